@@ -1,0 +1,62 @@
+# Build conventions shared by every folder: calib_library(), calib_program(), calib_test(), calib_bench().
+include(CTest)
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)  # calibctl finds calib-worker beside itself
+set(THREADS_PREFER_PTHREAD_FLAG ON)
+find_package(Threads REQUIRED)
+
+find_program(CALIB_CCACHE ccache)
+if(CALIB_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CALIB_CCACHE})
+endif()
+
+# One flag set for the whole tree. -ffp-contract=off: the same bits whatever the compiler fuses.
+add_library(calib_flags INTERFACE)
+target_compile_options(calib_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror
+                                             -ffp-contract=off)
+target_include_directories(calib_flags INTERFACE ${CMAKE_SOURCE_DIR})
+
+# calib_library(NAME SOURCES a.cc ... LINKS x ...): a static library of this tree; sources by name, no globs.
+function(calib_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_link_libraries(${name} PUBLIC ${ARG_LINKS} PRIVATE calib_flags)
+  target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
+endfunction()
+
+# calib_program(NAME SOURCES ... LINKS ...): an executable in <build>/bin.
+function(calib_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_flags)
+endfunction()
+
+# calib_test(NAME LABEL label SOURCES ... LINKS ... [TIMEOUT s]): one GoogleTest binary, one ctest entry with a label
+# (unit, property, verification, integration, fault, browser, data, layering, bench).
+function(calib_test name)
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;LINKS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  find_package(GTest REQUIRED)
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LINKS} GTest::gmock GTest::gtest_main calib_flags)
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+endfunction()
+
+# calib_bench(NAME SOURCES ... LINKS ... [TINY filter]): a Google Benchmark binary; ctest runs TINY once so that it cannot rot.
+function(calib_bench name)
+  cmake_parse_arguments(ARG "" "TINY" "SOURCES;LINKS" ${ARGN})
+  find_package(benchmark REQUIRED)
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LINKS} benchmark::benchmark calib_flags)
+  if(ARG_TINY)
+    add_test(NAME ${name} COMMAND ${name} --benchmark_filter=${ARG_TINY} --benchmark_min_time=0.001)
+    set_tests_properties(${name} PROPERTIES LABELS bench TIMEOUT 120)
+  endif()
+endfunction()

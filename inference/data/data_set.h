@@ -1,0 +1,39 @@
+#pragma once
+// The measurements as the inference sees them: a flat vector of readings with a Gaussian error model.
+
+#include <string>
+#include <vector>
+
+namespace calib::inference {
+
+/// One measured number. Readings are held in processing order: experiment, load step, observable.
+struct Reading {
+  int experiment = 0;
+  int observable = 0;      ///< index within the experiment
+  int load_step = 0;
+  double control = 0;      ///< path length of the control since the start of loading; distance for the correlation
+  double value = 0;
+  double sd = 0;           ///< standard deviation of its error (noise: given) > 0; unused with ess_target
+};
+
+/// Errors of one observable of one experiment are correlated as exp(-|c_i - c_j| / length); 0: independent.
+struct Correlation {
+  int experiment = 0;
+  int observable = 0;
+  double length = 0;
+};
+
+enum class NoiseMode {
+  kGiven,      ///< the sd of each reading
+  kInferred,   ///< sd of each reading times sqrt(f), one variance factor f per (experiment, observable) group, marginalised
+  kEssTarget,  ///< Sigma = sigma w_j y^2, sigma from the effective sample size [Cheng 2019, sec. 3.4]; a tempering, not an estimate
+};
+
+struct DataSet {
+  std::vector<Reading> readings;
+  std::vector<Correlation> correlations;         ///< only those with length > 0
+  /// w_j of kEssTarget, indexed [experiment][observable]; multiplies the variance. Empty: all one.
+  std::vector<std::vector<double>> ess_weights;
+};
+
+}  // namespace calib::inference

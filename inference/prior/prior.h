@@ -1,0 +1,36 @@
+#pragma once
+// Univariate priors, truncated where bounds are given. Units are the caller's (SI in calib).
+
+#include <limits>
+#include <string>
+
+#include "absl/status/status.h"
+
+namespace calib::inference {
+
+enum class PriorKind { kUniform, kLogUniform, kNormal, kLogNormal };
+
+/// kUniform, kLogUniform: on [min, max]. kNormal: mean, sd. kLogNormal: mean and sd of ln x. The last two are
+/// truncated to [min, max] (infinite by default; log-normal to x > 0) and renormalised.
+struct Prior {
+  PriorKind kind = PriorKind::kUniform;
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  double mean = 0;
+  double sd = 1;
+
+  /// INVALID_ARGUMENT with one sentence: min >= max, log prior with min <= 0, sd <= 0, no mass between the bounds.
+  absl::Status Validate() const;
+  bool InSupport(double x) const;
+  /// Natural log of the density; -inf outside the support.
+  double LogDensity(double x) const;
+  /// Inverse of the distribution function, u in (0, 1).
+  double Quantile(double u) const;
+  /// Coordinate in which mixtures are fitted: ln x for log priors, x otherwise; scaled to zero mean, unit sd of the prior.
+  double ToStandard(double x) const;
+  double FromStandard(double s) const;
+  /// ln |d standard / dx| at x.
+  double LogJacobian(double x) const;
+};
+
+}  // namespace calib::inference
