@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include "inference/filter/ensemble.h"
@@ -14,8 +16,30 @@ namespace calib::inference {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInsignificantShare = 1e-3;
 constexpr double kNegligibleWeight =
     1e-4;  // of a component: fewer than one in ten thousand samples
+
+// Indices, ascending, of the samples that matter: the lightest, which hold a thousandth of the
+// weight together and are often most of the samples, are left out. It costs the proposal nothing
+// and the importance weights stay exact.
+std::vector<Eigen::Index> Significant(const Eigen::VectorXd& log_weights) {
+  std::vector<Eigen::Index> order(log_weights.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Eigen::Index a, Eigen::Index b) { return log_weights[a] < log_weights[b]; });
+  double left_out = 0;
+  std::size_t first = 0;
+  while (first + 1 < order.size()) {
+    left_out += std::exp(log_weights[order[first]]);
+    if (left_out > kInsignificantShare) break;
+    ++first;
+  }
+  std::vector<Eigen::Index> significant(order.begin() + static_cast<std::ptrdiff_t>(first),
+                                        order.end());
+  std::sort(significant.begin(), significant.end());
+  return significant;
+}
 
 // Samples with weight, in standard coordinates, standing for as many observations as they are
 // worth: the counts sum to the effective sample size, not to a multiple of N as copies would [Cheng
@@ -23,12 +47,7 @@ constexpr double kNegligibleWeight =
 WeightedPoints Standardized(std::span<const Prior> priors, const Eigen::MatrixXd& parameters,
                             const Eigen::VectorXd& log_weights) {
   const double ess = EffectiveSampleSize(log_weights);
-  // Left out: samples of less than a millionth of the average weight.
-  const double least = std::log(1e-6 / static_cast<double>(log_weights.size()));
-  std::vector<Eigen::Index> counted;
-  for (Eigen::Index i = 0; i < log_weights.size(); ++i) {
-    if (log_weights[i] > least) counted.push_back(i);
-  }
+  const std::vector<Eigen::Index> counted = Significant(log_weights);
   const auto d = static_cast<Eigen::Index>(priors.size());
   WeightedPoints data{.points = Eigen::MatrixXd(d, counted.size()),
                       .counts = Eigen::VectorXd(counted.size())};

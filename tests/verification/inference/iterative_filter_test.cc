@@ -39,7 +39,7 @@ double LargestSdError(const Posterior& posterior, const LinearModel& model) {
 TEST(IterativeFilter, PosteriorAfterAnyIterationIsThePosteriorOfTheDataCountedOnce) {
   const LinearModel model(12, 2, 1.0, 11);
   const FilterOptions options{.seed = 5};
-  const auto iterations = RunIterations(model.priors, model.Data(), options, 4, 2000,
+  const auto iterations = RunIterations(model.priors, model.Data(), options, 4, 1000,
                                         [&](const Eigen::MatrixXd& p) { return model.Predict(p); });
   for (std::size_t count = 1; count <= 4; ++count) {
     const auto posterior =
@@ -82,7 +82,7 @@ TEST(IterativeFilter, PosteriorAtABoundOfALogPrior) {
   data.readings.push_back({.value = 0.5, .sd = 0.6});
   const FilterOptions options{.seed = 8};
   const auto iterations =
-      RunIterations(priors, data, options, 3, 2000, [](const Eigen::MatrixXd& p) { return p; });
+      RunIterations(priors, data, options, 3, 1000, [](const Eigen::MatrixXd& p) { return p; });
   const auto posterior = ComputePosterior(priors, data, options, iterations);
   double mass = 0;
   double first = 0;
@@ -137,7 +137,7 @@ TEST(IterativeFilter, InferredNoiseGivesTheStudentPosterior) {
   }
   const FilterOptions options{.noise = NoiseMode::kInferred, .seed = 4};
   const auto predict = [](const Eigen::MatrixXd& p) { return Eigen::MatrixXd(p.replicate(1, 10)); };
-  const auto iterations = RunIterations(priors, data, options, 2, 2000, predict);
+  const auto iterations = RunIterations(priors, data, options, 2, 1000, predict);
   const auto posterior = ComputePosterior(priors, data, options, iterations);
   double mass = 0;
   double first = 0;
