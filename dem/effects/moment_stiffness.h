@@ -1,0 +1,37 @@
+#pragma once
+// Stiffness, limit and catalogue parameters that rolling and twisting resistance have in common.
+
+#include <limits>
+#include <vector>
+
+#include "dem/catalog/catalog.h"
+#include "dem/contact/contact_kernel.h"
+
+namespace calib::dem {
+
+/// k = constant + ratio r1 r2 ks, limit = friction Fn l with l = mean radius or smaller radius.
+struct MomentLaw {
+  double constant = 0;                                        ///< [N m/rad]
+  double ratio = 0;                                           ///< [-]
+  double friction = std::numeric_limits<double>::infinity();  ///< eta [-]; infinite: no limit
+  bool limit_by_smaller = false;  ///< l = min(r1, r2) instead of (r1 + r2)/2
+};
+
+/// Law from the parameters stiffness or stiffness_ratio, and friction, under a contact law. [Cheng
+/// 2018, Table 1]
+MomentLaw MomentLawFrom(const KernelContext& context);
+
+/// stiffness, stiffness_ratio, friction; `motion` ("rolling", "twisting") completes the
+/// descriptions.
+std::vector<ParameterInfo> MomentParameters(const std::string& motion);
+
+/// Stiffness [N m/rad] and limit [N m] of every lane.
+struct MomentResponse {
+  ContactBlock::Lane stiffness;
+  ContactBlock::Lane limit;
+};
+
+/// Evaluates the law on a block whose normal force and tangential stiffness are known.
+void EvaluateMoment(const MomentLaw& law, const ContactBlock& block, MomentResponse& response);
+
+}  // namespace calib::dem

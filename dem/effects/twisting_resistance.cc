@@ -1,0 +1,60 @@
+#include "dem/effects/twisting_resistance.h"
+
+#include "dem/contact/simd.h"
+#include "dem/effects/moment_stiffness.h"
+
+namespace calib::dem {
+namespace {
+
+CALIB_DEM_CLONES void IntegrateTwisting(const MomentResponse& response, ContactBlock& b,
+                                        int first) {
+  double* const history = b.history[first];
+#pragma GCC ivdep
+  for (int k = 0; k < kBlock; ++k) {
+    const double stiffness = response.stiffness[k];
+    const double limit = response.limit[k];
+    const double trial = history[k] - stiffness * b.twist[k];
+    const double upper = trial < limit ? trial : limit;
+    const double moment = upper > -limit ? upper : -limit;
+    history[k] = moment;
+    b.mx[k] += moment * b.nx[k];
+    b.my[k] += moment * b.ny[k];
+    b.mz[k] += moment * b.nz[k];
+    b.twisting_stiffness[k] += stiffness;
+  }
+}
+
+class TwistingKernel final : public ContactKernel {
+ public:
+  explicit TwistingKernel(const MomentLaw& law) : law_(law) {}
+  [[nodiscard]] int HistorySize() const override { return 1; }
+  void Apply(ContactBlock& block, int first) const override {
+    MomentResponse response;
+    EvaluateMoment(law_, block, response);
+    IntegrateTwisting(response, block, first);
+  }
+
+ private:
+  MomentLaw law_;
+};
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  return std::make_unique<TwistingKernel>(MomentLawFrom(context));
+}
+
+}  // namespace
+
+EffectEntry TwistingResistance() {
+  return {
+      .info = {.name = "twisting_resistance",
+               .kind = "contact",
+               .description = "Moment dM = k_t dtheta about the normal against relative twisting, "
+                              "|M| <= eta Fn l; one-sided, vanishes at stiffness 0 or friction 0",
+               .contacts = {},
+               .parameters = MomentParameters("twisting"),
+               .reference = "Cheng et al. 2018, Table 1"},
+      .stage = ContactStage::kMoment,
+      .make = &Make};
+}
+
+}  // namespace calib::dem

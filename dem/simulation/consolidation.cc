@@ -1,0 +1,166 @@
+#include "dem/simulation/consolidation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dem/measure/observables.h"
+
+namespace calib::dem {
+namespace {
+
+/// A grain pack without friction is still a solid; below this coefficient nothing changes any more.
+constexpr double kSmallestFriction = 1e-3;
+
+CellTarget Isotropic(double pressure) {
+  const AxisTarget target{.mode = AxisTarget::Mode::kStress, .value = pressure};
+  return {target, target, target};
+}
+
+/// 1-2-5 x 10^k in [pressure/20, pressure), then the pressure itself.
+std::vector<double> PressureStages(double pressure) {
+  std::vector<double> stages;
+  const int decade = static_cast<int>(std::floor(std::log10(pressure)));
+  for (int k = decade - 2; k <= decade; ++k) {
+    for (const double digit : {1.0, 2.0, 5.0}) {
+      const double stage = digit * std::pow(10.0, k);
+      if (stage >= 0.05 * pressure * (1 - 1e-9) && stage < pressure * (1 - 1e-9)) {
+        stages.push_back(stage);
+      }
+    }
+  }
+  stages.push_back(pressure);
+  return stages;
+}
+
+absl::Status Unreachable(double porosity, double lowest, double highest) {
+  return absl::OutOfRangeError(
+      absl::StrCat("porosity ", porosity, " cannot be reached by lowering friction; attainable is ",
+                   lowest, " .. ", highest));
+}
+
+/// One attempt to pass a porosity by lowering friction.
+class Compaction {
+ public:
+  Compaction(double pressure, QuasiStatic& stages)
+      : target_(Isotropic(pressure)),
+        stages_(stages),
+        friction_(stages.assembly().sliding_friction()) {}
+
+  /// Lowers friction until the porosity is at most `threshold` or friction has gone; the assembly
+  /// is left there with the lowered friction. Leaves in `above` the last settled state above the
+  /// threshold.
+  StageEnd LowerTo(double threshold, Assembly& above) {
+    Assembly& assembly = stages_.assembly();
+    const StageOptions restore = stages_.options();
+    stages_.options().unbalanced = kIntermediate * restore.unbalanced;
+    stages_.options().least_volume = assembly.solid_volume() / (1 - threshold);
+    StageEnd end = StageEnd::kDone;
+    while (end == StageEnd::kDone && Porosity(assembly) > threshold &&
+           assembly.sliding_friction() > 0) {
+      above = assembly;
+      const double lower = 0.5 * assembly.sliding_friction();
+      assembly.SetSlidingFriction(lower > kSmallestFriction ? lower : 0.0);
+      end = stages_.MoveTo(target_);
+    }
+    stages_.options() = restore;
+    return end;
+  }
+
+  /// Puts the original friction back and settles.
+  StageEnd Freeze() {
+    stages_.assembly().SetSlidingFriction(friction_);
+    return stages_.MoveTo(target_);
+  }
+
+  /// Settles without friction: the densest state of this way.
+  StageEnd Densest() {
+    stages_.assembly().SetSlidingFriction(0);
+    return stages_.MoveTo(target_);
+  }
+
+ private:
+  /// Between two halvings a rough balance is enough.
+  static constexpr double kIntermediate = 10;
+
+  CellTarget target_;
+  QuasiStatic& stages_;
+  double friction_;
+};
+
+}  // namespace
+
+absl::Status LowerFrictionToPorosity(double porosity, double pressure, QuasiStatic& stages,
+                                     StageEnd& end) {
+  constexpr int kAttempts = 20;
+  Assembly& assembly = stages.assembly();
+  const double highest = Porosity(assembly);
+  Compaction compaction(pressure, stages);
+  end = StageEnd::kDone;
+  double threshold = porosity;
+  double closest = highest;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const double settled = Porosity(assembly);
+    if (std::abs(settled - porosity) <= kPorosityTolerance) {
+      return absl::OkStatus();
+    }
+    closest = settled;
+    if (highest < porosity || (settled > porosity && assembly.sliding_friction() == 0)) {
+      break;
+    }
+    Assembly above = assembly;
+    end = compaction.LowerTo(threshold, above);
+    if (end != StageEnd::kDone) {
+      return absl::OkStatus();
+    }
+    if (Porosity(assembly) > threshold) {
+      break;  // friction has gone and the target lies below
+    }
+    end = compaction.Freeze();
+    if (end != StageEnd::kDone) {
+      return absl::OkStatus();
+    }
+    if (const double frozen = Porosity(assembly); frozen < porosity - kPorosityTolerance) {
+      threshold += porosity - frozen;  // compaction goes on a little while friction comes back
+      assembly = above;
+    }
+  }
+  end = compaction.Densest();
+  if (end != StageEnd::kDone) {
+    return absl::OkStatus();
+  }
+  return Unreachable(porosity, std::min(closest, Porosity(assembly)), highest);
+}
+
+absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, StageEnd& end) {
+  Assembly& assembly = stages.assembly();
+  if (plan.consolidation.friction_coefficient) {
+    assembly.SetSlidingFriction(*plan.consolidation.friction_coefficient);
+  }
+  for (const double pressure : PressureStages(plan.pressure)) {
+    end = stages.MoveTo(Isotropic(pressure));
+    if (end != StageEnd::kDone) {
+      return absl::OkStatus();
+    }
+  }
+  if (plan.consolidation.porosity) {
+    if (auto s = LowerFrictionToPorosity(*plan.consolidation.porosity, plan.pressure, stages, end);
+        !s.ok()) {
+      return s;
+    }
+    if (end != StageEnd::kDone) {
+      return absl::OkStatus();
+    }
+  }
+  CellTarget target = Isotropic(plan.pressure);
+  if (plan.initial_stress) {
+    target[0].value = target[1].value = plan.initial_stress->lateral;
+    target[2].value = plan.initial_stress->axial;
+  }
+  assembly.SetSlidingFriction(assembly.model().sliding_friction());
+  end = stages.MoveTo(target);
+  return absl::OkStatus();
+}
+
+}  // namespace calib::dem
