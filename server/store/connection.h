@@ -6,6 +6,7 @@
 #include <cstring>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -57,6 +58,13 @@ class Connection {
   }
   static void BindOne(SQLite::Statement& statement, int index, bool value) {
     statement.bind(index, value ? 1 : 0);
+  }
+  static void BindOne(SQLite::Statement& statement, int index, std::optional<std::int64_t> value) {
+    if (value.has_value()) {
+      statement.bind(index, *value);
+    } else {
+      statement.bind(index);
+    }
   }
   static void BindOne(SQLite::Statement& statement, int index, DoubleBlob blob) {
     statement.bind(index, blob.values.data(), static_cast<int>(blob.values.size_bytes()));

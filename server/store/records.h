@@ -15,11 +15,11 @@ inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 /// A campaign as submitted, before anything has happened to it.
 struct NewCampaign {
   std::int64_t id = 0;  ///< above every id used before (Reader::LastCampaign)
-  std::string name;
-  std::string yaml;
-  std::string file_name;
-  std::optional<std::uint64_t> seed;
-  std::string method;
+  std::string name{};
+  std::string yaml{};
+  std::string file_name{};
+  std::optional<std::uint64_t> seed{};
+  std::string method{};
   int samples = 0;
   int max_iterations = 1;
   std::int64_t created_unix_ms = 0;
@@ -28,7 +28,7 @@ struct NewCampaign {
 /// What changes while a campaign lives.
 struct CampaignProgress {
   std::string state = "queued";  ///< queued running paused finished failed cancelled
-  std::string reason;
+  std::string reason{};
   std::string phase = "calibrating";  ///< calibrating validating done
   int iteration = 0;
   bool converged = false;
@@ -38,20 +38,20 @@ struct CampaignProgress {
 };
 
 struct CampaignRecord {
-  NewCampaign submitted;
-  CampaignProgress progress;
+  NewCampaign submitted{};
+  CampaignProgress progress{};
 };
 
 struct IterationRecord {
   int number = 0;
-  std::string proposal;                  ///< JSON
-  std::optional<std::string> posterior;  ///< JSON; empty while the iteration runs
+  std::string proposal{};                  ///< JSON
+  std::optional<std::string> posterior{};  ///< JSON; empty while the iteration runs
 };
 
 struct SampleRecord {
   int sample = 0;
   int iteration = 0;
-  std::vector<double> parameters;
+  std::vector<double> parameters{};
   double log_weight = kUnknown;
   double log_likelihood = kUnknown;
 };
@@ -71,55 +71,55 @@ const char* ToString(EvaluationStatus status);
 bool IsTerminal(EvaluationStatus status);
 
 struct EvaluationRecord {
-  EvaluationKey key;
+  EvaluationKey key{};
   EvaluationStatus status = EvaluationStatus::kWaiting;
-  std::string reason;
+  std::string reason{};
   int failures = 0;
-  std::string digest;
+  std::string digest{};
   bool reused = false;
 };
 
 /// An attempt that a worker holds.
 struct ActiveAttempt {
   std::int64_t id = 0;
-  EvaluationKey key;
-  std::string worker;
+  EvaluationKey key{};
+  std::string worker{};
 };
 
 struct NewAttempt {
   std::int64_t id = 0;
-  EvaluationKey key;
-  std::string worker;
-  std::string cpu;
-  std::string engine;
+  EvaluationKey key{};
+  std::string worker{};
+  std::string cpu{};
+  std::string engine{};
   std::int64_t started_unix_ms = 0;
 };
 
 struct AttemptEnd {
   std::int64_t id = 0;
-  std::string outcome;  ///< completed stopped diverged failed lost cancelled
-  std::string reason;
+  std::string outcome{};  ///< completed stopped diverged failed lost cancelled
+  std::string reason{};
   std::int64_t ended_unix_ms = 0;
   std::int64_t steps = 0;
   std::int64_t contact_updates = 0;
   double core_seconds = 0;
-  std::string staging;
+  std::string staging{};
 };
 
 struct StateRecord {
-  EvaluationKey key;
+  EvaluationKey key{};
   int load_step = 0;
-  std::vector<double> observables;
+  std::vector<double> observables{};
 };
 
 struct EventRecord {
   std::int64_t unix_ms = 0;
-  std::string what;
+  std::string what{};
 };
 
 struct RequestRecord {
-  std::string digest;
-  std::string answer;
+  std::string digest{};
+  std::string answer{};
 };
 
 /// Work done for a campaign.
