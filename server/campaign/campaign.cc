@@ -9,7 +9,7 @@ namespace {
 // nothing was controlled.
 std::vector<double> Travelled(const Experiment& experiment) {
   std::vector<double> travelled;
-  double at = 0;
+  double at = experiment.control_start;
   double length = 0;
   for (const dem::ControlPoint& point : experiment.path) {
     length += std::abs(point.axial_strain - at);

@@ -35,7 +35,7 @@ struct CalibratedParameter {
 struct MeasuredObservable {
   std::string name;
   std::vector<double> values;  ///< one per reading, SI, compression positive, strains logarithmic
-  std::vector<double> sd;      ///< one per reading, > 0 (empty with ess_target)
+  std::vector<double> sd;      ///< one per reading, > 0 (may be empty with ess_target)
   double correlation_length = 0;  ///< in the control; 0: independent
   double ess_weight = 1;          ///< w_j of ess_target
 };
@@ -52,30 +52,34 @@ using Specimen = std::variant<PackingFile, dem::PackingRecipe>;
 
 struct Experiment {
   std::string name;
-  std::string test;
+  std::string test;  ///< may be empty when precomputed
   std::map<std::string, double> settings;
   Role role = Role::kCalibrate;
-  std::vector<Specimen>
-      specimens;  ///< realizations; sample i uses specimen i mod size. Empty when precomputed
+  /// Realizations: sample i uses specimen i mod size. Empty when precomputed.
+  std::vector<Specimen> specimens;
   dem::Consolidation consolidation;
   std::optional<dem::InitialStress> initial_stress;
   std::optional<double> loading_rate;
   dem::Staging staging;
+  /// Observable that drives the loading; empty: readings are merely counted.
+  std::string control_name;
+  /// Where loading starts: 0 for strains, the start pressure for stresses.
+  double control_start = 0;
   std::vector<dem::ControlPoint> path;  ///< load_step = index of the reading
   std::vector<double> control;  ///< measured control at each reading (as compared, logarithmic)
-  std::vector<std::string>
-      segment;  ///< loading stage of each reading: "initial_loading", "unload_1", "reload_1", ...
+  /// Loading stage of each reading: "initial_loading", "unload_1", "reload_1", ...
+  std::vector<std::string> segment;
   std::vector<MeasuredObservable> observables;
 };
 
 /// Runs that exist already, from any code.
 struct Precomputed {
   Eigen::MatrixXd parameters;  ///< N x d, the campaign's parameters in order
-  std::vector<std::vector<std::vector<double>>>
-      values;  ///< [experiment][sample][reading * observables + observable], the experiment's
-               ///< observables
-  std::optional<Eigen::VectorXd>
-      log_proposal;  ///< ln density from which the rows were drawn; empty: the prior
+  /// [experiment][sample][reading * observables + observable], the experiment's observables in
+  /// order.
+  std::vector<std::vector<std::vector<double>>> values;
+  /// ln density from which the rows were drawn; empty: the prior.
+  std::optional<Eigen::VectorXd> log_proposal;
 };
 
 enum class Method { kSqmc, kIterativeBayesianFilter };

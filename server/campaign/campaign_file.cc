@@ -47,6 +47,28 @@ void ReadName(MapReader& map, Campaign& campaign) {
   }
 }
 
+// What the engine itself would refuse. Asked last, at the middle of the priors, where only rare
+// things are left.
+void AskEngine(const MapReader& map, const Campaign& campaign) {
+  std::vector<double> middle;
+  for (const CalibratedParameter& parameter : campaign.parameters)
+    middle.push_back(parameter.prior.Quantile(0.5));
+  for (const Experiment& experiment : campaign.experiments) {
+    dem::Scenario scenario = MakeScenario(campaign, experiment, middle, 0);
+    if (scenario.packing.x.empty()) {  // a recipe, whose packing does not exist yet
+      scenario.packing = {.length = {1, 1, 1},
+                          .x = {0, 0.5},
+                          .y = {0, 0.5},
+                          .z = {0, 0.5},
+                          .radius = {0.1, 0.1},
+                          .clump = {-1, -1}};
+    }
+    for (const std::string& problem : dem::ScenarioProblems(scenario)) {
+      map.Problem("experiments", experiment.name + ": " + problem);
+    }
+  }
+}
+
 }  // namespace
 
 FileReader DiskReader(const std::string& campaign_file_path) {
@@ -79,6 +101,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     ReadExperiments(map, context, campaign);
     if (campaign.precomputed) ReadPrecomputed(map, context, campaign);
     map.Finish();
+    if (problems.size() == 0 && !campaign.precomputed) AskEngine(map, campaign);
   }
   if (seed_override) campaign.seed = campaign.filter.seed = *seed_override;
   outcome.problems = problems.Sorted();

@@ -13,10 +13,10 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-double Threshold(const std::vector<double>& readings, std::optional<double> noise) {
+double Threshold(const std::vector<double>& readings, double start, std::optional<double> noise) {
   if (noise) return 4 * *noise;
   const auto [low, high] = std::minmax_element(readings.begin(), readings.end());
-  const double range = std::max(*high, 0.0) - std::min(*low, 0.0);
+  const double range = std::max(*high, start) - std::min(*low, start);
   std::vector<double> second;
   for (std::size_t i = 2; i < readings.size(); ++i) {
     second.push_back(std::abs(readings[i] - 2 * readings[i - 1] + readings[i - 2]));
@@ -29,11 +29,12 @@ double Threshold(const std::vector<double>& readings, std::optional<double> nois
 
 // Zigzag: an extreme becomes a turning point once the control has come back from it by more than
 // the threshold.
-std::vector<std::size_t> TurningPoints(const std::vector<double>& readings, double threshold) {
+std::vector<std::size_t> TurningPoints(const std::vector<double>& readings, double start,
+                                       double threshold) {
   std::vector<std::size_t> turning;
-  int direction = 0;  // of the running branch; 0: not known yet
-  double low = 0;     // extremes since the last turning point; loading starts at zero
-  double high = 0;
+  int direction = 0;   // of the running branch; 0: not known yet
+  double low = start;  // extremes since the start of loading
+  double high = start;
   std::size_t extreme = 0;
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const double value = readings[i];
@@ -117,12 +118,13 @@ std::size_t ClearPeak(const std::vector<double>& strength, std::size_t last) {
 
 }  // namespace
 
-ControlPath CleanControl(const std::vector<double>& readings, std::optional<double> noise) {
+ControlPath CleanControl(const std::vector<double>& readings, double start,
+                         std::optional<double> noise) {
   ControlPath path;
   if (readings.empty()) return path;
-  path.reversal = Threshold(readings, noise);
-  path.turning = TurningPoints(readings, path.reversal);
-  std::vector<double> values = {0};  // the start of loading in front
+  path.reversal = Threshold(readings, start, noise);
+  path.turning = TurningPoints(readings, start, path.reversal);
+  std::vector<double> values = {start};  // the start of loading in front
   values.insert(values.end(), readings.begin(), readings.end());
   std::size_t first = 0;
   for (const std::size_t turn : path.turning) {

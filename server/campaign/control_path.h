@@ -19,12 +19,14 @@ struct ControlPath {
   double reversal = 0;               ///< smallest excursion that counted as a turning point
 };
 
-/// Cleans a measured control (start of loading: 0). Excursions smaller than the reversal threshold
-/// are noise; between turning points the readings are made monotone by isotonic regression, so that
-/// readings may come to stand at the same control and still each be a state. The threshold is 4
-/// noise when noise (standard deviation) is given; otherwise six robust standard deviations of the
-/// second differences, held between 0.1 % and 2 % of the range. Pure; readings finite.
-ControlPath CleanControl(const std::vector<double>& readings, std::optional<double> noise);
+/// Cleans a measured control; loading starts at `start` (0 for strains, the start pressure for
+/// stresses). Excursions smaller than the reversal threshold are noise; between turning points the
+/// readings are made monotone by isotonic regression, so that readings may come to stand at the
+/// same control and still each be a state. The threshold is 4 noise when noise (standard deviation)
+/// is given; otherwise six robust standard deviations of the second differences, held between 0.1 %
+/// and 2 % of the range. Pure; readings finite.
+ControlPath CleanControl(const std::vector<double>& readings, double start,
+                         std::optional<double> noise);
 
 /// Loading stage of each reading: initial_loading, then unload_1, reload_1, unload_2, ... at the
 /// turning points. Where `strength` (a deviatoric observable at each reading; empty: none) has a

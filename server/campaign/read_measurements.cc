@@ -108,6 +108,16 @@ void CheckPath(const MapReader& map, const LaboratoryTable& table, const dem::Te
   }
 }
 
+// Loading starts where consolidation ends: strains count from there, stresses from the start
+// pressure.
+double StartOf(const std::string& control, const Experiment& experiment) {
+  const dem::ObservableInfo* info = dem::FindObservable(control);
+  const auto pressure = experiment.settings.find("confining_pressure");
+  const bool stress = info != nullptr && info->unit == "Pa";
+  if (stress && pressure != experiment.settings.end()) return pressure->second;
+  return 0;
+}
+
 // The observable whose peak divides the loading, if it was measured.
 std::vector<double> Strength(const Experiment& experiment) {
   for (const char* name : {"q_over_p", "stress_ratio", "deviatoric_stress"}) {
@@ -149,7 +159,10 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
     experiment.control = table->ToModel(control.name, table->Raw(control.name, context), context);
   }
   if (context.problems().size() > before) return;
-  const ControlPath path = CleanControl(experiment.control, control.noise);
+  experiment.control_name = control.name;
+  experiment.control_start = StartOf(control.name, experiment);
+  const ControlPath path =
+      CleanControl(experiment.control, experiment.control_start, control.noise);
   if (!control.name.empty()) CheckPath(experiment_map, *table, test, control, path);
   experiment.path = path.points;
   experiment.segment = NameSegments(path, Strength(experiment));

@@ -39,13 +39,18 @@ std::vector<std::string> NamesOf(const Entries& entries) {
   return names;
 }
 
-// "friction_coefficient" of "friction_angle"; with the effect's prefix where there is one.
-std::string AlternativeOf(const ModelParameter& parameter) {
-  if (parameter.info->alternative_to.empty()) return "";
-  const std::size_t dot = parameter.name.find('.');
-  return dot == std::string::npos
-             ? parameter.info->alternative_to
-             : parameter.name.substr(0, dot + 1) + parameter.info->alternative_to;
+// The other names for the same quantity ("friction_coefficient" for "friction_angle"); a catalogue
+// entry may name its alternative or be named by it.
+std::vector<std::string> AlternativesOf(const ModelParameter& parameter,
+                                        const std::vector<ModelParameter>& all) {
+  const auto prefix = [](const std::string& name) { return name.substr(0, name.find('.') + 1); };
+  std::vector<std::string> names;
+  for (const ModelParameter& other : all) {
+    const bool named = other.info->name == parameter.info->alternative_to ||
+                       other.info->alternative_to == parameter.info->name;
+    if (named && prefix(other.name) == prefix(parameter.name)) names.push_back(other.name);
+  }
+  return names;
 }
 
 Range AdmissibleRange(const dem::ParameterInfo& info) {
@@ -160,25 +165,29 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
   const auto given = [&](const std::string& name) {
     return calibrated(name) || model.parameters.contains(name);
   };
-  for (const ModelParameter& parameter : ParametersOf(model)) {
-    const std::string alternative = AlternativeOf(parameter);
+  const std::vector<ModelParameter> all = ParametersOf(model);
+  std::vector<std::string> said;  // names dealt with as the alternative of an earlier one
+  for (const ModelParameter& parameter : all) {
     if (calibrated(parameter.name) && model.parameters.contains(parameter.name)) {
-      campaign_map.Problem(
-          "parameters",
-          absl::StrCat(parameter.name, " is both calibrated and fixed; keep one of them"));
+      campaign_map.Problem("parameters",
+                           parameter.name + " is both calibrated and fixed; keep one of them");
     }
-    if (!alternative.empty() && given(parameter.name) && given(alternative) &&
-        parameter.name < alternative) {
-      campaign_map.Problem("parameters", absl::StrCat(parameter.name, " and ", alternative,
-                                                      " say the same thing; give one of them"));
+    if (std::find(said.begin(), said.end(), parameter.name) != said.end()) continue;
+    bool covered = given(parameter.name) || parameter.info->default_value;
+    std::string or_others;
+    for (const std::string& other : AlternativesOf(parameter, all)) {
+      said.push_back(other);
+      or_others += " (or " + other + ")";
+      if (given(parameter.name) && given(other)) {
+        campaign_map.Problem("parameters", absl::StrCat(parameter.name, " and ", other,
+                                                        " say the same thing; give one of them"));
+      }
+      covered = covered || given(other);
     }
-    const bool covered = given(parameter.name) || parameter.info->default_value ||
-                         (!alternative.empty() && given(alternative));
-    if (!covered && (alternative.empty() || parameter.name < alternative)) {
+    if (!covered) {
       campaign_map.Problem(
-          "parameters",
-          absl::StrCat(parameter.name, alternative.empty() ? "" : " (or " + alternative + ")",
-                       " has no value; calibrate it here or set it in model.fixed"));
+          "parameters", absl::StrCat(parameter.name, or_others,
+                                     " has no value; calibrate it here or set it in model.fixed"));
     }
   }
 }
