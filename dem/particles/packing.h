@@ -11,9 +11,9 @@
 namespace calib::dem {
 
 struct Packing {
-  double length[3] = {0, 0, 0};            ///< periodic cell [m], axial direction last (z)
-  std::vector<double> x, y, z, radius;     ///< [m], size N each
-  std::vector<int> clump;                  ///< -1: single sphere; equal ids move as one rigid body
+  double length[3] = {0, 0, 0};         ///< periodic cell [m], axial direction last (z)
+  std::vector<double> x, y, z, radius;  ///< [m], size N each
+  std::vector<int> clump;               ///< -1: single sphere; equal ids move as one rigid body
 };
 
 /// One thing wrong in a text file. line is 1-based; 0: the file as a whole.
@@ -22,27 +22,33 @@ struct PackingProblem {
   std::string message;
 };
 
-/// Reads `##PERIODIC:: Lx Ly Lz` followed by `x y z r clump` per line (blank lines and # comments allowed) [m].
-/// Appends everything wrong to problems (not a number, missing fields, radius <= 0 or too large for the cell, a grain
-/// outside the cell by more than one radius, no grains); the result is meaningful only if none was added.
+/// Reads `##PERIODIC:: Lx Ly Lz` followed by `x y z r clump` per line (blank lines and # comments
+/// allowed) [m]. Appends everything wrong to problems (not a number, missing fields, radius <= 0 or
+/// too large for the cell, a grain outside the cell by more than half its length, fewer than two
+/// grains); centres outside by less belong to an image; the result is meaningful only if none was
+/// added.
 Packing ParsePacking(const std::string& text, std::vector<PackingProblem>& problems);
 
-/// How to make a specimen: cloud -> isotropic compression -> friction lowered step by step until the target
-/// porosity holds at the pressure [Cheng 2018, sec. 2.2].
+/// The same text format, with 17 digits: ParsePacking() gives the same bits back.
+std::string FormatPacking(const Packing& packing);
+
+/// How to make a specimen: cloud -> isotropic compression -> friction lowered step by step until
+/// the target porosity holds at the pressure [Cheng 2018, sec. 2.2].
 struct PackingRecipe {
-  int particles = 1000;           ///< 20 .. 1e6
-  double porosity = 0.4;          ///< target, in (0.2, 0.6)
-  double mean_radius = 1e-3;      ///< [m] > 0
-  double radius_spread = 0.3;     ///< uniform in mean*(1 -/+ spread), 0 <= spread < 1
-  double aspect = 1.0;            ///< cell height / width, 0.2 .. 5
-  double pressure = 1e4;          ///< [Pa] > 0 during generation
+  int particles = 1000;        ///< 20 .. 1e6
+  double porosity = 0.4;       ///< target, in (0.2, 0.6)
+  double mean_radius = 1e-3;   ///< [m] > 0
+  double radius_spread = 0.3;  ///< uniform in mean*(1 -/+ spread), 0 <= spread < 1
+  double aspect = 1.0;         ///< cell height / width, 0.2 .. 5
+  double pressure = 1e4;       ///< [Pa] > 0 during generation
   std::uint64_t seed = 1;
 };
 
-/// Generates a packing; the same recipe gives the same bits on every thread count. Independent of the model's
-/// parameters, so that all samples of a campaign start from the same specimen.
-/// Errors: OUT_OF_RANGE with the attainable porosity range when the target cannot be reached by lowering friction;
-/// CANCELLED on stop.
-absl::StatusOr<Packing> GeneratePacking(const PackingRecipe& recipe, int threads, std::stop_token stop);
+/// Generates a packing; the same recipe gives the same bits on every thread count. Independent of
+/// the model's parameters, so that all samples of a campaign start from the same specimen. Errors:
+/// OUT_OF_RANGE with the attainable porosity range when the target cannot be reached by lowering
+/// friction; CANCELLED on stop.
+absl::StatusOr<Packing> GeneratePacking(const PackingRecipe& recipe, int threads,
+                                        std::stop_token stop);
 
 }  // namespace calib::dem

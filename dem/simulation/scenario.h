@@ -1,5 +1,6 @@
 #pragma once
-// One model evaluation: everything that determines its result, and what comes out. SI units, compression positive.
+// One model evaluation: everything that determines its result, and what comes out. SI units,
+// compression positive.
 
 #include <cstdint>
 #include <functional>
@@ -15,18 +16,20 @@
 
 namespace calib::dem {
 
-/// Contact law, effects and their parameters by dotted name ("young_modulus", "rolling_resistance.stiffness").
+/// Contact law, effects and their parameters by dotted name ("young_modulus",
+/// "rolling_resistance.stiffness").
 struct Model {
-  std::string contact;                        ///< a name of Contacts()
-  std::vector<std::string> effects;           ///< names of Effects()
-  double density = 2650;                      ///< of the grains [kg/m^3] > 0
-  std::map<std::string, double> parameters;   ///< every parameter without a default must be present
+  std::string contact;                       ///< a name of Contacts()
+  std::vector<std::string> effects;          ///< names of Effects()
+  double density = 2650;                     ///< of the grains [kg/m^3] > 0
+  std::map<std::string, double> parameters;  ///< every parameter without a default must be present
 };
 
-/// Friction during consolidation, restored before loading. At most one is set; none: the model's own friction.
+/// Friction during consolidation, restored before loading. At most one is set; none: the model's
+/// own friction.
 struct Consolidation {
   std::optional<double> friction_coefficient;
-  std::optional<double> porosity;             ///< friction is lowered until it holds
+  std::optional<double> porosity;  ///< friction is lowered until it holds
 };
 
 /// Principal stresses that replace the isotropic start [Pa].
@@ -35,34 +38,40 @@ struct InitialStress {
   double lateral = 0;
 };
 
-/// How a quasi-static path is walked. Unset fields are chosen by the engine from the model (and said in the Summary):
-/// DEM curves depend on staging by percents at low pressure, so comparisons with another code fix all of them.
+/// How a quasi-static path is walked. Unset fields are chosen by the engine from the model (and
+/// said in the Summary): DEM curves depend on staging by percents at low pressure, so comparisons
+/// with another code fix all of them.
 struct Staging {
-  std::optional<double> rate;                 ///< axial strain rate while straining [1/s] > 0
-  std::optional<double> step;                 ///< largest axial strain between two settlings [-] > 0
-  std::optional<double> damping_loading;      ///< local (Cundall) damping while straining [-], default 0.2
-  std::optional<double> damping_settling;     ///< while settling [-], default 0.9
-  std::optional<double> unbalanced;           ///< mean unbalanced force / mean contact force that ends a settling [-]
+  std::optional<double> rate;  ///< axial strain rate while straining [1/s] > 0
+  std::optional<double> step;  ///< largest axial strain between two settlings [-] > 0
+  std::optional<double>
+      damping_loading;  ///< local (Cundall) damping while straining [-], default 0.2
+  std::optional<double> damping_settling;  ///< while settling [-], default 0.9
+  std::optional<double>
+      unbalanced;  ///< mean unbalanced force / mean contact force that ends a settling [-]
 };
 
-/// One point of the control path. Points are visited in order; the axial strain may go down again.
+/// One point of the control path. Points are visited in order; the control may go down again.
 struct ControlPoint {
-  double axial_strain = 0;    ///< logarithmic, from the end of consolidation, compression positive [-]
-  int load_step = -1;         ///< index of the state reported here; -1: a turning point without a reading
+  double target =
+      0;  ///< of the test's control (TestInfo::control): logarithmic axial strain from the end of
+          ///< consolidation, compression positive [-], or mean stress [Pa] (isotropic)
+  int load_step = -1;  ///< index of the state reported here; -1: a turning point without a reading
 };
 
 struct Scenario {
   Model model;
-  std::string test;                           ///< a name of Tests()
-  std::map<std::string, double> settings;     ///< the test's settings by name, e.g. confining_pressure [Pa]
+  std::string test;  ///< a name of Tests()
+  std::map<std::string, double>
+      settings;  ///< the test's settings by name, e.g. confining_pressure [Pa]
   Packing packing;
   Consolidation consolidation;
   std::optional<InitialStress> initial_stress;
-  std::optional<double> loading_rate;         ///< [1/s]: real-rate loading instead of staged quasi-static
+  std::optional<double> loading_rate;  ///< [1/s]: real-rate loading instead of staged quasi-static
   Staging staging;
   std::vector<ControlPoint> path;
   int threads = 1;
-  std::uint64_t seed = 0;                     ///< for effects that draw random numbers
+  std::uint64_t seed = 0;  ///< for effects that draw random numbers
 };
 
 /// Observables at one load step, in the order of the test's TestInfo::observables; all finite.
@@ -72,36 +81,41 @@ struct State {
 };
 
 enum class Outcome {
-  kCompleted,   ///< every point of the path was reached
-  kStopped,     ///< the stop token was set
-  kDiverged,    ///< NaN, lost grains, or a stage that never settled; Summary::reason says which, where and when
+  kCompleted,  ///< every point of the path was reached
+  kStopped,    ///< the stop token was set
+  kDiverged,   ///< NaN, lost grains, or a stage that never settled; Summary::reason says which,
+               ///< where and when
 };
 
 struct Summary {
   Outcome outcome = Outcome::kCompleted;
-  std::string reason;               ///< empty when completed
-  std::int64_t steps = 0;           ///< time steps made
-  std::int64_t contact_updates = 0; ///< sum over steps of active contacts
-  double time_step = 0;             ///< last time step [s]
-  Staging staging;                  ///< as used, every field set
+  std::string reason;                ///< empty when completed
+  std::int64_t steps = 0;            ///< time steps made
+  std::int64_t contact_updates = 0;  ///< sum over steps of active contacts
+  double time_step = 0;              ///< last time step [s]
+  Staging staging;                   ///< as used, every field set
 };
 
 using StateSink = std::function<void(const State&)>;
 
-/// Everything wrong with a scenario that can be known without running it, one sentence each; empty: runnable.
+/// Everything wrong with a scenario that can be known without running it, one sentence each; empty:
+/// runnable.
 std::vector<std::string> ScenarioProblems(const Scenario& scenario);
 
-/// Runs the scenario, calling sink once per load step as soon as it is reached, from the calling thread.
-/// The stop token is looked at every time step. A diverged run is a result (Outcome), not an error.
-/// Errors: INVALID_ARGUMENT (joined ScenarioProblems), OUT_OF_RANGE (unreachable consolidation porosity).
-/// Same scenario, same bits, for any number of threads. Thread-safe (no shared state).
-absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink, std::stop_token stop);
+/// Runs the scenario, calling sink once per load step as soon as it is reached, from the calling
+/// thread. The stop token is looked at every time step. A diverged run is a result (Outcome), not
+/// an error. Errors: INVALID_ARGUMENT (joined ScenarioProblems), OUT_OF_RANGE (unreachable
+/// consolidation porosity). Same scenario, same bits, for any number of threads. Thread-safe (no
+/// shared state).
+absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink,
+                                 std::stop_token stop);
 
-/// Writes the grains (position, radius, velocity) after each load step as legacy VTK polydata `DIR/grains_NNNN.vtk`.
+/// Writes the grains (position, radius, velocity) after each load step as legacy VTK polydata
+/// `DIR/grains_NNNN.vtk`.
 struct VtkOutput {
   std::string directory;
 };
-absl::StatusOr<Summary> SimulateWithVtk(const Scenario& scenario, const StateSink& sink, std::stop_token stop,
-                                        const VtkOutput& vtk);
+absl::StatusOr<Summary> SimulateWithVtk(const Scenario& scenario, const StateSink& sink,
+                                        std::stop_token stop, const VtkOutput& vtk);
 
 }  // namespace calib::dem

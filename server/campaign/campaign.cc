@@ -12,8 +12,8 @@ std::vector<double> Travelled(const Experiment& experiment) {
   double at = experiment.control_start;
   double length = 0;
   for (const dem::ControlPoint& point : experiment.path) {
-    length += std::abs(point.axial_strain - at);
-    at = point.axial_strain;
+    length += std::abs(point.target - at);
+    at = point.target;
     if (point.load_step >= 0) travelled.push_back(length);
   }
   return travelled;

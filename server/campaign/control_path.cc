@@ -136,7 +136,7 @@ ControlPath CleanControl(const std::vector<double>& readings, double start,
   for (std::size_t i = 0; i < readings.size(); ++i) {
     travelled += std::abs(values[i + 1] - values[i]);
     path.travelled.push_back(travelled);
-    path.points.push_back({.axial_strain = values[i + 1], .load_step = static_cast<int>(i)});
+    path.points.push_back({.target = values[i + 1], .load_step = static_cast<int>(i)});
   }
   return path;
 }

@@ -1,0 +1,148 @@
+#include "dem/catalog/catalog.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "dem/catalog/registry.h"
+
+namespace calib::dem {
+namespace {
+
+template <class Info, class Entry>
+std::vector<Info> InfosOf(std::span<const Entry> entries) {
+  std::vector<Info> infos;
+  infos.reserve(entries.size());
+  for (const Entry& entry : entries) {
+    infos.push_back(entry.info);
+  }
+  return infos;
+}
+
+template <class Info>
+const Info* FindByName(std::span<const Info> infos, const std::string& name) {
+  const auto it =
+      std::find_if(infos.begin(), infos.end(), [&](const Info& i) { return i.name == name; });
+  return it == infos.end() ? nullptr : &*it;
+}
+
+void Append(std::string& text, const ParameterInfo& p) {
+  absl::StrAppend(&text, "  ", p.name, " [", p.unit, "]");
+  for (const auto& [contact, unit] : p.unit_by_contact) {
+    absl::StrAppend(&text, " ", contact, ":[", unit, "]");
+  }
+  absl::StrAppend(&text, p.min_open ? " (" : " [", p.min, ", ", p.max, "] ", p.default_prior.kind,
+                  " ", p.default_prior.min, " ", p.default_prior.max);
+  if (p.default_value) {
+    absl::StrAppend(&text, " default ", *p.default_value);
+  }
+  absl::StrAppend(&text, p.alternative_to.empty() ? "" : " alternative to ", p.alternative_to, ": ",
+                  p.description, "\n");
+}
+
+}  // namespace
+
+std::span<const ContactInfo> Contacts() {
+  static const std::vector<ContactInfo> infos = InfosOf<ContactInfo>(ContactEntries());
+  return infos;
+}
+
+std::span<const EffectInfo> Effects() {
+  static const std::vector<EffectInfo> infos = InfosOf<EffectInfo>(EffectEntries());
+  return infos;
+}
+
+std::span<const TestInfo> Tests() {
+  static const std::vector<TestInfo> infos = InfosOf<TestInfo>(ElementTestEntries());
+  return infos;
+}
+
+std::span<const ObservableInfo> Observables() {
+  static const std::vector<ObservableInfo> infos = {
+      {.name = "axial_strain",
+       .unit = "1",
+       .description = "logarithmic, from the end of consolidation"},
+      {.name = "volumetric_strain",
+       .unit = "1",
+       .description = "sum of the three logarithmic strains"},
+      {.name = "lateral_strain",
+       .unit = "1",
+       .description = "mean of the two lateral logarithmic strains"},
+      {.name = "axial_stress", .unit = "Pa", .description = "Love-Weber stress along z"},
+      {.name = "lateral_stress",
+       .unit = "Pa",
+       .description = "mean Love-Weber stress along x and y"},
+      {.name = "mean_stress", .unit = "Pa", .description = "p = (axial + 2 lateral)/3"},
+      {.name = "deviatoric_stress", .unit = "Pa", .description = "q = axial - lateral"},
+      {.name = "stress_ratio", .unit = "1", .description = "axial over lateral stress"},
+      {.name = "q_over_p", .unit = "1", .description = "deviatoric over mean stress"},
+      {.name = "porosity", .unit = "1", .description = "void volume over cell volume"},
+      {.name = "void_ratio", .unit = "1", .description = "void volume over solid volume"},
+      {.name = "coordination_number",
+       .unit = "1",
+       .description = "2 contacts / grains, all grains counted"},
+  };
+  return infos;
+}
+
+const ContactInfo* FindContact(const std::string& name) { return FindByName(Contacts(), name); }
+const EffectInfo* FindEffect(const std::string& name) { return FindByName(Effects(), name); }
+const TestInfo* FindTest(const std::string& name) { return FindByName(Tests(), name); }
+const ObservableInfo* FindObservable(const std::string& name) {
+  return FindByName(Observables(), name);
+}
+
+const std::string& UnitFor(const ParameterInfo& parameter, const std::string& contact) {
+  const auto it = parameter.unit_by_contact.find(contact);
+  return it == parameter.unit_by_contact.end() ? parameter.unit : it->second;
+}
+
+const ParameterInfo* FindParameter(const std::string& contact, std::span<const std::string> effects,
+                                   const std::string& dotted_name) {
+  const auto dot = dotted_name.find('.');
+  if (dot == std::string::npos) {
+    const ContactInfo* info = FindContact(contact);
+    return info == nullptr
+               ? nullptr
+               : FindByName(std::span<const ParameterInfo>(info->parameters), dotted_name);
+  }
+  const std::string prefix = dotted_name.substr(0, dot);
+  const EffectInfo* info = FindEffect(prefix);
+  if (info == nullptr || std::find(effects.begin(), effects.end(), prefix) == effects.end()) {
+    return nullptr;
+  }
+  return FindByName(std::span<const ParameterInfo>(info->parameters), dotted_name.substr(dot + 1));
+}
+
+std::string CatalogText() {
+  std::string text = absl::StrCat("engine ", EngineVersion(), "\n");
+  for (const ContactInfo& c : Contacts()) {
+    absl::StrAppend(&text, "contact ", c.name, ": ", c.description, " {", c.reference, "}\n");
+    for (const ParameterInfo& p : c.parameters) {
+      Append(text, p);
+    }
+  }
+  for (const EffectInfo& e : Effects()) {
+    absl::StrAppend(&text, "effect ", e.name, " (", e.kind, "; ", absl::StrJoin(e.contacts, " "),
+                    "): ", e.description, " {", e.reference, "}\n");
+    for (const ParameterInfo& p : e.parameters) {
+      Append(text, p);
+    }
+  }
+  for (const TestInfo& t : Tests()) {
+    absl::StrAppend(&text, "test ", t.name, " control ", t.control,
+                    t.may_reverse ? " reversible" : "", ": ", t.description, " {", t.reference,
+                    "} ", absl::StrJoin(t.observables, " "), "\n");
+    for (const ParameterInfo& p : t.settings) {
+      Append(text, p);
+    }
+  }
+  for (const ObservableInfo& o : Observables()) {
+    absl::StrAppend(&text, "observable ", o.name, " [", o.unit, "]: ", o.description, "\n");
+  }
+  return text;
+}
+
+std::string EngineVersion() { return "1"; }
+
+}  // namespace calib::dem

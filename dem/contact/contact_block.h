@@ -1,0 +1,57 @@
+#pragma once
+// The scratch that contact laws and effects work on: a block of touching pairs, one lane per
+// contact, one array per quantity, so that every kernel is a plain loop over lanes that the
+// compiler turns into vector instructions.
+
+namespace calib::dem {
+
+inline constexpr int kBlock = 32;       ///< lanes; a block stays well inside the first-level cache
+inline constexpr int kMaxHistory = 16;  ///< doubles that one contact can remember between steps
+
+/// One block. Grain i is the one with the smaller index; n points from i to j. All lanes are always
+/// valid numbers: lanes from `count` on repeat lane 0, so that kernels need no remainder loop and
+/// can raise no spurious NaN. SI units; forces and moments act on grain j, the opposite ones on
+/// grain i.
+struct alignas(64) ContactBlock {
+  using Lane = double[kBlock];
+
+  // Set by the caller for the whole block.
+  int count = 0;  ///< lanes in use
+  double dt = 0;  ///< time since the last evaluation [s]; 0: evaluate without moving on
+  double sliding_friction = 0;  ///< tan(phi_mu), or what replaces it during consolidation [-] >= 0
+  double stretch[3] = {0, 0, 0};  ///< homogeneous velocity gradient of the cell, diagonal [1/s]
+
+  // Set by the caller per contact.
+  int pair[kBlock];         ///< slot in the neighbour list
+  Lane dx, dy, dz;          ///< branch vector: centre of j minus centre of i, nearest image [m]
+  Lane radius_i, radius_j;  ///< [m]
+  Lane vx, vy, vz;          ///< peculiar velocity of j minus that of i [m/s]
+  Lane wix, wiy, wiz;       ///< angular velocity of i [rad/s]
+  Lane wjx, wjy, wjz;       ///< angular velocity of j [rad/s]
+
+  // Kinematics (contact_kinematics).
+  Lane nx, ny, nz;              ///< unit normal from i to j
+  Lane overlap;                 ///< u = r_i + r_j - distance [m] > 0
+  Lane effective_radius;        ///< r* = r_i r_j / (r_i + r_j) [m]
+  Lane normal_velocity;         ///< rate of separation [m/s]
+  Lane slip_x, slip_y, slip_z;  ///< tangential displacement of j against i during dt [m]
+  Lane roll_x, roll_y, roll_z;  ///< relative rotation without its normal part during dt [rad]
+  Lane twist;                   ///< relative rotation about n during dt [rad]
+  Lane spin;                    ///< mean rotation of both grains about n during dt [rad]
+  Lane tilt_x, tilt_y, tilt_z;  ///< half the change of n during dt
+
+  // Response, filled by the kernels in the order of ContactStage.
+  Lane normal_force;          ///< repulsion positive [N]
+  Lane normal_stiffness;      ///< tangent dFn/du [N/m]
+  Lane tangential_stiffness;  ///< ks [N/m]
+  Lane sliding_limit;         ///< largest |Fs| [N]
+  Lane fx, fy, fz;            ///< shear force [N]
+  Lane mx, my, mz;            ///< moment [N m]
+  Lane rolling_stiffness;     ///< bending stiffness, for the time step [N m/rad]
+  Lane twisting_stiffness;    ///< [N m/rad]
+
+  /// What the contacts remember; a kernel owns the columns from the `first` it was given on.
+  double history[kMaxHistory][kBlock];
+};
+
+}  // namespace calib::dem

@@ -1,0 +1,46 @@
+#pragma once
+// What a contact law or a contact effect is to the engine: a pure function over blocks of contacts.
+
+#include <memory>
+#include <string>
+
+#include "dem/catalog/parameter_set.h"
+#include "dem/contact/contact_block.h"
+
+namespace calib::dem {
+
+/// Order in which a block passes the kernels of a model.
+enum class ContactStage {
+  kNormal,        ///< sets normal_force, normal_stiffness, tangential_stiffness
+  kNormalExtra,   ///< adds to the normal force (adhesion, viscosity, plasticity)
+  kSlidingLimit,  ///< sets or changes sliding_limit
+  kTangential,    ///< integrates the shear force
+  kMoment,        ///< adds moments
+};
+
+/// Immutable after construction, so one instance serves all threads.
+class ContactKernel {
+ public:
+  ContactKernel() = default;
+  ContactKernel(const ContactKernel&) = delete;
+  ContactKernel& operator=(const ContactKernel&) = delete;
+  virtual ~ContactKernel() = default;
+
+  /// Doubles that each contact remembers for this kernel between steps; zero when a contact forms.
+  [[nodiscard]] virtual int HistorySize() const { return 0; }
+
+  /// Acts on all kBlock lanes. `first` is the kernel's first history column. With block.dt = 0
+  /// increments vanish and the call only evaluates: the engine uses it to read stiffnesses.
+  virtual void Apply(ContactBlock& block, int first) const = 0;
+};
+
+/// What a law or an effect may know when it is made: its own parameters and the law it joins.
+struct KernelContext {
+  std::string contact;  ///< name of the contact law
+  ParameterSet
+      parameters;  ///< of the law, or of the effect (without its prefix), defaults filled in
+};
+
+using MakeKernel = std::unique_ptr<ContactKernel> (*)(const KernelContext& context);
+
+}  // namespace calib::dem

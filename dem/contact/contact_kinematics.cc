@@ -1,0 +1,86 @@
+#include "dem/contact/contact_kinematics.h"
+
+#include <cmath>
+
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+
+CALIB_DEM_CLONES void ComputeKinematics(ContactBlock& b) {
+  const double dt = b.dt;
+  const double lx = b.stretch[0];
+  const double ly = b.stretch[1];
+  const double lz = b.stretch[2];
+  for (int k = 0; k < kBlock; ++k) {
+    const double ri = b.radius_i[k];
+    const double rj = b.radius_j[k];
+    const double sum = ri + rj;
+    const double distance = std::sqrt(b.dx[k] * b.dx[k] + b.dy[k] * b.dy[k] + b.dz[k] * b.dz[k]);
+    const double inverse = 1.0 / distance;
+    const double nx = b.dx[k] * inverse;
+    const double ny = b.dy[k] * inverse;
+    const double nz = b.dz[k] * inverse;
+    b.nx[k] = nx;
+    b.ny[k] = ny;
+    b.nz[k] = nz;
+    b.overlap[k] = sum - distance;
+    b.effective_radius[k] = ri * rj / sum;
+
+    const double vx = b.vx[k] + lx * b.dx[k];
+    const double vy = b.vy[k] + ly * b.dy[k];
+    const double vz = b.vz[k] + lz * b.dz[k];
+    const double vn = nx * vx + ny * vy + nz * vz;
+    b.normal_velocity[k] = vn;
+    const double tx = vx - nx * vn;
+    const double ty = vy - ny * vn;
+    const double tz = vz - nz * vn;
+
+    const double half_turn = 0.5 * dt * inverse;
+    b.tilt_x[k] = half_turn * tx;
+    b.tilt_y[k] = half_turn * ty;
+    b.tilt_z[k] = half_turn * tz;
+
+    const double cx = ri * b.wix[k] + rj * b.wjx[k];
+    const double cy = ri * b.wiy[k] + rj * b.wjy[k];
+    const double cz = ri * b.wiz[k] + rj * b.wjz[k];
+    const double rigid = sum * inverse;
+    b.slip_x[k] = dt * (rigid * tx - (cy * nz - cz * ny));
+    b.slip_y[k] = dt * (rigid * ty - (cz * nx - cx * nz));
+    b.slip_z[k] = dt * (rigid * tz - (cx * ny - cy * nx));
+
+    const double rx = dt * (b.wjx[k] - b.wix[k]);
+    const double ry = dt * (b.wjy[k] - b.wiy[k]);
+    const double rz = dt * (b.wjz[k] - b.wiz[k]);
+    const double twist = nx * rx + ny * ry + nz * rz;
+    b.twist[k] = twist;
+    b.roll_x[k] = rx - nx * twist;
+    b.roll_y[k] = ry - ny * twist;
+    b.roll_z[k] = rz - nz * twist;
+    b.spin[k] =
+        0.5 * dt *
+        (nx * (b.wix[k] + b.wjx[k]) + ny * (b.wiy[k] + b.wjy[k]) + nz * (b.wiz[k] + b.wjz[k]));
+  }
+}
+
+CALIB_DEM_CLONES void TransportTangential(ContactBlock& b, int first) {
+  double* const sx = b.history[first];
+  double* const sy = b.history[first + 1];
+  double* const sz = b.history[first + 2];
+#pragma GCC ivdep
+  for (int k = 0; k < kBlock; ++k) {
+    const double nx = b.nx[k];
+    const double ny = b.ny[k];
+    const double nz = b.nz[k];
+    const double along = nx * sx[k] + ny * sy[k] + nz * sz[k];
+    const double px = sx[k] - along * (nx - b.tilt_x[k]);
+    const double py = sy[k] - along * (ny - b.tilt_y[k]);
+    const double pz = sz[k] - along * (nz - b.tilt_z[k]);
+    const double spin = b.spin[k];
+    const double keep = 1.0 - 0.5 * spin * spin;
+    sx[k] = keep * px + spin * (ny * pz - nz * py);
+    sy[k] = keep * py + spin * (nz * px - nx * pz);
+    sz[k] = keep * pz + spin * (nx * py - ny * px);
+  }
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,25 @@
+#pragma once
+// Geometry and relative motion of touching spheres, and the transport of what a contact remembers.
+
+#include "dem/contact/contact_block.h"
+
+namespace calib::dem {
+
+/// From branch vector, radii and velocities to normal, overlap, and the increments of slip, rolling
+/// and twisting during block.dt. The homogeneous velocity of the cell acts over the branch vector.
+///   n = d/|d|, u = r_i + r_j - |d|, v = v_j - v_i + L d
+///   slip  = dt [ (r_i + r_j)/|d| (v - n (n.v)) - (r_i w_i + r_j w_j) x n ]
+///   roll  = dt [ (w_j - w_i) - n (n.(w_j - w_i)) ],   twist = dt n.(w_j - w_i),   spin = dt/2
+///   n.(w_i + w_j)
+/// Slip uses rigid arms r_i, r_j (the translation scaled by (r_i + r_j)/|d|): objective, and
+/// without the ratcheting that arms changing with the overlap give in cycles [McNamara,
+/// Garcia-Rojo, Herrmann, Phys. Rev. E 77 (2008) 031304]. Precondition: |d| > 0 in every lane.
+void ComputeKinematics(ContactBlock& block);
+
+/// Carries a tangential vector (three history columns from `first` on) from the last tangent plane
+/// to the present one and turns it with the mean spin of the grains about n:
+///   s' = s - (n.s)(n - dn/2),   s'' = s' + spin n x s' - spin^2/2 s'.
+/// s' is tangential; its length is kept to fourth order in the angle of the step.
+void TransportTangential(ContactBlock& block, int first);
+
+}  // namespace calib::dem

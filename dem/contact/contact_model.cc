@@ -1,0 +1,82 @@
+#include "dem/contact/contact_model.h"
+
+#include <algorithm>
+#include <cassert>
+#include <map>
+#include <string>
+#include <utility>
+
+#include "dem/catalog/registry.h"
+#include "dem/contact/common_parameters.h"
+#include "dem/contact/contact_kinematics.h"
+#include "dem/contact/sliding.h"
+
+namespace calib::dem {
+namespace {
+
+/// Given values of one law or effect without their prefix, and the defaults of what was not given.
+ParameterSet Resolve(const std::vector<ParameterInfo>& infos, const std::string& prefix,
+                     const std::map<std::string, double>& given) {
+  std::map<std::string, double> values;
+  for (const ParameterInfo& info : infos) {
+    if (const auto it = given.find(prefix + info.name); it != given.end()) {
+      values[info.name] = it->second;
+    } else if (info.default_value) {
+      values[info.name] = *info.default_value;
+    }
+  }
+  return ParameterSet(std::move(values));
+}
+
+const ContactEntry& LawNamed(const std::string& name) {
+  const auto entries = ContactEntries();
+  const auto it = std::find_if(entries.begin(), entries.end(),
+                               [&](const ContactEntry& entry) { return entry.info.name == name; });
+  assert(it != entries.end());
+  return *it;
+}
+
+}  // namespace
+
+ContactModel::ContactModel(const Model& model)
+    : sliding_friction_(SlidingFriction(model.parameters)) {
+  std::vector<std::pair<ContactStage, std::shared_ptr<const ContactKernel>>> kernels;
+  const ContactEntry& law = LawNamed(model.contact);
+  kernels.emplace_back(
+      ContactStage::kNormal,
+      law.make({.contact = model.contact,
+                .parameters = Resolve(law.info.parameters, "", model.parameters)}));
+  kernels.emplace_back(ContactStage::kSlidingLimit, MakeCoulombLimit());
+  kernels.emplace_back(ContactStage::kTangential, MakeTangentialSpring());
+  for (const EffectEntry& effect :
+       EffectEntries()) {  // in catalogue order, however the user lists them
+    const std::string& name = effect.info.name;
+    if (std::find(model.effects.begin(), model.effects.end(), name) != model.effects.end()) {
+      kernels.emplace_back(effect.stage,
+                           effect.make({.contact = model.contact,
+                                        .parameters = Resolve(effect.info.parameters, name + ".",
+                                                              model.parameters)}));
+    }
+  }
+  std::stable_sort(kernels.begin(), kernels.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (auto& [stage, kernel] : kernels) {
+    const int size = kernel->HistorySize();
+    chain_.push_back({.kernel = std::move(kernel), .first_history = history_size_});
+    history_size_ += size;
+  }
+  assert(history_size_ <= kMaxHistory);
+}
+
+void ContactModel::Evaluate(ContactBlock& block) const {
+  ComputeKinematics(block);
+  for (ContactBlock::Lane* lane :
+       {&block.mx, &block.my, &block.mz, &block.rolling_stiffness, &block.twisting_stiffness}) {
+    std::fill(*lane, *lane + kBlock, 0.0);
+  }
+  for (const Link& link : chain_) {
+    link.kernel->Apply(block, link.first_history);
+  }
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,38 @@
+#pragma once
+// A contact law joined by its effects: the chain of kernels that every block of contacts passes.
+
+#include <memory>
+#include <vector>
+
+#include "dem/contact/contact_kernel.h"
+#include "dem/simulation/scenario.h"
+
+namespace calib::dem {
+
+/// Immutable and shared between copies; thread-safe.
+class ContactModel {
+ public:
+  /// Precondition: ScenarioProblems() finds nothing wrong with the model.
+  explicit ContactModel(const Model& model);
+
+  /// Doubles that each contact remembers, <= kMaxHistory.
+  [[nodiscard]] int history_size() const { return history_size_; }
+
+  /// tan(phi_mu) of the model itself; consolidation may put another one into the block.
+  [[nodiscard]] double sliding_friction() const { return sliding_friction_; }
+
+  /// Kinematics and every kernel in the order of ContactStage. All inputs of the block are set; its
+  /// history is read and updated.
+  void Evaluate(ContactBlock& block) const;
+
+ private:
+  struct Link {
+    std::shared_ptr<const ContactKernel> kernel;
+    int first_history = 0;
+  };
+  std::vector<Link> chain_;
+  int history_size_ = 0;
+  double sliding_friction_ = 0;
+};
+
+}  // namespace calib::dem

@@ -1,0 +1,66 @@
+#include "dem/contact/hertz_mindlin.h"
+
+#include <cmath>
+
+#include "dem/contact/common_parameters.h"
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+struct HertzModuli {
+  double normal = 0;      ///< 2E / (3(1 - nu^2)) [Pa]
+  double tangential = 0;  ///< 2E / ((1 + nu)(2 - nu)) [Pa]
+};
+
+CALIB_DEM_CLONES void EvaluateHertz(const HertzModuli moduli, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const double u = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
+    const double contact_radius = std::sqrt(b.effective_radius[k] * u);
+    const double kn = moduli.normal * contact_radius;  // Eq. 5
+    b.normal_force[k] = kn * u;                        // Eq. 1
+    b.normal_stiffness[k] = 1.5 * kn;
+    b.tangential_stiffness[k] = moduli.tangential * contact_radius;  // Eq. 6
+  }
+}
+
+class HertzKernel final : public ContactKernel {
+ public:
+  explicit HertzKernel(const HertzModuli& moduli) : moduli_(moduli) {}
+  void Apply(ContactBlock& block, int /*first*/) const override { EvaluateHertz(moduli_, block); }
+
+ private:
+  HertzModuli moduli_;
+};
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  const double e = context.parameters.Get("young_modulus");
+  const double nu = context.parameters.Get("poisson_ratio");
+  return std::make_unique<HertzKernel>(
+      HertzModuli{.normal = 2.0 * e / (3.0 * (1.0 - nu * nu)),
+                  .tangential = 2.0 * e / ((1.0 + nu) * (2.0 - nu))});
+}
+
+}  // namespace
+
+ContactEntry HertzMindlin() {
+  ParameterInfo poisson;
+  poisson.name = "poisson_ratio";
+  poisson.unit = "1";
+  poisson.min = 0;
+  poisson.max = 0.5;
+  poisson.default_prior = {.kind = "uniform", .min = 0, .max = 0.5};
+  poisson.default_value = 0.2;
+  poisson.description = "Poisson's ratio of the grains";
+  return {
+      .info = {.name = "hertz_mindlin",
+               .description =
+                   "Elastic spheres: kn = 2E/(3(1-nu^2)) sqrt(r* u), Fn = kn u; "
+                   "ks = 2E/((1+nu)(2-nu)) sqrt(r* u), dFs = ks dus; |Fs| <= tan(phi_mu) Fn",
+               .parameters = {YoungModulus(), poisson, FrictionAngle(), FrictionCoefficient()},
+               .reference = "Cheng et al. 2018, Eqs. 1-2 and 5-6, Table 1; Johnson, Contact "
+                            "Mechanics (1985), sec. 4.2; Mindlin, J. Appl. Mech. 16 (1949) 259"},
+      .make = &Make};
+}
+
+}  // namespace calib::dem

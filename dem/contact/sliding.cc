@@ -1,0 +1,59 @@
+#include "dem/contact/sliding.h"
+
+#include <cmath>
+
+#include "dem/contact/contact_kinematics.h"
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+CALIB_DEM_CLONES void LimitByCoulomb(ContactBlock& b) {
+  const double friction = b.sliding_friction;
+  for (int k = 0; k < kBlock; ++k) {
+    b.sliding_limit[k] = b.normal_force[k] > 0 ? friction * b.normal_force[k] : 0.0;
+  }
+}
+
+CALIB_DEM_CLONES void IntegrateShear(ContactBlock& b, int first) {
+  double* const sx = b.history[first];
+  double* const sy = b.history[first + 1];
+  double* const sz = b.history[first + 2];
+#pragma GCC ivdep
+  for (int k = 0; k < kBlock; ++k) {
+    const double ks = b.tangential_stiffness[k];
+    const double x = sx[k] - ks * b.slip_x[k];
+    const double y = sy[k] - ks * b.slip_y[k];
+    const double z = sz[k] - ks * b.slip_z[k];
+    const double size = std::sqrt(x * x + y * y + z * z);
+    const double limit = b.sliding_limit[k];
+    const double cut = size > limit ? limit / size : 1.0;
+    sx[k] = b.fx[k] = cut * x;
+    sy[k] = b.fy[k] = cut * y;
+    sz[k] = b.fz[k] = cut * z;
+  }
+}
+
+class CoulombLimit final : public ContactKernel {
+ public:
+  void Apply(ContactBlock& block, int /*first*/) const override { LimitByCoulomb(block); }
+};
+
+class TangentialSpring final : public ContactKernel {
+ public:
+  [[nodiscard]] int HistorySize() const override { return 3; }
+  void Apply(ContactBlock& block, int first) const override {
+    TransportTangential(block, first);
+    IntegrateShear(block, first);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<ContactKernel> MakeCoulombLimit() { return std::make_unique<CoulombLimit>(); }
+
+std::unique_ptr<ContactKernel> MakeTangentialSpring() {
+  return std::make_unique<TangentialSpring>();
+}
+
+}  // namespace calib::dem

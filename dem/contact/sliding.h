@@ -1,0 +1,18 @@
+#pragma once
+// Coulomb friction with a tangential spring: the part that all contact laws share.
+
+#include <memory>
+
+#include "dem/contact/contact_kernel.h"
+
+namespace calib::dem {
+
+/// Largest shear force tan(phi_mu) Fn, zero in tension. [Cheng 2018, Table 1]
+std::unique_ptr<ContactKernel> MakeCoulombLimit();
+
+/// Incremental shear force dFs = -ks slip, carried along with the contact and cut back to
+/// sliding_limit; it is not rescaled when the overlap shrinks. History: the shear force on j (3
+/// doubles) [N]. [Cheng 2018, Eq. 2]
+std::unique_ptr<ContactKernel> MakeTangentialSpring();
+
+}  // namespace calib::dem

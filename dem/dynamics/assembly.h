@@ -1,0 +1,143 @@
+#pragma once
+// All grains of one specimen with their contacts in the periodic cell, and one explicit time step
+// of them.
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "dem/contact/contact_model.h"
+#include "dem/geometry/periodic_cell.h"
+#include "dem/neighbor/neighbor_list.h"
+#include "dem/particles/packing.h"
+#include "dem/particles/particle_arrays.h"
+
+namespace calib::dem {
+
+/// Force and torques of one pair: force on j (the opposite acts on i) [N], torque on i, torque on j
+/// [N m].
+struct PairLoad {
+  double force[3];
+  double torque_i[3];
+  double torque_j[3];
+};
+
+/// How the cell and the grains move during one time step.
+struct Motion {
+  double stretch[3] = {0, 0, 0};  ///< velocity gradient of the cell, compression negative [1/s]
+  double dt = 0;                  ///< [s] > 0
+  double damping = 0;             ///< local damping, 0 .. 1 [-]
+};
+
+/// Stiffness seen by the slowest-allowed time step and by the servo.
+struct StiffnessEstimate {
+  double critical_step =
+      0;  ///< min over grains of sqrt(m/K), translation and rotation [s]; 0: no contact
+  std::array<double, 3> modulus = {0, 0, 0};  ///< affine (Voigt) stiffness of each axis [Pa]
+};
+
+/// Copyable: a copy is a snapshot that goes on to the same bits. Not thread-safe; uses `threads`
+/// threads inside.
+class Assembly {
+ public:
+  /// Preconditions: the packing has grains, all single spheres; density > 0; threads >= 1.
+  Assembly(const Packing& packing, double density, ContactModel model, int threads);
+
+  /// Contact forces, torques and stress of the present configuration; searches neighbours first
+  /// when the list may miss a pair. To be called once after every Move. Errors: OUT_OF_RANGE naming
+  /// the grain or the axis (see BuildNeighborList).
+  absl::Status EvaluateForces();
+
+  /// One leapfrog step: velocities at half steps, positions and cell with the homogeneous motion
+  /// added.
+  ///   v += dt F'/m, F' = F (1 - damping sign(F (v + dt F/2m))) per component;  x += dt (v + L x)
+  /// The inertia of the homogeneous motion itself is left out: it is of the order of the squared
+  /// inertial number.
+  void Move(const Motion& motion);
+
+  /// Sets one cell length exactly, after a Move that reached it up to rounding.
+  void SetLength(int axis, double length) { cell_.length[axis] = length; }
+
+  /// Stiffnesses of the present contacts; their memory is not touched. Errors: OUT_OF_RANGE when
+  /// two grains overlap by more than half the smaller radius: the model is too soft for the stress.
+  [[nodiscard]] absl::Status EstimateStiffness(StiffnessEstimate& estimate) const;
+
+  /// Critical step of two touching grains of the smallest size at an overlap of 1e-4 radii [s]:
+  /// bounds the step where contacts are few or about to form.
+  [[nodiscard]] double NominalCriticalStep() const { return nominal_critical_step_; }
+
+  /// Mean net force of the loaded grains over mean contact force [-]; 0 without contacts, infinite
+  /// when not finite.
+  [[nodiscard]] double UnbalancedForce() const;
+
+  /// Grains whose net force is not a number, in words; empty: none.
+  [[nodiscard]] std::string FirstNotFinite() const;
+
+  void SetSlidingFriction(double friction) { sliding_friction_ = friction; }
+  [[nodiscard]] double sliding_friction() const { return sliding_friction_; }
+  [[nodiscard]] const ContactModel& model() const { return model_; }
+  [[nodiscard]] const PeriodicCell& cell() const { return cell_; }
+  [[nodiscard]] const ParticleArrays& particles() const { return particles_; }
+  [[nodiscard]] const NeighborList& neighbors() const { return list_; }
+  [[nodiscard]] bool touching(int slot) const {
+    return touching_[static_cast<std::size_t>(slot)] != 0;
+  }
+  [[nodiscard]] const std::vector<PairLoad>& loads() const { return loads_; }
+
+  /// Love-Weber stress sum_c f_a d_a / V of the last EvaluateForces, compression positive [Pa].
+  [[nodiscard]] const std::array<double, 3>& stress() const { return stress_; }
+  [[nodiscard]] std::int64_t contacts() const { return contacts_; }
+  [[nodiscard]] double solid_volume() const { return solid_volume_; }
+  [[nodiscard]] double mean_diameter() const { return mean_diameter_; }
+  [[nodiscard]] std::int64_t steps() const { return steps_; }
+  [[nodiscard]] std::int64_t contact_updates() const { return contact_updates_; }
+
+  /// Places and drives single grains by hand; for tests and for preparing states.
+  ParticleArrays& mutable_particles() { return particles_; }
+
+ private:
+  struct ChunkSums {
+    double stress[3] = {0, 0, 0};
+    std::int64_t contacts = 0;
+  };
+
+  absl::Status SearchNeighbors();
+  void EvaluateChunk(int chunk);
+  void LoadLane(int slot, const double* d, ContactBlock& block) const;
+  void StoreBlock(ContactBlock& block, ChunkSums& sums);
+  void GatherLoads(int grain);
+  double MoveChunk(int chunk, const Motion& motion);
+  [[nodiscard]] bool ListMayMissPairs() const;
+
+  PeriodicCell cell_;
+  ParticleArrays particles_;
+  ContactModel model_;
+  int threads_ = 1;
+  double sliding_friction_ = 0;
+  double last_dt_ = 0;
+
+  NeighborList list_;
+  std::vector<double> searched_x_, searched_y_, searched_z_;  ///< centres at the last search
+  double searched_length_[3] = {0, 0, 0};
+  double moved_ = 0;  ///< largest non-affine displacement since the last search [m]
+  double skin_ = 0;
+  double largest_radius_ = 0;
+
+  std::vector<std::uint8_t> touching_;                  ///< per slot
+  std::vector<double> history_;                         ///< per slot, history_size() doubles
+  std::vector<PairLoad> loads_;                         ///< per slot; zero where not touching
+  std::array<std::array<double, 3>, kImages> shift_{};  ///< translation of each image now [m]
+  std::vector<ChunkSums> sums_;
+  std::array<double, 3> stress_ = {0, 0, 0};
+  std::int64_t contacts_ = 0;
+
+  double solid_volume_ = 0;
+  double mean_diameter_ = 0;
+  double nominal_critical_step_ = 0;
+  std::int64_t steps_ = 0;
+  std::int64_t contact_updates_ = 0;
+};
+
+}  // namespace calib::dem

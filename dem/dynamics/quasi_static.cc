@@ -1,0 +1,175 @@
+#include "dem/dynamics/quasi_static.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace calib::dem {
+namespace {
+
+/// Steps between two looks at stiffness, balance and finiteness.
+constexpr std::int64_t kInspection = 20;
+
+/// Stress-controlled axes beside a driven one may have to move several times faster than it.
+constexpr double kServoRateOverDriven = 10;
+
+/// A stress target counts as reached for the end of loading; settling then closes the rest.
+constexpr double kLoadingTolerance = 1e-2;
+
+/// Largest strain in one step, where no stiffness limits the step yet.
+constexpr double kMaxStrainPerStep = 1e-4;
+
+bool Drives(const CellTarget& target, const PeriodicCell& cell) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (target[a].mode == AxisTarget::Mode::kLength && target[a].value != cell.length[a]) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+QuasiStatic::QuasiStatic(Assembly& assembly, const StageOptions& options, std::stop_token stop)
+    : assembly_(&assembly), options_(options), stop_(std::move(stop)) {}
+
+StageEnd QuasiStatic::Diverge(std::string reason) {
+  reason_ = std::move(reason);
+  return StageEnd::kDiverged;
+}
+
+StageEnd QuasiStatic::Begin() {
+  if (begun_) {
+    return StageEnd::kDone;
+  }
+  begun_ = true;
+  if (auto s = assembly_->EvaluateForces(); !s.ok()) {
+    return Diverge(std::string(s.message()));
+  }
+  return Inspect();
+}
+
+StageEnd QuasiStatic::Inspect() {
+  since_inspection_ = 0;
+  if (std::string bad = assembly_->FirstNotFinite(); !bad.empty()) {
+    return Diverge(std::move(bad));
+  }
+  StiffnessEstimate estimate;
+  if (auto s = assembly_->EstimateStiffness(estimate); !s.ok()) {
+    return Diverge(std::string(s.message()));
+  }
+  const double largest =
+      std::min(kMaxStrainPerStep / options_.rate, assembly_->NominalCriticalStep());
+  dt_ =
+      kSafety * (estimate.critical_step > 0 ? std::min(largest, estimate.critical_step) : largest);
+  modulus_ = estimate.modulus;
+  return StageEnd::kDone;
+}
+
+bool QuasiStatic::StressesWithin(const CellTarget& target, double tolerance) const {
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (target[a].mode == AxisTarget::Mode::kStress &&
+        !(std::abs(assembly_->stress()[a] - target[a].value) <= tolerance * target[a].value)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+double QuasiStatic::MaxServoRate(const CellTarget& target) const {
+  const bool all_stress = std::all_of(target.begin(), target.end(), [](const AxisTarget& t) {
+    return t.mode == AxisTarget::Mode::kStress;
+  });
+  return all_stress ? options_.rate : kServoRateOverDriven * options_.rate;
+}
+
+StageEnd QuasiStatic::Step(const CellTarget& target, double damping, double max_servo_rate) {
+  if (stop_.stop_requested()) {
+    return StageEnd::kStopped;
+  }
+  const PeriodicCell& cell = assembly_->cell();
+  Motion motion{.stretch = {0, 0, 0}, .dt = dt_, .damping = damping};
+  bool reached[3] = {false, false, false};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (target[a].mode == AxisTarget::Mode::kStress) {
+      motion.stretch[a] = -servo_[a].Update({.error = target[a].value - assembly_->stress()[a],
+                                             .modulus = modulus_[a],
+                                             .dt = dt_,
+                                             .max_rate = max_servo_rate});
+      continue;
+    }
+    const double remaining = target[a].value / cell.length[a] - 1.0;
+    const double largest = options_.rate * dt_;
+    reached[a] = std::abs(remaining) <= largest;
+    motion.stretch[a] = std::clamp(remaining, -largest, largest) / dt_;
+  }
+  assembly_->Move(motion);
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (reached[a]) {  // the last step ends at the target exactly, without rounding
+      assembly_->SetLength(static_cast<int>(a), target[a].value);
+    }
+  }
+  if (auto s = assembly_->EvaluateForces(); !s.ok()) {
+    return Diverge(std::string(s.message()));
+  }
+  return ++since_inspection_ >= kInspection ? Inspect() : StageEnd::kDone;
+}
+
+StageEnd QuasiStatic::Load(const CellTarget& target) {
+  const double max_servo_rate = MaxServoRate(target);
+  const bool by_length = Drives(target, assembly_->cell());
+  for (std::int64_t step = 0; step < options_.max_loading_steps; ++step) {
+    const bool there =
+        by_length ? !Drives(target, assembly_->cell()) : StressesWithin(target, kLoadingTolerance);
+    if (there) {
+      return StageEnd::kDone;
+    }
+    if (const StageEnd end = Step(target, options_.damping_loading, max_servo_rate);
+        end != StageEnd::kDone) {
+      return end;
+    }
+  }
+  return Diverge(absl::StrCat("loading did not reach its target within ",
+                              options_.max_loading_steps, " steps"));
+}
+
+StageEnd QuasiStatic::Settle(const CellTarget& target) {
+  if (const StageEnd end = Begin(); end != StageEnd::kDone) {
+    return end;
+  }
+  const double max_servo_rate = MaxServoRate(target);
+  double unbalanced = 0;
+  for (std::int64_t step = 0; step <= options_.max_settling_steps; ++step) {
+    if (step % kInspection == 0) {
+      unbalanced = assembly_->UnbalancedForce();
+      if (unbalanced < options_.unbalanced && StressesWithin(target, options_.stress_tolerance)) {
+        return StageEnd::kDone;
+      }
+    }
+    if (const StageEnd end = Step(target, options_.damping_settling, max_servo_rate);
+        end != StageEnd::kDone) {
+      return end;
+    }
+  }
+  const auto& stress = assembly_->stress();
+  return Diverge(absl::StrCat("the specimen did not settle within ", options_.max_settling_steps,
+                              " steps: unbalanced force ", unbalanced, " (limit ",
+                              options_.unbalanced, "), stresses ", stress[0], " ", stress[1], " ",
+                              stress[2], " Pa"));
+}
+
+StageEnd QuasiStatic::MoveTo(const CellTarget& target) {
+  const StageEnd end = MoveThrough(target);
+  return end == StageEnd::kDone ? Settle(target) : end;
+}
+
+StageEnd QuasiStatic::MoveThrough(const CellTarget& target) {
+  if (const StageEnd end = Begin(); end != StageEnd::kDone) {
+    return end;
+  }
+  return Load(target);
+}
+
+}  // namespace calib::dem

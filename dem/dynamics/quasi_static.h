@@ -1,0 +1,85 @@
+#pragma once
+// Quasi-static motion of one specimen: strain or load the cell, then let the grains come to rest.
+
+#include <array>
+#include <cstdint>
+#include <stop_token>
+#include <string>
+
+#include "dem/dynamics/assembly.h"
+#include "dem/dynamics/stress_servo.h"
+
+namespace calib::dem {
+
+/// Goal of one axis: a cell length to reach exactly, or a stress to hold.
+struct AxisTarget {
+  enum class Mode { kLength, kStress };
+  Mode mode = Mode::kLength;
+  double value = 0;  ///< [m] or [Pa]
+};
+using CellTarget = std::array<AxisTarget, 3>;
+
+/// How stages are walked.
+struct StageOptions {
+  double rate = 0.1;              ///< logarithmic strain rate of the driven axes [1/s] > 0
+  double damping_loading = 0.2;   ///< local damping while moving [-], 0 .. 1
+  double damping_settling = 0.9;  ///< while settling [-], 0 .. 1
+  double unbalanced =
+      5e-4;  ///< mean unbalanced over mean contact force that ends a settling [-] > 0
+  double stress_tolerance =
+      1e-3;  ///< relative error of held stresses at the end of a settling [-] > 0
+  std::int64_t max_settling_steps = 200'000;  ///< a settling that takes longer has diverged
+  std::int64_t max_loading_steps = 20'000'000;
+};
+
+enum class StageEnd { kDone, kStopped, kDiverged };
+
+/// Drives an assembly. Between calls its forces are those of its present configuration. Looks at
+/// the stop token every step.
+class QuasiStatic {
+ public:
+  /// safety: time step over the smallest sqrt(m/K) of all grains; 0.8 is well inside the limit
+  /// sqrt(2) of two grains that move against each other. [Cundall & Strack 1979; O'Sullivan & Bray
+  /// 2004]
+  static constexpr double kSafety = 0.8;
+
+  QuasiStatic(Assembly& assembly, const StageOptions& options, std::stop_token stop);
+
+  /// Moves to the target with damping_loading, then settles.
+  StageEnd MoveTo(const CellTarget& target);
+
+  /// Moves to the target's lengths with damping_loading and returns at once: constant-rate loading.
+  StageEnd MoveThrough(const CellTarget& target);
+
+  /// Keeps lengths and held stresses with damping_settling until forces are balanced and stresses
+  /// within tolerance.
+  StageEnd Settle(const CellTarget& target);
+
+  [[nodiscard]] StageOptions& options() { return options_; }
+  [[nodiscard]] Assembly& assembly() { return *assembly_; }
+  [[nodiscard]] double time_step() const { return dt_; }
+
+  /// Why the last call returned kDiverged.
+  [[nodiscard]] const std::string& reason() const { return reason_; }
+
+ private:
+  StageEnd Begin();
+  StageEnd Load(const CellTarget& target);
+  StageEnd Step(const CellTarget& target, double damping, double max_servo_rate);
+  StageEnd Inspect();
+  StageEnd Diverge(std::string reason);
+  [[nodiscard]] bool StressesWithin(const CellTarget& target, double tolerance) const;
+  [[nodiscard]] double MaxServoRate(const CellTarget& target) const;
+
+  Assembly* assembly_;
+  StageOptions options_;
+  std::stop_token stop_;
+  std::array<StressServo, 3> servo_;
+  std::array<double, 3> modulus_ = {0, 0, 0};
+  double dt_ = 0;
+  std::int64_t since_inspection_ = 0;
+  bool begun_ = false;
+  std::string reason_;
+};
+
+}  // namespace calib::dem

@@ -1,0 +1,54 @@
+#include "dem/effects/moment_stiffness.h"
+
+#include <algorithm>
+
+namespace calib::dem {
+
+MomentLaw MomentLawFrom(const KernelContext& context) {
+  const bool linear = context.contact == "linear";
+  MomentLaw law;
+  law.limit_by_smaller = linear;
+  // An infinite coefficient would make inf * 0 of an unloaded contact; the largest number does the
+  // same and stays finite.
+  law.friction = std::min(context.parameters.Get("friction"), 1e100);
+  if (const auto ratio = context.parameters.Find("stiffness_ratio")) {
+    law.ratio = *ratio;
+  } else if (linear) {
+    law.ratio = context.parameters.Get("stiffness");
+  } else {
+    law.constant = context.parameters.Get("stiffness");
+  }
+  return law;
+}
+
+std::vector<ParameterInfo> MomentParameters(const std::string& motion) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  ParameterInfo stiffness;
+  stiffness.name = "stiffness";
+  stiffness.unit = "N m/rad";
+  stiffness.unit_by_contact = {{"hertz_mindlin", "N m/rad"}, {"linear", "1"}};
+  stiffness.max = kInfinity;
+  stiffness.default_prior = {.kind = "uniform", .min = 0, .max = 1};
+  stiffness.description =
+      motion +
+      " stiffness: the constant k_m [N m/rad] with hertz_mindlin (its effect "
+      "depends on grain size), the factor in k_m = stiffness r1 r2 ks with linear";
+  ParameterInfo ratio;
+  ratio.name = "stiffness_ratio";
+  ratio.unit = "1";
+  ratio.max = kInfinity;
+  ratio.default_prior = {.kind = "uniform", .min = 0, .max = 1};
+  ratio.alternative_to = "stiffness";
+  ratio.description = motion + " stiffness over r1 r2 ks with the current ks, for any contact law";
+  ParameterInfo friction;
+  friction.name = "friction";
+  friction.unit = "1";
+  friction.max = kInfinity;
+  friction.default_prior = {.kind = "uniform", .min = 0, .max = 1};
+  friction.description = "limit eta of the " + motion +
+                         " moment over Fn (r1+r2)/2 (hertz_mindlin) or Fn min(r1,r2) (linear); "
+                         "infinite: no limit";
+  return {stiffness, ratio, friction};
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,56 @@
+#include "dem/effects/twisting_resistance.h"
+
+#include "dem/contact/simd.h"
+#include "dem/effects/moment_stiffness.h"
+
+namespace calib::dem {
+namespace {
+
+CALIB_DEM_CLONES void IntegrateTwisting(const MomentLaw law, ContactBlock& b, int first) {
+  double* const history = b.history[first];
+#pragma GCC ivdep
+  for (int k = 0; k < kBlock; ++k) {
+    const MomentResponse response = Evaluate(law, b, k);
+    const double trial = history[k] - response.stiffness * b.twist[k];
+    const double upper = trial < response.limit ? trial : response.limit;
+    const double moment = upper > -response.limit ? upper : -response.limit;
+    history[k] = moment;
+    b.mx[k] += moment * b.nx[k];
+    b.my[k] += moment * b.ny[k];
+    b.mz[k] += moment * b.nz[k];
+    b.twisting_stiffness[k] += response.stiffness;
+  }
+}
+
+class TwistingKernel final : public ContactKernel {
+ public:
+  explicit TwistingKernel(const MomentLaw& law) : law_(law) {}
+  [[nodiscard]] int HistorySize() const override { return 1; }
+  void Apply(ContactBlock& block, int first) const override {
+    IntegrateTwisting(law_, block, first);
+  }
+
+ private:
+  MomentLaw law_;
+};
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  return std::make_unique<TwistingKernel>(MomentLawFrom(context));
+}
+
+}  // namespace
+
+EffectEntry TwistingResistance() {
+  return {
+      .info = {.name = "twisting_resistance",
+               .kind = "contact",
+               .description = "Moment dM = k_t dtheta about the normal against relative twisting, "
+                              "|M| <= eta Fn l; one-sided, vanishes at stiffness 0 or friction 0",
+               .contacts = {},
+               .parameters = MomentParameters("twisting"),
+               .reference = "Cheng et al. 2018, Table 1"},
+      .stage = ContactStage::kMoment,
+      .make = &Make};
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,23 @@
+#include "dem/lab_tests/element_test.h"
+
+namespace calib::dem {
+
+std::vector<std::string> ElementObservables() {
+  return {"axial_strain",   "volumetric_strain", "lateral_strain",    "axial_stress",
+          "lateral_stress", "mean_stress",       "deviatoric_stress", "stress_ratio",
+          "q_over_p",       "porosity",          "void_ratio",        "coordination_number"};
+}
+
+ParameterInfo ConfiningPressure() {
+  ParameterInfo info;
+  info.name = "confining_pressure";
+  info.unit = "Pa";
+  info.min = 0;
+  info.min_open = true;
+  info.max = 1e10;
+  info.default_prior = {.kind = "log_uniform", .min = 1e4, .max = 1e7};
+  info.description = "isotropic stress to which the packing is compressed before loading";
+  return info;
+}
+
+}  // namespace calib::dem

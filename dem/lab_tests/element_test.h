@@ -1,0 +1,39 @@
+#pragma once
+// Tests of one specimen whose boundary is the periodic cell: per axis a strain or a stress for each
+// control target.
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "dem/catalog/catalog.h"
+
+namespace calib::dem {
+
+/// What one axis of the cell does until a target is reached.
+struct AxisGoal {
+  enum class Mode { kStrain, kStress };
+  Mode mode = Mode::kStrain;
+  double value = 0;  ///< logarithmic strain from the end of consolidation [-], or stress [Pa];
+                     ///< compression positive
+};
+
+using CellGoal = std::array<AxisGoal, 3>;  ///< x, y lateral; z axial
+
+/// What a plan may know beside the control target.
+struct ElementTestContext {
+  std::map<std::string, double> settings;  ///< of the test, defaults filled in
+  double lateral_stress = 0;               ///< at the end of consolidation [Pa]
+};
+
+/// Goal of the cell for one value of the control observable. Pure.
+using PlanElementTest = CellGoal (*)(const ElementTestContext& context, double target);
+
+/// Observables that every element test produces, in the order of their states.
+std::vector<std::string> ElementObservables();
+
+/// confining_pressure [Pa], the isotropic stress at which consolidation ends.
+ParameterInfo ConfiningPressure();
+
+}  // namespace calib::dem

@@ -1,0 +1,28 @@
+#include "dem/lab_tests/isotropic.h"
+
+namespace calib::dem {
+namespace {
+
+CellGoal Plan(const ElementTestContext& /*context*/, double mean_stress) {
+  const AxisGoal goal{.mode = AxisGoal::Mode::kStress, .value = mean_stress};
+  return {goal, goal, goal};
+}
+
+}  // namespace
+
+ElementTestEntry Isotropic() {
+  return {.info = {.name = "isotropic",
+                   .description =
+                       "Periodic cell, isotropic compression to confining_pressure (the start "
+                       "pressure), then the mean stress driven through the control path [Pa, "
+                       "positive] with all three normal stresses equal; unload-reload by a "
+                       "path that turns",
+                   .settings = {ConfiningPressure()},
+                   .observables = ElementObservables(),
+                   .control = "mean_stress",
+                   .may_reverse = true,
+                   .reference = "Cheng et al. 2018, sec. 2.2"},
+          .plan = &Plan};
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,27 @@
+#include "dem/lab_tests/oedometric.h"
+
+namespace calib::dem {
+namespace {
+
+CellGoal Plan(const ElementTestContext& /*context*/, double axial_strain) {
+  const AxisGoal fixed{.mode = AxisGoal::Mode::kStrain, .value = 0};
+  return {fixed, fixed, AxisGoal{.mode = AxisGoal::Mode::kStrain, .value = axial_strain}};
+}
+
+}  // namespace
+
+ElementTestEntry Oedometric() {
+  return {.info = {.name = "oedometric",
+                   .description =
+                       "Periodic cell, isotropic compression to confining_pressure (the start "
+                       "pressure), then axial strain driven through the control path without "
+                       "lateral strain; unload-reload by a path that turns",
+                   .settings = {ConfiningPressure()},
+                   .observables = ElementObservables(),
+                   .control = "axial_strain",
+                   .may_reverse = true,
+                   .reference = "Cheng et al. 2019, sec. 4"},
+          .plan = &Plan};
+}
+
+}  // namespace calib::dem

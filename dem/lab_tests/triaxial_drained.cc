@@ -1,0 +1,28 @@
+#include "dem/lab_tests/triaxial_drained.h"
+
+namespace calib::dem {
+namespace {
+
+CellGoal Plan(const ElementTestContext& context, double axial_strain) {
+  const AxisGoal lateral{.mode = AxisGoal::Mode::kStress, .value = context.lateral_stress};
+  return {lateral, lateral, AxisGoal{.mode = AxisGoal::Mode::kStrain, .value = axial_strain}};
+}
+
+}  // namespace
+
+ElementTestEntry TriaxialDrained() {
+  return {.info = {.name = "triaxial_drained",
+                   .description =
+                       "Periodic cell, isotropic compression to confining_pressure, then axial "
+                       "strain driven through the control path while both lateral stresses "
+                       "are held. Fails when the lateral stress cannot be held (a stage "
+                       "never settles)",
+                   .settings = {ConfiningPressure()},
+                   .observables = ElementObservables(),
+                   .control = "axial_strain",
+                   .may_reverse = true,
+                   .reference = "Cheng et al. 2018, sec. 4"},
+          .plan = &Plan};
+}
+
+}  // namespace calib::dem

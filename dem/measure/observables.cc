@@ -1,0 +1,62 @@
+#include "dem/measure/observables.h"
+
+#include <cassert>
+#include <cmath>
+#include <map>
+
+namespace calib::dem {
+
+double Porosity(const Assembly& assembly) {
+  return 1.0 - assembly.solid_volume() / assembly.cell().Volume();
+}
+
+Measurement Measure(const Assembly& assembly, const double reference[3]) {
+  const PeriodicCell& cell = assembly.cell();
+  double strain[3];
+  for (int a = 0; a < 3; ++a) {
+    strain[a] = std::log(reference[a] / cell.length[a]);
+  }
+  const auto& stress = assembly.stress();
+  Measurement m;
+  m.axial_strain = strain[2];
+  m.volumetric_strain = strain[0] + strain[1] + strain[2];
+  m.lateral_strain = 0.5 * (strain[0] + strain[1]);
+  m.axial_stress = stress[2];
+  m.lateral_stress = 0.5 * (stress[0] + stress[1]);
+  m.mean_stress = (m.axial_stress + 2.0 * m.lateral_stress) / 3.0;
+  m.deviatoric_stress = m.axial_stress - m.lateral_stress;
+  m.stress_ratio = m.axial_stress / m.lateral_stress;
+  m.q_over_p = m.deviatoric_stress / m.mean_stress;
+  m.porosity = Porosity(assembly);
+  m.void_ratio = m.porosity / (1.0 - m.porosity);
+  m.coordination_number =
+      2.0 * static_cast<double>(assembly.contacts()) / assembly.particles().size();
+  return m;
+}
+
+std::vector<double> Select(const Measurement& m, const std::vector<std::string>& names) {
+  static const std::map<std::string, double Measurement::*> members = {
+      {"axial_strain", &Measurement::axial_strain},
+      {"volumetric_strain", &Measurement::volumetric_strain},
+      {"lateral_strain", &Measurement::lateral_strain},
+      {"axial_stress", &Measurement::axial_stress},
+      {"lateral_stress", &Measurement::lateral_stress},
+      {"mean_stress", &Measurement::mean_stress},
+      {"deviatoric_stress", &Measurement::deviatoric_stress},
+      {"stress_ratio", &Measurement::stress_ratio},
+      {"q_over_p", &Measurement::q_over_p},
+      {"porosity", &Measurement::porosity},
+      {"void_ratio", &Measurement::void_ratio},
+      {"coordination_number", &Measurement::coordination_number},
+  };
+  std::vector<double> values;
+  values.reserve(names.size());
+  for (const std::string& name : names) {
+    const auto it = members.find(name);
+    assert(it != members.end());
+    values.push_back(m.*(it->second));
+  }
+  return values;
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,31 @@
+#pragma once
+// From a settled assembly to the observables of a load step.
+
+#include <string>
+#include <vector>
+
+#include "dem/dynamics/assembly.h"
+
+namespace calib::dem {
+
+/// Macroscopic state of one specimen. SI, compression positive; strains logarithmic from the
+/// reference lengths.
+struct Measurement {
+  double axial_strain = 0, volumetric_strain = 0, lateral_strain = 0;
+  double axial_stress = 0, lateral_stress = 0, mean_stress = 0, deviatoric_stress = 0;
+  double stress_ratio = 0, q_over_p = 0;
+  double porosity = 0, void_ratio = 0, coordination_number = 0;
+};
+
+/// Strains from the cell, Love-Weber stresses of the last force evaluation, porosity from the sum
+/// of sphere volumes, coordination number 2 Nc/Np over all grains. axial = z. reference: three
+/// lengths [m] > 0 of zero strain.
+Measurement Measure(const Assembly& assembly, const double reference[3]);
+
+/// Values of the named observables. Precondition: every name is a member of Measurement.
+std::vector<double> Select(const Measurement& measurement, const std::vector<std::string>& names);
+
+/// Void volume over cell volume.
+double Porosity(const Assembly& assembly);
+
+}  // namespace calib::dem

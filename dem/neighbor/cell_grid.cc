@@ -1,0 +1,61 @@
+#include "dem/neighbor/cell_grid.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace calib::dem {
+
+CellGrid::CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, double range) {
+  assert(range > 0);
+  for (std::size_t a = 0; a < 3; ++a) {
+    count_[a] = std::clamp(static_cast<int>(cell.length[a] / range), 1, 1024);
+  }
+  const auto n = static_cast<std::size_t>(particles.size());
+  const auto index = [this, &cell](double s, std::size_t a) {
+    return std::min(static_cast<int>(s / cell.length[a] * count_[a]), count_[a] - 1);
+  };
+  cell_of_.resize(n);
+  begin_.assign(static_cast<std::size_t>(count_[0]) * count_[1] * count_[2] + 1, 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    const int c = index(particles.x[i], 0) +
+                  count_[0] * (index(particles.y[i], 1) + count_[1] * index(particles.z[i], 2));
+    cell_of_[i] = c;
+    ++begin_[static_cast<std::size_t>(c) + 1];
+  }
+  for (std::size_t c = 1; c < begin_.size(); ++c) {
+    begin_[c] += begin_[c - 1];
+  }
+  grains_.resize(n);
+  std::vector<int> next(begin_.begin(), begin_.end() - 1);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto c = static_cast<std::size_t>(cell_of_[i]);
+    grains_[static_cast<std::size_t>(next[c]++)] = static_cast<int>(i);
+  }
+}
+
+std::vector<GridNeighbor> CellGrid::Around(int cell) const {
+  const int cx = cell % count_[0];
+  const int cy = cell / count_[0] % count_[1];
+  const int cz = cell / count_[0] / count_[1];
+  std::vector<GridNeighbor> around;
+  around.reserve(27);
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const int raw[3] = {cx + dx, cy + dy, cz + dz};
+        GridNeighbor neighbor;
+        int wrapped[3];
+        for (int a = 0; a < 3; ++a) {
+          const int count = count_[static_cast<std::size_t>(a)];
+          neighbor.shift[a] = raw[a] < 0 ? -1 : (raw[a] >= count ? 1 : 0);
+          wrapped[a] = raw[a] - neighbor.shift[a] * count;
+        }
+        neighbor.cell = wrapped[0] + count_[0] * (wrapped[1] + count_[1] * wrapped[2]);
+        around.push_back(neighbor);
+      }
+    }
+  }
+  return around;
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,117 @@
+#include "dem/neighbor/neighbor_list.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dem/neighbor/cell_grid.h"
+
+namespace calib::dem {
+namespace {
+
+constexpr const char* kAxis[3] = {"x", "y", "z"};
+
+/// Moves s into [0, length). Multiples beyond one cell cannot occur between two searches but cost
+/// nothing to allow.
+double Wrap(double s, double length) {
+  const double wrapped = s - std::floor(s / length) * length;
+  return wrapped < length ? wrapped : 0.0;
+}
+
+absl::Status WrapAll(const PeriodicCell& cell, ParticleArrays& p) {
+  for (std::size_t i = 0; i < p.x.size(); ++i) {
+    if (!std::isfinite(p.x[i]) || !std::isfinite(p.y[i]) || !std::isfinite(p.z[i])) {
+      return absl::OutOfRangeError(
+          absl::StrCat("grain ", p.id[i], " has no finite position (NaN or lost)"));
+    }
+    p.x[i] = Wrap(p.x[i], cell.length[0]);
+    p.y[i] = Wrap(p.y[i], cell.length[1]);
+    p.z[i] = Wrap(p.z[i], cell.length[2]);
+  }
+  return absl::OkStatus();
+}
+
+/// incident: for every grain its slots by ascending neighbour. Slots come sorted by (i, j), so that
+/// one pass in slot order meets, for a grain q, first the pairs (i, q) with i < q, then (q, j).
+void ListIncidence(int grains, NeighborList& list) {
+  list.incident_row.assign(static_cast<std::size_t>(grains) + 1, 0);
+  for (std::size_t s = 0; s < list.second.size(); ++s) {
+    ++list.incident_row[static_cast<std::size_t>(list.first[s]) + 1];
+    ++list.incident_row[static_cast<std::size_t>(list.second[s]) + 1];
+  }
+  for (std::size_t i = 1; i < list.incident_row.size(); ++i) {
+    list.incident_row[i] += list.incident_row[i - 1];
+  }
+  std::vector<int> next(list.incident_row.begin(), list.incident_row.end() - 1);
+  list.incident.resize(2 * list.second.size());
+  for (std::size_t s = 0; s < list.second.size(); ++s) {
+    const auto i = static_cast<std::size_t>(list.first[s]);
+    const auto j = static_cast<std::size_t>(list.second[s]);
+    list.incident[static_cast<std::size_t>(next[i]++)] = static_cast<int>(2 * s);
+    list.incident[static_cast<std::size_t>(next[j]++)] = static_cast<int>(2 * s + 1);
+  }
+}
+
+}  // namespace
+
+absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleArrays& p,
+                               NeighborList& list) {
+  if (auto s = WrapAll(cell, p); !s.ok()) {
+    return s;
+  }
+  const double largest = *std::max_element(p.radius.begin(), p.radius.end());
+  const double range = 2 * largest + skin;
+  for (int a = 0; a < 3; ++a) {
+    if (!(cell.length[a] >= 2 * range)) {
+      return absl::OutOfRangeError(absl::StrCat("the cell has become too short along ", kAxis[a],
+                                                ": ", cell.length[a], " m, at least ", 2 * range,
+                                                " m are needed"));
+    }
+  }
+  const CellGrid grid(cell, p, range);
+  list.skin = skin;
+  list.row.assign(1, 0);
+  list.first.clear();
+  list.second.clear();
+  list.image.clear();
+  std::vector<std::pair<int, std::uint8_t>> found;  // neighbour j > i, image
+  int grid_cell = -1;
+  std::vector<GridNeighbor> around;
+  for (int i = 0; i < p.size(); ++i) {
+    if (grid.cell_of(i) != grid_cell) {
+      grid_cell = grid.cell_of(i);
+      around = grid.Around(grid_cell);
+    }
+    found.clear();
+    for (const GridNeighbor& neighbor : around) {
+      const double sx = neighbor.shift[0] * cell.length[0] - p.x[i];
+      const double sy = neighbor.shift[1] * cell.length[1] - p.y[i];
+      const double sz = neighbor.shift[2] * cell.length[2] - p.z[i];
+      const double reach = p.radius[i] + skin;
+      const int end = grid.begin(neighbor.cell + 1);
+      for (int g = grid.begin(neighbor.cell); g < end; ++g) {
+        const int j = grid.grains()[static_cast<std::size_t>(g)];
+        const double dx = p.x[j] + sx;
+        const double dy = p.y[j] + sy;
+        const double dz = p.z[j] + sz;
+        const double limit = reach + p.radius[j];
+        if (j > i && dx * dx + dy * dy + dz * dz < limit * limit) {
+          found.emplace_back(j, static_cast<std::uint8_t>(ImageCode(
+                                    neighbor.shift[0], neighbor.shift[1], neighbor.shift[2])));
+        }
+      }
+    }
+    std::sort(found.begin(), found.end());
+    for (const auto& [j, image] : found) {
+      list.first.push_back(i);
+      list.second.push_back(j);
+      list.image.push_back(image);
+    }
+    list.row.push_back(list.size());
+  }
+  ListIncidence(p.size(), list);
+  return absl::OkStatus();
+}
+
+}  // namespace calib::dem

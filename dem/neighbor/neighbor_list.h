@@ -1,0 +1,32 @@
+#pragma once
+// Which grains may touch until the next search: a Verlet list in CSR order, found with a cell grid.
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "dem/geometry/periodic_cell.h"
+#include "dem/particles/particle_arrays.h"
+
+namespace calib::dem {
+
+/// Pairs (i, j), i < j, sorted by i then j; a pair's index is its slot. Every pair appears once,
+/// with the image of j that is nearest to i.
+struct NeighborList {
+  double skin = 0;                  ///< pairs are listed up to this gap between surfaces [m]
+  std::vector<int> row;             ///< CSR: slots of grain i are row[i] .. row[i+1]-1; size N+1
+  std::vector<int> first, second;   ///< grains i and j of a slot
+  std::vector<std::uint8_t> image;  ///< ImageCode of the cell that j is seen in
+  std::vector<int> incident_row;    ///< CSR over grains, size N+1
+  std::vector<int> incident;  ///< 2 slot + (1 if the grain is the slot's j), ascending neighbours
+
+  [[nodiscard]] int size() const { return static_cast<int>(second.size()); }
+};
+
+/// Wraps all centres into the cell and lists every pair with |x_j - x_i| < r_i + r_j + skin.
+/// Errors: OUT_OF_RANGE when a centre is not finite or the cell has become shorter than two
+/// interaction ranges (pairs would have several images); list and positions are then unusable.
+absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleArrays& particles,
+                               NeighborList& list);
+
+}  // namespace calib::dem

@@ -1,0 +1,28 @@
+#pragma once
+// State of all grains, one array per quantity. SI units.
+
+#include <vector>
+
+#include "dem/particles/packing.h"
+
+namespace calib::dem {
+
+struct ParticleArrays {
+  std::vector<double> x, y, z;     ///< centres, unwrapped between neighbour searches [m]
+  std::vector<double> vx, vy, vz;  ///< peculiar velocity: without the cell's homogeneous part [m/s]
+  std::vector<double> wx, wy, wz;  ///< angular velocity [rad/s]
+  std::vector<double> fx, fy, fz;  ///< net contact force of the last evaluation, before damping [N]
+  std::vector<double> tx, ty, tz;  ///< net contact torque [N m]
+  std::vector<double> radius;      ///< [m]
+  std::vector<double> inverse_mass;     ///< [1/kg]
+  std::vector<double> inverse_inertia;  ///< of the solid sphere, 5/(2 m r^2) [1/(kg m^2)]
+  std::vector<int> id;                  ///< index in the packing
+
+  [[nodiscard]] int size() const { return static_cast<int>(x.size()); }
+};
+
+/// Grains at rest, in an order that keeps neighbours close in memory: by grid cell, then by
+/// position, so that the order in which a file lists them does not matter. density [kg/m^3] > 0.
+ParticleArrays MakeParticles(const Packing& packing, double density);
+
+}  // namespace calib::dem

@@ -1,0 +1,35 @@
+#pragma once
+// From the packing as given to the stress and density at which a test begins.
+
+#include <optional>
+
+#include "absl/status/status.h"
+#include "dem/dynamics/quasi_static.h"
+#include "dem/simulation/scenario.h"
+
+namespace calib::dem {
+
+/// What to prepare, in SI units.
+struct ConsolidationPlan {
+  double pressure = 0;          ///< isotropic, > 0 [Pa]
+  Consolidation consolidation;  ///< friction while compressing, or the porosity to reach
+  std::optional<InitialStress> initial_stress;
+};
+
+/// Porosity counts as reached within this.
+inline constexpr double kPorosityTolerance = 1e-4;
+
+/// Compresses isotropically through the pressures 1-2-5 x 10^k between a twentieth of the target
+/// and the target (each settled, so that results do not hang on one long stage), lowers friction
+/// until the porosity holds if one is asked for, restores the model's friction, and moves to the
+/// initial stress. `end` says how it ended. Errors: OUT_OF_RANGE with the attainable range when
+/// lowering friction cannot reach the porosity.
+absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, StageEnd& end);
+
+/// Lowers friction step by step at constant isotropic pressure until the porosity is within
+/// tolerance, going back and taking a smaller step where one has overshot. Leaves the lowered
+/// friction in the assembly. Errors: OUT_OF_RANGE as above. Precondition: settled at the pressure.
+absl::Status LowerFrictionToPorosity(double porosity, double pressure, QuasiStatic& stages,
+                                     StageEnd& end);
+
+}  // namespace calib::dem

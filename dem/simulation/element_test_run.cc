@@ -1,0 +1,180 @@
+#include "dem/simulation/element_test_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dem/catalog/registry.h"
+#include "dem/contact/contact_model.h"
+#include "dem/dynamics/quasi_static.h"
+#include "dem/measure/observables.h"
+#include "dem/simulation/consolidation.h"
+
+namespace calib::dem {
+namespace {
+
+/// Inertial number I = rate d sqrt(rho/p) of an unset rate: curves no longer depend on it beyond
+/// their scatter (dem/VERIFICATION.md, rate study). [GDR MiDi 2004: quasi-static below about 1e-3]
+constexpr double kInertialNumber = 2e-3;
+constexpr double kStep = 0.002;
+constexpr double kDampingLoading = 0.2;
+constexpr double kDampingSettling = 0.9;
+constexpr double kUnbalanced = 5e-4;
+
+const ElementTestEntry& EntryOf(const std::string& test) {
+  const auto entries = ElementTestEntries();
+  return *std::find_if(entries.begin(), entries.end(),
+                       [&](const ElementTestEntry& entry) { return entry.info.name == test; });
+}
+
+double PressureScale(const Scenario& scenario) {
+  const double pressure = scenario.settings.at("confining_pressure");
+  return scenario.initial_stress ? std::min({pressure, scenario.initial_stress->axial,
+                                             scenario.initial_stress->lateral})
+                                 : pressure;
+}
+
+/// Staging with every field set: the user's, or the engine's choice.
+Staging ResolveStaging(const Scenario& scenario, const Assembly& assembly) {
+  const Staging& given = scenario.staging;
+  const double quasi_static_rate = kInertialNumber / assembly.mean_diameter() *
+                                   std::sqrt(PressureScale(scenario) / scenario.model.density);
+  return {.rate = given.rate.value_or(quasi_static_rate),
+          .step = given.step.value_or(kStep),
+          .damping_loading = given.damping_loading.value_or(kDampingLoading),
+          .damping_settling = given.damping_settling.value_or(kDampingSettling),
+          .unbalanced = given.unbalanced.value_or(kUnbalanced)};
+}
+
+class ElementTestRun {
+ public:
+  ElementTestRun(const Scenario& scenario, std::stop_token stop)
+      : scenario_(scenario),
+        entry_(EntryOf(scenario.test)),
+        assembly_(scenario.packing, scenario.model.density, ContactModel(scenario.model),
+                  scenario.threads),
+        staging_(ResolveStaging(scenario, assembly_)),
+        stages_(assembly_, OptionsFrom(staging_), std::move(stop)) {
+    context_.settings = scenario.settings;
+    const double pressure = scenario.settings.at("confining_pressure");
+    context_.lateral_stress = scenario.initial_stress ? scenario.initial_stress->lateral : pressure;
+  }
+
+  absl::StatusOr<Summary> Run(const LoadStepSink& sink) {
+    StageEnd end = StageEnd::kDone;
+    const ConsolidationPlan plan{.pressure = scenario_.settings.at("confining_pressure"),
+                                 .consolidation = scenario_.consolidation,
+                                 .initial_stress = scenario_.initial_stress};
+    if (auto s = Consolidate(plan, stages_, end); !s.ok()) {
+      return s;
+    }
+    if (end != StageEnd::kDone) {
+      return Finish(end, "consolidation");
+    }
+    std::copy_n(assembly_.cell().length, 3, reference_);
+    if (scenario_.loading_rate) {
+      stages_.options().rate = *scenario_.loading_rate;
+    }
+    for (std::size_t k = 0; k < scenario_.path.size(); ++k) {
+      const ControlPoint& point = scenario_.path[k];
+      const std::string where =
+          absl::StrCat("path point ", k, " (", entry_.info.control, " ", point.target, ")");
+      end = MoveToPoint(point.target);
+      if (end != StageEnd::kDone) {
+        return Finish(end, where);
+      }
+      if (point.load_step < 0) {
+        continue;
+      }
+      State state{.load_step = point.load_step,
+                  .values = Select(Measure(assembly_, reference_), entry_.info.observables)};
+      for (std::size_t v = 0; v < state.values.size(); ++v) {
+        if (!std::isfinite(state.values[v])) {
+          Summary summary = Finish(StageEnd::kDiverged, where);
+          summary.reason = absl::StrCat(where, ": ", entry_.info.observables[v], " is not finite");
+          return summary;
+        }
+      }
+      if (auto s = sink(state, assembly_); !s.ok()) {
+        return s;
+      }
+    }
+    return Finish(StageEnd::kDone, "");
+  }
+
+ private:
+  static StageOptions OptionsFrom(const Staging& staging) {
+    StageOptions options;
+    options.rate = *staging.rate;
+    options.damping_loading = *staging.damping_loading;
+    options.damping_settling = *staging.damping_settling;
+    options.unbalanced = *staging.unbalanced;
+    return options;
+  }
+
+  /// Goal of the lab test in terms of cell lengths and stresses.
+  [[nodiscard]] CellTarget TargetFor(double control) const {
+    const CellGoal goal = entry_.plan(context_, control);
+    CellTarget target;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const bool strain = goal[a].mode == AxisGoal::Mode::kStrain;
+      target[a] = {.mode = strain ? AxisTarget::Mode::kLength : AxisTarget::Mode::kStress,
+                   .value = strain ? reference_[a] * std::exp(-goal[a].value) : goal[a].value};
+    }
+    return target;
+  }
+
+  /// From the present control value to the next: at once when loading at a real rate or by stress,
+  /// in settled steps of at most staging.step otherwise.
+  StageEnd MoveToPoint(double target) {
+    if (scenario_.loading_rate) {
+      control_ = target;
+      return stages_.MoveThrough(TargetFor(target));
+    }
+    const bool by_stress = entry_.info.control == "mean_stress";
+    const double from = control_;
+    const double exact = std::abs(target - from) / *staging_.step;
+    const int steps = by_stress ? 1 : std::max(1, static_cast<int>(std::ceil(exact - 1e-6)));
+    for (int k = 1; k <= steps; ++k) {
+      control_ = k == steps ? target : from + (target - from) * k / steps;
+      if (const StageEnd end = stages_.MoveTo(TargetFor(control_)); end != StageEnd::kDone) {
+        return end;
+      }
+    }
+    return StageEnd::kDone;
+  }
+
+  [[nodiscard]] Summary Finish(StageEnd end, const std::string& where) const {
+    Summary summary;
+    summary.outcome = end == StageEnd::kDone      ? Outcome::kCompleted
+                      : end == StageEnd::kStopped ? Outcome::kStopped
+                                                  : Outcome::kDiverged;
+    if (end == StageEnd::kDiverged) {
+      summary.reason = absl::StrCat(where, ": ", stages_.reason());
+    }
+    summary.steps = assembly_.steps();
+    summary.contact_updates = assembly_.contact_updates();
+    summary.time_step = stages_.time_step();
+    summary.staging = staging_;
+    return summary;
+  }
+
+  const Scenario& scenario_;
+  const ElementTestEntry& entry_;
+  Assembly assembly_;
+  Staging staging_;
+  QuasiStatic stages_;
+  ElementTestContext context_;
+  double reference_[3] = {0, 0, 0};
+  double control_ = 0;
+};
+
+}  // namespace
+
+absl::StatusOr<Summary> RunElementTest(const Scenario& scenario, const LoadStepSink& sink,
+                                       std::stop_token stop) {
+  return ElementTestRun(scenario, std::move(stop)).Run(sink);
+}
+
+}  // namespace calib::dem

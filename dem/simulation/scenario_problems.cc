@@ -1,0 +1,231 @@
+// ScenarioProblems(): everything that can be known to be wrong with a scenario without running it.
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "dem/catalog/catalog.h"
+#include "dem/simulation/scenario.h"
+
+namespace calib::dem {
+namespace {
+
+using Problems = std::vector<std::string>;
+
+/// Strains beyond this would need a cell that shrinks to a third: a mistake of units.
+constexpr double kLargestStrain = 1.0;
+
+template <class Infos>
+std::string NamesOf(const Infos& infos) {
+  return absl::StrJoin(infos, ", ",
+                       [](std::string* out, const auto& info) { out->append(info.name); });
+}
+
+void CheckRange(const std::string& name, double value, const ParameterInfo& info,
+                const std::string& unit, Problems& problems) {
+  const bool above = info.min_open ? value > info.min : value >= info.min;
+  if (!(above && value <= info.max)) {
+    problems.push_back(absl::StrCat(name, " is ", value, ", allowed is ", info.min_open ? "(" : "[",
+                                    info.min, ", ", info.max, "] ", unit));
+  }
+}
+
+void CheckPositive(const std::string& what, const std::optional<double>& value,
+                   Problems& problems) {
+  if (value && !(*value > 0 && std::isfinite(*value))) {
+    problems.push_back(absl::StrCat(what, " is ", *value, ", it must be positive and finite"));
+  }
+}
+
+void CheckFraction(const std::string& what, const std::optional<double>& value,
+                   Problems& problems) {
+  if (value && !(*value >= 0 && *value < 1)) {
+    problems.push_back(absl::StrCat(what, " is ", *value, ", allowed is [0, 1)"));
+  }
+}
+
+/// Parameters of the law (empty prefix) or of one effect: present, in range, alternatives not given
+/// together.
+void CheckParameters(const std::vector<ParameterInfo>& infos, const std::string& prefix,
+                     const Model& model, Problems& problems) {
+  const auto& given = model.parameters;
+  for (const ParameterInfo& info : infos) {
+    const std::string name = prefix + info.name;
+    const auto it = given.find(name);
+    if (it != given.end()) {
+      CheckRange(name, it->second, info, UnitFor(info, model.contact), problems);
+      if (!info.alternative_to.empty() && given.contains(prefix + info.alternative_to)) {
+        problems.push_back(absl::StrCat(name, " and ", prefix, info.alternative_to,
+                                        " are alternatives: only one of them may be given"));
+      }
+      continue;
+    }
+    if (info.default_value || !info.alternative_to.empty()) {
+      continue;
+    }
+    const auto other = std::find_if(infos.begin(), infos.end(), [&](const ParameterInfo& p) {
+      return p.alternative_to == info.name && given.contains(prefix + p.name);
+    });
+    if (other == infos.end()) {
+      problems.push_back(absl::StrCat("parameter ", name, " is missing"));
+    }
+  }
+}
+
+void CheckModel(const Model& model, Problems& problems) {
+  if (!(model.density > 0 && std::isfinite(model.density))) {
+    problems.push_back(
+        absl::StrCat("density is ", model.density, ", it must be positive and finite"));
+  }
+  const ContactInfo* contact = FindContact(model.contact);
+  if (contact == nullptr) {
+    problems.push_back(
+        absl::StrCat("no contact law \"", model.contact, "\"; there are ", NamesOf(Contacts())));
+    return;
+  }
+  CheckParameters(contact->parameters, "", model, problems);
+  std::set<std::string> seen;
+  for (const std::string& name : model.effects) {
+    const EffectInfo* effect = FindEffect(name);
+    if (effect == nullptr) {
+      problems.push_back(absl::StrCat("no effect \"", name, "\"; there are ", NamesOf(Effects())));
+      continue;
+    }
+    if (!seen.insert(name).second) {
+      problems.push_back(absl::StrCat("effect ", name, " is named twice"));
+      continue;
+    }
+    if (!effect->contacts.empty() && std::find(effect->contacts.begin(), effect->contacts.end(),
+                                               model.contact) == effect->contacts.end()) {
+      problems.push_back(absl::StrCat("effect ", name, " cannot join contact ", model.contact,
+                                      "; it joins ", absl::StrJoin(effect->contacts, ", ")));
+    }
+    CheckParameters(effect->parameters, name + ".", model, problems);
+  }
+  for (const auto& [name, value] : model.parameters) {
+    if (FindParameter(model.contact, model.effects, name) == nullptr) {
+      problems.push_back(absl::StrCat("the model has no parameter \"", name, "\""));
+    }
+  }
+}
+
+void CheckPacking(const Packing& packing, Problems& problems) {
+  const std::size_t n = packing.x.size();
+  if (n < 2 || packing.y.size() != n || packing.z.size() != n || packing.radius.size() != n ||
+      packing.clump.size() != n) {
+    problems.emplace_back(
+        "the packing needs at least two grains and as many x, y, z, radii and clump ids");
+    return;
+  }
+  double largest = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!std::isfinite(packing.x[i] + packing.y[i] + packing.z[i]) ||
+        !(packing.radius[i] > 0 && std::isfinite(packing.radius[i]))) {
+      problems.push_back(
+          absl::StrCat("grain ", i, " has no finite position or no positive radius"));
+      return;
+    }
+    largest = std::max(largest, packing.radius[i]);
+  }
+  const auto clump =
+      std::find_if(packing.clump.begin(), packing.clump.end(), [](int id) { return id >= 0; });
+  if (clump != packing.clump.end()) {
+    problems.push_back(absl::StrCat("grain ", clump - packing.clump.begin(), " belongs to clump ",
+                                    *clump, "; only single spheres (clump -1) are simulated"));
+  }
+  for (int a = 0; a < 3; ++a) {
+    if (!(packing.length[a] > 4 * largest && std::isfinite(packing.length[a]))) {
+      problems.push_back(absl::StrCat("the cell is ", packing.length[a], " m long along axis ", a,
+                                      ", it must be longer than two of its largest grains (",
+                                      4 * largest, " m)"));
+    }
+  }
+}
+
+void CheckTest(const Scenario& scenario, Problems& problems) {
+  const TestInfo* test = FindTest(scenario.test);
+  if (test == nullptr) {
+    problems.push_back(
+        absl::StrCat("no test \"", scenario.test, "\"; there are ", NamesOf(Tests())));
+    return;
+  }
+  for (const ParameterInfo& info : test->settings) {
+    const auto it = scenario.settings.find(info.name);
+    if (it != scenario.settings.end()) {
+      CheckRange(info.name, it->second, info, info.unit, problems);
+    } else if (!info.default_value) {
+      problems.push_back(absl::StrCat("test ", scenario.test, " needs the setting ", info.name));
+    }
+  }
+  for (const auto& [name, value] : scenario.settings) {
+    if (std::none_of(test->settings.begin(), test->settings.end(),
+                     [&](const ParameterInfo& info) { return info.name == name; })) {
+      problems.push_back(absl::StrCat("test ", scenario.test, " has no setting \"", name, "\""));
+    }
+  }
+  const bool stress_driven = test->control == "mean_stress";
+  std::set<int> steps;
+  for (std::size_t k = 0; k < scenario.path.size(); ++k) {
+    const ControlPoint& point = scenario.path[k];
+    const bool sensible = stress_driven ? point.target > 0 && std::isfinite(point.target)
+                                        : std::abs(point.target) < kLargestStrain;
+    if (!sensible) {
+      problems.push_back(
+          absl::StrCat("path point ", k, ": ", test->control, " is ", point.target,
+                       stress_driven ? ", it must be positive" : ", allowed is (-1, 1)"));
+    }
+    if (point.load_step >= 0 && !steps.insert(point.load_step).second) {
+      problems.push_back(
+          absl::StrCat("path point ", k, ": load step ", point.load_step, " occurs twice"));
+    }
+  }
+  if (scenario.path.empty()) {
+    problems.emplace_back("the control path is empty");
+  }
+  if (stress_driven && scenario.loading_rate) {
+    problems.push_back(
+        absl::StrCat("test ", scenario.test, " is driven by stress and has no loading_rate"));
+  }
+}
+
+void CheckPreparation(const Scenario& scenario, Problems& problems) {
+  const Consolidation& c = scenario.consolidation;
+  if (c.friction_coefficient && c.porosity) {
+    problems.emplace_back("consolidation takes friction_coefficient or porosity, not both");
+  }
+  if (c.friction_coefficient && !(*c.friction_coefficient >= 0 && *c.friction_coefficient <= 14)) {
+    problems.push_back(absl::StrCat("consolidation friction_coefficient is ",
+                                    *c.friction_coefficient, ", allowed is [0, 14]"));
+  }
+  if (c.porosity && !(*c.porosity > 0 && *c.porosity < 1)) {
+    problems.push_back(
+        absl::StrCat("consolidation porosity is ", *c.porosity, ", allowed is (0, 1)"));
+  }
+  if (scenario.initial_stress) {
+    CheckPositive("initial_stress axial", scenario.initial_stress->axial, problems);
+    CheckPositive("initial_stress lateral", scenario.initial_stress->lateral, problems);
+  }
+  CheckPositive("loading_rate", scenario.loading_rate, problems);
+  CheckPositive("staging rate", scenario.staging.rate, problems);
+  CheckPositive("staging step", scenario.staging.step, problems);
+  CheckPositive("staging unbalanced", scenario.staging.unbalanced, problems);
+  CheckFraction("staging damping while loading", scenario.staging.damping_loading, problems);
+  CheckFraction("staging damping while settling", scenario.staging.damping_settling, problems);
+  if (scenario.threads < 1 || scenario.threads > 1024) {
+    problems.push_back(absl::StrCat("threads is ", scenario.threads, ", allowed is 1 .. 1024"));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> ScenarioProblems(const Scenario& scenario) {
+  Problems problems;
+  CheckModel(scenario.model, problems);
+  CheckPacking(scenario.packing, problems);
+  CheckTest(scenario, problems);
+  CheckPreparation(scenario, problems);
+  return problems;
+}
+
+}  // namespace calib::dem

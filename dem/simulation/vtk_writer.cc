@@ -1,0 +1,59 @@
+#include "dem/simulation/vtk_writer.h"
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <system_error>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+namespace calib::dem {
+
+absl::Status WriteVtk(const Assembly& assembly, const std::string& directory, int load_step) {
+  const ParticleArrays& p = assembly.particles();
+  const PeriodicCell& cell = assembly.cell();
+  const std::size_t n = p.x.size();
+  std::vector<std::size_t> at(n);  // position in the arrays of each grain of the packing
+  for (std::size_t k = 0; k < n; ++k) {
+    at[static_cast<std::size_t>(p.id[k])] = k;
+  }
+  const auto wrapped = [](double s, double length) { return s - std::floor(s / length) * length; };
+
+  std::string text = absl::StrFormat(
+      "# vtk DataFile Version 3.0\ngrains, load step %d, periodic cell %.9g %.9g %.9g "
+      "m\nASCII\nDATASET POLYDATA\n"
+      "POINTS %d double\n",
+      load_step, cell.length[0], cell.length[1], cell.length[2], n);
+  for (const std::size_t k : at) {
+    absl::StrAppendFormat(&text, "%.12g %.12g %.12g\n", wrapped(p.x[k], cell.length[0]),
+                          wrapped(p.y[k], cell.length[1]), wrapped(p.z[k], cell.length[2]));
+  }
+  absl::StrAppendFormat(&text, "VERTICES %d %d\n", n, 2 * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    absl::StrAppendFormat(&text, "1 %d\n", i);
+  }
+  absl::StrAppendFormat(&text, "POINT_DATA %d\nSCALARS radius double 1\nLOOKUP_TABLE default\n", n);
+  for (const std::size_t k : at) {
+    absl::StrAppendFormat(&text, "%.12g\n", p.radius[k]);
+  }
+  text += "VECTORS velocity double\n";
+  for (const std::size_t k : at) {
+    absl::StrAppendFormat(&text, "%.9g %.9g %.9g\n", p.vx[k] + cell.stretch[0] * p.x[k],
+                          p.vy[k] + cell.stretch[1] * p.y[k], p.vz[k] + cell.stretch[2] * p.z[k]);
+  }
+
+  std::error_code error;
+  std::filesystem::create_directories(directory, error);
+  const std::string path = absl::StrFormat("%s/grains_%04d.vtk", directory, load_step);
+  std::ofstream file(path);
+  file << text;
+  file.close();
+  if (error || !file) {
+    return absl::UnavailableError(absl::StrCat("cannot write ", path));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace calib::dem
