@@ -1,5 +1,6 @@
 #pragma once
-// A campaign as the program holds it: read from YAML and its files (campaign_file.h), SI inside, compression positive.
+// A campaign as the program holds it: read from YAML and its files (campaign_file.h), SI inside,
+// compression positive.
 
 #include <cstdint>
 #include <map>
@@ -22,21 +23,21 @@ struct Problem {
   std::string key;      ///< dotted path ("parameters.young_modulus.min") or column
   std::string message;  ///< what is wrong, what is allowed
 };
-/// "campaign.yaml:12: parameters.young_modulus.min: ..." 
+/// "campaign.yaml:12: parameters.young_modulus.min: ..."
 std::string ToString(const Problem& problem);
 
 struct CalibratedParameter {
-  std::string name;     ///< dotted
-  std::string unit;     ///< SI, for display
+  std::string name;  ///< dotted
+  std::string unit;  ///< SI, for display
   inference::Prior prior;
 };
 
 struct MeasuredObservable {
   std::string name;
-  std::vector<double> values;      ///< one per reading, SI, compression positive, strains logarithmic
-  std::vector<double> sd;          ///< one per reading, > 0 (empty with ess_target)
-  double correlation_length = 0;   ///< in the control; 0: independent
-  double ess_weight = 1;           ///< w_j of ess_target
+  std::vector<double> values;  ///< one per reading, SI, compression positive, strains logarithmic
+  std::vector<double> sd;      ///< one per reading, > 0 (may be empty with ess_target)
+  double correlation_length = 0;  ///< in the control; 0: independent
+  double ess_weight = 1;          ///< w_j of ess_target
 };
 
 enum class Role { kCalibrate, kValidate };
@@ -44,43 +45,60 @@ enum class Role { kCalibrate, kValidate };
 /// A specimen: the packing file's content (path as written, parsed), or a recipe.
 struct PackingFile {
   std::string path;
-  std::string digest;              ///< SHA-256 of the text
+  std::string digest;  ///< SHA-256 of the text
   dem::Packing packing;
 };
 using Specimen = std::variant<PackingFile, dem::PackingRecipe>;
 
 struct Experiment {
   std::string name;
-  std::string test;
+  std::string test;  ///< may be empty when precomputed
   std::map<std::string, double> settings;
   Role role = Role::kCalibrate;
-  std::vector<Specimen> specimens;             ///< realizations; sample i uses specimen i mod size. Empty when precomputed
+  /// Realizations: sample i uses specimen i mod size. Empty when precomputed.
+  std::vector<Specimen> specimens;
   dem::Consolidation consolidation;
   std::optional<dem::InitialStress> initial_stress;
   std::optional<double> loading_rate;
   dem::Staging staging;
-  std::vector<dem::ControlPoint> path;         ///< load_step = index of the reading
-  std::vector<double> control;                 ///< measured control at each reading (as compared, logarithmic)
-  std::vector<std::string> segment;            ///< loading stage of each reading: "initial_loading", "unload_1", "reload_1", ...
+  /// Observable that drives the loading; empty: readings are merely counted.
+  std::string control_name;
+  /// Where loading starts: 0 for strains, the start pressure for stresses.
+  double control_start = 0;
+  std::vector<dem::ControlPoint> path;  ///< load_step = index of the reading
+  std::vector<double> control;  ///< measured control at each reading (as compared, logarithmic)
+  /// Loading stage of each reading: "initial_loading", "unload_1", "reload_1", ...
+  std::vector<std::string> segment;
   std::vector<MeasuredObservable> observables;
 };
 
 /// Runs that exist already, from any code.
 struct Precomputed {
-  Eigen::MatrixXd parameters;                       ///< N x d, the campaign's parameters in order
-  std::vector<std::vector<std::vector<double>>> values;  ///< [experiment][sample][reading * observables + observable], the experiment's observables
-  std::optional<Eigen::VectorXd> log_proposal;      ///< ln density from which the rows were drawn; empty: the prior
+  Eigen::MatrixXd parameters;  ///< N x d, the campaign's parameters in order
+  /// [experiment][sample][reading * observables + observable], the experiment's observables in
+  /// order.
+  std::vector<std::vector<std::vector<double>>> values;
+  /// ln density from which the rows were drawn; empty: the prior.
+  std::optional<Eigen::VectorXd> log_proposal;
 };
 
 enum class Method { kSqmc, kIterativeBayesianFilter };
 
-struct EarlyStopping { double discard_at_most = 1e-3; };
-struct Failure { int attempts = 5; double pause_above = 0.25; };
-struct Budget { std::optional<std::int64_t> model_evaluations; std::optional<double> core_hours; };
+struct EarlyStopping {
+  double discard_at_most = 1e-3;
+};
+struct Failure {
+  int attempts = 5;
+  double pause_above = 0.25;
+};
+struct Budget {
+  std::optional<std::int64_t> model_evaluations;
+  std::optional<double> core_hours;
+};
 
 struct Campaign {
   std::string name;
-  dem::Model model;                                 ///< parameters: the fixed ones
+  dem::Model model;  ///< parameters: the fixed ones
   std::optional<Precomputed> precomputed;
   std::vector<CalibratedParameter> parameters;
   std::vector<Experiment> experiments;
@@ -94,15 +112,16 @@ struct Campaign {
   std::uint64_t seed = 0;
 };
 
-/// Readings of the calibrated experiments, flat, in processing order; experiment = index in campaign.experiments.
+/// Readings of the calibrated experiments, flat, in processing order; experiment = index in
+/// campaign.experiments.
 inference::DataSet MakeDataSet(const Campaign& campaign);
 
 /// The priors of the calibrated parameters in order.
 std::vector<inference::Prior> Priors(const Campaign& campaign);
 
-/// The scenario of one evaluation. values: SI, in the order of campaign.parameters. With a recipe the packing is left
-/// empty for the worker to generate.
-dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment, const std::vector<double>& values,
-                           int sample);
+/// The scenario of one evaluation. values: SI, in the order of campaign.parameters. With a recipe
+/// the packing is left empty for the worker to generate.
+dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
+                           const std::vector<double>& values, int sample);
 
 }  // namespace calib::campaign

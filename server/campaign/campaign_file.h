@@ -1,5 +1,6 @@
 #pragma once
-// The campaign file (YAML) and the data, packing and table files it names -> Campaign, or everything that is wrong.
+// The campaign file (YAML) and the data, packing and table files it names -> Campaign, or
+// everything that is wrong.
 
 #include <functional>
 #include <optional>
@@ -11,21 +12,24 @@
 
 namespace calib::campaign {
 
-/// Content of a file named in the campaign file, by the path as written there. NOT_FOUND when there is none.
-/// On the user's machine it reads the disk (DiskReader); in the server it reads stored blobs.
+/// Content of a file named in the campaign file, by the path as written there. NOT_FOUND when there
+/// is none. On the user's machine it reads the disk (DiskReader); in the server it reads stored
+/// blobs.
 using FileReader = std::function<absl::StatusOr<std::string>(const std::string& path)>;
 
 /// Reader for paths relative to the folder of the campaign file; expands $CALIB_DATA.
 FileReader DiskReader(const std::string& campaign_file_path);
 
 struct ReadOutcome {
-  Campaign campaign;                       ///< meaningful only when problems is empty
-  std::vector<Problem> problems;           ///< in order of file and line
-  std::vector<std::string> files;          ///< paths the campaign names, as written, that could be read
+  Campaign campaign;               ///< meaningful only when problems is empty
+  std::vector<Problem> problems;   ///< in order of file and line
+  std::vector<std::string> files;  ///< paths the campaign names, as written, that could be read
 };
 
-/// Parses and validates everything `submit` checks. Never throws; reads files only through `reader`.
-ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name, const FileReader& reader,
+/// Parses and validates everything `submit` checks. Never throws; reads files only through
+/// `reader`.
+ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name,
+                         const FileReader& reader,
                          std::optional<std::uint64_t> seed_override = std::nullopt);
 
 }  // namespace calib::campaign

@@ -1,0 +1,84 @@
+#include "server/campaign/campaign.h"
+
+#include <cmath>
+
+namespace calib::campaign {
+namespace {
+
+// Path length of the control at each reading, from the cleaned path; the reading's index where
+// nothing was controlled.
+std::vector<double> Travelled(const Experiment& experiment) {
+  std::vector<double> travelled;
+  double at = experiment.control_start;
+  double length = 0;
+  for (const dem::ControlPoint& point : experiment.path) {
+    length += std::abs(point.target - at);
+    at = point.target;
+    if (point.load_step >= 0) travelled.push_back(length);
+  }
+  return travelled;
+}
+
+}  // namespace
+
+inference::DataSet MakeDataSet(const Campaign& campaign) {
+  inference::DataSet data;
+  for (std::size_t e = 0; e < campaign.experiments.size(); ++e) {
+    const Experiment& experiment = campaign.experiments[e];
+    data.ess_weights.emplace_back();
+    for (const MeasuredObservable& observable : experiment.observables) {
+      data.ess_weights.back().push_back(observable.ess_weight);
+    }
+    if (experiment.role != Role::kCalibrate) continue;
+    const std::vector<double> travelled = Travelled(experiment);
+    for (std::size_t i = 0; i < experiment.control.size(); ++i) {
+      for (std::size_t j = 0; j < experiment.observables.size(); ++j) {
+        const MeasuredObservable& observable = experiment.observables[j];
+        data.readings.push_back({.experiment = static_cast<int>(e),
+                                 .observable = static_cast<int>(j),
+                                 .load_step = static_cast<int>(i),
+                                 .control = travelled[i],
+                                 .value = observable.values[i],
+                                 .sd = observable.sd.empty() ? 0 : observable.sd[i]});
+      }
+    }
+    for (std::size_t j = 0; j < experiment.observables.size(); ++j) {
+      const double length = experiment.observables[j].correlation_length;
+      if (length > 0)
+        data.correlations.push_back({static_cast<int>(e), static_cast<int>(j), length});
+    }
+  }
+  return data;
+}
+
+std::vector<inference::Prior> Priors(const Campaign& campaign) {
+  std::vector<inference::Prior> priors;
+  for (const CalibratedParameter& parameter : campaign.parameters)
+    priors.push_back(parameter.prior);
+  return priors;
+}
+
+dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
+                           const std::vector<double>& values, int sample) {
+  dem::Scenario scenario;
+  scenario.model = campaign.model;
+  for (std::size_t i = 0; i < campaign.parameters.size(); ++i) {
+    scenario.model.parameters[campaign.parameters[i].name] = values[i];
+  }
+  scenario.test = experiment.test;
+  scenario.settings = experiment.settings;
+  if (!experiment.specimens.empty()) {
+    const auto index = static_cast<std::size_t>(sample) % experiment.specimens.size();
+    if (const auto* file = std::get_if<PackingFile>(&experiment.specimens[index]))
+      scenario.packing = file->packing;
+  }
+  scenario.consolidation = experiment.consolidation;
+  scenario.initial_stress = experiment.initial_stress;
+  scenario.loading_rate = experiment.loading_rate;
+  scenario.staging = experiment.staging;
+  scenario.path = experiment.path;
+  scenario.seed = campaign.seed + static_cast<std::uint64_t>(sample);
+  return scenario;
+}
+
+}  // namespace calib::campaign

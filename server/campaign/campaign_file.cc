@@ -1,0 +1,112 @@
+#include "server/campaign/campaign_file.h"
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "absl/strings/str_cat.h"
+#include "server/campaign/map_reader.h"
+#include "server/campaign/read_context.h"
+#include "server/campaign/read_experiment.h"
+#include "server/campaign/read_inference.h"
+#include "server/campaign/read_model.h"
+#include "server/campaign/read_precomputed.h"
+#include "server/campaign/yaml_tree.h"
+
+namespace calib::campaign {
+namespace {
+
+absl::StatusOr<std::string> ExpandPath(const std::string& path) {
+  constexpr const char* kVariable = "$CALIB_DATA";
+  const std::size_t at = path.find(kVariable);
+  if (at == std::string::npos) return path;
+  const char* value = std::getenv("CALIB_DATA");
+  if (value == nullptr)
+    return absl::NotFoundError("the environment variable CALIB_DATA is not set");
+  return path.substr(0, at) + value + path.substr(at + std::string(kVariable).size());
+}
+
+absl::StatusOr<std::string> ReadFromDisk(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return absl::NotFoundError("no such file");
+  if (!std::filesystem::is_regular_file(path, error)) return absl::NotFoundError("not a file");
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream content;
+  content << file.rdbuf();
+  if (!file) return absl::NotFoundError("no permission to read it");
+  return std::move(content).str();
+}
+
+void ReadName(MapReader& map, Campaign& campaign) {
+  constexpr std::size_t kLongest = 200;
+  campaign.name =
+      map.RequiredText("name", "what the campaign is called, e.g. toyoura-0.2MPa").value_or("");
+  if (map.Has("name") && (campaign.name.empty() || campaign.name.size() > kLongest)) {
+    map.Problem("name", "has to be a text of 1 to 200 characters");
+  }
+}
+
+// What the engine itself would refuse. Asked last, at the middle of the priors, where only rare
+// things are left.
+void AskEngine(const MapReader& map, const Campaign& campaign) {
+  std::vector<double> middle;
+  for (const CalibratedParameter& parameter : campaign.parameters)
+    middle.push_back(parameter.prior.Quantile(0.5));
+  for (const Experiment& experiment : campaign.experiments) {
+    dem::Scenario scenario = MakeScenario(campaign, experiment, middle, 0);
+    if (scenario.packing.x.empty()) {  // a recipe, whose packing does not exist yet
+      scenario.packing = {.length = {1, 1, 1},
+                          .x = {0, 0.5},
+                          .y = {0, 0.5},
+                          .z = {0, 0.5},
+                          .radius = {0.1, 0.1},
+                          .clump = {-1, -1}};
+    }
+    for (const std::string& problem : dem::ScenarioProblems(scenario)) {
+      map.Problem("experiments", experiment.name + ": " + problem);
+    }
+  }
+}
+
+}  // namespace
+
+FileReader DiskReader(const std::string& campaign_file_path) {
+  const std::filesystem::path folder = std::filesystem::path(campaign_file_path).parent_path();
+  return [folder](const std::string& path) -> absl::StatusOr<std::string> {
+    const auto expanded = ExpandPath(path);
+    if (!expanded.ok()) return expanded.status();
+    return ReadFromDisk(folder / *expanded);  // an absolute path replaces the folder
+  };
+}
+
+ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name,
+                         const FileReader& reader, std::optional<std::uint64_t> seed_override) {
+  ReadOutcome outcome;
+  ProblemList problems(file_name);
+  const YamlParse parse = ParseYaml(yaml_text);
+  if (parse.error) {
+    problems.Add(parse.error->line, "", parse.error->message);
+    outcome.problems = problems.Sorted();
+    return outcome;
+  }
+  Campaign& campaign = outcome.campaign;
+  ReadContext context(reader, problems);
+  MapReader map(*parse.root, "", problems);
+  if (parse.root->kind == YamlNode::Kind::kMap) {
+    ReadName(map, campaign);
+    ReadModel(map, campaign);
+    ReadInference(map, campaign);
+    ReadParameters(map, campaign);
+    ReadExperiments(map, context, campaign);
+    if (campaign.precomputed) ReadPrecomputed(map, context, campaign);
+    map.Finish();
+    if (problems.size() == 0 && !campaign.precomputed) AskEngine(map, campaign);
+  }
+  if (seed_override) campaign.seed = campaign.filter.seed = *seed_override;
+  outcome.problems = problems.Sorted();
+  outcome.files = context.files();
+  return outcome;
+}
+
+}  // namespace calib::campaign

@@ -1,0 +1,187 @@
+#include "server/campaign/read_experiment.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
+#include "server/campaign/read_measurements.h"
+#include "server/campaign/read_specimen.h"
+#include "server/campaign/suggestion.h"
+
+namespace calib::campaign {
+namespace {
+
+constexpr Range kPositive{.min = 0, .min_open = true};
+constexpr Range kDamping{.min = 0, .max = 1, .max_open = true};
+
+std::vector<std::string> TestNames() {
+  std::vector<std::string> names;
+  for (const dem::TestInfo& test : dem::Tests()) names.push_back(test.name);
+  return names;
+}
+
+// Names stand in tables, file names and on the command line.
+std::string ReadName(MapReader& map, const Campaign& campaign) {
+  const std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
+  const auto plain = [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '+';
+  };
+  constexpr std::size_t kLongest = 64;
+  if (map.Has("name") &&
+      (name.empty() || name.size() > kLongest || !std::all_of(name.begin(), name.end(), plain))) {
+    map.Problem("name",
+                absl::StrCat(Quoted(name), " is not a short word of letters, digits and _ - . +"));
+  }
+  for (const Experiment& other : campaign.experiments) {
+    if (!name.empty() && other.name == name)
+      map.Problem("name", absl::StrCat(Quoted(name), " is the name of two experiments"));
+  }
+  return name;
+}
+
+void ReadSettings(MapReader& map, const dem::TestInfo& test, Experiment& experiment) {
+  for (const dem::ParameterInfo& setting : test.settings) {
+    const Range range{.min = setting.min, .max = setting.max, .min_open = setting.min_open};
+    if (const auto value = map.Quantity(setting.name, setting.unit, range)) {
+      experiment.settings[setting.name] = *value;
+    } else if (!map.Has(setting.name)) {
+      if (setting.default_value) {
+        experiment.settings[setting.name] = *setting.default_value;
+      } else {
+        map.Problem(setting.name,
+                    absl::StrCat("is missing; ", test.name, " needs it: ", setting.description));
+      }
+    }
+  }
+}
+
+void ReadConsolidation(MapReader& map, Experiment& experiment) {
+  auto consolidation = map.Map("consolidation");
+  if (!consolidation) return;
+  experiment.consolidation.friction_coefficient =
+      consolidation->Quantity("friction_coefficient", "1", {.min = 0, .max = 10});
+  experiment.consolidation.porosity = consolidation->Quantity(
+      "porosity", "1", {.min = 0.2, .max = 0.6, .min_open = true, .max_open = true});
+  consolidation->Finish();
+  if (consolidation->Has("friction_coefficient") == consolidation->Has("porosity")) {
+    map.Problem("consolidation", "needs exactly one of friction_coefficient and porosity");
+  }
+}
+
+void ReadInitialStress(MapReader& map, Experiment& experiment) {
+  auto stress = map.Map("initial_stress");
+  if (!stress) return;
+  for (const char* key : {"axial", "lateral"})
+    stress->Require(key, "both principal stresses are needed");
+  const auto axial = stress->Quantity("axial", "Pa", kPositive);
+  const auto lateral = stress->Quantity("lateral", "Pa", kPositive);
+  stress->Finish();
+  if (axial && lateral)
+    experiment.initial_stress = dem::InitialStress{.axial = *axial, .lateral = *lateral};
+}
+
+void ReadDamping(MapReader& staging, dem::Staging& out) {
+  const YamlNode* damping = staging.Find("damping");
+  if (damping == nullptr) return;
+  if (damping->kind != YamlNode::Kind::kSequence || damping->items.size() != 2) {
+    staging.Problem("damping",
+                    "is a list of two: [while straining, while settling], e.g. [0.2, 0.9]");
+    return;
+  }
+  const std::string path = staging.PathOf("damping");
+  out.damping_loading = ReadQuantity(damping->items[0], path, "1", kDamping, staging.problems());
+  out.damping_settling = ReadQuantity(damping->items[1], path, "1", kDamping, staging.problems());
+}
+
+void ReadStaging(MapReader& map, Experiment& experiment) {
+  experiment.loading_rate = map.Quantity("loading_rate", "1/s", kPositive);
+  auto staging = map.Map("staging");
+  if (!staging) return;
+  if (map.Has("loading_rate")) {
+    map.Problem(
+        "staging",
+        "goes without loading_rate: loading at a real rate has no stages; keep one of them");
+  }
+  experiment.staging.rate = staging->Quantity("rate", "1/s", kPositive);
+  experiment.staging.step =
+      staging->Quantity("step", "1", {.min = 0, .max = 0.1, .min_open = true});
+  experiment.staging.unbalanced =
+      staging->Quantity("unbalanced", "1", {.min = 0, .max = 1, .min_open = true});
+  ReadDamping(*staging, experiment.staging);
+  staging->Finish();
+}
+
+const dem::TestInfo* ReadTest(MapReader& map, const Campaign& campaign, Experiment& experiment) {
+  const std::vector<std::string> names = TestNames();
+  if (!campaign.precomputed && map.Require("test", "one of " + Listed(names)) == nullptr)
+    return nullptr;
+  experiment.test = map.Choice("test", names).value_or("");
+  return dem::FindTest(experiment.test);
+}
+
+// Keys that only a simulation needs: all problems with them at once.
+void RefuseSimulationKeys(const MapReader& map) {
+  for (const char* key :
+       {"packing", "realizations", "consolidation", "initial_stress", "loading_rate", "staging"}) {
+    if (map.Has(key)) map.Problem(key, "has no meaning with precomputed runs; remove it");
+  }
+}
+
+void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
+  Experiment experiment;
+  experiment.name = ReadName(map, campaign);
+  const dem::TestInfo* test = ReadTest(map, campaign, experiment);
+  if (test != nullptr) ReadSettings(map, *test, experiment);
+  experiment.role =
+      map.Choice("role", {"calibrate", "validate"}).value_or("calibrate") == "validate"
+          ? Role::kValidate
+          : Role::kCalibrate;
+  if (campaign.precomputed) {
+    map.Ignore(
+        {"packing", "realizations", "consolidation", "initial_stress", "loading_rate", "staging"});
+    if (test == nullptr) map.Ignore({"confining_pressure"});
+    RefuseSimulationKeys(map);
+  } else {
+    experiment.specimens = ReadSpecimens(map, context);
+    ReadConsolidation(map, experiment);
+    ReadInitialStress(map, experiment);
+    ReadStaging(map, experiment);
+  }
+  const MeasurementRules rules{
+      .precomputed = campaign.precomputed.has_value(),
+      .noise_needed = campaign.filter.noise != inference::NoiseMode::kEssTarget};
+  if (campaign.precomputed || test != nullptr) {
+    ReadMeasurements(map, rules, context, experiment);
+    map.Finish();
+  }  // with an unknown test neither its settings nor its observables can be told from mistakes
+  campaign.experiments.push_back(std::move(experiment));
+}
+
+}  // namespace
+
+void ReadExperiments(MapReader& campaign_map, ReadContext& context, Campaign& campaign) {
+  const YamlNode* node = campaign_map.Require(
+      "experiments", "a list of measurements and the lab tests that reproduce them");
+  if (node == nullptr) return;
+  if (node->kind != YamlNode::Kind::kSequence || node->items.empty()) {
+    campaign_map.Problem(
+        "experiments",
+        "has to be a list with at least one experiment, each beginning with '- name: ...'");
+    return;
+  }
+  for (std::size_t i = 0; i < node->items.size(); ++i) {
+    MapReader map(node->items[i], absl::StrCat("experiments[", i + 1, "]"), context.problems());
+    if (node->items[i].kind == YamlNode::Kind::kMap) ReadExperiment(map, context, campaign);
+  }
+  const auto calibrates = [](const Experiment& experiment) {
+    return experiment.role == Role::kCalibrate;
+  };
+  if (!campaign.experiments.empty() &&
+      std::none_of(campaign.experiments.begin(), campaign.experiments.end(), calibrates)) {
+    campaign_map.Problem("experiments",
+                         "are all for validation; at least one needs role: calibrate");
+  }
+}
+
+}  // namespace calib::campaign

@@ -1,0 +1,136 @@
+#include "server/campaign/read_inference.h"
+
+#include "absl/strings/str_cat.h"
+#include "server/campaign/suggestion.h"
+
+namespace calib::campaign {
+namespace {
+
+using inference::NoiseMode;
+
+constexpr Range kFraction{.min = 0, .max = 1, .min_open = true, .max_open = true};
+constexpr Range kPositive{.min = 0, .min_open = true};
+
+void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
+  const YamlNode* node = map.Find("noise");
+  if (node == nullptr) return;
+  if (node->kind == YamlNode::Kind::kMap) {
+    auto noise = map.Map("noise");
+    noise->Require("ess_target", "allowed: given, inferred or {ess_target: 0.2}");
+    filter.noise = NoiseMode::kEssTarget;
+    filter.ess_target = noise->Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
+    noise->Finish();
+    return;
+  }
+  const auto mode = map.Choice("noise", {"given", "inferred", "ess_target"});
+  if (mode == "inferred") filter.noise = NoiseMode::kInferred;
+  if (mode == "ess_target") filter.noise = NoiseMode::kEssTarget;
+}
+
+void ReadMethod(MapReader& map, Campaign& campaign) {
+  const std::vector<std::string> have = {"sqmc", "iterative_bayesian_filter"};
+  const auto method = map.Text("method");
+  if (method == "tmcmc" || method == "surrogate_msrs") {
+    map.Problem("method",
+                absl::StrCat(*method, " is not available in this build, which has ", Listed(have)));
+  } else if (method) {
+    map.Choice("method", have);
+  }
+  campaign.method = method == "sqmc" ? Method::kSqmc : Method::kIterativeBayesianFilter;
+}
+
+void ReadFilterOptions(MapReader& map, Campaign& campaign) {
+  inference::FilterOptions& filter = campaign.filter;
+  filter.tolerance = map.Quantity("tolerance", "1", kFraction).value_or(filter.tolerance);
+  filter.defensive_share =
+      map.Quantity("defensive_share", "1", {.min = 0, .max = 1, .max_open = true})
+          .value_or(filter.defensive_share);
+  filter.max_components =
+      static_cast<int>(map.Integer("max_components", 1, 1000).value_or(filter.max_components));
+  filter.concentration =
+      map.Quantity("concentration", "1", kPositive).value_or(filter.concentration);
+  if (map.Choice("design", {"halton", "sobol"}).value_or("halton") == "sobol")
+    filter.design = inference::Design::kSobol;
+  if (campaign.filter.noise != NoiseMode::kEssTarget) {
+    filter.ess_target = map.Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
+  } else if (map.Has("ess_target")) {
+    map.Ignore({"ess_target"});
+    map.Problem("ess_target", "is given by noise: {ess_target: ...} already; remove it here");
+  }
+}
+
+void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
+  constexpr std::int64_t kMostSamples = 1'000'000;
+  constexpr std::int64_t kMostIterations = 1000;
+  auto map = campaign_map.Map("inference");
+  if (map) {
+    ReadMethod(*map, campaign);
+    campaign.samples =
+        static_cast<int>(map->Integer("samples", 2, kMostSamples).value_or(campaign.samples));
+    campaign.max_iterations = static_cast<int>(
+        map->Integer("max_iterations", 1, kMostIterations).value_or(campaign.max_iterations));
+    ReadFilterOptions(*map, campaign);
+    if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&
+        campaign.max_iterations != 1) {
+      map->Problem(
+          "max_iterations",
+          "has to be 1 with sqmc, which has one iteration; use iterative_bayesian_filter for more");
+    }
+    map->Finish();
+  }
+  if (campaign.method == Method::kSqmc) campaign.max_iterations = 1;
+}
+
+void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
+  const YamlNode* node = campaign_map.Find("early_stopping");
+  if (node == nullptr) return;
+  if (node->kind == YamlNode::Kind::kScalar &&
+      (node->scalar == "off" || node->scalar == "none" || node->scalar == "false")) {
+    return;
+  }
+  auto map = campaign_map.Map("early_stopping");
+  if (!map) return;
+  EarlyStopping stopping;
+  map->Require("discard_at_most", "the posterior mass that stopping early may lose, e.g. 1e-3");
+  stopping.discard_at_most =
+      map->Quantity("discard_at_most", "1", kFraction).value_or(stopping.discard_at_most);
+  map->Finish();
+  // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing
+  // to stop.
+  if (campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed)
+    campaign.early_stopping = stopping;
+}
+
+void ReadFailure(MapReader& campaign_map, Campaign& campaign) {
+  auto map = campaign_map.Map("failure");
+  if (!map) return;
+  campaign.failure.attempts =
+      static_cast<int>(map->Integer("attempts", 1, 100).value_or(campaign.failure.attempts));
+  campaign.failure.pause_above =
+      map->Quantity("pause_above", "1", {.min = 0, .max = 1, .min_open = true})
+          .value_or(campaign.failure.pause_above);
+  map->Finish();
+}
+
+void ReadBudget(MapReader& campaign_map, Campaign& campaign) {
+  auto map = campaign_map.Map("budget");
+  if (!map) return;
+  constexpr std::int64_t kMost = 1'000'000'000;
+  campaign.budget.model_evaluations = map->Integer("model_evaluations", 1, kMost);
+  campaign.budget.core_hours = map->Quantity("core_hours", "1", kPositive);
+  map->Finish();
+}
+
+}  // namespace
+
+void ReadInference(MapReader& campaign_map, Campaign& campaign) {
+  ReadNoiseMode(campaign_map, campaign.filter);
+  ReadMethodSection(campaign_map, campaign);
+  ReadEarlyStopping(campaign_map, campaign);
+  ReadFailure(campaign_map, campaign);
+  ReadBudget(campaign_map, campaign);
+  campaign.seed = campaign_map.Seed("seed").value_or(campaign.seed);
+  campaign.filter.seed = campaign.seed;
+}
+
+}  // namespace calib::campaign

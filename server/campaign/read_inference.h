@@ -1,0 +1,10 @@
+#pragma once
+// How the campaign is inferred and run: noise, inference, early_stopping, failure, budget, seed.
+
+#include "server/campaign/map_reader.h"
+
+namespace calib::campaign {
+
+void ReadInference(MapReader& campaign_map, Campaign& campaign);
+
+}  // namespace calib::campaign

@@ -1,0 +1,139 @@
+#include "server/campaign/read_noise.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
+#include "server/campaign/suggestion.h"
+
+namespace calib::campaign {
+namespace {
+
+constexpr Range kPositive{.min = 0, .min_open = true};
+constexpr Range kNotNegative{.min = 0};
+constexpr double kNextToNothing = 1e-9;  // of the largest reading
+
+struct NoiseSpec {
+  std::optional<double> relative, floor, absolute;
+  std::string column;
+};
+
+std::string UnitOf(const std::string& name) {
+  const dem::ObservableInfo* info = dem::FindObservable(name);
+  return info != nullptr ? info->unit : "1";
+}
+
+// First reading that has no size to scale an error with; nullopt when all keep clear of zero.
+std::optional<std::size_t> ReadingAtZero(const std::vector<double>& raw) {
+  double largest = 0;
+  for (const double value : raw) largest = std::max(largest, std::abs(value));
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    const bool crosses = i > 0 && raw[i] * raw[i - 1] < 0;
+    if (std::abs(raw[i]) <= kNextToNothing * largest || crosses) return i;
+  }
+  return std::nullopt;
+}
+
+std::optional<NoiseSpec> ReadSpec(MapReader& noise, const std::string& name) {
+  const std::size_t before = noise.problems().size();
+  NoiseSpec spec;
+  spec.relative = noise.Quantity("relative", "1", kPositive);
+  spec.floor = noise.Quantity("floor", UnitOf(name), kNotNegative);
+  spec.absolute = noise.Quantity("absolute", UnitOf(name), kPositive);
+  spec.column = noise.Text("column").value_or("");
+  const int kinds = static_cast<int>(noise.Has("relative")) +
+                    static_cast<int>(noise.Has("absolute")) + static_cast<int>(noise.Has("column"));
+  if (kinds != 1) {
+    noise.problems().Add(noise.line(), noise.path(),
+                         "needs exactly one of relative (with floor), absolute and column");
+  } else if (noise.Has("floor") && !noise.Has("relative")) {
+    noise.Problem("floor", "belongs to relative noise: sd = sqrt((relative y)^2 + floor^2)");
+  }
+  if (noise.problems().size() > before) return std::nullopt;
+  return spec;
+}
+
+std::vector<double> FromColumn(const NoiseSpec& spec, const std::string& name,
+                               const LaboratoryTable& table, ReadContext& context) {
+  std::vector<double> sd = table.RawColumn(spec.column, name, context);
+  for (std::size_t i = 0; i < sd.size(); ++i) {
+    if (sd[i] <= 0) {
+      context.problems().AddIn(table.path(), table.LineOf(i), spec.column,
+                               "a standard deviation has to be greater than 0");
+    }
+  }
+  return sd;
+}
+
+std::vector<double> StandardDeviations(const NoiseSpec& spec, const MapReader& noise,
+                                       const std::string& name, const LaboratoryTable& table,
+                                       const std::vector<double>& raw, ReadContext& context) {
+  if (!spec.column.empty()) return FromColumn(spec, name, table, context);
+  if (spec.absolute) return std::vector<double>(raw.size(), *spec.absolute);
+  const double floor = spec.floor.value_or(0);
+  if (const auto zero = ReadingAtZero(raw); floor == 0 && zero) {
+    noise.Problem(
+        "relative",
+        absl::StrCat(name, " reaches zero (", table.path(), ":", table.LineOf(*zero),
+                     "), where a relative error vanishes; add floor: ... or give absolute or "
+                     "per-point noise"));
+    return {};
+  }
+  std::vector<double> sd;
+  for (const double value : raw) sd.push_back(std::hypot(*spec.relative * value, floor));
+  return sd;
+}
+
+void RefuseZeroReadings(const MapReader& experiment, const std::string& name,
+                        const LaboratoryTable& table, const std::vector<double>& raw) {
+  double largest = 0;
+  for (const double value : raw) largest = std::max(largest, std::abs(value));
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    if (std::abs(raw[i]) > kNextToNothing * largest) continue;
+    experiment.problems().Add(experiment.LineOf("observables"),
+                              experiment.PathOf("observables." + name),
+                              absl::StrCat("is zero in ", table.path(), ":", table.LineOf(i),
+                                           ", but ess_target scales errors with the reading; leave "
+                                           "the row out or use noise: given"));
+    return;
+  }
+}
+
+}  // namespace
+
+void ReadNoise(const MapReader& experiment, const std::string& name, const YamlNode* node,
+               const NoiseRules& rules, const LaboratoryTable* table,
+               const std::vector<double>& raw, ReadContext& context,
+               MeasuredObservable& observable) {
+  const bool readable = table != nullptr && std::none_of(raw.begin(), raw.end(),
+                                                         [](double v) { return std::isnan(v); });
+  if (!rules.noise_needed && readable) RefuseZeroReadings(experiment, name, *table, raw);
+  const std::string path = experiment.PathOf("observables." + name);
+  const bool given = node != nullptr && node->kind != YamlNode::Kind::kNull;
+  bool noise_given = false;
+  if (given) {
+    MapReader map(*node, path, context.problems());
+    observable.ess_weight = map.Quantity("weight", "1", kPositive).value_or(1);
+    noise_given = map.Has("noise") || node->kind != YamlNode::Kind::kMap;
+    if (auto noise = map.Map("noise")) {
+      const auto spec = ReadSpec(*noise, name);
+      observable.correlation_length =
+          noise->Quantity("correlation_length", UnitOf(rules.control), kNotNegative).value_or(0);
+      noise->Finish();
+      if (spec && readable) {
+        observable.sd = StandardDeviations(*spec, *noise, name, *table, raw, context);
+        for (std::size_t i = 0; i < observable.sd.size(); ++i)
+          observable.sd[i] *= table->Slope(name, raw[i]);
+      }
+    }
+    map.Finish();
+  }
+  if (!noise_given && rules.noise_needed) {
+    context.problems().Add(
+        given ? node->line : experiment.LineOf("observables"), path + ".noise",
+        "is missing; e.g. {relative: 0.02, floor: 0.01}, {absolute: 0.1 percent} or {column: sd}");
+  }
+}
+
+}  // namespace calib::campaign

@@ -1,0 +1,14 @@
+#pragma once
+// The keys `packing` and `realizations` of an experiment.
+
+#include <vector>
+
+#include "server/campaign/read_context.h"
+
+namespace calib::campaign {
+
+/// {file: F}, {files: [F, ...]} or {generate: {...}}; realizations: R makes R packings of a recipe
+/// (seeds seed .. seed + R - 1) or takes the first R of the files. Empty after a problem.
+std::vector<Specimen> ReadSpecimens(MapReader& experiment, ReadContext& context);
+
+}  // namespace calib::campaign
