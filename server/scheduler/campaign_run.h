@@ -1,0 +1,82 @@
+#pragma once
+// A live campaign in memory: which evaluations still need what, and how well the running iteration does so far. It
+// mirrors the store; after a restart, and after every plan, it is read again from there.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/scheduler/definition.h"
+#include "server/scheduler/transitions.h"
+#include "server/store/reader.h"
+
+namespace calib::scheduler {
+
+/// How the running iteration does, from the load steps that every sample has reached.
+struct LiveView {
+  double effective_samples = 0;
+  double best_misfit = 0;
+};
+
+/// Not thread-safe.
+class CampaignRun {
+ public:
+  struct Evaluation {
+    store::EvaluationStatus status = store::EvaluationStatus::kWaiting;
+    int failures = 0;
+    std::set<int> missing{};  ///< load steps not yet there
+  };
+
+  static absl::StatusOr<std::unique_ptr<CampaignRun>> Load(store::Reader& reader, std::int64_t id);
+  /// Reads samples, evaluations and states again. Progress is kept: memory may be ahead of the disk in it.
+  absl::Status Reload(store::Reader& reader);
+
+  std::int64_t id() const { return id_; }
+  const Definition& definition() const { return *definition_; }
+  std::shared_ptr<const Definition> shared_definition() const { return definition_; }
+  const store::CampaignRecord& record() const { return record_; }
+  store::CampaignProgress& progress() { return record_.progress; }
+  CampaignState state() const { return state_; }
+  /// FAILED_PRECONDITION when the event is not allowed now; else changes state() and progress().
+  absl::Status Apply(CampaignEvent event, const std::string& reason);
+
+  Evaluation* Find(const store::EvaluationKey& key);
+  /// Keys with this status, in order.
+  std::vector<store::EvaluationKey> With(store::EvaluationStatus status) const;
+  bool AllTerminal() const;
+  const std::vector<double>& Parameters(int sample) const { return parameters_.at(sample); }
+
+  /// Everything wrong with a state that a worker sent, in a sentence; empty: acceptable.
+  std::string Refusal(const store::EvaluationKey& key, int load_step,
+                      std::span<const double> observables) const;
+  void AddState(const store::EvaluationKey& key, int load_step,
+                std::span<const double> observables);
+  void SetStatus(const store::EvaluationKey& key, store::EvaluationStatus status, int failures);
+
+  /// Samples of the running iteration of which an evaluation diverged, and those with nothing left to run.
+  int Diverged() const;
+  int Done() const;
+  LiveView View() const;
+
+ private:
+  CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition)
+      : id_(id), definition_(std::move(definition)) {}
+  Eigen::Index Position(int sample) const;  ///< row of a sample of the running iteration, else -1
+
+  std::int64_t id_;
+  std::shared_ptr<const Definition> definition_;
+  store::CampaignRecord record_;
+  CampaignState state_ = CampaignState::kQueued;
+  std::map<store::EvaluationKey, Evaluation> evaluations_;
+  std::map<int, std::vector<double>> parameters_;  // by sample
+  Eigen::MatrixXd predictions_;                    // of the running iteration
+  std::vector<char> diverged_;
+};
+
+}  // namespace calib::scheduler

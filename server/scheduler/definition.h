@@ -1,0 +1,59 @@
+#pragma once
+// A stored campaign as it is worked on: read again from what was submitted, with what follows from it.
+
+#include <Eigen/Dense>
+#include <map>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/campaign/campaign.h"
+#include "server/campaign/campaign_file.h"
+#include "server/store/reader.h"
+
+namespace calib::scheduler {
+
+/// Where the numbers of a state stand in a row of predictions (the order of inference::DataSet::readings).
+class ReadingIndex {
+ public:
+  ReadingIndex(const campaign::Campaign& campaign, const inference::DataSet& data);
+
+  /// Copies what was measured at this load step out of a state's observables.
+  void Place(int experiment, int load_step, std::span<const double> observables,
+             Eigen::Ref<Eigen::RowVectorXd> predictions) const;
+
+ private:
+  struct Column {
+    Eigen::Index reading;
+    std::size_t observable;  ///< position in the state
+  };
+  std::map<std::pair<int, int>, std::vector<Column>> columns_;  // by (experiment, load step)
+};
+
+struct Definition {
+  campaign::Campaign campaign;
+  inference::DataSet data;
+  std::vector<inference::Prior> priors;
+  ReadingIndex readings;
+
+  /// Load steps that a complete evaluation of the experiment has.
+  std::vector<int> LoadSteps(int experiment) const;
+  /// Numbers in one of its states.
+  std::size_t StateSize(int experiment) const;
+  /// Indices of the experiments with this role, in the order of the file.
+  std::vector<int> ExperimentsOf(campaign::Role role) const;
+};
+
+/// Reads files by their digests in `files` (path -> digest) from the store.
+campaign::FileReader StoredFiles(store::Reader& reader,
+                                 const std::map<std::string, std::string>& files);
+
+/// FAILED_PRECONDITION when what was accepted once is refused by this program (the message has the first problem).
+absl::StatusOr<std::shared_ptr<const Definition>> LoadDefinition(
+    store::Reader& reader, const store::NewCampaign& submitted);
+
+std::shared_ptr<const Definition> MakeDefinition(campaign::Campaign campaign);
+
+}  // namespace calib::scheduler

@@ -1,0 +1,28 @@
+#pragma once
+// All that a campaign has computed so far, as inference takes it.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/filter/iterative_filter.h"
+#include "server/scheduler/definition.h"
+#include "server/store/reader.h"
+
+namespace calib::scheduler {
+
+struct History {
+  std::vector<inference::Iteration> iterations;   ///< predictions of samples that did not finish are NaN
+  std::vector<std::vector<char>> diverged;        ///< [iteration][position]: it has no finite prediction
+  std::vector<store::SampleRecord> samples;       ///< of all iterations
+  std::optional<std::string> last_posterior;      ///< JSON, of the last iteration that has one
+  int stopped_early = 0;
+  store::Effort effort;
+};
+
+/// Reads every record in the order of its natural key.
+absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t campaign,
+                                    store::Reader& reader);
+
+}  // namespace calib::scheduler

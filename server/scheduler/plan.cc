@@ -1,0 +1,294 @@
+#include "server/scheduler/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include "absl/strings/str_cat.h"
+#include "server/scheduler/attempt_spec.h"
+#include "server/scheduler/history.h"
+#include "server/scheduler/posterior_record.h"
+
+namespace calib::scheduler {
+namespace {
+
+using campaign::Role;
+using store::EvaluationStatus;
+
+// Held-out experiments are run for the samples that carry the posterior.
+constexpr double kValidatedMass = 0.99;
+constexpr std::size_t kMostValidatedSamples = 20;
+
+class Planner {
+ public:
+  Planner(const Definition& definition, const store::CampaignRecord& record, store::Reader& reader)
+      : definition_(definition),
+        campaign_(definition.campaign),
+        record_(record),
+        reader_(reader) {}
+
+  absl::StatusOr<Plan> Next() {
+    absl::StatusOr<History> history = LoadHistory(definition_, record_.submitted.id, reader_);
+    if (!history.ok()) {
+      return history.status();
+    }
+    history_ = *std::move(history);
+    plan_.phase = record_.progress.phase;
+    plan_.converged = record_.progress.converged;
+    absl::Status status;
+    if (history_.iterations.empty()) {
+      status = Begin(0, inference::Proposal{});
+      if (campaign_.precomputed.has_value()) {
+        plan_.event = CampaignEvent::kStart;
+      }
+    } else if (plan_.phase == "calibrating") {
+      status = Conclude();
+    } else {
+      Finish();
+    }
+    if (!status.ok()) {
+      return status;
+    }
+    return std::move(plan_);
+  }
+
+ private:
+  void Finish() {
+    plan_.phase = "done";
+    plan_.event = CampaignEvent::kFinish;
+  }
+
+  absl::Status Fail(const absl::Status& why) {
+    plan_ = Plan{};
+    plan_.phase = record_.progress.phase;
+    plan_.event = CampaignEvent::kFail;
+    plan_.reason = std::string(why.message());
+    return absl::OkStatus();
+  }
+
+  /// Posterior of the iteration that has just ended, then whatever follows from it.
+  absl::Status Conclude() {
+    const auto posterior = inference::ComputePosterior(definition_.priors, definition_.data,
+                                                       campaign_.filter, history_.iterations);
+    if (!posterior.ok()) {
+      return Fail(posterior.status());
+    }
+    const int iteration = static_cast<int>(history_.iterations.size()) - 1;
+    absl::StatusOr<bool> converged = IsConverged(*posterior);
+    if (!converged.ok()) {
+      return converged.status();
+    }
+    plan_.converged = *converged;
+    AddConclusion(*posterior, iteration);
+    const bool last = *converged || campaign_.method == campaign::Method::kSqmc ||
+                      campaign_.precomputed.has_value() ||
+                      iteration + 1 >= campaign_.max_iterations || BudgetSpent();
+    if (last) {
+      return Validate();
+    }
+    const auto proposal = inference::FitProposal(definition_.priors, definition_.data,
+                                                 campaign_.filter, history_.iterations);
+    if (!proposal.ok()) {
+      return Fail(proposal.status());
+    }
+    return Begin(iteration + 1, *proposal);
+  }
+
+  absl::StatusOr<bool> IsConverged(const inference::Posterior& posterior) {
+    if (!IsTrustworthy(posterior)) {
+      return false;
+    }
+    if (campaign_.method == campaign::Method::kSqmc || campaign_.precomputed.has_value()) {
+      return true;  // one iteration is all there is
+    }
+    if (!history_.last_posterior.has_value()) {
+      return false;
+    }
+    const auto before = PosteriorFromJson(*history_.last_posterior);
+    if (!before.ok()) {
+      return before.status();
+    }
+    return inference::MeansConverged(MeansOf(*before), posterior, campaign_.filter);
+  }
+
+  void AddConclusion(const inference::Posterior& posterior, int iteration) {
+    Conclusion conclusion{
+        .iteration = iteration,
+        .posterior = ToMessage(definition_, posterior, iteration, plan_.converged),
+        .log_weights = {posterior.log_weights.begin(), posterior.log_weights.end()}};
+    conclusion.posterior.set_campaign(absl::StrCat("c", record_.submitted.id));
+    conclusion.posterior.set_model_evaluations(history_.effort.model_evaluations);
+    conclusion.posterior.set_stopped_early(history_.stopped_early);
+    const auto view = inference::ViewOnline(definition_.data, campaign_.filter,
+                                            history_.iterations.back().predictions,
+                                            history_.diverged.back());
+    conclusion.posterior.set_best_misfit(view.best_rms);
+    plan_.log.push_back(absl::StrCat("iteration ", iteration, " complete: ", posterior.ess,
+                                     " effective samples, log evidence ", posterior.log_evidence));
+    plan_.conclusion = std::move(conclusion);
+  }
+
+  /// True when the next iteration would exceed what the user allowed.
+  bool BudgetSpent() {
+    const campaign::Budget& budget = campaign_.budget;
+    const auto next = static_cast<std::int64_t>(campaign_.samples) *
+                      static_cast<std::int64_t>(definition_.ExperimentsOf(Role::kCalibrate).size());
+    const bool spent =
+        (budget.model_evaluations.has_value() &&
+         history_.effort.model_evaluations + next > *budget.model_evaluations) ||
+        (budget.core_hours.has_value() && history_.effort.core_seconds > *budget.core_hours * 3600);
+    if (spent) {
+      plan_.log.emplace_back("no further iteration: it would exceed the budget");
+    }
+    return spent;
+  }
+
+  absl::Status Begin(int iteration, const inference::Proposal& proposal) {
+    Start start{.iteration = iteration, .proposal = ProposalToJson(proposal), .samples = {}};
+    Eigen::MatrixXd parameters;
+    if (campaign_.precomputed.has_value()) {
+      parameters = campaign_.precomputed->parameters;
+    } else {
+      auto drawn = inference::DrawSamples(proposal, definition_.priors, campaign_.filter, iteration,
+                                          campaign_.samples);
+      if (!drawn.ok()) {
+        return Fail(drawn.status());
+      }
+      parameters = *std::move(drawn);
+    }
+    const int first = iteration * record_.submitted.samples;
+    for (Eigen::Index i = 0; i < parameters.rows(); ++i) {
+      const Eigen::VectorXd row = parameters.row(i);
+      start.samples.push_back({.sample = first + static_cast<int>(i),
+                               .iteration = iteration,
+                               .parameters = {row.begin(), row.end()}});
+    }
+    for (const store::SampleRecord& sample : start.samples) {
+      if (absl::Status status = campaign_.precomputed.has_value()
+                                    ? TakeFromTables(sample)
+                                    : Ask(sample, definition_.ExperimentsOf(Role::kCalibrate));
+          !status.ok()) {
+        return status;
+      }
+    }
+    plan_.start = std::move(start);
+    return absl::OkStatus();
+  }
+
+  /// Adds evaluations of these experiments, reusing what was run before.
+  absl::Status Ask(const store::SampleRecord& sample, const std::vector<int>& experiments) {
+    for (const int experiment : experiments) {
+      store::EvaluationRecord evaluation{
+          .key = {record_.submitted.id, sample.sample, experiment},
+          .digest =
+              SpecDigest(SpecOf(campaign_, experiment, sample.parameters, sample.sample))};
+      const auto equal = reader_.FindEqual(evaluation.digest);
+      if (!equal.ok()) {
+        return equal.status();
+      }
+      if (equal->has_value()) {
+        plan_.reused.emplace_back(**equal, evaluation.key);
+      }
+      plan_.evaluations.push_back(std::move(evaluation));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeFromTables(const store::SampleRecord& sample) {
+    for (std::size_t e = 0; e < campaign_.experiments.size(); ++e) {
+      const std::size_t width = campaign_.experiments[e].observables.size();
+      const auto& values =
+          campaign_.precomputed->values[e][static_cast<std::size_t>(sample.sample)];
+      const bool finite =
+          std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+      const store::EvaluationKey key{record_.submitted.id, sample.sample, static_cast<int>(e)};
+      plan_.evaluations.push_back(
+          {.key = key,
+           .status = finite ? EvaluationStatus::kFinished : EvaluationStatus::kDiverged,
+           .reason = finite ? "" : "the table holds a value that is not finite",
+           .reused = true});
+      for (std::size_t r = 0; finite && (r + 1) * width <= values.size(); ++r) {
+        const auto at = values.begin() + static_cast<std::ptrdiff_t>(r * width);
+        plan_.states.push_back({.key = key,
+                                .load_step = static_cast<int>(r),
+                                .observables = {at, at + static_cast<std::ptrdiff_t>(width)}});
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  /// Held-out experiments for the samples with the largest weights (ties: the earlier sample).
+  absl::Status Validate() {
+    const auto experiments = definition_.ExperimentsOf(Role::kValidate);
+    if (experiments.empty() || campaign_.precomputed.has_value()) {
+      Finish();
+      return absl::OkStatus();
+    }
+    const std::vector<double>& log_weights = plan_.conclusion->log_weights;
+    std::vector<std::size_t> order(log_weights.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return log_weights[a] > log_weights[b];
+    });
+    double mass = 0;
+    for (std::size_t i = 0;
+         i < std::min(order.size(), kMostValidatedSamples) && mass < kValidatedMass; ++i) {
+      mass += std::exp(log_weights[order[i]]);
+      if (absl::Status status = Ask(history_.samples[order[i]], experiments); !status.ok()) {
+        return status;
+      }
+    }
+    plan_.phase = "validating";
+    return absl::OkStatus();
+  }
+
+  const Definition& definition_;
+  const campaign::Campaign& campaign_;
+  const store::CampaignRecord& record_;
+  store::Reader& reader_;
+  History history_;
+  Plan plan_;
+};
+
+}  // namespace
+
+absl::StatusOr<Plan> PlanNext(const Definition& definition, const store::CampaignRecord& campaign,
+                              store::Reader& reader) {
+  return Planner(definition, campaign, reader).Next();
+}
+
+void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgress& progress,
+           std::int64_t unix_ms, store::Transaction& transaction) {
+  if (plan.conclusion.has_value()) {
+    const Conclusion& conclusion = *plan.conclusion;
+    transaction.SetPosterior(campaign, conclusion.iteration,
+                             PosteriorToJson(conclusion.posterior));
+    for (std::size_t i = 0; i < conclusion.log_weights.size(); ++i) {
+      transaction.SetWeight(campaign, static_cast<int>(i), conclusion.log_weights[i],
+                            store::kUnknown);
+    }
+  }
+  if (plan.start.has_value()) {
+    transaction.InsertIteration(campaign, plan.start->iteration, plan.start->proposal);
+    for (const store::SampleRecord& sample : plan.start->samples) {
+      transaction.InsertSample(campaign, sample);
+    }
+  }
+  for (const store::EvaluationRecord& evaluation : plan.evaluations) {
+    transaction.InsertEvaluation(evaluation);
+  }
+  for (const auto& [from, to] : plan.reused) {
+    transaction.ReuseEvaluation(from, to);
+  }
+  for (const store::StateRecord& state : plan.states) {
+    transaction.PutState(state, unix_ms);
+  }
+  transaction.SetProgress(campaign, progress);
+  for (const std::string& line : plan.log) {
+    transaction.Log(campaign, unix_ms, line);
+  }
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,172 @@
+#include "server/scheduler/posterior_record.h"
+
+#include <google/protobuf/util/json_util.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "absl/strings/str_cat.h"
+
+namespace calib::scheduler {
+namespace {
+
+constexpr double kLargestParetoIndex = 0.7;
+constexpr double kSmallestEffectiveSamples = 10;
+constexpr double kTail = 1e-3;  // shown as the range of an unbounded prior
+
+const char* ToString(inference::NoiseMode mode) {
+  switch (mode) {
+    case inference::NoiseMode::kGiven:
+      return "given";
+    case inference::NoiseMode::kInferred:
+      return "inferred";
+    case inference::NoiseMode::kEssTarget:
+      break;
+  }
+  return "ess_target";
+}
+
+void AddParameters(const Definition& definition, const inference::Posterior& posterior,
+                   v1::Posterior& message) {
+  for (std::size_t i = 0; i < posterior.parameters.size(); ++i) {
+    const inference::ParameterSummary& summary = posterior.parameters[i];
+    const campaign::CalibratedParameter& parameter = definition.campaign.parameters[i];
+    const inference::Prior& prior = parameter.prior;
+    v1::Posterior::Parameter& out = *message.add_parameters();
+    out.set_name(parameter.name);
+    out.set_unit(parameter.unit);
+    out.set_mean(summary.mean);
+    out.set_sd(summary.sd);
+    out.set_cov(summary.cov);
+    out.set_q05(summary.q05);
+    out.set_q50(summary.q50);
+    out.set_q95(summary.q95);
+    out.set_at_bound(summary.at_bound);
+    out.set_prior_min(std::isfinite(prior.min) ? prior.min : prior.Quantile(kTail));
+    out.set_prior_max(std::isfinite(prior.max) ? prior.max : prior.Quantile(1 - kTail));
+  }
+}
+
+void AddPath(const Definition& definition, const inference::PosteriorPath& path,
+             v1::Posterior& message) {
+  for (std::size_t s = 0; s < path.load_step.size(); ++s) {
+    const auto row = static_cast<Eigen::Index>(s);
+    v1::Posterior::PathPoint& point = *message.add_path();
+    point.set_experiment(
+        definition.campaign.experiments[static_cast<std::size_t>(path.experiment[s])].name);
+    point.set_load_step(path.load_step[s]);
+    for (Eigen::Index j = 0; j < path.mean.cols(); ++j) {
+      point.add_mean(path.mean(row, j));
+      point.add_cov(path.cov(row, j));
+    }
+    point.set_ess(path.ess(row));
+  }
+}
+
+using Json = nlohmann::json;
+
+Json ToJson(const Eigen::VectorXd& values) {
+  return Json(std::vector<double>(values.data(), values.data() + values.size()));
+}
+
+Eigen::VectorXd ToVector(const Json& json) {
+  const auto values = json.get<std::vector<double>>();
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+}  // namespace
+
+v1::Posterior ToMessage(const Definition& definition, const inference::Posterior& posterior,
+                        int iteration, bool converged) {
+  v1::Posterior message;
+  message.set_iteration(iteration);
+  message.set_iterations(iteration + 1);
+  message.set_converged(converged);
+  message.set_log_evidence(posterior.log_evidence);
+  message.set_log_evidence_se(posterior.log_evidence_se);
+  message.set_ess(posterior.ess);
+  message.set_pareto_k(posterior.pareto_k);
+  if (posterior.sigma.has_value()) {
+    message.set_sigma(*posterior.sigma);
+  }
+  AddParameters(definition, posterior, message);
+  for (Eigen::Index i = 0; i < posterior.correlation.rows(); ++i) {
+    for (Eigen::Index j = 0; j < posterior.correlation.cols(); ++j) {
+      message.add_correlation(posterior.correlation(i, j));
+    }
+  }
+  AddPath(definition, posterior.path, message);
+  message.mutable_warnings()->Add(posterior.warnings.begin(), posterior.warnings.end());
+  message.set_noise(ToString(definition.campaign.filter.noise));
+  return message;
+}
+
+std::string PosteriorToJson(const v1::Posterior& posterior) {
+  std::string json;
+  google::protobuf::util::JsonPrintOptions options;
+  options.preserve_proto_field_names = true;
+  // Fails only for maps and Any of unknown types, which the message does not have.
+  (void)google::protobuf::util::MessageToJsonString(posterior, &json, options);
+  return json;
+}
+
+absl::StatusOr<v1::Posterior> PosteriorFromJson(const std::string& json) {
+  v1::Posterior posterior;
+  if (const auto status = google::protobuf::util::JsonStringToMessage(json, &posterior);
+      !status.ok()) {
+    return absl::DataLossError(
+        absl::StrCat("stored posterior: ", std::string(status.message())));
+  }
+  return posterior;
+}
+
+std::string ProposalToJson(const inference::Proposal& proposal) {
+  Json json{{"defensive_share", proposal.defensive_share},
+            {"log_acceptance", proposal.log_acceptance},
+            {"components", Json::array()}};
+  for (const auto& component : proposal.components) {
+    json["components"].push_back(
+        {{"weight", component.weight},
+         {"mean", ToJson(component.mean)},
+         {"covariance", ToJson(component.covariance.reshaped())}});
+  }
+  return json.dump();
+}
+
+absl::StatusOr<inference::Proposal> ProposalFromJson(const std::string& text) {
+  try {
+    const Json json = Json::parse(text);
+    inference::Proposal proposal;
+    proposal.defensive_share = json.at("defensive_share").get<double>();
+    proposal.log_acceptance = json.at("log_acceptance").get<double>();
+    for (const Json& item : json.at("components")) {
+      inference::Proposal::Component component;
+      component.weight = item.at("weight").get<double>();
+      component.mean = ToVector(item.at("mean"));
+      const Eigen::Index d = component.mean.size();
+      component.covariance = ToVector(item.at("covariance")).reshaped(d, d);
+      proposal.components.push_back(std::move(component));
+    }
+    return proposal;
+  } catch (const Json::exception& error) {
+    return absl::DataLossError(absl::StrCat("stored proposal: ", error.what()));
+  }
+}
+
+inference::Posterior MeansOf(const v1::Posterior& posterior) {
+  inference::Posterior means;
+  for (const auto& parameter : posterior.parameters()) {
+    inference::ParameterSummary& summary = means.parameters.emplace_back();
+    summary.mean = parameter.mean();
+    summary.sd = parameter.sd();
+    summary.cov = parameter.cov();
+  }
+  return means;
+}
+
+bool IsTrustworthy(const inference::Posterior& posterior) {
+  return posterior.pareto_k <= kLargestParetoIndex && posterior.ess >= kSmallestEffectiveSamples;
+}
+
+}  // namespace calib::scheduler

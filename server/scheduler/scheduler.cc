@@ -1,0 +1,341 @@
+// Campaigns: taking them up, their states, and what they do next. Workers: scheduler_workers.cc.
+#include "server/scheduler/scheduler.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace calib::scheduler {
+
+using store::EvaluationKey;
+using store::EvaluationStatus;
+using store::Transaction;
+
+namespace {
+
+/// Too few samples say nothing about the share that fails.
+constexpr int kFewestDoneToPause = 4;
+
+}  // namespace
+
+absl::Status Scheduler::Load() {
+  auto reader = ports_.Read();
+  if (!reader.ok()) {
+    return reader.status();
+  }
+  const auto last_attempt = reader->LastAttempt();
+  const auto last_campaign = reader->LastCampaign();
+  const auto campaigns = reader->Campaigns();
+  const auto attempts = reader->ActiveAttempts();
+  for (const absl::Status& status :
+       {last_attempt.status(), last_campaign.status(), campaigns.status(), attempts.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  last_attempt_ = *last_attempt;
+  last_campaign_ = *last_campaign;
+  for (const store::CampaignRecord& record : *campaigns) {
+    const auto state = ToCampaignState(record.progress.state);
+    if (!state.has_value() || !IsOver(*state)) {
+      TakeUp(record.submitted.id, *reader);
+    }
+  }
+  for (const store::ActiveAttempt& attempt : *attempts) {
+    CampaignRun* run = FindRun(attempt.key.campaign);
+    leases_.Grant(attempt.id, attempt.key, attempt.worker, ports_.Now());
+    if (run == nullptr) {
+      GiveBack(*leases_.Release(attempt.id), {}, "lost", false);
+    }
+  }
+  for (auto& [id, run] : runs_) {
+    Enqueue(*run);
+    Advance(id);
+  }
+  return absl::OkStatus();
+}
+
+void Scheduler::TakeUp(std::int64_t campaign, store::Reader& reader) {
+  auto run = CampaignRun::Load(reader, campaign);
+  if (run.ok()) {
+    runs_[campaign] = *std::move(run);
+    return;
+  }
+  // One campaign that cannot be read must not keep the others from going on.
+  const store::CampaignProgress failed{.state = ToString(CampaignState::kFailed),
+                                       .reason = std::string(run.status().message())};
+  ports_.Write(
+      [=, now = ports_.UnixMs()](Transaction& transaction) {
+        transaction.SetProgress(campaign, failed);
+        transaction.Log(campaign, now, absl::StrCat("failed: ", failed.reason));
+      },
+      [](const absl::Status&) {});
+}
+
+CampaignRun* Scheduler::FindRun(std::int64_t campaign) {
+  const auto found = runs_.find(campaign);
+  return found == runs_.end() ? nullptr : found->second.get();
+}
+
+void Scheduler::Enqueue(CampaignRun& run) {
+  const bool leasable = IsLeasable(run.state());
+  for (const EvaluationKey& key : run.With(EvaluationStatus::kWaiting)) {
+    if (leasable) {
+      queue_.insert(key);
+    } else {
+      queue_.erase(key);
+    }
+  }
+}
+
+void Scheduler::Submit(store::NewCampaign submitted, std::map<std::string, std::string> files,
+                       const std::string& request_id, const store::RequestRecord& request,
+                       std::function<void(absl::StatusOr<std::string>)> reply) {
+  submitted.id = ++last_campaign_;
+  const std::int64_t id = submitted.id;
+  const std::string answer = absl::StrCat("c", id);
+  ports_.Write(
+      [submitted = std::move(submitted), files = std::move(files), request_id, request, answer,
+       now = ports_.UnixMs()](Transaction& transaction) {
+        transaction.InsertCampaign(submitted, files);
+        if (!request_id.empty()) {
+          transaction.PutRequest(request_id, {.digest = request.digest, .answer = answer});
+        }
+        transaction.Log(submitted.id, now, "submitted");
+      },
+      [this, id, answer, reply = std::move(reply)](const absl::Status& status) {
+        if (!status.ok()) {
+          reply(status);
+          return;
+        }
+        reply(answer);
+        if (auto reader = ports_.Read(); reader.ok()) {
+          TakeUp(id, *reader);
+          Advance(id);
+        }
+        ++version_;
+      });
+}
+
+void Scheduler::SetState(CampaignRun& run, CampaignEvent event, const std::string& reason,
+                         const store::Store::Job& also, const Reply& reply) {
+  if (absl::Status status = run.Apply(event, reason); !status.ok()) {
+    reply(status);
+    return;
+  }
+  ++version_;
+  Enqueue(run);
+  ports_.Write(
+      [id = run.id(), progress = run.progress(), now = ports_.UnixMs(), also,
+       line = reason.empty() ? absl::StrCat(ToString(event))
+                             : absl::StrCat(ToString(event), ": ", reason)](Transaction& t) {
+        t.SetProgress(id, progress);
+        t.Log(id, now, line);
+        if (also) {
+          also(t);
+        }
+      },
+      [this, id = run.id(), reply](const absl::Status& status) {
+        reply(status);
+        if (status.ok()) {
+          Advance(id);
+          Dispatch();
+        }
+      });
+}
+
+void Scheduler::Pause(std::int64_t campaign, const Reply& reply) {
+  CampaignRun* run = FindRun(campaign);
+  if (run == nullptr) {
+    reply(absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
+    return;
+  }
+  SetState(*run, CampaignEvent::kPause, "asked for", nullptr, reply);
+}
+
+void Scheduler::Resume(std::int64_t campaign, const Reply& reply) {
+  CampaignRun* run = FindRun(campaign);
+  if (run == nullptr) {
+    reply(absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
+    return;
+  }
+  if (run->state() == CampaignState::kPaused) {
+    // What paused it is known to whoever resumes it: not asked again in this iteration.
+    run->progress().pause_waived = run->progress().pause_waived || run->Diverged() > 0;
+  }
+  std::vector<EvaluationKey> again;
+  if (run->state() == CampaignState::kPaused) {
+    again = run->With(EvaluationStatus::kFailed);
+    for (const EvaluationKey& key : again) {
+      run->SetStatus(key, EvaluationStatus::kWaiting, 0);
+    }
+  }
+  SetState(
+      *run, CampaignEvent::kResume, "",
+      [again](Transaction& transaction) {
+        for (const EvaluationKey& key : again) {
+          transaction.SetEvaluation(key, EvaluationStatus::kWaiting, "", 0);
+        }
+      },
+      reply);
+}
+
+void Scheduler::Cancel(std::int64_t campaign, const Reply& reply) {
+  CampaignRun* run = FindRun(campaign);
+  if (run == nullptr) {
+    reply(absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
+    return;
+  }
+  const auto held = leases_.OfCampaign(campaign);
+  std::vector<store::AttemptEnd> ends;
+  for (const LeaseEntry& lease : held) {
+    leases_.Release(lease.attempt);
+    v1::Finished finished;
+    finished.set_attempt(lease.attempt);
+    ends.push_back(ToRecord(finished, "cancelled"));
+    run->SetStatus(lease.key, EvaluationStatus::kWaiting, 0);
+  }
+  SetState(
+      *run, CampaignEvent::kCancel, "asked for",
+      [held, ends](Transaction& transaction) {
+        for (std::size_t i = 0; i < held.size(); ++i) {
+          transaction.EndAttempt(ends[i]);
+          transaction.SetEvaluation(held[i].key, EvaluationStatus::kWaiting, "", 0);
+        }
+      },
+      reply);
+  runs_.erase(campaign);
+  for (const LeaseEntry& lease : held) {
+    if (const WorkerEntry* worker = workers_.Find(lease.worker); worker != nullptr) {
+      v1::ServerMessage message;
+      message.mutable_stop()->set_attempt(lease.attempt);
+      ports_.Send(worker->session, std::move(message));
+    }
+  }
+}
+
+void Scheduler::Delete(std::int64_t campaign, const Reply& reply) {
+  if (const CampaignRun* run = FindRun(campaign); run != nullptr) {
+    reply(absl::FailedPreconditionError(absl::StrCat("cannot delete a campaign that is ",
+                                                     ToString(run->state()), "; cancel it first")));
+    return;
+  }
+  ports_.Write([campaign](Transaction& transaction) { transaction.DeleteCampaign(campaign); },
+               reply);
+  ++version_;
+}
+
+std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
+  const CampaignRun* run = FindRun(campaign);
+  if (run == nullptr) {
+    return std::nullopt;
+  }
+  LiveStatus live{.view = run->View()};
+  const auto& [seconds, ended] = durations_[campaign];
+  const int slots = workers_.Slots();
+  if (ended > 0 && slots > 0) {
+    const auto open = run->With(EvaluationStatus::kWaiting).size() +
+                      run->With(EvaluationStatus::kRunning).size();
+    live.eta_seconds = seconds / ended * static_cast<double>(open) / slots;
+  }
+  return live;
+}
+
+void Scheduler::PauseIfTooManyDiverged(CampaignRun& run) {
+  const campaign::Failure& failure = run.definition().campaign.failure;
+  const int samples = run.record().submitted.samples;
+  const int diverged = run.Diverged();
+  if (run.progress().pause_waived || !IsLeasable(run.state()) || run.Done() < kFewestDoneToPause ||
+      diverged <= failure.pause_above * samples) {
+    return;
+  }
+  SetState(run, CampaignEvent::kPause,
+           absl::StrCat(diverged, " of ", samples,
+                        " samples diverged, more than failure.pause_above = ", failure.pause_above,
+                        " allows; see the reasons of the samples, then resume or cancel"),
+           nullptr, [](const absl::Status&) {});
+}
+
+void Scheduler::Advance(std::int64_t campaign) {
+  CampaignRun* run = FindRun(campaign);
+  if (run == nullptr || computing_.count(campaign) > 0 || !IsLeasable(run->state()) ||
+      !run->AllTerminal()) {
+    return;
+  }
+  computing_.insert(campaign);
+  // An empty write: when it is done, everything that memory knows of this campaign is on disk.
+  ports_.Write([](Transaction&) {},
+               [this, campaign](const absl::Status& status) {
+                 CampaignRun* current = FindRun(campaign);
+                 if (!status.ok() || current == nullptr) {
+                   computing_.erase(campaign);
+                   return;
+                 }
+                 ComputePlan(*current);
+               });
+}
+
+void Scheduler::ComputePlan(CampaignRun& run) {
+  ports_.Compute([this, id = run.id(), definition = run.shared_definition(),
+                  record = run.record()]() -> std::function<void()> {
+    auto reader = ports_.Read();
+    auto plan = std::make_shared<absl::StatusOr<Plan>>(
+        reader.ok() ? PlanNext(*definition, record, *reader)
+                    : absl::StatusOr<Plan>(reader.status()));
+    return [this, id, plan] { Adopt(id, *plan); };
+  });
+}
+
+void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& computed) {
+  CampaignRun* run = FindRun(campaign);
+  if (run == nullptr) {  // cancelled meanwhile
+    computing_.erase(campaign);
+    return;
+  }
+  Plan plan;
+  if (computed.ok()) {
+    plan = *computed;
+  } else {
+    plan.phase = run->progress().phase;
+    plan.event = CampaignEvent::kFail;
+    plan.reason = std::string(computed.status().message());
+  }
+  store::CampaignProgress& progress = run->progress();
+  progress.phase = plan.phase;
+  progress.converged = plan.converged;
+  if (plan.start.has_value()) {
+    progress.iteration = plan.start->iteration;
+    progress.pause_waived = false;
+  }
+  if (plan.event.has_value()) {
+    plan.log.push_back(absl::StrCat(ToString(*plan.event), plan.reason.empty() ? "" : ": ",
+                                    plan.reason));
+    // Allowed in every state in which a plan is computed (transitions.cc).
+    (void)run->Apply(*plan.event, plan.reason);
+  }
+  const bool over = IsOver(run->state());
+  ports_.Write(
+      [plan = std::move(plan), campaign, progress, now = ports_.UnixMs()](Transaction& t) {
+        scheduler::Write(plan, campaign, progress, now, t);
+      },
+      [this, campaign, over](const absl::Status& status) {
+        computing_.erase(campaign);
+        ++version_;
+        CampaignRun* planned = FindRun(campaign);
+        if (!status.ok() || planned == nullptr) {
+          return;
+        }
+        if (over) {
+          runs_.erase(campaign);
+          return;
+        }
+        durations_.erase(campaign);
+        if (auto reader = ports_.Read(); reader.ok() && planned->Reload(*reader).ok()) {
+          Enqueue(*planned);
+          Advance(campaign);
+          Dispatch();
+        }
+      });
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,121 @@
+#pragma once
+// The heart of the service: which worker runs what, what its messages mean, and what a campaign does next.
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "calib/v1/campaign.pb.h"
+#include "calib/v1/worker.pb.h"
+#include "server/scheduler/campaign_run.h"
+#include "server/scheduler/lease_table.h"
+#include "server/scheduler/plan.h"
+#include "server/scheduler/ports.h"
+#include "server/scheduler/worker_table.h"
+
+namespace calib::scheduler {
+
+struct SchedulerOptions {
+  std::chrono::milliseconds lease{15'000};     ///< an attempt is lost when nothing was heard for this long
+  std::chrono::milliseconds heartbeat{2'000};  ///< workers are told to speak at least this often
+};
+
+/// What is known of a live campaign beyond the store.
+struct LiveStatus {
+  LiveView view{};
+  double eta_seconds = -1;  ///< of what is planned; negative: unknown
+};
+
+/// A single-threaded state machine: every call comes on one strand, where its Ports run its continuations. Memory is
+/// ahead of the disk; what leaves the program (leases, acks, answers) waits for the commit of all that led to it.
+class Scheduler {
+ public:
+  using Reply = std::function<void(const absl::Status&)>;
+
+  Scheduler(Ports& ports, SchedulerOptions options)
+      : ports_(ports), options_(options), leases_(options.lease) {}
+
+  /// Takes up every campaign that is not over. Attempts that were running get a fresh lease: their workers may come
+  /// back and go on.
+  absl::Status Load();
+
+  // ---- workers (scheduler_workers.cc) ----
+  /// FAILED_PRECONDITION when the worker's mechanics or catalogue are not the server's; INVALID_ARGUMENT for a Hello
+  /// without name or slots.
+  absl::Status Connected(std::int64_t session, const v1::Hello& hello);
+  void Disconnected(std::int64_t session);
+  void Receive(std::int64_t session, const v1::StateBatch& batch);
+  void Receive(std::int64_t session, const v1::Finished& finished);
+  void Receive(std::int64_t session, const v1::Heartbeat& heartbeat);
+  /// NOT_FOUND: no such worker.
+  absl::StatusOr<v1::WorkerInfo> Drain(const std::string& worker);
+  std::vector<v1::WorkerInfo> Workers() const;
+  /// Gives up leases that have run out. Call a few times per lease.
+  void Tick();
+
+  // ---- campaigns (scheduler.cc) ----
+  /// Stores and starts a campaign that was read without problems. Its id is chosen here ("c1"), given to `reply` and
+  /// remembered as the answer to the request (request.answer is ignored; an empty request_id is not remembered).
+  void Submit(store::NewCampaign submitted, std::map<std::string, std::string> files,
+              const std::string& request_id, const store::RequestRecord& request,
+              std::function<void(absl::StatusOr<std::string>)> reply);
+  /// NOT_FOUND, or FAILED_PRECONDITION when the campaign's state does not allow it.
+  void Pause(std::int64_t campaign, const Reply& reply);
+  void Resume(std::int64_t campaign, const Reply& reply);
+  void Cancel(std::int64_t campaign, const Reply& reply);
+  /// Only campaigns that are over.
+  void Delete(std::int64_t campaign, const Reply& reply);
+  /// Empty when the campaign is not live.
+  std::optional<LiveStatus> Live(std::int64_t campaign);
+  /// Grows whenever something changed that a status shows.
+  std::uint64_t version() const { return version_; }
+  /// Campaigns that are not over.
+  std::size_t live() const { return runs_.size(); }
+
+ private:
+  CampaignRun* FindRun(std::int64_t campaign);
+
+  // Work (scheduler_workers.cc)
+  void Dispatch();
+  void Grant(const WorkerEntry& worker, const store::EvaluationKey& key);
+  void Refuse(std::int64_t session, std::int64_t attempt);
+  /// The attempt is over without a result: back to the queue, or the campaign is paused when it failed too often.
+  void GiveBack(const LeaseEntry& lease, const v1::Finished& how, const std::string& outcome,
+                bool counts_as_failure);
+  void End(std::int64_t session, const LeaseEntry& lease, store::EvaluationStatus status,
+           const v1::Finished& finished);
+  store::AttemptEnd ToRecord(const v1::Finished& finished, const std::string& outcome);
+
+  // Campaigns (scheduler.cc)
+  void TakeUp(std::int64_t campaign, store::Reader& reader);
+  /// Puts waiting evaluations into the queue, or takes them out, as the campaign's state demands.
+  void Enqueue(CampaignRun& run);
+  void PauseIfTooManyDiverged(CampaignRun& run);
+  /// Changes the state, writes it with `also`, then replies.
+  void SetState(CampaignRun& run, CampaignEvent event, const std::string& reason,
+                const store::Store::Job& also, const Reply& reply);
+  /// Computes the next plan when everything planned so far has ended. Only after a commit.
+  void Advance(std::int64_t campaign);
+  void ComputePlan(CampaignRun& run);
+  void Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& plan);
+
+  Ports& ports_;
+  SchedulerOptions options_;
+  LeaseTable leases_;
+  WorkerTable workers_;
+  std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over
+  std::set<store::EvaluationKey> queue_;                       // waiting, of leasable campaigns
+  std::set<std::int64_t> computing_;                           // campaigns with a plan in the making
+  std::map<std::int64_t, std::pair<double, int>> durations_;   // seconds and number of ended attempts
+  std::int64_t last_attempt_ = 0;
+  std::int64_t last_campaign_ = 0;
+  std::uint64_t version_ = 0;
+};
+
+}  // namespace calib::scheduler

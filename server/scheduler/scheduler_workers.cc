@@ -1,0 +1,381 @@
+// Workers: their links, leases and messages. Campaigns: scheduler.cc.
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
+#include "proto/rpc/digest.h"
+#include "server/scheduler/attempt_spec.h"
+#include "server/scheduler/scheduler.h"
+
+namespace calib::scheduler {
+
+using store::EvaluationKey;
+using store::EvaluationStatus;
+using store::Transaction;
+
+namespace {
+
+/// A worker that left is still shown this long.
+constexpr std::chrono::minutes kRemembered{10};
+
+v1::Finished Because(std::int64_t attempt, const std::string& reason) {
+  v1::Finished finished;
+  finished.set_attempt(attempt);
+  finished.set_reason(reason);
+  return finished;
+}
+
+std::string NameOf(const CampaignRun& run, const EvaluationKey& key) {
+  return absl::StrCat(
+      "sample ", key.sample, ", experiment ",
+      run.definition().campaign.experiments[static_cast<std::size_t>(key.experiment)].name);
+}
+
+}  // namespace
+
+absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) {
+  if (hello.name().empty() || hello.slots() < 1) {
+    return absl::InvalidArgumentError("a worker must have a name and at least one slot");
+  }
+  if (hello.engine_version() != dem::EngineVersion()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("worker ", hello.name(), " has mechanics version ", hello.engine_version(),
+                     ", the server ", dem::EngineVersion(), ": update the node"));
+  }
+  if (hello.catalog_digest() != rpc::Sha256Hex(dem::CatalogText())) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("worker ", hello.name(),
+                     " offers other contacts, effects or tests than the server: update the node"));
+  }
+  const Clock::time_point now = ports_.Now();
+  if (const std::int64_t before = workers_.Connect(hello, session, now); before != 0) {
+    ports_.Close(before, absl::AbortedError("the worker has opened another stream"));
+  }
+  v1::ServerMessage welcome;
+  welcome.mutable_welcome()->set_heartbeat_ms(static_cast<int>(options_.heartbeat.count()));
+  welcome.mutable_welcome()->set_lease_ms(static_cast<int>(options_.lease.count()));
+  ports_.Send(session, std::move(welcome));
+
+  const std::set<std::int64_t> held(hello.attempts().begin(), hello.attempts().end());
+  for (const std::int64_t attempt : held) {
+    if (!leases_.Renew(attempt, hello.name(), now)) {
+      Refuse(session, attempt);
+    }
+  }
+  for (const LeaseEntry& lease : leases_.OfWorker(hello.name())) {
+    if (held.count(lease.attempt) == 0) {
+      leases_.Release(lease.attempt);
+      GiveBack(lease, Because(lease.attempt, "the worker came back without it"), "lost", true);
+    }
+  }
+  ++version_;
+  Dispatch();
+  return absl::OkStatus();
+}
+
+void Scheduler::Disconnected(std::int64_t session) {
+  // Its leases stay: the worker may only have lost the connection and go on computing.
+  workers_.Disconnect(session);
+  ++version_;
+}
+
+void Scheduler::Refuse(std::int64_t session, std::int64_t attempt) {
+  v1::ServerMessage message;
+  message.mutable_ack()->set_attempt(attempt);
+  message.mutable_ack()->set_refused(true);
+  ports_.Send(session, std::move(message));
+}
+
+void Scheduler::Receive(std::int64_t session, const v1::Heartbeat& heartbeat) {
+  WorkerEntry* worker = workers_.OfSession(session);
+  if (worker == nullptr) {
+    return;
+  }
+  const Clock::time_point now = ports_.Now();
+  const bool was_silent = worker->heard < now - options_.lease;
+  worker->heard = now;
+  for (const std::int64_t attempt : heartbeat.attempts()) {
+    if (!leases_.Renew(attempt, worker->hello.name(), now)) {
+      Refuse(session, attempt);
+    }
+  }
+  if (was_silent) {
+    Dispatch();
+  }
+}
+
+void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
+  WorkerEntry* worker = workers_.OfSession(session);
+  if (worker == nullptr) {
+    return;
+  }
+  worker->heard = ports_.Now();
+  if (!leases_.Renew(batch.attempt(), worker->hello.name(), ports_.Now())) {
+    Refuse(session, batch.attempt());
+    return;
+  }
+  const EvaluationKey key = leases_.Find(batch.attempt(), worker->hello.name())->key;
+  CampaignRun& run = *FindRun(key.campaign);  // leases end with their campaign
+  std::vector<store::StateRecord> records;
+  for (const v1::State& state : batch.states()) {
+    store::StateRecord record{.key = key,
+                              .load_step = state.load_step(),
+                              .observables = {state.values().begin(), state.values().end()}};
+    if (const std::string refusal = run.Refusal(key, record.load_step, record.observables);
+        !refusal.empty()) {
+      GiveBack(*leases_.Release(batch.attempt()), Because(batch.attempt(), refusal), "failed",
+               true);
+      Refuse(session, batch.attempt());
+      return;
+    }
+    records.push_back(std::move(record));
+  }
+  for (const store::StateRecord& record : records) {
+    run.AddState(key, record.load_step, record.observables);
+  }
+  ++version_;
+  v1::ServerMessage ack;
+  ack.mutable_ack()->set_attempt(batch.attempt());
+  ack.mutable_ack()->set_up_to(batch.first() + batch.states_size());
+  ports_.Write(
+      [records = std::move(records), now = ports_.UnixMs()](Transaction& transaction) {
+        for (const store::StateRecord& record : records) {
+          transaction.PutState(record, now);
+        }
+      },
+      [this, session, ack](const absl::Status& status) {
+        if (status.ok()) {
+          ports_.Send(session, ack);
+        }
+      });
+}
+
+void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
+  WorkerEntry* worker = workers_.OfSession(session);
+  if (worker == nullptr) {
+    return;
+  }
+  worker->heard = ports_.Now();
+  if (leases_.Find(finished.attempt(), worker->hello.name()) == nullptr) {
+    Refuse(session, finished.attempt());
+    return;
+  }
+  const LeaseEntry lease = *leases_.Release(finished.attempt());
+  CampaignRun& run = *FindRun(lease.key.campaign);
+  auto& [seconds, ended] = durations_[lease.key.campaign];
+  seconds += std::chrono::duration<double>(ports_.Now() - lease.started).count();
+  ++ended;
+  switch (finished.outcome()) {
+    case v1::Finished::OUTCOME_COMPLETED: {
+      const auto missing = run.Find(lease.key)->missing.size();
+      if (missing == 0) {
+        End(session, lease, EvaluationStatus::kFinished, finished);
+      } else {
+        GiveBack(lease,
+                 Because(lease.attempt, absl::StrCat("said to be complete, but ", missing,
+                                                     " load steps are missing")),
+                 "failed", true);
+        Refuse(session, finished.attempt());
+      }
+      break;
+    }
+    case v1::Finished::OUTCOME_DIVERGED:
+      End(session, lease, EvaluationStatus::kDiverged, finished);
+      break;
+    case v1::Finished::OUTCOME_STOPPED:  // of its own accord: the node is going down
+      GiveBack(lease, finished, "stopped", false);
+      Refuse(session, finished.attempt());
+      break;
+    default:
+      GiveBack(lease, finished, "failed", true);
+      Refuse(session, finished.attempt());
+  }
+  Dispatch();
+}
+
+store::AttemptEnd Scheduler::ToRecord(const v1::Finished& finished, const std::string& outcome) {
+  return {.id = finished.attempt(),
+          .outcome = outcome,
+          .reason = finished.reason(),
+          .ended_unix_ms = ports_.UnixMs(),
+          .steps = finished.steps(),
+          .contact_updates = finished.contact_updates(),
+          .core_seconds = finished.core_seconds(),
+          .staging = finished.staging()};
+}
+
+void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationStatus status,
+                    const v1::Finished& finished) {
+  CampaignRun& run = *FindRun(lease.key.campaign);
+  const int failures = run.Find(lease.key)->failures;
+  run.SetStatus(lease.key, status, failures);
+  ++version_;
+  const bool diverged = status == EvaluationStatus::kDiverged;
+  ports_.Write(
+      [key = lease.key, status, failures, diverged, now = ports_.UnixMs(),
+       name = NameOf(run, lease.key),
+       end = ToRecord(finished, diverged ? "diverged" : "completed")](Transaction& t) {
+        t.EndAttempt(end);
+        t.SetEvaluation(key, status, end.reason, failures);
+        if (diverged) {
+          t.Log(key.campaign, now, absl::StrCat(name, " diverged: ", end.reason));
+        }
+      },
+      [this, session, lease, states = finished.states()](const absl::Status& committed) {
+        if (!committed.ok()) {
+          return;
+        }
+        v1::ServerMessage ack;
+        ack.mutable_ack()->set_attempt(lease.attempt);
+        ack.mutable_ack()->set_up_to(states);
+        ack.mutable_ack()->set_finished(true);
+        ports_.Send(session, std::move(ack));
+        Advance(lease.key.campaign);
+      });
+  if (diverged) {
+    PauseIfTooManyDiverged(run);
+  }
+}
+
+void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how,
+                         const std::string& outcome, bool counts_as_failure) {
+  v1::Finished finished = how;
+  finished.set_attempt(lease.attempt);
+  CampaignRun* run = FindRun(lease.key.campaign);
+  ++version_;
+  if (run == nullptr) {
+    ports_.Write([end = ToRecord(finished, outcome)](Transaction& t) { t.EndAttempt(end); },
+                 [](const absl::Status&) {});
+    return;
+  }
+  const int failures = run->Find(lease.key)->failures + (counts_as_failure ? 1 : 0);
+  const bool too_often = failures >= run->definition().campaign.failure.attempts;
+  const auto status = too_often ? EvaluationStatus::kFailed : EvaluationStatus::kWaiting;
+  run->SetStatus(lease.key, status, failures);
+  ports_.Write(
+      [key = lease.key, status, failures, now = ports_.UnixMs(), name = NameOf(*run, lease.key),
+       end = ToRecord(finished, outcome)](Transaction& t) {
+        t.EndAttempt(end);
+        t.SetEvaluation(key, status, end.reason, failures);
+        t.Log(key.campaign, now,
+              absl::StrCat(name, ": attempt ", end.id, " ", end.outcome, ": ", end.reason));
+      },
+      [](const absl::Status&) {});
+  Enqueue(*run);
+  if (too_often && IsLeasable(run->state())) {
+    SetState(*run, CampaignEvent::kPause,
+             absl::StrCat(NameOf(*run, lease.key), " failed ", failures,
+                          " times, last: ", finished.reason(),
+                          "; resume to try again once the cause is removed"),
+             nullptr, [](const absl::Status&) {});
+  }
+}
+
+void Scheduler::Dispatch() {
+  while (!queue_.empty()) {
+    const WorkerEntry* worker = workers_.MostFree(leases_, ports_.Now() - options_.lease);
+    if (worker == nullptr) {
+      return;
+    }
+    const EvaluationKey key = *queue_.begin();
+    queue_.erase(queue_.begin());
+    Grant(*worker, key);
+  }
+}
+
+void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
+  CampaignRun& run = *FindRun(key.campaign);  // the queue holds live campaigns only
+  const std::int64_t attempt = ++last_attempt_;
+  leases_.Grant(attempt, key, worker.hello.name(), ports_.Now());
+  const int failures = run.Find(key)->failures;
+  run.SetStatus(key, EvaluationStatus::kRunning, failures);
+  ++version_;
+  if (run.state() == CampaignState::kQueued) {
+    SetState(run, CampaignEvent::kStart, "", nullptr, [](const absl::Status&) {});
+  }
+  v1::ServerMessage message;
+  message.mutable_lease()->set_attempt(attempt);
+  *message.mutable_lease()->mutable_spec() = SpecOf(run.definition().campaign, key.experiment,
+                                                    run.Parameters(key.sample), key.sample);
+  message.mutable_lease()->mutable_spec()->set_threads(worker.hello.threads_per_slot());
+  ports_.Write(
+      [key, failures,
+       record = store::NewAttempt{.id = attempt,
+                                  .key = key,
+                                  .worker = worker.hello.name(),
+                                  .cpu = worker.hello.cpu(),
+                                  .engine = worker.hello.engine_version(),
+                                  .started_unix_ms = ports_.UnixMs()}](Transaction& t) {
+        t.InsertAttempt(record);
+        t.SetEvaluation(key, EvaluationStatus::kRunning, "", failures);
+      },
+      [this, attempt, session = worker.session, name = worker.hello.name(),
+       message = std::move(message)](const absl::Status& status) {
+        if (status.ok() && leases_.Find(attempt, name) != nullptr) {
+          ports_.Send(session, message);
+        }
+      });
+}
+
+void Scheduler::Tick() {
+  const Clock::time_point now = ports_.Now();
+  for (const LeaseEntry& lease : leases_.TakeExpired(now)) {
+    GiveBack(lease,
+             Because(lease.attempt, absl::StrCat("nothing was heard from worker ", lease.worker,
+                                                 " for ", options_.lease.count(), " ms")),
+             "lost", true);
+    if (const WorkerEntry* worker = workers_.Find(lease.worker); worker != nullptr) {
+      Refuse(worker->session, lease.attempt);
+    }
+  }
+  workers_.ForgetGone(now - kRemembered);
+  Dispatch();
+}
+
+absl::StatusOr<v1::WorkerInfo> Scheduler::Drain(const std::string& name) {
+  WorkerEntry* worker = workers_.Find(name);
+  if (worker == nullptr) {
+    return absl::NotFoundError(absl::StrCat("there is no worker ", name));
+  }
+  worker->draining = true;
+  v1::ServerMessage message;
+  message.mutable_drain();
+  ports_.Send(worker->session, std::move(message));
+  ++version_;
+  for (const v1::WorkerInfo& info : Workers()) {
+    if (info.name() == name) {
+      return info;
+    }
+  }
+  return absl::NotFoundError(absl::StrCat("there is no worker ", name));
+}
+
+std::vector<v1::WorkerInfo> Scheduler::Workers() const {
+  std::vector<v1::WorkerInfo> infos;
+  for (const auto& [name, entry] : workers_.all()) {
+    v1::WorkerInfo& info = infos.emplace_back();
+    info.set_name(name);
+    info.set_slots(entry.hello.slots());
+    info.set_contact_updates_per_second(entry.hello.contact_updates_per_second());
+    info.set_cpu(entry.hello.cpu());
+    info.set_engine_version(entry.hello.engine_version());
+    info.set_draining(entry.draining);
+    info.set_connected(entry.session != 0);
+    info.set_seconds_since_heard(
+        std::chrono::duration<double>(ports_.Now() - entry.heard).count());
+    for (const LeaseEntry& lease : leases_.OfWorker(name)) {
+      const auto run = runs_.find(lease.key.campaign);
+      info.add_running(absl::StrCat(
+          "c", lease.key.campaign, "/", lease.key.sample, "/",
+          run == runs_.end()
+              ? absl::StrCat(lease.key.experiment)
+              : run->second->definition()
+                    .campaign.experiments[static_cast<std::size_t>(lease.key.experiment)]
+                    .name));
+    }
+    info.set_busy(info.running_size());
+  }
+  return infos;
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,79 @@
+#pragma once
+// One SQLite connection with its prepared statements. Private to this folder: SQLiteCpp is seen by nobody else.
+
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <cstring>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+
+namespace calib::store {
+
+/// Doubles as a BLOB, bit for bit.
+struct DoubleBlob {
+  std::span<const double> values;
+};
+
+/// RESOURCE_EXHAUSTED for a full disk, UNAVAILABLE for a busy file, DATA_LOSS for a corrupt one, INTERNAL otherwise.
+absl::Status ToStatus(const SQLite::Exception& error);
+
+class Connection {
+ public:
+  /// Throws SQLite::Exception. Sets WAL, FULL synchronisation and foreign keys on a writable connection.
+  Connection(const std::string& path, bool writable);
+
+  SQLite::Database& database() { return database_; }
+
+  /// The statement for `sql`, prepared once, reset and bound to the arguments in order. Throws SQLite::Exception.
+  template <typename... Arguments>
+  SQLite::Statement& Bind(std::string_view sql, const Arguments&... arguments) {
+    SQLite::Statement& statement = Prepare(sql);
+    int index = 0;
+    (BindOne(statement, ++index, arguments), ...);
+    return statement;
+  }
+
+  /// Runs a statement that gives no rows; returns the number of rows changed.
+  template <typename... Arguments>
+  int Run(std::string_view sql, const Arguments&... arguments) {
+    SQLite::Statement& statement = Bind(sql, arguments...);
+    const int changed = statement.exec();
+    statement.reset();
+    return changed;
+  }
+
+ private:
+  SQLite::Statement& Prepare(std::string_view sql);
+
+  template <typename T>
+  static void BindOne(SQLite::Statement& statement, int index, const T& value) {
+    statement.bind(index, value);
+  }
+  static void BindOne(SQLite::Statement& statement, int index, bool value) {
+    statement.bind(index, value ? 1 : 0);
+  }
+  static void BindOne(SQLite::Statement& statement, int index, std::optional<std::int64_t> value) {
+    if (value.has_value()) {
+      statement.bind(index, *value);
+    } else {
+      statement.bind(index);
+    }
+  }
+  static void BindOne(SQLite::Statement& statement, int index, DoubleBlob blob) {
+    statement.bind(index, blob.values.data(), static_cast<int>(blob.values.size_bytes()));
+  }
+
+  SQLite::Database database_;
+  std::map<std::string_view, std::unique_ptr<SQLite::Statement>> statements_;  // keys: literals
+};
+
+std::vector<double> ToDoubles(const SQLite::Column& column);
+
+}  // namespace calib::store

@@ -1,0 +1,332 @@
+#include "server/store/reader.h"
+
+#include <bit>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/store/connection.h"
+
+namespace calib::store {
+namespace {
+
+double ToDouble(const SQLite::Column& column) {
+  return column.isNull() ? kUnknown : column.getDouble();
+}
+
+EvaluationStatus ToEvaluationStatus(const std::string& text) {
+  for (const auto status :
+       {EvaluationStatus::kWaiting, EvaluationStatus::kRunning, EvaluationStatus::kFinished,
+        EvaluationStatus::kDiverged, EvaluationStatus::kStoppedEarly}) {
+    if (text == ToString(status)) {
+      return status;
+    }
+  }
+  return EvaluationStatus::kFailed;
+}
+
+CampaignRecord ToCampaign(SQLite::Statement& row) {
+  CampaignRecord record;
+  NewCampaign& submitted = record.submitted;
+  submitted.id = row.getColumn(0).getInt64();
+  submitted.name = row.getColumn(1).getString();
+  submitted.yaml = row.getColumn(2).getString();
+  submitted.file_name = row.getColumn(3).getString();
+  if (!row.isColumnNull(4)) {
+    submitted.seed = std::bit_cast<std::uint64_t>(row.getColumn(4).getInt64());
+  }
+  submitted.method = row.getColumn(5).getString();
+  submitted.samples = row.getColumn(6).getInt();
+  submitted.max_iterations = row.getColumn(7).getInt();
+  submitted.created_unix_ms = row.getColumn(8).getInt64();
+  CampaignProgress& progress = record.progress;
+  progress.state = row.getColumn(9).getString();
+  progress.reason = row.getColumn(10).getString();
+  progress.phase = row.getColumn(11).getString();
+  progress.iteration = row.getColumn(12).getInt();
+  progress.converged = row.getColumn(13).getInt() != 0;
+  progress.pause_waived = row.getColumn(14).getInt() != 0;
+  return record;
+}
+
+constexpr std::string_view kAllCampaigns =
+    "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
+    "state, reason, phase, iteration, converged, pause_waived FROM campaign ORDER BY id";
+constexpr std::string_view kOneCampaign =
+    "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
+    "state, reason, phase, iteration, converged, pause_waived FROM campaign WHERE id = ?";
+
+}  // namespace
+
+Reader::Reader(std::unique_ptr<Connection> connection) : connection_(std::move(connection)) {}
+Reader::Reader(Reader&&) noexcept = default;
+Reader& Reader::operator=(Reader&&) noexcept = default;
+Reader::~Reader() = default;
+
+template <typename F>
+auto Reader::Guard(F read) -> absl::StatusOr<decltype(read())> {
+  try {
+    return read();
+  } catch (const SQLite::Exception& error) {
+    return ToStatus(error);
+  }
+}
+
+absl::StatusOr<std::vector<CampaignRecord>> Reader::Campaigns() {
+  return Guard([&] {
+    std::vector<CampaignRecord> records;
+    SQLite::Statement& row = connection_->Bind(kAllCampaigns);
+    while (row.executeStep()) {
+      records.push_back(ToCampaign(row));
+    }
+    return records;
+  });
+}
+
+absl::StatusOr<CampaignRecord> Reader::Campaign(std::int64_t id) {
+  auto found = Guard([&] {
+    std::optional<CampaignRecord> record;
+    SQLite::Statement& row = connection_->Bind(kOneCampaign, id);
+    if (row.executeStep()) {
+      record = ToCampaign(row);
+    }
+    return record;
+  });
+  if (!found.ok()) {
+    return found.status();
+  }
+  if (!found->has_value()) {
+    return absl::NotFoundError(absl::StrCat("there is no campaign c", id));
+  }
+  return **std::move(found);
+}
+
+absl::StatusOr<std::int64_t> Reader::LastCampaign() {
+  return Guard([&] {
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'campaign'");
+    return row.executeStep() ? row.getColumn(0).getInt64() : std::int64_t{0};
+  });
+}
+
+absl::StatusOr<std::map<std::string, std::string>> Reader::Files(std::int64_t campaign) {
+  return Guard([&] {
+    std::map<std::string, std::string> files;
+    SQLite::Statement& row =
+        connection_->Bind("SELECT path, digest FROM campaign_file WHERE campaign = ?", campaign);
+    while (row.executeStep()) {
+      files.emplace(row.getColumn(0).getString(), row.getColumn(1).getString());
+    }
+    return files;
+  });
+}
+
+absl::StatusOr<std::string> Reader::Blob(const std::string& digest) {
+  auto found = Guard([&] {
+    std::optional<std::string> content;
+    SQLite::Statement& row =
+        connection_->Bind("SELECT content FROM blob WHERE digest = ?", digest);
+    if (row.executeStep()) {
+      const SQLite::Column column = row.getColumn(0);
+      const void* bytes = column.getBlob();
+      content.emplace(static_cast<const char*>(bytes != nullptr ? bytes : ""),
+                      static_cast<std::size_t>(column.getBytes()));
+    }
+    return content;
+  });
+  if (!found.ok()) {
+    return found.status();
+  }
+  if (!found->has_value()) {
+    return absl::NotFoundError(absl::StrCat("there is no content with SHA-256 ", digest));
+  }
+  return **std::move(found);
+}
+
+absl::StatusOr<bool> Reader::HasBlob(const std::string& digest) {
+  return Guard([&] {
+    return connection_->Bind("SELECT 1 FROM blob WHERE digest = ?", digest).executeStep();
+  });
+}
+
+absl::StatusOr<std::optional<RequestRecord>> Reader::Request(const std::string& id) {
+  return Guard([&] {
+    std::optional<RequestRecord> record;
+    SQLite::Statement& row =
+        connection_->Bind("SELECT digest, answer FROM request WHERE id = ?", id);
+    if (row.executeStep()) {
+      record = RequestRecord{.digest = row.getColumn(0).getString(),
+                             .answer = row.getColumn(1).getString()};
+    }
+    return record;
+  });
+}
+
+absl::StatusOr<std::vector<IterationRecord>> Reader::Iterations(std::int64_t campaign) {
+  return Guard([&] {
+    std::vector<IterationRecord> records;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT number, proposal, posterior FROM iteration WHERE campaign = ? ORDER BY number",
+        campaign);
+    while (row.executeStep()) {
+      IterationRecord& record = records.emplace_back();
+      record.number = row.getColumn(0).getInt();
+      record.proposal = row.getColumn(1).getString();
+      if (!row.isColumnNull(2)) {
+        record.posterior = row.getColumn(2).getString();
+      }
+    }
+    return records;
+  });
+}
+
+absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign) {
+  return Guard([&] {
+    std::vector<SampleRecord> records;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT sample, iteration, parameters, log_weight, log_likelihood FROM sample "
+        "WHERE campaign = ? ORDER BY sample",
+        campaign);
+    while (row.executeStep()) {
+      records.push_back({.sample = row.getColumn(0).getInt(),
+                         .iteration = row.getColumn(1).getInt(),
+                         .parameters = ToDoubles(row.getColumn(2)),
+                         .log_weight = ToDouble(row.getColumn(3)),
+                         .log_likelihood = ToDouble(row.getColumn(4))});
+    }
+    return records;
+  });
+}
+
+absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t campaign) {
+  return Guard([&] {
+    std::vector<EvaluationRecord> records;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT sample, experiment, status, reason, failures, digest, reused FROM evaluation "
+        "WHERE campaign = ? ORDER BY sample, experiment",
+        campaign);
+    while (row.executeStep()) {
+      records.push_back({.key = {.campaign = campaign,
+                                 .sample = row.getColumn(0).getInt(),
+                                 .experiment = row.getColumn(1).getInt()},
+                         .status = ToEvaluationStatus(row.getColumn(2).getString()),
+                         .reason = row.getColumn(3).getString(),
+                         .failures = row.getColumn(4).getInt(),
+                         .digest = row.getColumn(5).getString(),
+                         .reused = row.getColumn(6).getInt() != 0});
+    }
+    return records;
+  });
+}
+
+absl::StatusOr<std::vector<StateRecord>> Reader::States(std::int64_t campaign,
+                                                        std::optional<int> sample) {
+  return Guard([&] {
+    std::vector<StateRecord> records;
+    SQLite::Statement& row =
+        sample.has_value()
+            ? connection_->Bind(
+                  "SELECT sample, experiment, load_step, observables FROM state "
+                  "WHERE campaign = ? AND sample = ? ORDER BY sample, experiment, load_step",
+                  campaign, *sample)
+            : connection_->Bind(
+                  "SELECT sample, experiment, load_step, observables FROM state "
+                  "WHERE campaign = ? ORDER BY sample, experiment, load_step",
+                  campaign);
+    while (row.executeStep()) {
+      records.push_back({.key = {.campaign = campaign,
+                                 .sample = row.getColumn(0).getInt(),
+                                 .experiment = row.getColumn(1).getInt()},
+                         .load_step = row.getColumn(2).getInt(),
+                         .observables = ToDoubles(row.getColumn(3))});
+    }
+    return records;
+  });
+}
+
+absl::StatusOr<std::optional<EvaluationKey>> Reader::FindEqual(const std::string& digest) {
+  return Guard([&] {
+    std::optional<EvaluationKey> key;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT campaign, sample, experiment FROM evaluation "
+        "WHERE digest = ? AND status IN ('finished', 'diverged') "
+        "ORDER BY campaign, sample, experiment LIMIT 1",
+        digest);
+    if (row.executeStep()) {
+      key = EvaluationKey{.campaign = row.getColumn(0).getInt64(),
+                          .sample = row.getColumn(1).getInt(),
+                          .experiment = row.getColumn(2).getInt()};
+    }
+    return key;
+  });
+}
+
+absl::StatusOr<std::vector<ActiveAttempt>> Reader::ActiveAttempts() {
+  return Guard([&] {
+    std::vector<ActiveAttempt> attempts;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT id, campaign, sample, experiment, worker FROM attempt WHERE outcome IS NULL "
+        "ORDER BY id");
+    while (row.executeStep()) {
+      attempts.push_back({.id = row.getColumn(0).getInt64(),
+                          .key = {.campaign = row.getColumn(1).getInt64(),
+                                  .sample = row.getColumn(2).getInt(),
+                                  .experiment = row.getColumn(3).getInt()},
+                          .worker = row.getColumn(4).getString()});
+    }
+    return attempts;
+  });
+}
+
+absl::StatusOr<std::int64_t> Reader::LastAttempt() {
+  return Guard([&] {
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT coalesce(max(seq), 0) FROM sqlite_sequence WHERE name = 'attempt'");
+    return row.executeStep() ? row.getColumn(0).getInt64() : std::int64_t{0};
+  });
+}
+
+absl::StatusOr<std::map<int, int>> Reader::AttemptsBySample(std::int64_t campaign) {
+  return Guard([&] {
+    std::map<int, int> attempts;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT sample, count(*) FROM attempt WHERE campaign = ? GROUP BY sample", campaign);
+    while (row.executeStep()) {
+      attempts[row.getColumn(0).getInt()] = row.getColumn(1).getInt();
+    }
+    return attempts;
+  });
+}
+
+absl::StatusOr<Effort> Reader::EffortOf(std::int64_t campaign) {
+  return Guard([&] {
+    Effort effort;
+    SQLite::Statement& evaluations = connection_->Bind(
+        "SELECT count(*) FROM evaluation WHERE campaign = ? AND NOT reused "
+        "AND status IN ('finished', 'diverged', 'stopped_early')",
+        campaign);
+    if (evaluations.executeStep()) {
+      effort.model_evaluations = evaluations.getColumn(0).getInt64();
+    }
+    SQLite::Statement& seconds = connection_->Bind(
+        "SELECT coalesce(sum(core_seconds), 0.0) FROM attempt WHERE campaign = ?", campaign);
+    if (seconds.executeStep()) {
+      effort.core_seconds = seconds.getColumn(0).getDouble();
+    }
+    return effort;
+  });
+}
+
+absl::StatusOr<std::vector<EventRecord>> Reader::Events(std::int64_t campaign) {
+  return Guard([&] {
+    std::vector<EventRecord> events;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT unix_ms, what FROM event WHERE campaign = ? ORDER BY id", campaign);
+    while (row.executeStep()) {
+      events.push_back(
+          {.unix_ms = row.getColumn(0).getInt64(), .what = row.getColumn(1).getString()});
+    }
+    return events;
+  });
+}
+
+}  // namespace calib::store

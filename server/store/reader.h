@@ -1,0 +1,63 @@
+#pragma once
+// What may be asked of the store. A Reader is one consistent picture of it, taken at its first query.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/store/records.h"
+
+namespace calib::store {
+
+class Connection;
+
+/// Over its own read-only connection; cheap enough to open one per request. Not thread-safe; movable. Errors of every
+/// query: as the store's (connection.h). Collections are in the order of their natural keys.
+class Reader {
+ public:
+  explicit Reader(std::unique_ptr<Connection> connection);
+  Reader(Reader&&) noexcept;
+  Reader& operator=(Reader&&) noexcept;
+  ~Reader();
+
+  absl::StatusOr<std::vector<CampaignRecord>> Campaigns();
+  /// NOT_FOUND when there is none.
+  absl::StatusOr<CampaignRecord> Campaign(std::int64_t id);
+  /// Largest id ever given to a campaign, deleted ones included; 0 when there was none.
+  absl::StatusOr<std::int64_t> LastCampaign();
+  absl::StatusOr<std::map<std::string, std::string>> Files(std::int64_t campaign);
+  /// NOT_FOUND when there is none.
+  absl::StatusOr<std::string> Blob(const std::string& digest);
+  absl::StatusOr<bool> HasBlob(const std::string& digest);
+  absl::StatusOr<std::optional<RequestRecord>> Request(const std::string& id);
+
+  absl::StatusOr<std::vector<IterationRecord>> Iterations(std::int64_t campaign);
+  absl::StatusOr<std::vector<SampleRecord>> Samples(std::int64_t campaign);
+  absl::StatusOr<std::vector<EvaluationRecord>> Evaluations(std::int64_t campaign);
+  /// Of one sample, or of all.
+  absl::StatusOr<std::vector<StateRecord>> States(std::int64_t campaign,
+                                                  std::optional<int> sample = std::nullopt);
+  /// An evaluation that ended with a result (finished or diverged) and was determined by the same things.
+  absl::StatusOr<std::optional<EvaluationKey>> FindEqual(const std::string& digest);
+
+  absl::StatusOr<std::vector<ActiveAttempt>> ActiveAttempts();
+  /// Largest id ever given to an attempt; 0 when there was none.
+  absl::StatusOr<std::int64_t> LastAttempt();
+  /// Attempts made so far, by sample.
+  absl::StatusOr<std::map<int, int>> AttemptsBySample(std::int64_t campaign);
+  absl::StatusOr<Effort> EffortOf(std::int64_t campaign);
+  absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);
+
+ private:
+  /// Runs `read`; SQLite's exceptions end here.
+  template <typename F>
+  auto Guard(F read) -> absl::StatusOr<decltype(read())>;
+
+  std::unique_ptr<Connection> connection_;
+};
+
+}  // namespace calib::store

@@ -1,0 +1,131 @@
+#pragma once
+// Rows as the rest of the server sees them. Plain values; doubles survive the store bit for bit.
+
+#include <compare>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace calib::store {
+
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// A campaign as submitted, before anything has happened to it.
+struct NewCampaign {
+  std::int64_t id = 0;  ///< above every id used before (Reader::LastCampaign)
+  std::string name{};
+  std::string yaml{};
+  std::string file_name{};
+  std::optional<std::uint64_t> seed{};
+  std::string method{};
+  int samples = 0;
+  int max_iterations = 1;
+  std::int64_t created_unix_ms = 0;
+};
+
+/// What changes while a campaign lives.
+struct CampaignProgress {
+  std::string state = "queued";  ///< queued running paused finished failed cancelled
+  std::string reason{};
+  std::string phase = "calibrating";  ///< calibrating validating done
+  int iteration = 0;
+  bool converged = false;
+  bool pause_waived = false;
+
+  friend bool operator==(const CampaignProgress&, const CampaignProgress&) = default;
+};
+
+struct CampaignRecord {
+  NewCampaign submitted{};
+  CampaignProgress progress{};
+};
+
+struct IterationRecord {
+  int number = 0;
+  std::string proposal{};                  ///< JSON
+  std::optional<std::string> posterior{};  ///< JSON; empty while the iteration runs
+};
+
+struct SampleRecord {
+  int sample = 0;
+  int iteration = 0;
+  std::vector<double> parameters{};
+  double log_weight = kUnknown;
+  double log_likelihood = kUnknown;
+};
+
+/// Names one model evaluation; its order is the order in which work is handed out.
+struct EvaluationKey {
+  std::int64_t campaign = 0;
+  int sample = 0;
+  int experiment = 0;
+
+  friend auto operator<=>(const EvaluationKey&, const EvaluationKey&) = default;
+};
+
+enum class EvaluationStatus { kWaiting, kRunning, kFinished, kDiverged, kStoppedEarly, kFailed };
+const char* ToString(EvaluationStatus status);
+/// True when nothing more is to be run for it.
+bool IsTerminal(EvaluationStatus status);
+
+struct EvaluationRecord {
+  EvaluationKey key{};
+  EvaluationStatus status = EvaluationStatus::kWaiting;
+  std::string reason{};
+  int failures = 0;
+  std::string digest{};
+  bool reused = false;
+};
+
+/// An attempt that a worker holds.
+struct ActiveAttempt {
+  std::int64_t id = 0;
+  EvaluationKey key{};
+  std::string worker{};
+};
+
+struct NewAttempt {
+  std::int64_t id = 0;
+  EvaluationKey key{};
+  std::string worker{};
+  std::string cpu{};
+  std::string engine{};
+  std::int64_t started_unix_ms = 0;
+};
+
+struct AttemptEnd {
+  std::int64_t id = 0;
+  std::string outcome{};  ///< completed stopped diverged failed lost cancelled
+  std::string reason{};
+  std::int64_t ended_unix_ms = 0;
+  std::int64_t steps = 0;
+  std::int64_t contact_updates = 0;
+  double core_seconds = 0;
+  std::string staging{};
+};
+
+struct StateRecord {
+  EvaluationKey key{};
+  int load_step = 0;
+  std::vector<double> observables{};
+};
+
+struct EventRecord {
+  std::int64_t unix_ms = 0;
+  std::string what{};
+};
+
+struct RequestRecord {
+  std::string digest{};
+  std::string answer{};
+};
+
+/// Work done for a campaign.
+struct Effort {
+  std::int64_t model_evaluations = 0;  ///< run to an end here (reused ones are not counted again)
+  double core_seconds = 0;
+};
+
+}  // namespace calib::store

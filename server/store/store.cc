@@ -1,0 +1,146 @@
+#include "server/store/store.h"
+
+#include <deque>
+#include <future>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "server/store/connection.h"
+#include "server/store/migrations.h"
+
+namespace calib::store {
+namespace {
+
+/// Bounds how long one transaction keeps earlier acknowledgements waiting.
+constexpr std::size_t kLargestGroup = 512;
+
+}  // namespace
+
+class Store::Writer {
+ public:
+  Writer(std::unique_ptr<Connection> connection, StoreHooks hooks)
+      : connection_(std::move(connection)), hooks_(std::move(hooks)), thread_([this] { Loop(); }) {}
+
+  ~Writer() {
+    {
+      absl::MutexLock lock(&mutex_);
+      closing_ = true;
+    }
+    thread_.join();
+  }
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+
+  void Enqueue(Job job, Done done) {
+    absl::MutexLock lock(&mutex_);
+    queue_.push_back({std::move(job), std::move(done)});
+  }
+
+ private:
+  struct Entry {
+    Job job;
+    Done done;
+  };
+
+  bool HasWork() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return closing_ || !queue_.empty();
+  }
+
+  /// What waits, up to a full group; empty: closing and all done.
+  std::vector<Entry> NextGroup() {
+    absl::MutexLock lock(&mutex_);
+    mutex_.Await(absl::Condition(this, &Writer::HasWork));
+    std::vector<Entry> group;
+    while (!queue_.empty() && group.size() < kLargestGroup) {
+      group.push_back(std::move(queue_.front()));
+      queue_.pop_front();
+    }
+    return group;
+  }
+
+  void Loop() {
+    for (auto group = NextGroup(); !group.empty(); group = NextGroup()) {
+      if (failure_.ok()) {
+        failure_ = Commit(group);
+      }
+      for (Entry& entry : group) {
+        entry.done(failure_);
+      }
+    }
+  }
+
+  absl::Status Commit(std::vector<Entry>& group) {
+    try {
+      SQLite::Transaction scope(connection_->database(), SQLite::TransactionBehavior::IMMEDIATE);
+      Transaction transaction(*connection_);
+      for (Entry& entry : group) {
+        entry.job(transaction);
+      }
+      if (!transaction.status().ok()) {
+        return transaction.status();  // rolls back
+      }
+      if (hooks_.before_commit) {
+        if (absl::Status status = hooks_.before_commit(); !status.ok()) {
+          return status;
+        }
+      }
+      scope.commit();
+    } catch (const SQLite::Exception& error) {
+      return ToStatus(error);
+    }
+    if (hooks_.after_commit) {
+      hooks_.after_commit();
+    }
+    return absl::OkStatus();
+  }
+
+  const std::unique_ptr<Connection> connection_;  // the writer thread's alone
+  const StoreHooks hooks_;
+  absl::Status failure_;  // the writer thread's alone
+  absl::Mutex mutex_;
+  std::deque<Entry> queue_ ABSL_GUARDED_BY(mutex_);
+  bool closing_ ABSL_GUARDED_BY(mutex_) = false;
+  std::thread thread_;  // last: starts when everything above is there
+};
+
+absl::StatusOr<std::unique_ptr<Store>> Store::Open(const std::string& path, StoreHooks hooks) {
+  std::unique_ptr<Connection> connection;
+  try {
+    connection = std::make_unique<Connection>(path, /*writable=*/true);
+  } catch (const SQLite::Exception& error) {
+    return ToStatus(error);
+  }
+  if (absl::Status status = Migrate(*connection); !status.ok()) {
+    return status;
+  }
+  return std::unique_ptr<Store>(
+      new Store(path, std::make_unique<Writer>(std::move(connection), std::move(hooks))));
+}
+
+Store::Store(std::string path, std::unique_ptr<Writer> writer)
+    : path_(std::move(path)), writer_(std::move(writer)) {}
+
+Store::~Store() = default;
+
+void Store::Write(Job job, Done done) { writer_->Enqueue(std::move(job), std::move(done)); }
+
+absl::Status Store::WriteNow(Job job) {
+  std::promise<absl::Status> result;
+  Write(std::move(job), [&result](const absl::Status& status) { result.set_value(status); });
+  return result.get_future().get();
+}
+
+absl::StatusOr<Reader> Store::Read() const {
+  try {
+    auto connection = std::make_unique<Connection>(path_, /*writable=*/false);
+    connection->database().exec("BEGIN");
+    return Reader(std::move(connection));
+  } catch (const SQLite::Exception& error) {
+    return ToStatus(error);
+  }
+}
+
+}  // namespace calib::store

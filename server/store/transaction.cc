@@ -1,0 +1,201 @@
+#include "server/store/transaction.h"
+
+#include <bit>
+#include <optional>
+
+#include "absl/strings/str_cat.h"
+#include "server/store/connection.h"
+
+namespace calib::store {
+
+template <typename F>
+void Transaction::Guard(F write) {
+  if (!status_.ok()) {
+    return;
+  }
+  try {
+    write();
+  } catch (const SQLite::Exception& error) {
+    status_ = ToStatus(error);
+  }
+}
+
+void Transaction::PutBlob(const std::string& digest, const std::string& content) {
+  Guard([&] {
+    SQLite::Statement& insert =
+        connection_.Bind("INSERT INTO blob(digest, content) VALUES(?, ?) ON CONFLICT DO NOTHING");
+    insert.bind(1, digest);
+    // An empty blob has no address; a zero-length one of any address is stored as such, not as NULL.
+    insert.bind(2, static_cast<const void*>(content.data()), static_cast<int>(content.size()));
+    insert.exec();
+    insert.reset();
+  });
+}
+
+void Transaction::PutRequest(const std::string& id, const RequestRecord& request) {
+  Guard([&] {
+    connection_.Run("INSERT INTO request(id, digest, answer) VALUES(?, ?, ?)", id, request.digest,
+                    request.answer);
+  });
+}
+
+void Transaction::InsertCampaign(const NewCampaign& campaign,
+                                 const std::map<std::string, std::string>& files) {
+  Guard([&] {
+    std::optional<std::int64_t> seed;
+    if (campaign.seed.has_value()) {
+      seed = std::bit_cast<std::int64_t>(*campaign.seed);
+    }
+    connection_.Run(
+        "INSERT INTO campaign(id, name, yaml, file_name, seed, method, samples, max_iterations, "
+        "created_unix_ms, state) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
+        campaign.id, campaign.name, campaign.yaml, campaign.file_name, seed, campaign.method,
+        campaign.samples, campaign.max_iterations, campaign.created_unix_ms);
+    for (const auto& [path, digest] : files) {
+      connection_.Run("INSERT INTO campaign_file(campaign, path, digest) VALUES(?, ?, ?)",
+                      campaign.id, path, digest);
+    }
+  });
+}
+
+void Transaction::SetProgress(std::int64_t campaign, const CampaignProgress& progress) {
+  Guard([&] {
+    connection_.Run(
+        "UPDATE campaign SET state = ?, reason = ?, phase = ?, iteration = ?, converged = ?, "
+        "pause_waived = ? WHERE id = ?",
+        progress.state, progress.reason, progress.phase, progress.iteration, progress.converged,
+        progress.pause_waived, campaign);
+  });
+}
+
+void Transaction::DeleteCampaign(std::int64_t campaign) {
+  Guard([&] { connection_.Run("DELETE FROM campaign WHERE id = ?", campaign); });
+}
+
+void Transaction::InsertIteration(std::int64_t campaign, int number, const std::string& proposal) {
+  Guard([&] {
+    connection_.Run("INSERT INTO iteration(campaign, number, proposal) VALUES(?, ?, ?)", campaign,
+                    number, proposal);
+  });
+}
+
+void Transaction::SetPosterior(std::int64_t campaign, int number, const std::string& posterior) {
+  Guard([&] {
+    connection_.Run("UPDATE iteration SET posterior = ? WHERE campaign = ? AND number = ?",
+                    posterior, campaign, number);
+  });
+}
+
+void Transaction::InsertSample(std::int64_t campaign, const SampleRecord& sample) {
+  Guard([&] {
+    connection_.Run(
+        "INSERT INTO sample(campaign, sample, iteration, parameters, log_weight, log_likelihood) "
+        "VALUES(?, ?, ?, ?, ?, ?)",
+        campaign, sample.sample, sample.iteration, DoubleBlob{sample.parameters}, sample.log_weight,
+        sample.log_likelihood);
+  });
+}
+
+void Transaction::SetWeight(std::int64_t campaign, int sample, double log_weight,
+                            double log_likelihood) {
+  Guard([&] {
+    connection_.Run(
+        "UPDATE sample SET log_weight = ?, log_likelihood = ? WHERE campaign = ? AND sample = ?",
+        log_weight, log_likelihood, campaign, sample);
+  });
+}
+
+void Transaction::InsertEvaluation(const EvaluationRecord& evaluation) {
+  Guard([&] {
+    connection_.Run(
+        "INSERT INTO evaluation(campaign, sample, experiment, status, reason, failures, digest, "
+        "reused) VALUES(?, ?, ?, ?, ?, ?, ?, ?)",
+        evaluation.key.campaign, evaluation.key.sample, evaluation.key.experiment,
+        ToString(evaluation.status), evaluation.reason, evaluation.failures, evaluation.digest,
+        evaluation.reused);
+  });
+}
+
+void Transaction::SetEvaluation(const EvaluationKey& key, EvaluationStatus status,
+                                const std::string& reason, int failures) {
+  Guard([&] {
+    connection_.Run(
+        "UPDATE evaluation SET status = ?, reason = ?, failures = ? "
+        "WHERE campaign = ? AND sample = ? AND experiment = ?",
+        ToString(status), reason, failures, key.campaign, key.sample, key.experiment);
+  });
+}
+
+void Transaction::ReuseEvaluation(const EvaluationKey& from, const EvaluationKey& to) {
+  Guard([&] {
+    connection_.Run(
+        "UPDATE evaluation SET (status, reason, reused) = (SELECT status, reason, 1 "
+        "FROM evaluation WHERE campaign = ? AND sample = ? AND experiment = ?) "
+        "WHERE campaign = ? AND sample = ? AND experiment = ?",
+        from.campaign, from.sample, from.experiment, to.campaign, to.sample, to.experiment);
+    connection_.Run(
+        "INSERT INTO state(campaign, sample, experiment, load_step, observables) "
+        "SELECT ?, ?, ?, load_step, observables FROM state "
+        "WHERE campaign = ? AND sample = ? AND experiment = ? ON CONFLICT DO NOTHING",
+        to.campaign, to.sample, to.experiment, from.campaign, from.sample, from.experiment);
+  });
+}
+
+void Transaction::InsertAttempt(const NewAttempt& attempt) {
+  Guard([&] {
+    connection_.Run(
+        "INSERT INTO attempt(id, campaign, sample, experiment, worker, cpu, engine, "
+        "started_unix_ms) VALUES(?, ?, ?, ?, ?, ?, ?, ?)",
+        attempt.id, attempt.key.campaign, attempt.key.sample, attempt.key.experiment,
+        attempt.worker, attempt.cpu, attempt.engine, attempt.started_unix_ms);
+  });
+}
+
+void Transaction::EndAttempt(const AttemptEnd& end) {
+  Guard([&] {
+    connection_.Run(
+        "UPDATE attempt SET ended_unix_ms = ?, outcome = ?, reason = ?, steps = ?, "
+        "contact_updates = ?, core_seconds = ?, staging = ? WHERE id = ?",
+        end.ended_unix_ms, end.outcome, end.reason, end.steps, end.contact_updates,
+        end.core_seconds, end.staging, end.id);
+  });
+}
+
+void Transaction::PutState(const StateRecord& state, std::int64_t unix_ms) {
+  Guard([&] {
+    const EvaluationKey& key = state.key;
+    const DoubleBlob blob{state.observables};
+    const int inserted = connection_.Run(
+        "INSERT INTO state(campaign, sample, experiment, load_step, observables) "
+        "VALUES(?, ?, ?, ?, ?) ON CONFLICT DO NOTHING",
+        key.campaign, key.sample, key.experiment, state.load_step, blob);
+    if (inserted > 0) {
+      return;
+    }
+    SQLite::Statement& same = connection_.Bind(
+        "SELECT observables = ? FROM state "
+        "WHERE campaign = ? AND sample = ? AND experiment = ? AND load_step = ?",
+        blob, key.campaign, key.sample, key.experiment, state.load_step);
+    const bool differs = same.executeStep() && same.getColumn(0).getInt() == 0;
+    same.reset();
+    if (differs) {
+      Log(key.campaign, unix_ms,
+          absl::StrCat("nondeterminism: sample ", key.sample, " experiment ", key.experiment,
+                       " load step ", state.load_step,
+                       " was computed again with other bits; the first result is kept"));
+    }
+  });
+}
+
+void Transaction::Log(std::int64_t campaign, std::int64_t unix_ms, const std::string& what) {
+  Guard([&] {
+    std::optional<std::int64_t> owner;
+    if (campaign != 0) {
+      owner = campaign;
+    }
+    connection_.Run("INSERT INTO event(unix_ms, campaign, what) VALUES(?, ?, ?)", unix_ms, owner,
+                    what);
+  });
+}
+
+}  // namespace calib::store

@@ -1,0 +1,63 @@
+#pragma once
+// What may be written: the verbs of the domain, all of one Write() in one SQLite transaction (store.h).
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "server/store/records.h"
+
+namespace calib::store {
+
+class Connection;
+
+/// Handed to the function given to Store::Write, on the store's thread. Errors stick: after the first one nothing more
+/// is written, and everything that shares the commit is rolled back.
+class Transaction {
+ public:
+  explicit Transaction(Connection& connection) : connection_(connection) {}
+  Transaction(const Transaction&) = delete;
+  Transaction& operator=(const Transaction&) = delete;
+
+  const absl::Status& status() const { return status_; }
+
+  /// Content under its digest; a second copy changes nothing.
+  void PutBlob(const std::string& digest, const std::string& content);
+  /// Remembers the answer to a request so that its repetition gets the same one.
+  void PutRequest(const std::string& id, const RequestRecord& request);
+  /// files: path -> digest of a stored blob.
+  void InsertCampaign(const NewCampaign& campaign, const std::map<std::string, std::string>& files);
+  void SetProgress(std::int64_t campaign, const CampaignProgress& progress);
+  /// With everything that belongs to it; blobs stay.
+  void DeleteCampaign(std::int64_t campaign);
+
+  void InsertIteration(std::int64_t campaign, int number, const std::string& proposal);
+  void SetPosterior(std::int64_t campaign, int number, const std::string& posterior);
+  void InsertSample(std::int64_t campaign, const SampleRecord& sample);
+  void SetWeight(std::int64_t campaign, int sample, double log_weight, double log_likelihood);
+  void InsertEvaluation(const EvaluationRecord& evaluation);
+  void SetEvaluation(const EvaluationKey& key, EvaluationStatus status, const std::string& reason,
+                     int failures);
+  /// Ends `to` as `from` ended and gives it the same states; counted as reused.
+  void ReuseEvaluation(const EvaluationKey& from, const EvaluationKey& to);
+
+  void InsertAttempt(const NewAttempt& attempt);
+  void EndAttempt(const AttemptEnd& end);
+  /// A state that is there already is left alone; if its bits differ, that is logged as nondeterminism.
+  void PutState(const StateRecord& state, std::int64_t unix_ms);
+
+  /// campaign 0: concerns the server as a whole.
+  void Log(std::int64_t campaign, std::int64_t unix_ms, const std::string& what);
+
+ private:
+  /// Runs `write` unless an earlier one failed; SQLite's exceptions end here.
+  template <typename F>
+  void Guard(F write);
+
+  Connection& connection_;
+  absl::Status status_;
+};
+
+}  // namespace calib::store

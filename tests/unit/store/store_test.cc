@@ -1,0 +1,203 @@
+#include "server/store/store.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+namespace calib::store {
+namespace {
+
+class StoreTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    path_ = testing::TempDir() + "/" +
+            testing::UnitTest::GetInstance()->current_test_info()->name() + ".db";
+    for (const char* suffix : {"", "-wal", "-shm"}) {
+      std::filesystem::remove(path_ + suffix);
+    }
+    Open({});
+  }
+
+  void Open(StoreHooks hooks) {
+    store_.reset();
+    auto opened = Store::Open(path_, std::move(hooks));
+    ASSERT_TRUE(opened.ok()) << opened.status();
+    store_ = *std::move(opened);
+  }
+
+  void Write(const Store::Job& job) {
+    const absl::Status status = store_->WriteNow(job);
+    ASSERT_TRUE(status.ok()) << status;
+  }
+
+  Reader Read() {
+    auto reader = store_->Read();
+    EXPECT_TRUE(reader.ok()) << reader.status();
+    return *std::move(reader);
+  }
+
+  /// One campaign, one iteration, one sample, one evaluation.
+  static void PutEvaluation(Transaction& t) {
+    t.InsertCampaign({.id = 1, .name = "sand", .yaml = "name: sand", .method = "sqmc", .samples = 1},
+                     {});
+    t.InsertIteration(1, 0, "{}");
+    t.InsertSample(1, {.sample = 0, .iteration = 0, .parameters = {1e9, 0.1}});
+    t.InsertEvaluation({.key = kKey, .digest = "d"});
+  }
+
+  static constexpr EvaluationKey kKey{.campaign = 1, .sample = 0, .experiment = 0};
+  std::string path_;
+  std::unique_ptr<Store> store_;
+};
+
+TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
+  const NewCampaign campaign{.id = 7,
+                             .name = "sand",
+                             .yaml = "name: sand\n",
+                             .file_name = "sand.yaml",
+                             .seed = std::numeric_limits<std::uint64_t>::max(),
+                             .method = "sqmc",
+                             .samples = 10,
+                             .max_iterations = 3,
+                             .created_unix_ms = 1234};
+  Write([&](Transaction& t) {
+    t.PutBlob("abc", std::string("\0grains\n", 8));
+    t.InsertCampaign(campaign, {{"packing.txt", "abc"}});
+    t.SetProgress(7, {.state = "paused", .reason = "asked", .iteration = 2, .pause_waived = true});
+    t.Log(7, 99, "submitted");
+  });
+  Reader reader = Read();
+  const auto record = reader.Campaign(7);
+  ASSERT_TRUE(record.ok());
+  EXPECT_EQ(record->submitted.seed, campaign.seed);
+  EXPECT_EQ(record->submitted.yaml, campaign.yaml);
+  EXPECT_EQ(record->progress.state, "paused");
+  EXPECT_TRUE(record->progress.pause_waived);
+  EXPECT_EQ(reader.Files(7)->at("packing.txt"), "abc");
+  EXPECT_EQ(*reader.Blob("abc"), std::string("\0grains\n", 8));
+  EXPECT_EQ(reader.Events(7)->front().what, "submitted");
+  EXPECT_EQ(reader.Campaign(8).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(*reader.LastCampaign(), 7);
+}
+
+TEST_F(StoreTest, DoublesSurviveBitForBit) {
+  const std::vector<double> values = {0.1, -0.0, 5e-324, 1.7976931348623157e308, 1.0 / 3.0};
+  Write([&](Transaction& t) {
+    PutEvaluation(t);
+    t.PutState({.key = kKey, .load_step = 3, .observables = values}, 0);
+    t.SetWeight(1, 0, -std::numeric_limits<double>::infinity(), std::nan(""));
+  });
+  Reader reader = Read();
+  const auto states = reader.States(1);
+  ASSERT_TRUE(states.ok());
+  ASSERT_EQ(states->size(), 1U);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(states->front().observables[i]),
+              std::bit_cast<std::uint64_t>(values[i]));
+  }
+  const auto samples = reader.Samples(1);
+  EXPECT_EQ(samples->front().log_weight, -std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(std::isnan(samples->front().log_likelihood));
+}
+
+TEST_F(StoreTest, StateThatArrivesTwiceIsHarmlessAndOtherBitsAreLogged) {
+  Write([](Transaction& t) {
+    PutEvaluation(t);
+    t.PutState({.key = kKey, .load_step = 0, .observables = {1.0}}, 10);
+    t.PutState({.key = kKey, .load_step = 0, .observables = {1.0}}, 11);
+  });
+  EXPECT_TRUE(Read().Events(1)->empty());
+  Write([](Transaction& t) {
+    t.PutState({.key = kKey, .load_step = 0, .observables = {1.0000000000000002}}, 12);
+  });
+  Reader reader = Read();
+  EXPECT_EQ(reader.States(1)->front().observables.front(), 1.0);
+  ASSERT_EQ(reader.Events(1)->size(), 1U);
+  EXPECT_NE(reader.Events(1)->front().what.find("nondeterminism"), std::string::npos);
+}
+
+TEST_F(StoreTest, AttemptNumbersAreNeverUsedAgain) {
+  Write([](Transaction& t) {
+    PutEvaluation(t);
+    t.InsertAttempt({.id = 5, .key = kKey, .worker = "w"});
+  });
+  EXPECT_EQ(Read().ActiveAttempts()->size(), 1U);
+  Write([](Transaction& t) {
+    t.EndAttempt({.id = 5, .outcome = "completed", .core_seconds = 2.5});
+    t.SetEvaluation(kKey, EvaluationStatus::kFinished, "", 0);
+  });
+  EXPECT_TRUE(Read().ActiveAttempts()->empty());
+  EXPECT_EQ(Read().EffortOf(1)->model_evaluations, 1);
+  EXPECT_EQ(Read().EffortOf(1)->core_seconds, 2.5);
+  Write([](Transaction& t) { t.DeleteCampaign(1); });
+  EXPECT_EQ(*Read().LastAttempt(), 5);
+  EXPECT_EQ(*Read().LastCampaign(), 1);
+  EXPECT_TRUE(Read().States(1)->empty());
+}
+
+TEST_F(StoreTest, EqualEvaluationIsReusedWithItsStates) {
+  Write([](Transaction& t) {
+    PutEvaluation(t);
+    t.PutState({.key = kKey, .load_step = 0, .observables = {4.0}}, 0);
+  });
+  EXPECT_FALSE(Read().FindEqual("d")->has_value()) << "it has not ended yet";
+  const EvaluationKey copy{.campaign = 1, .sample = 1, .experiment = 0};
+  Write([&](Transaction& t) {
+    t.SetEvaluation(kKey, EvaluationStatus::kDiverged, "lost grains", 0);
+    t.InsertSample(1, {.sample = 1, .iteration = 0, .parameters = {1e9, 0.1}});
+    t.InsertEvaluation({.key = copy, .digest = "d"});
+    t.ReuseEvaluation(kKey, copy);
+  });
+  EXPECT_EQ(*Read().FindEqual("d"), kKey);
+  const auto evaluations = Read().Evaluations(1);
+  EXPECT_EQ(evaluations->at(1).status, EvaluationStatus::kDiverged);
+  EXPECT_EQ(evaluations->at(1).reason, "lost grains");
+  EXPECT_TRUE(evaluations->at(1).reused);
+  EXPECT_EQ(Read().States(1, 1)->front().observables.front(), 4.0);
+  EXPECT_EQ(Read().EffortOf(1)->model_evaluations, 1) << "counted once";
+}
+
+TEST_F(StoreTest, FailedCommitIsReportedToEveryoneAndNothingMoreIsTaken) {
+  bool full = false;
+  Open({.before_commit = [&] {
+    return full ? absl::ResourceExhaustedError("database or disk is full") : absl::OkStatus();
+  }});
+  Write([](Transaction& t) { PutEvaluation(t); });
+  full = true;
+  EXPECT_EQ(store_->WriteNow([](Transaction& t) { t.Log(1, 0, "lost"); }).code(),
+            absl::StatusCode::kResourceExhausted);
+  full = false;
+  EXPECT_EQ(store_->WriteNow([](Transaction& t) { t.Log(1, 0, "also lost"); }).code(),
+            absl::StatusCode::kResourceExhausted);
+  Open({});
+  EXPECT_TRUE(Read().Events(1)->empty());
+  EXPECT_EQ(Read().Evaluations(1)->size(), 1U) << "what was acknowledged is there";
+}
+
+TEST_F(StoreTest, WriteThatBreaksAConstraintRollsBackItsWholeCommit) {
+  Write([](Transaction& t) { PutEvaluation(t); });
+  EXPECT_FALSE(store_->WriteNow([](Transaction& t) {
+    t.Log(1, 0, "before");
+    t.InsertEvaluation({.key = {.campaign = 99, .sample = 0, .experiment = 0}, .digest = "x"});
+  }).ok());
+  Open({});
+  EXPECT_TRUE(Read().Events(1)->empty());
+  EXPECT_EQ(Read().Evaluations(1)->size(), 1U);
+}
+
+TEST_F(StoreTest, AReaderSeesOneMomentOnly) {
+  Write([](Transaction& t) { PutEvaluation(t); });
+  Reader reader = Read();
+  EXPECT_EQ(reader.Campaigns()->size(), 1U);
+  Write([](Transaction& t) {
+    t.InsertCampaign({.id = 2, .name = "clay", .method = "sqmc", .samples = 1}, {});
+  });
+  EXPECT_EQ(reader.Campaigns()->size(), 1U);
+  EXPECT_EQ(Read().Campaigns()->size(), 2U);
+}
+
+}  // namespace
+}  // namespace calib::store
