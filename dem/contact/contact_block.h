@@ -50,6 +50,11 @@ struct alignas(64) ContactBlock {
   Lane rolling_stiffness;     ///< bending stiffness, for the time step [N m/rad]
   Lane twisting_stiffness;    ///< [N m/rad]
 
+  // Totals (contact_kinematics), after the last kernel.
+  Lane force_x, force_y, force_z;        ///< on j [N]
+  Lane torque_ix, torque_iy, torque_iz;  ///< on i [N m]
+  Lane torque_jx, torque_jy, torque_jz;  ///< on j [N m]
+
   /// What the contacts remember; a kernel owns the columns from the `first` it was given on.
   double history[kMaxHistory][kBlock];
 };

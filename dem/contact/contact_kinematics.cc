@@ -83,4 +83,26 @@ CALIB_DEM_CLONES void TransportTangential(ContactBlock& b, int first) {
   }
 }
 
+CALIB_DEM_CLONES void ComputeTotals(ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const double nx = b.nx[k];
+    const double ny = b.ny[k];
+    const double nz = b.nz[k];
+    b.force_x[k] = b.normal_force[k] * nx + b.fx[k];
+    b.force_y[k] = b.normal_force[k] * ny + b.fy[k];
+    b.force_z[k] = b.normal_force[k] * nz + b.fz[k];
+    const double tx = ny * b.fz[k] - nz * b.fy[k];
+    const double ty = nz * b.fx[k] - nx * b.fz[k];
+    const double tz = nx * b.fy[k] - ny * b.fx[k];
+    const double arm_i = b.radius_i[k] - 0.5 * b.overlap[k];
+    const double arm_j = b.radius_j[k] - 0.5 * b.overlap[k];
+    b.torque_ix[k] = -arm_i * tx - b.mx[k];
+    b.torque_iy[k] = -arm_i * ty - b.my[k];
+    b.torque_iz[k] = -arm_i * tz - b.mz[k];
+    b.torque_jx[k] = b.mx[k] - arm_j * tx;
+    b.torque_jy[k] = b.my[k] - arm_j * ty;
+    b.torque_jz[k] = b.mz[k] - arm_j * tz;
+  }
+}
+
 }  // namespace calib::dem

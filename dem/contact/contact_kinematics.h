@@ -22,4 +22,9 @@ void ComputeKinematics(ContactBlock& block);
 /// s' is tangential; its length is kept to fourth order in the angle of the step.
 void TransportTangential(ContactBlock& block, int first);
 
+/// Adds up what the contact does to its grains: force on j, torques with arms to the middle of the
+/// overlap.
+///   F = Fn n + Fs,   T_i = -(r_i - u/2) n x Fs - M,   T_j = -(r_j - u/2) n x Fs + M
+void ComputeTotals(ContactBlock& block);
+
 }  // namespace calib::dem

@@ -77,6 +77,7 @@ void ContactModel::Evaluate(ContactBlock& block) const {
   for (const Link& link : chain_) {
     link.kernel->Apply(block, link.first_history);
   }
+  ComputeTotals(block);
 }
 
 }  // namespace calib::dem

@@ -21,8 +21,8 @@ class ContactModel {
   /// tan(phi_mu) of the model itself; consolidation may put another one into the block.
   [[nodiscard]] double sliding_friction() const { return sliding_friction_; }
 
-  /// Kinematics and every kernel in the order of ContactStage. All inputs of the block are set; its
-  /// history is read and updated.
+  /// Kinematics, every kernel in the order of ContactStage, totals. All inputs of the block are
+  /// set; its history is read and updated.
   void Evaluate(ContactBlock& block) const;
 
  private:

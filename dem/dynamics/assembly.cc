@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/contact/simd.h"
 #include "dem/dynamics/chunks.h"
 
 namespace calib::dem {
@@ -15,7 +16,7 @@ namespace {
 
 /// Gap up to which pairs are listed, over the mean diameter: a wider skin lists more pairs, a
 /// narrower one searches more often. Measured best on dense packings of 1000 to 10 000 grains.
-constexpr double kSkin = 0.06;
+constexpr double kSkin = 0.03;
 
 /// sqrt(m/K) of the smallest grain, held by one like it at an overlap of 1e-4 radii.
 double NominalStep(const ContactModel& model, const ParticleArrays& p) {
@@ -35,12 +36,77 @@ double NominalStep(const ContactModel& model, const ParticleArrays& p) {
   return 1.0 / std::sqrt(std::max(translation, rotation));
 }
 
-/// Local damping of one component: the force opposing the motion is enlarged, the driving one
-/// reduced. [Cundall 1987]
-inline double Damped(double acceleration, double velocity, double dt, double damping) {
-  const double direction = acceleration * (velocity + 0.5 * dt * acceleration);
-  const double sign = direction > 0 ? 1.0 : (direction < 0 ? -1.0 : 0.0);
-  return acceleration * (1.0 - damping * sign);
+/// Repeats lane 0 in the unused lanes, so that kernels meet valid numbers everywhere.
+void PadLanes(int width, ContactBlock& b) {
+  for (ContactBlock::Lane* lane : {&b.dx, &b.dy, &b.dz, &b.radius_i, &b.radius_j, &b.vx, &b.vy,
+                                   &b.vz, &b.wix, &b.wiy, &b.wiz, &b.wjx, &b.wjy, &b.wjz}) {
+    std::fill(*lane + b.count, *lane + kBlock, (*lane)[0]);
+  }
+  for (int c = 0; c < width; ++c) {
+    std::fill(b.history[c] + b.count, b.history[c] + kBlock, b.history[c][0]);
+  }
+}
+
+/// What deciding on contact needs of pairs and grains.
+struct PairInput {
+  const int* first;
+  const int* second;
+  const std::uint8_t* image;
+  const double* x;
+  const double* y;
+  const double* z;
+  const double* radius;
+  const std::array<double, 3>* shift;
+};
+
+/// depth: (r_i + r_j)^2 - |d|^2 of each pair [m^2]; positive: touching.
+void MeasureDistances(const PairInput& in, std::size_t begin, std::size_t end, double* depth) {
+  for (std::size_t s = begin; s < end; ++s) {
+    const int i = in.first[s];
+    const int j = in.second[s];
+    const double* const shift = in.shift[in.image[s]].data();
+    const double dx = in.x[j] + shift[0] - in.x[i];
+    const double dy = in.y[j] + shift[1] - in.y[i];
+    const double dz = in.z[j] + shift[2] - in.z[i];
+    const double reach = in.radius[i] + in.radius[j];
+    depth[s - begin] = reach * reach - (dx * dx + dy * dy + dz * dz);
+  }
+}
+
+/// Largest squared distance between centres and the affine image of where they were; NaN if there
+/// is one.
+CALIB_DEM_CLONES double LargestShift2(const ParticleArrays& p, const std::vector<double>* searched,
+                                      const double* scale, std::size_t begin, std::size_t end) {
+  constexpr std::size_t kLanes = 8;
+  const double* const x = p.x.data();
+  const double* const y = p.y.data();
+  const double* const z = p.z.data();
+  const double* const x0 = searched[0].data();
+  const double* const y0 = searched[1].data();
+  const double* const z0 = searched[2].data();
+  double largest[kLanes] = {};
+  const auto shift2 = [&](std::size_t g) {
+    const double ux = x[g] - scale[0] * x0[g];
+    const double uy = y[g] - scale[1] * y0[g];
+    const double uz = z[g] - scale[2] * z0[g];
+    return ux * ux + uy * uy + uz * uz;
+  };
+  std::size_t g = begin;
+  for (; g + kLanes <= end; g += kLanes) {
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      const double u2 = shift2(g + l);
+      largest[l] = u2 <= largest[l] ? largest[l] : u2;  // a NaN enters and stays
+    }
+  }
+  double result = 0;
+  for (; g < end; ++g) {
+    const double u2 = shift2(g);
+    result = u2 <= result ? result : u2;
+  }
+  for (const double l : largest) {
+    result = l <= result ? result : l;
+  }
+  return result;
 }
 
 }  // namespace
@@ -107,9 +173,9 @@ absl::Status Assembly::SearchNeighbors() {
   if (auto s = BuildNeighborList(cell_, skin_, particles_, list_); !s.ok()) {
     return s;
   }
-  searched_x_ = particles_.x;
-  searched_y_ = particles_.y;
-  searched_z_ = particles_.z;
+  searched_[0] = particles_.x;
+  searched_[1] = particles_.y;
+  searched_[2] = particles_.z;
   std::copy(std::begin(cell_.length), std::end(cell_.length), std::begin(searched_length_));
   moved_ = 0;
 
@@ -131,80 +197,80 @@ absl::Status Assembly::SearchNeighbors() {
   }
   touching_ = std::move(touching);
   history_ = std::move(history);
-  loads_.assign(slots, PairLoad{});
+  loads_.assign(2 * slots, GrainLoad{});
   sums_.assign(static_cast<std::size_t>(ChunkCount(list_.size(), kPairChunk)), {});
   return absl::OkStatus();
 }
 
-void Assembly::LoadLane(int slot, const double* d, ContactBlock& b) const {
+void Assembly::LoadLane(int slot, ContactBlock& b) const {
   const int k = b.count++;
   const ParticleArrays& p = particles_;
-  const auto i = static_cast<std::size_t>(list_.first[static_cast<std::size_t>(slot)]);
-  const auto j = static_cast<std::size_t>(list_.second[static_cast<std::size_t>(slot)]);
+  const int i = list_.first.data()[slot];
+  const int j = list_.second.data()[slot];
+  const std::array<double, 3>& shift = shift_[list_.image.data()[slot]];
   b.pair[k] = slot;
-  b.dx[k] = d[0];
-  b.dy[k] = d[1];
-  b.dz[k] = d[2];
-  b.radius_i[k] = p.radius[i];
-  b.radius_j[k] = p.radius[j];
-  b.vx[k] = p.vx[j] - p.vx[i];
-  b.vy[k] = p.vy[j] - p.vy[i];
-  b.vz[k] = p.vz[j] - p.vz[i];
-  b.wix[k] = p.wx[i];
-  b.wiy[k] = p.wy[i];
-  b.wiz[k] = p.wz[i];
-  b.wjx[k] = p.wx[j];
-  b.wjy[k] = p.wy[j];
-  b.wjz[k] = p.wz[j];
+  b.dx[k] = p.x.data()[j] + shift[0] - p.x.data()[i];
+  b.dy[k] = p.y.data()[j] + shift[1] - p.y.data()[i];
+  b.dz[k] = p.z.data()[j] + shift[2] - p.z.data()[i];
+  b.radius_i[k] = p.radius.data()[i];
+  b.radius_j[k] = p.radius.data()[j];
+  b.vx[k] = p.vx.data()[j] - p.vx.data()[i];
+  b.vy[k] = p.vy.data()[j] - p.vy.data()[i];
+  b.vz[k] = p.vz.data()[j] - p.vz.data()[i];
+  b.wix[k] = p.wx.data()[i];
+  b.wiy[k] = p.wy.data()[i];
+  b.wiz[k] = p.wz.data()[i];
+  b.wjx[k] = p.wx.data()[j];
+  b.wjy[k] = p.wy.data()[j];
+  b.wjz[k] = p.wz.data()[j];
   const int width = model_.history_size();
-  const double* remembered =
-      &history_[static_cast<std::size_t>(slot) * static_cast<std::size_t>(width)];
+  const double* const remembered = history_.data() + static_cast<std::ptrdiff_t>(slot) * width;
   for (int c = 0; c < width; ++c) {
     b.history[c][k] = remembered[c];
   }
 }
 
-namespace {
-
-/// Repeats lane 0 in the unused lanes, so that kernels meet valid numbers everywhere.
-void PadLanes(int width, ContactBlock& b) {
-  for (ContactBlock::Lane* lane : {&b.dx, &b.dy, &b.dz, &b.radius_i, &b.radius_j, &b.vx, &b.vy,
-                                   &b.vz, &b.wix, &b.wiy, &b.wiz, &b.wjx, &b.wjy, &b.wjz}) {
-    std::fill(*lane + b.count, *lane + kBlock, (*lane)[0]);
-  }
-  for (int c = 0; c < width; ++c) {
-    std::fill(b.history[c] + b.count, b.history[c] + kBlock, b.history[c][0]);
-  }
+void Assembly::OpenContact(std::size_t slot) {
+  const auto width = static_cast<std::size_t>(model_.history_size());
+  touching_[slot] = 0;
+  loads_[static_cast<std::size_t>(list_.place_i[slot])] = GrainLoad{};
+  loads_[static_cast<std::size_t>(list_.place_j[slot])] = GrainLoad{};
+  std::fill_n(history_.begin() + static_cast<std::ptrdiff_t>(slot * width), width, 0.0);
 }
 
-}  // namespace
-
 void Assembly::EvaluateChunk(int chunk) {
+  const auto begin = static_cast<std::size_t>(chunk) * kPairChunk;
+  const auto end = std::min(begin + kPairChunk, list_.second.size());
+  double depth[kPairChunk];
+  MeasureDistances({.first = list_.first.data(),
+                    .second = list_.second.data(),
+                    .image = list_.image.data(),
+                    .x = particles_.x.data(),
+                    .y = particles_.y.data(),
+                    .z = particles_.z.data(),
+                    .radius = particles_.radius.data(),
+                    .shift = shift_.data()},
+                   begin, end, depth);
+  int active[kPairChunk];
+  int count = 0;
+  for (std::size_t s = begin; s < end;
+       ++s) {  // without branches: which pairs touch cannot be predicted
+    const bool touches = depth[s - begin] > 0;
+    active[count] = static_cast<int>(s);
+    count += touches ? 1 : 0;
+    if (touching_.data()[s] > static_cast<std::uint8_t>(touches)) {
+      OpenContact(s);
+    }
+  }
   ContactBlock block;
   block.dt = last_dt_;
   block.sliding_friction = sliding_friction_;
   std::copy(std::begin(cell_.stretch), std::end(cell_.stretch), std::begin(block.stretch));
   ChunkSums sums;
-  const ParticleArrays& p = particles_;
-  const auto begin = static_cast<std::size_t>(chunk) * kPairChunk;
-  const auto end = std::min(begin + kPairChunk, list_.second.size());
-  const auto width = static_cast<std::size_t>(model_.history_size());
-  for (std::size_t s = begin; s < end; ++s) {
-    const auto i = static_cast<std::size_t>(list_.first[s]);
-    const auto j = static_cast<std::size_t>(list_.second[s]);
-    const std::array<double, 3>& shift = shift_[list_.image[s]];
-    const double d[3] = {p.x[j] + shift[0] - p.x[i], p.y[j] + shift[1] - p.y[i],
-                         p.z[j] + shift[2] - p.z[i]};
-    const double reach = p.radius[i] + p.radius[j];
-    if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < reach * reach) {
-      LoadLane(static_cast<int>(s), d, block);
-      if (block.count == kBlock) {
-        StoreBlock(block, sums);
-      }
-    } else if (touching_[s] != 0) {  // the contact opens and forgets
-      touching_[s] = 0;
-      loads_[s] = PairLoad{};
-      std::fill_n(&history_[s * width], width, 0.0);
+  for (int a = 0; a < count; ++a) {
+    LoadLane(active[a], block);
+    if (block.count == kBlock) {
+      StoreBlock(block, sums);
     }
   }
   if (block.count > 0) {
@@ -218,28 +284,19 @@ void Assembly::StoreBlock(ContactBlock& b, ChunkSums& sums) {
   model_.Evaluate(b);
   const int width = model_.history_size();
   for (int k = 0; k < b.count; ++k) {
-    const auto slot = static_cast<std::size_t>(b.pair[k]);
-    const double f[3] = {b.normal_force[k] * b.nx[k] + b.fx[k],
-                         b.normal_force[k] * b.ny[k] + b.fy[k],
-                         b.normal_force[k] * b.nz[k] + b.fz[k]};
-    // n x Fs; arms reach from the centres to the middle of the overlap.
-    const double t[3] = {b.ny[k] * b.fz[k] - b.nz[k] * b.fy[k],
-                         b.nz[k] * b.fx[k] - b.nx[k] * b.fz[k],
-                         b.nx[k] * b.fy[k] - b.ny[k] * b.fx[k]};
-    const double m[3] = {b.mx[k], b.my[k], b.mz[k]};
-    const double arm_i = b.radius_i[k] - 0.5 * b.overlap[k];
-    const double arm_j = b.radius_j[k] - 0.5 * b.overlap[k];
-    PairLoad& load = loads_[slot];
-    for (int a = 0; a < 3; ++a) {
-      load.force[a] = f[a];
-      load.torque_i[a] = -arm_i * t[a] - m[a];
-      load.torque_j[a] = -arm_j * t[a] + m[a];
-    }
-    sums.stress[0] += f[0] * b.dx[k];
-    sums.stress[1] += f[1] * b.dy[k];
-    sums.stress[2] += f[2] * b.dz[k];
-    touching_[slot] = 1;
-    double* remembered = &history_[slot * static_cast<std::size_t>(width)];
+    const int slot = b.pair[k];
+    const double fx = b.force_x[k];
+    const double fy = b.force_y[k];
+    const double fz = b.force_z[k];
+    loads_.data()[list_.place_i.data()[slot]] = {{-fx, -fy, -fz},
+                                                 {b.torque_ix[k], b.torque_iy[k], b.torque_iz[k]}};
+    loads_.data()[list_.place_j.data()[slot]] = {{fx, fy, fz},
+                                                 {b.torque_jx[k], b.torque_jy[k], b.torque_jz[k]}};
+    sums.stress[0] += fx * b.dx[k];
+    sums.stress[1] += fy * b.dy[k];
+    sums.stress[2] += fz * b.dz[k];
+    touching_.data()[slot] = 1;
+    double* const remembered = history_.data() + static_cast<std::ptrdiff_t>(slot) * width;
     for (int c = 0; c < width; ++c) {
       remembered[c] = b.history[c][k];
     }
@@ -248,65 +305,37 @@ void Assembly::StoreBlock(ContactBlock& b, ChunkSums& sums) {
   b.count = 0;
 }
 
-void Assembly::GatherLoads(int grain) {
+void Assembly::GatherLoads(std::size_t begin, std::size_t end) {
   ParticleArrays& p = particles_;
-  const auto g = static_cast<std::size_t>(grain);
-  double force[3] = {0, 0, 0};
-  double torque[3] = {0, 0, 0};
-  for (int e = list_.incident_row[g]; e < list_.incident_row[g + 1]; ++e) {
-    const int incident = list_.incident[static_cast<std::size_t>(e)];
-    const PairLoad& load = loads_[static_cast<std::size_t>(incident >> 1)];
-    const bool is_j = (incident & 1) != 0;
-    const double sign = is_j ? 1.0 : -1.0;
-    const double* pair_torque = is_j ? load.torque_j : load.torque_i;
-    for (int a = 0; a < 3; ++a) {
-      force[a] += sign * load.force[a];
-      torque[a] += pair_torque[a];
+  const GrainLoad* load = loads_.data() + list_.place_row[begin];
+  for (std::size_t g = begin; g < end; ++g) {
+    const GrainLoad* const row_end = loads_.data() + list_.place_row.data()[g + 1];
+    GrainLoad sum{};
+    for (; load != row_end; ++load) {
+      for (int a = 0; a < 3; ++a) {
+        sum.force[a] += load->force[a];
+        sum.torque[a] += load->torque[a];
+      }
     }
+    p.fx.data()[g] = sum.force[0];
+    p.fy.data()[g] = sum.force[1];
+    p.fz.data()[g] = sum.force[2];
+    p.tx.data()[g] = sum.torque[0];
+    p.ty.data()[g] = sum.torque[1];
+    p.tz.data()[g] = sum.torque[2];
   }
-  p.fx[g] = force[0];
-  p.fy[g] = force[1];
-  p.fz[g] = force[2];
-  p.tx[g] = torque[0];
-  p.ty[g] = torque[1];
-  p.tz[g] = torque[2];
 }
 
 double Assembly::MoveChunk(int chunk, const Motion& motion) {
-  ParticleArrays& p = particles_;
-  const double dt = motion.dt;
-  const double damping = motion.damping;
   const auto begin = static_cast<std::size_t>(chunk) * kGrainChunk;
-  const auto end = std::min(begin + kGrainChunk, p.x.size());
+  const auto end = std::min(begin + kGrainChunk, particles_.x.size());
   double scale[3];
   for (int a = 0; a < 3; ++a) {
     scale[a] = cell_.length[a] / searched_length_[a];
   }
-  for (std::size_t g = begin; g < end; ++g) {
-    GatherLoads(static_cast<int>(g));
-  }
-  double moved2 = 0;
-  for (std::size_t g = begin; g < end; ++g) {
-    const double im = p.inverse_mass[g];
-    const double ii = p.inverse_inertia[g];
-    p.vx[g] += dt * Damped(p.fx[g] * im, p.vx[g], dt, damping);
-    p.vy[g] += dt * Damped(p.fy[g] * im, p.vy[g], dt, damping);
-    p.vz[g] += dt * Damped(p.fz[g] * im, p.vz[g], dt, damping);
-    p.wx[g] += dt * Damped(p.tx[g] * ii, p.wx[g], dt, damping);
-    p.wy[g] += dt * Damped(p.ty[g] * ii, p.wy[g], dt, damping);
-    p.wz[g] += dt * Damped(p.tz[g] * ii, p.wz[g], dt, damping);
-    p.x[g] += dt * (p.vx[g] + motion.stretch[0] * p.x[g]);
-    p.y[g] += dt * (p.vy[g] + motion.stretch[1] * p.y[g]);
-    p.z[g] += dt * (p.vz[g] + motion.stretch[2] * p.z[g]);
-    const double ux = p.x[g] - scale[0] * searched_x_[g];
-    const double uy = p.y[g] - scale[1] * searched_y_[g];
-    const double uz = p.z[g] - scale[2] * searched_z_[g];
-    const double u2 = ux * ux + uy * uy + uz * uz;
-    moved2 = u2 > moved2 || u2 != u2
-                 ? u2
-                 : moved2;  // a NaN stays, and forces a search that names the grain
-  }
-  return moved2;
+  GatherLoads(begin, end);
+  AdvanceGrains(motion, static_cast<int>(begin), static_cast<int>(end), particles_);
+  return LargestShift2(particles_, searched_, scale, begin, end);
 }
 
 void Assembly::Move(const Motion& motion) {
@@ -322,7 +351,7 @@ void Assembly::Move(const Motion& motion) {
   });
   double largest = 0;
   for (const double m : moved2) {
-    largest = m > largest || m != m ? m : largest;
+    largest = m <= largest ? largest : m;
   }
   moved_ = std::sqrt(largest);
   ++steps_;
@@ -368,13 +397,7 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
     if (!touching(s)) {
       continue;
     }
-    const auto slot = static_cast<std::size_t>(s);
-    const auto i = static_cast<std::size_t>(list_.first[slot]);
-    const auto j = static_cast<std::size_t>(list_.second[slot]);
-    const std::array<double, 3>& shift = shift_[list_.image[slot]];
-    const double d[3] = {p.x[j] + shift[0] - p.x[i], p.y[j] + shift[1] - p.y[i],
-                         p.z[j] + shift[2] - p.z[i]};
-    LoadLane(s, d, b);
+    LoadLane(s, b);
     if (b.count == kBlock) {
       add();
     }
@@ -409,9 +432,9 @@ double Assembly::UnbalancedForce() const {
   }
   double contact = 0;
   std::int64_t contacts = 0;
-  for (std::size_t s = 0; s < loads_.size(); ++s) {
+  for (std::size_t s = 0; s < touching_.size(); ++s) {
     if (touching_[s] != 0) {
-      const double* f = loads_[s].force;
+      const double* f = load_on_j(static_cast<int>(s)).force;
       contact += std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
       ++contacts;
     }

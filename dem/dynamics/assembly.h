@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "dem/contact/contact_model.h"
+#include "dem/dynamics/leapfrog.h"
 #include "dem/geometry/periodic_cell.h"
 #include "dem/neighbor/neighbor_list.h"
 #include "dem/particles/packing.h"
@@ -16,19 +17,10 @@
 
 namespace calib::dem {
 
-/// Force and torques of one pair: force on j (the opposite acts on i) [N], torque on i, torque on j
-/// [N m].
-struct PairLoad {
-  double force[3];
-  double torque_i[3];
-  double torque_j[3];
-};
-
-/// How the cell and the grains move during one time step.
-struct Motion {
-  double stretch[3] = {0, 0, 0};  ///< velocity gradient of the cell, compression negative [1/s]
-  double dt = 0;                  ///< [s] > 0
-  double damping = 0;             ///< local damping, 0 .. 1 [-]
+/// What one contact does to one of its grains.
+struct GrainLoad {
+  double force[3];   ///< [N]
+  double torque[3];  ///< about the centre [N m]
 };
 
 /// Stiffness seen by the slowest-allowed time step and by the servo.
@@ -50,11 +42,7 @@ class Assembly {
   /// the grain or the axis (see BuildNeighborList).
   absl::Status EvaluateForces();
 
-  /// One leapfrog step: velocities at half steps, positions and cell with the homogeneous motion
-  /// added.
-  ///   v += dt F'/m, F' = F (1 - damping sign(F (v + dt F/2m))) per component;  x += dt (v + L x)
-  /// The inertia of the homogeneous motion itself is left out: it is of the order of the squared
-  /// inertial number.
+  /// One leapfrog step of grains and cell under the loads of the last EvaluateForces.
   void Move(const Motion& motion);
 
   /// Sets one cell length exactly, after a Move that reached it up to rounding.
@@ -84,7 +72,14 @@ class Assembly {
   [[nodiscard]] bool touching(int slot) const {
     return touching_[static_cast<std::size_t>(slot)] != 0;
   }
-  [[nodiscard]] const std::vector<PairLoad>& loads() const { return loads_; }
+
+  /// What slot s does to its grain j: force and torque [N, N m].
+  [[nodiscard]] const GrainLoad& load_on_j(int slot) const {
+    return loads_[static_cast<std::size_t>(list_.place_j[static_cast<std::size_t>(slot)])];
+  }
+  [[nodiscard]] const GrainLoad& load_on_i(int slot) const {
+    return loads_[static_cast<std::size_t>(list_.place_i[static_cast<std::size_t>(slot)])];
+  }
 
   /// Love-Weber stress sum_c f_a d_a / V of the last EvaluateForces, compression positive [Pa].
   [[nodiscard]] const std::array<double, 3>& stress() const { return stress_; }
@@ -105,9 +100,10 @@ class Assembly {
 
   absl::Status SearchNeighbors();
   void EvaluateChunk(int chunk);
-  void LoadLane(int slot, const double* d, ContactBlock& block) const;
+  void LoadLane(int slot, ContactBlock& block) const;
   void StoreBlock(ContactBlock& block, ChunkSums& sums);
-  void GatherLoads(int grain);
+  void OpenContact(std::size_t slot);
+  void GatherLoads(std::size_t begin, std::size_t end);
   double MoveChunk(int chunk, const Motion& motion);
   [[nodiscard]] bool ListMayMissPairs() const;
 
@@ -119,15 +115,15 @@ class Assembly {
   double last_dt_ = 0;
 
   NeighborList list_;
-  std::vector<double> searched_x_, searched_y_, searched_z_;  ///< centres at the last search
+  std::vector<double> searched_[3];  ///< centres at the last search
   double searched_length_[3] = {0, 0, 0};
   double moved_ = 0;  ///< largest non-affine displacement since the last search [m]
   double skin_ = 0;
   double largest_radius_ = 0;
 
-  std::vector<std::uint8_t> touching_;                  ///< per slot
-  std::vector<double> history_;                         ///< per slot, history_size() doubles
-  std::vector<PairLoad> loads_;                         ///< per slot; zero where not touching
+  std::vector<std::uint8_t> touching_;  ///< per slot
+  std::vector<double> history_;         ///< per slot, history_size() doubles
+  std::vector<GrainLoad> loads_;        ///< per place of the list; zero where not touching
   std::array<std::array<double, 3>, kImages> shift_{};  ///< translation of each image now [m]
   std::vector<ChunkSums> sums_;
   std::array<double, 3> stress_ = {0, 0, 0};

@@ -142,7 +142,10 @@ StageEnd QuasiStatic::Settle(const CellTarget& target) {
   const double max_servo_rate = MaxServoRate(target);
   double unbalanced = 0;
   for (std::int64_t step = 0; step <= options_.max_settling_steps; ++step) {
-    if (step % kInspection == 0) {
+    if (assembly_->cell().Volume() <= options_.least_volume) {
+      return StageEnd::kDone;
+    }
+    if (step > 0 && step % kInspection == 0) {  // a change of friction shows after some steps only
       unbalanced = assembly_->UnbalancedForce();
       if (unbalanced < options_.unbalanced && StressesWithin(target, options_.stress_tolerance)) {
         return StageEnd::kDone;

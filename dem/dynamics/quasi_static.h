@@ -27,7 +27,8 @@ struct StageOptions {
   double unbalanced =
       5e-4;  ///< mean unbalanced over mean contact force that ends a settling [-] > 0
   double stress_tolerance =
-      1e-3;  ///< relative error of held stresses at the end of a settling [-] > 0
+      1e-3;                 ///< relative error of held stresses at the end of a settling [-] > 0
+  double least_volume = 0;  ///< a settling ends where the cell has shrunk to this [m^3]
   std::int64_t max_settling_steps = 200'000;  ///< a settling that takes longer has diverged
   std::int64_t max_loading_steps = 20'000'000;
 };

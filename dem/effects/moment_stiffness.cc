@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "dem/contact/simd.h"
+
 namespace calib::dem {
 
 MomentLaw MomentLawFrom(const KernelContext& context) {
@@ -19,6 +21,26 @@ MomentLaw MomentLawFrom(const KernelContext& context) {
     law.constant = context.parameters.Get("stiffness");
   }
   return law;
+}
+
+CALIB_DEM_CLONES void EvaluateMoment(const MomentLaw& law, const ContactBlock& b,
+                                     MomentResponse& response) {
+  double* const __restrict stiffness = response.stiffness;
+  double* const __restrict limit = response.limit;
+  const double constant = law.constant;
+  const double ratio = law.ratio;
+  const double friction = law.friction;
+  for (int k = 0; k < kBlock; ++k) {
+    stiffness[k] = constant + ratio * (b.radius_i[k] * b.radius_j[k] * b.tangential_stiffness[k]);
+    const double mean = 0.5 * (b.radius_i[k] + b.radius_j[k]);
+    limit[k] = friction * ((b.normal_force[k] > 0 ? b.normal_force[k] : 0.0) * mean);
+  }
+  if (law.limit_by_smaller) {
+    for (int k = 0; k < kBlock; ++k) {
+      const double smaller = b.radius_i[k] < b.radius_j[k] ? b.radius_i[k] : b.radius_j[k];
+      limit[k] = friction * ((b.normal_force[k] > 0 ? b.normal_force[k] : 0.0) * smaller);
+    }
+  }
 }
 
 std::vector<ParameterInfo> MomentParameters(const std::string& motion) {

@@ -25,20 +25,13 @@ MomentLaw MomentLawFrom(const KernelContext& context);
 /// descriptions.
 std::vector<ParameterInfo> MomentParameters(const std::string& motion);
 
-/// Stiffness [N m/rad] and limit [N m] of one contact.
+/// Stiffness [N m/rad] and limit [N m] of every lane.
 struct MomentResponse {
-  double stiffness = 0;
-  double limit = 0;
+  ContactBlock::Lane stiffness;
+  ContactBlock::Lane limit;
 };
 
-inline MomentResponse Evaluate(const MomentLaw& law, const ContactBlock& b, int k) {
-  const double ri = b.radius_i[k];
-  const double rj = b.radius_j[k];
-  const double smaller = ri < rj ? ri : rj;
-  const double length = law.limit_by_smaller ? smaller : 0.5 * (ri + rj);
-  const double force = b.normal_force[k] > 0 ? b.normal_force[k] : 0.0;
-  return {.stiffness = law.constant + law.ratio * (ri * rj * b.tangential_stiffness[k]),
-          .limit = law.friction * (force * length)};
-}
+/// Evaluates the law on a block whose normal force and tangential stiffness are known.
+void EvaluateMoment(const MomentLaw& law, const ContactBlock& block, MomentResponse& response);
 
 }  // namespace calib::dem

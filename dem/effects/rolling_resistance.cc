@@ -9,25 +9,26 @@
 namespace calib::dem {
 namespace {
 
-CALIB_DEM_CLONES void IntegrateRolling(const MomentLaw law, ContactBlock& b, int first) {
+CALIB_DEM_CLONES void IntegrateRolling(const MomentResponse& response, ContactBlock& b, int first) {
   double* const hx = b.history[first];
   double* const hy = b.history[first + 1];
   double* const hz = b.history[first + 2];
 #pragma GCC ivdep
   for (int k = 0; k < kBlock; ++k) {
-    const MomentResponse response = Evaluate(law, b, k);
-    const double x = hx[k] - response.stiffness * b.roll_x[k];
-    const double y = hy[k] - response.stiffness * b.roll_y[k];
-    const double z = hz[k] - response.stiffness * b.roll_z[k];
+    const double stiffness = response.stiffness[k];
+    const double limit = response.limit[k];
+    const double x = hx[k] - stiffness * b.roll_x[k];
+    const double y = hy[k] - stiffness * b.roll_y[k];
+    const double z = hz[k] - stiffness * b.roll_z[k];
     const double size = std::sqrt(x * x + y * y + z * z);
-    const double cut = size > response.limit ? response.limit / size : 1.0;
+    const double cut = size > limit ? limit / size : 1.0;
     hx[k] = cut * x;
     hy[k] = cut * y;
     hz[k] = cut * z;
-    b.mx[k] += hx[k];
-    b.my[k] += hy[k];
-    b.mz[k] += hz[k];
-    b.rolling_stiffness[k] += response.stiffness;
+    b.mx[k] += cut * x;
+    b.my[k] += cut * y;
+    b.mz[k] += cut * z;
+    b.rolling_stiffness[k] += stiffness;
   }
 }
 
@@ -37,7 +38,9 @@ class RollingKernel final : public ContactKernel {
   [[nodiscard]] int HistorySize() const override { return 3; }
   void Apply(ContactBlock& block, int first) const override {
     TransportTangential(block, first);
-    IntegrateRolling(law_, block, first);
+    MomentResponse response;
+    EvaluateMoment(law_, block, response);
+    IntegrateRolling(response, block, first);
   }
 
  private:

@@ -6,19 +6,21 @@
 namespace calib::dem {
 namespace {
 
-CALIB_DEM_CLONES void IntegrateTwisting(const MomentLaw law, ContactBlock& b, int first) {
+CALIB_DEM_CLONES void IntegrateTwisting(const MomentResponse& response, ContactBlock& b,
+                                        int first) {
   double* const history = b.history[first];
 #pragma GCC ivdep
   for (int k = 0; k < kBlock; ++k) {
-    const MomentResponse response = Evaluate(law, b, k);
-    const double trial = history[k] - response.stiffness * b.twist[k];
-    const double upper = trial < response.limit ? trial : response.limit;
-    const double moment = upper > -response.limit ? upper : -response.limit;
+    const double stiffness = response.stiffness[k];
+    const double limit = response.limit[k];
+    const double trial = history[k] - stiffness * b.twist[k];
+    const double upper = trial < limit ? trial : limit;
+    const double moment = upper > -limit ? upper : -limit;
     history[k] = moment;
     b.mx[k] += moment * b.nx[k];
     b.my[k] += moment * b.ny[k];
     b.mz[k] += moment * b.nz[k];
-    b.twisting_stiffness[k] += response.stiffness;
+    b.twisting_stiffness[k] += stiffness;
   }
 }
 
@@ -27,7 +29,9 @@ class TwistingKernel final : public ContactKernel {
   explicit TwistingKernel(const MomentLaw& law) : law_(law) {}
   [[nodiscard]] int HistorySize() const override { return 1; }
   void Apply(ContactBlock& block, int first) const override {
-    IntegrateTwisting(law_, block, first);
+    MomentResponse response;
+    EvaluateMoment(law_, block, response);
+    IntegrateTwisting(response, block, first);
   }
 
  private:

@@ -32,24 +32,23 @@ absl::Status WrapAll(const PeriodicCell& cell, ParticleArrays& p) {
   return absl::OkStatus();
 }
 
-/// incident: for every grain its slots by ascending neighbour. Slots come sorted by (i, j), so that
-/// one pass in slot order meets, for a grain q, first the pairs (i, q) with i < q, then (q, j).
-void ListIncidence(int grains, NeighborList& list) {
-  list.incident_row.assign(static_cast<std::size_t>(grains) + 1, 0);
+/// Slots come sorted by (i, j), so that one pass in slot order meets, for a grain q, first the
+/// pairs (i, q) with i < q, then (q, j): its row of places fills in ascending order of neighbours.
+void AssignPlaces(int grains, NeighborList& list) {
+  list.place_row.assign(static_cast<std::size_t>(grains) + 1, 0);
   for (std::size_t s = 0; s < list.second.size(); ++s) {
-    ++list.incident_row[static_cast<std::size_t>(list.first[s]) + 1];
-    ++list.incident_row[static_cast<std::size_t>(list.second[s]) + 1];
+    ++list.place_row[static_cast<std::size_t>(list.first[s]) + 1];
+    ++list.place_row[static_cast<std::size_t>(list.second[s]) + 1];
   }
-  for (std::size_t i = 1; i < list.incident_row.size(); ++i) {
-    list.incident_row[i] += list.incident_row[i - 1];
+  for (std::size_t i = 1; i < list.place_row.size(); ++i) {
+    list.place_row[i] += list.place_row[i - 1];
   }
-  std::vector<int> next(list.incident_row.begin(), list.incident_row.end() - 1);
-  list.incident.resize(2 * list.second.size());
+  std::vector<int> next(list.place_row.begin(), list.place_row.end() - 1);
+  list.place_i.resize(list.second.size());
+  list.place_j.resize(list.second.size());
   for (std::size_t s = 0; s < list.second.size(); ++s) {
-    const auto i = static_cast<std::size_t>(list.first[s]);
-    const auto j = static_cast<std::size_t>(list.second[s]);
-    list.incident[static_cast<std::size_t>(next[i]++)] = static_cast<int>(2 * s);
-    list.incident[static_cast<std::size_t>(next[j]++)] = static_cast<int>(2 * s + 1);
+    list.place_i[s] = next[static_cast<std::size_t>(list.first[s])]++;
+    list.place_j[s] = next[static_cast<std::size_t>(list.second[s])]++;
   }
 }
 
@@ -110,7 +109,7 @@ absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleAr
     }
     list.row.push_back(list.size());
   }
-  ListIncidence(p.size(), list);
+  AssignPlaces(p.size(), list);
   return absl::OkStatus();
 }
 

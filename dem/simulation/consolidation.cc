@@ -1,5 +1,6 @@
 #include "dem/simulation/consolidation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -39,45 +40,97 @@ absl::Status Unreachable(double porosity, double lowest, double highest) {
                    lowest, " .. ", highest));
 }
 
+/// One attempt to pass a porosity by lowering friction.
+class Compaction {
+ public:
+  Compaction(double pressure, QuasiStatic& stages)
+      : target_(Isotropic(pressure)),
+        stages_(stages),
+        friction_(stages.assembly().sliding_friction()) {}
+
+  /// Lowers friction until the porosity is at most `threshold` or friction has gone; the assembly
+  /// is left there with the lowered friction. Leaves in `above` the last settled state above the
+  /// threshold.
+  StageEnd LowerTo(double threshold, Assembly& above) {
+    Assembly& assembly = stages_.assembly();
+    const StageOptions restore = stages_.options();
+    stages_.options().unbalanced = kIntermediate * restore.unbalanced;
+    stages_.options().least_volume = assembly.solid_volume() / (1 - threshold);
+    StageEnd end = StageEnd::kDone;
+    while (end == StageEnd::kDone && Porosity(assembly) > threshold &&
+           assembly.sliding_friction() > 0) {
+      above = assembly;
+      const double lower = 0.5 * assembly.sliding_friction();
+      assembly.SetSlidingFriction(lower > kSmallestFriction ? lower : 0.0);
+      end = stages_.MoveTo(target_);
+    }
+    stages_.options() = restore;
+    return end;
+  }
+
+  /// Puts the original friction back and settles.
+  StageEnd Freeze() {
+    stages_.assembly().SetSlidingFriction(friction_);
+    return stages_.MoveTo(target_);
+  }
+
+  /// Settles without friction: the densest state of this way.
+  StageEnd Densest() {
+    stages_.assembly().SetSlidingFriction(0);
+    return stages_.MoveTo(target_);
+  }
+
+ private:
+  /// Between two halvings a rough balance is enough.
+  static constexpr double kIntermediate = 10;
+
+  CellTarget target_;
+  QuasiStatic& stages_;
+  double friction_;
+};
+
 }  // namespace
 
 absl::Status LowerFrictionToPorosity(double porosity, double pressure, QuasiStatic& stages,
                                      StageEnd& end) {
-  const CellTarget target = Isotropic(pressure);
+  constexpr int kAttempts = 20;
   Assembly& assembly = stages.assembly();
   const double highest = Porosity(assembly);
+  Compaction compaction(pressure, stages);
   end = StageEnd::kDone;
-  if (porosity > highest + kPorosityTolerance) {
-    // The lower end of the range is found by removing friction altogether.
-    assembly.SetSlidingFriction(0);
-    end = stages.MoveTo(target);
-    return end == StageEnd::kDone ? Unreachable(porosity, Porosity(assembly), highest)
-                                  : absl::OkStatus();
-  }
-  double factor = 0.8;
-  while (Porosity(assembly) > porosity + kPorosityTolerance) {
-    const double friction = assembly.sliding_friction();
-    if (friction == 0) {
-      return Unreachable(porosity, Porosity(assembly), highest);
+  double threshold = porosity;
+  double closest = highest;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const double settled = Porosity(assembly);
+    if (std::abs(settled - porosity) <= kPorosityTolerance) {
+      return absl::OkStatus();
     }
-    const Assembly snapshot = assembly;
-    assembly.SetSlidingFriction(friction * factor > kSmallestFriction ? friction * factor : 0.0);
-    end = stages.MoveTo(target);
+    closest = settled;
+    if (highest < porosity || (settled > porosity && assembly.sliding_friction() == 0)) {
+      break;
+    }
+    Assembly above = assembly;
+    end = compaction.LowerTo(threshold, above);
     if (end != StageEnd::kDone) {
       return absl::OkStatus();
     }
-    if (Porosity(assembly) < porosity - kPorosityTolerance) {
-      assembly = snapshot;
-      factor = std::sqrt(factor);
-      if (factor >
-          1 - 1e-6) {  // one rearrangement jumps over the target: the nearest state below it stands
-        assembly.SetSlidingFriction(friction * factor);
-        end = stages.MoveTo(target);
-        return absl::OkStatus();
-      }
+    if (Porosity(assembly) > threshold) {
+      break;  // friction has gone and the target lies below
+    }
+    end = compaction.Freeze();
+    if (end != StageEnd::kDone) {
+      return absl::OkStatus();
+    }
+    if (const double frozen = Porosity(assembly); frozen < porosity - kPorosityTolerance) {
+      threshold += porosity - frozen;  // compaction goes on a little while friction comes back
+      assembly = above;
     }
   }
-  return absl::OkStatus();
+  end = compaction.Densest();
+  if (end != StageEnd::kDone) {
+    return absl::OkStatus();
+  }
+  return Unreachable(porosity, std::min(closest, Porosity(assembly)), highest);
 }
 
 absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, StageEnd& end) {

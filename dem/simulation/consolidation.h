@@ -26,9 +26,11 @@ inline constexpr double kPorosityTolerance = 1e-4;
 /// lowering friction cannot reach the porosity.
 absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, StageEnd& end);
 
-/// Lowers friction step by step at constant isotropic pressure until the porosity is within
-/// tolerance, going back and taking a smaller step where one has overshot. Leaves the lowered
-/// friction in the assembly. Errors: OUT_OF_RANGE as above. Precondition: settled at the pressure.
+/// Halves friction again and again at constant isotropic pressure, settling in between, until the
+/// porosity passes the target; there the friction that the assembly came with is put back, which
+/// stops the compaction. Repeated from the last state above the target with a corrected moment
+/// until the settled porosity is within kPorosityTolerance. Errors: OUT_OF_RANGE as above.
+/// Precondition: settled at the pressure.
 absl::Status LowerFrictionToPorosity(double porosity, double pressure, QuasiStatic& stages,
                                      StageEnd& end);
 

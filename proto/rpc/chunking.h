@@ -1,5 +1,6 @@
 #pragma once
-// Files travel as streams of BlobChunk, each well below the message limit, named by the digest of the whole.
+// Files travel as streams of BlobChunk, each well below the message limit, named by the digest of
+// the whole.
 
 #include <string>
 #include <vector>
@@ -13,7 +14,8 @@ namespace calib::rpc {
 inline constexpr std::size_t kChunkBytes = std::size_t{512} * 1024;
 inline constexpr std::size_t kLargestBlob = std::size_t{256} * 1024 * 1024;
 
-/// Content as chunks in order; the first carries the digest. Empty content is one chunk without data.
+/// Content as chunks in order; the first carries the digest. Empty content is one chunk without
+/// data.
 std::vector<v1::BlobChunk> ToChunks(const std::string& content);
 
 /// Puts chunks together again. Not thread-safe.

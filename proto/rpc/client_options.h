@@ -15,8 +15,9 @@ namespace calib::rpc {
 inline constexpr std::chrono::seconds kUnaryDeadline{30};
 inline constexpr std::chrono::seconds kBlobDeadline{120};
 
-/// Plain-text channel with quick reconnects (at most 2 s between tries) and keep-alive pings, so that a peer which
-/// vanished without closing its socket is noticed. Never shared with other channels to the same address.
+/// Plain-text channel with quick reconnects (at most 2 s between tries) and keep-alive pings, so
+/// that a peer which vanished without closing its socket is noticed. Never shared with other
+/// channels to the same address.
 std::shared_ptr<grpc::Channel> OpenChannel(const std::string& address);
 
 /// The call fails with DEADLINE_EXCEEDED this long from now.

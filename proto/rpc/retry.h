@@ -15,8 +15,8 @@ struct BackoffOptions {
   double factor = 2;  ///< growth from one wait to the next, > 1
 };
 
-/// Exponential backoff with full jitter: wait k is uniform in (0, min(longest, first * factor^k)], so that many
-/// workers that lost one server do not come back in step. Not thread-safe.
+/// Exponential backoff with full jitter: wait k is uniform in (0, min(longest, first * factor^k)],
+/// so that many workers that lost one server do not come back in step. Not thread-safe.
 class Backoff {
  public:
   explicit Backoff(BackoffOptions options, std::uint64_t seed = std::random_device{}());
@@ -30,9 +30,11 @@ class Backoff {
   double ceiling_ms_;
 };
 
-/// Makes a call until it succeeds, fails for good (any code that IsRetryable() denies) or `attempts` are used up.
-/// `call` must use a fresh context each time; `sleep` is injected so that tests need no time.
-absl::Status CallWithRetry(int attempts, Backoff& backoff, const std::function<absl::Status()>& call,
+/// Makes a call until it succeeds, fails for good (any code that IsRetryable() denies) or
+/// `attempts` are used up. `call` must use a fresh context each time; `sleep` is injected so that
+/// tests need no time.
+absl::Status CallWithRetry(int attempts, Backoff& backoff,
+                           const std::function<absl::Status()>& call,
                            const std::function<void(std::chrono::milliseconds)>& sleep);
 
 }  // namespace calib::rpc

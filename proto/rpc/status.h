@@ -10,7 +10,8 @@ namespace calib::rpc {
 grpc::Status ToGrpc(const absl::Status& status);
 absl::Status FromGrpc(const grpc::Status& status);
 
-/// True for the codes after which the same call may be made again: UNAVAILABLE and RESOURCE_EXHAUSTED.
+/// True for the codes after which the same call may be made again: UNAVAILABLE and
+/// RESOURCE_EXHAUSTED.
 bool IsRetryable(absl::StatusCode code);
 
 }  // namespace calib::rpc

@@ -76,7 +76,7 @@ v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& 
   *spec.mutable_staging() = ToMessage(scenario.staging);
   for (const dem::ControlPoint& point : scenario.path) {
     v1::ControlPoint& message = *spec.add_path();
-    message.set_axial_strain(point.axial_strain);
+    message.set_target(point.target);
     message.set_load_step(point.load_step);
   }
   spec.set_seed(scenario.seed);

@@ -1,5 +1,6 @@
 #pragma once
-// dem::Scenario -> AttemptSpec: what a worker is told, and the digest by which equal evaluations are recognised.
+// dem::Scenario -> AttemptSpec: what a worker is told, and the digest by which equal evaluations
+// are recognised.
 
 #include <string>
 
@@ -9,7 +10,8 @@
 
 namespace calib::scheduler {
 
-/// The message for a scenario whose specimen is named by `specimen` (the scenario's own packing is not sent).
+/// The message for a scenario whose specimen is named by `specimen` (the scenario's own packing is
+/// not sent).
 v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& specimen,
                        const std::string& experiment);
 
@@ -17,8 +19,8 @@ v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& 
 v1::AttemptSpec SpecOf(const campaign::Campaign& campaign, int experiment,
                        const std::vector<double>& values, int sample);
 
-/// SHA-256 of everything that determines the states: the spec without its name and thread count, and the version of
-/// the mechanics.
+/// SHA-256 of everything that determines the states: the spec without its name and thread count,
+/// and the version of the mechanics.
 std::string SpecDigest(v1::AttemptSpec spec);
 
 }  // namespace calib::scheduler

@@ -1,6 +1,7 @@
 #pragma once
-// A live campaign in memory: which evaluations still need what, and how well the running iteration does so far. It
-// mirrors the store; after a restart, and after every plan, it is read again from there.
+// A live campaign in memory: which evaluations still need what, and how well the running iteration
+// does so far. It mirrors the store; after a restart, and after every plan, it is read again from
+// there.
 
 #include <cstdint>
 #include <map>
@@ -34,7 +35,8 @@ class CampaignRun {
   };
 
   static absl::StatusOr<std::unique_ptr<CampaignRun>> Load(store::Reader& reader, std::int64_t id);
-  /// Reads samples, evaluations and states again. Progress is kept: memory may be ahead of the disk in it.
+  /// Reads samples, evaluations and states again. Progress is kept: memory may be ahead of the disk
+  /// in it.
   absl::Status Reload(store::Reader& reader);
 
   std::int64_t id() const { return id_; }
@@ -59,7 +61,8 @@ class CampaignRun {
                 std::span<const double> observables);
   void SetStatus(const store::EvaluationKey& key, store::EvaluationStatus status, int failures);
 
-  /// Samples of the running iteration of which an evaluation diverged, and those with nothing left to run.
+  /// Samples of the running iteration of which an evaluation diverged, and those with nothing left
+  /// to run.
   int Diverged() const;
   int Done() const;
   LiveView View() const;

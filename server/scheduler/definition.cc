@@ -10,7 +10,8 @@
 namespace calib::scheduler {
 namespace {
 
-/// Position of an experiment's observable in its states: tables made elsewhere hold the measured ones alone.
+/// Position of an experiment's observable in its states: tables made elsewhere hold the measured
+/// ones alone.
 std::size_t PositionInState(const campaign::Campaign& campaign,
                             const campaign::Experiment& experiment, int observable) {
   const auto index = static_cast<std::size_t>(observable);

@@ -1,5 +1,6 @@
 #pragma once
-// A stored campaign as it is worked on: read again from what was submitted, with what follows from it.
+// A stored campaign as it is worked on: read again from what was submitted, with what follows from
+// it.
 
 #include <Eigen/Dense>
 #include <map>
@@ -15,7 +16,8 @@
 
 namespace calib::scheduler {
 
-/// Where the numbers of a state stand in a row of predictions (the order of inference::DataSet::readings).
+/// Where the numbers of a state stand in a row of predictions (the order of
+/// inference::DataSet::readings).
 class ReadingIndex {
  public:
   ReadingIndex(const campaign::Campaign& campaign, const inference::DataSet& data);
@@ -50,7 +52,8 @@ struct Definition {
 campaign::FileReader StoredFiles(store::Reader& reader,
                                  const std::map<std::string, std::string>& files);
 
-/// FAILED_PRECONDITION when what was accepted once is refused by this program (the message has the first problem).
+/// FAILED_PRECONDITION when what was accepted once is refused by this program (the message has the
+/// first problem).
 absl::StatusOr<std::shared_ptr<const Definition>> LoadDefinition(
     store::Reader& reader, const store::NewCampaign& submitted);
 

@@ -13,10 +13,11 @@
 namespace calib::scheduler {
 
 struct History {
-  std::vector<inference::Iteration> iterations;   ///< predictions of samples that did not finish are NaN
-  std::vector<std::vector<char>> diverged;        ///< [iteration][position]: it has no finite prediction
-  std::vector<store::SampleRecord> samples;       ///< of all iterations
-  std::optional<std::string> last_posterior;      ///< JSON, of the last iteration that has one
+  std::vector<inference::Iteration>
+      iterations;                            ///< predictions of samples that did not finish are NaN
+  std::vector<std::vector<char>> diverged;   ///< [iteration][position]: it has no finite prediction
+  std::vector<store::SampleRecord> samples;  ///< of all iterations
+  std::optional<std::string> last_posterior;  ///< JSON, of the last iteration that has one
   int stopped_early = 0;
   store::Effort effort;
 };

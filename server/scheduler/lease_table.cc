@@ -64,9 +64,9 @@ std::vector<LeaseEntry> LeaseTable::OfCampaign(std::int64_t campaign) const {
 }
 
 int LeaseTable::Busy(const std::string& worker) const {
-  return static_cast<int>(
-      std::count_if(leases_.begin(), leases_.end(),
-                    [&](const auto& item) { return item.second.worker == worker; }));
+  return static_cast<int>(std::count_if(leases_.begin(), leases_.end(), [&](const auto& item) {
+    return item.second.worker == worker;
+  }));
 }
 
 }  // namespace calib::scheduler

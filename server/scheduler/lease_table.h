@@ -1,5 +1,6 @@
 #pragma once
-// Who works on what, and until when: the time-limited rights to attempts. Pure; time comes with each call.
+// Who works on what, and until when: the time-limited rights to attempts. Pure; time comes with
+// each call.
 
 #include <chrono>
 #include <cstdint>
@@ -22,7 +23,8 @@ struct LeaseEntry {
   Clock::time_point expires{};
 };
 
-/// Leases by attempt. An attempt that is not in the table has no right to be heard any more. Not thread-safe.
+/// Leases by attempt. An attempt that is not in the table has no right to be heard any more. Not
+/// thread-safe.
 class LeaseTable {
  public:
   explicit LeaseTable(Clock::duration lease) : lease_(lease) {}

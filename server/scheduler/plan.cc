@@ -24,10 +24,7 @@ constexpr std::size_t kMostValidatedSamples = 20;
 class Planner {
  public:
   Planner(const Definition& definition, const store::CampaignRecord& record, store::Reader& reader)
-      : definition_(definition),
-        campaign_(definition.campaign),
-        record_(record),
-        reader_(reader) {}
+      : definition_(definition), campaign_(definition.campaign), record_(record), reader_(reader) {}
 
   absl::StatusOr<Plan> Next() {
     absl::StatusOr<History> history = LoadHistory(definition_, record_.submitted.id, reader_);
@@ -121,9 +118,9 @@ class Planner {
     conclusion.posterior.set_campaign(absl::StrCat("c", record_.submitted.id));
     conclusion.posterior.set_model_evaluations(history_.effort.model_evaluations);
     conclusion.posterior.set_stopped_early(history_.stopped_early);
-    const auto view = inference::ViewOnline(definition_.data, campaign_.filter,
-                                            history_.iterations.back().predictions,
-                                            history_.diverged.back());
+    const auto view =
+        inference::ViewOnline(definition_.data, campaign_.filter,
+                              history_.iterations.back().predictions, history_.diverged.back());
     conclusion.posterior.set_best_misfit(view.best_rms);
     plan_.log.push_back(absl::StrCat("iteration ", iteration, " complete: ", posterior.ess,
                                      " effective samples, log evidence ", posterior.log_evidence));
@@ -182,8 +179,7 @@ class Planner {
     for (const int experiment : experiments) {
       store::EvaluationRecord evaluation{
           .key = {record_.submitted.id, sample.sample, experiment},
-          .digest =
-              SpecDigest(SpecOf(campaign_, experiment, sample.parameters, sample.sample))};
+          .digest = SpecDigest(SpecOf(campaign_, experiment, sample.parameters, sample.sample))};
       const auto equal = reader_.FindEqual(evaluation.digest);
       if (!equal.ok()) {
         return equal.status();
@@ -229,9 +225,8 @@ class Planner {
     const std::vector<double>& log_weights = plan_.conclusion->log_weights;
     std::vector<std::size_t> order(log_weights.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return log_weights[a] > log_weights[b];
-    });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::size_t a, std::size_t b) { return log_weights[a] > log_weights[b]; });
     double mass = 0;
     for (std::size_t i = 0;
          i < std::min(order.size(), kMostValidatedSamples) && mass < kValidatedMass; ++i) {
@@ -263,8 +258,7 @@ void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgres
            std::int64_t unix_ms, store::Transaction& transaction) {
   if (plan.conclusion.has_value()) {
     const Conclusion& conclusion = *plan.conclusion;
-    transaction.SetPosterior(campaign, conclusion.iteration,
-                             PosteriorToJson(conclusion.posterior));
+    transaction.SetPosterior(campaign, conclusion.iteration, PosteriorToJson(conclusion.posterior));
     for (std::size_t i = 0; i < conclusion.log_weights.size(); ++i) {
       transaction.SetWeight(campaign, static_cast<int>(i), conclusion.log_weights[i],
                             store::kUnknown);

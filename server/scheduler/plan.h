@@ -1,6 +1,7 @@
 #pragma once
-// What comes next for a campaign, computed from the store alone: the same records give the same bits, whatever the order
-// in which workers delivered them and however often the server was killed in between.
+// What comes next for a campaign, computed from the store alone: the same records give the same
+// bits, whatever the order in which workers delivered them and however often the server was killed
+// in between.
 
 #include <optional>
 #include <string>
@@ -20,13 +21,13 @@ namespace calib::scheduler {
 struct Conclusion {
   int iteration = 0;
   v1::Posterior posterior;
-  std::vector<double> log_weights;      ///< of all samples of the campaign so far
+  std::vector<double> log_weights;  ///< of all samples of the campaign so far
 };
 
 /// A new iteration.
 struct Start {
   int iteration = 0;
-  std::string proposal;                 ///< JSON
+  std::string proposal;  ///< JSON
   std::vector<store::SampleRecord> samples;
 };
 
@@ -35,17 +36,19 @@ struct Plan {
   std::optional<Conclusion> conclusion;
   std::optional<Start> start;
   std::vector<store::EvaluationRecord> evaluations;  ///< new ones
-  std::vector<std::pair<store::EvaluationKey, store::EvaluationKey>> reused;  ///< (done before, the same now)
-  std::vector<store::StateRecord> states;            ///< of runs made elsewhere
-  std::string phase;                                 ///< afterwards
+  std::vector<std::pair<store::EvaluationKey, store::EvaluationKey>>
+      reused;                              ///< (done before, the same now)
+  std::vector<store::StateRecord> states;  ///< of runs made elsewhere
+  std::string phase;                       ///< afterwards
   bool converged = false;
-  std::optional<CampaignEvent> event;                ///< start, finish or fail
-  std::string reason;                                ///< of a failure
+  std::optional<CampaignEvent> event;  ///< start, finish or fail
+  std::string reason;                  ///< of a failure
   std::vector<std::string> log;
 };
 
-/// The step after everything planned so far has ended: the first iteration; posterior and next iteration; posterior and
-/// validation; the end. Errors: those of the store. What inference cannot do becomes a plan with event kFail.
+/// The step after everything planned so far has ended: the first iteration; posterior and next
+/// iteration; posterior and validation; the end. Errors: those of the store. What inference cannot
+/// do becomes a plan with event kFail.
 absl::StatusOr<Plan> PlanNext(const Definition& definition, const store::CampaignRecord& campaign,
                               store::Reader& reader);
 

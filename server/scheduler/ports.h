@@ -1,5 +1,6 @@
 #pragma once
-// What the scheduler needs from its surroundings, so that tests can run it without threads, sockets or time.
+// What the scheduler needs from its surroundings, so that tests can run it without threads, sockets
+// or time.
 
 #include <chrono>
 #include <cstdint>

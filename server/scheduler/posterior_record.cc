@@ -115,8 +115,7 @@ absl::StatusOr<v1::Posterior> PosteriorFromJson(const std::string& json) {
   v1::Posterior posterior;
   if (const auto status = google::protobuf::util::JsonStringToMessage(json, &posterior);
       !status.ok()) {
-    return absl::DataLossError(
-        absl::StrCat("stored posterior: ", std::string(status.message())));
+    return absl::DataLossError(absl::StrCat("stored posterior: ", std::string(status.message())));
   }
   return posterior;
 }
@@ -126,10 +125,9 @@ std::string ProposalToJson(const inference::Proposal& proposal) {
             {"log_acceptance", proposal.log_acceptance},
             {"components", Json::array()}};
   for (const auto& component : proposal.components) {
-    json["components"].push_back(
-        {{"weight", component.weight},
-         {"mean", ToJson(component.mean)},
-         {"covariance", ToJson(component.covariance.reshaped())}});
+    json["components"].push_back({{"weight", component.weight},
+                                  {"mean", ToJson(component.mean)},
+                                  {"covariance", ToJson(component.covariance.reshaped())}});
   }
   return json.dump();
 }

@@ -24,8 +24,8 @@ absl::StatusOr<inference::Proposal> ProposalFromJson(const std::string& json);
 /// The part of an earlier posterior that convergence looks at: the means.
 inference::Posterior MeansOf(const v1::Posterior& posterior);
 
-/// Weights good enough to call the result an answer: Pareto index at most 0.7 [Vehtari 2024, sec. 2.4], at least ten
-/// effective samples.
+/// Weights good enough to call the result an answer: Pareto index at most 0.7 [Vehtari 2024,
+/// sec. 2.4], at least ten effective samples.
 bool IsTrustworthy(const inference::Posterior& posterior);
 
 }  // namespace calib::scheduler

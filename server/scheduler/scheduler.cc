@@ -77,6 +77,14 @@ CampaignRun* Scheduler::FindRun(std::int64_t campaign) {
   return found == runs_.end() ? nullptr : found->second.get();
 }
 
+CampaignRun* Scheduler::LiveRun(std::int64_t campaign, const Reply& reply) {
+  CampaignRun* run = FindRun(campaign);
+  if (run == nullptr) {
+    reply(absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
+  }
+  return run;
+}
+
 void Scheduler::Enqueue(CampaignRun& run) {
   const bool leasable = IsLeasable(run.state());
   for (const EvaluationKey& key : run.With(EvaluationStatus::kWaiting)) {
@@ -144,19 +152,17 @@ void Scheduler::SetState(CampaignRun& run, CampaignEvent event, const std::strin
       });
 }
 
-void Scheduler::Pause(std::int64_t campaign, const Reply& reply) {
-  CampaignRun* run = FindRun(campaign);
+void Scheduler::Pause(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
+  CampaignRun* run = LiveRun(campaign, reply);
   if (run == nullptr) {
-    reply(absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
     return;
   }
-  SetState(*run, CampaignEvent::kPause, "asked for", nullptr, reply);
+  SetState(*run, CampaignEvent::kPause, "asked for", also, reply);
 }
 
-void Scheduler::Resume(std::int64_t campaign, const Reply& reply) {
-  CampaignRun* run = FindRun(campaign);
+void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
+  CampaignRun* run = LiveRun(campaign, reply);
   if (run == nullptr) {
-    reply(absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
     return;
   }
   if (run->state() == CampaignState::kPaused) {
@@ -172,7 +178,10 @@ void Scheduler::Resume(std::int64_t campaign, const Reply& reply) {
   }
   SetState(
       *run, CampaignEvent::kResume, "",
-      [again](Transaction& transaction) {
+      [again, also](Transaction& transaction) {
+        if (also) {
+          also(transaction);
+        }
         for (const EvaluationKey& key : again) {
           transaction.SetEvaluation(key, EvaluationStatus::kWaiting, "", 0);
         }
@@ -180,10 +189,9 @@ void Scheduler::Resume(std::int64_t campaign, const Reply& reply) {
       reply);
 }
 
-void Scheduler::Cancel(std::int64_t campaign, const Reply& reply) {
-  CampaignRun* run = FindRun(campaign);
+void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
+  CampaignRun* run = LiveRun(campaign, reply);
   if (run == nullptr) {
-    reply(absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
     return;
   }
   const auto held = leases_.OfCampaign(campaign);
@@ -197,7 +205,10 @@ void Scheduler::Cancel(std::int64_t campaign, const Reply& reply) {
   }
   SetState(
       *run, CampaignEvent::kCancel, "asked for",
-      [held, ends](Transaction& transaction) {
+      [held, ends, also](Transaction& transaction) {
+        if (also) {
+          also(transaction);
+        }
         for (std::size_t i = 0; i < held.size(); ++i) {
           transaction.EndAttempt(ends[i]);
           transaction.SetEvaluation(held[i].key, EvaluationStatus::kWaiting, "", 0);
@@ -214,14 +225,20 @@ void Scheduler::Cancel(std::int64_t campaign, const Reply& reply) {
   }
 }
 
-void Scheduler::Delete(std::int64_t campaign, const Reply& reply) {
+void Scheduler::Delete(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
   if (const CampaignRun* run = FindRun(campaign); run != nullptr) {
     reply(absl::FailedPreconditionError(absl::StrCat("cannot delete a campaign that is ",
                                                      ToString(run->state()), "; cancel it first")));
     return;
   }
-  ports_.Write([campaign](Transaction& transaction) { transaction.DeleteCampaign(campaign); },
-               reply);
+  ports_.Write(
+      [campaign, also](Transaction& transaction) {
+        transaction.DeleteCampaign(campaign);
+        if (also) {
+          also(transaction);
+        }
+      },
+      reply);
   ++version_;
 }
 
@@ -234,8 +251,8 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
   const auto& [seconds, ended] = durations_[campaign];
   const int slots = workers_.Slots();
   if (ended > 0 && slots > 0) {
-    const auto open = run->With(EvaluationStatus::kWaiting).size() +
-                      run->With(EvaluationStatus::kRunning).size();
+    const auto open =
+        run->With(EvaluationStatus::kWaiting).size() + run->With(EvaluationStatus::kRunning).size();
     live.eta_seconds = seconds / ended * static_cast<double>(open) / slots;
   }
   return live;
@@ -279,9 +296,9 @@ void Scheduler::ComputePlan(CampaignRun& run) {
   ports_.Compute([this, id = run.id(), definition = run.shared_definition(),
                   record = run.record()]() -> std::function<void()> {
     auto reader = ports_.Read();
-    auto plan = std::make_shared<absl::StatusOr<Plan>>(
-        reader.ok() ? PlanNext(*definition, record, *reader)
-                    : absl::StatusOr<Plan>(reader.status()));
+    auto plan =
+        std::make_shared<absl::StatusOr<Plan>>(reader.ok() ? PlanNext(*definition, record, *reader)
+                                                           : absl::StatusOr<Plan>(reader.status()));
     return [this, id, plan] { Adopt(id, *plan); };
   });
 }
@@ -308,34 +325,32 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
     progress.pause_waived = false;
   }
   if (plan.event.has_value()) {
-    plan.log.push_back(absl::StrCat(ToString(*plan.event), plan.reason.empty() ? "" : ": ",
-                                    plan.reason));
+    plan.log.push_back(
+        absl::StrCat(ToString(*plan.event), plan.reason.empty() ? "" : ": ", plan.reason));
     // Allowed in every state in which a plan is computed (transitions.cc).
     (void)run->Apply(*plan.event, plan.reason);
   }
   const bool over = IsOver(run->state());
-  ports_.Write(
-      [plan = std::move(plan), campaign, progress, now = ports_.UnixMs()](Transaction& t) {
-        scheduler::Write(plan, campaign, progress, now, t);
-      },
-      [this, campaign, over](const absl::Status& status) {
-        computing_.erase(campaign);
-        ++version_;
-        CampaignRun* planned = FindRun(campaign);
-        if (!status.ok() || planned == nullptr) {
-          return;
-        }
-        if (over) {
-          runs_.erase(campaign);
-          return;
-        }
-        durations_.erase(campaign);
-        if (auto reader = ports_.Read(); reader.ok() && planned->Reload(*reader).ok()) {
-          Enqueue(*planned);
-          Advance(campaign);
-          Dispatch();
-        }
-      });
+  ports_.Write([plan = std::move(plan), campaign, progress, now = ports_.UnixMs()](
+                   Transaction& t) { scheduler::Write(plan, campaign, progress, now, t); },
+               [this, campaign, over](const absl::Status& status) {
+                 computing_.erase(campaign);
+                 ++version_;
+                 CampaignRun* planned = FindRun(campaign);
+                 if (!status.ok() || planned == nullptr) {
+                   return;
+                 }
+                 if (over) {
+                   runs_.erase(campaign);
+                   return;
+                 }
+                 durations_.erase(campaign);
+                 if (auto reader = ports_.Read(); reader.ok() && planned->Reload(*reader).ok()) {
+                   Enqueue(*planned);
+                   Advance(campaign);
+                   Dispatch();
+                 }
+               });
 }
 
 }  // namespace calib::scheduler

@@ -1,5 +1,6 @@
 #pragma once
-// The heart of the service: which worker runs what, what its messages mean, and what a campaign does next.
+// The heart of the service: which worker runs what, what its messages mean, and what a campaign
+// does next.
 
 #include <cstdint>
 #include <functional>
@@ -22,7 +23,8 @@
 namespace calib::scheduler {
 
 struct SchedulerOptions {
-  std::chrono::milliseconds lease{15'000};     ///< an attempt is lost when nothing was heard for this long
+  std::chrono::milliseconds lease{
+      15'000};  ///< an attempt is lost when nothing was heard for this long
   std::chrono::milliseconds heartbeat{2'000};  ///< workers are told to speak at least this often
 };
 
@@ -32,8 +34,9 @@ struct LiveStatus {
   double eta_seconds = -1;  ///< of what is planned; negative: unknown
 };
 
-/// A single-threaded state machine: every call comes on one strand, where its Ports run its continuations. Memory is
-/// ahead of the disk; what leaves the program (leases, acks, answers) waits for the commit of all that led to it.
+/// A single-threaded state machine: every call comes on one strand, where its Ports run its
+/// continuations. Memory is ahead of the disk; what leaves the program (leases, acks, answers)
+/// waits for the commit of all that led to it.
 class Scheduler {
  public:
   using Reply = std::function<void(const absl::Status&)>;
@@ -41,13 +44,13 @@ class Scheduler {
   Scheduler(Ports& ports, SchedulerOptions options)
       : ports_(ports), options_(options), leases_(options.lease) {}
 
-  /// Takes up every campaign that is not over. Attempts that were running get a fresh lease: their workers may come
-  /// back and go on.
+  /// Takes up every campaign that is not over. Attempts that were running get a fresh lease: their
+  /// workers may come back and go on.
   absl::Status Load();
 
   // ---- workers (scheduler_workers.cc) ----
-  /// FAILED_PRECONDITION when the worker's mechanics or catalogue are not the server's; INVALID_ARGUMENT for a Hello
-  /// without name or slots.
+  /// FAILED_PRECONDITION when the worker's mechanics or catalogue are not the server's;
+  /// INVALID_ARGUMENT for a Hello without name or slots.
   absl::Status Connected(std::int64_t session, const v1::Hello& hello);
   void Disconnected(std::int64_t session);
   void Receive(std::int64_t session, const v1::StateBatch& batch);
@@ -60,17 +63,20 @@ class Scheduler {
   void Tick();
 
   // ---- campaigns (scheduler.cc) ----
-  /// Stores and starts a campaign that was read without problems. Its id is chosen here ("c1"), given to `reply` and
-  /// remembered as the answer to the request (request.answer is ignored; an empty request_id is not remembered).
+  /// Stores and starts a campaign that was read without problems. Its id is chosen here ("c1"),
+  /// given to `reply` and remembered as the answer to the request (request.answer is ignored; an
+  /// empty request_id is not remembered).
   void Submit(store::NewCampaign submitted, std::map<std::string, std::string> files,
               const std::string& request_id, const store::RequestRecord& request,
               std::function<void(absl::StatusOr<std::string>)> reply);
-  /// NOT_FOUND, or FAILED_PRECONDITION when the campaign's state does not allow it.
-  void Pause(std::int64_t campaign, const Reply& reply);
-  void Resume(std::int64_t campaign, const Reply& reply);
-  void Cancel(std::int64_t campaign, const Reply& reply);
+  /// FAILED_PRECONDITION when the campaign's state does not allow it. `also` is written with the
+  /// change (the request that asked for it); may be empty. A paused campaign's running evaluations
+  /// go on to their ends.
+  void Pause(std::int64_t campaign, const store::Store::Job& also, const Reply& reply);
+  void Resume(std::int64_t campaign, const store::Store::Job& also, const Reply& reply);
+  void Cancel(std::int64_t campaign, const store::Store::Job& also, const Reply& reply);
   /// Only campaigns that are over.
-  void Delete(std::int64_t campaign, const Reply& reply);
+  void Delete(std::int64_t campaign, const store::Store::Job& also, const Reply& reply);
   /// Empty when the campaign is not live.
   std::optional<LiveStatus> Live(std::int64_t campaign);
   /// Grows whenever something changed that a status shows.
@@ -80,12 +86,15 @@ class Scheduler {
 
  private:
   CampaignRun* FindRun(std::int64_t campaign);
+  /// FindRun(), or replies that the campaign is over.
+  CampaignRun* LiveRun(std::int64_t campaign, const Reply& reply);
 
   // Work (scheduler_workers.cc)
   void Dispatch();
   void Grant(const WorkerEntry& worker, const store::EvaluationKey& key);
   void Refuse(std::int64_t session, std::int64_t attempt);
-  /// The attempt is over without a result: back to the queue, or the campaign is paused when it failed too often.
+  /// The attempt is over without a result: back to the queue, or the campaign is paused when it
+  /// failed too often.
   void GiveBack(const LeaseEntry& lease, const v1::Finished& how, const std::string& outcome,
                 bool counts_as_failure);
   void End(std::int64_t session, const LeaseEntry& lease, store::EvaluationStatus status,
@@ -111,8 +120,9 @@ class Scheduler {
   WorkerTable workers_;
   std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over
   std::set<store::EvaluationKey> queue_;                       // waiting, of leasable campaigns
-  std::set<std::int64_t> computing_;                           // campaigns with a plan in the making
-  std::map<std::int64_t, std::pair<double, int>> durations_;   // seconds and number of ended attempts
+  std::set<std::int64_t> computing_;  // campaigns with a plan in the making
+  std::map<std::int64_t, std::pair<double, int>>
+      durations_;  // seconds and number of ended attempts
   std::int64_t last_attempt_ = 0;
   std::int64_t last_campaign_ = 0;
   std::uint64_t version_ = 0;

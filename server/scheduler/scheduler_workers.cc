@@ -264,9 +264,8 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how,
   Enqueue(*run);
   if (too_often && IsLeasable(run->state())) {
     SetState(*run, CampaignEvent::kPause,
-             absl::StrCat(NameOf(*run, lease.key), " failed ", failures,
-                          " times, last: ", finished.reason(),
-                          "; resume to try again once the cause is removed"),
+             absl::StrCat(NameOf(*run, lease.key), " failed ", failures, " times, last: ",
+                          finished.reason(), "; resume to try again once the cause is removed"),
              nullptr, [](const absl::Status&) {});
   }
 }
@@ -295,8 +294,8 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
   }
   v1::ServerMessage message;
   message.mutable_lease()->set_attempt(attempt);
-  *message.mutable_lease()->mutable_spec() = SpecOf(run.definition().campaign, key.experiment,
-                                                    run.Parameters(key.sample), key.sample);
+  *message.mutable_lease()->mutable_spec() =
+      SpecOf(run.definition().campaign, key.experiment, run.Parameters(key.sample), key.sample);
   message.mutable_lease()->mutable_spec()->set_threads(worker.hello.threads_per_slot());
   ports_.Write(
       [key, failures,
@@ -361,8 +360,7 @@ std::vector<v1::WorkerInfo> Scheduler::Workers() const {
     info.set_engine_version(entry.hello.engine_version());
     info.set_draining(entry.draining);
     info.set_connected(entry.session != 0);
-    info.set_seconds_since_heard(
-        std::chrono::duration<double>(ports_.Now() - entry.heard).count());
+    info.set_seconds_since_heard(std::chrono::duration<double>(ports_.Now() - entry.heard).count());
     for (const LeaseEntry& lease : leases_.OfWorker(name)) {
       const auto run = runs_.find(lease.key.campaign);
       info.add_running(absl::StrCat(

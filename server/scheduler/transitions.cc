@@ -29,7 +29,7 @@ constexpr std::array kTransitions = {
     Transition{S::kRunning, E::kFinish, S::kFinished},
     Transition{S::kPaused, E::kResume, S::kRunning},
     Transition{S::kPaused, E::kCancel, S::kCancelled},
-    Transition{S::kPaused, E::kFail, S::kFailed},      // the computation that ran when it was paused
+    Transition{S::kPaused, E::kFail, S::kFailed},  // the computation that ran when it was paused
     Transition{S::kPaused, E::kFinish, S::kFinished},  // likewise
 };
 

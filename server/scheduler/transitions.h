@@ -11,8 +11,8 @@ namespace calib::scheduler {
 enum class CampaignState { kQueued, kRunning, kPaused, kFinished, kFailed, kCancelled };
 
 enum class CampaignEvent {
-  kStart,   ///< its first evaluation was handed out, or its runs exist already
-  kPause,   ///< asked for, or too many samples diverged or failed
+  kStart,  ///< its first evaluation was handed out, or its runs exist already
+  kPause,  ///< asked for, or too many samples diverged or failed
   kResume,
   kCancel,
   kFinish,  ///< nothing is left to be run

@@ -1,5 +1,6 @@
 #pragma once
-// The workers known since the server started: who is connected, over which stream, with how many slots.
+// The workers known since the server started: who is connected, over which stream, with how many
+// slots.
 
 #include <cstdint>
 #include <map>
@@ -30,8 +31,9 @@ class WorkerTable {
   WorkerEntry* Find(const std::string& name);
   /// By its stream, or nullptr when that has been replaced.
   WorkerEntry* OfSession(std::int64_t session);
-  /// The worker with the most free slots (ties: by name) among those that are connected, not draining and were heard
-  /// since `heard_since` (a frozen machine keeps its connection), or nullptr when none is free.
+  /// The worker with the most free slots (ties: by name) among those that are connected, not
+  /// draining and were heard since `heard_since` (a frozen machine keeps its connection), or
+  /// nullptr when none is free.
   const WorkerEntry* MostFree(const LeaseTable& leases, Clock::time_point heard_since) const;
   const std::map<std::string, WorkerEntry>& all() const { return workers_; }
   int Slots() const;  ///< of all that are connected

@@ -1,5 +1,6 @@
 #pragma once
-// One SQLite connection with its prepared statements. Private to this folder: SQLiteCpp is seen by nobody else.
+// One SQLite connection with its prepared statements. Private to this folder: SQLiteCpp is seen by
+// nobody else.
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
@@ -21,17 +22,20 @@ struct DoubleBlob {
   std::span<const double> values;
 };
 
-/// RESOURCE_EXHAUSTED for a full disk, UNAVAILABLE for a busy file, DATA_LOSS for a corrupt one, INTERNAL otherwise.
+/// RESOURCE_EXHAUSTED for a full disk, UNAVAILABLE for a busy file, DATA_LOSS for a corrupt one,
+/// INTERNAL otherwise.
 absl::Status ToStatus(const SQLite::Exception& error);
 
 class Connection {
  public:
-  /// Throws SQLite::Exception. Sets WAL, FULL synchronisation and foreign keys on a writable connection.
+  /// Throws SQLite::Exception. Sets WAL, FULL synchronisation and foreign keys on a writable
+  /// connection.
   Connection(const std::string& path, bool writable);
 
   SQLite::Database& database() { return database_; }
 
-  /// The statement for `sql`, prepared once, reset and bound to the arguments in order. Throws SQLite::Exception.
+  /// The statement for `sql`, prepared once, reset and bound to the arguments in order. Throws
+  /// SQLite::Exception.
   template <typename... Arguments>
   SQLite::Statement& Bind(std::string_view sql, const Arguments&... arguments) {
     SQLite::Statement& statement = Prepare(sql);

@@ -11,9 +11,9 @@ absl::Status Migrate(Connection& connection) {
     const int found = database.execAndGet("PRAGMA user_version").getInt();
     const int known = static_cast<int>(Migrations().size());
     if (found > known) {
-      return absl::FailedPreconditionError(
-          absl::StrCat("the state file has schema version ", found, ", this program knows ", known,
-                       ": use the newer program that wrote it"));
+      return absl::FailedPreconditionError(absl::StrCat("the state file has schema version ", found,
+                                                        ", this program knows ", known,
+                                                        ": use the newer program that wrote it"));
     }
     for (const Migration& migration : Migrations().subspan(static_cast<std::size_t>(found))) {
       SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);

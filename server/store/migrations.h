@@ -1,5 +1,6 @@
 #pragma once
-// The schema as numbered steps, compiled in from migrations/NNNN_what.sql (CMakeLists.txt of this folder lists them).
+// The schema as numbered steps, compiled in from migrations/NNNN_what.sql (CMakeLists.txt of this
+// folder lists them).
 
 #include <span>
 
@@ -18,8 +19,8 @@ struct Migration {
 /// In order, numbered 1, 2, ...
 std::span<const Migration> Migrations();
 
-/// Brings the file to the last migration, one transaction each. FAILED_PRECONDITION: the file was written by a newer
-/// program. Other errors as ToStatus(SQLite::Exception).
+/// Brings the file to the last migration, one transaction each. FAILED_PRECONDITION: the file was
+/// written by a newer program. Other errors as ToStatus(SQLite::Exception).
 absl::Status Migrate(Connection& connection);
 
 }  // namespace calib::store

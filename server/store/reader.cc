@@ -123,8 +123,7 @@ absl::StatusOr<std::map<std::string, std::string>> Reader::Files(std::int64_t ca
 absl::StatusOr<std::string> Reader::Blob(const std::string& digest) {
   auto found = Guard([&] {
     std::optional<std::string> content;
-    SQLite::Statement& row =
-        connection_->Bind("SELECT content FROM blob WHERE digest = ?", digest);
+    SQLite::Statement& row = connection_->Bind("SELECT content FROM blob WHERE digest = ?", digest);
     if (row.executeStep()) {
       const SQLite::Column column = row.getColumn(0);
       const void* bytes = column.getBlob();

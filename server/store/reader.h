@@ -1,5 +1,6 @@
 #pragma once
-// What may be asked of the store. A Reader is one consistent picture of it, taken at its first query.
+// What may be asked of the store. A Reader is one consistent picture of it, taken at its first
+// query.
 
 #include <cstdint>
 #include <map>
@@ -15,8 +16,9 @@ namespace calib::store {
 
 class Connection;
 
-/// Over its own read-only connection; cheap enough to open one per request. Not thread-safe; movable. Errors of every
-/// query: as the store's (connection.h). Collections are in the order of their natural keys.
+/// Over its own read-only connection; cheap enough to open one per request. Not thread-safe;
+/// movable. Errors of every query: as the store's (connection.h). Collections are in the order of
+/// their natural keys.
 class Reader {
  public:
   explicit Reader(std::unique_ptr<Connection> connection);
@@ -41,7 +43,8 @@ class Reader {
   /// Of one sample, or of all.
   absl::StatusOr<std::vector<StateRecord>> States(std::int64_t campaign,
                                                   std::optional<int> sample = std::nullopt);
-  /// An evaluation that ended with a result (finished or diverged) and was determined by the same things.
+  /// An evaluation that ended with a result (finished or diverged) and was determined by the same
+  /// things.
   absl::StatusOr<std::optional<EvaluationKey>> FindEqual(const std::string& digest);
 
   absl::StatusOr<std::vector<ActiveAttempt>> ActiveAttempts();

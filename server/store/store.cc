@@ -45,9 +45,7 @@ class Store::Writer {
     Done done;
   };
 
-  bool HasWork() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    return closing_ || !queue_.empty();
-  }
+  bool HasWork() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closing_ || !queue_.empty(); }
 
   /// What waits, up to a full group; empty: closing and all done.
   std::vector<Entry> NextGroup() {

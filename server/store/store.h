@@ -17,16 +17,17 @@ struct StoreHooks {
   std::function<void()> after_commit{};
 };
 
-/// Thread-safe. Writes are executed in the order of Write(); those that wait while a commit reaches the disk go
-/// together into the next one (group commit). After the first failed commit (full disk, I/O error) nothing is written
-/// any more and every Write() reports that failure: what was acknowledged stays readable, the program must start again.
+/// Thread-safe. Writes are executed in the order of Write(); those that wait while a commit reaches
+/// the disk go together into the next one (group commit). After the first failed commit (full disk,
+/// I/O error) nothing is written any more and every Write() reports that failure: what was
+/// acknowledged stays readable, the program must start again.
 class Store {
  public:
   using Job = std::function<void(Transaction&)>;
   using Done = std::function<void(const absl::Status&)>;
 
-  /// Creates or migrates the file. Errors: FAILED_PRECONDITION (written by a newer program), RESOURCE_EXHAUSTED
-  /// (cannot be written), DATA_LOSS (not a database).
+  /// Creates or migrates the file. Errors: FAILED_PRECONDITION (written by a newer program),
+  /// RESOURCE_EXHAUSTED (cannot be written), DATA_LOSS (not a database).
   static absl::StatusOr<std::unique_ptr<Store>> Open(const std::string& path,
                                                      StoreHooks hooks = {});
   /// Finishes what was queued.
@@ -34,7 +35,8 @@ class Store {
   Store(const Store&) = delete;
   Store& operator=(const Store&) = delete;
 
-  /// `job` runs on the store's thread; then `done` does, with OK only once the job is on disk. Both must be short.
+  /// `job` runs on the store's thread; then `done` does, with OK only once the job is on disk. Both
+  /// must be short.
   void Write(Job job, Done done);
   /// Write() that waits. Not to be called from a Job or Done.
   absl::Status WriteNow(Job job);

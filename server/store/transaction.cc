@@ -25,7 +25,8 @@ void Transaction::PutBlob(const std::string& digest, const std::string& content)
     SQLite::Statement& insert =
         connection_.Bind("INSERT INTO blob(digest, content) VALUES(?, ?) ON CONFLICT DO NOTHING");
     insert.bind(1, digest);
-    // An empty blob has no address; a zero-length one of any address is stored as such, not as NULL.
+    // An empty blob has no address; a zero-length one of any address is stored as such, not as
+    // NULL.
     insert.bind(2, static_cast<const void*>(content.data()), static_cast<int>(content.size()));
     insert.exec();
     insert.reset();

@@ -1,5 +1,6 @@
 #pragma once
-// What may be written: the verbs of the domain, all of one Write() in one SQLite transaction (store.h).
+// What may be written: the verbs of the domain, all of one Write() in one SQLite transaction
+// (store.h).
 
 #include <cstdint>
 #include <map>
@@ -13,8 +14,8 @@ namespace calib::store {
 
 class Connection;
 
-/// Handed to the function given to Store::Write, on the store's thread. Errors stick: after the first one nothing more
-/// is written, and everything that shares the commit is rolled back.
+/// Handed to the function given to Store::Write, on the store's thread. Errors stick: after the
+/// first one nothing more is written, and everything that shares the commit is rolled back.
 class Transaction {
  public:
   explicit Transaction(Connection& connection) : connection_(connection) {}
@@ -45,7 +46,8 @@ class Transaction {
 
   void InsertAttempt(const NewAttempt& attempt);
   void EndAttempt(const AttemptEnd& end);
-  /// A state that is there already is left alone; if its bits differ, that is logged as nondeterminism.
+  /// A state that is there already is left alone; if its bits differ, that is logged as
+  /// nondeterminism.
   void PutState(const StateRecord& state, std::int64_t unix_ms);
 
   /// campaign 0: concerns the server as a whole.

@@ -22,9 +22,8 @@ absl::StatusOr<std::string> RoundTrip(const std::string& content) {
 }
 
 TEST(Chunking, ContentOfEverySizeComesBack) {
-  for (const std::size_t size :
-       {std::size_t{0}, std::size_t{1}, kChunkBytes - 1, kChunkBytes, kChunkBytes + 1,
-        3 * kChunkBytes}) {
+  for (const std::size_t size : {std::size_t{0}, std::size_t{1}, kChunkBytes - 1, kChunkBytes,
+                                 kChunkBytes + 1, 3 * kChunkBytes}) {
     const std::string content(size, 'x');
     const auto back = RoundTrip(content);
     ASSERT_TRUE(back.ok()) << back.status();

@@ -30,13 +30,12 @@ TEST(CallWithRetry, OnlyPassingTroubleIsTriedAgain) {
   const auto sleep = [&](milliseconds wait) { slept.push_back(wait); };
   Backoff backoff({}, 1);
   int calls = 0;
-  EXPECT_TRUE(CallWithRetry(
-                  5, backoff,
-                  [&] {
-                    return ++calls < 3 ? absl::UnavailableError("starting") : absl::OkStatus();
-                  },
-                  sleep)
-                  .ok());
+  EXPECT_TRUE(
+      CallWithRetry(
+          5, backoff,
+          [&] { return ++calls < 3 ? absl::UnavailableError("starting") : absl::OkStatus(); },
+          sleep)
+          .ok());
   EXPECT_EQ(calls, 3);
   EXPECT_EQ(slept.size(), 2U);
 

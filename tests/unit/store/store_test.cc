@@ -41,8 +41,8 @@ class StoreTest : public testing::Test {
 
   /// One campaign, one iteration, one sample, one evaluation.
   static void PutEvaluation(Transaction& t) {
-    t.InsertCampaign({.id = 1, .name = "sand", .yaml = "name: sand", .method = "sqmc", .samples = 1},
-                     {});
+    t.InsertCampaign(
+        {.id = 1, .name = "sand", .yaml = "name: sand", .method = "sqmc", .samples = 1}, {});
     t.InsertIteration(1, 0, "{}");
     t.InsertSample(1, {.sample = 0, .iteration = 0, .parameters = {1e9, 0.1}});
     t.InsertEvaluation({.key = kKey, .digest = "d"});
@@ -179,10 +179,13 @@ TEST_F(StoreTest, FailedCommitIsReportedToEveryoneAndNothingMoreIsTaken) {
 
 TEST_F(StoreTest, WriteThatBreaksAConstraintRollsBackItsWholeCommit) {
   Write([](Transaction& t) { PutEvaluation(t); });
-  EXPECT_FALSE(store_->WriteNow([](Transaction& t) {
-    t.Log(1, 0, "before");
-    t.InsertEvaluation({.key = {.campaign = 99, .sample = 0, .experiment = 0}, .digest = "x"});
-  }).ok());
+  EXPECT_FALSE(store_
+                   ->WriteNow([](Transaction& t) {
+                     t.Log(1, 0, "before");
+                     t.InsertEvaluation(
+                         {.key = {.campaign = 99, .sample = 0, .experiment = 0}, .digest = "x"});
+                   })
+                   .ok());
   Open({});
   EXPECT_TRUE(Read().Events(1)->empty());
   EXPECT_EQ(Read().Evaluations(1)->size(), 1U);

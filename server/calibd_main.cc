@@ -1,0 +1,77 @@
+// calibd: the service.
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
+#include <iostream>
+
+#include "server/service/server.h"
+
+namespace {
+
+constexpr std::chrono::seconds kShutdown{5};
+
+bool IsLoopback(const std::string& address) {
+  const std::string host = address.substr(0, address.rfind(':'));
+  return host == "localhost" || host == "[::1]" || host.rfind("127.", 0) == 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Holds calibration campaigns and leases their model evaluations to calib-worker nodes."};
+  calib::service::ServerOptions options;
+  options.listen = "127.0.0.1:7443";
+  std::int64_t lease_ms = options.lease.count();
+  std::int64_t heartbeat_ms = options.heartbeat.count();
+  app.add_option("--state", options.state_dir, "folder of the state, created if need be")
+      ->required();
+  app.add_option("--listen", options.listen,
+                 "HOST:PORT, port 0 for a free one (DIR/server.json tells which)")
+      ->capture_default_str();
+  app.add_option("--lease-ms", lease_ms,
+                 "an evaluation is handed to another worker after this silence")
+      ->check(CLI::Range(50, 86'400'000))
+      ->capture_default_str();
+  app.add_option("--heartbeat-ms", heartbeat_ms, "workers speak at least this often")
+      ->check(CLI::Range(10, 3'600'000))
+      ->capture_default_str();
+  app.add_option("--log", options.log_file, "log file [standard error]");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (heartbeat_ms >= lease_ms) {
+    std::cerr << "--heartbeat-ms must be below --lease-ms\n";
+    return 2;
+  }
+  options.lease = std::chrono::milliseconds(lease_ms);
+  options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
+  if (!IsLoopback(options.listen)) {
+    std::cerr << "warning: " << options.listen
+              << " can be reached from other machines, and there is no authentication yet\n";
+  }
+
+  // Blocked before any thread exists, so that all of them leave the signals to sigwait below.
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+
+  std::atomic<bool> failed = false;
+  options.on_failure = [&failed](const absl::Status&) {
+    failed = true;
+    kill(getpid(), SIGTERM);
+  };
+  auto server = calib::service::Server::Start(options);
+  if (!server.ok()) {
+    std::cerr << "calibd: " << server.status().message() << '\n';
+    return 1;
+  }
+  int signal = 0;
+  sigwait(&signals, &signal);
+  (*server)->Shutdown(kShutdown);
+  return failed ? 1 : 0;
+}

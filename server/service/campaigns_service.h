@@ -1,0 +1,61 @@
+#pragma once
+// The Campaigns rpcs. Questions are answered on the pool from a Reader; changes go through the
+// strand.
+
+#include <functional>
+
+#include "calib/v1/campaign.grpc.pb.h"
+#include "server/service/core.h"
+#include "server/service/requests.h"
+
+namespace calib::service {
+
+class CampaignsService final : public v1::Campaigns::CallbackService {
+ public:
+  explicit CampaignsService(Core& core) : core_(core) {}
+
+  using Context = grpc::CallbackServerContext;
+  using Unary = grpc::ServerUnaryReactor;
+
+  grpc::ServerReadReactor<v1::BlobChunk>* PutBlob(Context*, v1::BlobReceipt* reply) override;
+  Unary* Submit(Context*, const v1::SubmitRequest*, v1::SubmitReply*) override;
+  Unary* List(Context*, const v1::ListRequest*, v1::ListReply*) override;
+  Unary* Show(Context*, const v1::CampaignRequest*, v1::CampaignStatus*) override;
+  grpc::ServerWriteReactor<v1::CampaignStatus>* Watch(Context*,
+                                                      const v1::CampaignRequest*) override;
+  Unary* GetPosterior(Context*, const v1::PosteriorRequest*, v1::Posterior*) override;
+  grpc::ServerWriteReactor<v1::Sample>* GetSamples(Context*, const v1::CampaignRequest*) override;
+  grpc::ServerWriteReactor<v1::SampleStates>* GetStates(Context*,
+                                                        const v1::StatesRequest*) override;
+  Unary* GetSource(Context*, const v1::CampaignRequest*, v1::CampaignSource*) override;
+  grpc::ServerWriteReactor<v1::BlobChunk>* GetBlob(Context*, const v1::BlobByDigest*) override;
+  grpc::ServerWriteReactor<v1::LogEntry>* GetLog(Context*, const v1::CampaignRequest*) override;
+  Unary* Pause(Context*, const v1::ControlRequest*, v1::CampaignStatus*) override;
+  Unary* Resume(Context*, const v1::ControlRequest*, v1::CampaignStatus*) override;
+  Unary* Cancel(Context*, const v1::ControlRequest*, v1::CampaignStatus*) override;
+  Unary* Delete(Context*, const v1::ControlRequest*, v1::DeleteReply*) override;
+  Unary* ListWorkers(Context*, const v1::ListWorkersRequest*, v1::WorkerList*) override;
+  Unary* DrainWorker(Context*, const v1::DrainRequest*, v1::WorkerInfo*) override;
+
+ private:
+  using Act = std::function<void(std::int64_t campaign, const store::Store::Job& also,
+                                 const scheduler::Scheduler::Reply& reply)>;
+
+  /// A question that the store alone answers.
+  template <typename Reply>
+  Unary* Ask(Context* context, Reply* reply,
+             std::function<absl::StatusOr<Reply>(store::Reader&)> answer);
+  /// Status of a campaign, live parts included, then the end of the call.
+  void FinishWithStatus(Unary* reactor, std::int64_t campaign, v1::CampaignStatus* reply);
+  /// On the strand: a change of one campaign, once per request_id. done gets its outcome.
+  void Control(const std::string& verb, const v1::ControlRequest& request, const Act& act,
+               std::function<void(const absl::StatusOr<std::int64_t>&)> done);
+  Unary* ControlWithStatus(Context* context, const std::string& verb,
+                           const v1::ControlRequest* request, v1::CampaignStatus* reply,
+                           const Act& act);
+
+  Core& core_;
+  Requests requests_;  // the strand's
+};
+
+}  // namespace calib::service

@@ -1,0 +1,128 @@
+#include "server/service/core.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <utility>
+
+namespace calib::service {
+namespace {
+
+/// One for the long computations between iterations, one so that questions are answered meanwhile.
+constexpr int kPoolThreads = 2;
+
+}  // namespace
+
+Core::Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions options,
+           std::function<void(const absl::Status&)> on_failure)
+    : options_(options),
+      on_failure_(std::move(on_failure)),
+      keep_running_(strand_.get_executor()),
+      tick_(strand_),
+      pool_(kPoolThreads),
+      store_(std::move(store)),
+      scheduler_(*this, options),
+      thread_([this] { strand_.run(); }) {}
+
+Core::~Core() {
+  BeginShutdown();
+  pool_.join();
+  keep_running_.reset();
+  thread_.join();
+  // The store then finishes what it was given; nobody waits for those answers any more.
+}
+
+absl::Status Core::Start() {
+  absl::Status status = scheduler_.Load();
+  if (status.ok()) {
+    ScheduleTick();
+  }
+  return status;
+}
+
+void Core::BeginShutdown() {
+  Post([this] {
+    if (health_.ok()) {
+      health_ = absl::UnavailableError("the server is going down");
+    }
+    for (const auto& [id, session] : sessions_) {
+      session->Close(absl::UnavailableError("the server is going down"));
+    }
+    tick_.cancel();
+  });
+}
+
+void Core::Post(std::function<void()> task) { boost::asio::post(strand_, std::move(task)); }
+
+void Core::Query(std::function<void()> task) { boost::asio::post(pool_, std::move(task)); }
+
+std::int64_t Core::AddSession(Session* session) {
+  sessions_[++last_session_] = session;
+  return last_session_;
+}
+
+void Core::RemoveSession(std::int64_t session) {
+  sessions_.erase(session);
+  scheduler_.Disconnected(session);
+}
+
+void Core::Write(store::Store::Job job, std::function<void(const absl::Status&)> then) {
+  store_->Write(std::move(job), [this, then = std::move(then)](const absl::Status& status) {
+    Post([this, status, then] {
+      if (!status.ok()) {
+        Fail(status);
+      }
+      then(status);
+    });
+  });
+}
+
+void Core::Fail(const absl::Status& status) {
+  if (std::exchange(failed_, true)) {
+    return;
+  }
+  spdlog::critical("store_failed reason=\"{}\"", std::string(status.message()));
+  health_ = status;
+  for (const auto& [id, session] : sessions_) {
+    session->Close(absl::UnavailableError(status.message()));
+  }
+  on_failure_(status);
+}
+
+void Core::Compute(std::function<std::function<void()>()> work) {
+  Query([this, work = std::move(work)] { Post(work()); });
+}
+
+void Core::Send(std::int64_t session, v1::ServerMessage message) {
+  if (const auto found = sessions_.find(session); found != sessions_.end()) {
+    found->second->Send(std::move(message));
+  }
+}
+
+void Core::Close(std::int64_t session, const absl::Status& status) {
+  if (const auto found = sessions_.find(session); found != sessions_.end()) {
+    found->second->Close(status);
+  }
+}
+
+std::chrono::steady_clock::time_point Core::Now() { return std::chrono::steady_clock::now(); }
+
+std::int64_t Core::UnixMs() {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+void Core::ScheduleTick() {
+  tick_.expires_after(std::clamp<std::chrono::milliseconds>(
+      options_.lease / 4, std::chrono::milliseconds(20), std::chrono::milliseconds(1000)));
+  tick_.async_wait([this](const boost::system::error_code& error) {
+    if (!error && health_.ok()) {
+      scheduler_.Tick();
+      ScheduleTick();
+    }
+  });
+}
+
+}  // namespace calib::service

@@ -1,0 +1,84 @@
+#pragma once
+// The threads of the service and what they own: the strand with the scheduler, the store, and the
+// pool for reading and computing. The gRPC reactors only move data between the wire and here.
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <thread>
+
+#include "server/scheduler/ports.h"
+#include "server/scheduler/scheduler.h"
+#include "server/store/store.h"
+
+namespace calib::service {
+
+/// A worker's stream as the strand sees it. Both calls return at once.
+class Session {
+ public:
+  virtual ~Session() = default;
+  virtual void Send(v1::ServerMessage message) = 0;
+  /// Ends the stream after what was sent.
+  virtual void Close(const absl::Status& status) = 0;
+};
+
+class Core final : public scheduler::Ports {
+ public:
+  /// on_failure is called once, on the strand, when the store can no longer be written.
+  Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions options,
+       std::function<void(const absl::Status&)> on_failure);
+  ~Core() override;
+
+  /// Takes up what the store holds and starts the clock.
+  absl::Status Start();
+  /// Refuses what comes from now on and ends the streams. Reactors must be gone before the
+  /// destructor.
+  void BeginShutdown();
+
+  /// Runs on the strand, in order.
+  void Post(std::function<void()> task);
+  /// Runs on the pool.
+  void Query(std::function<void()> task);
+
+  // ---- on the strand only ----
+  scheduler::Scheduler& scheduler() { return scheduler_; }
+  /// OK while the service takes work; UNAVAILABLE when it is going down; else why the store cannot
+  /// be written.
+  const absl::Status& health() const { return health_; }
+  std::int64_t AddSession(Session* session);
+  void RemoveSession(std::int64_t session);
+  boost::asio::io_context& strand() { return strand_; }
+
+  // ---- Ports ----
+  void Write(store::Store::Job job, std::function<void(const absl::Status&)> then) override;
+  absl::StatusOr<store::Reader> Read() override { return store_->Read(); }  // on any thread
+  void Compute(std::function<std::function<void()>()> work) override;
+  void Send(std::int64_t session, v1::ServerMessage message) override;
+  void Close(std::int64_t session, const absl::Status& status) override;
+  std::chrono::steady_clock::time_point Now() override;
+  std::int64_t UnixMs() override;
+
+ private:
+  void Fail(const absl::Status& status);
+  void ScheduleTick();
+
+  const scheduler::SchedulerOptions options_;
+  const std::function<void(const absl::Status&)> on_failure_;
+  boost::asio::io_context strand_;
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> keep_running_;
+  boost::asio::steady_timer tick_;
+  boost::asio::thread_pool pool_;
+  std::unique_ptr<store::Store> store_;
+  scheduler::Scheduler scheduler_;
+  absl::Status health_;
+  bool failed_ = false;
+  std::map<std::int64_t, Session*> sessions_;
+  std::int64_t last_session_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace calib::service

@@ -1,0 +1,306 @@
+#include "server/service/queries.h"
+
+#include <charconv>
+#include <cmath>
+#include <map>
+
+#include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
+#include "server/scheduler/definition.h"
+#include "server/scheduler/posterior_record.h"
+
+namespace calib::service {
+
+using store::EvaluationRecord;
+using store::EvaluationStatus;
+
+namespace {
+
+struct SampleStatus {
+  std::string name = "waiting";
+  std::string reason{};
+};
+
+/// Of one sample from its evaluations: what is worst about it, else how far it has come.
+SampleStatus Summarise(const std::vector<const EvaluationRecord*>& evaluations) {
+  SampleStatus status;
+  std::size_t finished = 0;
+  bool begun = false;
+  for (const EvaluationRecord* evaluation : evaluations) {
+    switch (evaluation->status) {
+      case EvaluationStatus::kDiverged:
+      case EvaluationStatus::kStoppedEarly:
+      case EvaluationStatus::kFailed:
+        return {.name = store::ToString(evaluation->status), .reason = evaluation->reason};
+      case EvaluationStatus::kRunning:
+        begun = true;
+        break;
+      case EvaluationStatus::kFinished:
+        ++finished;
+        break;
+      case EvaluationStatus::kWaiting:
+        break;
+    }
+  }
+  if (finished == evaluations.size()) {
+    status.name = "finished";
+  } else if (begun || finished > 0) {
+    status.name = "running";
+  }
+  return status;
+}
+
+std::map<int, SampleStatus> StatusBySample(const std::vector<EvaluationRecord>& evaluations) {
+  std::map<int, std::vector<const EvaluationRecord*>> by_sample;
+  for (const EvaluationRecord& evaluation : evaluations) {
+    by_sample[evaluation.key.sample].push_back(&evaluation);
+  }
+  std::map<int, SampleStatus> statuses;
+  for (const auto& [sample, of_sample] : by_sample) {
+    statuses[sample] = Summarise(of_sample);
+  }
+  return statuses;
+}
+
+void CountSamples(const store::CampaignRecord& record,
+                  const std::vector<EvaluationRecord>& evaluations, v1::CampaignStatus& status) {
+  const int size = record.submitted.samples;
+  for (const auto& [sample, sample_status] : StatusBySample(evaluations)) {
+    if (sample / size != record.progress.iteration) {
+      continue;
+    }
+    const bool diverged = sample_status.name == "diverged";
+    const bool stopped = sample_status.name == "stopped_early";
+    status.set_samples_diverged(status.samples_diverged() + (diverged ? 1 : 0));
+    status.set_samples_stopped_early(status.samples_stopped_early() + (stopped ? 1 : 0));
+    status.set_samples_running(status.samples_running() +
+                               (sample_status.name == "running" ? 1 : 0));
+    status.set_samples_done(status.samples_done() +
+                            (diverged || stopped || sample_status.name == "finished" ? 1 : 0));
+  }
+}
+
+/// The last posterior, or nothing before the first.
+absl::StatusOr<std::optional<v1::Posterior>> LastPosterior(store::Reader& reader,
+                                                           std::int64_t campaign) {
+  const auto iterations = reader.Iterations(campaign);
+  if (!iterations.ok()) {
+    return iterations.status();
+  }
+  std::optional<v1::Posterior> last;
+  for (const store::IterationRecord& iteration : *iterations) {
+    if (iteration.posterior.has_value()) {
+      auto posterior = scheduler::PosteriorFromJson(*iteration.posterior);
+      if (!posterior.ok()) {
+        return posterior.status();
+      }
+      last = *std::move(posterior);
+    }
+  }
+  return last;
+}
+
+}  // namespace
+
+absl::StatusOr<std::int64_t> ParseCampaign(const std::string& id) {
+  std::int64_t number = 0;
+  const char* end = id.data() + id.size();
+  if (id.size() > 1 && id.front() == 'c') {
+    if (const auto [at, error] = std::from_chars(id.data() + 1, end, number);
+        error == std::errc() && at == end && number > 0) {
+      return number;
+    }
+  }
+  return absl::NotFoundError(
+      absl::StrCat("there is no campaign \"", id, "\" (ids are like c1; see list)"));
+}
+
+absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t campaign,
+                                            const std::optional<scheduler::LiveStatus>& live) {
+  const auto record = reader.Campaign(campaign);
+  const auto evaluations = reader.Evaluations(campaign);
+  const auto effort = reader.EffortOf(campaign);
+  const auto posterior = LastPosterior(reader, campaign);
+  for (const absl::Status& status :
+       {record.status(), evaluations.status(), effort.status(), posterior.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  v1::CampaignStatus status;
+  status.set_campaign(absl::StrCat("c", campaign));
+  status.set_name(record->submitted.name);
+  status.set_state(record->progress.state);
+  status.set_reason(record->progress.reason);
+  status.set_iteration(record->progress.iteration);
+  status.set_max_iterations(record->submitted.max_iterations);
+  status.set_samples(record->submitted.samples);
+  CountSamples(*record, *evaluations, status);
+  status.set_eta_seconds(-1);
+  if (posterior->has_value()) {
+    status.set_effective_sample_size((*posterior)->ess());
+    status.set_best_misfit((*posterior)->best_misfit());
+  }
+  if (live.has_value() && record->progress.phase == "calibrating") {
+    status.set_effective_sample_size(live->view.effective_samples);
+    status.set_best_misfit(live->view.best_misfit);
+  }
+  if (live.has_value()) {
+    status.set_eta_seconds(live->eta_seconds);
+  }
+  status.set_model_evaluations(effort->model_evaluations);
+  status.set_core_hours(effort->core_seconds / 3600);
+  status.set_converged(record->progress.converged);
+  status.set_method(record->submitted.method);
+  status.set_created_unix_ms(record->submitted.created_unix_ms);
+  status.set_phase(record->progress.phase);
+  return status;
+}
+
+absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t campaign,
+                                          std::optional<int> iteration) {
+  const auto record = reader.Campaign(campaign);
+  const auto iterations = reader.Iterations(campaign);
+  const auto effort = reader.EffortOf(campaign);
+  for (const absl::Status& status : {record.status(), iterations.status(), effort.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  const std::string* found = nullptr;
+  int complete = 0;
+  for (const store::IterationRecord& candidate : *iterations) {
+    if (candidate.posterior.has_value()) {
+      ++complete;
+      if (!iteration.has_value() || candidate.number == *iteration) {
+        found = &*candidate.posterior;
+      }
+    }
+  }
+  if (found == nullptr) {
+    return absl::FailedPreconditionError(
+        complete == 0 ? absl::StrCat("campaign c", campaign, " has no complete iteration yet")
+                      : absl::StrCat("campaign c", campaign, " has ", complete,
+                                     " complete iterations, counted from 0"));
+  }
+  auto posterior = scheduler::PosteriorFromJson(*found);
+  if (posterior.ok()) {
+    posterior->set_iterations(complete);
+    posterior->set_core_hours(effort->core_seconds / 3600);
+  }
+  return posterior;
+}
+
+absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::int64_t campaign) {
+  const auto record = reader.Campaign(campaign);
+  const auto samples = reader.Samples(campaign);
+  const auto evaluations = reader.Evaluations(campaign);
+  const auto attempts = reader.AttemptsBySample(campaign);
+  for (const absl::Status& status :
+       {record.status(), samples.status(), evaluations.status(), attempts.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  auto statuses = StatusBySample(*evaluations);
+  std::vector<v1::Sample> messages;
+  for (const store::SampleRecord& sample : *samples) {
+    v1::Sample& message = messages.emplace_back();
+    message.set_index(sample.sample);
+    message.set_iteration(sample.iteration);
+    message.mutable_parameters()->Add(sample.parameters.begin(), sample.parameters.end());
+    message.set_status(statuses[sample.sample].name);
+    message.set_reason(statuses[sample.sample].reason);
+    message.set_weight(std::exp(sample.log_weight));
+    message.set_log_likelihood(sample.log_likelihood);
+    const auto made = attempts->find(sample.sample);
+    message.set_attempts(made == attempts->end() ? 0 : made->second);
+  }
+  return messages;
+}
+
+absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, std::int64_t campaign,
+                                                       std::optional<int> sample) {
+  const auto record = reader.Campaign(campaign);
+  if (!record.ok()) {
+    return record.status();
+  }
+  const auto definition = scheduler::LoadDefinition(reader, record->submitted);
+  const auto states = reader.States(campaign, sample);
+  for (const absl::Status& status : {definition.status(), states.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  if (sample.has_value()) {
+    const auto samples = reader.Samples(campaign);
+    if (!samples.ok()) {
+      return samples.status();
+    }
+    if (*sample < 0 || static_cast<std::size_t>(*sample) >= samples->size()) {
+      return absl::NotFoundError(absl::StrCat("campaign c", campaign, " has no sample ", *sample,
+                                              ", only 0 .. ", samples->size() - 1));
+    }
+  }
+  const campaign::Campaign& read = (*definition)->campaign;
+  std::vector<v1::SampleStates> messages;
+  const store::EvaluationKey* last = nullptr;
+  for (const store::StateRecord& state : *states) {
+    if (last == nullptr || *last != state.key) {
+      const auto& experiment = read.experiments[static_cast<std::size_t>(state.key.experiment)];
+      v1::SampleStates& message = messages.emplace_back();
+      message.set_sample(state.key.sample);
+      message.set_experiment(experiment.name);
+      if (read.precomputed.has_value()) {
+        for (const campaign::MeasuredObservable& observable : experiment.observables) {
+          message.add_observables(observable.name);
+        }
+      } else {
+        const auto& names = dem::FindTest(experiment.test)->observables;
+        message.mutable_observables()->Add(names.begin(), names.end());
+      }
+    }
+    last = &state.key;
+    v1::State& message = *messages.back().add_states();
+    message.set_load_step(state.load_step);
+    message.mutable_values()->Add(state.observables.begin(), state.observables.end());
+  }
+  return messages;
+}
+
+absl::StatusOr<v1::CampaignSource> SourceOf(store::Reader& reader, std::int64_t campaign) {
+  const auto record = reader.Campaign(campaign);
+  const auto files = reader.Files(campaign);
+  for (const absl::Status& status : {record.status(), files.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  v1::CampaignSource source;
+  source.set_campaign_file(record->submitted.yaml);
+  source.set_file_name(record->submitted.file_name);
+  source.mutable_files()->insert(files->begin(), files->end());
+  if (record->submitted.seed.has_value()) {
+    source.set_seed(*record->submitted.seed);
+  }
+  return source;
+}
+
+absl::StatusOr<std::vector<v1::LogEntry>> LogOf(store::Reader& reader, std::int64_t campaign) {
+  const auto record = reader.Campaign(campaign);
+  const auto events = reader.Events(campaign);
+  for (const absl::Status& status : {record.status(), events.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  std::vector<v1::LogEntry> entries;
+  for (const store::EventRecord& event : *events) {
+    v1::LogEntry& entry = entries.emplace_back();
+    entry.set_unix_ms(event.unix_ms);
+    entry.set_what(event.what);
+  }
+  return entries;
+}
+
+}  // namespace calib::service

@@ -1,0 +1,29 @@
+#pragma once
+// Answers to what users ask, from one Reader. Pure functions of the store and of what the scheduler
+// said.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "calib/v1/campaign.pb.h"
+#include "server/scheduler/scheduler.h"
+#include "server/store/reader.h"
+
+namespace calib::service {
+
+/// "c12" -> 12; NOT_FOUND for anything else.
+absl::StatusOr<std::int64_t> ParseCampaign(const std::string& id);
+
+absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t campaign,
+                                            const std::optional<scheduler::LiveStatus>& live);
+absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t campaign,
+                                          std::optional<int> iteration);
+absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::int64_t campaign);
+absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, std::int64_t campaign,
+                                                       std::optional<int> sample);
+absl::StatusOr<v1::CampaignSource> SourceOf(store::Reader& reader, std::int64_t campaign);
+absl::StatusOr<std::vector<v1::LogEntry>> LogOf(store::Reader& reader, std::int64_t campaign);
+
+}  // namespace calib::service

@@ -1,0 +1,39 @@
+#include "server/service/requests.h"
+
+#include "absl/strings/str_cat.h"
+
+namespace calib::service {
+namespace {
+
+constexpr std::size_t kLongestId = 128;
+
+}  // namespace
+
+absl::StatusOr<std::optional<std::string>> Requests::Begin(const std::string& id,
+                                                           const std::string& digest,
+                                                           store::Reader& reader) {
+  if (id.empty()) {
+    return std::optional<std::string>();
+  }
+  if (id.size() > kLongestId) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("request_id has ", id.size(), " characters, at most ", kLongestId));
+  }
+  const auto stored = reader.Request(id);
+  if (!stored.ok()) {
+    return stored.status();
+  }
+  if (stored->has_value()) {
+    if ((*stored)->digest != digest) {
+      return absl::AlreadyExistsError(
+          absl::StrCat("request ", id, " was made before with another content"));
+    }
+    return std::optional<std::string>((*stored)->answer);
+  }
+  if (!in_progress_.insert(id).second) {
+    return absl::UnavailableError(absl::StrCat("request ", id, " is in progress"));
+  }
+  return std::optional<std::string>();
+}
+
+}  // namespace calib::service

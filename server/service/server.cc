@@ -1,0 +1,134 @@
+#include "server/service/server.h"
+
+#include <grpcpp/security/server_credentials.h>
+#include <grpcpp/server.h>
+#include <grpcpp/server_builder.h>
+#include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <future>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/service/campaigns_service.h"
+#include "server/service/core.h"
+#include "server/service/state_folder.h"
+#include "server/service/worker_link_service.h"
+
+namespace calib::service {
+namespace {
+
+constexpr int kKeepaliveMs = 20'000;
+constexpr int kFastestPingMs = 5'000;
+constexpr std::chrono::seconds kDefaultShutdown{5};
+
+absl::Status StartLog(const std::string& file) {
+  try {
+    auto logger =
+        file.empty() ? spdlog::stderr_logger_mt("calibd") : spdlog::basic_logger_mt("calibd", file);
+    spdlog::drop("calibd");  // kept by the default logger; the name is free for the next server
+    spdlog::set_default_logger(std::move(logger));
+  } catch (const spdlog::spdlog_ex& error) {
+    return absl::ResourceExhaustedError(absl::StrCat("log: ", error.what()));
+  }
+  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
+  spdlog::flush_on(spdlog::level::info);
+  return absl::OkStatus();
+}
+
+std::string HostOf(const std::string& address) { return address.substr(0, address.rfind(':')); }
+
+}  // namespace
+
+struct Server::Impl {
+  std::unique_ptr<StateFolder> folder;
+  std::unique_ptr<Core> core;
+  std::unique_ptr<CampaignsService> campaigns;
+  std::unique_ptr<WorkerLinkService> workers;
+  std::unique_ptr<grpc::Server> grpc;
+  std::string address;
+  int port = 0;
+
+  absl::Status Listen(const std::string& listen) {
+    grpc::ServerBuilder builder;
+    builder.AddListeningPort(listen, grpc::InsecureServerCredentials(), &port);
+    builder.RegisterService(campaigns.get());
+    builder.RegisterService(workers.get());
+    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+    builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                               kFastestPingMs);
+    grpc = builder.BuildAndStart();
+    if (grpc == nullptr || port == 0) {
+      return absl::UnavailableError(
+          absl::StrCat("cannot listen on ", listen, ": in use, or not an address of this machine"));
+    }
+    address = absl::StrCat(HostOf(listen), ":", port);
+    return absl::OkStatus();
+  }
+};
+
+Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Server::~Server() { Shutdown(kDefaultShutdown); }
+
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
+  auto folder = StateFolder::Open(options.state_dir);
+  if (!folder.ok()) {
+    return folder.status();
+  }
+  if (absl::Status status = StartLog(options.log_file); !status.ok()) {
+    return status;
+  }
+  auto store = store::Store::Open((*folder)->DatabasePath(), std::move(options.store_hooks));
+  if (!store.ok()) {
+    return store.status();
+  }
+  auto impl = std::make_unique<Impl>();
+  impl->folder = *std::move(folder);
+  impl->core = std::make_unique<Core>(
+      *std::move(store),
+      scheduler::SchedulerOptions{.lease = options.lease, .heartbeat = options.heartbeat},
+      [on_failure = std::move(options.on_failure)](const absl::Status& status) {
+        if (on_failure) {
+          on_failure(status);
+        }
+      });
+  impl->campaigns = std::make_unique<CampaignsService>(*impl->core);
+  impl->workers = std::make_unique<WorkerLinkService>(*impl->core);
+  std::promise<absl::Status> loaded;
+  impl->core->Post([&] { loaded.set_value(impl->core->Start()); });
+  if (absl::Status status = loaded.get_future().get(); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = impl->Listen(options.listen); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = impl->folder->Announce(impl->address); !status.ok()) {
+    return status;
+  }
+  spdlog::info("serving address={} state={}", impl->address, options.state_dir);
+  return std::unique_ptr<Server>(new Server(std::move(impl)));
+}
+
+int Server::port() const { return impl_->port; }
+
+std::string Server::address() const { return impl_->address; }
+
+void Server::Shutdown(std::chrono::milliseconds deadline) {
+  if (impl_ == nullptr) {
+    return;
+  }
+  spdlog::info("shutdown address={}", impl_->address);
+  impl_->core->BeginShutdown();
+  impl_->grpc->Shutdown(std::chrono::system_clock::now() + deadline);
+  impl_->grpc->Wait();
+  impl_->grpc.reset();
+  impl_->core.reset();
+  impl_.reset();
+}
+
+}  // namespace calib::service

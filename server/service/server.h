@@ -1,0 +1,52 @@
+#pragma once
+// The whole service in one object: calibd runs one, calibctl embeds one. No gRPC header is needed
+// to use it.
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "server/store/store.h"
+
+namespace calib::service {
+
+struct ServerOptions {
+  std::string state_dir{};             ///< created if need be; holds calib.db, lock and server.json
+  std::string listen = "127.0.0.1:0";  ///< HOST:PORT; port 0: a free one, see Server::port()
+  std::chrono::milliseconds lease{
+      15'000};  ///< a worker is lost when nothing was heard from it for this long
+  std::chrono::milliseconds heartbeat{2'000};  ///< workers speak at least this often
+  std::string log_file{};                      ///< appended to; empty: standard error
+  /// Called once, on another thread, when the state can no longer be written (full disk): the
+  /// server has stopped taking work and is to be shut down.
+  std::function<void(const absl::Status&)> on_failure{};
+  store::StoreHooks store_hooks{};  ///< for tests
+};
+
+class Server {
+ public:
+  /// Serves when it returns; unfinished campaigns go on. Errors: ALREADY_EXISTS when another
+  /// process serves the folder (ServingAddress() in state_folder.h tells where); UNAVAILABLE when
+  /// the address cannot be bound; those of store::Store::Open.
+  static absl::StatusOr<std::unique_ptr<Server>> Start(ServerOptions options);
+  /// Shutdown() if that has not been done.
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  int port() const;
+  /// HOST:PORT for clients on this machine.
+  std::string address() const;
+  /// Ends streams with UNAVAILABLE, waits for calls in progress at most this long, closes the
+  /// store. Campaigns stay as they are and go on with the next Start().
+  void Shutdown(std::chrono::milliseconds deadline);
+
+ private:
+  struct Impl;
+  explicit Server(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace calib::service

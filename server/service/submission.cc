@@ -1,0 +1,79 @@
+#include "server/service/submission.h"
+
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/rpc/digest.h"
+#include "server/campaign/campaign_file.h"
+#include "server/scheduler/definition.h"
+
+namespace calib::service {
+
+absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmission(
+    const v1::SubmitRequest& request, store::Reader& reader) {
+  const std::map<std::string, std::string> files(request.files().begin(), request.files().end());
+  for (const auto& [path, digest] : files) {
+    const auto there = reader.HasBlob(digest);
+    if (!there.ok()) {
+      return there.status();
+    }
+    if (!*there) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("the content of ", path, " (SHA-256 ", digest, ") was not put"));
+    }
+  }
+  std::optional<std::uint64_t> seed;
+  if (request.has_seed()) {
+    seed = request.seed();
+  }
+  const campaign::ReadOutcome outcome = campaign::ReadCampaign(
+      request.campaign_file(), request.file_name(), scheduler::StoredFiles(reader, files), seed);
+  if (!outcome.problems.empty()) {
+    v1::SubmitReply reply;
+    for (const campaign::Problem& problem : outcome.problems) {
+      v1::Problem& message = *reply.add_problems();
+      message.set_file(problem.file);
+      message.set_line(problem.line);
+      message.set_key(problem.key);
+      message.set_message(problem.message);
+    }
+    return reply;
+  }
+  const campaign::Campaign& campaign = outcome.campaign;
+  store::NewCampaign accepted{
+      .name = campaign.name,
+      .yaml = request.campaign_file(),
+      .file_name = request.file_name(),
+      .seed = seed,
+      .method = campaign.method == campaign::Method::kSqmc ? "sqmc" : "iterative_bayesian_filter",
+      .samples = campaign.samples,
+      .max_iterations = campaign.max_iterations};
+  if (campaign.precomputed.has_value()) {
+    accepted.samples = static_cast<int>(campaign.precomputed->parameters.rows());
+  }
+  if (campaign.precomputed.has_value() || campaign.method == campaign::Method::kSqmc) {
+    accepted.max_iterations = 1;
+  }
+  return accepted;
+}
+
+std::string ContentDigest(const v1::SubmitRequest& request) {
+  rpc::Sha256 digest;
+  const auto add = [&digest](const std::string& part) {
+    digest.Update(absl::StrCat(part.size(), ":"));
+    digest.Update(part);
+  };
+  add(request.campaign_file());
+  add(request.file_name());
+  for (const auto& [path, content] :
+       std::map<std::string, std::string>(request.files().begin(), request.files().end())) {
+    add(path);
+    add(content);
+  }
+  add(request.has_seed() ? absl::StrCat(request.seed()) : "");
+  return digest.Finish();
+}
+
+}  // namespace calib::service

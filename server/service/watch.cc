@@ -1,0 +1,102 @@
+#include "server/service/watch.h"
+
+#include <boost/asio/steady_timer.hpp>
+
+#include "proto/rpc/status.h"
+#include "server/scheduler/transitions.h"
+#include "server/service/queries.h"
+
+namespace calib::service {
+namespace {
+
+constexpr std::chrono::milliseconds kPeriod{500};
+
+/// Goes round: look on the strand, read on the pool, write, wait. Deletes itself.
+class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
+ public:
+  Watcher(Core& core, const std::string& campaign) : core_(core), timer_(core.strand()) {
+    const auto id = ParseCampaign(campaign);
+    if (!id.ok()) {
+      Finish(rpc::ToGrpc(id.status()));
+      return;
+    }
+    campaign_ = *id;
+    core_.Post([this] { Look(); });
+  }
+
+  void OnWriteDone(bool ok) override {
+    core_.Post([this, ok] {
+      const auto state = scheduler::ToCampaignState(status_.state());
+      if (!ok) {
+        Finish(grpc::Status::CANCELLED);
+      } else if (state.has_value() && scheduler::IsOver(*state)) {
+        Finish(grpc::Status::OK);
+      } else {
+        Wait();
+      }
+    });
+  }
+
+  void OnCancel() override {
+    core_.Post([this] {
+      cancelled_ = true;
+      timer_.cancel();
+    });
+  }
+
+  void OnDone() override {
+    // OnCancel comes before OnDone, so what it posted to the strand has run when this does.
+    core_.Post([this] { delete this; });
+  }
+
+ private:
+  void Wait() {
+    timer_.expires_after(kPeriod);
+    timer_.async_wait([this](const boost::system::error_code& /*error*/) {
+      if (!cancelled_ && core_.health().ok() && core_.scheduler().version() == seen_) {
+        Wait();
+      } else {
+        Look();
+      }
+    });
+  }
+
+  void Look() {
+    if (cancelled_) {
+      Finish(grpc::Status::CANCELLED);
+      return;
+    }
+    if (!core_.health().ok()) {
+      Finish(rpc::ToGrpc(core_.health()));
+      return;
+    }
+    seen_ = core_.scheduler().version();
+    core_.Query([this, live = core_.scheduler().Live(campaign_)] {
+      auto reader = core_.Read();
+      auto status = reader.ok() ? StatusOf(*reader, campaign_, live)
+                                : absl::StatusOr<v1::CampaignStatus>(reader.status());
+      if (!status.ok()) {
+        Finish(rpc::ToGrpc(status.status()));
+        return;
+      }
+      status_ = *std::move(status);
+      StartWrite(&status_);
+    });
+  }
+
+  Core& core_;
+  boost::asio::steady_timer timer_;  // the strand's, like everything below but status_
+  std::int64_t campaign_ = 0;
+  std::uint64_t seen_ = 0;
+  bool cancelled_ = false;
+  v1::CampaignStatus status_;
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core,
+                                                            const std::string& campaign) {
+  return new Watcher(core, campaign);
+}
+
+}  // namespace calib::service

@@ -1,0 +1,18 @@
+#pragma once
+// The live view of one campaign.
+
+#include <grpcpp/support/server_callback.h>
+
+#include <string>
+
+#include "calib/v1/campaign.pb.h"
+#include "server/service/core.h"
+
+namespace calib::service {
+
+/// One status at once, then one whenever something changed, at most two a second, until the
+/// campaign is over.
+grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core,
+                                                            const std::string& campaign);
+
+}  // namespace calib::service

@@ -1,0 +1,103 @@
+// calib-worker: the daemon on a compute node, or one evaluation with --once.
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <fstream>
+#include <iostream>
+#include <thread>
+
+#include "worker/once.h"
+#include "worker/throughput.h"
+#include "worker/worker.h"
+
+namespace {
+
+constexpr std::chrono::milliseconds kBenchmark{300};
+
+std::string CpuModel() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.rfind("model name", 0) == 0) {
+      return line.substr(std::min(line.size(), line.find(':') + 2));
+    }
+  }
+  return "unknown";
+}
+
+std::string DefaultName() {
+  std::array<char, 256> host{};
+  gethostname(host.data(), host.size() - 1);
+  return std::string(host.data()) + "-" + std::to_string(getpid());
+}
+
+/// The kernel ends this process with SIGTERM when its parent dies; false if the parent is dead
+/// already.
+bool ExitWithParent(int parent) {
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  return parent == 0 || getppid() == parent;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Runs model evaluations for a calibd server, or one of them without a server (--once)."};
+  calib::worker::WorkerOptions options;
+  calib::worker::OnceOptions once;
+  int parent = -1;
+  options.slots = 0;
+  auto* server = app.add_option("--server", options.server, "the server, HOST:PORT");
+  app.add_option("--slots", options.slots, "evaluations at a time [cores / threads per slot]")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--threads-per-slot", options.threads_per_slot, "threads of one evaluation")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--name", options.name, "unique name [host name and process id]");
+  app.add_option("--exit-with-parent", parent,
+                 "end when the parent process, of this id (0: whichever), ends");
+  auto* spec =
+      app.add_option("--once", once.spec, "run this AttemptSpec (JSON or binary) and leave");
+  app.add_option("--packing", once.packing, "packing file of --once")->needs(spec);
+  app.add_option("-o,--output", once.output, "CSV file of --once [standard output]")->needs(spec);
+  app.add_option("--vtk", once.vtk, "folder for the grains after each load step of --once")
+      ->needs(spec);
+  server->excludes(spec);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (!once.spec.empty()) {
+    return calib::worker::RunOnce(once, std::cerr);
+  }
+  if (options.server.empty()) {
+    std::cerr << "either --server HOST:PORT or --once SPEC is needed\n";
+    return 2;
+  }
+  if (parent >= 0 && !ExitWithParent(parent)) {
+    return 0;
+  }
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("calib-worker"));
+  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");
+  if (options.slots == 0) {
+    const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    options.slots = std::max(1, cores / options.threads_per_slot);
+  }
+  if (options.name.empty()) {
+    options.name = DefaultName();
+  }
+  options.cpu = CpuModel();
+  options.contact_updates_per_second = calib::worker::MeasureThroughput(kBenchmark);
+  spdlog::info("worker name={} slots={} threads_per_slot={} contact_updates_per_second={:.4g}",
+               options.name, options.slots, options.threads_per_slot,
+               options.contact_updates_per_second);
+  const absl::Status status = calib::worker::Worker(options).Run();
+  spdlog::info("exit ok={}", status.ok());
+  return status.ok() ? 0 : 1;
+}

@@ -1,0 +1,77 @@
+#include "worker/evaluate.h"
+
+#include <chrono>
+
+#include "absl/strings/str_cat.h"
+#include "worker/scenario_from_spec.h"
+
+namespace calib::worker {
+namespace {
+
+v1::Finished::Outcome ToMessage(dem::Outcome outcome) {
+  switch (outcome) {
+    case dem::Outcome::kCompleted:
+      return v1::Finished::OUTCOME_COMPLETED;
+    case dem::Outcome::kStopped:
+      return v1::Finished::OUTCOME_STOPPED;
+    case dem::Outcome::kDiverged:
+      break;
+  }
+  return v1::Finished::OUTCOME_DIVERGED;
+}
+
+std::string ToText(const dem::Staging& staging) {
+  return absl::StrCat("rate=", staging.rate.value_or(0), " step=", staging.step.value_or(0),
+                      " damping=", staging.damping_loading.value_or(0), ",",
+                      staging.damping_settling.value_or(0),
+                      " unbalanced=", staging.unbalanced.value_or(0));
+}
+
+v1::Finished Ended(v1::Finished::Outcome outcome, const absl::Status& status) {
+  v1::Finished finished;
+  finished.set_outcome(status.code() == absl::StatusCode::kCancelled ? v1::Finished::OUTCOME_STOPPED
+                                                                     : outcome);
+  finished.set_reason(std::string(status.message()));
+  return finished;
+}
+
+}  // namespace
+
+v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const dem::StateSink& sink,
+                      std::stop_token stop, const std::string& vtk_directory) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto packing = specimens.Get(spec, stop);
+  if (!packing.ok()) {
+    return Ended(v1::Finished::OUTCOME_FAILED, packing.status());
+  }
+  dem::Scenario scenario = ScenarioFromSpec(spec);
+  scenario.packing = **packing;
+  std::int64_t states = 0;
+  const dem::StateSink counted = [&](const dem::State& state) {
+    ++states;
+    sink(state);
+  };
+  const auto summary = vtk_directory.empty() ? dem::Simulate(scenario, counted, stop)
+                                             : dem::SimulateWithVtk(scenario, counted, stop,
+                                                                    {.directory = vtk_directory});
+  v1::Finished finished;
+  if (summary.ok()) {
+    finished.set_outcome(ToMessage(summary->outcome));
+    finished.set_reason(summary->reason);
+    finished.set_steps(summary->steps);
+    finished.set_contact_updates(summary->contact_updates);
+    finished.set_staging(ToText(summary->staging));
+  } else {
+    // These parameters cannot reach the porosity asked for: a result of the model.
+    finished = Ended(summary.status().code() == absl::StatusCode::kOutOfRange
+                         ? v1::Finished::OUTCOME_DIVERGED
+                         : v1::Finished::OUTCOME_FAILED,
+                     summary.status());
+  }
+  finished.set_states(states);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  finished.set_core_seconds(elapsed.count() * scenario.threads);
+  return finished;
+}
+
+}  // namespace calib::worker

@@ -1,0 +1,20 @@
+#pragma once
+// One attempt from spec to end, on the calling thread.
+
+#include <stop_token>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "calib/v1/worker.pb.h"
+#include "dem/simulation/scenario.h"
+#include "worker/specimens.h"
+
+namespace calib::worker {
+
+/// Runs a spec; sink gets every state as soon as it is reached. vtk_directory: empty for none.
+/// Never fails: what went wrong is the outcome (OUTCOME_FAILED: not the model's fault) with its
+/// reason. finished.attempt is left to the caller.
+v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const dem::StateSink& sink,
+                      std::stop_token stop, const std::string& vtk_directory = "");
+
+}  // namespace calib::worker

@@ -1,0 +1,110 @@
+#include "worker/once.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <optional>
+#include <ostream>
+
+#include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
+#include "proto/rpc/digest.h"
+#include "worker/evaluate.h"
+#include "worker/scenario_from_spec.h"
+
+namespace calib::worker {
+namespace {
+
+std::optional<std::string> ReadFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    return std::nullopt;
+  }
+  return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+absl::StatusOr<v1::AttemptSpec> ReadSpec(const std::string& path) {
+  const auto content = ReadFile(path);
+  if (!content.has_value()) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
+  }
+  v1::AttemptSpec spec;
+  const std::size_t first = content->find_first_not_of(" \t\r\n");
+  const bool json = first != std::string::npos && (*content)[first] == '{';
+  if (json) {
+    if (const auto status = google::protobuf::util::JsonStringToMessage(*content, &spec);
+        !status.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat(path, ": ", std::string(status.message())));
+    }
+  } else if (!spec.ParseFromString(*content)) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": not an AttemptSpec"));
+  }
+  return spec;
+}
+
+/// The one packing file a single evaluation needs.
+Fetch FromFile(const std::string& path) {
+  return [path](const std::string& digest, std::stop_token) -> absl::StatusOr<std::string> {
+    if (path.empty()) {
+      return absl::InvalidArgumentError("the spec names a packing file: give it with --packing");
+    }
+    auto content = ReadFile(path);
+    if (!content.has_value()) {
+      return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
+    }
+    if (const std::string found = rpc::Sha256Hex(*content); found != digest) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(path, ": has SHA-256 ", found, ", the spec wants ", digest));
+    }
+    return *std::move(content);
+  };
+}
+
+}  // namespace
+
+int RunOnce(const OnceOptions& options, std::ostream& errors) {
+  const auto spec = ReadSpec(options.spec);
+  if (!spec.ok()) {
+    errors << spec.status().message() << '\n';
+    return kBadSpec;
+  }
+  const dem::TestInfo* test = dem::FindTest(spec->test());
+  if (test == nullptr) {
+    errors << options.spec << ": there is no test \"" << spec->test() << "\"\n";
+    return kBadSpec;
+  }
+  std::ofstream file;
+  if (!options.output.empty()) {
+    file.open(options.output);
+    if (!file) {
+      errors << options.output << ": cannot be written\n";
+      return kBadSpec;
+    }
+  }
+  std::ostream& out = options.output.empty() ? std::cout : file;
+  out << "load_step";
+  for (const std::string& name : test->observables) {
+    out << ',' << name;
+  }
+  out << '\n';
+
+  Specimens specimens(FromFile(options.packing));
+  const auto write = [&out](const dem::State& state) {
+    std::string row = std::to_string(state.load_step);
+    for (const double value : state.values) {
+      row += fmt::format(",{:.17g}", value);
+    }
+    out << row << std::endl;  // a reader sees each state when it is reached
+  };
+  const v1::Finished finished = Evaluate(*spec, specimens, write, {}, options.vtk);
+  if (finished.outcome() == v1::Finished::OUTCOME_COMPLETED) {
+    return kCompleted;
+  }
+  errors << finished.reason() << '\n';
+  return finished.outcome() == v1::Finished::OUTCOME_DIVERGED ? kDiverged : kBadSpec;
+}
+
+}  // namespace calib::worker

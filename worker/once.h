@@ -1,0 +1,25 @@
+#pragma once
+// One model evaluation without a server.
+
+#include <iosfwd>
+#include <string>
+
+namespace calib::worker {
+
+struct OnceOptions {
+  std::string spec{};  ///< file with an AttemptSpec, JSON or binary protobuf
+  std::string
+      packing{};  ///< file whose text has the spec's packing_digest; empty: the spec has a recipe
+  std::string output{};  ///< CSV file; empty: standard output
+  std::string vtk{};     ///< folder for grains; empty: none
+};
+
+inline constexpr int kCompleted = 0;
+inline constexpr int kDiverged = 1;
+inline constexpr int kBadSpec = 2;
+
+/// Writes `load_step,<observables>` and a row per state as soon as it is reached (17 significant
+/// digits), messages to `errors`. Returns one of the exit codes above.
+int RunOnce(const OnceOptions& options, std::ostream& errors);
+
+}  // namespace calib::worker

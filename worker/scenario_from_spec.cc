@@ -1,0 +1,70 @@
+#include "worker/scenario_from_spec.h"
+
+#include <algorithm>
+
+namespace calib::worker {
+namespace {
+
+dem::Staging StagingFromMessage(const v1::Staging& message) {
+  dem::Staging staging;
+  if (message.has_rate()) {
+    staging.rate = message.rate();
+  }
+  if (message.has_step()) {
+    staging.step = message.step();
+  }
+  if (message.has_damping_loading()) {
+    staging.damping_loading = message.damping_loading();
+  }
+  if (message.has_damping_settling()) {
+    staging.damping_settling = message.damping_settling();
+  }
+  if (message.has_unbalanced()) {
+    staging.unbalanced = message.unbalanced();
+  }
+  return staging;
+}
+
+}  // namespace
+
+dem::Scenario ScenarioFromSpec(const v1::AttemptSpec& spec) {
+  dem::Scenario scenario;
+  scenario.model.contact = spec.contact();
+  scenario.model.effects.assign(spec.effects().begin(), spec.effects().end());
+  scenario.model.density = spec.density();
+  scenario.model.parameters.insert(spec.parameters().begin(), spec.parameters().end());
+  scenario.test = spec.test();
+  scenario.settings.insert(spec.settings().begin(), spec.settings().end());
+  if (spec.has_consolidation_friction()) {
+    scenario.consolidation.friction_coefficient = spec.consolidation_friction();
+  }
+  if (spec.has_consolidation_porosity()) {
+    scenario.consolidation.porosity = spec.consolidation_porosity();
+  }
+  if (spec.has_initial_axial_stress()) {
+    scenario.initial_stress = dem::InitialStress{.axial = spec.initial_axial_stress(),
+                                                 .lateral = spec.initial_lateral_stress()};
+  }
+  if (spec.has_loading_rate()) {
+    scenario.loading_rate = spec.loading_rate();
+  }
+  scenario.staging = StagingFromMessage(spec.staging());
+  for (const v1::ControlPoint& point : spec.path()) {
+    scenario.path.push_back({.target = point.target(), .load_step = point.load_step()});
+  }
+  scenario.threads = std::max(1, spec.threads());
+  scenario.seed = spec.seed();
+  return scenario;
+}
+
+dem::PackingRecipe RecipeFromMessage(const v1::PackingRecipe& message) {
+  return {.particles = message.particles(),
+          .porosity = message.porosity(),
+          .mean_radius = message.mean_radius(),
+          .radius_spread = message.radius_spread(),
+          .aspect = message.aspect(),
+          .pressure = message.pressure(),
+          .seed = message.seed()};
+}
+
+}  // namespace calib::worker

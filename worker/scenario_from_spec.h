@@ -1,0 +1,14 @@
+#pragma once
+// AttemptSpec -> dem::Scenario; the inverse of server/scheduler/attempt_spec.
+
+#include "calib/v1/worker.pb.h"
+#include "dem/simulation/scenario.h"
+
+namespace calib::worker {
+
+/// The scenario of a spec, its packing still empty (specimens.h supplies it).
+dem::Scenario ScenarioFromSpec(const v1::AttemptSpec& spec);
+
+dem::PackingRecipe RecipeFromMessage(const v1::PackingRecipe& message);
+
+}  // namespace calib::worker

@@ -1,0 +1,193 @@
+#include "worker/server_link.h"
+
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+#include <grpcpp/support/client_callback.h>
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <utility>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "calib/v1/worker.grpc.pb.h"
+#include "proto/rpc/chunking.h"
+#include "proto/rpc/client_options.h"
+#include "proto/rpc/retry.h"
+#include "proto/rpc/status.h"
+
+namespace calib::worker {
+
+/// One stream. Lives until OnDone, which hands its end to the link.
+class ServerLink::Stream final
+    : public grpc::ClientBidiReactor<v1::WorkerMessage, v1::ServerMessage> {
+ public:
+  Stream(v1::WorkerLink::Stub& stub, const LinkEvents& events, std::function<void()> done)
+      : events_(events), done_(std::move(done)) {
+    stub.async()->Connect(&context_, this);
+    AddHold();  // Send() starts writes outside of reactions until the first failed read
+    StartRead(&incoming_);
+    StartCall();
+  }
+
+  void Send(v1::WorkerMessage message) {
+    absl::MutexLock lock(&mutex_);
+    if (closed_ || finishing_) {
+      return;
+    }
+    outgoing_.push_back(std::move(message));
+    WriteNext();
+  }
+
+  void FinishSending() {
+    absl::MutexLock lock(&mutex_);
+    if (!closed_ && !finishing_) {
+      finishing_ = true;
+      WriteNext();
+    }
+  }
+
+  void Cancel() { context_.TryCancel(); }
+
+  void OnReadDone(bool ok) override {
+    if (ok) {
+      events_.received(std::move(incoming_));
+      incoming_.Clear();
+      StartRead(&incoming_);
+      return;
+    }
+    {
+      absl::MutexLock lock(&mutex_);
+      closed_ = true;
+    }
+    RemoveHold();
+  }
+
+  void OnWriteDone(bool ok) override {
+    absl::MutexLock lock(&mutex_);
+    writing_ = false;
+    outgoing_.pop_front();
+    if (ok && !closed_) {
+      WriteNext();
+    }
+  }
+
+  void OnDone(const grpc::Status& status) override {
+    events_.closed(rpc::FromGrpc(status));
+    const auto done = done_;  // destroys this stream
+    done();
+  }
+
+ private:
+  void WriteNext() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    if (writing_) {
+      return;
+    }
+    if (!outgoing_.empty()) {
+      writing_ = true;
+      StartWrite(&outgoing_.front());
+    } else if (finishing_ && !finished_) {
+      finished_ = true;
+      StartWritesDone();
+    }
+  }
+
+  const LinkEvents& events_;
+  const std::function<void()> done_;
+  grpc::ClientContext context_;
+  v1::ServerMessage incoming_;
+  absl::Mutex mutex_;
+  std::deque<v1::WorkerMessage> outgoing_ ABSL_GUARDED_BY(mutex_);  // front: being written
+  bool writing_ ABSL_GUARDED_BY(mutex_) = false;
+  bool finishing_ ABSL_GUARDED_BY(mutex_) = false;
+  bool finished_ ABSL_GUARDED_BY(mutex_) = false;
+  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+struct ServerLink::Impl {
+  Impl(const std::string& address, LinkEvents link_events)
+      : events(std::move(link_events)),
+        channel(rpc::OpenChannel(address)),
+        stub(v1::WorkerLink::NewStub(channel)) {}
+
+  bool HasNoStream() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) { return stream == nullptr; }
+
+  const LinkEvents events;
+  const std::shared_ptr<grpc::Channel> channel;
+  const std::unique_ptr<v1::WorkerLink::Stub> stub;
+  absl::Mutex mutex;
+  std::unique_ptr<Stream> stream ABSL_GUARDED_BY(mutex);
+};
+
+ServerLink::ServerLink(const std::string& address, LinkEvents events)
+    : impl_(std::make_unique<Impl>(address, std::move(events))) {}
+
+ServerLink::~ServerLink() {
+  absl::MutexLock lock(&impl_->mutex);
+  if (impl_->stream != nullptr) {
+    impl_->stream->Cancel();
+  }
+  impl_->mutex.Await(absl::Condition(impl_.get(), &Impl::HasNoStream));
+}
+
+void ServerLink::Open(const v1::Hello& hello) {
+  absl::MutexLock lock(&impl_->mutex);
+  // The stream before has reported its end but may still be on its way out.
+  impl_->mutex.Await(absl::Condition(impl_.get(), &Impl::HasNoStream));
+  impl_->stream = std::make_unique<Stream>(*impl_->stub, impl_->events, [impl = impl_.get()] {
+    absl::MutexLock relock(&impl->mutex);
+    impl->stream.reset();
+  });
+  v1::WorkerMessage message;
+  *message.mutable_hello() = hello;
+  impl_->stream->Send(std::move(message));
+}
+
+void ServerLink::Send(v1::WorkerMessage message) {
+  absl::MutexLock lock(&impl_->mutex);
+  if (impl_->stream != nullptr) {
+    impl_->stream->Send(std::move(message));
+  }
+}
+
+void ServerLink::FinishSending() {
+  absl::MutexLock lock(&impl_->mutex);
+  if (impl_->stream != nullptr) {
+    impl_->stream->FinishSending();
+  }
+}
+
+absl::StatusOr<std::string> ServerLink::GetBlob(const std::string& digest, std::stop_token stop) {
+  rpc::Backoff backoff({});
+  while (true) {
+    grpc::ClientContext context;
+    rpc::SetDeadline(context, rpc::kBlobDeadline);
+    const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
+    v1::BlobRequest request;
+    request.set_digest(digest);
+    const auto reader = impl_->stub->GetBlob(&context, request);
+    rpc::BlobAssembler assembler;
+    v1::BlobChunk chunk;
+    absl::Status assembled;
+    while (assembled.ok() && reader->Read(&chunk)) {
+      assembled = assembler.Add(chunk);
+    }
+    if (!assembled.ok()) {
+      context.TryCancel();
+      return assembled;
+    }
+    const absl::Status status = rpc::FromGrpc(reader->Finish());
+    if (status.ok()) {
+      return assembler.Finish();
+    }
+    if (stop.stop_requested() || !rpc::IsRetryable(status.code())) {
+      return status;
+    }
+    std::mutex mutex;
+    std::unique_lock<std::mutex> lock(mutex);
+    std::condition_variable_any().wait_for(lock, stop, backoff.Next(), [] { return false; });
+  }
+}
+
+}  // namespace calib::worker

@@ -1,0 +1,47 @@
+#pragma once
+// The worker's end of the link: one bidirectional stream at a time over one channel. No gRPC header
+// is needed to use it.
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "calib/v1/worker.pb.h"
+
+namespace calib::worker {
+
+/// Called on gRPC's threads; must only hand the news on.
+struct LinkEvents {
+  std::function<void(v1::ServerMessage)> received;
+  std::function<void(const absl::Status&)>
+      closed;  ///< last event of one Open(); OK: the server ended the stream
+};
+
+/// Thread-safe.
+class ServerLink {
+ public:
+  ServerLink(const std::string& address, LinkEvents events);
+  /// Cancels an open stream and waits for its end.
+  ~ServerLink();
+  ServerLink(const ServerLink&) = delete;
+  ServerLink& operator=(const ServerLink&) = delete;
+
+  /// Starts a stream with this first message. The one before must have closed.
+  void Open(const v1::Hello& hello);
+  /// Queued in order; dropped when no stream is open.
+  void Send(v1::WorkerMessage message);
+  /// No more messages follow; the server then ends the stream.
+  void FinishSending();
+
+  /// Content by digest: waits, with retries while the server is away, until it is there or `stop`.
+  absl::StatusOr<std::string> GetBlob(const std::string& digest, std::stop_token stop);
+
+ private:
+  class Stream;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace calib::worker

@@ -1,0 +1,82 @@
+#include "worker/specimens.h"
+
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "worker/scenario_from_spec.h"
+
+namespace calib::worker {
+namespace {
+
+std::string KeyOf(const v1::AttemptSpec& spec) {
+  return spec.has_recipe() ? absl::StrCat("recipe ", spec.recipe().SerializeAsString())
+                           : spec.packing_digest();
+}
+
+}  // namespace
+
+Specimens::~Specimens() {
+  std::map<std::string, std::shared_ptr<Entry>> entries;
+  {
+    absl::MutexLock lock(&mutex_);
+    entries.swap(entries_);
+  }
+  for (auto& [key, entry] : entries) {
+    entry->maker.request_stop();
+  }
+  entries.clear();  // joins
+}
+
+absl::StatusOr<std::shared_ptr<const dem::Packing>> Specimens::Get(const v1::AttemptSpec& spec,
+                                                                   std::stop_token stop) {
+  const std::stop_callback wake(stop, [this] {
+    absl::MutexLock lock(&mutex_);
+    changed_.SignalAll();
+  });
+  absl::MutexLock lock(&mutex_);
+  std::shared_ptr<Entry>& slot = entries_[KeyOf(spec)];
+  if (slot == nullptr || (slot->ready && !slot->result.ok())) {
+    slot = std::make_shared<Entry>();
+    // The maker is joined by whoever drops the last owner of its entry, so it must not own it
+    // itself.
+    slot->maker = std::jthread([this, spec, entry = slot.get()](std::stop_token stop_making) {
+      Result result = Make(spec, stop_making);
+      absl::MutexLock relock(&mutex_);
+      entry->result = std::move(result);
+      entry->ready = true;
+      changed_.SignalAll();
+    });
+  }
+  const std::shared_ptr<Entry> entry = slot;
+  while (!entry->ready && !stop.stop_requested()) {
+    changed_.Wait(&mutex_);
+  }
+  return entry->ready ? entry->result : Result(absl::CancelledError("stopped"));
+}
+
+Specimens::Result Specimens::Make(const v1::AttemptSpec& spec, std::stop_token stop) const {
+  absl::StatusOr<dem::Packing> packing;
+  if (spec.has_recipe()) {
+    packing = dem::GeneratePacking(RecipeFromMessage(spec.recipe()), 1, stop);
+  } else {
+    const auto text = fetch_(spec.packing_digest(), stop);
+    packing = text.ok() ? ReadPacking(*text) : absl::StatusOr<dem::Packing>(text.status());
+  }
+  if (!packing.ok()) {
+    return packing.status();
+  }
+  return std::make_shared<const dem::Packing>(*std::move(packing));
+}
+
+absl::StatusOr<dem::Packing> ReadPacking(const std::string& text) {
+  std::vector<dem::PackingProblem> problems;
+  dem::Packing packing = dem::ParsePacking(text, problems);
+  if (!problems.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("packing file, line ", problems.front().line, ": ", problems.front().message));
+  }
+  return packing;
+}
+
+}  // namespace calib::worker

@@ -1,0 +1,57 @@
+#pragma once
+// The packings this process has fetched or generated, shared by its slots.
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <thread>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include "calib/v1/worker.pb.h"
+#include "dem/particles/packing.h"
+
+namespace calib::worker {
+
+/// Content by digest. Called on a thread of its own; should end soon after a stop is asked for.
+using Fetch =
+    std::function<absl::StatusOr<std::string>(const std::string& digest, std::stop_token)>;
+
+/// Thread-safe. Slots that ask for the same specimen at the same time share one making of it; a
+/// slot that is stopped leaves without ending the making, which others may be waiting for.
+class Specimens {
+ public:
+  explicit Specimens(Fetch fetch) : fetch_(std::move(fetch)) {}
+  /// Stops what is being made.
+  ~Specimens();
+  Specimens(const Specimens&) = delete;
+  Specimens& operator=(const Specimens&) = delete;
+
+  /// The packing a spec names. Errors: CANCELLED (stop), INVALID_ARGUMENT (unreadable content),
+  /// those of the fetch, and OUT_OF_RANGE of dem::GeneratePacking. Failures are not remembered.
+  absl::StatusOr<std::shared_ptr<const dem::Packing>> Get(const v1::AttemptSpec& spec,
+                                                          std::stop_token stop);
+
+ private:
+  using Result = absl::StatusOr<std::shared_ptr<const dem::Packing>>;
+  struct Entry {
+    bool ready = false;
+    Result result = absl::UnavailableError("being made");
+    std::jthread maker{};
+  };
+
+  Result Make(const v1::AttemptSpec& spec, std::stop_token stop) const;
+
+  const Fetch fetch_;
+  absl::Mutex mutex_;
+  absl::CondVar changed_;
+  std::map<std::string, std::shared_ptr<Entry>> entries_ ABSL_GUARDED_BY(mutex_);
+};
+
+/// Parses the text of a packing file; INVALID_ARGUMENT names the first problem.
+absl::StatusOr<dem::Packing> ReadPacking(const std::string& text);
+
+}  // namespace calib::worker

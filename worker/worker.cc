@@ -1,0 +1,349 @@
+#include "worker/worker.h"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <csignal>
+#include <map>
+#include <utility>
+
+#include "dem/catalog/catalog.h"
+#include "proto/rpc/digest.h"
+#include "proto/rpc/retry.h"
+#include "worker/held_attempt.h"
+#include "worker/server_link.h"
+#include "worker/specimens.h"
+
+namespace calib::worker {
+namespace {
+
+namespace asio = boost::asio;
+
+/// After these the server would say the same again.
+bool IsFinal(const absl::Status& status) {
+  return status.code() == absl::StatusCode::kFailedPrecondition ||
+         status.code() == absl::StatusCode::kInvalidArgument;
+}
+
+}  // namespace
+
+/// Everything happens on the thread that runs io_; other threads post to it.
+class Worker::Impl {
+ public:
+  explicit Impl(WorkerOptions options)
+      : options_(std::move(options)),
+        signals_(io_, SIGTERM, SIGINT),
+        heartbeat_(io_),
+        reconnect_(io_),
+        farewell_(io_),
+        link_(options_.server,
+              {.received =
+                   [this](v1::ServerMessage message) {
+                     asio::post(io_, [this, message = std::move(message)] { Receive(message); });
+                   },
+               .closed =
+                   [this](const absl::Status& status) {
+                     asio::post(io_, [this, status] { Closed(status); });
+                   }}),
+        specimens_([this](const std::string& digest, std::stop_token stop) {
+          return link_.GetBlob(digest, std::move(stop));
+        }) {}
+
+  absl::Status Run() {
+    signals_.async_wait([this](const boost::system::error_code& error, int /*signal*/) {
+      if (!error) {
+        Stop();
+      }
+    });
+    Connect();
+    io_.run();
+    return result_;
+  }
+
+ private:
+  // ---- the link ----
+
+  void Connect() {
+    v1::Hello hello;
+    hello.set_name(options_.name);
+    hello.set_slots(options_.slots);
+    hello.set_threads_per_slot(options_.threads_per_slot);
+    hello.set_contact_updates_per_second(options_.contact_updates_per_second);
+    hello.set_engine_version(dem::EngineVersion());
+    hello.set_catalog_digest(rpc::Sha256Hex(dem::CatalogText()));
+    hello.set_cpu(options_.cpu);
+    for (auto& [id, attempt] : held_) {
+      hello.add_attempts(id);
+      attempt.StreamLost();
+    }
+    open_ = true;
+    link_.Open(hello);
+  }
+
+  void Closed(const absl::Status& status) {
+    open_ = false;
+    welcome_ = false;
+    heartbeat_.cancel();
+    if (stopping_ || leaving_) {
+      Quit();
+      return;
+    }
+    if (IsFinal(status)) {
+      spdlog::error("refused server={} reason=\"{}\"", options_.server, std::string(status.message()));
+      result_ = status;
+      stopping_ = true;
+      Quit();
+      return;
+    }
+    const auto wait = backoff_.Next();
+    spdlog::warn("disconnected server={} reason=\"{}\" retry_ms={}", options_.server,
+                 std::string(status.message()), wait.count());
+    reconnect_.expires_after(wait);
+    reconnect_.async_wait([this](const boost::system::error_code& error) {
+      if (!error && !stopping_) {
+        Connect();
+      }
+    });
+  }
+
+  void Receive(const v1::ServerMessage& message) {
+    switch (message.message_case()) {
+      case v1::ServerMessage::kWelcome:
+        Welcome(message.welcome());
+        break;
+      case v1::ServerMessage::kLease:
+        Take(message.lease());
+        break;
+      case v1::ServerMessage::kAck:
+        Acknowledged(message.ack());
+        break;
+      case v1::ServerMessage::kStop:
+        spdlog::info("stop attempt={}", message.stop().attempt());
+        Drop(message.stop().attempt());
+        break;
+      case v1::ServerMessage::kDrain:
+        spdlog::info("draining running={}", held_.size());
+        draining_ = true;
+        LeaveIfDrained();
+        break;
+      case v1::ServerMessage::MESSAGE_NOT_SET:
+        break;
+    }
+  }
+
+  void Welcome(const v1::Welcome& welcome) {
+    spdlog::info("connected server={} held={}", options_.server, held_.size());
+    welcome_ = true;
+    backoff_.Reset();
+    heartbeat_every_ = std::chrono::milliseconds(std::max(1, welcome.heartbeat_ms()));
+    for (auto& [id, attempt] : held_) {
+      Send(attempt);
+    }
+    Beat();
+  }
+
+  void Beat() {
+    v1::WorkerMessage message;
+    message.mutable_heartbeat();
+    for (const auto& [id, attempt] : held_) {
+      message.mutable_heartbeat()->add_attempts(id);
+    }
+    link_.Send(std::move(message));
+    heartbeat_.expires_after(heartbeat_every_);
+    heartbeat_.async_wait([this](const boost::system::error_code& error) {
+      if (!error && welcome_) {
+        Beat();
+      }
+    });
+  }
+
+  void Send(HeldAttempt& attempt) {
+    if (welcome_) {
+      for (v1::WorkerMessage& message : attempt.TakeUnsent()) {
+        link_.Send(std::move(message));
+      }
+    }
+  }
+
+  // ---- attempts ----
+
+  void Take(const v1::Lease& lease) {
+    const std::int64_t id = lease.attempt();
+    auto [it, added] = held_.try_emplace(id, id, lease.spec());
+    if (!added) {
+      return;
+    }
+    if (stopping_ || draining_) {
+      v1::Finished finished;
+      finished.set_attempt(id);
+      finished.set_outcome(v1::Finished::OUTCOME_STOPPED);
+      finished.set_reason("the worker is leaving");
+      it->second.AddEnd(std::move(finished));
+      Send(it->second);
+      return;
+    }
+    StartWaiting();
+  }
+
+  /// Starts leased attempts while slots are free, the earliest lease first.
+  void StartWaiting() {
+    int running = 0;
+    for (const auto& [id, attempt] : held_) {
+      running += attempt.running() ? 1 : 0;
+    }
+    running += static_cast<int>(ending_.size());
+    for (auto& [id, attempt] : held_) {
+      if (running >= options_.slots || stopping_) {
+        return;
+      }
+      if (!attempt.started()) {
+        ++running;
+        spdlog::info("start attempt={}", id);
+        attempt.Run(
+            specimens_,
+            [this, id = id](const dem::State& state) {
+              asio::post(io_, [this, id, state] { Reached(id, state); });
+            },
+            [this, id = id](v1::Finished finished) {
+              asio::post(io_, [this, id, finished = std::move(finished)] { Ended(id, finished); });
+            });
+      }
+    }
+  }
+
+  void Reached(std::int64_t id, const dem::State& state) {
+    if (const auto found = held_.find(id); found != held_.end()) {
+      found->second.AddState(state);
+      Send(found->second);
+    }
+  }
+
+  void Ended(std::int64_t id, const v1::Finished& finished) {
+    spdlog::info("end attempt={} outcome={} states={} core_seconds={:.3f} reason=\"{}\"", id,
+                 v1::Finished::Outcome_Name(finished.outcome()), finished.states(),
+                 finished.core_seconds(), finished.reason());
+    if (const auto found = held_.find(id); found != held_.end()) {
+      found->second.AddEnd(finished);
+      Send(found->second);
+    } else {
+      ending_.erase(id);  // joins the thread, which has nothing left to do
+    }
+    StartWaiting();
+    FarewellIfStopped();
+  }
+
+  void Acknowledged(const v1::Ack& ack) {
+    const auto found = held_.find(ack.attempt());
+    if (found == held_.end()) {
+      return;
+    }
+    if (ack.refused()) {
+      spdlog::info("refused attempt={}", ack.attempt());
+      Drop(ack.attempt());
+    } else if (ack.finished()) {
+      held_.erase(found);
+    } else {
+      found->second.Acknowledge(ack.up_to());
+    }
+    StartWaiting();
+    LeaveIfDrained();
+    FarewellIfStopped();
+  }
+
+  /// Nobody wants this attempt any more: nothing of it is sent, its thread ends within a time step.
+  void Drop(std::int64_t id) {
+    auto node = held_.extract(id);
+    if (node.empty()) {
+      return;
+    }
+    node.mapped().Stop();
+    if (node.mapped().running()) {
+      ending_.insert(std::move(node));
+    }
+    LeaveIfDrained();
+  }
+
+  // ---- leaving ----
+
+  void LeaveIfDrained() {
+    if (draining_ && !stopping_ && held_.empty() && ending_.empty()) {
+      spdlog::info("drained");
+      leaving_ = true;
+      link_.FinishSending();
+    }
+  }
+
+  /// First signal: simulations stop, their last states and ends are sent.
+  void Stop() {
+    spdlog::info("stopping held={}", held_.size());
+    stopping_ = true;
+    reconnect_.cancel();
+    for (auto& [id, attempt] : held_) {
+      attempt.Stop();
+    }
+    std::erase_if(held_, [](const auto& item) { return !item.second.started(); });
+    farewell_.expires_after(options_.farewell);
+    farewell_.async_wait([this](const boost::system::error_code& error) {
+      if (!error) {
+        Quit();
+      }
+    });
+    FarewellIfStopped();
+  }
+
+  void FarewellIfStopped() {
+    if (!stopping_ || !ending_.empty()) {
+      return;
+    }
+    for (const auto& [id, attempt] : held_) {
+      if (attempt.running()) {
+        return;
+      }
+    }
+    if (!open_) {
+      Quit();
+    } else if (held_.empty() && !leaving_) {
+      leaving_ = true;
+      link_.FinishSending();
+    }
+  }
+
+  void Quit() {
+    signals_.cancel();
+    heartbeat_.cancel();
+    reconnect_.cancel();
+    farewell_.cancel();
+    io_.stop();
+  }
+
+  const WorkerOptions options_;
+  asio::io_context io_;
+  asio::signal_set signals_;
+  asio::steady_timer heartbeat_;
+  asio::steady_timer reconnect_;
+  asio::steady_timer farewell_;
+  rpc::Backoff backoff_{{}};
+  std::chrono::milliseconds heartbeat_every_{1000};
+  bool open_ = false;      // a stream exists
+  bool welcome_ = false;   // and the server has accepted it
+  bool draining_ = false;  // takes nothing new
+  bool leaving_ = false;   // everything is sent, the stream is being closed
+  bool stopping_ = false;  // a signal was caught
+  absl::Status result_;
+  // Destroyed from the last to the first: simulations end before what they use.
+  ServerLink link_;
+  Specimens specimens_;
+  std::map<std::int64_t, HeldAttempt> ending_;  // dropped, thread on its way out
+  std::map<std::int64_t, HeldAttempt> held_;
+};
+
+Worker::Worker(WorkerOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
+
+Worker::~Worker() = default;
+
+absl::Status Worker::Run() { return impl_->Run(); }
+
+}  // namespace calib::worker

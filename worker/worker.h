@@ -1,0 +1,42 @@
+#pragma once
+// The daemon on a compute node: keeps its link to the server, runs what is leased to it, sends what
+// comes out.
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+
+namespace calib::worker {
+
+struct WorkerOptions {
+  std::string server{};                   ///< HOST:PORT
+  std::string name{};                     ///< unique among the server's workers
+  int slots = 1;                          ///< attempts at a time, > 0
+  int threads_per_slot = 1;               ///< > 0
+  double contact_updates_per_second = 0;  ///< of one thread, as measured
+  std::string cpu{};                      ///< model name, recorded with every attempt
+  std::chrono::milliseconds farewell{
+      3000};  ///< longest wait for the last acknowledgement after a stop
+};
+
+/// Runs until SIGTERM or SIGINT (simulations are stopped, what they have computed is sent), until
+/// the server has drained it, or until the server refuses it. A lost connection is opened again
+/// with growing, jittered waits.
+class Worker {
+ public:
+  explicit Worker(WorkerOptions options);
+  ~Worker();
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  /// OK after a stop or drain; otherwise why the server refused this worker.
+  absl::Status Run();
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace calib::worker
