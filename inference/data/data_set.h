@@ -1,22 +1,27 @@
 #pragma once
-// The measurements as the inference sees them: a flat vector of readings with a Gaussian error model.
+// The measurements as the inference sees them: a flat vector of readings with a Gaussian error
+// model.
 
 #include <string>
 #include <vector>
+
+#include "absl/status/status.h"
 
 namespace calib::inference {
 
 /// One measured number. Readings are held in processing order: experiment, load step, observable.
 struct Reading {
   int experiment = 0;
-  int observable = 0;      ///< index within the experiment
+  int observable = 0;  ///< index within the experiment
   int load_step = 0;
-  double control = 0;      ///< path length of the control since the start of loading; distance for the correlation
+  double control =
+      0;  ///< path length of the control since the start of loading; distance for the correlation
   double value = 0;
-  double sd = 0;           ///< standard deviation of its error (noise: given) > 0; unused with ess_target
+  double sd = 0;  ///< standard deviation of its error (noise: given) > 0; unused with ess_target
 };
 
-/// Errors of one observable of one experiment are correlated as exp(-|c_i - c_j| / length); 0: independent.
+/// Errors of one observable of one experiment are correlated as exp(-|c_i - c_j| / length); 0:
+/// independent.
 struct Correlation {
   int experiment = 0;
   int observable = 0;
@@ -25,15 +30,28 @@ struct Correlation {
 
 enum class NoiseMode {
   kGiven,      ///< the sd of each reading
-  kInferred,   ///< sd of each reading times sqrt(f), one variance factor f per (experiment, observable) group, marginalised
-  kEssTarget,  ///< Sigma = sigma w_j y^2, sigma from the effective sample size [Cheng 2019, sec. 3.4]; a tempering, not an estimate
+  kInferred,   ///< sd of each reading times sqrt(f), one variance factor f per (experiment,
+               ///< observable) group, marginalised
+  kEssTarget,  ///< Sigma = sigma w_j y^2, sigma from the effective sample size [Cheng 2019,
+               ///< sec. 3.4]; a tempering, not an estimate
 };
 
 struct DataSet {
   std::vector<Reading> readings;
-  std::vector<Correlation> correlations;         ///< only those with length > 0
+  std::vector<Correlation> correlations;  ///< only those with length > 0
   /// w_j of kEssTarget, indexed [experiment][observable]; multiplies the variance. Empty: all one.
   std::vector<std::vector<double>> ess_weights;
 };
+
+/// INVALID_ARGUMENT with one sentence: no readings, negative index, value or control that is not
+/// finite, sd that is not positive (value zero with kEssTarget), correlation length that is not
+/// positive or given twice, correlated readings at one and the same control, ess_weights that are
+/// not positive or missing for an observable.
+absl::Status ValidateData(const DataSet& data, NoiseMode noise);
+
+/// The same readings with independent errors of variance sigma w_j y^2, the Sigma of kEssTarget, so
+/// that the likelihood of kGiven serves both. sigma > 0; multiplies the variance. Needs
+/// ValidateData(data, kEssTarget).
+DataSet WithRelativeErrors(const DataSet& data, double sigma);
 
 }  // namespace calib::inference

@@ -1,0 +1,61 @@
+#include "inference/evidence/pareto_tail.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "inference/filter/log_weights.h"
+
+namespace calib::inference {
+
+double GeneralizedParetoShape(const std::vector<double>& x) {
+  const int n = static_cast<int>(x.size());
+  assert(n >= 5 && x.front() > 0);
+  // Candidates of theta = -k / scale spread around the reciprocal of the first quartile [Zhang &
+  // Stephens 2009, eq. 4].
+  constexpr double kPriorSpread = 3;
+  const int candidates = 30 + static_cast<int>(std::sqrt(n));
+  const double quartile = x[static_cast<std::size_t>(std::floor(n / 4.0 + 0.5)) - 1];
+  const auto shape_at = [&x, n](double theta) {
+    double sum = 0;
+    for (const double value : x) sum += std::log1p(-theta * value);
+    return sum / n;
+  };
+  Eigen::VectorXd theta(candidates);
+  Eigen::VectorXd log_likelihood(candidates);
+  for (int j = 0; j < candidates; ++j) {
+    theta[j] = 1 / x.back() + (1 - std::sqrt(candidates / (j + 0.5))) / (kPriorSpread * quartile);
+    const double shape = shape_at(theta[j]);
+    log_likelihood[j] = n * (std::log(-theta[j] / shape) - shape - 1);  // profile over the scale
+  }
+  const Eigen::VectorXd log_weights = NormalizedLogWeights(log_likelihood);
+  double average = 0;
+  for (int j = 0; j < candidates; ++j) average += std::exp(log_weights[j]) * theta[j];
+  constexpr double kShrinkage = 10;
+  return (n * shape_at(average) + kShrinkage * 0.5) / (n + kShrinkage);
+}
+
+double ParetoTailIndex(const Eigen::VectorXd& log_weights) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const auto n = static_cast<double>(log_weights.size());
+  const auto tail = static_cast<std::size_t>(std::ceil(std::min(n / 5, 3 * std::sqrt(n))));
+  if (tail < 5) return kInfinity;
+  std::vector<double> sorted(log_weights.begin(), log_weights.end());
+  std::sort(sorted.begin(), sorted.end());
+  const double threshold = sorted[sorted.size() - tail - 1];
+  const double largest = sorted.back();
+  if (sorted[sorted.size() - tail] == -kInfinity) return kInfinity;
+  std::vector<double> excesses;
+  for (std::size_t i = sorted.size() - tail; i < sorted.size(); ++i) {
+    const double excess = std::exp(sorted[i] - largest) - std::exp(threshold - largest);
+    if (excess > 0) excesses.push_back(excess);
+  }
+  // Equal weights have no tail; a few that stand out of equal (or underflowing) others are all
+  // tail.
+  if (excesses.empty()) return 0;
+  if (excesses.size() < 5) return kInfinity;
+  return GeneralizedParetoShape(excesses);
+}
+
+}  // namespace calib::inference

@@ -1,0 +1,117 @@
+#include "inference/filter/ensemble.h"
+
+#include <cmath>
+#include <limits>
+
+#include "absl/strings/str_cat.h"
+#include "inference/data/gaussian_likelihood.h"
+
+namespace calib::inference {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+absl::Status ValidateShapes(std::span<const Prior> priors, const DataSet& data,
+                            std::span<const Iteration> iterations) {
+  if (iterations.empty()) return absl::FailedPreconditionError("there is no finished iteration.");
+  const auto d = static_cast<Eigen::Index>(priors.size());
+  const auto readings = static_cast<Eigen::Index>(data.readings.size());
+  for (const Iteration& iteration : iterations) {
+    const Eigen::Index n = iteration.parameters.rows();
+    if (n == 0 || iteration.parameters.cols() != d || iteration.predictions.rows() != n ||
+        iteration.predictions.cols() != readings ||
+        (iteration.log_proposal && iteration.log_proposal->size() != n)) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "an iteration has ", n, " x ", iteration.parameters.cols(), " parameters and ",
+          iteration.predictions.rows(), " x ", iteration.predictions.cols(), " predictions; ", d,
+          " parameters and ", readings, " readings are expected, one row per sample."));
+    }
+  }
+  return absl::OkStatus();
+}
+
+// The sigma of kEssTarget: with errors for sigma = 1, ln L(sigma) = -chi^2 / (2 sigma) + const, so
+// that 1 / sigma is an exponent of exp(-chi^2 / 2).
+absl::Status FindSigma(const DataSet& data, const FilterOptions& options,
+                       const Eigen::MatrixXd& predictions, Ensemble& ensemble) {
+  const auto unit = GaussianLikelihood::Create(WithRelativeErrors(data, 1), NoiseMode::kGiven);
+  if (!unit.ok()) return unit.status();
+  const Eigen::VectorXd log_likelihood = unit->LogLikelihood(predictions);
+  ensemble.tempering =
+      FindExponent({.log_start = ensemble.log_start,
+                    .log_likelihood = log_likelihood,
+                    .target = options.ess_target * static_cast<double>(predictions.rows()),
+                    .max_exponent = kInfinity});
+  ensemble.sigma = 1 / ensemble.tempering.exponent;
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+StepOffsets LoadSteps(const DataSet& data) {
+  StepOffsets steps;
+  for (int t = 0; t < static_cast<int>(data.readings.size()); ++t) {
+    const bool begins = t == 0 || data.readings[t].experiment != data.readings[t - 1].experiment ||
+                        data.readings[t].load_step != data.readings[t - 1].load_step;
+    if (begins) steps.offsets.push_back(t);
+  }
+  steps.offsets.push_back(static_cast<int>(data.readings.size()));
+  return steps;
+}
+
+absl::StatusOr<Ensemble> MakeEnsemble(std::span<const Prior> priors, const DataSet& data,
+                                      const FilterOptions& options,
+                                      std::span<const Iteration> iterations) {
+  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  if (auto valid = ValidateData(data, options.noise); !valid.ok()) return valid;
+  for (const Prior& prior : priors) {
+    if (auto valid = prior.Validate(); !valid.ok()) return valid;
+  }
+  if (auto valid = ValidateShapes(priors, data, iterations); !valid.ok()) return valid;
+
+  Ensemble ensemble;
+  const bool last_only = options.noise == NoiseMode::kEssTarget;
+  const auto used = last_only ? iterations.last(1) : iterations;
+  Eigen::Index n = 0;
+  for (const Iteration& iteration : used) n += iteration.parameters.rows();
+  for (const Iteration& iteration : iterations) ensemble.first += iteration.parameters.rows();
+  ensemble.first -= n;
+  ensemble.last_size = iterations.back().parameters.rows();
+
+  Eigen::MatrixXd predictions(n, static_cast<Eigen::Index>(data.readings.size()));
+  ensemble.parameters.resize(n, static_cast<Eigen::Index>(priors.size()));
+  Eigen::Index row = 0;
+  for (const Iteration& iteration : used) {
+    ensemble.parameters.middleRows(row, iteration.parameters.rows()) = iteration.parameters;
+    predictions.middleRows(row, iteration.parameters.rows()) = iteration.predictions;
+    row += iteration.parameters.rows();
+  }
+  ensemble.log_start = LogImportance(priors, used);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (!predictions.row(i).allFinite()) {
+      ensemble.log_start[i] = -kInfinity;
+      ++ensemble.diverged;
+    } else if (ensemble.log_start[i] == -kInfinity) {
+      ++ensemble.outside;
+    }
+  }
+  if (last_only) {
+    if (auto found = FindSigma(data, options, predictions, ensemble); !found.ok()) return found;
+  }
+  const auto likelihood =
+      last_only
+          ? GaussianLikelihood::Create(WithRelativeErrors(data, *ensemble.sigma), NoiseMode::kGiven)
+          : GaussianLikelihood::Create(data, options.noise);
+  if (!likelihood.ok()) return likelihood.status();
+  ensemble.increments = likelihood->Increments(predictions);
+  ensemble.log_likelihood = likelihood->LogLikelihood(predictions);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (ensemble.log_start[i] > -kInfinity && ensemble.log_likelihood[i] > -kInfinity)
+      return ensemble;
+  }
+  return absl::FailedPreconditionError(absl::StrCat("no sample has a weight: of ", n, " samples ",
+                                                    ensemble.diverged, " diverged and ",
+                                                    ensemble.outside, " lie outside the prior."));
+}
+
+}  // namespace calib::inference

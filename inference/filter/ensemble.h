@@ -1,0 +1,40 @@
+#pragma once
+// What ComputePosterior and FitProposal have in common: the samples of all iterations with their
+// likelihood.
+
+#include <Eigen/Dense>
+#include <optional>
+#include <span>
+
+#include "absl/status/statusor.h"
+#include "inference/filter/iterative_filter.h"
+#include "inference/filter/sequential_filter.h"
+#include "inference/filter/tempering.h"
+
+namespace calib::inference {
+
+/// The samples that the posterior rests on: those of all iterations, or of the last one alone
+/// (kEssTarget).
+struct Ensemble {
+  Eigen::Index first = 0;      ///< samples of earlier iterations left out in front
+  Eigen::Index last_size = 0;  ///< samples of the last iteration
+  Eigen::MatrixXd parameters;  ///< N x d
+  Eigen::VectorXd log_start;   ///< N, ln prior / proposal; -inf: diverged or outside the prior
+  Eigen::MatrixXd
+      increments;  ///< N x T, ln p(y_t | earlier, sample); NaN from where a diverged sample ends
+  Eigen::VectorXd log_likelihood;  ///< N; -inf: diverged
+  Eigen::Index diverged = 0;       ///< how many
+  Eigen::Index outside = 0;        ///< undiverged samples outside the prior's support
+  std::optional<double> sigma;     ///< kEssTarget
+  Tempering tempering;             ///< kEssTarget: how sigma was found (exponent = 1 / sigma)
+};
+
+/// Validates everything and evaluates. Errors as documented on ComputePosterior.
+absl::StatusOr<Ensemble> MakeEnsemble(std::span<const Prior> priors, const DataSet& data,
+                                      const FilterOptions& options,
+                                      std::span<const Iteration> iterations);
+
+/// Ranges of equal (experiment, load_step) in processing order.
+StepOffsets LoadSteps(const DataSet& data);
+
+}  // namespace calib::inference

@@ -1,0 +1,46 @@
+// Options and the convergence rule of the iterative filter.
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "inference/filter/iterative_filter.h"
+
+namespace calib::inference {
+
+absl::Status FilterOptions::Validate() const {
+  if (!(ess_target > 0 && ess_target < 1)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("ess_target is ", ess_target, "; it must lie between 0 and 1."));
+  }
+  if (!(tolerance > 0)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("tolerance is ", tolerance, "; it must be positive."));
+  }
+  if (!(defensive_share >= 0 && defensive_share < 1)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("defensive_share is ", defensive_share, "; it must lie in [0, 1)."));
+  }
+  if (max_components < 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("max_components is ", max_components, "; it must be at least 1."));
+  }
+  if (!(concentration > 0)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("concentration is ", concentration, "; it must be positive."));
+  }
+  return absl::OkStatus();
+}
+
+bool MeansConverged(const Posterior& before, const Posterior& now, const FilterOptions& options) {
+  if (before.parameters.size() != now.parameters.size()) return false;
+  for (std::size_t j = 0; j < now.parameters.size(); ++j) {
+    const ParameterSummary& parameter = now.parameters[j];
+    const double scale = std::max(std::abs(parameter.mean), 0.1 * parameter.prior_sd);
+    const double change = std::abs(parameter.mean - before.parameters[j].mean);
+    if (!(change <= options.tolerance * scale)) return false;
+  }
+  return true;
+}
+
+}  // namespace calib::inference

@@ -1,0 +1,35 @@
+#pragma once
+// Sequential importance sampling along the readings [Cheng 2019, Eqs. 13-17], in log space.
+
+#include <Eigen/Dense>
+#include <vector>
+
+namespace calib::inference {
+
+/// Half-open ranges of readings that make one load step, in processing order: step s holds readings
+/// offsets[s] ... offsets[s + 1] - 1; offsets has S + 1 entries.
+struct StepOffsets {
+  std::vector<int> offsets;
+  int steps() const { return static_cast<int>(offsets.size()) - 1; }
+};
+
+struct SequentialResult {
+  Eigen::MatrixXd
+      log_weights;      ///< N x S, normalised after each step; the last column is the posterior
+  Eigen::VectorXd ess;  ///< S, 1 / (N sum w^2) in (0, 1]
+  Eigen::MatrixXd mean, cov;  ///< S x d; cov = sd / |mean|, NaN where the mean is zero
+  /// S; ln sum_i w_{t-1,i} p(y_t | x_i), with w_0 the start weights normalised to one: increments
+  /// of ln p(y_1..t).
+  Eigen::VectorXd log_evidence_increments;
+};
+
+/// log w_t = log w_{t-1} + ln p(y_t | x_t), normalised after each step                 [Cheng 2019,
+/// Eq. 14] in: log_start N, not necessarily normalised (-inf: sample does not count); at least one
+/// finite;
+///     increments N x T, ln p(y_t | earlier, x) of each reading, finite for samples that count;
+///     parameters N x d
+SequentialResult SequentialFilter(const Eigen::VectorXd& log_start,
+                                  const Eigen::MatrixXd& increments, const StepOffsets& steps,
+                                  const Eigen::MatrixXd& parameters);
+
+}  // namespace calib::inference

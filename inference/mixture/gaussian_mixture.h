@@ -1,0 +1,41 @@
+#pragma once
+// A finite mixture of multivariate Gaussians: its density and its draws.
+
+#include <Eigen/Dense>
+#include <span>
+#include <vector>
+
+#include "inference/sampling/philox.h"
+
+namespace calib::inference {
+
+struct MixtureComponent {
+  double weight = 0;           ///< > 0; the weights of a mixture are normalised on use
+  Eigen::VectorXd mean;        ///< d
+  Eigen::MatrixXd covariance;  ///< d x d, symmetric positive definite
+};
+
+/// Factorised mixture; const and thread safe once made. Precondition: at least one component, equal
+/// sizes, positive definite covariances.
+class GaussianMixture {
+ public:
+  explicit GaussianMixture(std::span<const MixtureComponent> components);
+
+  /// ln sum_k w_k N(x; m_k, C_k)                                                       [Cheng 2019,
+  /// Eq. 22]
+  double LogDensity(const Eigen::VectorXd& x) const;
+  /// One draw: a component by its weight, then m + L z. Takes 1 + d numbers from the stream.
+  Eigen::VectorXd Draw(PhiloxStream& stream) const;
+  /// ln of the mass inside the box low < x < high, to about 1e-4 (box_probability.h).
+  double LogBoxMass(const Eigen::VectorXd& low, const Eigen::VectorXd& high) const;
+
+ private:
+  struct Factorised {
+    double log_weight, log_normaliser;
+    Eigen::VectorXd mean;
+    Eigen::MatrixXd cholesky;  // lower
+  };
+  std::vector<Factorised> components_;
+};
+
+}  // namespace calib::inference

@@ -1,0 +1,43 @@
+#pragma once
+// Counter-based random numbers [Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"]:
+// the draw number k of sample i in iteration j for a purpose is a pure function of (seed, purpose,
+// j, i, k), so nothing that runs earlier, later or elsewhere can change it.
+
+#include <cstdint>
+
+namespace calib::inference {
+
+/// What a stream is for; part of the key, so that streams of two purposes never meet. Values are
+/// fixed for ever: changing one changes every result with the same seed.
+enum class StreamPurpose : std::uint64_t {
+  kProposalDraws = 1,
+  kSobolScramble = 2,
+  kMixtureStart = 3,
+  kTest = 4,
+};
+
+/// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,
+/// draw / 4). Cheap to make, never shared.
+class PhiloxStream {
+ public:
+  struct Key {
+    std::uint64_t seed = 0;
+    StreamPurpose purpose = StreamPurpose::kTest;
+    std::uint64_t iteration = 0;
+    std::uint64_t sample = 0;
+  };
+  explicit PhiloxStream(const Key& key) : key_(key) {}
+
+  std::uint64_t Bits();
+  /// Uniform in the open interval (0, 1): (k + 1/2) 2^-53.
+  double Uniform();
+  /// Standard normal by inversion of one uniform.
+  double Normal();
+
+ private:
+  Key key_;
+  std::uint64_t draw_ = 0;
+  std::uint64_t block_[4] = {};
+};
+
+}  // namespace calib::inference
