@@ -10,11 +10,12 @@ namespace {
 using Eigen::Index;
 
 // Variables that may move: not at a bound, or pulled back inside by the gradient.
-std::vector<Index> FreeVariables(const Eigen::VectorXd& x, const Eigen::VectorXd& gradient, const Eigen::VectorXd& lower,
-                                 const Eigen::VectorXd& upper) {
+std::vector<Index> FreeVariables(const Eigen::VectorXd& x, const Eigen::VectorXd& gradient,
+                                 const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
   std::vector<Index> free;
   for (Index j = 0; j < x.size(); ++j) {
-    const bool held = (x[j] <= lower[j] && gradient[j] > 0) || (x[j] >= upper[j] && gradient[j] < 0);
+    const bool held =
+        (x[j] <= lower[j] && gradient[j] > 0) || (x[j] >= upper[j] && gradient[j] < 0);
     if (!held) free.push_back(j);
   }
   return free;
@@ -30,20 +31,25 @@ Eigen::VectorXd Direction(const Eigen::MatrixXd& inverse_hessian, const Eigen::V
   return direction;
 }
 
-// BFGS update of the inverse Hessian [Nocedal & Wright 2006, Eq. 6.17], skipped where the curvature is not positive.
-void Update(const Eigen::VectorXd& step, const Eigen::VectorXd& change, bool first, Eigen::MatrixXd& inverse_hessian) {
+// BFGS update of the inverse Hessian [Nocedal & Wright 2006, Eq. 6.17], skipped where the curvature
+// is not positive.
+void Update(const Eigen::VectorXd& step, const Eigen::VectorXd& change, bool first,
+            Eigen::MatrixXd& inverse_hessian) {
   const double curvature = step.dot(change);
   if (!(curvature > 1e-10 * step.norm() * change.norm())) return;
   const Index n = step.size();
   if (first) inverse_hessian = Eigen::MatrixXd::Identity(n, n) * (curvature / change.squaredNorm());
-  const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(n, n) - step * change.transpose() / curvature;
-  inverse_hessian = (left * inverse_hessian * left.transpose() + step * step.transpose() / curvature).eval();
+  const Eigen::MatrixXd left =
+      Eigen::MatrixXd::Identity(n, n) - step * change.transpose() / curvature;
+  inverse_hessian =
+      (left * inverse_hessian * left.transpose() + step * step.transpose() / curvature).eval();
 }
 
 }  // namespace
 
-Minimum MinimizeInBox(const SmoothFunction& function, const Eigen::VectorXd& start, const Eigen::VectorXd& lower,
-                      const Eigen::VectorXd& upper, const MinimizerOptions& options) {
+Minimum MinimizeInBox(const SmoothFunction& function, const Eigen::VectorXd& start,
+                      const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
+                      const MinimizerOptions& options) {
   const Index n = start.size();
   Minimum best{.x = start};
   Eigen::VectorXd gradient(n);

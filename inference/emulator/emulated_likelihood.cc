@@ -16,7 +16,8 @@ const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
 
 }  // namespace
 
-absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& data, const StateEmulator& emulator,
+absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& data,
+                                                              const StateEmulator& emulator,
                                                               const Options& options) {
   EmulatedLikelihood likelihood;
   const PrincipalComponents& components = emulator.components();
@@ -26,7 +27,8 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
 
   std::map<std::pair<int, int>, std::vector<Index>> groups;
   for (std::size_t t = 0; t < data.readings.size(); ++t) {
-    groups[{data.readings[t].experiment, data.readings[t].observable}].push_back(static_cast<Index>(t));
+    groups[{data.readings[t].experiment, data.readings[t].observable}].push_back(
+        static_cast<Index>(t));
   }
   std::map<std::pair<int, int>, double> lengths;
   if (options.correlated_noise) {
@@ -43,7 +45,8 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
       const Reading& reading = data.readings[static_cast<std::size_t>(t)];
       for (Index j = 0; length != lengths.end() && j < i; ++j) {
         const Index earlier = readings[static_cast<std::size_t>(j)];
-        const double distance = std::abs(reading.control - data.readings[static_cast<std::size_t>(earlier)].control);
+        const double distance =
+            std::abs(reading.control - data.readings[static_cast<std::size_t>(earlier)].control);
         covariance(i, j) = covariance(j, i) = std::exp(-distance / length->second);
       }
       covariance(i, i) += components.remainder[t];
@@ -52,22 +55,24 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
     }
     const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
     if (factor.info() != Eigen::Success) {
-      return absl::InvalidArgumentError(absl::StrCat("readings of observable ", key.second, " of experiment ", key.first,
-                                                     " lie too close for their correlation length: leave out some."));
+      return absl::InvalidArgumentError(
+          absl::StrCat("readings of observable ", key.second, " of experiment ", key.first,
+                       " lie too close for their correlation length: leave out some."));
     }
     form.log_normaliser -= factor.matrixLLT().diagonal().array().log().sum();
     form.whitening = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
     form.whitened_basis = form.whitening * basis;
     form.gram = form.whitened_basis.transpose() * form.whitened_basis;
     form.readings = std::move(readings);
-    likelihood.Project(form, Eigen::VectorXd::Zero(components.mean.size()), form.projection, form.square);
+    likelihood.Project(form, Eigen::VectorXd::Zero(components.mean.size()), form.projection,
+                       form.square);
     likelihood.forms_.push_back(std::move(form));
   }
   return likelihood;
 }
 
-void EmulatedLikelihood::Project(const Form& form, const Eigen::VectorXd& z, Eigen::VectorXd& projection,
-                                 double& square) const {
+void EmulatedLikelihood::Project(const Form& form, const Eigen::VectorXd& z,
+                                 Eigen::VectorXd& projection, double& square) const {
   Eigen::VectorXd residual(static_cast<Index>(form.readings.size()));
   for (Index i = 0; i < residual.size(); ++i) {
     const Index t = form.readings[static_cast<std::size_t>(i)];
@@ -78,9 +83,12 @@ void EmulatedLikelihood::Project(const Form& form, const Eigen::VectorXd& z, Eig
   square = whitened.squaredNorm();
 }
 
-// What depends on the prediction: with G = (WB)^T WB, g = (WB)^T W r - G m, S = D chol(C), M = I + S^T G S,
-//   -1/2 (m^T G m - 2 m^T (WB)^T W r - |M^{-1/2} S^T g|^2 + ln det M)         [matrix inversion and determinant lemmas]
-double EmulatedLikelihood::Combine(const Eigen::VectorXd& mean, const Eigen::VectorXd& sd, const Eigen::MatrixXd& gram,
+// What depends on the prediction: with G = (WB)^T WB, g = (WB)^T W r - G m, S = D chol(C), M = I +
+// S^T G S,
+//   -1/2 (m^T G m - 2 m^T (WB)^T W r - |M^{-1/2} S^T g|^2 + ln det M)         [matrix inversion and
+//   determinant lemmas]
+double EmulatedLikelihood::Combine(const Eigen::VectorXd& mean, const Eigen::VectorXd& sd,
+                                   const Eigen::MatrixXd& gram,
                                    const Eigen::VectorXd& projection) const {
   const Eigen::VectorXd along = gram * mean;
   const Eigen::VectorXd left = projection - along;
@@ -91,7 +99,8 @@ double EmulatedLikelihood::Combine(const Eigen::VectorXd& mean, const Eigen::Vec
   const Eigen::LLT<Eigen::MatrixXd> cholesky(inner);
   const Eigen::VectorXd explained = cholesky.matrixL().solve(factor.transpose() * left);
   const double log_determinant = 2 * cholesky.matrixLLT().diagonal().array().log().sum();
-  return -0.5 * (mean.dot(along) - 2 * mean.dot(projection) - explained.squaredNorm() + log_determinant);
+  return -0.5 *
+         (mean.dot(along) - 2 * mean.dot(projection) - explained.squaredNorm() + log_determinant);
 }
 
 Eigen::VectorXd EmulatedLikelihood::LogLikelihood(const ScorePrediction& prediction,
@@ -117,7 +126,8 @@ Eigen::VectorXd EmulatedLikelihood::LogLikelihood(const ScorePrediction& predict
   return result;
 }
 
-double EmulatedLikelihood::LogDensity(const ScorePrediction& prediction, Index row, const Eigen::VectorXd& z) const {
+double EmulatedLikelihood::LogDensity(const ScorePrediction& prediction, Index row,
+                                      const Eigen::VectorXd& z) const {
   const Index q = prediction.mean.cols();
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(q, q);
   Eigen::VectorXd projection = Eigen::VectorXd::Zero(q);

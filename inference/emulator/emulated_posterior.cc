@@ -44,9 +44,9 @@ absl::StatusOr<Runs> CollectRuns(std::span<const Prior> priors, const DataSet& d
     if (iteration.parameters.cols() != d || iteration.predictions.cols() != t ||
         iteration.parameters.rows() != iteration.predictions.rows()) {
       return absl::InvalidArgumentError(absl::StrCat(
-          "an iteration has ", iteration.parameters.rows(), " x ", iteration.parameters.cols(), " parameters and ",
-          iteration.predictions.rows(), " x ", iteration.predictions.cols(), " predictions; there are ", d,
-          " priors and ", t, " readings."));
+          "an iteration has ", iteration.parameters.rows(), " x ", iteration.parameters.cols(),
+          " parameters and ", iteration.predictions.rows(), " x ", iteration.predictions.cols(),
+          " predictions; there are ", d, " priors and ", t, " readings."));
     }
     const Eigen::MatrixXd standard = ToStandard(priors, iteration.parameters);
     for (Index i = 0; i < standard.rows(); ++i) {
@@ -66,7 +66,8 @@ Eigen::MatrixXd Factors(const Eigen::MatrixXd& points, Index d) {
   return points.rightCols(points.cols() - d).array().square().max(1e-12).inverse();
 }
 
-ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weights, const Eigen::VectorXd& values) {
+ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weights,
+                           const Eigen::VectorXd& values) {
   ParameterSummary summary;
   summary.mean = values.mean();
   summary.sd = std::sqrt((values.array() - summary.mean).square().mean());
@@ -76,14 +77,15 @@ ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weight
   summary.q95 = WeightedQuantile(log_weights, values, 0.95);
   summary.prior_sd = prior.StandardDeviation();
   const auto tenth = static_cast<double>(values.size()) / 10;
-  summary.at_bound = static_cast<double>((values.array() <= prior.Quantile(0.02)).count()) > tenth ||
-                     static_cast<double>((values.array() >= prior.Quantile(0.98)).count()) > tenth;
+  summary.at_bound =
+      static_cast<double>((values.array() <= prior.Quantile(0.02)).count()) > tenth ||
+      static_cast<double>((values.array() >= prior.Quantile(0.98)).count()) > tenth;
   return summary;
 }
 
 // Histories of the model at the draws: the mean history and what is not known of it.
-void AddPredictive(const DataSet& data, const StateEmulator& emulator, const ScorePrediction& prediction,
-                   std::uint64_t seed, EmulatedResult& result) {
+void AddPredictive(const DataSet& data, const StateEmulator& emulator,
+                   const ScorePrediction& prediction, std::uint64_t seed, EmulatedResult& result) {
   const Index n = prediction.mean.rows();
   const Index q = prediction.mean.cols();
   const auto t = static_cast<Index>(data.readings.size());
@@ -96,7 +98,8 @@ void AddPredictive(const DataSet& data, const StateEmulator& emulator, const Sco
                          .iteration = 0,
                          .sample = static_cast<std::uint64_t>(i)});
     for (double& z : normal) z = stream.Normal();
-    scores.row(i) = prediction.mean.row(i) + (factor * normal).transpose().cwiseProduct(prediction.sd.row(i));
+    scores.row(i) =
+        prediction.mean.row(i) + (factor * normal).transpose().cwiseProduct(prediction.sd.row(i));
   }
   const PrincipalComponents& components = emulator.components();
   result.predictive_mean.resize(t);
@@ -108,11 +111,13 @@ void AddPredictive(const DataSet& data, const StateEmulator& emulator, const Sco
     const Reading& reading = data.readings[static_cast<std::size_t>(k)];
     const Eigen::VectorXd column = scores * components.basis.row(k).transpose();
     for (Index i = 0; i < n; ++i) {
-      history[static_cast<std::size_t>(i)] = reading.value + reading.sd * (components.mean[k] + column[i]);
+      history[static_cast<std::size_t>(i)] =
+          reading.value + reading.sd * (components.mean[k] + column[i]);
     }
     result.predictive_mean[k] = reading.value + reading.sd * (components.mean[k] + column.mean());
     const auto quantile = [&history](double p) {
-      const auto at = history.begin() + static_cast<std::ptrdiff_t>(p * static_cast<double>(history.size()));
+      const auto at =
+          history.begin() + static_cast<std::ptrdiff_t>(p * static_cast<double>(history.size()));
       std::nth_element(history.begin(), at, history.end());
       return *at;
     };
@@ -123,27 +128,32 @@ void AddPredictive(const DataSet& data, const StateEmulator& emulator, const Sco
 }
 
 // The errors in units of the noise sd, the inferred one with kInferred, and the verdict.
-void Judge(const EmulatorOptions& options, const TrainedEmulator& trained, const ScorePrediction& prediction,
-           double noise_variance, EmulatedResult& result) {
+void Judge(const EmulatorOptions& options, const TrainedEmulator& trained,
+           const ScorePrediction& prediction, double noise_variance, EmulatedResult& result) {
   const CrossValidation& check = trained.emulator.cross_validation();
   const double unit = std::sqrt(noise_variance);
   result.cross_validated_error = check.rms / unit;
-  result.reading_error = check.error.colwise().norm() / (unit * std::sqrt(static_cast<double>(check.error.rows())));
+  result.reading_error =
+      check.error.colwise().norm() / (unit * std::sqrt(static_cast<double>(check.error.rows())));
   result.scatter = check.scatter_rms / unit;
   result.calibration = check.calibration;
   const auto readings = static_cast<double>(check.error.cols());
-  result.emulator_sd =
-      std::sqrt(prediction.sd.squaredNorm() / (static_cast<double>(prediction.sd.rows()) * readings)) / unit;
+  result.emulator_sd = std::sqrt(prediction.sd.squaredNorm() /
+                                 (static_cast<double>(prediction.sd.rows()) * readings)) /
+                       unit;
   result.adequate = false;
   if (result.cross_validated_error > options.max_error) {
     result.reason = absl::StrFormat(
-        "The emulator misses its own runs by %.1f standard deviations of the readings' noise (limit %g), of which it puts "
-        "%.1f down to the scatter of single runs: run more samples near the posterior or fewer parameters, or state a "
+        "The emulator misses its own runs by %.1f standard deviations of the readings' noise "
+        "(limit %g), of which it puts "
+        "%.1f down to the scatter of single runs: run more samples near the posterior or fewer "
+        "parameters, or state a "
         "larger noise.",
         result.cross_validated_error, options.max_error, result.scatter);
   } else if (result.calibration > options.max_calibration) {
     result.reason = absl::StrFormat(
-        "The emulator's errors on its own runs are %.1f times as large as it claims (limit %.1f): the response is not "
+        "The emulator's errors on its own runs are %.1f times as large as it claims (limit %.1f): "
+        "the response is not "
         "smooth on the scale of the runs, run more samples near the posterior.",
         std::sqrt(result.calibration), std::sqrt(options.max_calibration));
   } else {
@@ -155,11 +165,13 @@ void Judge(const EmulatorOptions& options, const TrainedEmulator& trained, const
 
 absl::Status EmulatorOptions::Validate() const {
   const auto wrong = [](const char* name, double found, const char* allowed) {
-    return absl::InvalidArgumentError(absl::StrCat("emulator: ", name, " is ", found, "; allowed is ", allowed, "."));
+    return absl::InvalidArgumentError(
+        absl::StrCat("emulator: ", name, " is ", found, "; allowed is ", allowed, "."));
   };
   if (noise == NoiseMode::kEssTarget) {
     return absl::InvalidArgumentError(
-        "emulator: noise by effective sample size is a tempering of the runs' own weights and has no emulated posterior; "
+        "emulator: noise by effective sample size is a tempering of the runs' own weights and has "
+        "no emulated posterior; "
         "give the noise or let it be inferred.");
   }
   if (auto valid = training.Validate(); !valid.ok()) return valid;
@@ -173,7 +185,8 @@ absl::Status EmulatorOptions::Validate() const {
 
 absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, const DataSet& data,
                                                  const EmulatorOptions& options,
-                                                 std::span<const Iteration> iterations, std::stop_token stop) {
+                                                 std::span<const Iteration> iterations,
+                                                 std::stop_token stop) {
   if (auto valid = options.Validate(); !valid.ok()) return valid;
   if (auto valid = ValidateData(data, options.noise); !valid.ok()) return valid;
   for (const Prior& prior : priors) {
@@ -183,8 +196,8 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
   if (!runs.ok()) return runs.status();
   const auto trained = TrainEmulator(*runs, data, options.training);
   if (!trained.ok()) return trained.status();
-  const auto likelihood = EmulatedLikelihood::Create(data, trained->emulator,
-                                                     {.scatter_share = options.training.scatter_share});
+  const auto likelihood = EmulatedLikelihood::Create(
+      data, trained->emulator, {.scatter_share = options.training.scatter_share});
   if (!likelihood.ok()) return likelihood.status();
 
   const auto d = static_cast<Index>(priors.size());
@@ -195,8 +208,10 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
     sampled.resize(sampled.size() + static_cast<std::size_t>(likelihood->groups()),
                    Prior{.kind = PriorKind::kNormal, .min = 0, .mean = 0, .sd = 1});
   }
-  const TmcmcOptions sampler{
-      .samples = options.draws, .target_cv = options.target_cv, .steps = options.steps, .seed = options.seed};
+  const TmcmcOptions sampler{.samples = options.draws,
+                             .target_cv = options.target_cv,
+                             .steps = options.steps,
+                             .seed = options.seed};
   const auto state = RunTmcmc(
       sampled, sampler,
       [&](const Eigen::MatrixXd& points) {
@@ -211,12 +226,14 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
   result.log_evidence = state->log_evidence;
   result.log_evidence_se = state->LogEvidenceStandardError();
   const Index n = result.draws.rows();
-  const Eigen::VectorXd log_weights = Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
+  const Eigen::VectorXd log_weights =
+      Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
   for (Index j = 0; j < d; ++j) {
-    result.parameters.push_back(Summarize(priors[static_cast<std::size_t>(j)], log_weights, result.draws.col(j)));
+    result.parameters.push_back(
+        Summarize(priors[static_cast<std::size_t>(j)], log_weights, result.draws.col(j)));
   }
-  result.correlation =
-      CorrelationOf(WeightedCovariance(log_weights, result.draws, WeightedMean(log_weights, result.draws)));
+  result.correlation = CorrelationOf(
+      WeightedCovariance(log_weights, result.draws, WeightedMean(log_weights, result.draws)));
   double noise_variance = 1;
   if (options.noise == NoiseMode::kInferred) {
     const Eigen::MatrixXd factors = Factors(state->samples, d);

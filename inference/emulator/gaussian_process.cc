@@ -36,10 +36,12 @@ HyperParameters MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorX
   };
   for (const Start& start : {Start{4, 1, 1e-3}, Start{1, 0.3, 1e-2}}) {
     Eigen::VectorXd x(d + 2);
-    x << Eigen::VectorXd::Constant(d, std::log(start.length)), std::log(start.signal), std::log(start.scatter);
+    x << Eigen::VectorXd::Constant(d, std::log(start.length)), std::log(start.signal),
+        std::log(start.scatter);
     Eigen::VectorXd gradient(d + 2);
     if (!std::isfinite(objective(x, gradient))) continue;
-    const Minimum minimum = MinimizeInBox(objective, x, lower, upper, {.max_iterations = 40, .tolerance = 1e-2});
+    const Minimum minimum =
+        MinimizeInBox(objective, x, lower, upper, {.max_iterations = 40, .tolerance = 1e-2});
     if (minimum.value < best.value) best = {.x = minimum.x, .value = minimum.value};
   }
   return best;
@@ -47,23 +49,27 @@ HyperParameters MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorX
 
 }  // namespace
 
-absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs) {
+absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inputs,
+                                                     const Eigen::VectorXd& outputs) {
   assert(inputs.rows() == outputs.size() && inputs.rows() >= 4);
   const Index n = inputs.rows();
   const Index d = inputs.cols();
   GaussianProcess process;
   process.input_mean_ = inputs.colwise().mean();
   process.input_sd_.resize(d);
-  for (Index j = 0; j < d; ++j) process.input_sd_[j] = Spread(inputs.col(j), process.input_mean_[j]);
+  for (Index j = 0; j < d; ++j)
+    process.input_sd_[j] = Spread(inputs.col(j), process.input_mean_[j]);
   process.output_mean_ = outputs.mean();
   process.output_sd_ = Spread(outputs, process.output_mean_);
-  process.train_ = (inputs.rowwise() - process.input_mean_).array().rowwise() / process.input_sd_.array();
+  process.train_ =
+      (inputs.rowwise() - process.input_mean_).array().rowwise() / process.input_sd_.array();
   const Eigen::VectorXd scaled = (outputs.array() - process.output_mean_) / process.output_sd_;
 
   const HyperParameters hyper = MostProbable(process.train_, scaled);
   if (!std::isfinite(hyper.value)) {
     return absl::FailedPreconditionError(
-        "the emulator's covariance matrix cannot be factorised: are the runs' parameters all the same?");
+        "the emulator's covariance matrix cannot be factorised: are the runs' parameters all the "
+        "same?");
   }
   process.lengths_ = hyper.x.head(d).array().exp().transpose();
   process.signal_ = std::exp(hyper.x[d]);
@@ -71,8 +77,8 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   const double output_variance = process.output_sd_ * process.output_sd_;
   process.scatter_variance_ = scatter * output_variance;
 
-  Eigen::MatrixXd covariance =
-      KernelMatrix(process.train_, process.train_, {.lengths = process.lengths_, .signal = process.signal_});
+  Eigen::MatrixXd covariance = KernelMatrix(
+      process.train_, process.train_, {.lengths = process.lengths_, .signal = process.signal_});
   covariance.diagonal().array() += scatter;
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   process.cholesky_ = factor.matrixL();
@@ -84,8 +90,10 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
 }
 
 GaussianProcessPrediction GaussianProcess::Predict(const Eigen::MatrixXd& inputs) const {
-  const Eigen::MatrixXd points = (inputs.rowwise() - input_mean_).array().rowwise() / input_sd_.array();
-  Eigen::MatrixXd cross = KernelMatrix(train_, points, {.lengths = lengths_, .signal = signal_});  // n x m
+  const Eigen::MatrixXd points =
+      (inputs.rowwise() - input_mean_).array().rowwise() / input_sd_.array();
+  Eigen::MatrixXd cross =
+      KernelMatrix(train_, points, {.lengths = lengths_, .signal = signal_});  // n x m
   GaussianProcessPrediction prediction;
   prediction.mean = (cross.transpose() * alpha_ * output_sd_).array() + output_mean_;
   cholesky_.triangularView<Eigen::Lower>().solveInPlace(cross);

@@ -21,7 +21,8 @@ LogPrior HyperPrior(Index j, Index d) {
 
 }  // namespace
 
-Eigen::MatrixXd KernelMatrix(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const KernelParameters& parameters) {
+Eigen::MatrixXd KernelMatrix(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
+                             const KernelParameters& parameters) {
   const Eigen::MatrixXd scaled_a = a.array().rowwise() / parameters.lengths.array();
   const Eigen::MatrixXd scaled_b = b.array().rowwise() / parameters.lengths.array();
   Eigen::MatrixXd kernel = -2 * scaled_a * scaled_b.transpose();
@@ -29,7 +30,8 @@ Eigen::MatrixXd KernelMatrix(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
   kernel.rowwise() += scaled_b.rowwise().squaredNorm().transpose();
   // z = sqrt5 r; the difference of squares may fall below zero by rounding.
   kernel = (5 * kernel.array().max(0)).sqrt();
-  kernel = parameters.signal * (1 + kernel.array() * (1 + kernel.array() / 3)) * (-kernel.array()).exp();
+  kernel =
+      parameters.signal * (1 + kernel.array() * (1 + kernel.array() / 3)) * (-kernel.array()).exp();
   kernel.array() += kTrendVariance;
   kernel.noalias() += kTrendVariance * a * b.transpose();
   return kernel;
@@ -42,7 +44,8 @@ KernelObjective::KernelObjective(const Eigen::MatrixXd& inputs, const Eigen::Vec
   squared_.resize(n * (n - 1) / 2, inputs.cols());
   Index pair = 0;
   for (Index j = 0; j < n; ++j) {
-    for (Index i = j + 1; i < n; ++i) squared_.row(pair++) = (inputs.row(i) - inputs.row(j)).array().square();
+    for (Index i = j + 1; i < n; ++i)
+      squared_.row(pair++) = (inputs.row(i) - inputs.row(j)).array().square();
   }
 }
 

@@ -8,9 +8,12 @@ namespace calib::inference {
 
 using Eigen::Index;
 
-absl::StatusOr<StateEmulator> StateEmulator::Fit(const Eigen::MatrixXd& inputs, const Eigen::MatrixXd& histories,
-                                                 std::span<const Index> relevant, const PrincipalOptions& options) {
-  // Rows farther from the readings than any relevant one count in the basis as if they lay at that distance.
+absl::StatusOr<StateEmulator> StateEmulator::Fit(const Eigen::MatrixXd& inputs,
+                                                 const Eigen::MatrixXd& histories,
+                                                 std::span<const Index> relevant,
+                                                 const PrincipalOptions& options) {
+  // Rows farther from the readings than any relevant one count in the basis as if they lay at that
+  // distance.
   const Eigen::VectorXd distance = histories.rowwise().norm();
   double reach = 0;
   for (const Index i : relevant) reach = std::max(reach, distance[i]);
@@ -29,7 +32,8 @@ absl::StatusOr<StateEmulator> StateEmulator::Fit(const Eigen::MatrixXd& inputs, 
   return emulator;
 }
 
-void StateEmulator::CrossValidate(const Eigen::MatrixXd& histories, std::span<const Index> relevant) {
+void StateEmulator::CrossValidate(const Eigen::MatrixXd& histories,
+                                  std::span<const Index> relevant) {
   const auto q = static_cast<Index>(processes_.size());
   const auto m = static_cast<Index>(relevant.size());
   Eigen::MatrixXd error(m, q);
@@ -42,7 +46,8 @@ void StateEmulator::CrossValidate(const Eigen::MatrixXd& histories, std::span<co
       error(i, k) = left_out.error[row];
       sd(i, k) = std::sqrt(left_out.variance[row]);
     }
-    outside.row(i) = histories.row(row) - components_.mean - scores_.row(row) * components_.basis.transpose();
+    outside.row(i) =
+        histories.row(row) - components_.mean - scores_.row(row) * components_.basis.transpose();
   }
   const Eigen::MatrixXd standardised = error.cwiseQuotient(sd);
   widening_ = standardised.colwise().squaredNorm().transpose() / static_cast<double>(m);
@@ -50,10 +55,12 @@ void StateEmulator::CrossValidate(const Eigen::MatrixXd& histories, std::span<co
   widening_ = widening_.cwiseMax(1);
   scatter_sd_.resize(q);
   for (Index k = 0; k < q; ++k) {
-    scatter_sd_[k] = std::sqrt(widening_[k] * processes_[static_cast<std::size_t>(k)].scatter_variance());
+    scatter_sd_[k] =
+        std::sqrt(widening_[k] * processes_[static_cast<std::size_t>(k)].scatter_variance());
   }
 
-  // Shrunk towards independence with the weight of q runs, so that the matrix is definite for any number of runs.
+  // Shrunk towards independence with the weight of q runs, so that the matrix is definite for any
+  // number of runs.
   correlation_ = standardised.transpose() * standardised;
   const Eigen::VectorXd norm = correlation_.diagonal().cwiseSqrt().cwiseMax(1e-300);
   correlation_ = norm.cwiseInverse().asDiagonal() * correlation_ * norm.cwiseInverse().asDiagonal();
@@ -73,13 +80,15 @@ void StateEmulator::CrossValidate(const Eigen::MatrixXd& histories, std::span<co
   }
   const auto count = static_cast<double>(cross_validation_.error.size());
   cross_validation_.rms = std::sqrt(cross_validation_.error.squaredNorm() / count);
-  const double scatter = scatter_sd_.squaredNorm() / static_cast<double>(histories.cols()) + components_.remainder.mean();
+  const double scatter = scatter_sd_.squaredNorm() / static_cast<double>(histories.cols()) +
+                         components_.remainder.mean();
   cross_validation_.scatter_rms = std::sqrt(scatter);
 }
 
 ScorePrediction StateEmulator::Predict(const Eigen::MatrixXd& inputs) const {
   const auto q = static_cast<Index>(processes_.size());
-  ScorePrediction result{.mean = Eigen::MatrixXd(inputs.rows(), q), .sd = Eigen::MatrixXd(inputs.rows(), q)};
+  ScorePrediction result{.mean = Eigen::MatrixXd(inputs.rows(), q),
+                         .sd = Eigen::MatrixXd(inputs.rows(), q)};
   for (Index k = 0; k < q; ++k) {
     const GaussianProcessPrediction one = processes_[static_cast<std::size_t>(k)].Predict(inputs);
     result.mean.col(k) = one.mean;
@@ -94,7 +103,8 @@ ScorePrediction StateEmulator::PredictLeftOut() const {
   for (Index k = 0; k < q; ++k) {
     const GaussianProcess& process = processes_[static_cast<std::size_t>(k)];
     result.mean.col(k) -= process.leave_one_out().error;
-    const Eigen::ArrayXd function = process.leave_one_out().variance.array() - process.scatter_variance();
+    const Eigen::ArrayXd function =
+        process.leave_one_out().variance.array() - process.scatter_variance();
     result.sd.col(k) = (widening_[k] * function.max(0)).sqrt();
   }
   return result;

@@ -27,7 +27,8 @@ double Variation(const Eigen::VectorXd& relative, double increment) {
 
 }  // namespace
 
-TemperingStep NextExponent(const Eigen::VectorXd& log_likelihood, double exponent, double target_cv) {
+TemperingStep NextExponent(const Eigen::VectorXd& log_likelihood, double exponent,
+                           double target_cv) {
   double largest = -std::numeric_limits<double>::infinity();
   for (const double value : log_likelihood) largest = std::max(largest, value);
   const Eigen::VectorXd relative = log_likelihood.array() - largest;
@@ -41,7 +42,8 @@ TemperingStep NextExponent(const Eigen::VectorXd& log_likelihood, double exponen
       const double middle = 0.5 * (low + high);
       (Variation(relative, middle) <= target_cv ? low : high) = middle;
     }
-    if (low == 0) low = high;  // no exponent is small enough: the smallest step that bisection knows
+    if (low == 0)
+      low = high;  // no exponent is small enough: the smallest step that bisection knows
   }
   TemperingStep step;
   step.exponent = low == 1 - exponent ? 1 : exponent + low;
@@ -54,7 +56,8 @@ TemperingStep NextExponent(const Eigen::VectorXd& log_likelihood, double exponen
   return step;
 }
 
-Eigen::MatrixXd WeightedCovarianceFactor(const Eigen::MatrixXd& rows, const Eigen::VectorXd& weights) {
+Eigen::MatrixXd WeightedCovarianceFactor(const Eigen::MatrixXd& rows,
+                                         const Eigen::VectorXd& weights) {
   const Index d = rows.cols();
   Eigen::RowVectorXd mean = Eigen::RowVectorXd::Zero(d);
   for (Index i = 0; i < rows.rows(); ++i) mean += weights[i] * rows.row(i);
@@ -63,9 +66,11 @@ Eigen::MatrixXd WeightedCovarianceFactor(const Eigen::MatrixXd& rows, const Eige
     const Eigen::RowVectorXd difference = rows.row(i) - mean;
     covariance += weights[i] * difference.transpose() * difference;
   }
-  const double largest = std::max(covariance.diagonal().maxCoeff(), std::numeric_limits<double>::min());
+  const double largest =
+      std::max(covariance.diagonal().maxCoeff(), std::numeric_limits<double>::min());
   Eigen::LLT<Eigen::MatrixXd> factor(covariance);
-  if (factor.info() != Eigen::Success || factor.matrixL().toDenseMatrix().diagonal().minCoeff() < 1e-6 * std::sqrt(largest)) {
+  if (factor.info() != Eigen::Success ||
+      factor.matrixL().toDenseMatrix().diagonal().minCoeff() < 1e-6 * std::sqrt(largest)) {
     covariance.diagonal().array() += 1e-12 * largest;
     factor.compute(covariance);
   }

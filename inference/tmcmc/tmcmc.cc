@@ -18,10 +18,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Stage 0 holds the prior draws; step 0 of a later stage is its resampling.
 PhiloxStream Stream(const TmcmcOptions& options, std::size_t stage, int step, Index row) {
-  return PhiloxStream({.seed = options.seed,
-                       .purpose = StreamPurpose::kTmcmc,
-                       .iteration = (static_cast<std::uint64_t>(stage) << 32) + static_cast<std::uint64_t>(step),
-                       .sample = static_cast<std::uint64_t>(row)});
+  return PhiloxStream(
+      {.seed = options.seed,
+       .purpose = StreamPurpose::kTmcmc,
+       .iteration = (static_cast<std::uint64_t>(stage) << 32) + static_cast<std::uint64_t>(step),
+       .sample = static_cast<std::uint64_t>(row)});
 }
 
 // Log density of the prior in standardised coordinates.
@@ -60,7 +61,8 @@ void Propose(std::span<const Prior> priors, const TmcmcOptions& options, TmcmcSt
   }
 }
 
-void Accept(std::span<const Prior> priors, const Eigen::VectorXd& log_likelihood, TmcmcState& state) {
+void Accept(std::span<const Prior> priors, const Eigen::VectorXd& log_likelihood,
+            TmcmcState& state) {
   int accepted = 0;
   for (Index i = 0; i < state.samples.rows(); ++i) {
     if (!(log_likelihood[i] > state.accept_above[i])) continue;
@@ -73,21 +75,42 @@ void Accept(std::span<const Prior> priors, const Eigen::VectorXd& log_likelihood
   ++state.step;
 }
 
-// Steers the scale to the acceptance wanted. What a step did to all N samples is known only after it, so the next step's
-// proposal does not depend on the sample it moves, up to 1/N.
+// Steers the scale to the acceptance wanted. What a step did to all N samples is known only after
+// it, so the next step's proposal does not depend on the sample it moves, up to 1/N.
 void AdaptScale(const TmcmcOptions& options, int accepted, TmcmcState& state) {
   const auto n = static_cast<double>(state.samples.rows());
-  const double first = 2.38 / std::sqrt(static_cast<double>(state.samples.cols()));  // [Roberts et al. 1997]
+  const double first =
+      2.38 / std::sqrt(static_cast<double>(state.samples.cols()));  // [Roberts et al. 1997]
   constexpr double kGain = 2;
-  state.scale = std::clamp(state.scale * std::exp(kGain * (accepted / n - options.acceptance)), 1e-3 * first, 2 * first);
+  state.scale = std::clamp(state.scale * std::exp(kGain * (accepted / n - options.acceptance)),
+                           1e-3 * first, 2 * first);
+}
+
+// Likelihood of the proposals inside the prior's support, -inf for the others.
+Eigen::VectorXd EvaluateInSupport(const TmcmcState& state,
+                                  const BatchLogLikelihood& log_likelihood) {
+  std::vector<Index> inside;
+  for (Index i = 0; i < state.proposals.rows(); ++i) {
+    if (state.accept_above[i] < kInfinity) inside.push_back(i);
+  }
+  Eigen::MatrixXd rows(static_cast<Index>(inside.size()), state.proposals.cols());
+  for (std::size_t i = 0; i < inside.size(); ++i)
+    rows.row(static_cast<Index>(i)) = state.proposals.row(inside[i]);
+  Eigen::VectorXd result = Eigen::VectorXd::Constant(state.proposals.rows(), -kInfinity);
+  if (inside.empty()) return result;
+  const Eigen::VectorXd values = log_likelihood(rows);
+  if (values.size() != rows.rows()) return values;  // refused by AdvanceTmcmc
+  for (std::size_t i = 0; i < inside.size(); ++i) result[inside[i]] = values[static_cast<Index>(i)];
+  return result;
 }
 
 // Chooses the next exponent, adds its mean weight to the evidence and resamples.
-absl::Status BeginStage(std::span<const Prior> priors, const TmcmcOptions& options, TmcmcState& state) {
+absl::Status BeginStage(std::span<const Prior> priors, const TmcmcOptions& options,
+                        TmcmcState& state) {
   if (static_cast<int>(state.stages.size()) == options.max_stages) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("tempering has reached exponent ", state.exponent, " only after the ", options.max_stages,
-                     " stages allowed: allow more, or widen the stated errors of the readings."));
+    return absl::FailedPreconditionError(absl::StrCat(
+        "tempering has reached exponent ", state.exponent, " only after the ", options.max_stages,
+        " stages allowed: allow more, or widen the stated errors of the readings."));
   }
   const Index n = state.samples.rows();
   const TemperingStep next = NextExponent(state.log_likelihood, state.exponent, options.target_cv);
@@ -108,7 +131,8 @@ absl::Status BeginStage(std::span<const Prior> priors, const TmcmcOptions& optio
   const TmcmcState before = state;
   for (Index i = 0; i < n; ++i) {  // multinomial: what the standard error by ancestors needs
     const double u = sum * Stream(options, state.stages.size(), 0, i).Uniform();
-    const auto found = std::upper_bound(cumulative.begin(), cumulative.end(), u) - cumulative.begin();
+    const auto found =
+        std::upper_bound(cumulative.begin(), cumulative.end(), u) - cumulative.begin();
     const Index parent = std::min<Index>(found, n - 1);
     state.samples.row(i) = before.samples.row(parent);
     state.log_prior[i] = before.log_prior[parent];
@@ -124,12 +148,14 @@ absl::Status BeginStage(std::span<const Prior> priors, const TmcmcOptions& optio
 
 absl::Status TmcmcOptions::Validate() const {
   const auto wrong = [](const char* name, double found, const char* allowed) {
-    return absl::InvalidArgumentError(absl::StrCat("tmcmc: ", name, " is ", found, "; allowed is ", allowed, "."));
+    return absl::InvalidArgumentError(
+        absl::StrCat("tmcmc: ", name, " is ", found, "; allowed is ", allowed, "."));
   };
   if (samples < 20 || samples > 1000000) return wrong("samples", samples, "20 to 1e6");
   if (!(target_cv > 0 && target_cv <= 2)) return wrong("target_cv", target_cv, "above 0 up to 2");
   if (steps < 1) return wrong("steps", steps, "1 or more");
-  if (!(acceptance > 0 && acceptance < 1)) return wrong("acceptance", acceptance, "between 0 and 1");
+  if (!(acceptance > 0 && acceptance < 1))
+    return wrong("acceptance", acceptance, "between 0 and 1");
   if (max_stages < 1) return wrong("max_stages", max_stages, "1 or more");
   return absl::OkStatus();
 }
@@ -174,7 +200,8 @@ absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& opt
         absl::StrCat("tmcmc: ", log_likelihood.size(), " log likelihoods for ", n, " proposals."));
   }
   if ((log_likelihood.array() == kInfinity).any()) {
-    return absl::InvalidArgumentError("tmcmc: a log likelihood is infinite: an error of the readings is zero.");
+    return absl::InvalidArgumentError(
+        "tmcmc: a log likelihood is infinite: an error of the readings is zero.");
   }
   const Eigen::VectorXd finite =
       log_likelihood.unaryExpr([](double value) { return std::isnan(value) ? -kInfinity : value; });
@@ -182,7 +209,8 @@ absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& opt
   if (next.stages.empty()) {
     if ((finite.array() > -kInfinity).count() < 2) {
       return absl::FailedPreconditionError(
-          absl::StrCat("tmcmc: fewer than two of ", n, " draws from the prior have a likelihood: all others diverged."));
+          absl::StrCat("tmcmc: fewer than two of ", n,
+                       " draws from the prior have a likelihood: all others diverged."));
     }
     next.samples = next.proposals;
     next.log_likelihood = finite;
@@ -215,11 +243,13 @@ absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& opt
 }
 
 absl::StatusOr<TmcmcState> RunTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
-                                    const BatchLogLikelihood& log_likelihood, std::stop_token stop) {
+                                    const BatchLogLikelihood& log_likelihood,
+                                    std::stop_token stop) {
   auto state = StartTmcmc(priors, options);
   while (state.ok() && !state->finished()) {
     if (stop.stop_requested()) return absl::CancelledError("tmcmc was stopped.");
-    const auto advanced = AdvanceTmcmc(priors, options, log_likelihood(state->proposals), *state);
+    const auto advanced =
+        AdvanceTmcmc(priors, options, EvaluateInSupport(*state, log_likelihood), *state);
     if (!advanced.ok()) return advanced;
   }
   return state;
