@@ -1,5 +1,6 @@
 #include "inference/emulator/gaussian_process.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -71,6 +72,13 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
         "the emulator's covariance matrix cannot be factorised: are the runs' parameters all the "
         "same?");
   }
+  // The same density of the best constant, whose scatter has the outputs' variance, one; Gaussian
+  // normalisers and the prior of the scatter, which both have, left out.
+  const auto count = static_cast<double>(n);
+  if (hyper.value > 0.5 * count + 0.5 * std::log1p(count * kTrendVariance)) {
+    process.SetConstant(outputs);
+    return process;
+  }
   process.lengths_ = hyper.x.head(d).array().exp().transpose();
   process.signal_ = std::exp(hyper.x[d]);
   const double scatter = std::exp(hyper.x[d + 1]);
@@ -89,7 +97,36 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   return process;
 }
 
+void GaussianProcess::SetConstant(const Eigen::VectorXd& outputs) {
+  const auto n = static_cast<double>(outputs.size());
+  constant_ = true;
+  lengths_ =
+      Eigen::RowVectorXd::Constant(input_sd_.size(), std::numeric_limits<double>::infinity());
+  const Eigen::ArrayXd deviation = outputs.array() - output_mean_;
+  scatter_variance_ = deviation.square().sum() / (n - 1);
+  leave_one_out_.error = deviation * (n / (n - 1));
+  leave_one_out_.variance =
+      Eigen::VectorXd::Constant(outputs.size(), scatter_variance_ * (1 + 1 / (n - 1)));
+  constant_variance_ = scatter_variance_ / n;
+}
+
 GaussianProcessPrediction GaussianProcess::Predict(const Eigen::MatrixXd& inputs) const {
+  const Index m = inputs.rows();
+  GaussianProcessPrediction prediction{
+      .mean = Eigen::VectorXd::Constant(m, output_mean_),
+      .variance = Eigen::VectorXd::Constant(m, constant_variance_)};
+  if (constant_) return prediction;
+  constexpr Index kBlock = 256;  // the cross-covariances of a block stay in the cache
+  for (Index first = 0; first < m; first += kBlock) {
+    const Index size = std::min(kBlock, m - first);
+    const GaussianProcessPrediction block = PredictBlock(inputs.middleRows(first, size));
+    prediction.mean.segment(first, size) = block.mean;
+    prediction.variance.segment(first, size) = block.variance;
+  }
+  return prediction;
+}
+
+GaussianProcessPrediction GaussianProcess::PredictBlock(const Eigen::MatrixXd& inputs) const {
   const Eigen::MatrixXd points =
       (inputs.rowwise() - input_mean_).array().rowwise() / input_sd_.array();
   Eigen::MatrixXd cross =

@@ -42,20 +42,26 @@ class GaussianProcess {
   /// variance_i = 1 / (K^-1)_ii.
   const LeaveOneOut& leave_one_out() const { return leave_one_out_; }
   double scatter_variance() const { return scatter_variance_; }
+  bool constant() const { return constant_; }
   /// l_j in units of the inputs.
   Eigen::VectorXd lengths() const { return lengths_.cwiseProduct(input_sd_); }
 
  private:
+  void SetConstant(const Eigen::VectorXd& outputs);
+  GaussianProcessPrediction PredictBlock(const Eigen::MatrixXd& inputs) const;
+
+  bool constant_ = false;
   Eigen::RowVectorXd input_mean_;
   Eigen::RowVectorXd input_sd_;
   double output_mean_ = 0;
   double output_sd_ = 1;
-  Eigen::MatrixXd train_;        // n x d, scaled
-  Eigen::RowVectorXd lengths_;   // scaled
-  double signal_ = 1;            // s, in units of the output's variance
-  double scatter_variance_ = 0;  // in units of the output
-  Eigen::MatrixXd cholesky_;     // of K, lower
-  Eigen::VectorXd alpha_;        // K^-1 outputs
+  Eigen::MatrixXd train_;         // n x d, scaled
+  Eigen::RowVectorXd lengths_;    // scaled
+  double signal_ = 1;             // s, in units of the output's variance
+  double constant_variance_ = 0;  // of the mean, where constant
+  double scatter_variance_ = 0;   // in units of the output
+  Eigen::MatrixXd cholesky_;      // of K, lower
+  Eigen::VectorXd alpha_;         // K^-1 outputs
   LeaveOneOut leave_one_out_;
 };
 
