@@ -10,7 +10,7 @@
 namespace calib::inference {
 namespace {
 
-constexpr int kPoints = 2048;
+constexpr int kPoints = 4096;
 
 }  // namespace
 

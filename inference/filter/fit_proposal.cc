@@ -1,0 +1,119 @@
+// The proposal of the next iteration from what has been computed so far.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+#include "inference/filter/ensemble.h"
+#include "inference/filter/iterative_filter.h"
+#include "inference/filter/log_weights.h"
+#include "inference/mixture/dirichlet_mixture.h"
+
+namespace calib::inference {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInsignificantShare = 1e-3;
+constexpr double kNegligibleWeight =
+    1e-4;  // of a component: fewer than one in ten thousand samples
+
+// Indices, ascending, of the samples that matter: the lightest, which hold a thousandth of the
+// weight together and are often most of the samples, are left out. It costs the proposal nothing
+// and the importance weights stay exact.
+std::vector<Eigen::Index> Significant(const Eigen::VectorXd& log_weights) {
+  std::vector<Eigen::Index> order(log_weights.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Eigen::Index a, Eigen::Index b) { return log_weights[a] < log_weights[b]; });
+  double left_out = 0;
+  std::size_t first = 0;
+  while (first + 1 < order.size()) {
+    left_out += std::exp(log_weights[order[first]]);
+    if (left_out > kInsignificantShare) break;
+    ++first;
+  }
+  std::vector<Eigen::Index> significant(order.begin() + static_cast<std::ptrdiff_t>(first),
+                                        order.end());
+  std::sort(significant.begin(), significant.end());
+  return significant;
+}
+
+// Samples with weight, in standard coordinates, standing for as many observations as they are
+// worth: the counts sum to the effective sample size, not to a multiple of N as copies would [Cheng
+// 2019, footnote 1].
+WeightedPoints Standardized(std::span<const Prior> priors, const Eigen::MatrixXd& parameters,
+                            const Eigen::VectorXd& log_weights) {
+  const double ess = EffectiveSampleSize(log_weights);
+  const std::vector<Eigen::Index> counted = Significant(log_weights);
+  const auto d = static_cast<Eigen::Index>(priors.size());
+  WeightedPoints data{.points = Eigen::MatrixXd(d, counted.size()),
+                      .counts = Eigen::VectorXd(counted.size())};
+  for (std::size_t k = 0; k < counted.size(); ++k) {
+    const auto column = static_cast<Eigen::Index>(k);
+    data.counts[column] = ess * std::exp(log_weights[counted[k]]);
+    for (Eigen::Index j = 0; j < d; ++j)
+      data.points(j, column) = priors[j].ToStandard(parameters(counted[k], j));
+  }
+  return data;
+}
+
+// The exponent of the likelihood that leaves enough samples to fit to: the target's share of one
+// iteration, but no fewer than two per parameter.
+double TemperingExponent(const FilterOptions& options, const Ensemble& ensemble) {
+  if (options.noise == NoiseMode::kEssTarget) return 1;
+  const double wanted = std::max(options.ess_target * static_cast<double>(ensemble.last_size),
+                                 2.0 * static_cast<double>(ensemble.parameters.cols()));
+  return FindExponent(
+             {.log_start = ensemble.log_start,
+              .log_likelihood = ensemble.log_likelihood,
+              .target = std::min(wanted, 0.5 * static_cast<double>(ensemble.log_start.size())),
+              .max_exponent = 1})
+      .exponent;
+}
+
+Eigen::VectorXd TemperedLogWeights(const Ensemble& ensemble, double exponent) {
+  Eigen::VectorXd result(ensemble.log_start.size());
+  for (Eigen::Index i = 0; i < result.size(); ++i) {
+    const bool counts =
+        ensemble.log_start[i] > -kInfinity && ensemble.log_likelihood[i] > -kInfinity;
+    result[i] = counts ? ensemble.log_start[i] + exponent * ensemble.log_likelihood[i] : -kInfinity;
+  }
+  return NormalizedLogWeights(result);
+}
+
+}  // namespace
+
+absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSet& data,
+                                     const FilterOptions& options,
+                                     std::span<const Iteration> iterations) {
+  const auto ensemble = MakeEnsemble(priors, data, options, iterations);
+  if (!ensemble.ok()) return ensemble.status();
+  const Eigen::VectorXd log_weights =
+      TemperedLogWeights(*ensemble, TemperingExponent(options, *ensemble));
+  const auto mixture = FitDirichletMixture(Standardized(priors, ensemble->parameters, log_weights),
+                                           {.max_components = options.max_components,
+                                            .concentration = options.concentration,
+                                            .seed = options.seed,
+                                            .stream = iterations.size()});
+  if (!mixture.ok()) return mixture.status();
+
+  Proposal proposal;
+  proposal.components = mixture->PlugIn(kNegligibleWeight);
+  proposal.defensive_share = options.defensive_share;
+  const auto d = static_cast<Eigen::Index>(priors.size());
+  Eigen::VectorXd low(d);
+  Eigen::VectorXd high(d);
+  for (Eigen::Index j = 0; j < d; ++j) {
+    const Prior& prior = priors[j];
+    const double least = prior.kind == PriorKind::kLogNormal ? std::max(prior.min, 0.0) : prior.min;
+    low[j] = prior.ToStandard(least);
+    high[j] = prior.ToStandard(prior.max);
+  }
+  proposal.log_acceptance = GaussianMixture(proposal.components).LogBoxMass(low, high);
+  return proposal;
+}
+
+}  // namespace calib::inference

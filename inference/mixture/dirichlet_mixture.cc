@@ -1,0 +1,123 @@
+#include "inference/mixture/dirichlet_mixture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "inference/mixture/k_means.h"
+
+namespace calib::inference {
+namespace {
+
+absl::Status ValidateData(const WeightedPoints& data) {
+  if (data.points.cols() != data.counts.size() || data.points.cols() == 0 ||
+      !data.points.allFinite() || !data.counts.allFinite() || data.counts.minCoeff() < 0) {
+    return absl::InvalidArgumentError(
+        "a mixture needs at least one point, finite coordinates and one finite count >= 0 per "
+        "point.");
+  }
+  if (!(data.counts.sum() > 1)) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "a mixture needs more than one effective sample; there are ", data.counts.sum(), "."));
+  }
+  return absl::OkStatus();
+}
+
+// Hard responsibilities from k-means. The largest cluster takes the first stick: sticks are not
+// exchangeable, and the bound prefers them in falling order, an exchange that coordinate ascent
+// cannot make.
+Eigen::MatrixXd StartResponsibilities(const WeightedPoints& data, int clusters, int components,
+                                      PhiloxStream& stream) {
+  const std::vector<int> labels = KMeans(data, clusters, stream);
+  std::vector<double> sizes(clusters, 0);
+  for (std::size_t i = 0; i < labels.size(); ++i)
+    sizes[labels[i]] += data.counts[static_cast<Eigen::Index>(i)];
+  std::vector<int> order(clusters);
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&sizes](int a, int b) { return sizes[a] > sizes[b]; });
+  std::vector<int> rank(clusters);
+  for (int k = 0; k < clusters; ++k) rank[order[k]] = k;
+  Eigen::MatrixXd responsibilities = Eigen::MatrixXd::Zero(data.points.cols(), components);
+  for (std::size_t i = 0; i < labels.size(); ++i)
+    responsibilities(static_cast<Eigen::Index>(i), rank[labels[i]]) = 1;
+  return responsibilities;
+}
+
+}  // namespace
+
+absl::Status DirichletMixtureOptions::Validate() const {
+  if (max_components < 1 || max_iterations < 1 || restarts < 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("max_components, max_iterations and restarts are ", max_components, ", ",
+                     max_iterations, " and ", restarts, "; each must be at least 1."));
+  }
+  if (!(concentration > 0) || !(tolerance > 0) || !(covariance_floor >= 0)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "concentration, tolerance and covariance_floor are ", concentration, ", ", tolerance,
+        " and ", covariance_floor, "; the first two must be positive, the last not negative."));
+  }
+  return absl::OkStatus();
+}
+
+std::vector<MixtureComponent> DirichletMixture::PlugIn(double negligible) const {
+  const Eigen::VectorXd weights = state.Weights();
+  std::vector<MixtureComponent> components;
+  double total = 0;
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    if (weights[k] < negligible) continue;
+    components.push_back(
+        {.weight = weights[k], .mean = state.means.col(k), .covariance = state.covariances[k]});
+    total += weights[k];
+  }
+  for (MixtureComponent& component : components) component.weight /= total;
+  return components;
+}
+
+DirichletMixture FitFrom(const WeightedPoints& data, const DirichletMixtureOptions& options,
+                         const Eigen::MatrixXd& responsibilities) {
+  DirichletMixture fit;
+  fit.prior = EmpiricalPrior(data, options.concentration, options.covariance_floor);
+  fit.state = MStep(data, fit.prior, responsibilities);
+  fit.lower_bound = -std::numeric_limits<double>::infinity();
+  while (fit.iterations < options.max_iterations && !fit.converged) {
+    const Expectation expectation = EStep(data.points, fit.state);
+    fit.state = MStep(data, fit.prior, expectation.responsibilities);
+    const double bound = IterationBound(data, fit.state, expectation);
+    fit.converged = std::abs(bound - fit.lower_bound) < options.tolerance;
+    fit.lower_bound = bound;
+    ++fit.iterations;
+  }
+  return fit;
+}
+
+absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
+                                                     const DirichletMixtureOptions& options) {
+  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  if (auto valid = ValidateData(data); !valid.ok()) return valid;
+  const MixturePrior prior = EmpiricalPrior(data, options.concentration, options.covariance_floor);
+  if (Eigen::LLT<Eigen::MatrixXd>(prior.inverse_scale).info() != Eigen::Success) {
+    return absl::FailedPreconditionError(
+        "the samples with weight do not span all directions of parameter space: no covariance can "
+        "be estimated.");
+  }
+  std::optional<DirichletMixture> best;
+  for (int start = 0; start < options.restarts; ++start) {
+    PhiloxStream stream({.seed = options.seed,
+                         .purpose = StreamPurpose::kMixtureStart,
+                         .iteration = options.stream,
+                         .sample = static_cast<std::uint64_t>(start)});
+    const int variation = start % 2 == 0 ? 0 : start / 2 % options.max_components;
+    const Eigen::MatrixXd responsibilities = StartResponsibilities(
+        data, options.max_components - variation, options.max_components, stream);
+    DirichletMixture fit = FitFrom(data, options, responsibilities);
+    if (!best || fit.lower_bound > best->lower_bound) best = std::move(fit);
+  }
+  return *std::move(best);
+}
+
+}  // namespace calib::inference

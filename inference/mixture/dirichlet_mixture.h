@@ -1,0 +1,55 @@
+#pragma once
+// Variational Dirichlet-process mixture of Gaussians, fitted to weighted samples [Blei & Jordan
+// 2006; Cheng 2019, sec. 3.5].
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "inference/mixture/gaussian_mixture.h"
+#include "inference/mixture/variational_steps.h"
+
+namespace calib::inference {
+
+struct DirichletMixtureOptions {
+  int max_components = 10;         ///< >= 1, truncation K [Cheng 2019: N/10]
+  double concentration = 0.01;     ///< > 0, gamma (alpha of Cheng 2019); small: few components
+  double covariance_floor = 1e-6;  ///< >= 0, squared units of the points; for a lone point
+  double tolerance = 1e-3;         ///< > 0, change of the lower bound [nats] that ends a start
+  int max_iterations = 1000;       ///< >= 1, of one start
+  int restarts = 10;               ///< >= 1; the largest bound wins, the earliest on a tie
+  std::uint64_t seed = 0;  ///< starts draw from Philox streams (seed, kMixtureStart, stream, start)
+  std::uint64_t stream = 0;       ///< e.g. the iteration of the filter
+  absl::Status Validate() const;  ///< INVALID_ARGUMENT naming the field
+};
+
+struct DirichletMixture {
+  MixturePrior prior;
+  MixtureState state;
+  double lower_bound = 0;  ///< IterationBound at the end
+  int iterations = 0;      ///< of the winning start
+  bool converged = false;
+
+  /// Plug-in mixture: expected weights, means m_k, covariances C_k; the density proposals are drawn
+  /// from. Components of weight below `negligible` are left out (their share goes to the others).
+  std::vector<MixtureComponent> PlugIn(double negligible = 0) const;
+};
+
+/// E and M steps from given responsibilities (n x K) to convergence. Preconditions: valid options,
+/// at least one point, counts summing to more than one, a data covariance that is positive
+/// definite.
+DirichletMixture FitFrom(const WeightedPoints& data, const DirichletMixtureOptions& options,
+                         const Eigen::MatrixXd& responsibilities);
+
+/// The best of options.restarts starts from k-means labels, largest cluster first: every second
+/// start with K clusters, the others with K, K - 1, ... in turn, because optima with few components
+/// are seldom reached by merging ten clusters.
+/// Errors: INVALID_ARGUMENT for options, counts that are negative or not finite;
+/// FAILED_PRECONDITION when the counts sum to one or less, or the points do not span all directions
+/// (no covariance can be estimated).
+absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
+                                                     const DirichletMixtureOptions& options);
+
+}  // namespace calib::inference

@@ -1,0 +1,258 @@
+#include "inference/mixture/variational_steps.h"
+
+#include <boost/math/special_functions/digamma.hpp>
+#include <boost/math/special_functions/gamma.hpp>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace calib::inference {
+namespace {
+
+using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
+
+double Digamma(double x) { return boost::math::digamma(x, Policy()); }
+double LogGamma(double x) { return boost::math::lgamma(x, Policy()); }
+double LogBeta(double a, double b) { return LogGamma(a) + LogGamma(b) - LogGamma(a + b); }
+
+// sum_{i<d} f((nu - i) / 2), the multivariate digamma and log gamma without their constants.
+template <typename Function>
+double SumOverDimensions(double degrees_of_freedom, Eigen::Index d, Function function) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < d; ++i)
+    sum += function(0.5 * (degrees_of_freedom - static_cast<double>(i)));
+  return sum;
+}
+
+Eigen::MatrixXd LowerFactor(const Eigen::MatrixXd& matrix) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
+  assert(factor.info() == Eigen::Success);
+  return factor.matrixL();
+}
+
+double LogDeterminantOfFactor(const Eigen::MatrixXd& lower) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < lower.rows(); ++i) sum += std::log(lower(i, i));
+  return sum;
+}
+
+// ln |W_k| from C_k = W_k^-1 / nu_k.
+double LogDeterminantOfScale(const MixtureState& state, Eigen::Index k) {
+  const auto d = static_cast<double>(state.means.rows());
+  return -2 * LogDeterminantOfFactor(LowerFactor(state.covariances[k])) -
+         d * std::log(state.degrees_of_freedom[k]);
+}
+
+// E ln |L_k|                                                                      [Bishop 2006,
+// Eq. 10.65]
+double ExpectedLogPrecision(const MixtureState& state, Eigen::Index k) {
+  const Eigen::Index d = state.means.rows();
+  return SumOverDimensions(state.degrees_of_freedom[k], d, Digamma) +
+         static_cast<double>(d) * std::numbers::ln2 + LogDeterminantOfScale(state, k);
+}
+
+// E ln pi_k = E ln v_k + sum_{l<k} E ln (1 - v_l).
+Eigen::VectorXd ExpectedLogWeights(const MixtureState& state) {
+  Eigen::VectorXd result(state.size());
+  double rest = 0;
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    const double sum = Digamma(state.a[k] + state.b[k]);
+    result[k] = Digamma(state.a[k]) - sum + rest;
+    rest += Digamma(state.b[k]) - sum;
+  }
+  return result;
+}
+
+}  // namespace
+
+MixturePrior EmpiricalPrior(const WeightedPoints& data, double concentration,
+                            double covariance_floor) {
+  const Eigen::Index d = data.points.rows();
+  const Eigen::Index n = data.points.cols();
+  double total = 0;
+  for (const double count : data.counts) total += count;
+  assert(total > 1);
+  MixturePrior prior{.concentration = concentration,
+                     .mean_precision = 1,
+                     .degrees_of_freedom = static_cast<double>(d),
+                     .mean = Eigen::VectorXd::Zero(d),
+                     .inverse_scale = Eigen::MatrixXd::Zero(d, d),
+                     .covariance_floor = covariance_floor};
+  for (Eigen::Index i = 0; i < n; ++i) prior.mean += data.counts[i] * data.points.col(i);
+  prior.mean /= total;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::VectorXd difference = data.points.col(i) - prior.mean;
+    prior.inverse_scale += data.counts[i] * difference * difference.transpose();
+  }
+  prior.inverse_scale /= total - 1;
+  return prior;
+}
+
+Eigen::VectorXd MixtureState::Weights() const {
+  Eigen::VectorXd weights(size());
+  double rest = 1;
+  double total = 0;
+  for (Eigen::Index k = 0; k < size(); ++k) {
+    const double sum = a[k] + b[k];
+    weights[k] = a[k] / sum * rest;
+    rest *= b[k] / sum;
+    total += weights[k];
+  }
+  return weights / total;
+}
+
+Expectation EStep(const Eigen::MatrixXd& points, const MixtureState& state) {
+  const auto d = static_cast<double>(points.rows());
+  const Eigen::Index n = points.cols();
+  const Eigen::VectorXd log_weights = ExpectedLogWeights(state);
+  Expectation expectation{.responsibilities = Eigen::MatrixXd(n, state.size()),
+                          .log_responsibilities = Eigen::MatrixXd(n, state.size()),
+                          .log_density = Eigen::VectorXd(n)};
+  Eigen::MatrixXd& log_rho = expectation.log_responsibilities;
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    // E ln N = (E ln|L| - d/beta - nu (x - m)^T W (x - m) - d ln 2 pi) / 2  [Bishop 2006,
+    // Eq. 10.64]
+    const Eigen::MatrixXd whiten =
+        LowerFactor(state.covariances[k])
+            .triangularView<Eigen::Lower>()
+            .solve(Eigen::MatrixXd::Identity(points.rows(), points.rows()));
+    const double constant =
+        log_weights[k] + 0.5 * (ExpectedLogPrecision(state, k) - d / state.mean_precision[k] -
+                                d * std::log(2 * std::numbers::pi));
+    for (Eigen::Index i = 0; i < n; ++i) {
+      double square = 0;
+      for (Eigen::Index j = 0; j < points.rows(); ++j) {
+        double z = 0;
+        for (Eigen::Index l = 0; l <= j; ++l)
+          z += whiten(j, l) * (points(l, i) - state.means(l, k));
+        square += z * z;
+      }
+      log_rho(i, k) = constant - 0.5 * square;
+    }
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double largest = log_rho.row(i).maxCoeff();
+    double sum = 0;
+    for (Eigen::Index k = 0; k < state.size(); ++k) {
+      const double rho = std::exp(log_rho(i, k) - largest);
+      expectation.responsibilities(i, k) = rho;
+      sum += rho;
+    }
+    const double log_density = largest + std::log(sum);
+    expectation.log_density[i] = log_density;
+    for (Eigen::Index k = 0; k < state.size(); ++k) {
+      expectation.responsibilities(i, k) /= sum;
+      log_rho(i, k) -= log_density;
+    }
+  }
+  return expectation;
+}
+
+MixtureState MStep(const WeightedPoints& data, const MixturePrior& prior,
+                   const Eigen::MatrixXd& responsibilities) {
+  const Eigen::Index d = data.points.rows();
+  const Eigen::Index n = data.points.cols();
+  const Eigen::Index components = responsibilities.cols();
+  assert(responsibilities.rows() == n);
+  MixtureState state{.a = Eigen::VectorXd(components),
+                     .b = Eigen::VectorXd(components),
+                     .mean_precision = Eigen::VectorXd(components),
+                     .degrees_of_freedom = Eigen::VectorXd(components),
+                     .means = Eigen::MatrixXd(d, components),
+                     .covariances = std::vector<Eigen::MatrixXd>(components)};
+  Eigen::VectorXd size(components);
+  for (Eigen::Index k = 0; k < components; ++k) {
+    size[k] = 10 * std::numeric_limits<double>::epsilon();
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(d);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double share = data.counts[i] * responsibilities(i, k);
+      size[k] += share;
+      mean += share * data.points.col(i);
+    }
+    mean /= size[k];
+    Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(d, d);  // lower triangle of N_k S_k
+    Eigen::VectorXd difference(d);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double share = data.counts[i] * responsibilities(i, k);
+      if (share == 0) continue;
+      difference = data.points.col(i) - mean;
+      for (Eigen::Index j = 0; j < d; ++j) {
+        const double scaled = share * difference[j];
+        for (Eigen::Index l = j; l < d; ++l) scatter(l, j) += scaled * difference[l];
+      }
+    }
+    state.mean_precision[k] = prior.mean_precision + size[k];
+    state.degrees_of_freedom[k] = prior.degrees_of_freedom + size[k];
+    state.means.col(k) =
+        (prior.mean_precision * prior.mean + size[k] * mean) / state.mean_precision[k];
+    const Eigen::VectorXd pull = mean - prior.mean;
+    Eigen::MatrixXd inverse_scale = scatter.selfadjointView<Eigen::Lower>();
+    inverse_scale.diagonal().array() += size[k] * prior.covariance_floor;
+    inverse_scale += prior.inverse_scale + size[k] * prior.mean_precision /
+                                               state.mean_precision[k] * pull * pull.transpose();
+    state.covariances[k] = inverse_scale / state.degrees_of_freedom[k];
+  }
+  double later = 0;
+  for (Eigen::Index k = components - 1; k >= 0; --k) {
+    state.a[k] = 1 + size[k];
+    state.b[k] = prior.concentration + later;
+    later += size[k];
+  }
+  return state;
+}
+
+double IterationBound(const WeightedPoints& data, const MixtureState& state,
+                      const Expectation& expectation) {
+  const Eigen::Index d = state.means.rows();
+  const auto dimensions = static_cast<double>(d);
+  double bound = 0;
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    for (Eigen::Index i = 0; i < data.points.cols(); ++i) {
+      bound -= data.counts[i] * expectation.responsibilities(i, k) *
+               expectation.log_responsibilities(i, k);
+    }
+    const double nu = state.degrees_of_freedom[k];
+    bound += 0.5 * nu * (LogDeterminantOfScale(state, k) + dimensions * std::numbers::ln2) +
+             SumOverDimensions(nu, d, LogGamma);
+    bound += LogBeta(state.a[k], state.b[k]) - 0.5 * dimensions * std::log(state.mean_precision[k]);
+  }
+  return bound;
+}
+
+double EvidenceLowerBound(const WeightedPoints& data, const MixturePrior& prior,
+                          const MixtureState& state) {
+  const Eigen::Index d = state.means.rows();
+  const auto dimensions = static_cast<double>(d);
+  const Expectation expectation = EStep(data.points, state);
+  double bound = 0;
+  for (Eigen::Index i = 0; i < data.points.cols(); ++i)
+    bound += data.counts[i] * expectation.log_density[i];
+  const double nu0 = prior.degrees_of_freedom;
+  const double log_scale0 = -2 * LogDeterminantOfFactor(LowerFactor(prior.inverse_scale));
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    const double a = state.a[k];
+    const double b = state.b[k];
+    const double kl_beta = LogBeta(1, prior.concentration) - LogBeta(a, b) + (a - 1) * Digamma(a) +
+                           (b - prior.concentration) * Digamma(b) +
+                           (1 - a + prior.concentration - b) * Digamma(a + b);
+    const double nu = state.degrees_of_freedom[k];
+    const double beta_ratio = prior.mean_precision / state.mean_precision[k];
+    const Eigen::MatrixXd factor = LowerFactor(state.covariances[k]);
+    const auto lower = factor.triangularView<Eigen::Lower>();
+    // nu W = C^-1, so quadratic forms of W come from C.
+    const double pull = lower.solve(state.means.col(k) - prior.mean).squaredNorm();
+    const double kl_mean = 0.5 * (-dimensions * std::log(beta_ratio) + dimensions * beta_ratio +
+                                  prior.mean_precision * pull - dimensions);
+    const double trace =
+        lower.solve(LowerFactor(prior.inverse_scale)).squaredNorm();  // nu tr(W0^-1 W)
+    const double kl_wishart =
+        0.5 * (nu0 * (log_scale0 - LogDeterminantOfScale(state, k)) + trace - nu * dimensions) +
+        SumOverDimensions(nu0, d, LogGamma) - SumOverDimensions(nu, d, LogGamma) +
+        0.5 * (nu - nu0) * SumOverDimensions(nu, d, Digamma);
+    bound -= kl_beta + kl_mean + kl_wishart;
+  }
+  return bound;
+}
+
+}  // namespace calib::inference

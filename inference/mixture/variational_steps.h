@@ -1,0 +1,75 @@
+#pragma once
+// The coordinate ascent behind the Dirichlet-process mixture: E step, M step, lower bounds.
+
+#include <Eigen/Dense>
+#include <vector>
+
+namespace calib::inference {
+
+/// Samples as columns, each with the number of observations it stands for. A weight of three is the
+/// same as three copies of the sample with weight one.
+struct WeightedPoints {
+  Eigen::MatrixXd points;  ///< d x n, finite
+  Eigen::VectorXd counts;  ///< n, >= 0, with a sum above one
+};
+
+/// Gauss-Wishart and stick-breaking priors [Bishop 2006, sec. 10.2; Blei & Jordan 2006].
+struct MixturePrior {
+  double concentration = 0.01;     ///< gamma: each stick v_k ~ Beta(1, gamma)
+  double mean_precision = 1;       ///< beta0
+  double degrees_of_freedom = 1;   ///< nu0 >= d
+  Eigen::VectorXd mean;            ///< m0
+  Eigen::MatrixXd inverse_scale;   ///< W0^-1: expected scatter times nu0
+  double covariance_floor = 1e-6;  ///< added to the diagonal of each component's scatter S_k
+};
+
+/// Empirical prior: m0 and W0^-1 are mean and sample covariance (divisor sum of counts - 1) of the
+/// data, beta0 = 1, nu0 = d. What scikit-learn's BayesianGaussianMixture takes by default, so that
+/// its results can be compared digit by digit.
+MixturePrior EmpiricalPrior(const WeightedPoints& data, double concentration,
+                            double covariance_floor);
+
+/// Variational posterior of K components:
+///   v_k ~ Beta(a_k, b_k),  mu_k | L_k ~ N(m_k, (beta_k L_k)^-1),  L_k ~ Wishart(W_k, nu_k),  C_k =
+///   W_k^-1 / nu_k
+struct MixtureState {
+  Eigen::VectorXd a, b;                      ///< K
+  Eigen::VectorXd mean_precision;            ///< K, beta_k
+  Eigen::VectorXd degrees_of_freedom;        ///< K, nu_k
+  Eigen::MatrixXd means;                     ///< d x K
+  std::vector<Eigen::MatrixXd> covariances;  ///< K of d x d, C_k: plug-in covariance
+  Eigen::Index size() const { return a.size(); }
+  /// Expected weights E v_k prod_{l<k} E(1 - v_l), renormalised over the K sticks.
+  Eigen::VectorXd Weights() const;
+};
+
+/// E step. ln rho_nk = E ln pi_k + E ln N(x_n; mu_k, L_k^-1)                                [Bishop
+/// 2006, Eq. 10.46]
+struct Expectation {
+  Eigen::MatrixXd responsibilities;      ///< n x K, rho_nk normalised: rows sum to one
+  Eigen::MatrixXd log_responsibilities;  ///< n x K
+  Eigen::VectorXd log_density;           ///< n, ln sum_k rho_nk: scikit-learn's score_samples
+};
+Expectation EStep(const Eigen::MatrixXd& points, const MixtureState& state);
+
+/// M step: the Gauss-Wishart and Beta posteriors for given responsibilities       [Bishop 2006,
+/// Eqs. 10.51-10.63]
+///   a_k = 1 + N_k, b_k = gamma + sum_{l>k} N_l                                   [Blei & Jordan
+///   2006, Eqs. 18-19]
+/// N_k carries ten machine epsilons so that an empty component keeps its prior without a division
+/// by zero.
+MixtureState MStep(const WeightedPoints& data, const MixturePrior& prior,
+                   const Eigen::MatrixXd& responsibilities);
+
+/// Lower bound up to a constant of data and prior, valid right after the M step that used these
+/// responsibilities: cheap, watched for convergence. Equals scikit-learn's lower_bound_.
+double IterationBound(const WeightedPoints& data, const MixtureState& state,
+                      const Expectation& expectation);
+
+/// The complete evidence lower bound at a state with its own E step:
+///   sum_n c_n ln sum_k rho_nk - sum_k KL(Beta) - sum_k KL(Gauss-Wishart)          [Bishop 2006,
+///   Eq. 10.70]
+double EvidenceLowerBound(const WeightedPoints& data, const MixturePrior& prior,
+                          const MixtureState& state);
+
+}  // namespace calib::inference

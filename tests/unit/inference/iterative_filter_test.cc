@@ -1,0 +1,194 @@
+#include "inference/filter/iterative_filter.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace calib::inference {
+namespace {
+
+using testing::HasSubstr;
+
+const std::vector<Prior>& Priors() {
+  static const std::vector<Prior> priors{{.kind = PriorKind::kUniform, .min = 0, .max = 1},
+                                         {.kind = PriorKind::kUniform, .min = 2, .max = 4}};
+  return priors;
+}
+
+// Both parameters are read once, in two load steps.
+DataSet Data(double sd) {
+  DataSet data;
+  data.readings.push_back({.observable = 0, .load_step = 0, .value = 0.4, .sd = sd});
+  data.readings.push_back({.observable = 1, .load_step = 1, .value = 3.1, .sd = sd});
+  return data;
+}
+
+Iteration FirstIteration(const FilterOptions& options, int n) {
+  Iteration iteration;
+  iteration.parameters = DrawSamples({}, Priors(), options, 0, n).value();
+  iteration.predictions = iteration.parameters;
+  return iteration;
+}
+
+std::string Message(const absl::Status& status) { return std::string(status.message()); }
+
+TEST(DrawSamples, FirstIterationIsTheHaltonDesign) {
+  const Eigen::MatrixXd samples = DrawSamples({}, Priors(), {}, 0, 3).value();
+  EXPECT_NEAR(samples(0, 0), 0.5, 1e-15);
+  EXPECT_NEAR(samples(2, 0), 0.75, 1e-15);
+  EXPECT_NEAR(samples(1, 1), 2 + 2 * 2.0 / 3, 1e-15);
+}
+
+TEST(DrawSamples, SobolDesignFollowsTheSeed) {
+  const auto draw = [](std::uint64_t seed) {
+    return DrawSamples({}, Priors(), {.design = Design::kSobol, .seed = seed}, 0, 16).value();
+  };
+  EXPECT_EQ(draw(1), draw(1));
+  EXPECT_NE(draw(1), draw(2));
+}
+
+TEST(DrawSamples, LaterIterationFromThePriorDoesNotRepeatTheDesign) {
+  EXPECT_NE(DrawSamples({}, Priors(), {}, 0, 5).value(),
+            DrawSamples({}, Priors(), {}, 1, 5).value());
+}
+
+TEST(DrawSamples, MixtureOutsideTheSupportIsRefused) {
+  Proposal proposal;
+  proposal.components.push_back(
+      {.weight = 1, .mean = Eigen::Vector2d(50, 50), .covariance = Eigen::Matrix2d::Identity()});
+  proposal.log_acceptance = -1000;
+  EXPECT_EQ(DrawSamples(proposal, Priors(), {}, 1, 5).status().code(),
+            absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(DrawSamples({}, Priors(), {}, 0, 0).status().code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
+TEST(LogImportance, SamplesOfThePriorHaveWeightOne) {
+  const Iteration iteration = FirstIteration({}, 20);
+  EXPECT_LE(LogImportance(Priors(), std::span(&iteration, 1)).cwiseAbs().maxCoeff(), 1e-14);
+}
+
+TEST(LogImportance, OutsideThePriorThereIsNoWeight) {
+  Iteration iteration = FirstIteration({}, 20);
+  iteration.log_proposal = Eigen::VectorXd::Zero(20);
+  iteration.parameters(3, 0) = 1.5;
+  EXPECT_EQ(LogImportance(Priors(), std::span(&iteration, 1))[3], -INFINITY);
+}
+
+// Weights are bounded by the reciprocal of the prior's share in all draws.
+TEST(LogImportance, DefensiveShareBoundsTheWeights) {
+  const FilterOptions options{.seed = 2};
+  std::vector<Iteration> iterations{FirstIteration(options, 100)};
+  Iteration second;
+  second.proposal = FitProposal(Priors(), Data(0.05), options, iterations).value();
+  second.parameters = DrawSamples(second.proposal, Priors(), options, 1, 300).value();
+  second.predictions = second.parameters;
+  iterations.push_back(second);
+  const double share = (100 + 300 * options.defensive_share) / 400;
+  const Eigen::VectorXd log_weights = LogImportance(Priors(), iterations);
+  EXPECT_LE(log_weights.maxCoeff(), -std::log(share) + 1e-12);
+  EXPECT_NEAR(log_weights.array().exp().mean(), 1, 0.15);
+}
+
+TEST(ComputePosterior, TinyNoiseStaysFinite) {
+  const FilterOptions options;
+  const Iteration iteration = FirstIteration(options, 100);
+  const auto posterior = ComputePosterior(Priors(), Data(1e-9), options, std::span(&iteration, 1));
+  ASSERT_TRUE(posterior.ok()) << posterior.status();
+  EXPECT_TRUE(std::isfinite(posterior->log_evidence));
+  EXPECT_NEAR(posterior->ess, 1, 1e-9);
+  EXPECT_EQ(posterior->parameters[0].sd, 0);
+  EXPECT_EQ(posterior->path.load_step, (std::vector<int>{0, 1}));
+  EXPECT_THAT(posterior->warnings, testing::ElementsAre(HasSubstr("not reliable")));
+}
+
+TEST(ComputePosterior, AllDivergedIsAnErrorThatSaysSo) {
+  Iteration iteration = FirstIteration({}, 10);
+  iteration.predictions.setConstant(NAN);
+  const auto status = ComputePosterior(Priors(), Data(0.1), {}, std::span(&iteration, 1)).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(Message(status), HasSubstr("10 diverged"));
+}
+
+TEST(ComputePosterior, BadInputIsRefused) {
+  Iteration iteration = FirstIteration({}, 10);
+  const auto solve = [&](const DataSet& data, const FilterOptions& options) {
+    return ComputePosterior(Priors(), data, options, std::span(&iteration, 1)).status().code();
+  };
+  EXPECT_EQ(solve({}, {}), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(solve(Data(-1), {}), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(solve(Data(1), {.ess_target = 1}), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(solve(Data(1), {.defensive_share = 1}), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ComputePosterior(Priors(), Data(1), {}, {}).status().code(),
+            absl::StatusCode::kFailedPrecondition);
+  iteration.predictions.resize(10, 3);
+  EXPECT_EQ(solve(Data(1), {}), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(ComputePosterior, EffectiveSampleSizeTargetUsesTheLastIterationAndLabelsItself) {
+  const FilterOptions options{.noise = NoiseMode::kEssTarget, .ess_target = 0.3};
+  const std::vector<Iteration> iterations{FirstIteration(options, 50),
+                                          FirstIteration(options, 100)};
+  const auto posterior = ComputePosterior(Priors(), Data(0), options, iterations);
+  ASSERT_TRUE(posterior.ok()) << posterior.status();
+  ASSERT_EQ(posterior->log_weights.size(), 150);
+  EXPECT_EQ(posterior->log_weights.head(50).maxCoeff(), -INFINITY);
+  EXPECT_NEAR(posterior->ess, 30, 1e-6);
+  EXPECT_GT(posterior->sigma.value(), 0);
+  EXPECT_THAT(posterior->warnings, testing::ElementsAre(HasSubstr("tempers the data")));
+  EXPECT_EQ(LogLikelihood(Data(0), options, iterations[0].predictions).status().code(),
+            absl::StatusCode::kFailedPrecondition);
+}
+
+TEST(ComputePosterior, AtBoundWhenTheDataPullOutOfThePrior) {
+  const FilterOptions options;
+  const Iteration iteration = FirstIteration(options, 500);
+  DataSet data = Data(0.05);
+  data.readings[0].value = -0.1;
+  const auto posterior = ComputePosterior(Priors(), data, options, std::span(&iteration, 1));
+  EXPECT_TRUE(posterior->parameters[0].at_bound);
+  EXPECT_FALSE(posterior->parameters[1].at_bound);
+}
+
+TEST(MeansConverged, RelativeToTheMeanOrToTheScaleOfThePrior) {
+  Posterior before;
+  before.parameters = {{.mean = 100, .sd = 1, .prior_sd = 20},
+                       {.mean = 0.001, .sd = 1, .prior_sd = 20}};
+  Posterior now = before;
+  const FilterOptions options{.tolerance = 0.01};
+  now.parameters[0].mean = 100.9;
+  now.parameters[1].mean = 0.02;  // twenty times as much, but a thousandth of the prior's sd
+  EXPECT_TRUE(MeansConverged(before, now, options));
+  now.parameters[0].mean = 102;
+  EXPECT_FALSE(MeansConverged(before, now, options));
+  now.parameters[0].mean = NAN;
+  EXPECT_FALSE(MeansConverged(before, now, options));
+}
+
+TEST(ViewOnline, CountsWhatEveryUndivergedSampleHasReached) {
+  const FilterOptions options;
+  DataSet data = Data(0.1);
+  data.readings.push_back({.experiment = 1, .load_step = 0, .value = 1, .sd = 0.1});
+  Eigen::MatrixXd predictions(3, 3);
+  predictions << 0.4, NAN, 1, 0.6, 3.1, 1.05, NAN, NAN, NAN;
+  const std::vector<char> diverged{0, 0, 1};
+  // The second load step of experiment 0 is not common; experiment 1 is.
+  const OnlineView view = ViewOnline(data, options, predictions, diverged);
+  EXPECT_EQ(view.readings, 2);
+  EXPECT_EQ(view.best, 0);
+  EXPECT_NEAR(view.best_rms, 0, 1e-12);
+  EXPECT_NEAR(view.ess, 1, 0.3);
+}
+
+TEST(ViewOnline, BeforeAnythingHasArrived) {
+  const Eigen::MatrixXd predictions = Eigen::MatrixXd::Constant(2, 2, NAN);
+  const OnlineView view = ViewOnline(Data(0.1), {}, predictions, std::vector<char>{0, 0});
+  EXPECT_EQ(view.readings, 0);
+  EXPECT_EQ(view.best, -1);
+  EXPECT_EQ(view.ess, 2);
+  EXPECT_EQ(ViewOnline(Data(0.1), {}, predictions, std::vector<char>{1, 1}).ess, 0);
+}
+
+}  // namespace
+}  // namespace calib::inference
