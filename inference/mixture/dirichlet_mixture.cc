@@ -78,6 +78,17 @@ std::vector<MixtureComponent> DirichletMixture::PlugIn(double negligible) const 
   return components;
 }
 
+std::vector<MixtureComponent> DirichletMixture::Predictive(double negligible) const {
+  DirichletMixture widened = *this;
+  const auto d = static_cast<double>(state.means.rows());
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    const double nu = state.degrees_of_freedom[k];
+    widened.state.covariances[k] *=
+        nu * (1 + 1 / state.mean_precision[k]) / std::max(nu - d - 1, 1.0);
+  }
+  return widened.PlugIn(negligible);
+}
+
 DirichletMixture FitFrom(const WeightedPoints& data, const DirichletMixtureOptions& options,
                          const Eigen::MatrixXd& responsibilities) {
   DirichletMixture fit;
