@@ -50,7 +50,8 @@ DirichletMixture FitFrom(const WeightedPoints& data, const DirichletMixtureOptio
 
 /// The best of options.restarts starts from k-means labels, largest cluster first: every second
 /// start with K clusters, the others with K, K - 1, ... in turn, because optima with few components
-/// are seldom reached by merging ten clusters.
+/// are seldom reached by merging ten clusters. All starts run until the bound changes by less than
+/// 0.1, the best two of them on to options.tolerance.
 /// Errors: INVALID_ARGUMENT for options, counts that are negative or not finite;
 /// FAILED_PRECONDITION when the counts sum to one or less, or the points do not span all directions
 /// (no covariance can be estimated).
