@@ -22,13 +22,11 @@ struct Curve {
   double steps = 0;
 };
 
-/// Mean over repeats whose first grain is moved by 1e-6 m times the number of the repeat.
-Curve MeanCurve(Scenario scenario) {
-  const double x0 = scenario.packing.x[0];
+/// Mean over perturbed repeats.
+Curve MeanCurve(const Scenario& scenario) {
   std::vector<test::Run> runs;
   for (int r = 0; r < kRepeats; ++r) {
-    scenario.packing.x[0] = x0 + r * 1e-6;
-    runs.push_back(test::RunAll(scenario));
+    runs.push_back(test::RunAll(test::Perturbed(scenario, r)));
     EXPECT_EQ(runs.back().summary.outcome, Outcome::kCompleted) << runs.back().summary.reason;
   }
   Curve curve;

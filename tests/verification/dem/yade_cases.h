@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <map>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -80,6 +81,17 @@ inline Scenario CaseScenario(const std::string& name, const std::string& test, d
     s.path.push_back({.target = strains[k], .load_step = static_cast<int>(k)});
   }
   return s;
+}
+
+/// Repeat r of a scenario: every grain moved by up to 1e-6 m along x; repeat 0 is the scenario
+/// itself.
+inline Scenario Perturbed(Scenario scenario, int r) {
+  std::mt19937 random(static_cast<unsigned>(r));
+  std::uniform_real_distribution<double> shift(-1e-6, 1e-6);
+  for (double& x : scenario.packing.x) {
+    x += r > 0 ? shift(random) : 0.0;
+  }
+  return scenario;
 }
 
 inline double Observable(const State& state, const std::string& name) {
