@@ -141,6 +141,9 @@ void Judge(const EmulatorOptions& options, const TrainedEmulator& trained,
   result.emulator_sd = std::sqrt(prediction.sd.squaredNorm() /
                                  (static_cast<double>(prediction.sd.rows()) * readings)) /
                        unit;
+  const double shared = options.training.scatter_share * result.scatter * result.scatter;
+  const double uncovered = std::sqrt(
+      std::max(0.0, result.cross_validated_error * result.cross_validated_error - shared));
   result.adequate = false;
   if (result.cross_validated_error > options.max_error) {
     result.reason = absl::StrFormat(
@@ -150,6 +153,14 @@ void Judge(const EmulatorOptions& options, const TrainedEmulator& trained,
         "parameters, or state a "
         "larger noise.",
         result.cross_validated_error, options.max_error, result.scatter);
+  } else if (uncovered > options.max_uncovered) {
+    result.reason = absl::StrFormat(
+        "The emulator misses its own runs by %.1f standard deviations of the readings' noise "
+        "beyond the scatter that the "
+        "measurement is taken to share (limit %g): run more samples near the posterior, or give "
+        "the measurement a larger "
+        "share of the scatter.",
+        uncovered, options.max_uncovered);
   } else if (result.calibration > options.max_calibration) {
     result.reason = absl::StrFormat(
         "The emulator's errors on its own runs are %.1f times as large as it claims (limit %.1f): "
@@ -179,6 +190,7 @@ absl::Status EmulatorOptions::Validate() const {
   if (!(target_cv > 0 && target_cv <= 2)) return wrong("target_cv", target_cv, "above 0 up to 2");
   if (steps < 1) return wrong("steps", steps, "1 or more");
   if (!(max_error > 0)) return wrong("max_error", max_error, "above 0");
+  if (!(max_uncovered > 0)) return wrong("max_uncovered", max_uncovered, "above 0");
   if (!(max_calibration > 1)) return wrong("max_calibration", max_calibration, "above 1");
   return absl::OkStatus();
 }

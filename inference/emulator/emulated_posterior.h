@@ -24,13 +24,16 @@ struct EmulatorOptions {
   /// kGiven or kInferred. kEssTarget is a tempering chosen from the weights of the runs themselves,
   /// there is nothing in it to emulate: INVALID_ARGUMENT.
   NoiseMode noise = NoiseMode::kGiven;
-  TrainingOptions training;
+  TrainingOptions training = {};
   int draws = 2000;        ///< from the posterior, [100, 1e5]; also the population of the sampler
   double target_cv = 0.7;  ///< of the sampler's weights per stage, see TmcmcOptions
   int steps = 5;           ///< Metropolis steps per stage, see TmcmcOptions
-  double max_error =
-      2;  ///< limit of cross_validated_error, > 0; README.md of this folder has its reason
-  double max_calibration = 2;  ///< limit of calibration, > 1
+  /// Limits of an adequate emulator; README.md of this folder has the reasons. Of
+  /// cross_validated_error; of the part of it that the likelihood's covariance does not contain,
+  /// sqrt(error^2 - scatter_share scatter^2); of calibration.
+  double max_error = 3;        ///< > 0
+  double max_uncovered = 2;    ///< > 0
+  double max_calibration = 2;  ///< > 1
   std::uint64_t seed = 0;
   absl::Status Validate() const;
 };

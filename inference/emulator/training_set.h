@@ -19,7 +19,7 @@ struct TrainingOptions {
   double share_of_rest =
       0.25;  ///< of the other runs, kept in a local training set to tie the far field down, [0, 1]
   double scatter_share = 1;  ///< see EmulatedLikelihood
-  PrincipalOptions principal;
+  PrincipalOptions principal = {};
   absl::Status Validate() const;
 };
 
