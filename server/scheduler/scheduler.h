@@ -117,6 +117,8 @@ class Scheduler {
   Ports& ports_;
   SchedulerOptions options_;
   LeaseTable leases_;
+  std::set<std::int64_t>
+      ending_;  // attempts whose end is on its way to the disk: neither held nor refused
   WorkerTable workers_;
   std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over
   std::set<store::EvaluationKey> queue_;                       // waiting, of leasable campaigns

@@ -80,6 +80,9 @@ void Scheduler::Disconnected(std::int64_t session) {
 }
 
 void Scheduler::Refuse(std::int64_t session, std::int64_t attempt) {
+  if (ending_.count(attempt) > 0) {
+    return;  // the acknowledgement follows
+  }
   v1::ServerMessage message;
   message.mutable_ack()->set_attempt(attempt);
   message.mutable_ack()->set_refused(true);
@@ -211,6 +214,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   run.SetStatus(lease.key, status, failures);
   ++version_;
   const bool diverged = status == EvaluationStatus::kDiverged;
+  ending_.insert(lease.attempt);
   ports_.Write(
       [key = lease.key, status, failures, diverged, now = ports_.UnixMs(),
        name = NameOf(run, lease.key),
@@ -222,6 +226,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
         }
       },
       [this, session, lease, states = finished.states()](const absl::Status& committed) {
+        ending_.erase(lease.attempt);
         if (!committed.ok()) {
           return;
         }
