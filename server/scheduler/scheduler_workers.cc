@@ -55,6 +55,9 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   welcome.mutable_welcome()->set_heartbeat_ms(static_cast<int>(options_.heartbeat.count()));
   welcome.mutable_welcome()->set_lease_ms(static_cast<int>(options_.lease.count()));
   ports_.Send(session, std::move(welcome));
+  if (workers_.Find(hello.name())->draining) {  // it may have missed the message
+    SendDrain(session);
+  }
 
   const std::set<std::int64_t> held(hello.attempts().begin(), hello.attempts().end());
   for (const std::int64_t attempt : held) {
@@ -77,6 +80,12 @@ void Scheduler::Disconnected(std::int64_t session) {
   // Its leases stay: the worker may only have lost the connection and go on computing.
   workers_.Disconnect(session);
   ++version_;
+}
+
+void Scheduler::SendDrain(std::int64_t session) {
+  v1::ServerMessage message;
+  message.mutable_drain();
+  ports_.Send(session, std::move(message));
 }
 
 void Scheduler::Refuse(std::int64_t session, std::int64_t attempt) {
@@ -105,6 +114,19 @@ void Scheduler::Receive(std::int64_t session, const v1::Heartbeat& heartbeat) {
   if (was_silent) {
     Dispatch();
   }
+}
+
+void Scheduler::Receive(std::int64_t session, const v1::Leaving& /*leaving*/) {
+  WorkerEntry* worker = workers_.OfSession(session);
+  if (worker == nullptr) {
+    return;
+  }
+  worker->leaving = true;
+  for (const LeaseEntry& lease : leases_.OfWorker(worker->hello.name())) {
+    leases_.Release(lease.attempt);
+    GiveBack(lease, Because(lease.attempt, "the worker left"), "stopped", false);
+  }
+  Dispatch();
 }
 
 void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
@@ -186,6 +208,7 @@ void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
       End(session, lease, EvaluationStatus::kDiverged, finished);
       break;
     case v1::Finished::OUTCOME_STOPPED:  // of its own accord: the node is going down
+      worker->leaving = true;
       GiveBack(lease, finished, "stopped", false);
       Refuse(session, finished.attempt());
       break;
@@ -342,9 +365,7 @@ absl::StatusOr<v1::WorkerInfo> Scheduler::Drain(const std::string& name) {
     return absl::NotFoundError(absl::StrCat("there is no worker ", name));
   }
   worker->draining = true;
-  v1::ServerMessage message;
-  message.mutable_drain();
-  ports_.Send(worker->session, std::move(message));
+  SendDrain(worker->session);
   ++version_;
   for (const v1::WorkerInfo& info : Workers()) {
     if (info.name() == name) {

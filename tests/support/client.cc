@@ -70,6 +70,7 @@ Client::Client(const std::string& address)
 }
 Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
+Client& Client::operator=(Client&&) noexcept = default;
 
 absl::Status Client::PutBlob(const std::string& content) {
   grpc::ClientContext context;

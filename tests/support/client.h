@@ -20,6 +20,7 @@ class Client {
   explicit Client(const std::string& address);
   ~Client();
   Client(Client&&) noexcept;
+  Client& operator=(Client&&) noexcept;
 
   absl::Status PutBlob(const std::string& content);
   absl::StatusOr<v1::SubmitReply> Submit(const v1::SubmitRequest& request);
