@@ -269,10 +269,9 @@ class Worker::Impl {
   // ---- leaving ----
 
   void LeaveIfDrained() {
-    if (draining_ && !stopping_ && held_.empty() && ending_.empty()) {
+    if (draining_ && !stopping_ && !leaving_ && held_.empty() && ending_.empty()) {
       spdlog::info("drained");
-      leaving_ = true;
-      link_.FinishSending();
+      Leave();
     }
   }
 
@@ -306,9 +305,17 @@ class Worker::Impl {
     if (!open_) {
       Quit();
     } else if (held_.empty() && !leaving_) {
-      leaving_ = true;
-      link_.FinishSending();
+      Leave();
     }
+  }
+
+  /// The server ends the stream then, which ends this process.
+  void Leave() {
+    leaving_ = true;
+    v1::WorkerMessage message;
+    message.mutable_leaving();
+    link_.Send(std::move(message));
+    link_.FinishSending();
   }
 
   void Quit() {

@@ -114,7 +114,8 @@ class Planner {
     Conclusion conclusion{
         .iteration = iteration,
         .posterior = ToMessage(definition_, posterior, iteration, plan_.converged),
-        .log_weights = {posterior.log_weights.begin(), posterior.log_weights.end()}};
+        .log_weights = {posterior.log_weights.begin(), posterior.log_weights.end()},
+        .log_likelihoods = LogLikelihoods()};
     conclusion.posterior.set_campaign(absl::StrCat("c", record_.submitted.id));
     conclusion.posterior.set_model_evaluations(history_.effort.model_evaluations);
     conclusion.posterior.set_stopped_early(history_.stopped_early);
@@ -125,6 +126,18 @@ class Planner {
     plan_.log.push_back(absl::StrCat("iteration ", iteration, " complete: ", posterior.ess,
                                      " effective samples, log evidence ", posterior.log_evidence));
     plan_.conclusion = std::move(conclusion);
+  }
+
+  std::vector<double> LogLikelihoods() {
+    std::vector<double> values;
+    for (const inference::Iteration& iteration : history_.iterations) {
+      const auto of_iteration =
+          inference::LogLikelihood(definition_.data, campaign_.filter, iteration.predictions);
+      for (Eigen::Index i = 0; i < iteration.predictions.rows(); ++i) {
+        values.push_back(of_iteration.ok() ? (*of_iteration)(i) : store::kUnknown);
+      }
+    }
+    return values;
   }
 
   /// True when the next iteration would exceed what the user allowed.
@@ -261,7 +274,7 @@ void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgres
     transaction.SetPosterior(campaign, conclusion.iteration, PosteriorToJson(conclusion.posterior));
     for (std::size_t i = 0; i < conclusion.log_weights.size(); ++i) {
       transaction.SetWeight(campaign, static_cast<int>(i), conclusion.log_weights[i],
-                            store::kUnknown);
+                            conclusion.log_likelihoods[i]);
     }
   }
   if (plan.start.has_value()) {

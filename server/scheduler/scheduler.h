@@ -56,6 +56,7 @@ class Scheduler {
   void Receive(std::int64_t session, const v1::StateBatch& batch);
   void Receive(std::int64_t session, const v1::Finished& finished);
   void Receive(std::int64_t session, const v1::Heartbeat& heartbeat);
+  void Receive(std::int64_t session, const v1::Leaving& leaving);
   /// NOT_FOUND: no such worker.
   absl::StatusOr<v1::WorkerInfo> Drain(const std::string& worker);
   std::vector<v1::WorkerInfo> Workers() const;
@@ -92,6 +93,7 @@ class Scheduler {
   // Work (scheduler_workers.cc)
   void Dispatch();
   void Grant(const WorkerEntry& worker, const store::EvaluationKey& key);
+  void SendDrain(std::int64_t session);
   void Refuse(std::int64_t session, std::int64_t attempt);
   /// The attempt is over without a result: back to the queue, or the campaign is paused when it
   /// failed too often.
@@ -117,6 +119,8 @@ class Scheduler {
   Ports& ports_;
   SchedulerOptions options_;
   LeaseTable leases_;
+  std::set<std::int64_t>
+      ending_;  // attempts whose end is on its way to the disk: neither held nor refused
   WorkerTable workers_;
   std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over
   std::set<store::EvaluationKey> queue_;                       // waiting, of leasable campaigns

@@ -55,6 +55,9 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   welcome.mutable_welcome()->set_heartbeat_ms(static_cast<int>(options_.heartbeat.count()));
   welcome.mutable_welcome()->set_lease_ms(static_cast<int>(options_.lease.count()));
   ports_.Send(session, std::move(welcome));
+  if (workers_.Find(hello.name())->draining) {  // it may have missed the message
+    SendDrain(session);
+  }
 
   const std::set<std::int64_t> held(hello.attempts().begin(), hello.attempts().end());
   for (const std::int64_t attempt : held) {
@@ -79,7 +82,16 @@ void Scheduler::Disconnected(std::int64_t session) {
   ++version_;
 }
 
+void Scheduler::SendDrain(std::int64_t session) {
+  v1::ServerMessage message;
+  message.mutable_drain();
+  ports_.Send(session, std::move(message));
+}
+
 void Scheduler::Refuse(std::int64_t session, std::int64_t attempt) {
+  if (ending_.count(attempt) > 0) {
+    return;  // the acknowledgement follows
+  }
   v1::ServerMessage message;
   message.mutable_ack()->set_attempt(attempt);
   message.mutable_ack()->set_refused(true);
@@ -102,6 +114,19 @@ void Scheduler::Receive(std::int64_t session, const v1::Heartbeat& heartbeat) {
   if (was_silent) {
     Dispatch();
   }
+}
+
+void Scheduler::Receive(std::int64_t session, const v1::Leaving& /*leaving*/) {
+  WorkerEntry* worker = workers_.OfSession(session);
+  if (worker == nullptr) {
+    return;
+  }
+  worker->leaving = true;
+  for (const LeaseEntry& lease : leases_.OfWorker(worker->hello.name())) {
+    leases_.Release(lease.attempt);
+    GiveBack(lease, Because(lease.attempt, "the worker left"), "stopped", false);
+  }
+  Dispatch();
 }
 
 void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
@@ -183,6 +208,7 @@ void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
       End(session, lease, EvaluationStatus::kDiverged, finished);
       break;
     case v1::Finished::OUTCOME_STOPPED:  // of its own accord: the node is going down
+      worker->leaving = true;
       GiveBack(lease, finished, "stopped", false);
       Refuse(session, finished.attempt());
       break;
@@ -211,6 +237,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   run.SetStatus(lease.key, status, failures);
   ++version_;
   const bool diverged = status == EvaluationStatus::kDiverged;
+  ending_.insert(lease.attempt);
   ports_.Write(
       [key = lease.key, status, failures, diverged, now = ports_.UnixMs(),
        name = NameOf(run, lease.key),
@@ -222,6 +249,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
         }
       },
       [this, session, lease, states = finished.states()](const absl::Status& committed) {
+        ending_.erase(lease.attempt);
         if (!committed.ok()) {
           return;
         }
@@ -337,9 +365,7 @@ absl::StatusOr<v1::WorkerInfo> Scheduler::Drain(const std::string& name) {
     return absl::NotFoundError(absl::StrCat("there is no worker ", name));
   }
   worker->draining = true;
-  v1::ServerMessage message;
-  message.mutable_drain();
-  ports_.Send(worker->session, std::move(message));
+  SendDrain(worker->session);
   ++version_;
   for (const v1::WorkerInfo& info : Workers()) {
     if (info.name() == name) {

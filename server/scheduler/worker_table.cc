@@ -6,6 +6,8 @@ std::int64_t WorkerTable::Connect(const v1::Hello& hello, std::int64_t session,
                                   Clock::time_point now) {
   WorkerEntry& entry = workers_[hello.name()];
   const std::int64_t before = entry.session;
+  entry.draining = entry.draining && !entry.leaving;  // a drained worker that is started again works
+  entry.leaving = false;
   entry.hello = hello;
   entry.session = session;
   entry.heard = now;
@@ -44,7 +46,8 @@ const WorkerEntry* WorkerTable::MostFree(const LeaseTable& leases,
   int most = 0;
   for (const auto& [name, entry] : workers_) {
     const int free = entry.hello.slots() - leases.Busy(name);
-    if (entry.session != 0 && !entry.draining && entry.heard >= heard_since && free > most) {
+    if (entry.session != 0 && !entry.draining && !entry.leaving && entry.heard >= heard_since &&
+        free > most) {
       best = &entry;
       most = free;
     }

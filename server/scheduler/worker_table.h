@@ -15,7 +15,8 @@ namespace calib::scheduler {
 struct WorkerEntry {
   v1::Hello hello{};
   std::int64_t session = 0;  ///< of its stream; 0: not connected
-  bool draining = false;
+  bool draining = false;     ///< takes nothing new, by a user's wish
+  bool leaving = false;      ///< takes nothing new, by its own; until it comes back
   Clock::time_point heard{};
 };
 

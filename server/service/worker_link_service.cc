@@ -121,6 +121,9 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
       case v1::WorkerMessage::kHeartbeat:
         scheduler.Receive(session_, message.heartbeat());
         break;
+      case v1::WorkerMessage::kLeaving:
+        scheduler.Receive(session_, message.leaving());
+        break;
       case v1::WorkerMessage::kHello:
         return absl::InvalidArgumentError("only the first message may be Hello");
       case v1::WorkerMessage::MESSAGE_NOT_SET:

@@ -1,0 +1,75 @@
+// Workers killed, frozen past their lease and woken.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <random>
+#include <thread>
+
+#include "tests/fault/undisturbed.h"
+
+namespace calib::testing {
+namespace {
+
+void Submit(const Deployment& deployment) {
+  Client client = deployment.client();
+  const SmallCampaign campaign = FaultCampaign();
+  ASSERT_TRUE(client.SubmitCampaign(campaign.yaml, campaign.files, "r").ok());
+}
+
+TEST(WorkerLost, KilledTenTimesAtRandomMoments) {
+  Deployment deployment({.name = "killed-worker", .lease_ms = 500});
+  ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+  Submit(deployment);
+  deployment.StartWorker();
+  std::mt19937 random(20260102);
+  std::uniform_int_distribution<int> moment(0, 150);
+  Client client = deployment.client();
+  for (int i = 0; i < 10; ++i) {
+    deployment.StartWorker();
+    const std::string name = "w" + std::to_string(i + 2);
+    ASSERT_TRUE(Eventually(kLong, [&] {
+      const auto workers = client.Workers();
+      return workers.ok() && std::any_of(workers->workers().begin(), workers->workers().end(),
+                                         [&](const auto& w) { return w.name() == name; });
+    })) << deployment.Logs();
+    std::this_thread::sleep_for(std::chrono::milliseconds(moment(random)));
+    deployment.workers().back().Kill();
+  }
+  ASSERT_TRUE(WaitFinished(deployment)) << deployment.Logs();
+  ExpectUndisturbed(deployment);
+}
+
+TEST(WorkerLost, FrozenPastItsLeaseAndWoken) {
+  Deployment deployment({.name = "frozen", .lease_ms = 300, .heartbeat_ms = 50});
+  ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+  Submit(deployment);
+  deployment.StartWorker(2);
+  Client client = deployment.client();
+  for (int i = 0; i < 3; ++i) {
+    // Freeze it while it holds something, until the server has given that up.
+    ASSERT_TRUE(Eventually(kLong, [&] {
+      const auto workers = client.Workers();
+      return workers.ok() && workers->workers_size() == 1 && workers->workers(0).busy() == 2;
+    })) << deployment.Logs();
+    deployment.workers()[0].Signal(SIGSTOP);
+    const auto given_up = [&] {
+      const auto workers = client.Workers();
+      return workers.ok() && workers->workers(0).busy() == 0;
+    };
+    ASSERT_TRUE(Eventually(kLong, given_up)) << deployment.Logs();
+    deployment.workers()[0].Signal(SIGCONT);
+  }
+  ASSERT_TRUE(WaitFinished(deployment)) << deployment.Logs();
+  ExpectUndisturbed(deployment);
+  std::size_t lost = 0;
+  const auto log = client.Log("c1");
+  ASSERT_TRUE(log.ok()) << log.status();
+  for (const v1::LogEntry& entry : *log) {
+    lost += entry.what().find("nothing was heard") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_GE(lost, 3U) << "the freezes must have been noticed";
+}
+
+}  // namespace
+}  // namespace calib::testing

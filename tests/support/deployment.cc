@@ -1,0 +1,74 @@
+#include "tests/support/deployment.h"
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "server/service/state_folder.h"
+
+namespace calib::testing {
+namespace {
+
+constexpr std::chrono::seconds kStart{20};
+
+}  // namespace
+
+Deployment::Deployment(DeploymentOptions options)
+    : options_(std::move(options)), folder_(FreshFolder(options_.name)) {}
+
+bool Deployment::StartServer() {
+  server_ = std::make_unique<Process>(
+      std::vector<std::string>{Program("calibd"), "--state", state(), "--listen", address_,
+                               "--lease-ms", std::to_string(options_.lease_ms), "--heartbeat-ms",
+                               std::to_string(options_.heartbeat_ms)},
+      folder_ + "/server.log");
+  return Eventually(kStart, [this] {
+    const auto address = service::ServingAddress(state());
+    if (!address.ok() || !server_->Running()) {
+      return false;
+    }
+    address_ = *address;
+    return client().List().ok();
+  });
+}
+
+void Deployment::StartWorker(int slots) {
+  const std::string name = "w" + std::to_string(++started_workers_);
+  workers_.emplace_back(std::vector<std::string>{Program("calib-worker"), "--server", address_,
+                                                 "--slots", std::to_string(slots), "--name", name},
+                        folder_ + "/" + name + ".log");
+}
+
+std::string Deployment::Logs() const {
+  std::ostringstream text;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+    if (entry.path().extension() == ".log") {
+      text << "==== " << entry.path().filename().string() << '\n'
+           << std::ifstream(entry.path()).rdbuf() << '\n';
+    }
+  }
+  return text.str();
+}
+
+absl::StatusOr<std::string> Fingerprint(Client& client, const std::string& campaign) {
+  auto posterior = client.Posterior(campaign);
+  auto samples = client.Samples(campaign);
+  auto states = client.States(campaign);
+  for (const absl::Status& status : {posterior.status(), samples.status(), states.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  posterior->clear_core_hours();
+  std::string bytes = posterior->SerializeAsString();
+  for (v1::Sample& sample : *samples) {
+    sample.clear_attempts();
+    bytes += sample.SerializeAsString();
+  }
+  for (const v1::SampleStates& of_sample : *states) {
+    bytes += of_sample.SerializeAsString();
+  }
+  return bytes;
+}
+
+}  // namespace calib::testing

@@ -1,0 +1,26 @@
+#pragma once
+// A real campaign that is small enough for a test: a drained triaxial test on 64 grains, a fraction
+// of a second a run.
+
+#include <map>
+#include <string>
+
+namespace calib::testing {
+
+struct SmallCampaign {
+  std::string yaml{};
+  std::map<std::string, std::string> files{};  ///< path -> content
+};
+
+struct SmallCampaignOptions {
+  int samples = 8;
+  int max_iterations = 2;
+  int load_steps = 4;
+  int failure_attempts = 5;
+  bool with_validation = false;  ///< a second experiment at another pressure, held out
+  std::string extra{};           ///< further top-level YAML
+};
+
+SmallCampaign MakeSmallCampaign(const SmallCampaignOptions& options);
+
+}  // namespace calib::testing
