@@ -11,6 +11,7 @@ namespace calib::ctl {
 struct Arguments {
   // Of every verb.
   std::string server = "127.0.0.1:7443";  ///< HOST:PORT
+  bool server_given = false;              ///< by --server, not by default or $CALIB_SERVER
   std::string state;                      ///< folder of an embedded server; empty: use `server`
   std::optional<int> workers;             ///< local workers beside the embedded server
   bool json = false;

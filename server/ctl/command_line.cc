@@ -1,7 +1,7 @@
 #include "server/ctl/command_line.h"
 
 #include <CLI/CLI.hpp>
-#include <memory>
+#include <cstdlib>
 
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/verbs.h"
@@ -52,10 +52,16 @@ class Builder {
   Command& command_;
 };
 
+// $CALIB_SERVER is a default, not a wish: it does not stand in the way of --state.
 void AddCommonOptions(CLI::App& app, Arguments& a) {
-  auto* server = app.add_option("--server", a.server, "HOST:PORT of calibd")
-                     ->envname("CALIB_SERVER")
-                     ->capture_default_str();
+  if (const char* server = std::getenv("CALIB_SERVER"); server != nullptr) a.server = server;
+  auto* server = app.add_option_function<std::string>(
+      "--server",
+      [&a](const std::string& address) {
+        a.server = address;
+        a.server_given = true;
+      },
+      "HOST:PORT of calibd [$CALIB_SERVER or 127.0.0.1:7443]");
   app.add_option("--state", a.state,
                  "work on this state folder with an embedded server instead of --server")
       ->excludes(server);

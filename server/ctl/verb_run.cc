@@ -67,6 +67,10 @@ int PrintAnswer(Session& session, const std::string& campaign, bool json) {
 }  // namespace
 
 int Run(const Arguments& given) {
+  if (given.server_given) {
+    return Fail(absl::InvalidArgumentError(
+        "run brings its own server; with --server use submit and watch"));
+  }
   Arguments arguments = given;
   if (arguments.state.empty()) arguments.state = kDefaultState;
   arguments.workers.reset();  // started below, once there is something to do
