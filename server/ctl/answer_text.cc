@@ -35,6 +35,7 @@ std::string Wrapped(const std::string& text, const std::string& first, const std
   while (at < text.size()) {
     const std::size_t end = std::min(text.find(' ', at), text.size());
     if (column + (end - at) + 1 > kWidth) {
+      out.erase(out.find_last_not_of(' ') + 1);
       out += "\n" + indent;
       column = indent.size();
     }

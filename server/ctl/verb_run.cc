@@ -13,7 +13,7 @@
 #include "server/ctl/source_files.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
-#include "server/report/sections.h"
+#include "server/report/warnings.h"
 
 namespace calib::ctl {
 namespace {

@@ -60,9 +60,12 @@ seed: 7
 )";
   }
 
-  Answer Call(const std::string& arguments) const {
+  Answer Call(const std::string& arguments) const { return CallWith("", arguments); }
+
+  // wrapper: a program that starts calibctl and gives back its exit code (timeout --preserve-status).
+  Answer CallWith(const std::string& wrapper, const std::string& arguments) const {
     const std::string command =
-        "cd '" + work_.string() + "' && '" + CALIBCTL + "' " + arguments + " >out 2>err </dev/null";
+        "cd '" + work_.string() + "' && " + wrapper + " '" + CALIBCTL + "' " + arguments + " >out 2>err </dev/null";
     const int status = std::system(
         command.c_str());  // NOLINT(cert-env33-c,concurrency-mt-unsafe): a shell is the point
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadAll(work_ / "out"),
@@ -153,6 +156,19 @@ TEST_F(Calibctl, ACalibrationFromEndToEnd) {
   EXPECT_THAT(unknown.err, HasSubstr("nosuch"));
   EXPECT_EQ(Call("delete " + id + " --state s").code, 0);
   EXPECT_EQ(Call("list --state s --json").json().size(), 0U);
+}
+
+TEST_F(Calibctl, AnInterruptedRunGoesOnToTheSameAnswer) {
+  const Json undisturbed = Call("run good.yaml --workers 2 --state s1 --json").json();
+  const Answer stopped = CallWith("timeout --preserve-status -s INT 1.5", "run good.yaml --workers 2 --state s2 --json");
+  if (stopped.code != 0) {  // a fast machine may be done already
+    EXPECT_EQ(stopped.code, 1) << stopped.err;
+    EXPECT_THAT(stopped.err, HasSubstr("`calibctl run good.yaml --state s2` goes on from here"));
+  }
+  const Answer resumed = Call("run good.yaml --workers 1 --state s2 --json");
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_EQ(resumed.json()["parameters"], undisturbed["parameters"]);
+  EXPECT_EQ(resumed.json()["log_evidence"], undisturbed["log_evidence"]);
 }
 
 TEST_F(Calibctl, SubmittedWorkWaitsForWorkers) {
