@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "server/campaign/data_file.h"
+
 namespace calib::report {
 namespace {
 
@@ -176,6 +178,28 @@ std::string StatesJson(const std::string& campaign, int sample,
     experiments.push_back({{"experiment", name}, {"states", states}});
   }
   return Dump({{"campaign", campaign}, {"sample", sample}, {"experiments", experiments}});
+}
+
+std::string StateTableJson(const std::string& csv) {
+  std::vector<campaign::TableProblem>
+      ignored;  // the table is our own; without rows it has no states
+  const campaign::DataTable table(csv, {}, ignored);
+  std::vector<std::vector<std::string>> columns;
+  for (const std::string& name : table.columns()) columns.push_back(table.Texts(name));
+  Json states = Json::array();
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    Json state = Json::object();
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const std::string& text = columns[k][row];
+      const bool number = table.columns()[k] != "experiment";
+      state[table.columns()[k]] = number ? Json::parse(text, nullptr, false) : Json(text);
+    }
+    for (auto& value : state) {
+      if (value.is_discarded()) value = nullptr;  // no such observable in this experiment
+    }
+    states.push_back(std::move(state));
+  }
+  return Dump({{"states", states}});
 }
 
 std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers) {

@@ -19,6 +19,8 @@ std::string SamplesJson(const std::string& campaign, const std::vector<std::stri
                         const std::vector<v1::Sample>& samples);
 std::string StatesJson(const std::string& campaign, int sample,
                        const std::map<std::string, StateHistory>& by_experiment);
+/// A table of states (experiment,load_step,...) row by row.
+std::string StateTableJson(const std::string& csv);
 std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers);
 std::string ProblemsJson(const std::vector<campaign::Problem>& problems);
 /// The measurements as compared: SI, logarithmic strains, standard deviations.

@@ -2,6 +2,7 @@
 
 #include "server/report/html.h"
 #include "server/report/sections.h"
+#include "server/report/warnings.h"
 
 namespace calib::report {
 namespace {
@@ -21,37 +22,6 @@ std::string StateSentence(const CampaignView& view) {
 }
 
 }  // namespace
-
-std::vector<std::string> Warnings(const CampaignView& view) {
-  const v1::Posterior& posterior = view.posterior;
-  std::vector<std::string> warnings(posterior.warnings().begin(), posterior.warnings().end());
-  if (posterior.parameters_size() == 0) return warnings;
-  if (!posterior.converged() && view.status.state() == "finished") {
-    warnings.emplace_back(
-        "The iterations ended before the posterior means settled: treat the intervals as "
-        "provisional, or go on with more "
-        "iterations or samples.");
-  }
-  for (const auto& parameter : posterior.parameters()) {
-    if (!parameter.at_bound()) continue;
-    warnings.push_back(
-        fmt::format("{} presses against a bound of its prior: widen the prior if it was a guess, "
-                    "or look for a missing effect.",
-                    NameForPeople(parameter.name())));
-  }
-  if (posterior.noise() == "ess_target") {
-    warnings.emplace_back(
-        "The error model is tempered to a target effective sample size (ess_target). Standard "
-        "deviations and intervals "
-        "describe that tempering; they are not an estimate of uncertainty.");
-  }
-  if (view.status.samples_diverged() > 0) {
-    warnings.push_back(
-        fmt::format("{} simulations of the last iteration diverged and carry no weight.",
-                    view.status.samples_diverged()));
-  }
-  return warnings;
-}
 
 std::string SummarySection(const ReportData& data) {
   const CampaignView& view = data.view;

@@ -30,9 +30,6 @@ std::string EvolutionSection(
     const ReportData& data);  ///< section_evolution.cc: iterations and loading path
 std::string RecordSection(const ReportData& data);  ///< section_record.cc: campaign and provenance
 
-/// Everything a reader has to be warned of, in whole sentences.
-std::vector<std::string> Warnings(const CampaignView& view);
-
 /// The unit in which a calibrated parameter is shown throughout.
 DisplayUnit ParameterUnit(const v1::Posterior::Parameter& parameter);
 /// "young modulus (GPa)"
