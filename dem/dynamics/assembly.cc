@@ -75,7 +75,8 @@ void MeasureDistances(const PairInput& in, std::size_t begin, std::size_t end, d
 
 /// Largest squared distance between centres and the affine image of where they were; NaN if there
 /// is one.
-CALIB_DEM_CLONES double LargestShift2(const ParticleArrays& p, const std::vector<double>* searched,
+CALIB_DEM_CLONES double LargestShift2(const ParticleArrays& p,
+                                      const std::array<std::vector<double>, 3>& searched,
                                       const double* scale, std::size_t begin, std::size_t end) {
   constexpr std::size_t kLanes = 8;
   const double* const x = p.x.data();

@@ -115,7 +115,7 @@ class Assembly {
   double last_dt_ = 0;
 
   NeighborList list_;
-  std::vector<double> searched_[3];  ///< centres at the last search
+  std::array<std::vector<double>, 3> searched_;  ///< centres at the last search
   double searched_length_[3] = {0, 0, 0};
   double moved_ = 0;  ///< largest non-affine displacement since the last search [m]
   double skin_ = 0;

@@ -158,7 +158,8 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
       problems.push_back(absl::StrCat("test ", scenario.test, " needs the setting ", info.name));
     }
   }
-  for (const auto& [name, value] : scenario.settings) {
+  for (const auto& setting : scenario.settings) {
+    const std::string& name = setting.first;
     if (std::none_of(test->settings.begin(), test->settings.end(),
                      [&](const ParameterInfo& info) { return info.name == name; })) {
       problems.push_back(absl::StrCat("test ", scenario.test, " has no setting \"", name, "\""));

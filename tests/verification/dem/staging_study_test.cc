@@ -77,7 +77,7 @@ void StudyRate(double pressure) {
   first_step.path.resize(1);
   const double chosen = *test::RunAll(first_step).summary.staging.rate;
   std::vector<Curve> curves;
-  const std::vector<double> factors = {0.25, 0.5, 1, 2, 4};
+  const std::vector<double> factors = {0.5, 1, 2, 4};
   for (const double factor : factors) {
     scenario.staging.rate = factor * chosen;
     curves.push_back(MeanCurve(scenario));
@@ -92,7 +92,7 @@ void StudyRate(double pressure) {
         Rms(curves[k].volume, curves[0].volume), 100 * curves[k].ratio_scatter,
         curves[k].volume_scatter, curves[k].steps);
   }
-  EXPECT_LT(Rms(curves[2].ratio, curves[0].ratio) / largest, 2 * curves[0].ratio_scatter);
+  EXPECT_LT(Rms(curves[1].ratio, curves[0].ratio) / largest, 2 * curves[0].ratio_scatter);
 }
 
 TEST(StagingSlow, ChosenRateIsQuasiStaticAt05MPa) { StudyRate(5e5); }
