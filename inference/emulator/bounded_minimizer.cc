@@ -76,7 +76,8 @@ Minimum MinimizeInBox(const SmoothFunction& function, const Eigen::VectorXd& sta
 
     constexpr double kArmijo = 1e-4;
     bool found = false;
-    for (double length = 1; length > 1e-8; length *= 0.4) {
+    double length = 1;
+    for (int cut = 0; cut < 20; ++cut, length *= 0.4) {
       const Eigen::VectorXd x = (best.x + length * direction).cwiseMax(lower).cwiseMin(upper);
       const double value = function(x, trial_gradient);
       if (!(value <= best.value + kArmijo * gradient.dot(x - best.x))) continue;

@@ -198,7 +198,7 @@ absl::Status EmulatorOptions::Validate() const {
 absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, const DataSet& data,
                                                  const EmulatorOptions& options,
                                                  std::span<const Iteration> iterations,
-                                                 std::stop_token stop) {
+                                                 const std::stop_token& stop) {
   if (auto valid = options.Validate(); !valid.ok()) return valid;
   if (auto valid = ValidateData(data, options.noise); !valid.ok()) return valid;
   for (const Prior& prior : priors) {

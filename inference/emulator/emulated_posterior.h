@@ -81,6 +81,6 @@ struct EmulatedResult {
 absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, const DataSet& data,
                                                  const EmulatorOptions& options,
                                                  std::span<const Iteration> iterations,
-                                                 std::stop_token stop = {});
+                                                 const std::stop_token& stop = {});
 
 }  // namespace calib::inference

@@ -98,7 +98,7 @@ Eigen::VectorXd EvaluateInSupport(const TmcmcState& state,
     rows.row(static_cast<Index>(i)) = state.proposals.row(inside[i]);
   Eigen::VectorXd result = Eigen::VectorXd::Constant(state.proposals.rows(), -kInfinity);
   if (inside.empty()) return result;
-  const Eigen::VectorXd values = log_likelihood(rows);
+  Eigen::VectorXd values = log_likelihood(rows);
   if (values.size() != rows.rows()) return values;  // refused by AdvanceTmcmc
   for (std::size_t i = 0; i < inside.size(); ++i) result[inside[i]] = values[static_cast<Index>(i)];
   return result;
@@ -244,7 +244,7 @@ absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& opt
 
 absl::StatusOr<TmcmcState> RunTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
                                     const BatchLogLikelihood& log_likelihood,
-                                    std::stop_token stop) {
+                                    const std::stop_token& stop) {
   auto state = StartTmcmc(priors, options);
   while (state.ok() && !state->finished()) {
     if (stop.stop_requested()) return absl::CancelledError("tmcmc was stopped.");

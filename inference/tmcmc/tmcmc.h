@@ -89,6 +89,6 @@ using BatchLogLikelihood = std::function<Eigen::VectorXd(const Eigen::MatrixXd&)
 /// The whole run in this thread. Looks at `stop` before each batch: CANCELLED.
 absl::StatusOr<TmcmcState> RunTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
                                     const BatchLogLikelihood& log_likelihood,
-                                    std::stop_token stop = {});
+                                    const std::stop_token& stop = {});
 
 }  // namespace calib::inference

@@ -22,7 +22,8 @@ struct Coverage {
 
 // Campaigns of one iteration: truth from the prior, one run there measured with 1 % noise, `runs`
 // runs of a design.
-Coverage Repeat(const ToyCurve& toy, int runs, std::uint64_t campaigns) {
+Coverage Repeat(const ToyCurve& toy, int runs, std::uint64_t campaigns,
+                const TrainingOptions& training = {}) {
   Coverage coverage;
   const auto priors = toy.Priors();
   for (std::uint64_t r = 0; r < campaigns; ++r) {
@@ -38,8 +39,8 @@ Coverage Repeat(const ToyCurve& toy, int runs, std::uint64_t campaigns) {
       iteration.predictions.row(i) =
           toy.Run(iteration.parameters.row(i), r, static_cast<std::uint64_t>(i));
     }
-    const auto emulated =
-        EmulatedPosterior(priors, data, {.draws = 1000, .seed = r}, {&iteration, 1});
+    const auto emulated = EmulatedPosterior(
+        priors, data, {.training = training, .draws = 1000, .seed = r}, {&iteration, 1});
     const auto weighted = ComputePosterior(priors, data, {}, {&iteration, 1});
     EXPECT_TRUE(emulated.ok() && weighted.ok());
     if (!emulated.ok() || !weighted.ok()) return coverage;
@@ -63,7 +64,7 @@ TEST(EmulatorCoverage, NinetyPercentIntervalsHoldTheTruthNineTimesInTen) {
     std::uint64_t repeats;
   };
   for (const Campaign& campaign :
-       {Campaign{2, 60, 30}, Campaign{3, 100, 25}, Campaign{5, 100, 15}}) {
+       {Campaign{2, 60, 30}, Campaign{3, 60, 25}, Campaign{5, 100, 12}}) {
     const Coverage one = Repeat({.d = campaign.parameters}, campaign.runs, campaign.repeats);
     std::cout << campaign.parameters << " parameters, " << campaign.runs
               << " runs: " << one.emulated << " of " << one.intervals
@@ -73,10 +74,27 @@ TEST(EmulatorCoverage, NinetyPercentIntervalsHoldTheTruthNineTimesInTen) {
     all.emulated += one.emulated;
     all.weighted += one.weighted;
   }
-  // 210 intervals: binomial sd 2 %, and the seeds are fixed.
+  // 195 intervals: binomial sd 2 %, and the seeds are fixed.
   EXPECT_GE(all.emulated, 0.85 * all.intervals);
   EXPECT_LE(all.emulated, 0.95 * all.intervals);
   EXPECT_LE(all.weighted, 0.6 * all.intervals);
+}
+
+// The limits of EmulatorOptions: a rough response that the measurement is not taken to share makes
+// intervals that miss the truth, and is refused; the same with roughness well below the noise is
+// accepted and honest.
+TEST(EmulatorCoverage, RefusesWhereIntervalsAreFiction) {
+  constexpr std::uint64_t kRepeats = 12;
+  const Coverage rough = Repeat({.d = 3, .roughness = 0.05}, 60, kRepeats, {.scatter_share = 0});
+  const Coverage smooth =
+      Repeat({.d = 3, .scatter = 0.002, .roughness = 0.002}, 60, kRepeats, {.scatter_share = 0});
+  std::cout << "rough: " << rough.emulated << " of " << rough.intervals << ", adequate "
+            << rough.adequate << "; smooth: " << smooth.emulated << " of " << smooth.intervals
+            << ", adequate " << smooth.adequate << '\n';
+  EXPECT_EQ(rough.adequate, 0);
+  EXPECT_LT(rough.emulated, 0.75 * rough.intervals);
+  EXPECT_EQ(smooth.adequate, static_cast<int>(kRepeats));
+  EXPECT_GE(smooth.emulated, 0.8 * smooth.intervals);  // of 36: binomial sd 5 %
 }
 
 }  // namespace
