@@ -16,7 +16,7 @@ namespace {
 
 /// Inertial number I = rate d sqrt(rho/p) of an unset rate: curves no longer depend on it beyond
 /// their scatter (dem/VERIFICATION.md, rate study). [GDR MiDi 2004: quasi-static below about 1e-3]
-constexpr double kInertialNumber = 2e-3;
+constexpr double kInertialNumber = 1e-3;
 constexpr double kStep = 0.002;
 constexpr double kDampingLoading = 0.2;
 constexpr double kDampingSettling = 0.9;

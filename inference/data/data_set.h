@@ -1,6 +1,5 @@
 #pragma once
-// The measurements as the inference sees them: a flat vector of readings with a Gaussian error
-// model.
+// The measurements as the inference sees them: a flat vector of readings with Gaussian errors.
 
 #include <string>
 #include <vector>
@@ -14,8 +13,8 @@ struct Reading {
   int experiment = 0;
   int observable = 0;  ///< index within the experiment
   int load_step = 0;
-  double control =
-      0;  ///< path length of the control since the start of loading; distance for the correlation
+  /// Path length of the control since the start of loading: distance for the correlation.
+  double control = 0;
   double value = 0;
   double sd = 0;  ///< standard deviation of its error (noise: given) > 0; unused with ess_target
 };
@@ -29,11 +28,13 @@ struct Correlation {
 };
 
 enum class NoiseMode {
-  kGiven,      ///< the sd of each reading
-  kInferred,   ///< sd of each reading times sqrt(f), one variance factor f per (experiment,
-               ///< observable) group, marginalised
-  kEssTarget,  ///< Sigma = sigma w_j y^2, sigma from the effective sample size [Cheng 2019,
-               ///< sec. 3.4]; a tempering, not an estimate
+  kGiven,  ///< the sd of each reading
+  /// sd of each reading times sqrt(f), one variance factor f per (experiment, observable) group,
+  /// marginalised over its prior (gaussian_likelihood.h).
+  kInferred,
+  /// Sigma = sigma w_j y^2, sigma from the effective sample size [Cheng 2019, sec. 3.4]; a
+  /// tempering, not an estimate.
+  kEssTarget,
 };
 
 struct DataSet {

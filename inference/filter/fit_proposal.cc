@@ -84,6 +84,14 @@ Eigen::VectorXd TemperedLogWeights(const Ensemble& ensemble, double exponent) {
   return NormalizedLogWeights(result);
 }
 
+// Ten effective samples a component on average, as K_max = N_p / 10 [Cheng 2019, sec. 3.5.3], and
+// no fewer than two per parameter: more components would follow single samples.
+int MostComponents(const FilterOptions& options, const WeightedPoints& points) {
+  const double least_size = std::max(10.0, 2.0 * static_cast<double>(points.points.rows()));
+  const int affordable = static_cast<int>(points.counts.sum() / least_size);
+  return std::clamp(affordable, 1, options.max_components);
+}
+
 }  // namespace
 
 absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSet& data,
@@ -93,15 +101,16 @@ absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSe
   if (!ensemble.ok()) return ensemble.status();
   const Eigen::VectorXd log_weights =
       TemperedLogWeights(*ensemble, TemperingExponent(options, *ensemble));
-  const auto mixture = FitDirichletMixture(Standardized(priors, ensemble->parameters, log_weights),
-                                           {.max_components = options.max_components,
-                                            .concentration = options.concentration,
-                                            .seed = options.seed,
-                                            .stream = iterations.size()});
+  const WeightedPoints points = Standardized(priors, ensemble->parameters, log_weights);
+  const auto mixture =
+      FitDirichletMixture(points, {.max_components = MostComponents(options, points),
+                                   .concentration = options.concentration,
+                                   .seed = options.seed,
+                                   .stream = iterations.size()});
   if (!mixture.ok()) return mixture.status();
 
   Proposal proposal;
-  proposal.components = mixture->PlugIn(kNegligibleWeight);
+  proposal.components = mixture->Predictive(kNegligibleWeight);
   proposal.defensive_share = options.defensive_share;
   const auto d = static_cast<Eigen::Index>(priors.size());
   Eigen::VectorXd low(d);

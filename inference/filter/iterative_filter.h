@@ -25,15 +25,14 @@ struct FilterOptions {
   /// (0, 1): effective sample size, as a share of the samples of one iteration, of the tempered
   /// weights that shape the next proposal (and of kEssTarget itself) [Cheng 2019, Table 1, step 4].
   double ess_target = 0.2;
-  double tolerance = 1e-2;  ///< > 0; relative change of every posterior mean at which iterations
-                            ///< end [Table 1, step 7]
+  double tolerance = 1e-2;  ///< > 0; relative change of the means that ends it [Table 1, step 7]
   double defensive_share = 0.1;     ///< share of the prior in every later proposal, [0, 1)
   int max_components = 10;          ///< >= 1; truncation of the Dirichlet process
   double concentration = 0.01;      ///< > 0; its precision alpha [Cheng 2019, sec. 3.5]
   Design design = Design::kHalton;  ///< first iteration
   std::uint64_t seed = 0;
-  absl::Status Validate()
-      const;  ///< INVALID_ARGUMENT naming the field, what was found and what is allowed
+  /// INVALID_ARGUMENT naming the field, what was found and what is allowed.
+  absl::Status Validate() const;
 };
 
 /// Density from which the samples of one iteration are drawn: the prior alone (no mixture:
@@ -72,9 +71,10 @@ Eigen::VectorXd LogDensity(const Proposal& proposal, std::span<const Prior> prio
 struct ParameterSummary {
   double mean = 0, sd = 0, cov = 0;  ///< cov = sd / |mean|
   double q05 = 0, q50 = 0, q95 = 0;
-  double prior_sd = 0;    ///< standard deviation of the prior, the scale of a mean near zero
-  bool at_bound = false;  ///< more than a tenth of the posterior lies in the outer 2 % of the prior
-                          ///< (by prior probability) at one end
+  double prior_sd = 0;  ///< standard deviation of the prior, the scale of a mean near zero
+  /// More than a tenth of the posterior lies in the outer 2 % of the prior's probability at one
+  /// end.
+  bool at_bound = false;
 };
 
 /// The posterior along the readings: after load step s of the processing order. Rows: steps.
@@ -86,15 +86,14 @@ struct PosteriorPath {
 };
 
 struct Posterior {
-  Eigen::VectorXd
-      log_weights;  ///< normalised, over the samples of all iterations in order; -inf: diverged
+  /// Normalised, over the samples of all iterations in order; -inf: diverged, outside or not used.
+  Eigen::VectorXd log_weights;
   std::vector<ParameterSummary> parameters;
   Eigen::MatrixXd correlation;  ///< d x d
   double log_evidence = 0;      ///< ln p(data), proper Gaussian normalisation
-  double log_evidence_se = 0;  ///< its standard error from the spread of the weights (delta method)
-  double ess = 0;              ///< effective number of samples (not a fraction)
-  double pareto_k =
-      0;  ///< tail index of the importance weights; > 0.7: the weights cannot be trusted
+  double log_evidence_se = 0;   ///< its standard error from the spread of weights (delta method)
+  double ess = 0;               ///< effective number of samples (not a fraction)
+  double pareto_k = 0;          ///< tail index of the weights; > 0.7: they cannot be trusted
   std::optional<double> sigma;  ///< kEssTarget: the sigma found
   PosteriorPath path;
   std::vector<std::string> warnings;  ///< whole sentences: weight degeneracy and what to do, ...
@@ -147,8 +146,8 @@ struct OnlineView {
   int readings = 0;  ///< readings that count
   double ess = 0;    ///< effective number of samples
   int best = -1;     ///< sample with the largest likelihood
-  double best_rms =
-      0;  ///< root mean square of its residuals over sd (kEssTarget: over sqrt(w_j) |y|)
+  /// Root mean square of the best sample's residuals over sd (kEssTarget: over sqrt(w_j) |y|).
+  double best_rms = 0;
 };
 OnlineView ViewOnline(const DataSet& data, const FilterOptions& options,
                       const Eigen::MatrixXd& predictions, std::span<const char> diverged);

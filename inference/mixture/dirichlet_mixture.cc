@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numeric>
-#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -12,6 +12,9 @@
 
 namespace calib::inference {
 namespace {
+
+constexpr double kCoarseTolerance = 0.1;
+constexpr std::size_t kFinalists = 2;
 
 absl::Status ValidateData(const WeightedPoints& data) {
   if (data.points.cols() != data.counts.size() || data.points.cols() == 0 ||
@@ -48,6 +51,21 @@ Eigen::MatrixXd StartResponsibilities(const WeightedPoints& data, int clusters, 
   return responsibilities;
 }
 
+// E and M steps until the bound changes by less than the tolerance or the iterations, earlier ones
+// counted, run out.
+void Ascend(const WeightedPoints& data, int max_iterations, double tolerance,
+            DirichletMixture& fit) {
+  fit.converged = false;
+  while (fit.iterations < max_iterations && !fit.converged) {
+    const Expectation expectation = EStep(data.points, fit.state);
+    fit.state = MStep(data, fit.prior, expectation.responsibilities);
+    const double bound = IterationBound(data, fit.state, expectation);
+    fit.converged = std::abs(bound - fit.lower_bound) < tolerance;
+    fit.lower_bound = bound;
+    ++fit.iterations;
+  }
+}
+
 }  // namespace
 
 absl::Status DirichletMixtureOptions::Validate() const {
@@ -78,20 +96,24 @@ std::vector<MixtureComponent> DirichletMixture::PlugIn(double negligible) const 
   return components;
 }
 
+std::vector<MixtureComponent> DirichletMixture::Predictive(double negligible) const {
+  DirichletMixture widened = *this;
+  const auto d = static_cast<double>(state.means.rows());
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    const double nu = state.degrees_of_freedom[k];
+    widened.state.covariances[k] *=
+        nu * (1 + 1 / state.mean_precision[k]) / std::max(nu - d - 1, 1.0);
+  }
+  return widened.PlugIn(negligible);
+}
+
 DirichletMixture FitFrom(const WeightedPoints& data, const DirichletMixtureOptions& options,
                          const Eigen::MatrixXd& responsibilities) {
   DirichletMixture fit;
   fit.prior = EmpiricalPrior(data, options.concentration, options.covariance_floor);
   fit.state = MStep(data, fit.prior, responsibilities);
   fit.lower_bound = -std::numeric_limits<double>::infinity();
-  while (fit.iterations < options.max_iterations && !fit.converged) {
-    const Expectation expectation = EStep(data.points, fit.state);
-    fit.state = MStep(data, fit.prior, expectation.responsibilities);
-    const double bound = IterationBound(data, fit.state, expectation);
-    fit.converged = std::abs(bound - fit.lower_bound) < options.tolerance;
-    fit.lower_bound = bound;
-    ++fit.iterations;
-  }
+  Ascend(data, options.max_iterations, options.tolerance, fit);
   return fit;
 }
 
@@ -105,19 +127,27 @@ absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
         "the samples with weight do not span all directions of parameter space: no covariance can "
         "be estimated.");
   }
-  std::optional<DirichletMixture> best;
+  DirichletMixtureOptions coarse = options;
+  coarse.tolerance = std::max(options.tolerance, kCoarseTolerance);
+  std::vector<DirichletMixture> fits;
   for (int start = 0; start < options.restarts; ++start) {
     PhiloxStream stream({.seed = options.seed,
                          .purpose = StreamPurpose::kMixtureStart,
                          .iteration = options.stream,
                          .sample = static_cast<std::uint64_t>(start)});
     const int variation = start % 2 == 0 ? 0 : start / 2 % options.max_components;
-    const Eigen::MatrixXd responsibilities = StartResponsibilities(
-        data, options.max_components - variation, options.max_components, stream);
-    DirichletMixture fit = FitFrom(data, options, responsibilities);
-    if (!best || fit.lower_bound > best->lower_bound) best = std::move(fit);
+    fits.push_back(FitFrom(data, coarse,
+                           StartResponsibilities(data, options.max_components - variation,
+                                                 options.max_components, stream)));
   }
-  return *std::move(best);
+  const auto larger_bound = [](const DirichletMixture& a, const DirichletMixture& b) {
+    return a.lower_bound > b.lower_bound;
+  };
+  std::stable_sort(fits.begin(), fits.end(), larger_bound);
+  fits.resize(std::min(fits.size(), kFinalists));
+  for (DirichletMixture& fit : fits) Ascend(data, options.max_iterations, options.tolerance, fit);
+  std::stable_sort(fits.begin(), fits.end(), larger_bound);
+  return std::move(fits.front());
 }
 
 }  // namespace calib::inference

@@ -35,6 +35,11 @@ struct DirichletMixture {
   /// Plug-in mixture: expected weights, means m_k, covariances C_k; the density proposals are drawn
   /// from. Components of weight below `negligible` are left out (their share goes to the others).
   std::vector<MixtureComponent> PlugIn(double negligible = 0) const;
+  /// The same with the covariances of the posterior predictive density, a Student t with nu_k + 1 -
+  /// d degrees of freedom: C_k nu_k (1 + 1/beta_k) / max(nu_k - d - 1, 1). Wider by what few
+  /// samples leave unknown about mean and covariance, hence safer to draw from.  [Bishop 2006,
+  /// Eq. 10.81-82]
+  std::vector<MixtureComponent> Predictive(double negligible = 0) const;
 };
 
 /// E and M steps from given responsibilities (n x K) to convergence. Preconditions: valid options,
@@ -45,7 +50,8 @@ DirichletMixture FitFrom(const WeightedPoints& data, const DirichletMixtureOptio
 
 /// The best of options.restarts starts from k-means labels, largest cluster first: every second
 /// start with K clusters, the others with K, K - 1, ... in turn, because optima with few components
-/// are seldom reached by merging ten clusters.
+/// are seldom reached by merging ten clusters. All starts run until the bound changes by less than
+/// 0.1, the best two of them on to options.tolerance.
 /// Errors: INVALID_ARGUMENT for options, counts that are negative or not finite;
 /// FAILED_PRECONDITION when the counts sum to one or less, or the points do not span all directions
 /// (no covariance can be estimated).

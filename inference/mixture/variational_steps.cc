@@ -120,16 +120,8 @@ Expectation EStep(const Eigen::MatrixXd& points, const MixtureState& state) {
     const double constant =
         log_weights[k] + 0.5 * (ExpectedLogPrecision(state, k) - d / state.mean_precision[k] -
                                 d * std::log(2 * std::numbers::pi));
-    for (Eigen::Index i = 0; i < n; ++i) {
-      double square = 0;
-      for (Eigen::Index j = 0; j < points.rows(); ++j) {
-        double z = 0;
-        for (Eigen::Index l = 0; l <= j; ++l)
-          z += whiten(j, l) * (points(l, i) - state.means(l, k));
-        square += z * z;
-      }
-      log_rho(i, k) = constant - 0.5 * square;
-    }
+    const Eigen::MatrixXd z = whiten * (points.colwise() - state.means.col(k));
+    log_rho.col(k) = constant - 0.5 * z.colwise().squaredNorm().transpose().array();
   }
   for (Eigen::Index i = 0; i < n; ++i) {
     const double largest = log_rho.row(i).maxCoeff();

@@ -14,6 +14,10 @@ enum class StreamPurpose : std::uint64_t {
   kSobolScramble = 2,
   kMixtureStart = 3,
   kTest = 4,
+  kTmcmc = 16,
+  kEmulatorBand = 17,
+  kLatinHypercube = 18,
+  kResponseSurface = 19,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

@@ -1,5 +1,7 @@
 #include "server/campaign/campaign_file.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -42,8 +44,10 @@ void ReadName(MapReader& map, Campaign& campaign) {
   constexpr std::size_t kLongest = 200;
   campaign.name =
       map.RequiredText("name", "what the campaign is called, e.g. toyoura-0.2MPa").value_or("");
-  if (map.Has("name") && (campaign.name.empty() || campaign.name.size() > kLongest)) {
-    map.Problem("name", "has to be a text of 1 to 200 characters");
+  const auto control = [](unsigned char c) { return std::iscntrl(c) != 0; };
+  const bool printable = std::none_of(campaign.name.begin(), campaign.name.end(), control);
+  if (map.Has("name") && (campaign.name.empty() || campaign.name.size() > kLongest || !printable)) {
+    map.Problem("name", "has to be one line of 1 to 200 characters");
   }
 }
 

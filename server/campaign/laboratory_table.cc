@@ -12,7 +12,7 @@
 namespace calib::campaign {
 namespace {
 
-constexpr double kLargestStrain = 1.5;  // logarithmic; beyond it a unit was forgotten
+constexpr double kLargestStrain = 1;  // logarithmic; beyond it a unit was forgotten
 
 bool IsStrain(const std::string& name) {
   constexpr std::array<const char*, 3> kStrains = {"axial_strain", "volumetric_strain",
@@ -45,6 +45,8 @@ std::vector<std::pair<std::string, double>> ReadUnits(MapReader& data, bool free
   if (!units) return factors;
   for (const std::string& name : units->Keys()) {
     const auto text = units->Text(name);
+    factors.emplace_back(name,
+                         std::nan(""));  // after a problem nothing more is said about the column
     if (!text) continue;
     const auto unit = ParseUnit(*text);
     const dem::ObservableInfo* info = dem::FindObservable(name);
@@ -57,7 +59,7 @@ std::vector<std::pair<std::string, double>> ReadUnits(MapReader& data, bool free
       units->Problem(name,
                      absl::StrCat(*text, " is ", Kind(*text), ", expected ", Kind(info->unit)));
     } else {
-      factors.emplace_back(name, unit->factor);
+      factors.back().second = unit->factor;
     }
   }
   units->Finish();

@@ -76,8 +76,13 @@ void ReadEffects(MapReader& map, dem::Model& model) {
   for (const std::string& name : *names) {
     const dem::EffectInfo* effect = dem::FindEffect(name);
     if (effect == nullptr) {
+      const std::vector<std::string> offered = NamesOf(dem::Effects());
       map.Problem("effects", absl::StrCat(Quoted(name), " is not an effect of this build; ",
-                                          Suggestion(name, NamesOf(dem::Effects()))));
+                                          Suggestion(name, offered)));
+      // With the effect that was probably meant its parameters are no further problems.
+      if (const std::string meant = Nearest(name, offered); !meant.empty()) {
+        model.effects.push_back(meant);
+      }
     } else if (std::find(model.effects.begin(), model.effects.end(), name) != model.effects.end()) {
       map.Problem("effects", absl::StrCat(name, " is named twice"));
     } else if (!effect->contacts.empty() && !model.contact.empty() &&

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "inference/data/gaussian_likelihood.h"
+#include "inference/filter/iterative_filter.h"
 #include "inference/filter/log_weights.h"
 #include "inference/filter/sequential_filter.h"
 #include "inference/filter/tempering.h"
@@ -207,6 +208,35 @@ TEST_P(GlassBeadFilter, GrainLearningAtItsSigma) {
                 .cwiseAbs()
                 .maxCoeff(),
             1e-8);
+}
+
+// The same through the interface that the server calls: a table of runs from the uniform prior of
+// Table 2.
+TEST(GlassBeadCampaign, EffectiveSampleSizeTargetOfTheFirstIteration) {
+  const Problem problem = GlassBeads(0, {1, 1, 0.01}, false);
+  const std::vector<Prior> priors{{.kind = PriorKind::kUniform, .min = 1e11, .max = 2e11},
+                                  {.kind = PriorKind::kUniform, .min = 0.3, .max = 0.5},
+                                  {.kind = PriorKind::kUniform, .min = 0, .max = 1e4},
+                                  {.kind = PriorKind::kUniform, .min = 0.1, .max = 0.5}};
+  Iteration iteration;
+  iteration.parameters = problem.parameters;
+  iteration.predictions = problem.predictions;
+  const auto posterior = ComputePosterior(priors, problem.data, {.noise = NoiseMode::kEssTarget},
+                                          std::span(&iteration, 1));
+  ASSERT_TRUE(posterior.ok()) << posterior.status();
+  const nlohmann::json reference = ReadReference("smc_iter0.json");
+  const auto& item = reference.at("cases").at(1);
+  ASSERT_EQ(item.at("case"), "ess_target_0.20_uniform_start");
+  const double sigma = item.at("sigma").get<double>();
+  EXPECT_NEAR(posterior->sigma.value(), sigma, 1e-6 * sigma);
+  EXPECT_NEAR(posterior->ess, 20, 1e-8);
+  const Eigen::VectorXd mean = ToVector(item.at("result").at("mean_final"));
+  const Eigen::VectorXd cov = ToVector(item.at("result").at("cov_final"));
+  for (Eigen::Index j = 0; j < 4; ++j) {
+    EXPECT_NEAR(posterior->parameters[j].mean, mean[j], 1e-8 * mean[j]);
+    EXPECT_NEAR(posterior->parameters[j].cov, cov[j], 1e-8);
+  }
+  EXPECT_NEAR(posterior->log_evidence, item.at("result").at("log_evidence").get<double>(), 1e-6);
 }
 
 TEST(TriaxialFilter, WeightsOfTheAuthorsProgramAtEveryStep) {

@@ -124,7 +124,6 @@ TEST_P(MixtureReference, BestOfFiftyStarts) {
   const double best =
       case_.reference.at("best_of_restarts").at("lower_bounds_sorted").at(0).get<double>();
   const bool ensemble = case_.reference.at("truth").is_null();
-  std::cout << fit->lower_bound << " reference " << best << "\n";
   EXPECT_GE(fit->lower_bound, best - (ensemble ? 50 : 1));
   if (ensemble) return;
   const Eigen::VectorXd weights = fit->state.Weights();

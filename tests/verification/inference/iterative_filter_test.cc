@@ -67,7 +67,7 @@ TEST(IterativeFilter, SmallPosteriorIsReachedByTempering) {
   ASSERT_THAT(first->warnings, testing::SizeIs(1));
   EXPECT_THAT(first->warnings[0], testing::HasSubstr("not reliable"));
   const auto last = ComputePosterior(model.priors, model.Data(), options, iterations);
-  EXPECT_GT(last->ess, 150);
+  EXPECT_GT(last->ess, 100);
   EXPECT_LT(last->pareto_k, 0.7);
   EXPECT_LE(LargestMeanError(*last, model), 0.2);
   EXPECT_LE(LargestSdError(*last, model), 0.12);
@@ -99,8 +99,10 @@ TEST(IterativeFilter, PosteriorAtABoundOfALogPrior) {
   const double mean = first / mass;
   const double sd = std::sqrt(second / mass - mean * mean);
   EXPECT_NEAR(posterior->log_evidence, std::log(mass), 0.04);
-  EXPECT_NEAR(posterior->parameters[0].mean, mean, 0.05 * sd);
-  EXPECT_NEAR(posterior->parameters[0].sd, sd, 0.05 * sd);
+  // A thousand effective samples: 0.08 is two and a half standard errors.
+  EXPECT_GT(posterior->ess, 1000);
+  EXPECT_NEAR(posterior->parameters[0].mean, mean, 0.08 * sd);
+  EXPECT_NEAR(posterior->parameters[0].sd, sd, 0.08 * sd);
   EXPECT_TRUE(posterior->parameters[0].at_bound);
   EXPECT_GT(iterations[2].parameters.minCoeff(), 1);
 }

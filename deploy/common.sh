@@ -1,0 +1,32 @@
+# Shared by quickstart, test and bench: the repository root, the number of cores, installing Debian packages once.
+# Sourced, not run.
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cores=$(nproc)
+
+say() { printf '\n== %s\n' "$*" >&2; }
+
+# need FILE...: installs the packages listed in the files that are not installed yet (root, or sudo).
+need() {
+  local missing=() name
+  while read -r name; do
+    dpkg-query -W -f='${db:Status-Status}' "$name" 2>/dev/null | grep -qx installed || missing+=("$name")
+  done < <(cat "$@" | sed 's/#.*//' | tr -d ' \t' | grep -v '^$')
+  [ ${#missing[@]} -eq 0 ] && return 0
+  local as_root=()
+  if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo >/dev/null || { echo "these Debian packages are missing and neither root nor sudo is here to install them: ${missing[*]}" >&2; return 1; }
+    as_root=(sudo)
+  fi
+  say "installing ${#missing[@]} Debian packages: ${missing[*]}"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update -qq
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+}
+
+# build PRESET [CMake cache options]: configures and builds; a second call does only what changed.
+build() {
+  local preset=$1; shift
+  cmake --preset "$preset" -S "$root" "$@" >"$root/build-$preset.log" 2>&1 || { cat "$root/build-$preset.log" >&2; return 1; }
+  rm -f "$root/build-$preset.log"
+  cmake --build "$root/build/$preset" --parallel "$cores"
+}

@@ -1,0 +1,146 @@
+#include "inference/emulator/emulated_likelihood.h"
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
+
+}  // namespace
+
+absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& data,
+                                                              const StateEmulator& emulator,
+                                                              const Options& options) {
+  EmulatedLikelihood likelihood;
+  const PrincipalComponents& components = emulator.components();
+  likelihood.mean_ = components.mean;
+  likelihood.scatter_variance_ = options.scatter_share * emulator.scatter_sd().array().square();
+  likelihood.correlation_factor_ = Eigen::LLT<Eigen::MatrixXd>(emulator.correlation()).matrixL();
+
+  std::map<std::pair<int, int>, std::vector<Index>> groups;
+  for (std::size_t t = 0; t < data.readings.size(); ++t) {
+    groups[{data.readings[t].experiment, data.readings[t].observable}].push_back(
+        static_cast<Index>(t));
+  }
+  std::map<std::pair<int, int>, double> lengths;
+  if (options.correlated_noise) {
+    for (const Correlation& c : data.correlations) lengths[{c.experiment, c.observable}] = c.length;
+  }
+  for (auto& [key, readings] : groups) {
+    Form form;
+    const auto size = static_cast<Index>(readings.size());
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(size, size);
+    const auto length = lengths.find(key);
+    Eigen::MatrixXd basis(size, components.basis.cols());
+    for (Index i = 0; i < size; ++i) {
+      const Index t = readings[static_cast<std::size_t>(i)];
+      const Reading& reading = data.readings[static_cast<std::size_t>(t)];
+      for (Index j = 0; length != lengths.end() && j < i; ++j) {
+        const Index earlier = readings[static_cast<std::size_t>(j)];
+        const double distance =
+            std::abs(reading.control - data.readings[static_cast<std::size_t>(earlier)].control);
+        covariance(i, j) = covariance(j, i) = std::exp(-distance / length->second);
+      }
+      covariance(i, i) += components.remainder[t];
+      basis.row(i) = components.basis.row(t);
+      form.log_normaliser -= std::log(reading.sd) + kLogSqrtTwoPi;
+    }
+    const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+    if (factor.info() != Eigen::Success) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("readings of observable ", key.second, " of experiment ", key.first,
+                       " lie too close for their correlation length: leave out some."));
+    }
+    form.log_normaliser -= factor.matrixLLT().diagonal().array().log().sum();
+    form.whitening = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
+    form.whitened_basis = form.whitening * basis;
+    form.gram = form.whitened_basis.transpose() * form.whitened_basis;
+    form.readings = std::move(readings);
+    likelihood.Project(form, Eigen::VectorXd::Zero(components.mean.size()), form.projection,
+                       form.square);
+    likelihood.forms_.push_back(std::move(form));
+  }
+  return likelihood;
+}
+
+void EmulatedLikelihood::Project(const Form& form, const Eigen::VectorXd& z,
+                                 Eigen::VectorXd& projection, double& square) const {
+  Eigen::VectorXd residual(static_cast<Index>(form.readings.size()));
+  for (Index i = 0; i < residual.size(); ++i) {
+    const Index t = form.readings[static_cast<std::size_t>(i)];
+    residual[i] = z[t] - mean_[t];
+  }
+  const Eigen::VectorXd whitened = form.whitening * residual;
+  projection = form.whitened_basis.transpose() * whitened;
+  square = whitened.squaredNorm();
+}
+
+// What depends on the prediction: with G = (WB)^T WB, g = (WB)^T W r - G m, S = D chol(C), M = I +
+// S^T G S,
+//   -1/2 (m^T G m - 2 m^T (WB)^T W r - |M^{-1/2} S^T g|^2 + ln det M)         [matrix inversion and
+//   determinant lemmas]
+double EmulatedLikelihood::Combine(const Eigen::VectorXd& mean, const Eigen::VectorXd& sd,
+                                   const Eigen::MatrixXd& gram,
+                                   const Eigen::VectorXd& projection) const {
+  const Eigen::VectorXd along = gram * mean;
+  const Eigen::VectorXd left = projection - along;
+  const Eigen::VectorXd spread = (sd.array().square() + scatter_variance_.array()).sqrt();
+  const Eigen::MatrixXd factor = spread.asDiagonal() * correlation_factor_;
+  Eigen::MatrixXd inner = factor.transpose() * gram * factor;
+  inner.diagonal().array() += 1;
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(inner);
+  const Eigen::VectorXd explained = cholesky.matrixL().solve(factor.transpose() * left);
+  const double log_determinant = 2 * cholesky.matrixLLT().diagonal().array().log().sum();
+  return -0.5 *
+         (mean.dot(along) - 2 * mean.dot(projection) - explained.squaredNorm() + log_determinant);
+}
+
+Eigen::VectorXd EmulatedLikelihood::LogLikelihood(const ScorePrediction& prediction,
+                                                  const Eigen::MatrixXd& factors) const {
+  const Index q = prediction.mean.cols();
+  Eigen::VectorXd result(prediction.mean.rows());
+  Eigen::MatrixXd gram(q, q);
+  Eigen::VectorXd projection(q);
+  for (Index i = 0; i < result.size(); ++i) {
+    gram.setZero();
+    projection.setZero();
+    double sum = 0;
+    for (std::size_t g = 0; g < forms_.size(); ++g) {
+      const Form& form = forms_[g];
+      const double factor = factors.cols() == 0 ? 1 : factors(i, static_cast<Index>(g));
+      gram += form.gram / factor;
+      projection += form.projection / factor;
+      sum += form.log_normaliser - 0.5 * form.square / factor -
+             0.5 * static_cast<double>(form.readings.size()) * std::log(factor);
+    }
+    result[i] = sum + Combine(prediction.mean.row(i), prediction.sd.row(i), gram, projection);
+  }
+  return result;
+}
+
+double EmulatedLikelihood::LogDensity(const ScorePrediction& prediction, Index row,
+                                      const Eigen::VectorXd& z) const {
+  const Index q = prediction.mean.cols();
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(q, q);
+  Eigen::VectorXd projection = Eigen::VectorXd::Zero(q);
+  Eigen::VectorXd one;
+  double sum = 0;
+  for (const Form& form : forms_) {
+    double square = 0;
+    Project(form, z, one, square);
+    gram += form.gram;
+    projection += one;
+    sum += form.log_normaliser - 0.5 * square;
+  }
+  return sum + Combine(prediction.mean.row(row), prediction.sd.row(row), gram, projection);
+}
+
+}  // namespace calib::inference

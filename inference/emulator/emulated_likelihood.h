@@ -1,0 +1,67 @@
+#pragma once
+// Likelihood of the readings with the emulator's error in the covariance.
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/data/data_set.h"
+#include "inference/emulator/state_emulator.h"
+
+namespace calib::inference {
+
+/// Density of readings z, in units of their noise sd, under the emulator:
+///   N(z; mean + B m, F (R + diag(remainder)) + B D C D B^T),    D^2 = diag(sd^2 + share *
+///   scatter_sd^2)
+/// with mean, basis B, remainder and error correlation C of the emulator, its prediction m, sd at a
+/// point, the noise's correlation R (identity, or exponential along the control), and one variance
+/// factor per (experiment, observable) group in F. `share` is the part of a run's scatter that the
+/// measurement has as well. All that involves T is done once; a point then costs O(q^3).
+class EmulatedLikelihood {
+ public:
+  struct Options {
+    bool correlated_noise = true;  ///< use data.correlations
+    double scatter_share = 1;
+  };
+  /// in: data that ValidateData accepts for kGiven; emulator of the same T readings. Keeps no
+  /// reference. Errors: INVALID_ARGUMENT when correlated readings lie so close that their
+  /// covariance is singular.
+  static absl::StatusOr<EmulatedLikelihood> Create(const DataSet& data,
+                                                   const StateEmulator& emulator,
+                                                   const Options& options);
+
+  int groups() const { return static_cast<int>(forms_.size()); }
+
+  /// ln p(readings | point) in the readings' own units, m entries; readings as measured (z = 0).
+  /// factors: m x groups, > 0; 0 columns for all one.
+  Eigen::VectorXd LogLikelihood(const ScorePrediction& prediction,
+                                const Eigen::MatrixXd& factors) const;
+
+  /// ln p(z | point) for one point with readings z (T, noise units about the measured ones), all
+  /// factors one.
+  double LogDensity(const ScorePrediction& prediction, Eigen::Index row,
+                    const Eigen::VectorXd& z) const;
+
+ private:
+  // Of one group, whitened by W = chol(R + diag(remainder))^-1.
+  struct Form {
+    std::vector<Eigen::Index> readings;
+    Eigen::MatrixXd whitening;       // W, lower
+    Eigen::MatrixXd whitened_basis;  // W B
+    Eigen::MatrixXd gram;            // B^T W^T W B
+    double log_normaliser = 0;       // - sum ln sd - ln det W^-1 - n/2 ln 2 pi
+    Eigen::VectorXd projection;  // (W B)^T W r, r the residual of the measured readings at m = 0
+    double square = 0;           // |W r|^2
+  };
+  void Project(const Form& form, const Eigen::VectorXd& z, Eigen::VectorXd& projection,
+               double& square) const;
+  double Combine(const Eigen::VectorXd& mean, const Eigen::VectorXd& sd,
+                 const Eigen::MatrixXd& gram, const Eigen::VectorXd& projection) const;
+
+  Eigen::RowVectorXd mean_;
+  Eigen::VectorXd scatter_variance_;    // share * scatter_sd^2
+  Eigen::MatrixXd correlation_factor_;  // lower Cholesky factor of C
+  std::vector<Form> forms_;
+};
+
+}  // namespace calib::inference

@@ -1,0 +1,267 @@
+#include "inference/emulator/emulated_posterior.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "inference/data/gaussian_likelihood.h"
+#include "inference/emulator/emulated_likelihood.h"
+#include "inference/filter/weighted_moments.h"
+#include "inference/sampling/philox.h"
+#include "inference/tmcmc/tmcmc.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+Eigen::MatrixXd ToStandard(std::span<const Prior> priors, const Eigen::MatrixXd& parameters) {
+  Eigen::MatrixXd result(parameters.rows(), static_cast<Index>(priors.size()));
+  for (Index j = 0; j < result.cols(); ++j) {
+    const Prior& prior = priors[static_cast<std::size_t>(j)];
+    for (Index i = 0; i < result.rows(); ++i) result(i, j) = prior.ToStandard(parameters(i, j));
+  }
+  return result;
+}
+
+absl::StatusOr<Runs> CollectRuns(std::span<const Prior> priors, const DataSet& data,
+                                 std::span<const Iteration> iterations) {
+  const auto t = static_cast<Index>(data.readings.size());
+  const auto d = static_cast<Index>(priors.size());
+  Eigen::RowVectorXd value(t);
+  Eigen::RowVectorXd sd(t);
+  for (Index k = 0; k < t; ++k) {
+    value[k] = data.readings[static_cast<std::size_t>(k)].value;
+    sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+  }
+  Index total = 0;
+  for (const Iteration& iteration : iterations) total += iteration.parameters.rows();
+  Runs runs{.inputs = Eigen::MatrixXd(total, d), .histories = Eigen::MatrixXd(total, t)};
+  Index used = 0;
+  for (const Iteration& iteration : iterations) {
+    if (iteration.parameters.cols() != d || iteration.predictions.cols() != t ||
+        iteration.parameters.rows() != iteration.predictions.rows()) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "an iteration has ", iteration.parameters.rows(), " x ", iteration.parameters.cols(),
+          " parameters and ", iteration.predictions.rows(), " x ", iteration.predictions.cols(),
+          " predictions; there are ", d, " priors and ", t, " readings."));
+    }
+    const Eigen::MatrixXd standard = ToStandard(priors, iteration.parameters);
+    for (Index i = 0; i < standard.rows(); ++i) {
+      if (!iteration.predictions.row(i).allFinite() || !standard.row(i).allFinite()) continue;
+      runs.inputs.row(used) = standard.row(i);
+      runs.histories.row(used) = (iteration.predictions.row(i) - value).cwiseQuotient(sd);
+      ++used;
+    }
+  }
+  runs.inputs.conservativeResize(used, d);
+  runs.histories.conservativeResize(used, t);
+  return runs;
+}
+
+// f = 1 / z^2 per group; the columns after the parameters hold z.
+Eigen::MatrixXd Factors(const Eigen::MatrixXd& points, Index d) {
+  return points.rightCols(points.cols() - d).array().square().max(1e-12).inverse();
+}
+
+ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weights,
+                           const Eigen::VectorXd& values) {
+  ParameterSummary summary;
+  summary.mean = values.mean();
+  summary.sd = std::sqrt((values.array() - summary.mean).square().mean());
+  summary.cov = summary.sd / std::abs(summary.mean);
+  summary.q05 = WeightedQuantile(log_weights, values, 0.05);
+  summary.q50 = WeightedQuantile(log_weights, values, 0.5);
+  summary.q95 = WeightedQuantile(log_weights, values, 0.95);
+  summary.prior_sd = prior.StandardDeviation();
+  const auto tenth = static_cast<double>(values.size()) / 10;
+  summary.at_bound =
+      static_cast<double>((values.array() <= prior.Quantile(0.02)).count()) > tenth ||
+      static_cast<double>((values.array() >= prior.Quantile(0.98)).count()) > tenth;
+  return summary;
+}
+
+// Histories of the model at the draws: the mean history and what is not known of it.
+void AddPredictive(const DataSet& data, const StateEmulator& emulator,
+                   const ScorePrediction& prediction, std::uint64_t seed, EmulatedResult& result) {
+  const Index n = prediction.mean.rows();
+  const Index q = prediction.mean.cols();
+  const auto t = static_cast<Index>(data.readings.size());
+  const Eigen::MatrixXd factor = Eigen::LLT<Eigen::MatrixXd>(emulator.correlation()).matrixL();
+  Eigen::MatrixXd scores(n, q);
+  Eigen::VectorXd normal(q);
+  for (Index i = 0; i < n; ++i) {
+    PhiloxStream stream({.seed = seed,
+                         .purpose = StreamPurpose::kEmulatorBand,
+                         .iteration = 0,
+                         .sample = static_cast<std::uint64_t>(i)});
+    for (double& z : normal) z = stream.Normal();
+    scores.row(i) =
+        prediction.mean.row(i) + (factor * normal).transpose().cwiseProduct(prediction.sd.row(i));
+  }
+  const PrincipalComponents& components = emulator.components();
+  result.predictive_mean.resize(t);
+  result.predictive_q05.resize(t);
+  result.predictive_q50.resize(t);
+  result.predictive_q95.resize(t);
+  std::vector<double> history(static_cast<std::size_t>(n));
+  for (Index k = 0; k < t; ++k) {
+    const Reading& reading = data.readings[static_cast<std::size_t>(k)];
+    const Eigen::VectorXd column = scores * components.basis.row(k).transpose();
+    for (Index i = 0; i < n; ++i) {
+      history[static_cast<std::size_t>(i)] =
+          reading.value + reading.sd * (components.mean[k] + column[i]);
+    }
+    result.predictive_mean[k] = reading.value + reading.sd * (components.mean[k] + column.mean());
+    const auto quantile = [&history](double p) {
+      const auto at =
+          history.begin() + static_cast<std::ptrdiff_t>(p * static_cast<double>(history.size()));
+      std::nth_element(history.begin(), at, history.end());
+      return *at;
+    };
+    result.predictive_q05[k] = quantile(0.05);
+    result.predictive_q50[k] = quantile(0.5);
+    result.predictive_q95[k] = quantile(0.95);
+  }
+}
+
+// The errors in units of the noise sd, the inferred one with kInferred, and the verdict.
+void Judge(const EmulatorOptions& options, const TrainedEmulator& trained,
+           const ScorePrediction& prediction, double noise_variance, EmulatedResult& result) {
+  const CrossValidation& check = trained.emulator.cross_validation();
+  const double unit = std::sqrt(noise_variance);
+  result.cross_validated_error = check.rms / unit;
+  result.reading_error =
+      check.error.colwise().norm() / (unit * std::sqrt(static_cast<double>(check.error.rows())));
+  result.scatter = check.scatter_rms / unit;
+  result.calibration = check.calibration;
+  const auto readings = static_cast<double>(check.error.cols());
+  result.emulator_sd = std::sqrt(prediction.sd.squaredNorm() /
+                                 (static_cast<double>(prediction.sd.rows()) * readings)) /
+                       unit;
+  const double shared = options.training.scatter_share * result.scatter * result.scatter;
+  const double uncovered = std::sqrt(
+      std::max(0.0, result.cross_validated_error * result.cross_validated_error - shared));
+  result.adequate = false;
+  if (result.cross_validated_error > options.max_error) {
+    result.reason = absl::StrFormat(
+        "The emulator misses its own runs by %.1f standard deviations of the readings' noise "
+        "(limit %g), of which it puts "
+        "%.1f down to the scatter of single runs: run more samples near the posterior or fewer "
+        "parameters, or state a "
+        "larger noise.",
+        result.cross_validated_error, options.max_error, result.scatter);
+  } else if (uncovered > options.max_uncovered) {
+    result.reason = absl::StrFormat(
+        "The emulator misses its own runs by %.1f standard deviations of the readings' noise "
+        "beyond the scatter that the "
+        "measurement is taken to share (limit %g): run more samples near the posterior, or give "
+        "the measurement a larger "
+        "share of the scatter.",
+        uncovered, options.max_uncovered);
+  } else if (result.calibration > options.max_calibration) {
+    result.reason = absl::StrFormat(
+        "The emulator's errors on its own runs are %.1f times as large as it claims (limit %.1f): "
+        "the response is not "
+        "smooth on the scale of the runs, run more samples near the posterior.",
+        std::sqrt(result.calibration), std::sqrt(options.max_calibration));
+  } else {
+    result.adequate = true;
+  }
+}
+
+}  // namespace
+
+absl::Status EmulatorOptions::Validate() const {
+  const auto wrong = [](const char* name, double found, const char* allowed) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("emulator: ", name, " is ", found, "; allowed is ", allowed, "."));
+  };
+  if (noise == NoiseMode::kEssTarget) {
+    return absl::InvalidArgumentError(
+        "emulator: noise by effective sample size is a tempering of the runs' own weights and has "
+        "no emulated posterior; "
+        "give the noise or let it be inferred.");
+  }
+  if (auto valid = training.Validate(); !valid.ok()) return valid;
+  if (draws < 100 || draws > 100000) return wrong("draws", draws, "100 to 1e5");
+  if (!(target_cv > 0 && target_cv <= 2)) return wrong("target_cv", target_cv, "above 0 up to 2");
+  if (steps < 1) return wrong("steps", steps, "1 or more");
+  if (!(max_error > 0)) return wrong("max_error", max_error, "above 0");
+  if (!(max_uncovered > 0)) return wrong("max_uncovered", max_uncovered, "above 0");
+  if (!(max_calibration > 1)) return wrong("max_calibration", max_calibration, "above 1");
+  return absl::OkStatus();
+}
+
+absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, const DataSet& data,
+                                                 const EmulatorOptions& options,
+                                                 std::span<const Iteration> iterations,
+                                                 std::stop_token stop) {
+  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  if (auto valid = ValidateData(data, options.noise); !valid.ok()) return valid;
+  for (const Prior& prior : priors) {
+    if (auto valid = prior.Validate(); !valid.ok()) return valid;
+  }
+  const auto runs = CollectRuns(priors, data, iterations);
+  if (!runs.ok()) return runs.status();
+  const auto trained = TrainEmulator(*runs, data, options.training);
+  if (!trained.ok()) return trained.status();
+  const auto likelihood = EmulatedLikelihood::Create(
+      data, trained->emulator, {.scatter_share = options.training.scatter_share});
+  if (!likelihood.ok()) return likelihood.status();
+
+  const auto d = static_cast<Index>(priors.size());
+  std::vector<Prior> sampled(priors.begin(), priors.end());
+  if (options.noise == NoiseMode::kInferred) {
+    // An inverse gamma of shape and rate 1/2 is the law of 1 / z^2, z standard normal.
+    static_assert(VarianceFactorPrior{}.shape == 0.5 && VarianceFactorPrior{}.rate == 0.5);
+    sampled.resize(sampled.size() + static_cast<std::size_t>(likelihood->groups()),
+                   Prior{.kind = PriorKind::kNormal, .min = 0, .mean = 0, .sd = 1});
+  }
+  const TmcmcOptions sampler{.samples = options.draws,
+                             .target_cv = options.target_cv,
+                             .steps = options.steps,
+                             .seed = options.seed};
+  const auto state = RunTmcmc(
+      sampled, sampler,
+      [&](const Eigen::MatrixXd& points) {
+        const ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, points));
+        return likelihood->LogLikelihood(prediction, Factors(points, d));
+      },
+      stop);
+  if (!state.ok()) return state.status();
+
+  EmulatedResult result;
+  result.draws = state->samples.leftCols(d);
+  result.log_evidence = state->log_evidence;
+  result.log_evidence_se = state->LogEvidenceStandardError();
+  const Index n = result.draws.rows();
+  const Eigen::VectorXd log_weights =
+      Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
+  for (Index j = 0; j < d; ++j) {
+    result.parameters.push_back(
+        Summarize(priors[static_cast<std::size_t>(j)], log_weights, result.draws.col(j)));
+  }
+  result.correlation = CorrelationOf(
+      WeightedCovariance(log_weights, result.draws, WeightedMean(log_weights, result.draws)));
+  double noise_variance = 1;
+  if (options.noise == NoiseMode::kInferred) {
+    const Eigen::MatrixXd factors = Factors(state->samples, d);
+    result.variance_factors.resize(factors.cols());
+    for (Index g = 0; g < factors.cols(); ++g) {
+      result.variance_factors[g] = WeightedQuantile(log_weights, factors.col(g), 0.5);
+    }
+    noise_variance = result.variance_factors.mean();
+  }
+  result.runs = trained->runs;
+  result.components = static_cast<int>(trained->emulator.components().basis.cols());
+  result.local = trained->local;
+  const ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, result.draws));
+  AddPredictive(data, trained->emulator, prediction, options.seed, result);
+  Judge(options, *trained, prediction, noise_variance, result);
+  return result;
+}
+
+}  // namespace calib::inference

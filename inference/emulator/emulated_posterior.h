@@ -1,0 +1,86 @@
+#pragma once
+// The posterior from few runs of an expensive model: sampled on an emulator of the runs' histories,
+// whose error is part of the likelihood. For campaigns whose weights are not enough
+// [filter/iterative_filter.h, ess and pareto_k]: with honest noise a posterior is tiny against the
+// prior, and a hundred weighted runs hold one effective sample.
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "inference/data/data_set.h"
+#include "inference/emulator/training_set.h"
+#include "inference/filter/iterative_filter.h"
+#include "inference/prior/prior.h"
+
+namespace calib::inference {
+
+struct EmulatorOptions {
+  /// kGiven or kInferred. kEssTarget is a tempering chosen from the weights of the runs themselves,
+  /// there is nothing in it to emulate: INVALID_ARGUMENT.
+  NoiseMode noise = NoiseMode::kGiven;
+  TrainingOptions training = {};
+  int draws = 2000;        ///< from the posterior, [100, 1e5]; also the population of the sampler
+  double target_cv = 0.7;  ///< of the sampler's weights per stage, see TmcmcOptions
+  int steps = 5;           ///< Metropolis steps per stage, see TmcmcOptions
+  /// Limits of an adequate emulator; README.md of this folder has the reasons. Of
+  /// cross_validated_error; of the part of it that the likelihood's covariance does not contain,
+  /// sqrt(error^2 - scatter_share scatter^2); of calibration.
+  double max_error = 3;        ///< > 0
+  double max_uncovered = 2;    ///< > 0
+  double max_calibration = 2;  ///< > 1
+  std::uint64_t seed = 0;
+  absl::Status Validate() const;
+};
+
+struct EmulatedResult {
+  Eigen::MatrixXd draws;  ///< equally weighted, draws x d
+  std::vector<ParameterSummary> parameters;
+  Eigen::MatrixXd correlation;       ///< d x d
+  double log_evidence = 0;           ///< ln p(data), emulator error included
+  double log_evidence_se = 0;        ///< of the sampling alone
+  Eigen::VectorXd variance_factors;  ///< kInferred: posterior median of f per group, groups in
+                                     ///< ascending order of (experiment, observable)
+
+  /// History of the model over the posterior, T entries, in units of the readings: mean and
+  /// quantiles over parameters and over what the emulator does not know of the mean history.
+  /// Without a run's scatter and the readings' noise.
+  Eigen::VectorXd predictive_mean, predictive_q05, predictive_q50, predictive_q95;
+
+  /// Root mean square error of a run predicted from the others, over the relevant runs and all
+  /// readings, in units of the noise sd (of the inferred one with kInferred); the same per reading,
+  /// T; the part put down to scatter; and the emulator's own sd of the mean history, root mean
+  /// square over posterior and readings.
+  double cross_validated_error = 0;
+  Eigen::VectorXd reading_error;
+  double scatter = 0;
+  double emulator_sd = 0;
+  double calibration = 0;  ///< see CrossValidation
+
+  int runs = 0;  ///< the emulator learned from
+  int components = 0;
+  bool local = false;  ///< see TrainedEmulator
+  /// False: the emulator is not good enough for an interval; report no posterior (converged:
+  /// false). `reason` then says why and what helps, in a sentence.
+  bool adequate = false;
+  std::string reason;
+};
+
+/// Emulates the runs of all iterations (rows with NaN left out; how they were proposed does not
+/// matter, which is what makes an emulated posterior independent of weights) and samples prior x
+/// likelihood by TMCMC. Deterministic in options.seed. About a second or two at 400 runs, 5
+/// parameters and 300 readings. With kInferred a variance factor f multiplies the noise of each
+/// (experiment, observable) group, inverse gamma prior (VarianceFactorPrior), sampled along as f =
+/// 1 / z^2, z half normal. Errors: INVALID_ARGUMENT for options, priors, data or shapes;
+/// FAILED_PRECONDITION with too few undiverged runs; CANCELLED.
+absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, const DataSet& data,
+                                                 const EmulatorOptions& options,
+                                                 std::span<const Iteration> iterations,
+                                                 std::stop_token stop = {});
+
+}  // namespace calib::inference

@@ -1,0 +1,50 @@
+#pragma once
+// Which runs the emulator learns from.
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "inference/data/data_set.h"
+#include "inference/emulator/state_emulator.h"
+
+namespace calib::inference {
+
+struct TrainingOptions {
+  int max_runs =
+      120;  ///< most runs to learn from, >= 20; the cost of a prediction grows with the square
+  /// Runs that matter, the best by likelihood; 0: max(40, 10 d).
+  int relevant_runs = 0;
+  double share_of_rest =
+      0.25;  ///< of the other runs, kept in a local training set to tie the far field down, [0, 1]
+  double scatter_share = 1;  ///< see EmulatedLikelihood
+  PrincipalOptions principal = {};
+  absl::Status Validate() const;
+};
+
+/// Runs of a campaign as the emulator sees them; diverged ones left out.
+struct Runs {
+  Eigen::MatrixXd inputs;     ///< N x d, standardised parameters
+  Eigen::MatrixXd histories;  ///< N x T, (prediction - reading) / sd
+};
+
+struct TrainedEmulator {
+  StateEmulator emulator;
+  int runs = 0;                        ///< learned from
+  std::vector<Eigen::Index> relevant;  ///< rows of Runs on which it was judged
+  bool local = false;  ///< the local training set validated better than the broad one
+};
+
+/// Trains twice and keeps what predicts the relevant runs better. First broadly: all runs, or the
+/// better half of max_runs and an even choice of the rest. Its predictions, not the runs' own
+/// outcomes, then rank all runs by likelihood (a run whose scatter happens to lie towards the
+/// measurement must not be preferred for that: the emulator would inherit the luck). Then locally:
+/// the relevant runs and a share of the others. Judged by the leave-one-out log density of the
+/// relevant runs with the readings' noise added. Deterministic.
+/// Errors: FAILED_PRECONDITION with fewer than max(10, d + 4) runs, or when nothing can be
+/// factorised.
+absl::StatusOr<TrainedEmulator> TrainEmulator(const Runs& runs, const DataSet& data,
+                                              const TrainingOptions& options);
+
+}  // namespace calib::inference

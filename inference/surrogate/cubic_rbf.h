@@ -1,0 +1,66 @@
+#pragma once
+// Cubic radial basis function interpolant with a linear tail [Powell 1992; Regis & Shoemaker 2007].
+
+#include <Eigen/Dense>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+
+namespace calib::inference {
+
+/// s(x) = sum_i lambda_i |x - x_i|^3 + c_0 + c . x  through all (x_i, f_i), with sum_i lambda_i = 0
+/// and sum_i lambda_i x_i = 0, no regularisation.
+///
+/// d + 1 points in general position and the tail form a small block A, factorised once; what the
+/// other points leave,
+///   S = Phi_22 - B^T A^-1 B,
+/// is positive definite because the cubic kernel is so on the functions that vanish on linear
+/// polynomials. A further point therefore adds one row to a Cholesky factor: O(n^2) instead of
+/// O(n^3). Points that arrive before d + 1 of them are in general position wait. A value type;
+/// thread safety: const.
+class CubicRbf {
+ public:
+  explicit CubicRbf(int dimensions) : dimensions_(dimensions) {}
+
+  /// Adds a point with its value. Errors: INVALID_ARGUMENT when it (nearly) coincides with an
+  /// earlier one, or anything is not finite; the interpolant is unchanged then.
+  absl::Status Add(const Eigen::VectorXd& point, double value);
+
+  int dimensions() const { return dimensions_; }
+  int size() const { return static_cast<int>(points_.size()); }
+  /// True once d + 1 points are in general position; evaluate only then.
+  bool ready() const { return tail_points_.size() == static_cast<std::size_t>(dimensions_) + 1; }
+
+  double Value(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd Gradient(const Eigen::VectorXd& x) const;
+  /// From distances |x - x_i| already at hand (n, in the order of Add).
+  double Value(const Eigen::VectorXd& x, const Eigen::VectorXd& distances) const;
+
+  const Eigen::VectorXd& point(int i) const { return points_[static_cast<std::size_t>(i)]; }
+  /// lambda in the order of Add, n.
+  const Eigen::VectorXd& coefficients() const { return coefficients_; }
+  /// c_0, c_1 ... c_d.
+  const Eigen::VectorXd& tail() const { return tail_; }
+
+ private:
+  Eigen::VectorXd Border(
+      int i) const;  // (1, x_i, |x_i - t_0|^3 ... |x_i - t_d|^3), t the tail points
+  bool ChooseTailPoints();
+  bool AppendRow(int i);
+  void Solve();
+
+  int dimensions_;
+  std::vector<Eigen::VectorXd> points_;
+  std::vector<double> values_;
+  std::vector<int> tail_points_;                // d + 1 indices, ascending
+  std::vector<int> others_;                     // the rest in the order of the factor's rows
+  Eigen::PartialPivLU<Eigen::MatrixXd> block_;  // A = [0 P^T; P Phi_11]
+  std::vector<Eigen::VectorXd> borders_;        // columns of B
+  std::vector<Eigen::VectorXd> solved_;         // columns of A^-1 B
+  std::vector<Eigen::VectorXd> factor_;         // rows of the Cholesky factor of S
+  Eigen::VectorXd coefficients_;
+  Eigen::VectorXd tail_;
+};
+
+}  // namespace calib::inference

@@ -1,0 +1,194 @@
+#include "inference/surrogate/response_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "inference/sampling/latin_hypercube.h"
+#include "inference/sampling/philox.h"
+#include "inference/surrogate/merit.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+int InitialPoints(const ResponseSurfaceOptions& options) {
+  return options.initial_points > 0 ? options.initial_points
+                                    : 2 * options.dimensions + 1 + options.workers;
+}
+
+// Perturbations of the best point, cut off at the faces of the cube so that an optimum on a face
+// can be met exactly.
+Eigen::MatrixXd Candidates(const ResponseSurfaceOptions& options,
+                           const ResponseSurfaceState& state) {
+  const int count = options.candidates > 0 ? options.candidates : 100 * options.dimensions;
+  const Eigen::VectorXd& best = state.evaluations[static_cast<std::size_t>(state.best)].point;
+  Eigen::MatrixXd candidates(options.dimensions, count);
+  for (Index k = 0; k < count; ++k) {
+    PhiloxStream stream({.seed = options.seed,
+                         .purpose = StreamPurpose::kResponseSurface,
+                         .iteration = state.evaluations.size(),
+                         .sample = static_cast<std::uint64_t>(k)});
+    for (Index j = 0; j < options.dimensions; ++j) {
+      candidates(j, k) = std::clamp(best[j] + state.step * stream.Normal(), 0.0, 1.0);
+    }
+  }
+  return candidates;
+}
+
+// Distances of a point to the columns' points (m x d).
+Eigen::VectorXd Distances(const Eigen::MatrixXd& points, const Eigen::VectorXd& x) {
+  Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(points.rows());
+  for (Index j = 0; j < points.cols(); ++j) squares += (points.col(j).array() - x[j]).square();
+  return squares.sqrt();
+}
+
+Eigen::VectorXd ChoosePoint(const ResponseSurfaceOptions& options, const CubicRbf& surrogate,
+                            const ResponseSurfaceState& state) {
+  const Eigen::MatrixXd candidates = Candidates(options, state);
+  Eigen::MatrixXd done(surrogate.size(), options.dimensions);
+  for (Index i = 0; i < done.rows(); ++i) done.row(i) = surrogate.point(static_cast<int>(i));
+  Eigen::MatrixXd others(static_cast<Index>(state.evaluations.size() - state.completed.size()),
+                         options.dimensions);
+  Index filled = 0;
+  for (const Evaluation& evaluation : state.evaluations) {
+    if (evaluation.status != EvaluationStatus::kDone) others.row(filled++) = evaluation.point;
+  }
+  Eigen::VectorXd values(candidates.cols());
+  Eigen::VectorXd nearest(candidates.cols());
+  for (Index k = 0; k < candidates.cols(); ++k) {
+    const Eigen::VectorXd distances = Distances(done, candidates.col(k));
+    values[k] = surrogate.Value(candidates.col(k), distances);
+    nearest[k] = distances.minCoeff();
+    if (others.rows() > 0)
+      nearest[k] = std::min(nearest[k], Distances(others, candidates.col(k)).minCoeff());
+  }
+  const std::size_t turn =
+      (state.evaluations.size() - static_cast<std::size_t>(state.design.rows())) %
+      options.weights.size();
+  return candidates.col(BestCandidate(
+      values, nearest, {.weight = options.weights[turn], .min_distance = options.min_distance}));
+}
+
+}  // namespace
+
+absl::Status ResponseSurfaceOptions::Validate() const {
+  const auto wrong = [](const char* name, double found, const std::string& allowed) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("surrogate_msrs: ", name, " is ", found, "; allowed is ", allowed, "."));
+  };
+  if (dimensions < 1) return wrong("dimensions", dimensions, "1 or more");
+  if (workers < 1) return wrong("workers", workers, "1 or more");
+  if (initial_points != 0 && initial_points < 2 * dimensions + 1) {
+    return wrong("initial_points", initial_points,
+                 absl::StrCat(2 * dimensions + 1, " or more, or 0"));
+  }
+  if (max_evaluations < 2 * dimensions + 1) {
+    return wrong("max_evaluations", max_evaluations, absl::StrCat(2 * dimensions + 1, " or more"));
+  }
+  if (candidates < 0) return wrong("candidates", candidates, "1 or more, or 0");
+  if (!(max_step > 0 && max_step <= 1)) return wrong("max_step", max_step, "above 0 up to 1");
+  if (!(min_step > 0 && min_step <= max_step))
+    return wrong("min_step", min_step, "above 0 up to max_step");
+  if (successes_to_double < 1)
+    return wrong("successes_to_double", successes_to_double, "1 or more");
+  if (failures_to_halve < 1) return wrong("failures_to_halve", failures_to_halve, "1 or more");
+  if (weights.empty()) return absl::InvalidArgumentError("surrogate_msrs: weights are missing.");
+  for (const double weight : weights) {
+    if (!(weight >= 0 && weight <= 1)) return wrong("a weight", weight, "0 to 1");
+  }
+  if (!(min_distance >= 1e-6 && min_distance < 1))
+    return wrong("min_distance", min_distance, "1e-6 up to 1");
+  if (!(termination > 0)) return wrong("termination", termination, "above 0");
+  return absl::OkStatus();
+}
+
+absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceOptions& options) {
+  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  LatinHypercubeOptions design{.points = InitialPoints(options),
+                               .dimensions = options.dimensions,
+                               .symmetric = true,
+                               .candidates = 1000,
+                               .seed = options.seed};
+  ResponseSurfaceState state;
+  state.step = options.max_step;
+  constexpr int kTries =
+      100;  // a design that does not span the tail is rare: its points would lie in a plane
+  for (int i = 0; i < kTries; ++i) {
+    auto points = LatinHypercube(design);
+    if (!points.ok()) return points.status();
+    state.design = *std::move(points);
+    if (SpansLinearFunctions(state.design)) return state;
+    ++design.seed;
+  }
+  return absl::InternalError("surrogate_msrs: no design spans the linear functions.");
+}
+
+std::optional<Eigen::VectorXd> NextPoint(const ResponseSurfaceOptions& options,
+                                         ResponseSurfaceState& state, CubicRbf& surrogate) {
+  const auto dispatched = static_cast<int>(state.evaluations.size());
+  if (dispatched >= options.max_evaluations) return std::nullopt;
+  if (dispatched < state.design.rows()) {
+    state.evaluations.push_back({.point = state.design.row(dispatched)});
+    return state.evaluations.back().point;
+  }
+  for (auto k = static_cast<std::size_t>(surrogate.size()); k < state.completed.size(); ++k) {
+    const Evaluation& evaluation = state.evaluations[static_cast<std::size_t>(state.completed[k])];
+    // Points of the design and of the merit lie apart; should two coincide all the same, the first
+    // one stands for both and the surrogate is built without the other.
+    surrogate.Add(evaluation.point, evaluation.value).IgnoreError();
+  }
+  if (surrogate.size() < 2 * options.dimensions + 1 || !surrogate.ready()) return std::nullopt;
+  state.evaluations.push_back({.point = ChoosePoint(options, surrogate, state)});
+  return state.evaluations.back().point;
+}
+
+absl::Status Report(const ResponseSurfaceOptions& options, int id, std::optional<double> value,
+                    ResponseSurfaceState& state) {
+  if (id < 0 || id >= static_cast<int>(state.evaluations.size()) ||
+      state.evaluations[static_cast<std::size_t>(id)].status != EvaluationStatus::kPending) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("surrogate_msrs: evaluation ", id, " is not pending."));
+  }
+  if (value.has_value() && !std::isfinite(*value)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("surrogate_msrs: the value of evaluation ", id, " is not finite."));
+  }
+  Evaluation& evaluation = state.evaluations[static_cast<std::size_t>(id)];
+  evaluation.status = value.has_value() ? EvaluationStatus::kDone : EvaluationStatus::kTerminated;
+  evaluation.value = value.value_or(0);
+  const bool improved =
+      value.has_value() &&
+      (state.best < 0 || *value < state.evaluations[static_cast<std::size_t>(state.best)].value);
+  if (value.has_value()) state.completed.push_back(id);
+  if (improved) state.best = id;
+  if (id < state.design.rows()) return absl::OkStatus();
+  state.successes = improved ? state.successes + 1 : 0;
+  state.failures = improved ? 0 : state.failures + 1;
+  if (state.successes == options.successes_to_double) {
+    state.step = std::min(2 * state.step, options.max_step);
+    state.successes = 0;
+  } else if (state.failures == options.failures_to_halve) {
+    state.step = std::max(state.step / 2, options.min_step);
+    state.failures = 0;
+  }
+  return absl::OkStatus();
+}
+
+double TerminationBound(const ResponseSurfaceOptions& options, int id,
+                        const ResponseSurfaceState& state) {
+  const auto initial = static_cast<int>(state.design.rows());
+  if (id < initial || state.best < 0) return kInfinity;
+  const double progress =
+      static_cast<double>(id - initial) / std::max(1, options.max_evaluations - initial);
+  const double factor = progress < 0.5 ? 1 : progress < 0.75 ? 0.5 : 0.25;
+  return factor * options.termination *
+         state.evaluations[static_cast<std::size_t>(state.best)].value;
+}
+
+}  // namespace calib::inference

@@ -1,0 +1,88 @@
+#pragma once
+// Minimisation of an expensive function by the metric stochastic response surface method, local
+// version, asynchronous and with early termination [Regis & Shoemaker 2007; Samuelsson 2023, Alg.
+// 3-5].
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "inference/surrogate/cubic_rbf.h"
+
+namespace calib::inference {
+
+/// Defaults of [Samuelsson 2023, Table 4.2].
+struct ResponseSurfaceOptions {
+  int dimensions = 0;           ///< d >= 1; the unit cube is searched
+  int max_evaluations = 40;     ///< N_max, all dispatched runs together
+  int workers = 1;              ///< P >= 1
+  int initial_points = 0;       ///< of the symmetric Latin hypercube, >= 2 d + 1; 0: 2 d + 1 + P
+  int candidates = 0;           ///< t per proposal; 0: 100 d
+  double max_step = 0.2;        ///< sigma_max, the first step size, (0, 1]
+  double min_step = 0.2 / 64;   ///< sigma_min, (0, max_step]
+  int successes_to_double = 3;  ///< C_success
+  int failures_to_halve = 4;    ///< C_fail
+  std::vector<double> weights = {0.3, 0.5, 0.8,
+                                 0.95};  ///< of the merit, one after the other, each in [0, 1]
+  double min_distance = 1e-3;            ///< between any two points, see MeritOptions
+  double termination =
+      10;  ///< a: c = a, a/2, a/4 in the halves and quarters after the initial design
+  std::uint64_t seed = 0;
+  absl::Status Validate() const;
+};
+
+enum class EvaluationStatus {
+  kPending,     ///< dispatched; counts for the distance
+  kDone,        ///< counts for the distance and the surrogate
+  kTerminated,  ///< stopped early or failed: counts for the distance alone
+};
+
+struct Evaluation {
+  Eigen::VectorXd point;  ///< in [0, 1]^d
+  EvaluationStatus status = EvaluationStatus::kPending;
+  double value = 0;  ///< once done
+};
+
+/// Everything an optimisation is at one moment; plain values, to be stored and resumed. The
+/// evaluation's index is its id.
+struct ResponseSurfaceState {
+  Eigen::MatrixXd design;               ///< initial points; row k is evaluation k
+  std::vector<Evaluation> evaluations;  ///< in the order they were dispatched
+  std::vector<int> completed;           ///< ids of those done, in the order their values came
+  double step = 0;                      ///< sigma_n
+  int successes = 0;                    ///< in a row
+  int failures = 0;                     ///< in a row
+  int best = -1;                        ///< index of the smallest value, -1: none yet
+};
+
+/// Symmetric Latin hypercube, the maximin one of 1000 that spans the linear tail.
+/// Errors: INVALID_ARGUMENT from Validate.
+absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceOptions& options);
+
+/// The next point to evaluate, recorded as pending; its id is state.evaluations.size() - 1. First
+/// the initial design, then the best of `candidates` normal perturbations of the best point by the
+/// merit, weights cycling. Depends on the state alone, whatever the order in which pending
+/// evaluations finish afterwards. surrogate: kept by the caller between calls so that each new
+/// value costs O(n^2); brought up to date here from state.completed. A new one gives the same bits,
+/// at O(n^3). nullopt: the budget is dispatched, or fewer than 2 d + 1 points are done yet and the
+/// design is used up (wait).
+std::optional<Eigen::VectorXd> NextPoint(const ResponseSurfaceOptions& options,
+                                         ResponseSurfaceState& state, CubicRbf& surrogate);
+
+/// Takes the result of a pending evaluation: its value, or nullopt when it was stopped early or
+/// failed. Adapts the step: doubled after C_success improvements in a row, halved after C_fail
+/// evaluations in a row without one (terminated ones among them); the initial design does not
+/// count. Errors: INVALID_ARGUMENT for an id that is not pending or a value that is not finite.
+absl::Status Report(const ResponseSurfaceOptions& options, int id, std::optional<double> value,
+                    ResponseSurfaceState& state);
+
+/// The bound c f* above which the early error of a running evaluation ends it [Samuelsson 2023,
+/// Eq. 3.4]; +inf for the initial design and while nothing is done. Not a rigorous bound unless the
+/// early error is part of the objective and c >= 1.
+double TerminationBound(const ResponseSurfaceOptions& options, int id,
+                        const ResponseSurfaceState& state);
+
+}  // namespace calib::inference

@@ -1,0 +1,258 @@
+#include "inference/tmcmc/tmcmc.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "inference/sampling/philox.h"
+#include "inference/tmcmc/tempering_step.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Stage 0 holds the prior draws; step 0 of a later stage is its resampling.
+PhiloxStream Stream(const TmcmcOptions& options, std::size_t stage, int step, Index row) {
+  return PhiloxStream(
+      {.seed = options.seed,
+       .purpose = StreamPurpose::kTmcmc,
+       .iteration = (static_cast<std::uint64_t>(stage) << 32) + static_cast<std::uint64_t>(step),
+       .sample = static_cast<std::uint64_t>(row)});
+}
+
+// Log density of the prior in standardised coordinates.
+double LogPrior(std::span<const Prior> priors, const Eigen::RowVectorXd& parameters) {
+  double sum = 0;
+  for (std::size_t j = 0; j < priors.size(); ++j) {
+    const double x = parameters[static_cast<Index>(j)];
+    if (!priors[j].InSupport(x)) return -kInfinity;
+    sum += priors[j].LogDensity(x) - priors[j].LogJacobian(x);
+  }
+  return sum;
+}
+
+// Draws the proposals of the next Metropolis step and the likelihood each must exceed:
+//   accept if ln u < exponent (L' - L) + (P' - P).
+void Propose(std::span<const Prior> priors, const TmcmcOptions& options, TmcmcState& state) {
+  const Index n = state.samples.rows();
+  const Index d = state.samples.cols();
+  state.proposals.resize(n, d);
+  state.accept_above.resize(n);
+  Eigen::VectorXd normal(d);
+  for (Index i = 0; i < n; ++i) {
+    PhiloxStream stream = Stream(options, state.stages.size(), state.step + 1, i);
+    for (double& z : normal) z = stream.Normal();
+    const Eigen::VectorXd jump = state.scale * (state.proposal_factor * normal);
+    for (Index j = 0; j < d; ++j) {
+      const Prior& prior = priors[static_cast<std::size_t>(j)];
+      state.proposals(i, j) = prior.FromStandard(prior.ToStandard(state.samples(i, j)) + jump[j]);
+    }
+    const double log_prior = LogPrior(priors, state.proposals.row(i));
+    const double log_u = std::log(stream.Uniform());
+    state.accept_above[i] =
+        log_prior == -kInfinity
+            ? kInfinity
+            : state.log_likelihood[i] + (log_u - (log_prior - state.log_prior[i])) / state.exponent;
+  }
+}
+
+void Accept(std::span<const Prior> priors, const Eigen::VectorXd& log_likelihood,
+            TmcmcState& state) {
+  int accepted = 0;
+  for (Index i = 0; i < state.samples.rows(); ++i) {
+    if (!(log_likelihood[i] > state.accept_above[i])) continue;
+    state.samples.row(i) = state.proposals.row(i);
+    state.log_likelihood[i] = log_likelihood[i];
+    state.log_prior[i] = LogPrior(priors, state.samples.row(i));
+    ++accepted;
+  }
+  state.accepted += accepted;
+  ++state.step;
+}
+
+// Steers the scale to the acceptance wanted. What a step did to all N samples is known only after
+// it, so the next step's proposal does not depend on the sample it moves, up to 1/N.
+void AdaptScale(const TmcmcOptions& options, int accepted, TmcmcState& state) {
+  const auto n = static_cast<double>(state.samples.rows());
+  const double first =
+      2.38 / std::sqrt(static_cast<double>(state.samples.cols()));  // [Roberts et al. 1997]
+  constexpr double kGain = 2;
+  state.scale = std::clamp(state.scale * std::exp(kGain * (accepted / n - options.acceptance)),
+                           1e-3 * first, 2 * first);
+}
+
+// Likelihood of the proposals inside the prior's support, -inf for the others.
+Eigen::VectorXd EvaluateInSupport(const TmcmcState& state,
+                                  const BatchLogLikelihood& log_likelihood) {
+  std::vector<Index> inside;
+  for (Index i = 0; i < state.proposals.rows(); ++i) {
+    if (state.accept_above[i] < kInfinity) inside.push_back(i);
+  }
+  Eigen::MatrixXd rows(static_cast<Index>(inside.size()), state.proposals.cols());
+  for (std::size_t i = 0; i < inside.size(); ++i)
+    rows.row(static_cast<Index>(i)) = state.proposals.row(inside[i]);
+  Eigen::VectorXd result = Eigen::VectorXd::Constant(state.proposals.rows(), -kInfinity);
+  if (inside.empty()) return result;
+  const Eigen::VectorXd values = log_likelihood(rows);
+  if (values.size() != rows.rows()) return values;  // refused by AdvanceTmcmc
+  for (std::size_t i = 0; i < inside.size(); ++i) result[inside[i]] = values[static_cast<Index>(i)];
+  return result;
+}
+
+// Chooses the next exponent, adds its mean weight to the evidence and resamples.
+absl::Status BeginStage(std::span<const Prior> priors, const TmcmcOptions& options,
+                        TmcmcState& state) {
+  if (static_cast<int>(state.stages.size()) == options.max_stages) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "tempering has reached exponent ", state.exponent, " only after the ", options.max_stages,
+        " stages allowed: allow more, or widen the stated errors of the readings."));
+  }
+  const Index n = state.samples.rows();
+  const TemperingStep next = NextExponent(state.log_likelihood, state.exponent, options.target_cv);
+  Eigen::MatrixXd standard(n, state.samples.cols());
+  for (Index j = 0; j < standard.cols(); ++j) {
+    for (Index i = 0; i < n; ++i) {
+      standard(i, j) = priors[static_cast<std::size_t>(j)].ToStandard(state.samples(i, j));
+    }
+  }
+  state.proposal_factor = WeightedCovarianceFactor(standard, next.weights);
+  state.log_evidence += next.log_mean_weight;
+  state.stages.push_back({.exponent = next.exponent, .cv = next.cv});
+  state.exponent = next.exponent;
+
+  Eigen::VectorXd cumulative(n);
+  double sum = 0;
+  for (Index i = 0; i < n; ++i) cumulative[i] = sum += next.weights[i];
+  const TmcmcState before = state;
+  for (Index i = 0; i < n; ++i) {  // multinomial: what the standard error by ancestors needs
+    const double u = sum * Stream(options, state.stages.size(), 0, i).Uniform();
+    const auto found =
+        std::upper_bound(cumulative.begin(), cumulative.end(), u) - cumulative.begin();
+    const Index parent = std::min<Index>(found, n - 1);
+    state.samples.row(i) = before.samples.row(parent);
+    state.log_prior[i] = before.log_prior[parent];
+    state.log_likelihood[i] = before.log_likelihood[parent];
+    state.ancestor[i] = before.ancestor[parent];
+  }
+  state.step = 0;
+  state.accepted = 0;
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status TmcmcOptions::Validate() const {
+  const auto wrong = [](const char* name, double found, const char* allowed) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("tmcmc: ", name, " is ", found, "; allowed is ", allowed, "."));
+  };
+  if (samples < 20 || samples > 1000000) return wrong("samples", samples, "20 to 1e6");
+  if (!(target_cv > 0 && target_cv <= 2)) return wrong("target_cv", target_cv, "above 0 up to 2");
+  if (steps < 1) return wrong("steps", steps, "1 or more");
+  if (!(acceptance > 0 && acceptance < 1))
+    return wrong("acceptance", acceptance, "between 0 and 1");
+  if (max_stages < 1) return wrong("max_stages", max_stages, "1 or more");
+  return absl::OkStatus();
+}
+
+double TmcmcState::LogEvidenceStandardError() const {
+  const auto n = static_cast<double>(ancestor.size());
+  std::vector<double> descendants(ancestor.size());
+  for (const int draw : ancestor) ++descendants[static_cast<std::size_t>(draw)];
+  double same = 0;
+  for (const double count : descendants) same += (count / n) * (count / n);
+  const auto times = static_cast<double>(stages.size() + 1);
+  const double genealogical = 1 - std::exp(-times * std::log1p(-1 / n)) * (1 - same);
+  double mixing = 0;
+  for (const TmcmcStage& stage : stages) mixing += stage.cv * stage.cv / n;
+  return std::sqrt(std::max(genealogical, mixing));
+}
+
+absl::StatusOr<TmcmcState> StartTmcmc(std::span<const Prior> priors, const TmcmcOptions& options) {
+  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  if (priors.empty()) return absl::InvalidArgumentError("tmcmc: there is no parameter to sample.");
+  for (const Prior& prior : priors) {
+    if (auto valid = prior.Validate(); !valid.ok()) return valid;
+  }
+  TmcmcState state;
+  state.proposals.resize(options.samples, static_cast<Index>(priors.size()));
+  for (Index i = 0; i < state.proposals.rows(); ++i) {
+    PhiloxStream stream = Stream(options, 0, 0, i);
+    for (std::size_t j = 0; j < priors.size(); ++j) {
+      state.proposals(i, static_cast<Index>(j)) = priors[j].Quantile(stream.Uniform());
+    }
+  }
+  state.accept_above = Eigen::VectorXd::Constant(options.samples, -kInfinity);
+  state.scale = 2.38 / std::sqrt(static_cast<double>(priors.size()));
+  return state;
+}
+
+absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
+                          const Eigen::VectorXd& log_likelihood, TmcmcState& state) {
+  const Index n = state.proposals.rows();
+  if (log_likelihood.size() != n) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("tmcmc: ", log_likelihood.size(), " log likelihoods for ", n, " proposals."));
+  }
+  if ((log_likelihood.array() == kInfinity).any()) {
+    return absl::InvalidArgumentError(
+        "tmcmc: a log likelihood is infinite: an error of the readings is zero.");
+  }
+  const Eigen::VectorXd finite =
+      log_likelihood.unaryExpr([](double value) { return std::isnan(value) ? -kInfinity : value; });
+  TmcmcState next = state;
+  if (next.stages.empty()) {
+    if ((finite.array() > -kInfinity).count() < 2) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("tmcmc: fewer than two of ", n,
+                       " draws from the prior have a likelihood: all others diverged."));
+    }
+    next.samples = next.proposals;
+    next.log_likelihood = finite;
+    next.log_prior.resize(n);
+    next.ancestor.resize(static_cast<std::size_t>(n));
+    for (Index i = 0; i < n; ++i) {
+      next.log_prior[i] = LogPrior(priors, next.samples.row(i));
+      next.ancestor[static_cast<std::size_t>(i)] = static_cast<int>(i);
+    }
+  } else {
+    const int before = next.accepted;
+    Accept(priors, finite, next);
+    AdaptScale(options, next.accepted - before, next);
+  }
+  if (next.stages.empty() || next.step == options.steps) {
+    if (!next.stages.empty()) {
+      next.stages.back().acceptance = next.accepted / (static_cast<double>(n) * options.steps);
+    }
+    if (next.exponent == 1) {
+      next.proposals.resize(0, next.samples.cols());
+      next.accept_above.resize(0);
+      state = std::move(next);
+      return absl::OkStatus();
+    }
+    if (auto begun = BeginStage(priors, options, next); !begun.ok()) return begun;
+  }
+  Propose(priors, options, next);
+  state = std::move(next);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<TmcmcState> RunTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
+                                    const BatchLogLikelihood& log_likelihood,
+                                    std::stop_token stop) {
+  auto state = StartTmcmc(priors, options);
+  while (state.ok() && !state->finished()) {
+    if (stop.stop_requested()) return absl::CancelledError("tmcmc was stopped.");
+    const auto advanced =
+        AdvanceTmcmc(priors, options, EvaluateInSupport(*state, log_likelihood), *state);
+    if (!advanced.ok()) return advanced;
+  }
+  return state;
+}
+
+}  // namespace calib::inference

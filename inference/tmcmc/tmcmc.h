@@ -1,0 +1,94 @@
+#pragma once
+// Transitional Markov chain Monte Carlo [Ching & Chen 2007; Hadjidoukas 2014, sec. 3.1]: a
+// population is carried from the prior to the posterior through prior x likelihood^exponent,
+// exponent from 0 to 1, and leaves the evidence behind. Where we depart from the papers (steps per
+// stage, spread of the weights, standard error): README.md of this folder.
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "inference/prior/prior.h"
+
+namespace calib::inference {
+
+struct TmcmcOptions {
+  int samples = 1000;  ///< population N, [20, 1e6]
+  double target_cv =
+      0.5;         ///< coefficient of variation of a stage's weights, (0, 2]; Ching & Chen take 1
+  int steps = 10;  ///< Metropolis steps per stage, >= 1; Ching & Chen take 1
+  double acceptance =
+      0.3;  ///< share of accepted steps that the proposal's scale is steered to, (0, 1)
+  int max_stages = 200;  ///< >= 1
+  std::uint64_t seed = 0;
+  absl::Status Validate() const;
+};
+
+/// One finished move from exponent to exponent.
+struct TmcmcStage {
+  double exponent = 0;    ///< reached, in (0, 1]
+  double cv = 0;          ///< coefficient of variation of the weights that led there
+  double acceptance = 0;  ///< share of accepted Metropolis steps, over all steps of the stage
+};
+
+/// Everything a run is at one moment, plain values: store it after any advance, go on from it
+/// elsewhere, and the result has the same bits. Parameters are in their own units; N rows
+/// throughout.
+struct TmcmcState {
+  Eigen::MatrixXd samples;         ///< N x d, at `exponent`; empty before the first advance
+  Eigen::VectorXd log_prior;       ///< N, in standardised coordinates
+  Eigen::VectorXd log_likelihood;  ///< N; -inf: diverged
+  std::vector<int> ancestor;       ///< N: index of the prior draw each sample descends from
+  double exponent = 0;
+  double scale = 0;  ///< of the proposal's covariance factor, 2.38 / sqrt(d) at first
+  Eigen::MatrixXd
+      proposal_factor;  ///< d x d lower Cholesky factor of the weighted covariance, standardised
+  int step = 0;         ///< Metropolis steps done in the running stage
+  int accepted = 0;     ///< accepted moves in the running stage
+  std::vector<TmcmcStage> stages;
+  double log_evidence = 0;  ///< ln of the product of the mean weights so far
+
+  Eigen::MatrixXd proposals;  ///< N x d: evaluate these; 0 rows once finished
+  /// N: a proposal is accepted exactly if its log likelihood exceeds this (the uniform number is
+  /// drawn first), so a run may be stopped as soon as its likelihood is known to stay below; pass
+  /// -inf for it then. +inf: outside the prior's support, need not run at all. -inf: needed in any
+  /// case.
+  Eigen::VectorXd accept_above;
+
+  bool finished() const { return exponent == 1 && proposals.rows() == 0; }
+  /// Standard error of log_evidence: the variance of the product of mean weights is estimated from
+  /// how many of the samples share an ancestor among the prior draws [Lee & Whiteley 2018, Eq. 8],
+  ///   V = 1 - (N / (N - 1))^(n + 1) (1 - sum_e (n_e / N)^2),     n stages, n_e descendants of draw
+  ///   e,
+  /// which needs no independence within a stage, and not less than sum cv^2 / N, its value for
+  /// perfect mixing.
+  double LogEvidenceStandardError() const;
+};
+
+/// N draws from the prior as first proposals. Every random number is a function of (seed, stage,
+/// step, row): neither the order in which likelihoods arrive nor the number of workers matters.
+/// Errors: INVALID_ARGUMENT (options, a prior, no parameter).
+absl::StatusOr<TmcmcState> StartTmcmc(std::span<const Prior> priors, const TmcmcOptions& options);
+
+/// Takes ln p(data | proposals), N entries in the order of state.proposals (NaN counts as -inf: a
+/// diverged run), and prepares the next batch; one call per Metropolis step. Finished when
+/// state.finished(): the samples are equally weighted draws from the posterior. Errors:
+/// INVALID_ARGUMENT for a wrong number of entries or +inf; FAILED_PRECONDITION when fewer than two
+/// prior draws have a likelihood, or after max_stages. The state is unchanged then.
+absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
+                          const Eigen::VectorXd& log_likelihood, TmcmcState& state);
+
+/// ln p(data | parameters) of each row of an M x d matrix, M entries.
+using BatchLogLikelihood = std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>;
+
+/// The whole run in this thread. Looks at `stop` before each batch: CANCELLED.
+absl::StatusOr<TmcmcState> RunTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
+                                    const BatchLogLikelihood& log_likelihood,
+                                    std::stop_token stop = {});
+
+}  // namespace calib::inference

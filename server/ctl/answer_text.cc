@@ -1,0 +1,116 @@
+#include "server/ctl/answer_text.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "dem/catalog/catalog.h"
+#include "server/ctl/progress.h"
+#include "server/ctl/text_table.h"
+#include "server/report/people_units.h"
+
+namespace calib::ctl {
+namespace {
+
+using report::Number;
+
+std::string UnitOf(const std::string& observable) {
+  const dem::ObservableInfo* info = dem::FindObservable(observable);
+  return info != nullptr ? info->unit : "1";
+}
+
+// What an rms of residual / sd means.
+std::string Verdict(double rms, const std::optional<double>& p_value) {
+  if (p_value && *p_value < 0.01) return "misses by more than the errors explain";
+  if (rms > 1.5) return "misses by more than one expects";
+  if (rms < 0.3) return "closer than the stated errors: are they too large?";
+  return "fits within its errors";
+}
+
+std::string Wrapped(const std::string& text, const std::string& first, const std::string& indent) {
+  constexpr std::size_t kWidth = 98;
+  std::string out = first;
+  std::size_t column = first.size();
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t end = std::min(text.find(' ', at), text.size());
+    if (column + (end - at) + 1 > kWidth) {
+      out.erase(out.find_last_not_of(' ') + 1);
+      out += "\n" + indent;
+      column = indent.size();
+    }
+    out += text.substr(at, end - at) + " ";
+    column += end - at + 1;
+    at = end + 1;
+  }
+  while (!out.empty() && out.back() == ' ') out.pop_back();
+  return out + "\n";
+}
+
+}  // namespace
+
+std::string PosteriorText(const v1::Posterior& posterior,
+                          const std::vector<std::string>& warnings) {
+  TextTable table({"<parameter", "mean", "± sd", "cov", "5 %", "50 %", "95 %", "<unit", "<"});
+  for (const auto& p : posterior.parameters()) {
+    const report::DisplayUnit unit = report::UnitForPeople(p.name(), p.unit(), std::abs(p.mean()));
+    const auto shown = [&unit](double value, int digits) {
+      return Number(value * unit.factor, digits);
+    };
+    table.AddRow({p.name(), shown(p.mean(), 4), shown(p.sd(), 2), Number(100 * p.cov(), 2) + " %",
+                  shown(p.q05(), 4), shown(p.q50(), 4), shown(p.q95(), 4), unit.label,
+                  p.at_bound() ? "at a bound of the prior" : ""});
+  }
+  std::string text = table.ToString();
+  text += fmt::format(
+      "\n{} after {} iteration{}; {} effective samples, log evidence {} ± {}, {} model evaluations",
+      posterior.converged() ? "Converged" : "Not converged", posterior.iterations(),
+      posterior.iterations() == 1 ? "" : "s", Number(posterior.ess(), 3),
+      Number(posterior.log_evidence(), 5), Number(posterior.log_evidence_se(), 2),
+      posterior.model_evaluations());
+  if (posterior.stopped_early() > 0)
+    text += fmt::format(" ({} stopped early)", posterior.stopped_early());
+  text += ".\n";
+  for (const std::string& warning : warnings) text += Wrapped(warning, "! ", "  ");
+  return text;
+}
+
+std::string ComparisonText(const report::Comparison& comparison) {
+  if (comparison.by_observable.empty())
+    return "There is nothing to compare yet: no sample with weight has reached a reading.\n";
+  std::string text = fmt::format("Misfit: rms of residual over standard deviation {}",
+                                 Number(comparison.rms_error, 3));
+  if (comparison.reduced_chi2)
+    text += fmt::format(", reduced chi-squared {}", Number(*comparison.reduced_chi2, 3));
+  if (comparison.p_value) text += fmt::format(" (p = {})", Number(*comparison.p_value, 2));
+  text += ".\n";
+  if (comparison.heldout_rms_error) {
+    text += fmt::format("Held-out data, never fitted: rms {}.\n",
+                        Number(*comparison.heldout_rms_error, 3));
+  }
+  if (!comparison.note.empty()) text += Wrapped(comparison.note, "", "");
+  TextTable observables({"<experiment", "<observable", "readings", "rms/sd", "rms", "z", "p", "<"});
+  for (const report::ObservableMisfit& m : comparison.by_observable) {
+    observables.AddRow(
+        {m.experiment + (m.heldout ? " (held out)" : ""), m.observable, std::to_string(m.readings),
+         Number(m.rms_error, 3),
+         report::NumberWithUnit(m.rms_residual, m.observable, UnitOf(m.observable), 3),
+         m.z ? Number(*m.z, 2) : "–", m.p_value ? Number(*m.p_value, 2) : "–",
+         m.z ? Verdict(m.rms_error, m.p_value) : ""});
+  }
+  TextTable segments({"<experiment", "<observable", "<stage", "model − measured", "z"});
+  for (const report::SegmentMisfit& m : comparison.by_segment) {
+    segments.AddRow({m.experiment + (m.heldout ? " (held out)" : ""), m.observable, m.segment,
+                     report::NumberWithUnit(m.bias, m.observable, UnitOf(m.observable), 3),
+                     m.z ? Number(*m.z, 3) : "–"});
+  }
+  return text + "\n" + observables.ToString() + "\n" + segments.ToString();
+}
+
+std::string StatusText(const v1::CampaignStatus& s) {
+  return fmt::format("{}  {}\n{}\n{} model evaluations so far, {} core hours, method {}.\n",
+                     s.campaign(), s.name(), ProgressText(s), s.model_evaluations(),
+                     Number(s.core_hours(), 3), s.method());
+}
+
+}  // namespace calib::ctl

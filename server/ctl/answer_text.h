@@ -1,0 +1,21 @@
+#pragma once
+// Answers in words and tables, at most 100 columns wide.
+
+#include <string>
+#include <vector>
+
+#include "calib/v1/campaign.pb.h"
+#include "server/report/comparison.h"
+
+namespace calib::ctl {
+
+/// Identified parameters, evidence, effective samples and warnings.
+std::string PosteriorText(const v1::Posterior& posterior, const std::vector<std::string>& warnings);
+
+/// Overall misfit in a sentence, then per observable and per loading stage.
+std::string ComparisonText(const report::Comparison& comparison);
+
+/// One campaign in a few lines.
+std::string StatusText(const v1::CampaignStatus& status);
+
+}  // namespace calib::ctl

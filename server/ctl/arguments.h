@@ -1,0 +1,31 @@
+#pragma once
+// What the command line said.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace calib::ctl {
+
+struct Arguments {
+  // Of every verb.
+  std::string server = "127.0.0.1:7443";  ///< HOST:PORT
+  bool server_given = false;              ///< by --server, not by default or $CALIB_SERVER
+  std::string state;                      ///< folder of an embedded server; empty: use `server`
+  std::optional<int> workers;             ///< local workers beside the embedded server
+  bool json = false;
+
+  // Of some.
+  std::string file;      ///< campaign file
+  std::string campaign;  ///< id
+  std::string worker;    ///< name
+  int sample = 0;
+  std::optional<int> iteration;
+  std::optional<std::uint64_t> seed;
+  std::vector<std::string> set;  ///< NAME=VALUE
+  std::string output;            ///< file or folder; empty: standard output
+  std::string vtk;               ///< folder
+};
+
+}  // namespace calib::ctl

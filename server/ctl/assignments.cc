@@ -1,0 +1,82 @@
+#include "server/ctl/assignments.h"
+
+#include <cmath>
+#include <map>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "dem/catalog/catalog.h"
+#include "server/campaign/map_reader.h"
+#include "server/campaign/quantity.h"
+#include "server/campaign/suggestion.h"
+
+namespace calib::ctl {
+namespace {
+
+using campaign::Quoted;
+
+std::vector<std::string> KnownNames(const campaign::Campaign& campaign) {
+  std::vector<std::string> names;
+  for (const campaign::CalibratedParameter& parameter : campaign.parameters)
+    names.push_back(parameter.name);
+  for (const auto& [name, value] : campaign.model.parameters) names.push_back(name);
+  return names;
+}
+
+// What is wrong with one assignment, or nothing.
+std::string Apply(const std::string& assignment, const campaign::Campaign& campaign,
+                  std::map<std::string, double>& values) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    return absl::StrCat("--set ", Quoted(assignment),
+                        " is not NAME=VALUE, e.g. --set young_modulus='2 GPa'");
+  }
+  const std::string name = assignment.substr(0, equals);
+  const dem::ParameterInfo* info =
+      dem::FindParameter(campaign.model.contact, campaign.model.effects, name);
+  if (info == nullptr) {
+    return absl::StrCat("--set ", name, ": the model has no such parameter; ",
+                        campaign::Suggestion(name, KnownNames(campaign)));
+  }
+  if (values.contains(name)) return absl::StrCat("--set ", name, " is given twice");
+  const std::string& unit = dem::UnitFor(*info, campaign.model.contact);
+  const auto value = campaign::ParseQuantity(assignment.substr(equals + 1), unit);
+  if (!value.ok()) return absl::StrCat("--set ", name, ": ", std::string(value.status().message()));
+  const campaign::Range range{
+      .min = info->min, .max = info->max, .min_open = info->min_open, .infinite_allowed = true};
+  if (!range.Contains(*value)) {
+    return absl::StrCat("--set ", name, ": ", Quoted(assignment.substr(equals + 1)),
+                        " is outside what is allowed: ", range.Describe(unit));
+  }
+  values[name] = *value;
+  return "";
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<double>> ApplyAssignments(const std::vector<std::string>& assignments,
+                                                     campaign::Campaign& campaign) {
+  std::vector<std::string> problems;
+  std::map<std::string, double> values;
+  for (const std::string& assignment : assignments) {
+    if (std::string problem = Apply(assignment, campaign, values); !problem.empty())
+      problems.push_back(problem);
+  }
+  std::vector<double> calibrated;
+  for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
+    const auto value = values.find(parameter.name);
+    if (value == values.end()) {
+      problems.push_back(absl::StrCat(
+          parameter.name, " is calibrated in this campaign and needs a value: --set ",
+          parameter.name, "=VALUE", parameter.unit == "1" ? "" : "[ " + parameter.unit + "]"));
+      continue;
+    }
+    calibrated.push_back(value->second);
+    values.erase(value);
+  }
+  if (!problems.empty()) return absl::InvalidArgumentError(absl::StrJoin(problems, "\n"));
+  for (const auto& [name, value] : values) campaign.model.parameters[name] = value;
+  return calibrated;
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,161 @@
+#include "server/ctl/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/verbs.h"
+
+namespace calib::ctl {
+namespace {
+
+constexpr const char* kDescription =
+    "Calibrates discrete element models of granular materials against laboratory tests.\n\n"
+    "First steps:\n"
+    "  calibctl validate sand.yaml                     is the campaign file right?\n"
+    "  calibctl run sand.yaml                          the whole calibration on this machine\n"
+    "  calibctl report c1 --state calib-state -o r.html\n";
+
+// Declares one verb after the other; options write into one Arguments.
+class Builder {
+ public:
+  Builder(CLI::App& app, Command& command) : app_(app), command_(command) {}
+
+  // A verb with its one-line description and an example.
+  CLI::App* Add(const std::string& name, int (*verb)(const Arguments&),
+                const std::string& description, const std::string& example) {
+    CLI::App* sub = app_.add_subcommand(name, description);
+    sub->footer("Example:\n  calibctl " + example +
+                "\n\nWith --help before the verb: options that every verb takes.");
+    sub->callback([this, verb] { command_.verb = verb; });
+    return sub;
+  }
+
+  CLI::App* AddOnCampaign(const std::string& name, int (*verb)(const Arguments&),
+                          const std::string& description) {
+    CLI::App* sub = Add(name, verb, description, name + " c1 --state calib-state");
+    sub->add_option("ID", arguments().campaign, "campaign, as shown by `calibctl list`")
+        ->required();
+    return sub;
+  }
+
+  void AddFile(CLI::App* sub) {
+    sub->add_option("FILE", arguments().file, "campaign file (YAML)")->required();
+  }
+  void AddSeed(CLI::App* sub) {
+    sub->add_option("--seed", arguments().seed, "replaces the seed of the campaign file");
+  }
+  Arguments& arguments() { return command_.arguments; }
+
+ private:
+  CLI::App& app_;
+  Command& command_;
+};
+
+// $CALIB_SERVER is a default, not a wish: it does not stand in the way of --state.
+void AddCommonOptions(CLI::App& app, Arguments& a) {
+  if (const char* server = std::getenv("CALIB_SERVER"); server != nullptr) a.server = server;
+  auto* server = app.add_option_function<std::string>(
+      "--server",
+      [&a](const std::string& address) {
+        a.server = address;
+        a.server_given = true;
+      },
+      "HOST:PORT of calibd [$CALIB_SERVER or 127.0.0.1:7443]");
+  app.add_option("--state", a.state,
+                 "work on this state folder with an embedded server instead of --server")
+      ->excludes(server);
+  app.add_option("--workers", a.workers,
+                 "local workers beside the embedded server (run: all cores unless given)")
+      ->check(CLI::Range(0, 1024));
+  app.add_flag("--json", a.json, "one JSON document on standard output");
+}
+
+void AddVerbsOnFiles(Builder& b) {
+  auto* simulate = b.Add(
+      "simulate", &Simulate, "One model evaluation of each experiment at given parameters",
+      "simulate sand.yaml --set young_modulus='2 GPa' --set friction_angle='30 deg' -o states.csv");
+  b.AddFile(simulate);
+  simulate
+      ->add_option("--set", b.arguments().set,
+                   "NAME=VALUE with an optional unit; once per calibrated parameter")
+      ->allow_extra_args(false);
+  simulate->add_option("-o,--output", b.arguments().output,
+                       "CSV file, a row per load step [standard output]");
+  simulate->add_option("--vtk", b.arguments().vtk,
+                       "folder for the grains after each load step (VTK)");
+
+  auto* run = b.Add("run", &Run,
+                    "The whole campaign on this machine: server, workers and answer in one command",
+                    "run sand.yaml --workers 2 --state calib-state");
+  b.AddFile(run);
+  b.AddSeed(run);
+
+  auto* submit = b.Add("submit", &Submit, "Validate and submit; prints the campaign id",
+                       "submit sand.yaml --server node1:7443");
+  b.AddFile(submit);
+  b.AddSeed(submit);
+
+  b.AddFile(b.Add("validate", &Validate, "Everything that submit checks, without a server",
+                  "validate sand.yaml"));
+}
+
+void AddVerbsOnCampaigns(Builder& b) {
+  b.Add("list", &List, "All campaigns", "list");
+  b.AddOnCampaign("show", &Show, "State of a campaign");
+  b.AddOnCampaign("watch", &Watch, "Live view until the campaign ends");
+  b.AddOnCampaign("posterior", &Posterior, "Identified parameters with their uncertainty")
+      ->add_option("--iteration", b.arguments().iteration,
+                   "as known after this iteration, from 0 [the last complete one]")
+      ->check(CLI::NonNegativeNumber);
+  b.AddOnCampaign("samples", &Samples, "The ensemble with weights and status");
+  b.AddOnCampaign("states", &States, "The state history of one sample")
+      ->add_option("SAMPLE", b.arguments().sample, "index, as shown by `calibctl samples`")
+      ->required()
+      ->check(CLI::NonNegativeNumber);
+  b.AddOnCampaign("compare", &Compare,
+                  "Model against measurements: where it fits and where it fails");
+  b.AddOnCampaign("report", &Report, "One self-contained HTML file with plots")
+      ->add_option("-o,--output", b.arguments().output, "HTML file")
+      ->required();
+  b.AddOnCampaign("export", &Export, "CSV and JSON of everything")
+      ->add_option("-o,--output", b.arguments().output, "folder, created if need be")
+      ->required();
+  b.AddOnCampaign("pause", &Pause, "Stop handing out work; nothing is lost");
+  b.AddOnCampaign("resume", &Resume, "Go on with a paused campaign");
+  b.AddOnCampaign("cancel", &Cancel, "End a campaign for good, keeping what it has");
+  b.AddOnCampaign("delete", &Delete, "Remove an ended campaign and all its data");
+}
+
+void AddOtherVerbs(Builder& b) {
+  b.Add("workers", &Workers, "Nodes, slots, speed, running samples", "workers");
+  b.Add("drain", &Drain, "Let a worker finish what it does and leave", "drain node1-4711")
+      ->add_option("WORKER", b.arguments().worker, "name, as shown by `calibctl workers`")
+      ->required();
+  b.Add("effects", &Effects, "Physical effects this build offers", "effects");
+  b.Add("tests", &Tests, "Lab tests this build offers", "tests");
+  b.Add("contacts", &Contacts, "Contact laws this build offers", "contacts");
+}
+
+}  // namespace
+
+Parsed ParseCommandLine(int argc, const char* const* argv) {
+  Command command;
+  CLI::App app{kDescription, "calibctl"};
+  app.require_subcommand(1);
+  app.fallthrough();  // common options may stand behind the verb too
+  app.get_formatter()->column_width(28);
+  AddCommonOptions(app, command.arguments);
+  Builder builder(app, command);
+  AddVerbsOnFiles(builder);
+  AddVerbsOnCampaigns(builder);
+  AddOtherVerbs(builder);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return {std::nullopt, app.exit(error) == 0 ? kDone : kBadInput};
+  }
+  return {std::move(command), kDone};
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,60 @@
+#include "server/ctl/evaluation.h"
+
+#include <google/protobuf/util/json_util.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "server/ctl/write_file.h"
+
+namespace calib::ctl {
+namespace {
+
+std::string ReadAll(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const Task& task,
+                                             const std::string& folder) {
+  std::string json;
+  if (!google::protobuf::util::MessageToJsonString(task.spec, &json).ok()) {
+    return absl::InternalError("the evaluation cannot be written as JSON");
+  }
+  if (auto written = WriteFile(folder + "/spec.json", json); !written.ok()) return written;
+  std::vector<std::string> arguments = {"--once", folder + "/spec.json", "-o",
+                                        folder + "/states.csv"};
+  if (!task.packing.empty()) {
+    if (auto written = WriteFile(folder + "/packing.txt", task.packing); !written.ok())
+      return written;
+    arguments.insert(arguments.end(), {"--packing", folder + "/packing.txt"});
+  }
+  if (!task.vtk.empty()) arguments.insert(arguments.end(), {"--vtk", task.vtk});
+  auto process = ChildProcess::Start(program, arguments, folder + "/log");
+  if (!process.ok()) return process.status();
+  return Evaluation(*std::move(process), folder);
+}
+
+int Evaluation::StatesSoFar() const {
+  const std::string table = Table();
+  return std::max(0, static_cast<int>(std::count(table.begin(), table.end(), '\n')) - 1);
+}
+
+std::string Evaluation::Table() const { return ReadAll(folder_ + "/states.csv"); }
+
+absl::Status Evaluation::Result() {
+  const int code = process_.Wait();
+  if (code == 0) return absl::OkStatus();
+  std::string said = ReadAll(folder_ + "/log");
+  said = std::string(absl::StripAsciiWhitespace(said));
+  if (code == 1) return absl::AbortedError(said.empty() ? "the model diverged" : said);
+  return absl::InternalError(said.empty() ? absl::StrCat("calib-worker ended with status ", code)
+                                          : said);
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,42 @@
+#pragma once
+// One model evaluation by a calib-worker without a server.
+
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "calib/v1/worker.pb.h"
+#include "server/ctl/child_process.h"
+
+namespace calib::ctl {
+
+/// Runs `calib-worker --once` in a folder of its own. Movable.
+class Evaluation {
+ public:
+  struct Task {
+    v1::AttemptSpec spec;
+    std::string packing;  ///< text of the packing file; empty with a recipe
+    std::string vtk;      ///< folder for grains; empty: none
+  };
+  /// folder: an existing folder for the files in between.
+  static absl::StatusOr<Evaluation> Start(const std::string& program, const Task& task,
+                                          const std::string& folder);
+
+  /// True once the worker has ended.
+  bool Poll() { return process_.Poll().has_value(); }
+  /// States so far: whole lines of its table.
+  int StatesSoFar() const;
+  /// The table of states, `load_step,<observables>`; complete or not.
+  std::string Table() const;
+  /// OK; ABORTED with the reason when the model diverged; INTERNAL otherwise. Only after Poll() has
+  /// said true.
+  absl::Status Result();
+
+ private:
+  Evaluation(ChildProcess process, std::string folder)
+      : process_(std::move(process)), folder_(std::move(folder)) {}
+  ChildProcess process_;
+  std::string folder_;
+};
+
+}  // namespace calib::ctl

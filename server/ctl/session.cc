@@ -1,0 +1,110 @@
+#include "server/ctl/session.h"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/service/server.h"
+#include "server/service/state_folder.h"
+
+namespace calib::ctl {
+namespace {
+
+constexpr std::chrono::seconds kShutdown{3};
+
+bool HoldsState(const std::string& folder) {
+  std::error_code error;
+  return std::filesystem::exists(std::filesystem::path(folder) / "calib.db", error);
+}
+
+std::string LastLine(const std::string& path) {
+  std::ifstream file(path);
+  std::string last;
+  for (std::string line; std::getline(file, line);) {
+    if (!line.empty()) last = line;
+  }
+  return last;
+}
+
+}  // namespace
+
+Session::Session() = default;
+
+absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Arguments& arguments,
+                                                       bool may_create) {
+  std::unique_ptr<Session> session(new Session());
+  session->address_ = arguments.server;
+  if (!arguments.state.empty()) {
+    if (!may_create && !HoldsState(arguments.state)) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          arguments.state,
+          " holds no state of a server; `calibctl run` and `calibctl submit` make one"));
+    }
+    session->state_ = arguments.state;
+    service::ServerOptions options;
+    options.state_dir = arguments.state;
+    options.log_file = (std::filesystem::path(arguments.state) / "server.log").string();
+    auto server = service::Server::Start(options);
+    if (server.ok()) {
+      session->server_ = *std::move(server);
+      session->address_ = session->server_->address();
+    } else if (absl::IsAlreadyExists(server.status())) {
+      auto address = service::ServingAddress(arguments.state);
+      if (!address.ok()) return address.status();
+      session->address_ = *std::move(address);
+    } else {
+      return server.status();
+    }
+  }
+  auto client = Client::Connect(session->address_);
+  if (!client.ok()) return client.status();
+  session->client_ = *std::move(client);
+  if (arguments.workers.value_or(0) > 0) {
+    if (arguments.state.empty()) {
+      return absl::InvalidArgumentError(
+          "--workers goes with --state DIR; workers of a remote server are calib-worker --server");
+    }
+    if (auto started = session->StartWorkers(*arguments.workers); !started.ok()) return started;
+  }
+  return session;
+}
+
+Session::~Session() {
+  client_.reset();
+  for (ChildProcess& worker : workers_) worker.AskToStop();
+  workers_.clear();
+  if (server_ != nullptr) server_->Shutdown(kShutdown);
+}
+
+absl::Status Session::StartWorkers(int count) {
+  const auto program = FindWorkerProgram();
+  if (!program.ok()) return program.status();
+  for (int i = 1; i <= count; ++i) {
+    const std::string log =
+        (std::filesystem::path(state_) / absl::StrCat("worker-", i, ".log")).string();
+    auto worker = ChildProcess::Start(
+        *program,
+        {"--server", address_, "--slots", "1", "--name", absl::StrCat("local-", getpid(), "-", i),
+         "--exit-with-parent", absl::StrCat(getpid())},
+        log);
+    if (!worker.ok()) return worker.status();
+    workers_.push_back(*std::move(worker));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Session::CheckWorkers() {
+  if (workers_.empty()) return absl::OkStatus();
+  for (ChildProcess& worker : workers_) {
+    if (!worker.Poll()) return absl::OkStatus();
+  }
+  const std::string log = (std::filesystem::path(state_) / "worker-1.log").string();
+  return absl::FailedPreconditionError(absl::StrCat("all local workers have ended with status ",
+                                                    *workers_.front().Poll(), "; ", log,
+                                                    " ends with: ", LastLine(log)));
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,35 @@
+#pragma once
+// A campaign file on this machine with the files it names: what validate, submit, run and simulate
+// begin with.
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "calib/v1/campaign.pb.h"
+#include "server/campaign/campaign_file.h"
+#include "server/ctl/arguments.h"
+#include "server/ctl/client.h"
+
+namespace calib::ctl {
+
+struct SourceFiles {
+  std::string yaml;
+  std::string file_name;  ///< without folders
+  campaign::ReadOutcome outcome;
+  std::map<std::string, std::string> contents;  ///< path as written -> content
+};
+
+/// Reads and validates. With problems nothing is returned: they are printed, one line each (--json:
+/// one document on standard output), and the exit code is kBadInput.
+std::optional<SourceFiles> ReadSourceFiles(const Arguments& arguments);
+
+/// Puts the files and submits. The request id is the identity digest: submitting the same again
+/// gives the same campaign. Returns the campaign id. INVALID_ARGUMENT when the server refuses (its
+/// problems are printed).
+absl::StatusOr<std::string> SubmitSource(Client& client, const SourceFiles& source,
+                                         std::optional<std::uint64_t> seed,
+                                         const std::string& file);
+
+}  // namespace calib::ctl

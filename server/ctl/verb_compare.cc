@@ -1,0 +1,27 @@
+#include <iostream>
+
+#include "server/ctl/answer_text.h"
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/load_view.h"
+#include "server/ctl/session.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+
+namespace calib::ctl {
+
+int Compare(const Arguments& arguments) {
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  const auto view = LoadView((*session)->client(), arguments.campaign);
+  if (!view.ok()) return Fail(view.status());
+  if (view->iterations.empty()) {
+    return Fail(absl::FailedPreconditionError("no iteration of " + arguments.campaign +
+                                              " is complete yet: nothing to compare"));
+  }
+  const report::Comparison comparison = report::Compare(*view, report::PredictReadings(*view));
+  std::cout << (arguments.json ? report::ComparisonJson(arguments.campaign, comparison)
+                               : ComparisonText(comparison));
+  return kDone;
+}
+
+}  // namespace calib::ctl

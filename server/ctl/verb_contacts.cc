@@ -1,0 +1,23 @@
+#include <iostream>
+
+#include "server/ctl/catalog_text.h"
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+
+namespace calib::ctl {
+
+int Contacts(const Arguments& arguments) {
+  if (arguments.json) {
+    std::cout << report::ContactsJson();
+    return kDone;
+  }
+  for (const dem::ContactInfo& contact : dem::Contacts()) {
+    std::cout << contact.name << "\n  " << contact.description << "\n  " << contact.reference
+              << "\n"
+              << ParameterTable(contact.parameters) << "\n";
+  }
+  return kDone;
+}
+
+}  // namespace calib::ctl

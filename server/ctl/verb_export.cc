@@ -1,0 +1,64 @@
+#include <filesystem>
+#include <iostream>
+#include <system_error>
+#include <utility>
+
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/load_view.h"
+#include "server/ctl/session.h"
+#include "server/ctl/verbs.h"
+#include "server/ctl/write_file.h"
+#include "server/report/csv_export.h"
+#include "server/report/json_documents.h"
+#include "server/report/report.h"
+
+namespace calib::ctl {
+namespace {
+
+std::vector<std::pair<std::string, std::string>> Files(const report::CampaignView& view) {
+  const auto predictions = report::PredictReadings(view);
+  std::vector<std::string> names;
+  for (const campaign::CalibratedParameter& parameter : view.campaign.parameters)
+    names.push_back(parameter.name);
+  const std::string& id = view.status.campaign();
+  return {{"campaign.yaml", view.source.campaign_file()},
+          {"status.json", report::StatusJson(view.status)},
+          {"posterior.json", report::PosteriorJson(view.posterior)},
+          {"posterior.csv", report::PosteriorCsv(view.posterior)},
+          {"samples.json", report::SamplesJson(id, names, view.samples)},
+          {"samples.csv", report::SamplesCsv(view)},
+          {"states.csv", report::StatesCsv(view)},
+          {"data.json", report::DataJson(view.campaign)},
+          {"fit.csv", report::FitCsv(view, predictions)},
+          {"compare.json", report::ComparisonJson(id, report::Compare(view, predictions))},
+          {"report.html", report::RenderReport(view)}};
+}
+
+}  // namespace
+
+int Export(const Arguments& arguments) {
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  const auto view = LoadView((*session)->client(), arguments.campaign);
+  if (!view.ok()) return Fail(view.status());
+  const std::filesystem::path folder(arguments.output);
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    return Fail(
+        absl::PermissionDeniedError(arguments.output + " cannot be made: " + error.message()));
+  const auto files = Files(*view);
+  for (const auto& [name, content] : files) {
+    if (auto written = WriteFile((folder / name).string(), content); !written.ok())
+      return Fail(written);
+  }
+  if (arguments.json) {
+    std::cout << "{\"campaign\": \"" << view->status.campaign() << "\", \"files\": " << files.size()
+              << "}\n";
+  } else {
+    for (const auto& [name, content] : files) std::cout << (folder / name).string() << "\n";
+  }
+  return kDone;
+}
+
+}  // namespace calib::ctl

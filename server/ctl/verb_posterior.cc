@@ -1,0 +1,25 @@
+#include <iostream>
+
+#include "server/ctl/answer_text.h"
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/session.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+
+namespace calib::ctl {
+
+int Posterior(const Arguments& arguments) {
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  const auto posterior = (*session)->client().GetPosterior(arguments.campaign, arguments.iteration);
+  if (!posterior.ok()) return Fail(posterior.status());
+  if (arguments.json) {
+    std::cout << report::PosteriorJson(*posterior);
+  } else {
+    std::cout << PosteriorText(*posterior,
+                               {posterior->warnings().begin(), posterior->warnings().end()});
+  }
+  return kDone;
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,28 @@
+#include <iostream>
+
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/load_view.h"
+#include "server/ctl/session.h"
+#include "server/ctl/verbs.h"
+#include "server/ctl/write_file.h"
+#include "server/report/report.h"
+
+namespace calib::ctl {
+
+int Report(const Arguments& arguments) {
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  const auto view = LoadView((*session)->client(), arguments.campaign);
+  if (!view.ok()) return Fail(view.status());
+  if (auto written = WriteFile(arguments.output, report::RenderReport(*view)); !written.ok())
+    return Fail(written);
+  if (arguments.json) {
+    std::cout << "{\"campaign\": \"" << view->status.campaign() << "\", \"written\": true}\n";
+  } else {
+    std::cout << "The report of " << view->status.campaign() << " is in " << arguments.output
+              << ".\n";
+  }
+  return kDone;
+}
+
+}  // namespace calib::ctl

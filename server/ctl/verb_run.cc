@@ -1,0 +1,109 @@
+// The whole campaign in one process tree: embedded server, local workers, the answer.
+#include <chrono>
+#include <iostream>
+#include <thread>
+
+#include "absl/strings/str_cat.h"
+#include "server/ctl/answer_text.h"
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/interrupt.h"
+#include "server/ctl/load_view.h"
+#include "server/ctl/progress.h"
+#include "server/ctl/session.h"
+#include "server/ctl/source_files.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+#include "server/report/warnings.h"
+
+namespace calib::ctl {
+namespace {
+
+constexpr const char* kDefaultState = "calib-state";
+constexpr std::chrono::milliseconds kPoll{200};
+
+bool IsOver(const v1::CampaignStatus& status) {
+  return status.state() == "finished" || status.state() == "failed" ||
+         status.state() == "cancelled";
+}
+
+// A campaign that an earlier run left paused goes on.
+absl::Status TakeUp(Client& client, const std::string& campaign) {
+  const auto status = client.Show(campaign);
+  if (!status.ok()) return status.status();
+  return status->state() == "paused" ? client.Resume(campaign).status() : absl::OkStatus();
+}
+
+// Shows progress until the campaign is over, pauses by itself (too many failures) or the user
+// interrupts.
+absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& campaign) {
+  ProgressLine line;
+  for (;;) {
+    auto status = session.client().Show(campaign);
+    if (!status.ok()) return status;
+    constexpr int kMilestones = 5;
+    line.Show(ProgressText(*status),
+              kMilestones * 2 * status->iteration() +
+                  kMilestones * status->samples_done() / std::max(1, status->samples()));
+    if (IsOver(*status) || status->state() == "paused" || Interrupted()) return status;
+    if (auto alive = session.CheckWorkers(); !alive.ok()) return alive;
+    std::this_thread::sleep_for(kPoll);
+  }
+}
+
+int PrintAnswer(Session& session, const std::string& campaign, bool json) {
+  const auto view = LoadView(session.client(), campaign);
+  if (!view.ok()) return Fail(view.status());
+  if (json) {
+    std::cout << report::PosteriorJson(view->posterior);
+    return kDone;
+  }
+  const report::Comparison comparison = report::Compare(*view, report::PredictReadings(*view));
+  std::cout << "\n"
+            << PosteriorText(view->posterior, report::Warnings(*view)) << "\n"
+            << ComparisonText(comparison);
+  return kDone;
+}
+
+}  // namespace
+
+int Run(const Arguments& given) {
+  if (given.server_given) {
+    return Fail(absl::InvalidArgumentError(
+        "run brings its own server; with --server use submit and watch"));
+  }
+  Arguments arguments = given;
+  if (arguments.state.empty()) arguments.state = kDefaultState;
+  arguments.workers.reset();  // started below, once there is something to do
+  const auto source = ReadSourceFiles(arguments);
+  if (!source) return kBadInput;
+  CatchInterrupts();
+  const auto session = Session::Open(arguments, /*may_create=*/true);
+  if (!session.ok()) return Fail(session.status());
+  const auto campaign = SubmitSource((*session)->client(), *source, arguments.seed, arguments.file);
+  if (!campaign.ok()) return Fail(campaign.status());
+  if (auto taken = TakeUp((*session)->client(), *campaign); !taken.ok()) return Fail(taken);
+  auto status = (*session)->client().Show(*campaign);
+  if (!status.ok()) return Fail(status.status());
+  if (!IsOver(*status)) {
+    const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    const int workers = given.workers.value_or((*session)->is_guest() ? 0 : cores);
+    const bool needed = !source->outcome.campaign.precomputed && workers > 0;
+    if (auto started = needed ? (*session)->StartWorkers(workers) : absl::OkStatus(); !started.ok())
+      return Fail(started);
+    std::cerr << "campaign " << *campaign << " in " << arguments.state << " with "
+              << (needed ? workers : 0) << " worker(s)\n";
+    status = Follow(**session, *campaign);
+    if (!status.ok()) return Fail(status.status());
+  }
+  if (status->state() == "finished") return PrintAnswer(**session, *campaign, arguments.json);
+  if (Interrupted()) {
+    return Fail(absl::CancelledError(absl::StrCat("stopped; nothing is lost. `calibctl run ",
+                                                  arguments.file, " --state ", arguments.state,
+                                                  "` goes on from here")));
+  }
+  return Fail(
+      absl::AbortedError(absl::StrCat("campaign ", *campaign, " is ", status->state(),
+                                      status->reason().empty() ? "" : ": " + status->reason())));
+}
+
+}  // namespace calib::ctl

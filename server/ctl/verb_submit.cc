@@ -1,0 +1,28 @@
+#include <iostream>
+
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/session.h"
+#include "server/ctl/source_files.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+
+namespace calib::ctl {
+
+int Submit(const Arguments& arguments) {
+  const auto source = ReadSourceFiles(arguments);
+  if (!source) return kBadInput;
+  const auto session = Session::Open(arguments, /*may_create=*/true);
+  if (!session.ok()) return Fail(session.status());
+  const auto campaign = SubmitSource((*session)->client(), *source, arguments.seed, arguments.file);
+  if (!campaign.ok()) return Fail(campaign.status());
+  if (arguments.json) {
+    const auto status = (*session)->client().Show(*campaign);
+    if (!status.ok()) return Fail(status.status());
+    std::cout << report::StatusJson(*status);
+  } else {
+    std::cout << *campaign << "\n";
+  }
+  return kDone;
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,29 @@
+#include <iostream>
+
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/source_files.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+
+namespace calib::ctl {
+
+int Validate(const Arguments& arguments) {
+  const auto source = ReadSourceFiles(arguments);
+  if (!source) return kBadInput;
+  if (arguments.json) {
+    std::cout << report::ProblemsJson({});
+    return kDone;
+  }
+  const campaign::Campaign& campaign = source->outcome.campaign;
+  std::size_t readings = 0;
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    readings += experiment.control.size() * experiment.observables.size();
+  }
+  std::cout << arguments.file << " is good: " << campaign.parameters.size() << " parameters, "
+            << campaign.experiments.size() << " experiment(s), " << readings
+            << " measured numbers, " << campaign.samples << " samples in each of at most "
+            << campaign.max_iterations << " iteration(s).\n";
+  return kDone;
+}
+
+}  // namespace calib::ctl

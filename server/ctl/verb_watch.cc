@@ -1,0 +1,33 @@
+#include <iostream>
+#include <optional>
+
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/progress.h"
+#include "server/ctl/session.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+
+namespace calib::ctl {
+
+int Watch(const Arguments& arguments) {
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  std::optional<v1::CampaignStatus> last;
+  absl::Status ended;
+  {
+    ProgressLine line;
+    ended = (*session)->client().Watch(arguments.campaign, [&](const v1::CampaignStatus& status) {
+      last = status;
+      line.Show(ProgressText(status), 10 * status.iteration() + 10 * status.samples_done() /
+                                                                    std::max(1, status.samples()));
+    });
+  }
+  if (!ended.ok()) return Fail(ended);
+  if (last && arguments.json) std::cout << report::StatusJson(*last);
+  const bool good = last && last->state() == "finished";
+  if (last && !arguments.json)
+    std::cout << last->campaign() << " is " << ProgressText(*last) << ".\n";
+  return good ? kDone : kFailed;
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,37 @@
+#include <iostream>
+
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/session.h"
+#include "server/ctl/text_table.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+#include "server/report/people_units.h"
+
+namespace calib::ctl {
+
+int Workers(const Arguments& arguments) {
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  const auto workers = (*session)->client().ListWorkers();
+  if (!workers.ok()) return Fail(workers.status());
+  if (arguments.json) {
+    std::cout << report::WorkersJson(*workers);
+    return kDone;
+  }
+  if (workers->empty())
+    std::cout << "No worker is connected; start one with `calib-worker --server HOST:PORT`.\n";
+  TextTable table({"<worker", "busy", "slots", "million contacts/s", "<state", "<running"});
+  for (const v1::WorkerInfo& w : *workers) {
+    std::string running;
+    for (const std::string& what : w.running()) running += (running.empty() ? "" : " ") + what;
+    table.AddRow({w.name(), std::to_string(w.busy()), std::to_string(w.slots()),
+                  report::Number(w.contact_updates_per_second() / 1e6, 3),
+                  !w.connected() ? "silent for " + report::Duration(w.seconds_since_heard())
+                                 : (w.draining() ? "draining" : "ready"),
+                  running});
+  }
+  std::cout << table.ToString();
+  return kDone;
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,63 @@
+#pragma once
+// Model against measurements: where the posterior mean fits and where it does not, in units of the
+// stated errors.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/report/campaign_view.h"
+#include "server/report/predictions.h"
+
+namespace calib::report {
+
+struct ObservableMisfit {
+  std::string experiment, observable;
+  bool heldout = false;  ///< of a validation experiment: never used for fitting
+  int readings = 0;
+  double rms_error = 0;     ///< rms of residual / standard deviation
+  double rms_residual = 0;  ///< rms of residual [SI]
+  std::optional<double>
+      z;  ///< chi-squared of the group as a standard normal deviate [Wilson & Hilferty 1931]
+  std::optional<double>
+      p_value;  ///< probability of a chi-squared at least as large if the model is right
+};
+
+struct SegmentMisfit {
+  std::string experiment, observable, segment;
+  bool heldout = false;
+  double from = 0, to = 0;  ///< control at the first and last reading (strain [-] or stress [Pa])
+  double bias = 0;          ///< mean of model minus measurement [SI]
+  std::optional<double>
+      z;  ///< bias over its standard deviation, correlation of the errors included
+};
+
+/// How far a parameter's mean still moves while the second half of the readings is taken in.
+struct ParameterDrift {
+  std::string parameter;
+  double half_way = 0, end = 0;  ///< posterior mean [SI]
+  double change_over_sd = 0;     ///< in units of the final standard deviation
+};
+
+struct Comparison {
+  double rms_error = 0;  ///< over all calibrated readings; NaN: nothing to compare yet
+  std::optional<double> reduced_chi2;  ///< chi-squared / (readings - parameters)
+  std::optional<double> p_value;
+  std::optional<double> heldout_rms_error;  ///< over all validation readings
+  std::vector<ObservableMisfit> by_observable;
+  std::vector<SegmentMisfit> by_segment;
+  std::vector<ParameterDrift> parameter_drift;
+  std::string note;  ///< why something is not given; may be empty
+};
+
+/// Errors are those stated in the campaign, correlated where a correlation length is given. Without
+/// an independent scale of the errors (noise inferred or ess_target) nothing can be said about
+/// adequacy: z, p_value and reduced_chi2 stay empty.
+Comparison Compare(const CampaignView& view, const std::vector<ExperimentPrediction>& predictions);
+
+/// Standard deviation of one reading as compared: the stated one, or what ess_target's sigma makes
+/// of the reading.
+double ErrorOf(const CampaignView& view, const campaign::MeasuredObservable& observable,
+               std::size_t reading);
+
+}  // namespace calib::report

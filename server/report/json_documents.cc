@@ -1,0 +1,253 @@
+#include "server/report/json_documents.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "server/campaign/data_file.h"
+
+namespace calib::report {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// nlohmann-json writes NaN and infinities as null; texts from users may be malformed UTF-8, which
+// is replaced.
+std::string Dump(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+template <typename Values>
+Json Numbers(const Values& values) {
+  Json array = Json::array();
+  for (const double value : values) array.push_back(value);
+  return array;
+}
+
+Json Status(const v1::CampaignStatus& s) {
+  return {{"campaign", s.campaign()},
+          {"name", s.name()},
+          {"state", s.state()},
+          {"reason", s.reason()},
+          {"phase", s.phase()},
+          {"method", s.method()},
+          {"iteration", s.iteration()},
+          {"max_iterations", s.max_iterations()},
+          {"samples", s.samples()},
+          {"samples_done", s.samples_done()},
+          {"samples_running", s.samples_running()},
+          {"samples_stopped_early", s.samples_stopped_early()},
+          {"samples_diverged", s.samples_diverged()},
+          {"effective_sample_size", s.effective_sample_size()},
+          {"best_misfit", s.best_misfit()},
+          {"eta_seconds", s.eta_seconds() < 0 ? Json(nullptr) : Json(s.eta_seconds())},
+          {"model_evaluations", s.model_evaluations()},
+          {"core_hours", s.core_hours()},
+          {"converged", s.converged()},
+          {"created_unix_ms", s.created_unix_ms()}};
+}
+
+}  // namespace
+
+std::string PosteriorJson(const v1::Posterior& p) {
+  Json parameters = Json::object();
+  for (const auto& q : p.parameters()) {
+    parameters[q.name()] = {{"mean", q.mean()},
+                            {"sd", q.sd()},
+                            {"cov", q.cov()},
+                            {"q05", q.q05()},
+                            {"q50", q.q50()},
+                            {"q95", q.q95()},
+                            {"unit", q.unit()},
+                            {"at_bound", q.at_bound()},
+                            {"prior_min", q.prior_min()},
+                            {"prior_max", q.prior_max()}};
+  }
+  Json correlation = Json::array();
+  const int d = p.parameters_size();
+  for (int i = 0; i < d && p.correlation_size() == d * d; ++i) {
+    Json row = Json::array();
+    for (int j = 0; j < d; ++j) row.push_back(p.correlation(i * d + j));
+    correlation.push_back(std::move(row));
+  }
+  Json warnings = Json::array();
+  for (const std::string& warning : p.warnings()) warnings.push_back(warning);
+  return Dump({{"campaign", p.campaign()},
+               {"iteration", p.iteration()},
+               {"iterations", p.iterations()},
+               {"converged", p.converged()},
+               {"log_evidence", p.log_evidence()},
+               {"log_evidence_se", p.log_evidence_se()},
+               {"parameters", parameters},
+               {"correlation", correlation},
+               {"ess", p.ess()},
+               {"pareto_k", p.pareto_k()},
+               {"sigma", p.has_sigma() ? Json(p.sigma()) : Json(nullptr)},
+               {"noise", p.noise()},
+               {"model_evaluations", p.model_evaluations()},
+               {"stopped_early", p.stopped_early()},
+               {"core_hours", p.core_hours()},
+               {"warnings", warnings}});
+}
+
+std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
+  Json by_observable = Json::array();
+  for (const ObservableMisfit& m : c.by_observable) {
+    by_observable.push_back({{"experiment", m.experiment},
+                             {"observable", m.observable},
+                             {"rms_error", m.rms_error},
+                             {"z", OrNull(m.z)},
+                             {"p_value", OrNull(m.p_value)},
+                             {"rms_residual", m.rms_residual},
+                             {"readings", m.readings},
+                             {"role", m.heldout ? "validate" : "calibrate"}});
+  }
+  Json by_segment = Json::array();
+  for (const SegmentMisfit& m : c.by_segment) {
+    by_segment.push_back({{"experiment", m.experiment},
+                          {"observable", m.observable},
+                          {"segment", m.segment},
+                          {"from", m.from},
+                          {"to", m.to},
+                          {"bias", m.bias},
+                          {"z", OrNull(m.z)},
+                          {"role", m.heldout ? "validate" : "calibrate"}});
+  }
+  Json drift = Json::array();
+  for (const ParameterDrift& d : c.parameter_drift) {
+    drift.push_back({{"parameter", d.parameter},
+                     {"half_way", d.half_way},
+                     {"end", d.end},
+                     {"change_over_sd", d.change_over_sd}});
+  }
+  return Dump({{"campaign", campaign},
+               {"rms_error", c.rms_error},
+               {"reduced_chi2", OrNull(c.reduced_chi2)},
+               {"p_value", OrNull(c.p_value)},
+               {"heldout_rms_error", OrNull(c.heldout_rms_error)},
+               {"by_observable", by_observable},
+               {"by_segment", by_segment},
+               {"parameter_drift", drift},
+               {"note", c.note}});
+}
+
+std::string StatusJson(const v1::CampaignStatus& status) { return Dump(Status(status)); }
+
+std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses) {
+  Json list = Json::array();
+  for (const v1::CampaignStatus& status : statuses) list.push_back(Status(status));
+  return Dump(list);
+}
+
+std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,
+                        const std::vector<v1::Sample>& samples) {
+  Json list = Json::array();
+  for (const v1::Sample& s : samples) {
+    Json values = Json::object();
+    for (int k = 0; k < s.parameters_size(); ++k) {
+      const auto index = static_cast<std::size_t>(k);
+      values[index < parameters.size() ? parameters[index] : std::to_string(k)] = s.parameters(k);
+    }
+    list.push_back({{"index", s.index()},
+                    {"iteration", s.iteration()},
+                    {"parameters", values},
+                    {"status", s.status()},
+                    {"reason", s.reason()},
+                    {"weight", s.weight()},
+                    {"log_likelihood", s.log_likelihood()},
+                    {"attempts", s.attempts()}});
+  }
+  return Dump({{"campaign", campaign}, {"samples", list}});
+}
+
+std::string StatesJson(const std::string& campaign, int sample,
+                       const std::map<std::string, StateHistory>& by_experiment) {
+  Json experiments = Json::array();
+  for (const auto& [name, history] : by_experiment) {
+    Json states = Json::array();
+    for (const v1::State& state : history.states) {
+      Json row = {{"load_step", state.load_step()}};
+      for (int k = 0; k < state.values_size(); ++k) {
+        const auto index = static_cast<std::size_t>(k);
+        if (index < history.observables.size()) row[history.observables[index]] = state.values(k);
+      }
+      states.push_back(std::move(row));
+    }
+    experiments.push_back({{"experiment", name}, {"states", states}});
+  }
+  return Dump({{"campaign", campaign}, {"sample", sample}, {"experiments", experiments}});
+}
+
+std::string StateTableJson(const std::string& csv) {
+  std::vector<campaign::TableProblem>
+      ignored;  // the table is our own; without rows it has no states
+  const campaign::DataTable table(csv, {}, ignored);
+  std::vector<std::vector<std::string>> columns;
+  for (const std::string& name : table.columns()) columns.push_back(table.Texts(name));
+  Json states = Json::array();
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    Json state = Json::object();
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const std::string& text = columns[k][row];
+      const bool number = table.columns()[k] != "experiment";
+      state[table.columns()[k]] = number ? Json::parse(text, nullptr, false) : Json(text);
+    }
+    for (auto& value : state) {
+      if (value.is_discarded()) value = nullptr;  // no such observable in this experiment
+    }
+    states.push_back(std::move(state));
+  }
+  return Dump({{"states", states}});
+}
+
+std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers) {
+  Json list = Json::array();
+  for (const v1::WorkerInfo& w : workers) {
+    Json running = Json::array();
+    for (const std::string& what : w.running()) running.push_back(what);
+    list.push_back({{"name", w.name()},
+                    {"slots", w.slots()},
+                    {"busy", w.busy()},
+                    {"contact_updates_per_second", w.contact_updates_per_second()},
+                    {"cpu", w.cpu()},
+                    {"draining", w.draining()},
+                    {"connected", w.connected()},
+                    {"seconds_since_heard", w.seconds_since_heard()},
+                    {"running", running},
+                    {"engine_version", w.engine_version()}});
+  }
+  return Dump(list);
+}
+
+std::string ProblemsJson(const std::vector<campaign::Problem>& problems) {
+  Json list = Json::array();
+  for (const campaign::Problem& p : problems) {
+    list.push_back({{"file", p.file}, {"line", p.line}, {"key", p.key}, {"message", p.message}});
+  }
+  return Dump({{"valid", problems.empty()}, {"problems", list}});
+}
+
+std::string DataJson(const campaign::Campaign& campaign) {
+  Json experiments = Json::array();
+  for (const campaign::Experiment& e : campaign.experiments) {
+    Json observables = Json::array();
+    for (const campaign::MeasuredObservable& o : e.observables) {
+      observables.push_back({{"name", o.name},
+                             {"values", Numbers(o.values)},
+                             {"sd", Numbers(o.sd)},
+                             {"correlation_length", o.correlation_length}});
+    }
+    experiments.push_back({{"experiment", e.name},
+                           {"test", e.test},
+                           {"role", e.role == campaign::Role::kValidate ? "validate" : "calibrate"},
+                           {"control", e.control_name},
+                           {"control_values", Numbers(e.control)},
+                           {"segments", e.segment},
+                           {"observables", observables}});
+  }
+  return Dump({{"campaign", campaign.name}, {"experiments", experiments}});
+}
+
+}  // namespace calib::report

@@ -1,0 +1,34 @@
+#pragma once
+// The JSON documents that the command line prints and exports. NaN and infinities become null.
+
+#include <string>
+#include <vector>
+
+#include "server/campaign/campaign.h"
+#include "server/report/campaign_view.h"
+#include "server/report/comparison.h"
+
+namespace calib::report {
+
+std::string PosteriorJson(const v1::Posterior& posterior);
+std::string ComparisonJson(const std::string& campaign, const Comparison& comparison);
+std::string StatusJson(const v1::CampaignStatus& status);
+std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses);
+/// parameters: names in the order of each sample's values.
+std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,
+                        const std::vector<v1::Sample>& samples);
+std::string StatesJson(const std::string& campaign, int sample,
+                       const std::map<std::string, StateHistory>& by_experiment);
+/// A table of states (experiment,load_step,...) row by row.
+std::string StateTableJson(const std::string& csv);
+std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers);
+std::string ProblemsJson(const std::vector<campaign::Problem>& problems);
+/// The measurements as compared: SI, logarithmic strains, standard deviations.
+std::string DataJson(const campaign::Campaign& campaign);
+
+/// What this build offers.
+std::string ContactsJson();
+std::string EffectsJson();
+std::string TestsJson();
+
+}  // namespace calib::report

@@ -1,0 +1,33 @@
+#include "server/report/report.h"
+
+#include <cmath>
+#include <utility>
+
+#include "server/report/html.h"
+#include "server/report/sections.h"
+
+namespace calib::report {
+
+std::string RenderReport(const CampaignView& view) {
+  std::vector<ExperimentPrediction> predictions = PredictReadings(view);
+  Comparison comparison = Compare(view, predictions);
+  const ReportData data{view, std::move(predictions), std::move(comparison)};
+  std::string body = SummarySection(data);
+  if (view.posterior.parameters_size() > 0) {
+    body +=
+        ParameterSection(data) + FitSection(data) + PosteriorSection(data) + EvolutionSection(data);
+  } else {
+    body += "<p>No iteration is complete yet, so there is no posterior to show.</p>\n";
+  }
+  return Page(view.campaign.name + " – calibration report", body + RecordSection(data));
+}
+
+DisplayUnit ParameterUnit(const v1::Posterior::Parameter& parameter) {
+  return UnitForPeople(parameter.name(), parameter.unit(), std::abs(parameter.mean()));
+}
+
+std::string LabelWithUnit(const std::string& name, const DisplayUnit& unit) {
+  return NameForPeople(name) + (unit.label.empty() ? "" : " (" + unit.label + ")");
+}
+
+}  // namespace calib::report

@@ -1,0 +1,127 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "server/report/html.h"
+#include "server/report/plot/plot.h"
+#include "server/report/sections.h"
+
+namespace calib::report {
+namespace {
+
+std::vector<double> Counting(std::size_t n) {
+  std::vector<double> numbers;
+  for (std::size_t i = 1; i <= n; ++i) numbers.push_back(static_cast<double>(i));
+  return numbers;
+}
+
+// Mean and 5-95 % of one parameter after each iteration.
+std::string OverIterations(const CampaignView& view, int k) {
+  const auto& last = view.posterior.parameters(k);
+  const DisplayUnit unit = ParameterUnit(last);
+  std::vector<double> mean;
+  std::vector<double> low;
+  std::vector<double> high;
+  for (const v1::Posterior& posterior : view.iterations) {
+    if (k >= posterior.parameters_size()) continue;
+    mean.push_back(posterior.parameters(k).mean() * unit.factor);
+    low.push_back(posterior.parameters(k).q05() * unit.factor);
+    high.push_back(posterior.parameters(k).q95() * unit.factor);
+  }
+  const std::vector<double> x = Counting(mean.size());
+  std::vector<double> shown = low;
+  shown.insert(shown.end(), high.begin(), high.end());
+  Plot plot({.width = 330, .height = 200},
+            Axis("iterations", 0.7, static_cast<double>(x.size()) + 0.3, static_cast<int>(x.size()),
+                 Axis::Scale::kLinear, true),
+            Axis::Covering(LabelWithUnit(last.name(), unit), shown, 4));
+  plot.AddBand(x, low, high);
+  plot.AddLine(x, mean);
+  plot.AddPoints(x, mean, 3, "residual");
+  return "<figure>" +
+         plot.Svg(NameForPeople(last.name()) + " over the iterations",
+                  "posterior mean and 5 to 95 percent after each iteration") +
+         "</figure>\n";
+}
+
+// Mean +- sd of one parameter while the readings are taken in one after the other.
+std::string AlongPath(const CampaignView& view, int k) {
+  const auto& parameter = view.posterior.parameters(k);
+  const DisplayUnit unit = ParameterUnit(parameter);
+  std::vector<double> mean;
+  std::vector<double> low;
+  std::vector<double> high;
+  for (const auto& point : view.posterior.path()) {
+    if (k >= point.mean_size() || k >= point.cov_size()) continue;
+    const double sd = std::abs(point.mean(k)) * point.cov(k);
+    mean.push_back(point.mean(k) * unit.factor);
+    low.push_back((point.mean(k) - sd) * unit.factor);
+    high.push_back((point.mean(k) + sd) * unit.factor);
+  }
+  const std::vector<double> x = Counting(mean.size());
+  std::vector<double> shown = low;
+  shown.insert(shown.end(), high.begin(), high.end());
+  Plot plot(
+      {.width = 330, .height = 200},
+      Axis("load steps taken in", 0, static_cast<double>(x.size()), 5, Axis::Scale::kLinear, true),
+      Axis::Covering(LabelWithUnit(parameter.name(), unit), shown, 4));
+  plot.AddBand(x, low, high);
+  plot.AddLine(x, mean);
+  return "<figure>" +
+         plot.Svg(NameForPeople(parameter.name()) + " along the loading path",
+                  "posterior mean plus and minus one standard deviation after each load step") +
+         "</figure>\n";
+}
+
+std::string EssAlongPath(const CampaignView& view) {
+  std::vector<double> ess;
+  for (const auto& point : view.posterior.path()) ess.push_back(100 * point.ess());
+  const std::vector<double> x = Counting(ess.size());
+  Plot plot(
+      {.width = 330, .height = 200},
+      Axis("load steps taken in", 0, static_cast<double>(x.size()), 5, Axis::Scale::kLinear, true),
+      Axis("effective sample size (%)", 0, 100, 5));
+  plot.AddLine(x, ess);
+  return "<figure>" +
+         plot.Svg("effective sample size along the loading path",
+                  "share of the samples that still count, in percent") +
+         "</figure>\n";
+}
+
+std::string IterationTable(const CampaignView& view) {
+  std::string html =
+      "<div class=\"scroll\"><table><tr><th>after iteration</th><th>effective "
+      "samples</th><th>Pareto index</th><th>log evidence</th>"
+      "<th>model evaluations</th></tr>\n";
+  for (const v1::Posterior& posterior : view.iterations) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{} ± {}</td><td>{}</td></tr>\n",
+                        posterior.iteration() + 1, Number(posterior.ess(), 3),
+                        Number(posterior.pareto_k(), 2), Number(posterior.log_evidence(), 5),
+                        Number(posterior.log_evidence_se(), 2), posterior.model_evaluations());
+  }
+  return html + "</table></div>\n";
+}
+
+}  // namespace
+
+std::string EvolutionSection(const ReportData& data) {
+  const CampaignView& view = data.view;
+  std::string html = "<h2>How the answer came about</h2>\n" + IterationTable(view);
+  if (view.iterations.size() > 1) {
+    html += "<h3>Over the iterations</h3>\n<div class=\"grid\">\n";
+    for (int k = 0; k < view.posterior.parameters_size(); ++k) html += OverIterations(view, k);
+    html += "</div>\n";
+  }
+  if (view.posterior.path_size() > 1) {
+    html +=
+        "<h3>Along the loading path</h3>\n<p class=\"sub\">What the readings say when they are "
+        "taken in one load step after the "
+        "other: a parameter that keeps drifting is asked to play different roles in different "
+        "stages.</p>\n<div class=\"grid\">\n";
+    for (int k = 0; k < view.posterior.parameters_size(); ++k) html += AlongPath(view, k);
+    html += EssAlongPath(view) + "</div>\n";
+  }
+  return html;
+}
+
+}  // namespace calib::report

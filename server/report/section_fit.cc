@@ -1,0 +1,169 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dem/catalog/catalog.h"
+#include "server/report/html.h"
+#include "server/report/plot/plot.h"
+#include "server/report/sections.h"
+
+namespace calib::report {
+namespace {
+
+std::vector<double> Scaled(std::vector<double> values, double factor) {
+  for (double& value : values) value *= factor;
+  return values;
+}
+
+double Largest(const std::vector<double>& values) {
+  double largest = 0;
+  for (const double value : values) {
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  return largest;
+}
+
+DisplayUnit UnitOf(const std::string& observable, const std::vector<double>& values) {
+  const dem::ObservableInfo* info = dem::FindObservable(observable);
+  return UnitForPeople(observable, info != nullptr ? info->unit : "1", Largest(values));
+}
+
+struct ControlAxis {
+  std::vector<double> values;  // as shown
+  std::string label;
+};
+
+ControlAxis ControlOf(const campaign::Experiment& experiment) {
+  if (experiment.control_name.empty()) return {experiment.control, "reading"};
+  const DisplayUnit unit = UnitOf(experiment.control_name, experiment.control);
+  return {Scaled(experiment.control, unit.factor), LabelWithUnit(experiment.control_name, unit)};
+}
+
+std::string CurvePlot(const ReportData& data, std::size_t e, std::size_t j) {
+  const campaign::Experiment& experiment = data.view.campaign.experiments[e];
+  const campaign::MeasuredObservable& observable = experiment.observables[j];
+  const ObservablePrediction& prediction = data.predictions[e].observables[j];
+  const DisplayUnit unit = UnitOf(observable.name, observable.values);
+  const ControlAxis control = ControlOf(experiment);
+  const bool held = experiment.role == campaign::Role::kValidate;
+  std::vector<double> sd;
+  for (std::size_t i = 0; i < observable.values.size(); ++i)
+    sd.push_back(ErrorOf(data.view, observable, i) * unit.factor);
+  const std::vector<double> measured = Scaled(observable.values, unit.factor);
+  std::vector<double> shown = measured;
+  for (const auto* curve : {&prediction.mean, &prediction.q05, &prediction.q95}) {
+    const std::vector<double> scaled = Scaled(*curve, unit.factor);
+    shown.insert(shown.end(), scaled.begin(), scaled.end());
+  }
+  Plot plot({.bottom = 24}, Axis::Covering(control.label, control.values),
+            Axis::Covering(LabelWithUnit(observable.name, unit), shown, 5));
+  plot.HideLabels(true, false);
+  const std::string css = held ? " held" : "";
+  plot.AddBand(control.values, Scaled(prediction.q05, unit.factor),
+               Scaled(prediction.q95, unit.factor), "band" + css);
+  plot.AddLine(control.values, Scaled(prediction.mean, unit.factor), "mean" + css);
+  plot.AddErrorBars(control.values, measured, sd);
+  plot.AddPoints(control.values, measured, 2.6);
+  return plot.Svg(fmt::format("{}: {}", experiment.name, NameForPeople(observable.name)),
+                  "measured points with error bars, posterior mean as a line, 5 to 95 percent of "
+                  "the posterior as a band");
+}
+
+std::string ResidualPlot(const ReportData& data, std::size_t e, std::size_t j) {
+  const campaign::Experiment& experiment = data.view.campaign.experiments[e];
+  const campaign::MeasuredObservable& observable = experiment.observables[j];
+  const ObservablePrediction& prediction = data.predictions[e].observables[j];
+  const ControlAxis control = ControlOf(experiment);
+  std::vector<double> residual;
+  double largest = 3;
+  for (std::size_t i = 0; i < observable.values.size(); ++i) {
+    residual.push_back((prediction.mean[i] - observable.values[i]) /
+                       ErrorOf(data.view, observable, i));
+    if (std::isfinite(residual.back())) largest = std::max(largest, std::abs(residual.back()));
+  }
+  Plot plot({.height = 130}, Axis::Covering(control.label, control.values),
+            Axis("residual / sd", -largest, largest, 3));
+  const std::vector<double> ends = {control.values.front(), control.values.back()};
+  plot.AddHorizontal(0);
+  plot.AddHorizontal(2);
+  plot.AddHorizontal(-2);
+  plot.AddPoints(control.values, residual, 2.4,
+                 experiment.role == campaign::Role::kValidate ? "residual held" : "residual");
+  return plot.Svg(
+      fmt::format("{}: residuals of {}", experiment.name, NameForPeople(observable.name)),
+      "model minus measurement over the standard deviation of the error; dashed lines at plus and "
+      "minus 2");
+}
+
+std::string Caption(const ReportData& data, const std::string& experiment,
+                    const std::string& observable) {
+  for (const ObservableMisfit& misfit : data.comparison.by_observable) {
+    if (misfit.experiment != experiment || misfit.observable != observable) continue;
+    std::string text = fmt::format("rms misfit {} sd over {} readings", Number(misfit.rms_error, 3),
+                                   misfit.readings);
+    if (misfit.p_value) text += fmt::format(", p = {}", Number(*misfit.p_value, 2));
+    return text;
+  }
+  return "no predictions yet";
+}
+
+std::string ExperimentFigures(const ReportData& data, std::size_t e) {
+  const campaign::Experiment& experiment = data.view.campaign.experiments[e];
+  const bool held = experiment.role == campaign::Role::kValidate;
+  std::string html =
+      fmt::format("<h3>{}{}{}</h3>\n<div class=\"grid fit\">\n", Escape(experiment.name),
+                  experiment.test.empty() ? "" : " – " + Escape(NameForPeople(experiment.test)),
+                  held ? " (held out: not used for fitting)" : "");
+  for (std::size_t j = 0; j < experiment.observables.size(); ++j) {
+    html += "<figure>\n" + CurvePlot(data, e, j) + ResidualPlot(data, e, j) +
+            fmt::format("<figcaption>{}: {}</figcaption>\n</figure>\n",
+                        Escape(NameForPeople(experiment.observables[j].name)),
+                        Escape(Caption(data, experiment.name, experiment.observables[j].name)));
+  }
+  return html + "</div>\n";
+}
+
+std::string SegmentTable(const ReportData& data) {
+  if (data.comparison.by_segment.empty()) return "";
+  std::string html =
+      "<h3>Misfit by loading stage</h3>\n<p class=\"sub\">Bias is the mean of model minus "
+      "measurement; z is the bias over its "
+      "standard deviation. Beyond ±3 the model misses that stage by more than its errors "
+      "explain.</p>\n"
+      "<div class=\"scroll\"><table><tr><th>experiment</th><th class=\"l\">observable</th><th "
+      "class=\"l\">stage</th><th>bias</th>"
+      "<th>z</th></tr>\n";
+  for (const SegmentMisfit& segment : data.comparison.by_segment) {
+    const dem::ObservableInfo* info = dem::FindObservable(segment.observable);
+    constexpr double kClear = 3;
+    const bool bad = segment.z && std::abs(*segment.z) > kClear;
+    html += fmt::format(
+        "<tr><td>{}{}</td><td class=\"l\">{}</td><td class=\"l\">{}</td><td>{}</td><td "
+        "class=\"{}\">{}</td></tr>\n",
+        Escape(segment.experiment), segment.heldout ? " (held out)" : "",
+        Escape(NameForPeople(segment.observable)), Escape(NameForPeople(segment.segment)),
+        Escape(NumberWithUnit(segment.bias, segment.observable, info != nullptr ? info->unit : "1",
+                              3)),
+        bad ? "bad" : "", segment.z ? Number(*segment.z, 3) : "–");
+  }
+  return html + "</table></div>\n";
+}
+
+}  // namespace
+
+std::string FitSection(const ReportData& data) {
+  std::string html =
+      "<h2>Model against measurements</h2>\n<p class=\"sub\">Points: measured, with one standard "
+      "deviation of the error."
+      "<span class=\"key\" style=\"color:var(--model)\"></span>posterior mean, shaded 5–95&#8201;%."
+      "<span class=\"key\" style=\"color:var(--held)\"></span>held out. Below each curve: "
+      "residuals in standard deviations.</p>\n";
+  if (!data.comparison.note.empty())
+    html += "<p class=\"sub\">" + Escape(data.comparison.note) + "</p>\n";
+  for (std::size_t e = 0; e < data.view.campaign.experiments.size(); ++e)
+    html += ExperimentFigures(data, e);
+  return html + SegmentTable(data);
+}
+
+}  // namespace calib::report

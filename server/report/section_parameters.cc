@@ -1,0 +1,85 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/report/html.h"
+#include "server/report/sections.h"
+
+namespace calib::report {
+namespace {
+
+// Where the 5-95 % interval lies within the prior's range.
+std::string RangeBar(const v1::Posterior::Parameter& p, bool log) {
+  const auto fraction = [&p, log](double value) {
+    const double f = log && p.prior_min() > 0
+                         ? std::log(value / p.prior_min()) / std::log(p.prior_max() / p.prior_min())
+                         : (value - p.prior_min()) / (p.prior_max() - p.prior_min());
+    return std::clamp(f, 0.0, 1.0);
+  };
+  constexpr double kWidth = 150;
+  const double left = kWidth * fraction(p.q05());
+  const double width = std::max(1.5, kWidth * fraction(p.q95()) - left);
+  return fmt::format(
+      "<svg viewBox=\"0 0 {0} 14\" width=\"{0}\" height=\"14\" role=\"img\"><title>{1}: 5 to 95 % "
+      "of the posterior within the "
+      "prior's range</title><rect class=\"rangebar\" x=\"0\" y=\"4\" width=\"{0}\" height=\"6\" "
+      "rx=\"3\"/><rect "
+      "class=\"rangepart\" x=\"{2:.2f}\" y=\"4\" width=\"{3:.2f}\" height=\"6\" rx=\"2\"/><rect "
+      "class=\"rangemean\" "
+      "x=\"{4:.2f}\" y=\"1\" width=\"2\" height=\"12\"/></svg>",
+      kWidth, Escape(NameForPeople(p.name())), left, width, kWidth * fraction(p.mean()) - 1);
+}
+
+bool HasLogPrior(const campaign::Campaign& campaign, const std::string& name) {
+  return std::any_of(campaign.parameters.begin(), campaign.parameters.end(),
+                     [&name](const auto& parameter) {
+                       return parameter.name == name &&
+                              (parameter.prior.kind == inference::PriorKind::kLogUniform ||
+                               parameter.prior.kind == inference::PriorKind::kLogNormal);
+                     });
+}
+
+std::string Row(const v1::Posterior::Parameter& p, bool log) {
+  const DisplayUnit unit = ParameterUnit(p);
+  const auto shown = [&unit](double value, int digits) {
+    return Escape(Number(value * unit.factor, digits));
+  };
+  return fmt::format(
+      "<tr><td>{}</td><td "
+      "class=\"l\">{}</td><td>{}</td><td>{}</td><td>{}&#8201;%</td><td>{}</td><td>{}</td><td>{}</"
+      "td>"
+      "<td>{} – {}</td><td class=\"l\">{}</td><td class=\"l{}\">{}</td></tr>\n",
+      Escape(NameForPeople(p.name())), Escape(unit.label.empty() ? "–" : unit.label),
+      shown(p.mean(), 4), shown(p.sd(), 2), Number(100 * p.cov(), 2), shown(p.q05(), 4),
+      shown(p.q50(), 4), shown(p.q95(), 4), shown(p.prior_min(), 3), shown(p.prior_max(), 3),
+      RangeBar(p, log), p.at_bound() ? " bad" : "", p.at_bound() ? "at a bound" : "");
+}
+
+}  // namespace
+
+std::string ParameterSection(const ReportData& data) {
+  std::string html =
+      "<h2>Identified parameters</h2>\n<div class=\"scroll\"><table>\n<tr><th>parameter</th><th "
+      "class=\"l\">unit</th><th>mean</th>"
+      "<th>± "
+      "sd</th><th>cov</th><th>5&#8201;%</th><th>50&#8201;%</th><th>95&#8201;%</th><th>prior</"
+      "th><th class=\"l\">5–95&#8201;% in "
+      "the prior</th><th></th></tr>\n";
+  for (const auto& parameter : data.view.posterior.parameters()) {
+    html += Row(parameter, HasLogPrior(data.view.campaign, parameter.name()));
+  }
+  html += "</table></div>\n";
+  if (!data.view.campaign.model.parameters.empty()) {
+    html += "<p class=\"sub\">Held fixed: ";
+    bool first = true;
+    for (const auto& [name, value] : data.view.campaign.model.parameters) {
+      html += (first ? "" : ", ") + Escape(NameForPeople(name)) + " = " + Escape(Number(value));
+      first = false;
+    }
+    html += " (SI).</p>\n";
+  }
+  return html;
+}
+
+}  // namespace calib::report

@@ -1,0 +1,139 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/report/html.h"
+#include "server/report/plot/plot.h"
+#include "server/report/sections.h"
+#include "server/report/weighted_statistics.h"
+
+namespace calib::report {
+namespace {
+
+constexpr int kBins = 24;
+
+// One parameter as it is drawn: prior range, scale and unit, and the samples.
+struct ParameterPlot {
+  std::string name, label;
+  DisplayUnit unit;
+  bool log = false;
+  double min = 0, max = 1;     // as shown
+  std::vector<double> values;  // as shown, one per sample
+  const inference::Prior* prior = nullptr;
+
+  Axis MakeAxis(int ticks) const {
+    return {label, min, max, ticks, log ? Axis::Scale::kLog : Axis::Scale::kLinear, true};
+  }
+};
+
+std::vector<ParameterPlot> MakeParameterPlots(const CampaignView& view) {
+  std::vector<ParameterPlot> plots;
+  for (int k = 0; k < view.posterior.parameters_size(); ++k) {
+    const auto& p = view.posterior.parameters(k);
+    ParameterPlot plot;
+    plot.name = p.name();
+    plot.unit = ParameterUnit(p);
+    plot.label = LabelWithUnit(p.name(), plot.unit);
+    plot.prior = &view.campaign.parameters[static_cast<std::size_t>(k)].prior;
+    plot.log = plot.prior->kind == inference::PriorKind::kLogUniform ||
+               plot.prior->kind == inference::PriorKind::kLogNormal;
+    plot.min = p.prior_min() * plot.unit.factor;
+    plot.max = p.prior_max() * plot.unit.factor;
+    for (const v1::Sample& sample : view.samples) {
+      plot.values.push_back(k < sample.parameters_size() ? sample.parameters(k) * plot.unit.factor
+                                                         : std::nan(""));
+    }
+    plots.push_back(std::move(plot));
+  }
+  return plots;
+}
+
+std::vector<double> Weights(const CampaignView& view) {
+  std::vector<double> weights;
+  for (const v1::Sample& sample : view.samples)
+    weights.push_back(std::isfinite(sample.weight()) ? sample.weight() : 0);
+  return weights;
+}
+
+std::string Marginal(const ParameterPlot& parameter, const std::vector<double>& weights) {
+  // Log parameters are counted in bins of equal ratio, so that a log-uniform prior is flat in the
+  // picture.
+  const auto coordinate = [&parameter](double value) {
+    return parameter.log ? std::log(value) : value;
+  };
+  const auto back = [&parameter](double value) { return parameter.log ? std::exp(value) : value; };
+  const double low = coordinate(parameter.min);
+  const double high = coordinate(parameter.max);
+  std::vector<double> values;
+  for (const double value : parameter.values) values.push_back(coordinate(value));
+  const std::vector<double> density = WeightedHistogram(values, weights, low, high, kBins);
+  std::vector<double> edges;
+  for (int i = 0; i <= kBins; ++i) edges.push_back(back(low + (high - low) * i / kBins));
+  std::vector<double> prior_x;
+  std::vector<double> prior_y;
+  constexpr int kCurvePoints = 100;
+  for (int i = 0; i <= kCurvePoints; ++i) {
+    const double at = low + (high - low) * i / kCurvePoints;
+    prior_x.push_back(back(at));
+    const double si = back(at) / parameter.unit.factor;
+    // Density per unit of the drawn coordinate.
+    const double jacobian = parameter.log ? si : 1 / parameter.unit.factor;
+    prior_y.push_back(std::exp(parameter.prior->LogDensity(si)) * jacobian);
+  }
+  double top = *std::max_element(density.begin(), density.end());
+  for (const double h : prior_y) top = std::isfinite(h) ? std::max(top, h) : top;
+  Plot plot({.width = 330, .height = 190, .left = 14, .right = 14}, parameter.MakeAxis(5),
+            Axis("", 0, 1.06 * top, 3, Axis::Scale::kLinear, true));
+  plot.HideLabels(false, true);
+  plot.AddColumns(edges, density);
+  plot.AddLine(prior_x, prior_y, "prior");
+  return "<figure>" +
+         plot.Svg("posterior of " + NameForPeople(parameter.name),
+                  "weighted histogram of the posterior over the prior's range; dashed line: prior "
+                  "density") +
+         "</figure>\n";
+}
+
+std::string Pair(const ParameterPlot& x, const ParameterPlot& y, const std::vector<double>& weights,
+                 double correlation) {
+  Plot plot({.width = 330, .height = 260}, x.MakeAxis(4), y.MakeAxis(4));
+  plot.AddPoints(x.values, y.values, 1.1, "faint");
+  plot.AddWeightedPoints(x.values, y.values, weights, 7);
+  return "<figure>" +
+         plot.Svg(NameForPeople(x.name) + " against " + NameForPeople(y.name),
+                  "samples; area in proportion to posterior weight") +
+         fmt::format("<figcaption>correlation {}</figcaption></figure>\n", Number(correlation, 2));
+}
+
+}  // namespace
+
+std::string PosteriorSection(const ReportData& data) {
+  const std::vector<ParameterPlot> parameters = MakeParameterPlots(data.view);
+  const std::vector<double> weights = Weights(data.view);
+  std::string html =
+      "<h2>Posterior</h2>\n<p class=\"sub\">Columns: weighted samples of all iterations over the "
+      "prior's range."
+      "<span class=\"key\" style=\"color:var(--prior)\"></span>prior.</p>\n<div class=\"grid\">\n";
+  for (const ParameterPlot& parameter : parameters) html += Marginal(parameter, weights);
+  html += "</div>\n";
+  if (parameters.size() < 2) return html;
+  html +=
+      "<h3>Pairs</h3>\n<p class=\"sub\">Every sample as a faint dot; the area of a blue disc is "
+      "its posterior weight.</p>\n"
+      "<div class=\"grid\">\n";
+  const auto d = static_cast<int>(parameters.size());
+  for (int i = 0; i < d; ++i) {
+    for (int j = i + 1; j < d; ++j) {
+      const int at = i * d + j;
+      const double correlation = at < data.view.posterior.correlation_size()
+                                     ? data.view.posterior.correlation(at)
+                                     : std::nan("");
+      html += Pair(parameters[static_cast<std::size_t>(i)], parameters[static_cast<std::size_t>(j)],
+                   weights, correlation);
+    }
+  }
+  return html + "</div>\n";
+}
+
+}  // namespace calib::report

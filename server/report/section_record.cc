@@ -1,0 +1,89 @@
+#include <fmt/format.h>
+
+#include <ctime>
+
+#include "dem/catalog/catalog.h"
+#include "server/report/html.h"
+#include "server/report/sections.h"
+
+namespace calib::report {
+namespace {
+
+std::string Entry(const std::string& term, const std::string& text) {
+  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", Escape(term), Escape(text));
+}
+
+std::string Joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text.empty() ? "none" : text;
+}
+
+std::string Date(std::int64_t unix_ms) {
+  const std::time_t seconds = unix_ms / 1000;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02} UTC", utc.tm_year + 1900, utc.tm_mon + 1,
+                     utc.tm_mday, utc.tm_hour, utc.tm_min);
+}
+
+std::string NoiseSentence(const campaign::Campaign& campaign) {
+  switch (campaign.filter.noise) {
+    case inference::NoiseMode::kGiven:
+      return "given: the standard deviations stated in the campaign file";
+    case inference::NoiseMode::kInferred:
+      return "inferred: one variance factor per observable, marginalised";
+    case inference::NoiseMode::kEssTarget:
+      break;
+  }
+  return fmt::format("ess_target {}: tempered until that share of the samples counts",
+                     campaign.filter.ess_target);
+}
+
+std::string SpecimenSentence(const campaign::Experiment& experiment) {
+  if (experiment.specimens.empty()) return "runs made elsewhere";
+  if (const auto* file = std::get_if<campaign::PackingFile>(&experiment.specimens.front())) {
+    return fmt::format("packing {} ({} grains)", file->path, file->packing.x.size());
+  }
+  const auto& recipe = std::get<dem::PackingRecipe>(experiment.specimens.front());
+  return fmt::format("{} generated packing(s) of {} grains, porosity {}",
+                     experiment.specimens.size(), recipe.particles, Number(recipe.porosity, 3));
+}
+
+}  // namespace
+
+std::string RecordSection(const ReportData& data) {
+  const CampaignView& view = data.view;
+  const campaign::Campaign& campaign = view.campaign;
+  std::string html =
+      "<h2>Record</h2>\n<dl>\n" + Entry("campaign", view.status.campaign()) +
+      Entry("submitted", Date(view.status.created_unix_ms())) +
+      Entry("model", campaign.precomputed ? "runs made elsewhere" : campaign.model.contact) +
+      Entry("effects", campaign.precomputed ? "–" : Joined(campaign.model.effects)) +
+      Entry("engine", dem::EngineVersion()) + Entry("seed", std::to_string(campaign.seed)) +
+      Entry("noise", NoiseSentence(campaign)) +
+      Entry("samples", fmt::format("{} per iteration, at most {} iterations", campaign.samples,
+                                   campaign.max_iterations)) +
+      Entry("stopped early", std::to_string(view.posterior.stopped_early())) +
+      Entry("effort",
+            fmt::format("{} model evaluations, {} core hours", view.posterior.model_evaluations(),
+                        Number(view.posterior.core_hours(), 3)));
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    html +=
+        Entry("experiment " + experiment.name,
+              fmt::format("{}; {} readings; {}; {}",
+                          experiment.test.empty() ? "–" : NameForPeople(experiment.test),
+                          experiment.control.size(), SpecimenSentence(experiment),
+                          experiment.role == campaign::Role::kValidate ? "held out" : "fitted"));
+  }
+  for (const auto& [path, digest] : view.source.files())
+    html += Entry("file " + path, "SHA-256 " + digest);
+  html += "</dl>\n";
+  if (!view.source.campaign_file().empty()) {
+    html += "<details><summary>The campaign file</summary><pre>" +
+            Escape(view.source.campaign_file()) + "</pre></details>\n";
+  }
+  return html;
+}
+
+}  // namespace calib::report

@@ -1,0 +1,38 @@
+#pragma once
+// The sections of the report, each HTML of its own.
+
+#include <string>
+#include <vector>
+
+#include "server/report/campaign_view.h"
+#include "server/report/comparison.h"
+#include "server/report/people_units.h"
+#include "server/report/predictions.h"
+
+namespace calib::report {
+
+/// What every section reads.
+struct ReportData {
+  const CampaignView& view;
+  std::vector<ExperimentPrediction> predictions;
+  Comparison comparison;
+};
+
+std::string SummarySection(
+    const ReportData& data);  ///< section_summary.cc: name, key numbers, warnings
+std::string ParameterSection(
+    const ReportData& data);  ///< section_parameters.cc: the table of identified parameters
+std::string FitSection(
+    const ReportData& data);  ///< section_fit.cc: curves, residuals, misfit by stage
+std::string PosteriorSection(
+    const ReportData& data);  ///< section_posterior.cc: marginals and pairs
+std::string EvolutionSection(
+    const ReportData& data);  ///< section_evolution.cc: iterations and loading path
+std::string RecordSection(const ReportData& data);  ///< section_record.cc: campaign and provenance
+
+/// The unit in which a calibrated parameter is shown throughout.
+DisplayUnit ParameterUnit(const v1::Posterior::Parameter& parameter);
+/// "young modulus (GPa)"
+std::string LabelWithUnit(const std::string& name, const DisplayUnit& unit);
+
+}  // namespace calib::report

@@ -1,0 +1,14 @@
+#pragma once
+// What a reader has to be warned of before believing an answer.
+
+#include <string>
+#include <vector>
+
+#include "server/report/campaign_view.h"
+
+namespace calib::report {
+
+/// Whole sentences: those of the inference, then iterations that ended unsettled and parameters at a bound of their prior.
+std::vector<std::string> Warnings(const CampaignView& view);
+
+}  // namespace calib::report

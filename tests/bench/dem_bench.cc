@@ -1,0 +1,91 @@
+// Speed of the step loop on dense packings: contact updates/s and particle-steps/s by law, grains
+// and threads.
+#include <benchmark/benchmark.h>
+
+#include <cstdlib>
+#include <map>
+#include <string>
+
+#include "dem/dynamics/quasi_static.h"
+#include "tests/support/dem/scenarios.h"
+
+namespace calib::dem {
+namespace {
+
+Model BenchModel(bool moments) {
+  Model model = moments ? test::LinearModel() : test::HertzModel();
+  if (moments) {
+    model.parameters = {
+        {"young_modulus", 1e9}, {"poisson_ratio", 0.25}, {"friction_coefficient", 0.5}};
+    model.effects = {"rolling_resistance", "twisting_resistance"};
+    for (const std::string& effect : model.effects) {
+      model.parameters[effect + ".stiffness"] = 0.13;
+      model.parameters[effect + ".friction"] = 0.13;
+    }
+  }
+  return model;
+}
+
+/// The published packing where $CALIB_DATA has it, else a generated one.
+const Packing& PackingOf(int grains) {
+  static std::map<int, Packing> packings;
+  if (const auto it = packings.find(grains); it != packings.end()) {
+    return it->second;
+  }
+  const char* folder = std::getenv("CALIB_DATA");
+  const std::string path = std::string(folder == nullptr ? "" : folder) +
+                           "/toyoura_triaxial/packing_" + std::to_string(grains) + ".txt";
+  Packing packing = folder != nullptr && !test::ReadFile(path).empty() ? test::LoadPacking(path)
+                                                                       : test::SmallPacking(grains);
+  return packings.emplace(grains, std::move(packing)).first->second;
+}
+
+/// Dense at 0.5 MPa, then compressed along z at 0.1/s: every iteration is one step of the engine.
+void ContactUpdates(benchmark::State& state, bool moments) {
+  const Model model = BenchModel(moments);
+  const int threads = static_cast<int>(state.range(1));
+  Assembly assembly(PackingOf(static_cast<int>(state.range(0))), model.density, ContactModel(model),
+                    threads);
+  StageOptions options;
+  options.unbalanced = 5e-3;
+  QuasiStatic stages(assembly, options, {});
+  const AxisTarget axis{.mode = AxisTarget::Mode::kStress, .value = 5e5};
+  if (stages.MoveTo({axis, axis, axis}) != StageEnd::kDone) {
+    state.SkipWithError(stages.reason().c_str());
+    return;
+  }
+  const std::int64_t updates = assembly.contact_updates();
+  const std::int64_t steps = assembly.steps();
+  const Motion motion{.stretch = {0.05, 0.05, -0.1}, .dt = stages.time_step(), .damping = 0.2};
+  for (auto _ : state) {
+    assembly.Move(motion);
+    if (!assembly.EvaluateForces().ok()) {
+      state.SkipWithError("diverged");
+      return;
+    }
+  }
+  const auto rate = [](std::int64_t count) {
+    return benchmark::Counter(static_cast<double>(count), benchmark::Counter::kIsRate);
+  };
+  state.counters["contact_updates/s"] = rate(assembly.contact_updates() - updates);
+  state.counters["particle_steps/s"] =
+      rate((assembly.steps() - steps) * assembly.particles().size());
+  state.counters["contacts"] = static_cast<double>(assembly.contacts());
+}
+
+void Arguments(benchmark::internal::Benchmark* bench) {
+  for (const int grains : {1000, 5000, 10000}) {
+    for (const int threads : {1, 2}) {
+      bench->Args({grains, threads});
+    }
+  }
+  bench->UseRealTime();
+}
+
+BENCHMARK_CAPTURE(ContactUpdates, hertz, false)->Apply(Arguments);
+BENCHMARK_CAPTURE(ContactUpdates, linear_moments, true)->Apply(Arguments);
+
+}  // namespace
+}  // namespace calib::dem
+
+BENCHMARK_MAIN();

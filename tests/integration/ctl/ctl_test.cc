@@ -1,0 +1,196 @@
+// calibctl as a user meets it: real processes and exit codes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace calib::ctl {
+namespace {
+
+using ::testing::HasSubstr;
+using Json = nlohmann::json;
+
+std::string ReadAll(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+struct Answer {
+  int code = -1;
+  std::string out, err;
+  Json json() const { return Json::parse(out, nullptr, false); }
+};
+
+class Calibctl : public ::testing::Test {
+ protected:
+  Calibctl() {
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "calib-ctl-test-XXXXXX").string();
+    work_ = mkdtemp(pattern.data());
+    std::ofstream(work_ / "data.csv") << "axial_strain,q_over_p,volumetric_strain\n0.002,0.5,0."
+                                         "0008\n0.005,0.8,0.0012\n0.01,1.0,0.001\n";
+    std::ofstream(work_ / "good.yaml") << Campaign();
+  }
+  ~Calibctl() override { std::filesystem::remove_all(work_); }
+
+  static std::string Campaign() {
+    return R"(name: small
+model: {contact: linear, density: 2650000 kg/m^3, fixed: {poisson_ratio: 0.3}}
+parameters:
+  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e9 Pa}
+  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
+experiments:
+  - name: tx
+    test: triaxial_drained
+    confining_pressure: 100 kPa
+    packing: {generate: {particles: 64, porosity: 0.42, radii: {mean: 1 mm, spread: 0.2}, seed: 3}}
+    data: {file: data.csv, strain: logarithmic}
+    control: axial_strain
+    staging: {rate: 1 1/s, step: 0.005, damping: [0.3, 0.9], unbalanced: 5e-3}
+    observables: {q_over_p: {noise: {absolute: 0.3}}, volumetric_strain: {noise: {absolute: 0.002}}}
+inference: {method: iterative_bayesian_filter, samples: 6, max_iterations: 2}
+seed: 7
+)";
+  }
+
+  Answer Call(const std::string& arguments) const { return CallWith("", arguments); }
+
+  // wrapper: a program that starts calibctl and gives back its exit code (timeout --preserve-status).
+  Answer CallWith(const std::string& wrapper, const std::string& arguments) const {
+    const std::string command =
+        "cd '" + work_.string() + "' && " + wrapper + " '" + CALIBCTL + "' " + arguments + " >out 2>err </dev/null";
+    const int status = std::system(
+        command.c_str());  // NOLINT(cert-env33-c,concurrency-mt-unsafe): a shell is the point
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadAll(work_ / "out"),
+            ReadAll(work_ / "err")};
+  }
+
+  std::filesystem::path work_;
+};
+
+TEST_F(Calibctl, BadInputIsTwoWithOneLinePerProblem) {
+  std::string bad = Campaign();
+  bad.replace(bad.find("min: 0.2, max: 0.8"), 18, "min: 0.8, max: 0.2");
+  std::ofstream(work_ / "bad.yaml") << bad;
+  const Answer answer = Call("validate bad.yaml");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_EQ(std::count(answer.err.begin(), answer.err.end(), '\n'), 1) << answer.err;
+  EXPECT_THAT(
+      answer.err,
+      HasSubstr("bad.yaml:5: parameters.friction_coefficient.min: the prior is upside down"));
+  EXPECT_EQ(Call("run bad.yaml").code, 2);
+  EXPECT_FALSE(std::filesystem::exists(work_ / "calib-state"));  // refused before anything was made
+  EXPECT_EQ(Call("validate nowhere.yaml").code, 2);
+  EXPECT_EQ(Call("validate good.yaml").code, 0);
+  EXPECT_EQ(Call("show c1 --state nowhere").code, 2);
+}
+
+TEST_F(Calibctl, NoServerIsThreeWithinSeconds) {
+  const auto begin = std::chrono::steady_clock::now();
+  const Answer answer = Call("--server 127.0.0.1:9 list");
+  EXPECT_EQ(answer.code, 3);
+  EXPECT_THAT(answer.err, HasSubstr("no server answers at 127.0.0.1:9"));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+  EXPECT_EQ(Call("submit good.yaml --server 127.0.0.1:9").code, 3);
+}
+
+TEST_F(Calibctl, SimulateWritesARowPerLoadStep) {
+  const Answer missing = Call("simulate good.yaml --set young_modulus='300 MPa'");
+  EXPECT_EQ(missing.code, 2);
+  EXPECT_THAT(missing.err,
+              HasSubstr("friction_coefficient is calibrated in this campaign and needs a value"));
+  const Answer answer = Call(
+      "simulate good.yaml --set young_modulus='300 MPa' --set friction_coefficient=0.5 -o "
+      "states.csv --vtk grains");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const std::string table = ReadAll(work_ / "states.csv");
+  EXPECT_THAT(table, ::testing::StartsWith("experiment,load_step,axial_strain,volumetric_strain,"));
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 4);
+  EXPECT_FALSE(std::filesystem::is_empty(work_ / "grains" / "tx"));
+}
+
+TEST_F(Calibctl, ACalibrationFromEndToEnd) {
+  const Answer run = Call("run good.yaml --workers 2 --state s --json");
+  ASSERT_EQ(run.code, 0) << run.err;
+  const Json posterior = run.json();
+  const std::string id = posterior["campaign"];
+  EXPECT_TRUE(posterior["parameters"]["friction_coefficient"]["mean"].is_number());
+  EXPECT_EQ(posterior["model_evaluations"], 12);
+
+  const Answer again = Call(
+      "run good.yaml --workers 2 --state s --json");  // finished already: the same answer at once
+  EXPECT_EQ(again.out, run.out);
+  EXPECT_EQ(Call("posterior " + id + " --state s --json").json()["parameters"],
+            posterior["parameters"]);
+
+  const Json samples = Call("--state s samples " + id + " --json").json()["samples"];
+  EXPECT_EQ(samples.size(), 12U);
+  EXPECT_EQ(Call("states " + id + " 0 --state s --json").json()["experiments"][0]["states"].size(),
+            3U);
+  EXPECT_EQ(Call("list --state s --json").json()[0]["state"], "finished");
+  const Json comparison = Call("compare " + id + " --state s --json").json();
+  EXPECT_TRUE(comparison["rms_error"].is_number());
+  EXPECT_TRUE(comparison["heldout_rms_error"].is_null());
+  for (const std::string verb : {"show", "posterior", "samples", "compare", "watch"}) {
+    const Answer answer = Call(verb + " " + id + " --state s");
+    EXPECT_EQ(answer.code, 0) << verb << ": " << answer.err;
+    EXPECT_FALSE(answer.out.empty()) << verb;
+  }
+
+  EXPECT_EQ(Call("report " + id + " --state s -o r.html").code, 0);
+  EXPECT_THAT(ReadAll(work_ / "r.html"), HasSubstr("<h2>Identified parameters</h2>"));
+  EXPECT_EQ(Call("export " + id + " --state s -o all").code, 0);
+  for (const char* name :
+       {"samples.csv", "states.csv", "posterior.json", "fit.csv", "data.json", "report.html"}) {
+    EXPECT_GT(ReadAll(work_ / "all" / name).size(), 50U) << name;
+  }
+  const Answer unknown = Call("show nosuch --state s");
+  EXPECT_EQ(unknown.code, 1);
+  EXPECT_THAT(unknown.err, HasSubstr("nosuch"));
+  EXPECT_EQ(Call("delete " + id + " --state s").code, 0);
+  EXPECT_EQ(Call("list --state s --json").json().size(), 0U);
+}
+
+TEST_F(Calibctl, AnInterruptedRunGoesOnToTheSameAnswer) {
+  const Json undisturbed = Call("run good.yaml --workers 2 --state s1 --json").json();
+  const Answer stopped = CallWith("timeout --preserve-status -s INT 1.5", "run good.yaml --workers 2 --state s2 --json");
+  if (stopped.code != 0) {  // a fast machine may be done already
+    EXPECT_EQ(stopped.code, 1) << stopped.err;
+    EXPECT_THAT(stopped.err, HasSubstr("`calibctl run good.yaml --state s2` goes on from here"));
+  }
+  const Answer resumed = Call("run good.yaml --workers 1 --state s2 --json");
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_EQ(resumed.json()["parameters"], undisturbed["parameters"]);
+  EXPECT_EQ(resumed.json()["log_evidence"], undisturbed["log_evidence"]);
+}
+
+TEST_F(Calibctl, SubmittedWorkWaitsForWorkers) {
+  const Answer submitted = Call("submit good.yaml --state s");
+  ASSERT_EQ(submitted.code, 0) << submitted.err;
+  EXPECT_EQ(submitted.out, "c1\n");
+  EXPECT_EQ(Call("pause c1 --state s").code, 0);
+  EXPECT_EQ(Call("show c1 --state s --json").json()["state"], "paused");
+  EXPECT_EQ(Call("posterior c1 --state s").code, 1);  // nothing to tell yet
+  EXPECT_EQ(Call("report c1 --state s -o r.html").code, 0);
+  EXPECT_EQ(Call("resume c1 --state s").code, 0);
+  const Answer watched = Call("watch c1 --state s --workers 2");
+  EXPECT_EQ(watched.code, 0) << watched.err;
+  EXPECT_THAT(watched.out, HasSubstr("c1 is finished"));
+}
+
+TEST_F(Calibctl, CataloguesNeedNoServer) {
+  for (const std::string verb : {"effects", "tests", "contacts"}) {
+    EXPECT_TRUE(Call(verb + " --json").json().is_array());
+    EXPECT_EQ(Call(verb).code, 0);
+  }
+}
+
+}  // namespace
+}  // namespace calib::ctl

@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# Holds the #include lines of the tree against the table of who may know whom (deploy and README: architecture).
+# usage: check_layers.sh ROOT. One line per wrong arrow; exit 1 if there is any. Longest matching folder wins.
+set -euo pipefail
+root=${1:?usage: check_layers.sh ROOT}
+cd "$root"
+
+# folder | own headers it may include (prefixes) | libraries it may include (regular expression; - for none of the watched)
+table='
+dem/catalog       dem/catalog/                                                        -
+dem               dem/                                                                -
+inference         inference/                                                          -
+proto/rpc         proto/rpc/,calib/v1/                                                grpcpp
+worker            worker/,dem/,proto/rpc/,calib/v1/                                   grpcpp|spdlog|chrono|CLI
+server/campaign   server/campaign/,dem/,inference/                                    yaml-cpp
+server/store      server/store/,server/campaign/,inference/                           SQLiteCpp|sqlite3|chrono|spdlog
+server/scheduler  server/scheduler/,server/store/,server/campaign/,inference/,dem/,calib/v1/   chrono|spdlog|nlohmann
+server/report     server/report/,server/campaign/,inference/,dem/catalog/,calib/v1/   nlohmann|chrono
+server/service    server/service/,server/scheduler/,server/store/,server/campaign/,inference/,dem/,proto/rpc/,calib/v1/  grpcpp|spdlog|chrono
+server/ctl        server/,proto/rpc/,calib/v1/,dem/catalog/,dem/simulation/,inference/  grpcpp|CLI|nlohmann|chrono|spdlog
+server            server/service/,server/store/,server/scheduler/                     spdlog|CLI|chrono
+'
+watched='grpcpp|SQLiteCpp|sqlite3|yaml-cpp|spdlog|CLI|nlohmann|chrono'
+
+wrong=0
+while IFS=: read -r file line text; do
+  header=$(sed -E 's/^[[:space:]]*#[[:space:]]*include[[:space:]]*["<]([^">]+)[">].*/\1/' <<<"$text")
+  best='' own='' libraries=''
+  while read -r folder may_own may_libraries; do
+    [ -n "$folder" ] || continue
+    if [[ $file == "$folder"/* && ${#folder} -gt ${#best} ]]; then best=$folder own=$may_own libraries=$may_libraries; fi
+  done <<<"$table"
+  [ -n "$best" ] || continue
+  if [[ $header =~ ^(dem|inference|server|worker|proto|calib)/ ]]; then
+    allowed=no
+    IFS=, read -ra prefixes <<<"$own"
+    for prefix in "${prefixes[@]}"; do [[ $header == "$prefix"* ]] && allowed=yes; done
+    [ $allowed = yes ] || { echo "$file:$line: $best may not include $header (allowed: $own)"; wrong=1; }
+  elif [[ $header =~ ^($watched)(/|\.|$) && ( $libraries = - || ! $header =~ ^($libraries)(/|\.|$) ) ]]; then
+    echo "$file:$line: $best may not include <$header>"; wrong=1
+  fi
+done < <(grep -rnE '^[[:space:]]*#[[:space:]]*include' --include='*.h' --include='*.cc' dem inference proto server worker 2>/dev/null)
+
+# The libraries without a machine around them: no environment, no clock, no output.
+if grep -rnE '\b(std::)?(getenv|cout|cerr|clock_gettime|gettimeofday)\b' --include='*.h' --include='*.cc' dem inference; then
+  echo 'dem and inference know no environment, no clock and no terminal'; wrong=1
+fi
+exit $wrong

@@ -1,0 +1,259 @@
+// Every mistake a user can make in a campaign file: one line each, with file, line, key, what is
+// wrong and what is allowed.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/campaign/good_campaign.h"
+
+namespace calib::campaign {
+namespace {
+
+using testing::GoodFiles;
+using testing::GoodYaml;
+using ::testing::HasSubstr;
+using testing::ProblemsOf;
+using testing::Spoiled;
+using ::testing::StartsWith;
+
+struct Mistake {
+  const char* name;
+  const char* from;
+  const char* to;
+  const char* expected;  // the whole output, without the last newline
+};
+
+class BadCampaign : public ::testing::TestWithParam<Mistake> {};
+
+TEST_P(BadCampaign, IsRefusedInOneLine) {
+  const Mistake& mistake = GetParam();
+  EXPECT_EQ(ProblemsOf(Spoiled(mistake.from, mistake.to)), std::string(mistake.expected) + "\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, BadCampaign,
+    ::testing::Values(
+        Mistake{"UnknownTopKey", "seed: 7", "sede: 7",
+                "c.yaml:40: sede: is an unknown key; did you mean 'seed'?"},
+        Mistake{"UnknownModelKey", "  density: 2650", "  densty: 2650",
+                "c.yaml:5: model.densty: is an unknown key; did you mean 'density'?"},
+        Mistake{"KeyTwice", "seed: 7", "seed: 7\nseed: 8",
+                "c.yaml:41: seed: stands here twice; keep one"},
+        Mistake{
+            "NoSuchContact", "hertz_mindlin\n", "hertz_mindln\n",
+            "c.yaml:3: model.contact: 'hertz_mindln' is unknown; did you mean 'hertz_mindlin'?"},
+        Mistake{"MistypedEffectIsOneProblem", "[rolling_resistance]", "[roling_resistance]",
+                "c.yaml:4: model.effects: 'roling_resistance' is not an effect of this build; did you mean "
+                "'rolling_resistance'?"},
+        Mistake{"EffectTwice", "[rolling_resistance]", "[rolling_resistance, rolling_resistance]",
+                "c.yaml:4: model.effects: rolling_resistance is named twice"},
+        Mistake{"WrongUnit", "min: 1e8 Pa", "min: 1e8 deg",
+                "c.yaml:8: parameters.young_modulus.min: deg is an angle (deg, rad), expected a "
+                "pressure (Pa, kPa, MPa, "
+                "GPa)"},
+        Mistake{"UpsideDown", "min: 10 deg, max: 45 deg", "min: 45 deg, max: 10 deg",
+                "c.yaml:9: parameters.friction_angle.min: the prior is upside down: min 0.785398 "
+                "is not below max "
+                "0.174533 rad"},
+        Mistake{"LogPriorFromZero", "min: 1e8 Pa", "min: 0 Pa",
+                "c.yaml:8: parameters.young_modulus.min: a log_uniform prior needs a min greater "
+                "than 0; use uniform for "
+                "ranges that hold 0"},
+        Mistake{"NoSuchPrior", "prior: log_uniform", "prior: loguniform",
+                "c.yaml:8: parameters.young_modulus.prior: 'loguniform' is unknown; did you mean "
+                "'log_uniform'?"},
+        Mistake{"PriorWithoutMax", ", max: 45 deg", "",
+                "c.yaml:9: parameters.friction_angle.max: is missing; the prior uniform needs it"},
+        Mistake{"PriorOutsideAdmissible", "max: 45 deg", "max: 95 deg",
+                "c.yaml:9: parameters.friction_angle: the prior from 0.174533 to 1.65806 leaves "
+                "what is admissible: "
+                "between 0 and 1.5 rad"},
+        Mistake{"FixedOutsideAdmissible", "poisson_ratio: 0.2", "poisson_ratio: 0.7",
+                "c.yaml:6: model.fixed.poisson_ratio: '0.7' is outside what is allowed: between 0 "
+                "and 0.5"},
+        Mistake{"NotANumber", "poisson_ratio: 0.2", "poisson_ratio: soft",
+                "c.yaml:6: model.fixed.poisson_ratio: 'soft' is not a number, expected a "
+                "dimensionless number (plain, or "
+                "percent)"},
+        Mistake{"MissingParameter",
+                "  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}\n", "",
+                "c.yaml:7: parameters: young_modulus has no value; calibrate it here or set it in "
+                "model.fixed"},
+        Mistake{"BothAlternatives", "{poisson_ratio: 0.2}",
+                "{poisson_ratio: 0.2, friction_coefficient: 0.5}",
+                "c.yaml:7: parameters: friction_angle and friction_coefficient say the same thing; "
+                "give one of them"},
+        Mistake{
+            "CalibratedAndFixed", "{poisson_ratio: 0.2}",
+            "{poisson_ratio: 0.2, young_modulus: 1 GPa}",
+            "c.yaml:7: parameters: young_modulus is both calibrated and fixed; keep one of them"},
+        Mistake{"NegativeDensity", "2650 kg/m^3", "-2650 kg/m^3",
+                "c.yaml:5: model.density: '-2650 kg/m^3' is outside what is allowed: greater than "
+                "0 kg/m^3"},
+        Mistake{"NegativeStress", "confining_pressure: 0.2 MPa", "confining_pressure: -0.2 MPa",
+                "c.yaml:15: experiments[1].confining_pressure: '-0.2 MPa' is outside what is "
+                "allowed: between 0 "
+                "(excluded) and 1e+10 Pa"},
+        Mistake{"MissingSetting", "    confining_pressure: 0.2 MPa\n", "",
+                "c.yaml:13: experiments[1].confining_pressure: is missing; triaxial_drained needs "
+                "it: isotropic stress to "
+                "which the packing is compressed before loading"},
+        Mistake{"DataFileMissing", "file: data.txt", "file: nowhere.txt",
+                "c.yaml:18: experiments[1].data.file: cannot read 'nowhere.txt': no such file; "
+                "relative paths start at "
+                "the folder of the campaign file"},
+        Mistake{"PackingMissing", "{file: packing.txt}", "{file: no.txt}",
+                "c.yaml:16: experiments[1].packing.file: cannot read 'no.txt': no such file; "
+                "relative paths start at the "
+                "folder of the campaign file"},
+        Mistake{"NoSuchColumn", "axial_strain: e_z,", "axial_strain: ez,",
+                "data.txt:2: ez: is not a column of this file; did you mean 'e_z'?"},
+        Mistake{"NoSuchObservableName", "columns: {axial_strain: e_z,",
+                "columns: {axial_strain: e_z, volume_strain: e_v,",
+                "c.yaml:19: experiments[1].data.columns: 'volume_strain' is not an observable (our "
+                "name: column in the "
+                "file); did you mean 'volumetric_strain'?"},
+        Mistake{"ForgottenPercent", "units: {axial_strain: percent, volumetric_strain: percent}",
+                "units: {axial_strain: percent}",
+                "data.txt:7: e_v: a strain of -1.9 is not possible; if the column is in percent, "
+                "say so: units: "
+                "{volumetric_strain: percent}"},
+        Mistake{"UnitOfAnotherKind", "units: {axial_strain: percent,", "units: {axial_strain: MPa,",
+                "c.yaml:20: experiments[1].data.units.axial_strain: MPa is a pressure (Pa, kPa, "
+                "MPa, GPa), expected a "
+                "dimensionless number (plain, or percent)"},
+        Mistake{"ControlOfAnotherTest", "control: axial_strain\n", "control: volumetric_strain\n",
+                "c.yaml:21: experiments[1].control: 'volumetric_strain' cannot drive "
+                "triaxial_drained; it is driven by "
+                "axial_strain"},
+        Mistake{"ControlMissing", "    control: axial_strain\n", "",
+                "c.yaml:13: experiments[1].control: is missing; the model is driven along it, e.g. "
+                "control: axial_strain"},
+        Mistake{"RelativeNoiseAtZero", "{absolute: 0.1 percent, correlation_length: 0.5 percent}",
+                "{relative: 0.1}",
+                "c.yaml:24: experiments[1].observables.volumetric_strain.noise.relative: "
+                "volumetric_strain reaches zero "
+                "(data.txt:3), where a relative error vanishes; add floor: ... or give absolute or "
+                "per-point noise"},
+        Mistake{"NoiseMissing", "{noise: {relative: 0.05}}", "{}",
+                "c.yaml:33: experiments[2].observables.q_over_p.noise: is missing; e.g. {relative: "
+                "0.02, floor: 0.01}, "
+                "{absolute: 0.1 percent} or {column: sd}"},
+        Mistake{"NoiseTwice", "{relative: 0.02, floor: 0.01}", "{relative: 0.02, absolute: 0.01}",
+                "c.yaml:23: experiments[1].observables.stress_ratio.noise: needs exactly one of "
+                "relative (with floor), "
+                "absolute and column"},
+        Mistake{"NegativeNoise", "{relative: 0.02, floor", "{relative: -0.02, floor",
+                "c.yaml:23: experiments[1].observables.stress_ratio.noise.relative: '-0.02' is "
+                "outside what is allowed: "
+                "greater than 0"},
+        Mistake{
+            "NoSuchRole", "role: calibrate", "role: calibration",
+            "c.yaml:25: experiments[1].role: 'calibration' is unknown; did you mean 'calibrate'?"},
+        Mistake{"SameName", "name: tx05", "name: tx02",
+                "c.yaml:26: experiments[2].name: 'tx02' is the name of two experiments"},
+        Mistake{"FileCannotBeManyPackings", "    packing: {file: packing.txt}\n",
+                "    packing: {file: packing.txt}\n    realizations: 4\n",
+                "c.yaml:17: experiments[1].realizations: is 4, but one packing file is given; name "
+                "one file per "
+                "realization in packing.files, or generate them"},
+        Mistake{"ImpossiblePorosity", "void_ratio: 0.68", "porosity: 0.9",
+                "c.yaml:29: experiments[2].packing.generate.porosity: '0.9' is outside what is "
+                "allowed: between 0.2 "
+                "(excluded) and 0.6 (excluded)"},
+        Mistake{"NoSuchNoiseMode", "noise: given", "noise: guessed",
+                "c.yaml:35: noise: 'guessed' is unknown; allowed: given, inferred, ess_target"},
+        Mistake{
+            "MethodOfALaterBuild", "method: iterative_bayesian_filter", "method: tmcmc",
+            "c.yaml:36: inference.method: tmcmc is not available in this build, which has sqmc, "
+            "iterative_bayesian_filter"},
+        Mistake{"NoSuchMethod", "method: iterative_bayesian_filter", "method: iterative_filter",
+                "c.yaml:36: inference.method: 'iterative_filter' is unknown; allowed: sqmc, "
+                "iterative_bayesian_filter"},
+        Mistake{"HalfASample", "samples: 20", "samples: 20.5",
+                "c.yaml:36: inference.samples: '20.5' is not a whole number from 2 to 1000000"},
+        Mistake{"DiscardTooMuch", "discard_at_most: 1e-3", "discard_at_most: 2",
+                "c.yaml:37: early_stopping.discard_at_most: '2' is outside what is allowed: "
+                "between 0 (excluded) and 1 "
+                "(excluded)"},
+        Mistake{"NegativeSeed", "seed: 7", "seed: -7",
+                "c.yaml:40: seed: '-7' is not a whole number of at least 0"},
+        Mistake{"ListForAMap", "failure: {attempts: 5, pause_above: 0.25}", "failure: [5, 0.25]",
+                "c.yaml:38: failure: is a list, expected a map of key: value"}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+TEST(BadCampaigns, UnknownEffectsAndParametersSayWhatThereIs) {
+  EXPECT_THAT(ProblemsOf(Spoiled("[rolling_resistance]", "[rolling_resistance, tea]")),
+              StartsWith("c.yaml:4: model.effects: 'tea' is not an effect of this build; allowed: "
+                         "rolling_resistance,"));
+  EXPECT_EQ(
+      ProblemsOf(Spoiled("  rolling_resistance.friction: {prior: uniform, min: 0, max: 1}\n",
+                         "  rolling_resistance.friction: {prior: uniform, min: 0, max: 1}\n"
+                         "  twisting_resistance.friction: {prior: uniform, min: 0, max: 1}\n")),
+      "c.yaml:12: parameters.twisting_resistance.friction: is not a parameter of hertz_mindlin "
+      "with "
+      "rolling_resistance; add twisting_resistance to model.effects to use it\n");
+}
+
+TEST(BadCampaigns, EveryMistakeIsReportedAtOnce) {
+  std::string yaml = Spoiled("min: 1e8 Pa", "min: 1e8 deg");
+  yaml.replace(yaml.find("seed: 7"), 7, "sede: 7");
+  yaml.replace(yaml.find("file: data.txt"), 14, "file: nope.txt");
+  const std::string problems = ProblemsOf(yaml);
+  EXPECT_THAT(problems, StartsWith("c.yaml:8: parameters.young_modulus.min:"));
+  EXPECT_THAT(problems, HasSubstr("c.yaml:18: experiments[1].data.file:"));
+  EXPECT_THAT(problems, HasSubstr("c.yaml:40: sede:"));
+  EXPECT_EQ(std::count(problems.begin(), problems.end(), '\n'), 3);
+}
+
+TEST(BadCampaigns, NotYaml) {
+  EXPECT_THAT(ProblemsOf(GoodYaml() + "\n  - [}"), StartsWith("c.yaml:4"));
+  EXPECT_THAT(ProblemsOf("name: a: b\n"),
+              HasSubstr("c.yaml:1: is not YAML: two colons in one line"));
+  EXPECT_THAT(ProblemsOf("- a\n- b\n"), HasSubstr("c.yaml:1: is a list, expected a map"));
+  EXPECT_THAT(ProblemsOf(""), HasSubstr("c.yaml:1: is empty"));
+  EXPECT_THAT(ProblemsOf("a: 1\n---\nb: 2\n"), HasSubstr("more than one document"));
+}
+
+TEST(BadCampaigns, NothingToCalibrate) {
+  EXPECT_THAT(ProblemsOf(Spoiled("role: calibrate", "role: validate")),
+              HasSubstr("experiments: are all for validation; at least one needs role: calibrate"));
+  EXPECT_THAT(ProblemsOf("name: x\n"), HasSubstr("model: is missing"));
+}
+
+TEST(BadCampaigns, ObservableOfAnotherTest) {
+  EXPECT_THAT(ProblemsOf(Spoiled("observables: {q_over_p:", "observables: {mass_flow_rate:")),
+              HasSubstr("c.yaml:33: experiments[2].observables.mass_flow_rate: is not an "
+                        "observable of triaxial_drained"));
+  EXPECT_THAT(ProblemsOf(Spoiled("observables: {q_over_p:", "observables: {axial_strain:")),
+              HasSubstr("is the control: the model follows it exactly"));
+}
+
+TEST(BadCampaigns, ProblemsInDataAndPackingCarryTheirOwnFileAndLine) {
+  auto files = GoodFiles();
+  files["data.txt"].replace(files["data.txt"].find("3.7"), 3, "n/a");
+  files["packing.txt"] += "0.001 0.001 0.001 -0.0005 -1\n";
+  const std::string problems = ProblemsOf(GoodYaml(), files);
+  EXPECT_THAT(problems, HasSubstr("data.txt:7: ratio: 'n/a' is not a number"));
+  EXPECT_THAT(problems, HasSubstr("packing.txt:5: "));
+}
+
+TEST(BadCampaigns, PerPointNoiseHasToBePositive) {
+  auto files = GoodFiles();
+  files["data.txt"].replace(files["data.txt"].find("0.03"), 4, "0.00");
+  EXPECT_EQ(ProblemsOf(Spoiled("{relative: 0.02, floor: 0.01}", "{column: sd}"), files),
+            "data.txt:5: sd: a standard deviation has to be greater than 0\n");
+}
+
+TEST(BadCampaigns, ClumpsThatTheEngineDoesNotHave) {
+  auto files = GoodFiles();
+  files["packing.txt"].replace(files["packing.txt"].rfind("-1"), 2, "1");
+  EXPECT_THAT(ProblemsOf(GoodYaml(), files), HasSubstr("tx02: "));
+}
+
+TEST(BadCampaigns, NamesCannotBreakTheOneLineRule) {
+  const std::string problems = ProblemsOf("\"a\\nb\": 1\n");
+  EXPECT_THAT(problems, HasSubstr("a b: is an unknown key"));
+}
+
+}  // namespace
+}  // namespace calib::campaign

@@ -1,0 +1,161 @@
+#include "server/campaign/campaign_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "server/campaign/identity.h"
+#include "tests/unit/campaign/good_campaign.h"
+
+namespace calib::campaign {
+namespace {
+
+using ::testing::ElementsAre;
+using testing::GoodFiles;
+using testing::GoodYaml;
+using ::testing::IsEmpty;
+using testing::ProblemsOf;
+using testing::ReaderOf;
+using ::testing::SizeIs;
+using testing::Spoiled;
+
+ReadOutcome Read(const std::string& yaml) {
+  ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(GoodFiles()));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  return outcome;
+}
+
+TEST(CampaignFile, ReadsEverySection) {
+  const ReadOutcome outcome = Read(GoodYaml());
+  const Campaign& c = outcome.campaign;
+  EXPECT_EQ(c.name, "sand");
+  EXPECT_EQ(c.model.contact, "hertz_mindlin");
+  EXPECT_THAT(c.model.effects, ElementsAre("rolling_resistance"));
+  EXPECT_DOUBLE_EQ(c.model.density, 2650);
+  EXPECT_DOUBLE_EQ(c.model.parameters.at("poisson_ratio"), 0.2);
+  ASSERT_THAT(c.parameters, SizeIs(4));
+  EXPECT_EQ(c.parameters[1].name, "friction_angle");
+  EXPECT_EQ(c.parameters[1].unit, "rad");
+  EXPECT_DOUBLE_EQ(c.parameters[1].prior.max, std::numbers::pi / 4);
+  EXPECT_EQ(c.parameters[0].prior.kind, inference::PriorKind::kLogUniform);
+  EXPECT_EQ(c.samples, 20);
+  EXPECT_EQ(c.max_iterations, 3);
+  EXPECT_EQ(c.seed, 7U);
+  EXPECT_EQ(c.filter.seed, 7U);
+  EXPECT_DOUBLE_EQ(c.early_stopping->discard_at_most, 1e-3);
+  EXPECT_EQ(c.budget.model_evaluations, 400);
+  EXPECT_THAT(outcome.files, ElementsAre("packing.txt", "data.txt", "validation.csv"));
+}
+
+TEST(CampaignFile, ConvertsEngineeringStrainAndItsNoise) {
+  const Campaign c = Read(GoodYaml()).campaign;
+  const Experiment& e = c.experiments[0];
+  EXPECT_EQ(e.control_name, "axial_strain");
+  ASSERT_THAT(e.control, SizeIs(6));
+  EXPECT_DOUBLE_EQ(e.control[5], -std::log(1 - 0.12));
+  EXPECT_EQ(e.path[5].load_step, 5);
+  const MeasuredObservable& volume = e.observables[1];
+  EXPECT_EQ(volume.name, "volumetric_strain");
+  EXPECT_NEAR(volume.values[5], -std::log(1 + 0.029), 1e-15);
+  EXPECT_DOUBLE_EQ(volume.sd[5], 1e-3 / (1 + 0.029));
+  EXPECT_DOUBLE_EQ(volume.correlation_length, 0.005);
+  EXPECT_DOUBLE_EQ(e.observables[0].sd[1], std::hypot(0.02 * 2.1, 0.01));
+  EXPECT_THAT(e.segment, ElementsAre("initial_loading", "initial_loading", "pre_peak", "pre_peak",
+                                     "post_peak", "post_peak"));
+}
+
+TEST(CampaignFile, RealizationsOfARecipeDifferInTheirSeeds) {
+  const Campaign c = Read(GoodYaml()).campaign;
+  ASSERT_THAT(c.experiments[1].specimens, SizeIs(3));
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto& recipe = std::get<dem::PackingRecipe>(c.experiments[1].specimens[i]);
+    EXPECT_EQ(recipe.seed, 5 + i);
+    EXPECT_DOUBLE_EQ(recipe.porosity, 0.68 / 1.68);
+    EXPECT_DOUBLE_EQ(recipe.mean_radius, 1e-3);
+  }
+}
+
+TEST(CampaignFile, ValidationDataAreNotFitted) {
+  const Campaign c = Read(GoodYaml()).campaign;
+  const inference::DataSet data = MakeDataSet(c);
+  EXPECT_THAT(data.readings, SizeIs(12));
+  for (const inference::Reading& reading : data.readings) EXPECT_EQ(reading.experiment, 0);
+  ASSERT_THAT(data.correlations, SizeIs(1));
+  EXPECT_EQ(data.correlations[0].observable, 1);
+  // Processing order: load step, then observable; the control counts as path length.
+  EXPECT_EQ(data.readings[3].load_step, 1);
+  EXPECT_EQ(data.readings[3].observable, 1);
+  EXPECT_DOUBLE_EQ(data.readings[3].control, -std::log(1 - 0.004));
+}
+
+TEST(CampaignFile, MakesTheScenarioOfASample) {
+  const Campaign c = Read(GoodYaml()).campaign;
+  const dem::Scenario s = MakeScenario(c, c.experiments[0], {1e9, 0.5, 0.1, 0.2}, 3);
+  EXPECT_DOUBLE_EQ(s.model.parameters.at("young_modulus"), 1e9);
+  EXPECT_DOUBLE_EQ(s.model.parameters.at("poisson_ratio"), 0.2);
+  EXPECT_DOUBLE_EQ(s.settings.at("confining_pressure"), 2e5);
+  EXPECT_THAT(s.packing.x, SizeIs(3));
+  EXPECT_THAT(s.path, SizeIs(6));
+  EXPECT_THAT(MakeScenario(c, c.experiments[1], {1e9, 0.5, 0.1, 0.2}, 0).packing.x, IsEmpty());
+}
+
+TEST(CampaignFile, ASeedOnTheCommandLineWins) {
+  const ReadOutcome outcome = ReadCampaign(GoodYaml(), "c.yaml", ReaderOf(GoodFiles()), 99);
+  EXPECT_EQ(outcome.campaign.seed, 99U);
+  EXPECT_EQ(outcome.campaign.filter.seed, 99U);
+}
+
+TEST(CampaignFile, AcceptsEveryNoiseMode) {
+  EXPECT_EQ(Read(Spoiled("noise: given", "noise: inferred")).campaign.filter.noise,
+            inference::NoiseMode::kInferred);
+  const Campaign tempered = Read(R"(name: t
+model: {contact: linear, effects: none, fixed: {poisson_ratio: 0.3, young_modulus: 1 GPa}}
+parameters: {friction_coefficient: default}
+experiments:
+  - name: a
+    test: triaxial_drained
+    confining_pressure: 0.5 MPa
+    packing: {file: packing.txt}
+    data: {file: validation.csv}
+    control: axial_strain
+    observables: [q_over_p]
+noise: {ess_target: 0.3}
+early_stopping: {discard_at_most: 1e-3}
+inference: {method: sqmc, samples: 50}
+)")
+                                .campaign;
+  EXPECT_EQ(tempered.filter.noise, inference::NoiseMode::kEssTarget);
+  EXPECT_DOUBLE_EQ(tempered.filter.ess_target, 0.3);
+  EXPECT_EQ(tempered.max_iterations, 1);
+  EXPECT_FALSE(tempered.early_stopping.has_value());  // a tempered likelihood has no bound to keep
+}
+
+TEST(CampaignFile, PriorsOfEveryKind) {
+  const Campaign c = Read(Spoiled("young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}",
+                                  "young_modulus: {prior: log_normal, mean: 1 GPa, sd: 0.5}"))
+                         .campaign;
+  EXPECT_EQ(c.parameters[0].prior.kind, inference::PriorKind::kLogNormal);
+  EXPECT_DOUBLE_EQ(c.parameters[0].prior.mean, std::log(1e9));
+  EXPECT_DOUBLE_EQ(c.parameters[0].prior.min, 1e4);  // cut off at what is admissible
+}
+
+TEST(Identity, ChangesWithEverythingSubmitted) {
+  Submission a{
+      .campaign_file = "x", .file_name = "c.yaml", .files = {{"p", "d"}}, .seed = std::nullopt};
+  const std::string digest = IdentityDigest(a);
+  EXPECT_THAT(digest, SizeIs(64));
+  EXPECT_EQ(IdentityDigest(a), digest);
+  for (const auto& change : std::vector<std::function<void(Submission&)>>{
+           [](Submission& s) { s.campaign_file = "y"; },
+           [](Submission& s) { s.file_name = "d.yaml"; }, [](Submission& s) { s.files["p"] = "e"; },
+           [](Submission& s) { s.files["q"] = "d"; }, [](Submission& s) { s.seed = 7; }}) {
+    Submission b = a;
+    change(b);
+    EXPECT_NE(IdentityDigest(b), digest);
+  }
+}
+
+}  // namespace
+}  // namespace calib::campaign

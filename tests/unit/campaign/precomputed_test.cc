@@ -1,0 +1,112 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/campaign/good_campaign.h"
+
+namespace calib::campaign {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::ProblemsOf;
+using testing::ReaderOf;
+
+// The shape of the published glass-bead tables: columns under other names, in other units, one
+// negative stiffness.
+std::map<std::string, std::string> Tables() {
+  return {
+      {"exp.dat", "#\t\te_a\t\tp\t\tn\n0.0\t1.0\t0.40\t\n0.1\t2.0\t0.39\t\n0.05\t1.5\t0.392\t\n"},
+      {"par.csv", "sample,E_GPa,km_nNm\n0,100,8000\n1,120,-5000\n"},
+      {"sta.csv",
+       "sample,step,p_MPa,porosity\n0,0,1.1,0.4\n0,1,2.1,0.39\n0,2,1.4,0.393\n1,0,0.9,0.4\n1,1,1.9,"
+       "0.38\n"}};
+}
+
+std::string Yaml() {
+  return R"(name: beads
+model:
+  precomputed:
+    parameters: par.csv
+    states: sta.csv
+    parameter_columns: {young_modulus: E_GPa, rolling_stiffness: km_nNm}
+    parameter_units: {young_modulus: GPa, rolling_stiffness: nN m/rad}
+    state_columns: {mean_stress: p_MPa}
+    state_units: {mean_stress: MPa}
+    absolute: [rolling_stiffness]
+parameters:
+  young_modulus: {prior: uniform, min: 50 GPa, max: 200 GPa}
+  rolling_stiffness: {prior: uniform, min: 0 N m/rad, max: 1e-5 N m/rad}
+experiments:
+  - name: oedo
+    test: oedometric
+    confining_pressure: 5 MPa
+    data: {file: exp.dat, columns: {axial_strain: e_a, mean_stress: p, porosity: n}, units: {mean_stress: MPa}, strain: logarithmic}
+    control: axial_strain
+    observables: {mean_stress: {}, porosity: {weight: 0.01}}
+noise: {ess_target: 0.2}
+inference: {method: sqmc}
+)";
+}
+
+TEST(Precomputed, ReadsBothTablesInSi) {
+  const ReadOutcome outcome = ReadCampaign(Yaml(), "c.yaml", ReaderOf(Tables()));
+  ASSERT_EQ(ProblemsOf(Yaml(), Tables()), "");
+  const Campaign& c = outcome.campaign;
+  ASSERT_TRUE(c.precomputed.has_value());
+  EXPECT_EQ(c.samples, 2);
+  EXPECT_EQ(c.parameters[1].unit, "N m/rad");
+  EXPECT_DOUBLE_EQ(c.precomputed->parameters(1, 0), 1.2e11);
+  EXPECT_DOUBLE_EQ(c.precomputed->parameters(1, 1), 5e-6);  // the sign the simulation ignored
+  const auto& states = c.precomputed->values.at(0);
+  EXPECT_DOUBLE_EQ(states[0][2 * 1 + 0], 2.1e6);
+  EXPECT_DOUBLE_EQ(states[0][2 * 2 + 1], 0.393);
+  EXPECT_TRUE(std::isnan(states[1][2 * 2 + 0]));  // not in the table: a run that did not end
+  EXPECT_DOUBLE_EQ(MakeDataSet(c).ess_weights[0][1], 0.01);
+  EXPECT_EQ(c.experiments[0].segment.back(), "unload_1");
+}
+
+TEST(Precomputed, CountsStepsFromOneToo) {
+  auto files = Tables();
+  files["sta.csv"] = "sample,step,p_MPa,porosity\n0,1,1.1,0.4\n0,2,2.1,0.39\n0,3,1.4,0.393\n";
+  const ReadOutcome outcome = ReadCampaign(Yaml(), "c.yaml", ReaderOf(files));
+  ASSERT_THAT(outcome.problems, IsEmpty());
+  EXPECT_DOUBLE_EQ(outcome.campaign.precomputed->values[0][0][0], 1.1e6);
+}
+
+TEST(Precomputed, SaysWhichTableIsWrong) {
+  auto files = Tables();
+  files["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n0,120,-5000\n";
+  EXPECT_THAT(ProblemsOf(Yaml(), files),
+              HasSubstr("par.csv:3: sample: sample 0 stands here for the second time"));
+  EXPECT_THAT(ProblemsOf(Yaml(), files),
+              HasSubstr("sta.csv:5: sample: sample 1 is not in par.csv"));
+  files = Tables();
+  files["sta.csv"] = "sample,step,p_MPa,porosity\n0,0,1.1,0.4\n0,7,2.1,0.39\n";
+  EXPECT_THAT(ProblemsOf(Yaml(), files),
+              HasSubstr("the steps run from 0 to 7, but oedo has 3 readings"));
+  files = Tables();
+  files["par.csv"] = "sample,E,km_nNm\n0,100,8000\n";
+  EXPECT_THAT(ProblemsOf(Yaml(), files),
+              HasSubstr("par.csv:1: E_GPa: is not a column of this file"));
+}
+
+TEST(Precomputed, RefusesWhatOnlyASimulationNeeds) {
+  std::string yaml = Yaml();
+  yaml.replace(yaml.find("    control:"), 0, "    packing: {file: p.txt}\n");
+  EXPECT_EQ(ProblemsOf(yaml, Tables()),
+            "c.yaml:19: experiments[1].packing: has no meaning with precomputed runs; remove it\n");
+}
+
+TEST(Precomputed, ZeroReadingsHaveNoSizeToScaleErrorsWith) {
+  auto files = Tables();
+  files["exp.dat"].replace(files["exp.dat"].find("1.0"), 3, "0.0");
+  EXPECT_EQ(ProblemsOf(Yaml(), files),
+            "c.yaml:20: experiments[1].observables.mean_stress: is zero in exp.dat:2, but "
+            "ess_target scales errors with "
+            "the reading; leave the row out or use noise: given\n");
+}
+
+}  // namespace
+}  // namespace calib::campaign

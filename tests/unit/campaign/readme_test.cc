@@ -1,0 +1,36 @@
+// The examples of server/campaign/README.md are what a user copies first: all of them have to be
+// good campaigns.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "tests/unit/campaign/good_campaign.h"
+
+namespace calib::campaign {
+namespace {
+
+std::vector<std::string> YamlBlocks(const std::string& path) {
+  std::ifstream file(path);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string fence = "```yaml\n";
+  std::vector<std::string> blocks;
+  for (std::size_t at = text.find(fence); at != std::string::npos; at = text.find(fence, at)) {
+    at += fence.size();
+    blocks.push_back(text.substr(at, text.find("```", at) - at));
+  }
+  return blocks;
+}
+
+TEST(CampaignReadme, EveryExampleIsAGoodCampaign) {
+  auto files = testing::GoodFiles();
+  files["parameters.csv"] = "sample,E_GPa,km\n0,100,8000\n";
+  files["states.csv"] = "sample,step,p_MPa,porosity\n0,0,1,0.4\n0,1,2,0.39\n";
+  files["beads.dat"] = "#\te_a\tp\tn\n0.001\t1\t0.4\n0.002\t2\t0.39\n";
+  const auto blocks = YamlBlocks(CALIB_CAMPAIGN_README);
+  EXPECT_EQ(blocks.size(), 2U);
+  for (const std::string& block : blocks) EXPECT_EQ(testing::ProblemsOf(block, files), "") << block;
+}
+
+}  // namespace
+}  // namespace calib::campaign

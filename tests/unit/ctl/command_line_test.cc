@@ -1,0 +1,46 @@
+#include "server/ctl/command_line.h"
+
+#include <gtest/gtest.h>
+
+#include "server/ctl/exit_codes.h"
+
+namespace calib::ctl {
+namespace {
+
+Parsed Parse(std::vector<const char*> words) {
+  words.insert(words.begin(), "calibctl");
+  return ParseCommandLine(static_cast<int>(words.size()), words.data());
+}
+
+TEST(CommandLine, CommonOptionsStandOnEitherSideOfTheVerb) {
+  for (const auto& words :
+       {std::vector<const char*>{"--state", "s", "--json", "posterior", "c1"},
+        std::vector<const char*>{"posterior", "c1", "--json", "--state", "s"}}) {
+    const Parsed parsed = Parse(words);
+    ASSERT_TRUE(parsed.command.has_value());
+    EXPECT_EQ(parsed.command->arguments.state, "s");
+    EXPECT_EQ(parsed.command->arguments.campaign, "c1");
+    EXPECT_TRUE(parsed.command->arguments.json);
+  }
+}
+
+TEST(CommandLine, ASettingMayHoldBlanks) {
+  const Parsed parsed =
+      Parse({"simulate", "a.yaml", "--set", "e=2 GPa", "--set", "f=0.5", "-o", "x.csv"});
+  ASSERT_TRUE(parsed.command.has_value());
+  EXPECT_EQ(parsed.command->arguments.set, (std::vector<std::string>{"e=2 GPa", "f=0.5"}));
+  EXPECT_EQ(parsed.command->arguments.output, "x.csv");
+}
+
+TEST(CommandLine, BadUsageIsTwoAndHelpIsZero) {
+  EXPECT_EQ(Parse({}).exit_code, kBadInput);
+  EXPECT_EQ(Parse({"frobnicate"}).exit_code, kBadInput);
+  EXPECT_EQ(Parse({"show"}).exit_code, kBadInput);
+  EXPECT_EQ(Parse({"list", "--state", "a", "--server", "b:1"}).exit_code, kBadInput);
+  EXPECT_EQ(Parse({"run", "a.yaml", "--workers", "many"}).exit_code, kBadInput);
+  EXPECT_EQ(Parse({"--help"}).exit_code, kDone);
+  EXPECT_EQ(Parse({"run", "--help"}).exit_code, kDone);
+}
+
+}  // namespace
+}  // namespace calib::ctl

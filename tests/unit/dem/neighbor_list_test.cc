@@ -1,0 +1,101 @@
+#include "dem/neighbor/neighbor_list.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+
+namespace calib::dem {
+namespace {
+
+Packing RandomGrains(unsigned seed, int n, double height) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> u(0, 1);
+  Packing p;
+  p.length[0] = 0.9e-2;
+  p.length[1] = 1.1e-2;
+  p.length[2] = height;
+  for (int i = 0; i < n; ++i) {
+    p.x.push_back((3 * u(random) - 1) * p.length[0]);  // also outside the cell
+    p.y.push_back(u(random) * p.length[1]);
+    p.z.push_back(u(random) * p.length[2]);
+    p.radius.push_back(0.5e-3 + 1e-3 * u(random));
+    p.clump.push_back(-1);
+  }
+  return p;
+}
+
+TEST(NeighborList, FindsWhatBruteForceFinds) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const Packing packing = RandomGrains(seed, 150, seed % 2 == 0 ? 0.8e-2 : 2.3e-2);
+    ParticleArrays p = MakeParticles(packing, 2650);
+    PeriodicCell cell{.length = {packing.length[0], packing.length[1], packing.length[2]}};
+    const double skin = 0.3e-3;
+    NeighborList list;
+    ASSERT_TRUE(BuildNeighborList(cell, skin, p, list).ok());
+    std::set<std::pair<int, int>> expected;
+    for (int i = 0; i < p.size(); ++i) {
+      for (int j = i + 1; j < p.size(); ++j) {
+        double d2 = 0;
+        const double d[3] = {p.x[j] - p.x[i], p.y[j] - p.y[i], p.z[j] - p.z[i]};
+        for (int a = 0; a < 3; ++a) {
+          const double nearest = d[a] - std::round(d[a] / cell.length[a]) * cell.length[a];
+          d2 += nearest * nearest;
+        }
+        if (std::sqrt(d2) < p.radius[i] + p.radius[j] + skin) {
+          expected.emplace(i, j);
+        }
+      }
+    }
+    std::set<std::pair<int, int>> found;
+    for (int s = 0; s < list.size(); ++s) {
+      found.emplace(list.first[s], list.second[s]);
+    }
+    EXPECT_EQ(found.size(), static_cast<std::size_t>(list.size())) << "a pair is listed twice";
+    EXPECT_EQ(found, expected) << "seed " << seed;
+  }
+}
+
+TEST(NeighborList, PlacesFollowAscendingNeighbours) {
+  const Packing packing = RandomGrains(3, 120, 2e-2);
+  ParticleArrays p = MakeParticles(packing, 2650);
+  PeriodicCell cell{.length = {packing.length[0], packing.length[1], packing.length[2]}};
+  NeighborList list;
+  ASSERT_TRUE(BuildNeighborList(cell, 1e-4, p, list).ok());
+  std::vector<int> neighbour(static_cast<std::size_t>(2 * list.size()), -1);
+  for (int s = 0; s < list.size(); ++s) {
+    neighbour[list.place_i[s]] = list.second[s];
+    neighbour[list.place_j[s]] = list.first[s];
+  }
+  for (int g = 0; g < p.size(); ++g) {
+    EXPECT_TRUE(std::is_sorted(neighbour.begin() + list.place_row[g],
+                               neighbour.begin() + list.place_row[g + 1]));
+  }
+  EXPECT_EQ(std::count(neighbour.begin(), neighbour.end(), -1), 0);
+}
+
+TEST(NeighborList, NamesTheGrainThatWasLost) {
+  const Packing packing = RandomGrains(3, 50, 2e-2);
+  ParticleArrays p = MakeParticles(packing, 2650);
+  PeriodicCell cell{.length = {packing.length[0], packing.length[1], packing.length[2]}};
+  p.y[7] = std::numeric_limits<double>::quiet_NaN();
+  NeighborList list;
+  const absl::Status status = BuildNeighborList(cell, 1e-4, p, list);
+  EXPECT_EQ(status.code(), absl::StatusCode::kOutOfRange);
+  EXPECT_NE(std::string(status.message()).find("grain " + std::to_string(p.id[7])),
+            std::string::npos);
+}
+
+TEST(NeighborList, RefusesACellOfLessThanTwoRanges) {
+  const Packing packing = RandomGrains(3, 50, 2e-2);
+  ParticleArrays p = MakeParticles(packing, 2650);
+  PeriodicCell cell{.length = {packing.length[0], packing.length[1], 4e-3}};
+  NeighborList list;
+  EXPECT_EQ(BuildNeighborList(cell, 1e-4, p, list).code(), absl::StatusCode::kOutOfRange);
+}
+
+}  // namespace
+}  // namespace calib::dem

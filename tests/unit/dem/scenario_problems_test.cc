@@ -1,0 +1,95 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "dem/simulation/scenario.h"
+#include "tests/support/dem/scenarios.h"
+
+namespace calib::dem {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+Scenario Good() {
+  Scenario s;
+  s.model = test::HertzModel();
+  s.test = "triaxial_drained";
+  s.settings = {{"confining_pressure", 2e5}};
+  const double along_x[3] = {1, 0, 0};
+  s.packing = test::TwoSpheres(1e-3, 2e-3, along_x);
+  s.path = {{.target = 0.01, .load_step = 0}};
+  return s;
+}
+
+TEST(ScenarioProblems, AGoodScenarioHasNone) { EXPECT_THAT(ScenarioProblems(Good()), IsEmpty()); }
+
+TEST(ScenarioProblems, NamesWhatIsUnknown) {
+  Scenario s = Good();
+  s.model.contact = "hertz_mindln";
+  s.test = "triaxal";
+  EXPECT_THAT(ScenarioProblems(s),
+              ElementsAre(HasSubstr("hertz_mindlin, linear"), HasSubstr("triaxial_drained")));
+  s = Good();
+  s.model.effects = {"rolling", "rolling"};
+  EXPECT_THAT(ScenarioProblems(s), testing::Contains(HasSubstr("no effect \"rolling\"")));
+  s = Good();
+  s.model.parameters["poison_ratio"] = 0.2;
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("poison_ratio")));
+}
+
+TEST(ScenarioProblems, ParametersMustBePresentOnceAndInRange) {
+  Scenario s = Good();
+  s.model.parameters.erase("young_modulus");
+  s.model.parameters["poisson_ratio"] = 0.6;
+  s.model.parameters["friction_angle"] = 0.3;
+  EXPECT_THAT(
+      ScenarioProblems(s),
+      testing::UnorderedElementsAre(HasSubstr("young_modulus is missing"),
+                                    HasSubstr("poisson_ratio is 0.6"), HasSubstr("alternatives")));
+  s = Good();
+  s.model.parameters.erase("friction_coefficient");
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("friction_angle is missing")));
+  s = Good();
+  s.model.parameters["young_modulus"] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("young_modulus")));
+}
+
+TEST(ScenarioProblems, RollingStiffnessAndRatioExcludeEachOther) {
+  Scenario s = Good();
+  s.model.effects = {"rolling_resistance"};
+  s.model.parameters["rolling_resistance.stiffness"] = 0.5;
+  s.model.parameters["rolling_resistance.stiffness_ratio"] = 0.5;
+  s.model.parameters["rolling_resistance.friction"] = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("alternatives")));
+  s.model.parameters.erase("rolling_resistance.stiffness");
+  EXPECT_THAT(ScenarioProblems(s), IsEmpty());
+  s.model.parameters.erase("rolling_resistance.stiffness_ratio");
+  EXPECT_THAT(ScenarioProblems(s),
+              ElementsAre(HasSubstr("rolling_resistance.stiffness is missing")));
+}
+
+TEST(ScenarioProblems, ClumpsAreRefusedAsSuch) {
+  Scenario s = Good();
+  s.packing.clump[1] = 3;
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("clump 3")));
+}
+
+TEST(ScenarioProblems, CollectsEverythingAtOnce) {
+  Scenario s = Good();
+  s.settings.clear();
+  s.path = {{.target = 5, .load_step = 0}, {.target = 0.1, .load_step = 0}};
+  s.staging.rate = -1;
+  s.staging.damping_loading = 1.5;
+  s.consolidation = {.friction_coefficient = 0.1, .porosity = 0.4};
+  s.initial_stress = InitialStress{.axial = 0, .lateral = 1};
+  s.threads = 0;
+  EXPECT_EQ(ScenarioProblems(s).size(), 8U);
+  const auto summary = Simulate(s, [](const State&) {}, {});
+  EXPECT_EQ(summary.status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace calib::dem

@@ -1,0 +1,90 @@
+#include "server/report/comparison.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/report/weighted_statistics.h"
+#include "tests/unit/report/example_view.h"
+
+namespace calib::report {
+namespace {
+
+// Four readings of one observable with known residuals (model - measured = +1, -1, +1, -1 standard
+// deviations).
+CampaignView FourReadings(double correlation_length) {
+  CampaignView view;
+  campaign::Experiment e;
+  e.name = "a";
+  e.control_name = "axial_strain";
+  campaign::MeasuredObservable o{
+      .name = "q_over_p", .values = {1, 2, 3, 4}, .sd = {0.5, 0.5, 0.5, 0.5}};
+  o.correlation_length = correlation_length;
+  v1::Sample sample;
+  sample.set_weight(1);
+  StateHistory history{.observables = {"q_over_p"}, .states = {}};
+  for (int i = 0; i < 4; ++i) {
+    e.control.push_back(0.01 * (i + 1));
+    e.path.push_back({.target = 0.01 * (i + 1), .load_step = i});
+    e.segment.emplace_back(i < 2 ? "initial_loading" : "post_peak");
+    v1::State state;
+    state.set_load_step(i);
+    state.add_values(i + 1 + (i % 2 == 0 ? 0.5 : -0.5));
+    history.states.push_back(state);
+  }
+  e.observables = {o};
+  view.campaign.experiments = {e};
+  view.campaign.parameters = {{"p", "1", {}}};
+  view.samples = {sample};
+  view.states[{"a", 0}] = history;
+  return view;
+}
+
+TEST(Comparison, IndependentErrors) {
+  const CampaignView view = FourReadings(0);
+  const Comparison c = Compare(view, PredictReadings(view));
+  EXPECT_NEAR(c.rms_error, 1, 1e-9);
+  EXPECT_NEAR(*c.reduced_chi2, 4.0 / 3, 1e-6);
+  EXPECT_NEAR(*c.p_value, 0.2615, 1e-4);  // chi-squared of 4 at 3 degrees of freedom
+  EXPECT_NEAR(*c.by_observable[0].p_value, 0.4060, 1e-4);  // at 4
+  ASSERT_EQ(c.by_segment.size(), 2U);
+  EXPECT_EQ(c.by_segment[0].segment, "initial_loading");
+  EXPECT_NEAR(c.by_segment[0].bias, 0, 1e-12);
+  EXPECT_FALSE(c.heldout_rms_error.has_value());
+}
+
+TEST(Comparison, CorrelatedErrorsMakeAlternatingResidualsUnlikely) {
+  const CampaignView view = FourReadings(0.05);
+  EXPECT_GT(*Compare(view, PredictReadings(view)).reduced_chi2, 4.0);
+}
+
+TEST(Comparison, SaysNothingOfAdequacyWithoutAnIndependentErrorScale) {
+  CampaignView view = FourReadings(0);
+  view.campaign.filter.noise = inference::NoiseMode::kInferred;
+  const Comparison c = Compare(view, PredictReadings(view));
+  EXPECT_FALSE(c.p_value.has_value());
+  EXPECT_FALSE(c.by_observable[0].z.has_value());
+  EXPECT_FALSE(c.note.empty());
+}
+
+TEST(Comparison, HeldOutDataAreReportedApart) {
+  const CampaignView view = testing::ExampleView("x");
+  const Comparison c = Compare(view, PredictReadings(view));
+  ASSERT_TRUE(c.heldout_rms_error.has_value());
+  EXPECT_NEAR(c.rms_error, 1, 0.3);
+  EXPECT_EQ(c.parameter_drift.size(), 3U);
+}
+
+TEST(WeightedStatistics, QuantilesAndHistogram) {
+  const std::vector<double> values = {1, 2, 3, std::nan("")};
+  const std::vector<double> weights = {1, 1, 2, 5};
+  EXPECT_DOUBLE_EQ(WeightedMean(values, weights), 2.25);
+  EXPECT_DOUBLE_EQ(WeightedQuantile(values, weights, 0.5), 2);
+  EXPECT_DOUBLE_EQ(WeightedQuantile(values, weights, 0.95), 3);
+  const auto density = WeightedHistogram(values, weights, 0, 4, 4);
+  EXPECT_DOUBLE_EQ(density[3], 0.5);
+  EXPECT_TRUE(std::isnan(WeightedMean({}, {})));
+}
+
+}  // namespace
+}  // namespace calib::report

@@ -1,0 +1,86 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "server/report/csv_export.h"
+#include "server/report/json_documents.h"
+#include "tests/unit/report/example_view.h"
+
+namespace calib::report {
+namespace {
+
+using Json = nlohmann::json;
+
+TEST(Json, PosteriorHasTheFieldsOfTheInterface) {
+  const CampaignView view = testing::ExampleView("x");
+  const Json json = Json::parse(PosteriorJson(view.posterior));
+  for (const char* field : {"campaign", "iterations", "converged", "log_evidence", "parameters",
+                            "ess", "model_evaluations", "stopped_early"}) {
+    EXPECT_TRUE(json.contains(field)) << field;
+  }
+  const Json& p = json["parameters"]["young_modulus"];
+  for (const char* field : {"mean", "sd", "cov", "q05", "q50", "q95", "unit", "at_bound"})
+    EXPECT_TRUE(p.contains(field)) << field;
+  EXPECT_EQ(p["mean"].get<double>(), view.posterior.parameters(0).mean());  // bit for bit
+}
+
+TEST(Json, WhatIsNotKnownIsNull) {
+  v1::Posterior posterior;
+  posterior.set_log_evidence(std::nan(""));
+  posterior.set_ess(HUGE_VAL);
+  const Json json = Json::parse(PosteriorJson(posterior));
+  EXPECT_TRUE(json["log_evidence"].is_null());
+  EXPECT_TRUE(json["ess"].is_null());
+}
+
+TEST(Json, ComparisonHasTheFieldsOfTheInterface) {
+  const CampaignView view = testing::ExampleView("x");
+  const Json json = Json::parse(ComparisonJson("c1", Compare(view, PredictReadings(view))));
+  for (const char* field : {"campaign", "rms_error", "reduced_chi2", "p_value", "heldout_rms_error",
+                            "by_observable", "by_segment", "parameter_drift"}) {
+    EXPECT_TRUE(json.contains(field)) << field;
+  }
+  for (const char* field : {"experiment", "observable", "rms_error", "z", "p_value"})
+    EXPECT_TRUE(json["by_observable"][0].contains(field));
+  for (const char* field : {"experiment", "observable", "segment", "from", "to", "bias", "z"})
+    EXPECT_TRUE(json["by_segment"][0].contains(field));
+}
+
+TEST(Json, CataloguesHaveNamesAndParameters) {
+  for (const std::string& text : {EffectsJson(), ContactsJson(), TestsJson()}) {
+    const Json list = Json::parse(text);
+    ASSERT_TRUE(list.is_array());
+    for (const Json& entry : list) {
+      EXPECT_TRUE(entry.contains("name"));
+      EXPECT_TRUE(entry["parameters"].is_array());
+    }
+  }
+}
+
+TEST(Json, MalformedTextFromUsersIsReplaced) {
+  v1::CampaignStatus status;
+  status.set_state("a\xff");
+  EXPECT_TRUE(Json::accept(StatusJson(status)));
+}
+
+TEST(Json, StatesOfSeveralExperiments) {
+  const Json json = Json::parse(StateTableJson("experiment,load_step,x,y\na,0,1.5,\nb,0,,2\n"));
+  EXPECT_EQ(json["states"][0]["x"], 1.5);
+  EXPECT_TRUE(json["states"][0]["y"].is_null());
+  EXPECT_EQ(json["states"][1]["experiment"], "b");
+}
+
+TEST(Csv, OneRowPerSampleStateAndReading) {
+  const CampaignView view = testing::ExampleView("x");
+  const auto lines = [](const std::string& text) {
+    return std::count(text.begin(), text.end(), '\n');
+  };
+  EXPECT_EQ(lines(SamplesCsv(view)), 1 + 120);
+  EXPECT_EQ(lines(StatesCsv(view)), 1 + 2 * 120 * 40);
+  EXPECT_EQ(lines(FitCsv(view, PredictReadings(view))), 1 + 2 * 2 * 40);
+  EXPECT_EQ(lines(PosteriorCsv(view.posterior)), 1 + 3);
+}
+
+}  // namespace
+}  // namespace calib::report

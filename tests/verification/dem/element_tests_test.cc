@@ -1,0 +1,177 @@
+// What the lab tests promise: exact strains, held stresses, prepared states, reported failures.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "dem/catalog/catalog.h"
+#include "tests/support/dem/scenarios.h"
+
+namespace calib::dem {
+namespace {
+
+using testing::HasSubstr;
+
+double Value(const State& state, const std::string& observable) {
+  const auto& names = FindTest("triaxial_drained")->observables;
+  return state.values[static_cast<std::size_t>(std::find(names.begin(), names.end(), observable) -
+                                               names.begin())];
+}
+
+TEST(TriaxialDrained, StopsAtExactlyTheAskedStrains) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.path = {{.target = 0, .load_step = 3},
+            {.target = 0.00123456789, .load_step = 4},
+            {.target = 0.0101, .load_step = -1},
+            {.target = 0.005, .load_step = 9}};
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  ASSERT_EQ(run.states.size(), 3U);
+  EXPECT_EQ(run.states[2].load_step, 9);
+  EXPECT_NEAR(Value(run.states[0], "axial_strain"), 0, 1e-15);
+  EXPECT_NEAR(Value(run.states[1], "axial_strain"), 0.00123456789, 1e-15);
+  EXPECT_NEAR(Value(run.states[2], "axial_strain"), 0.005, 1e-15);
+}
+
+TEST(TriaxialDrained, HoldsTheLateralStressAndRelationsBetweenObservables) {
+  const test::Run run = test::RunAll(test::SmallTriaxial(test::HertzModel()));
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  for (const State& state : run.states) {
+    EXPECT_NEAR(Value(state, "lateral_stress"), 2e5, 1e-3 * 2e5);
+    const double p = (Value(state, "axial_stress") + 2 * Value(state, "lateral_stress")) / 3;
+    EXPECT_NEAR(Value(state, "mean_stress"), p, 1e-9 * p);
+    EXPECT_NEAR(Value(state, "volumetric_strain"),
+                Value(state, "axial_strain") + 2 * Value(state, "lateral_strain"), 1e-14);
+    const double n = Value(state, "porosity");
+    EXPECT_NEAR(Value(state, "void_ratio"), n / (1 - n), 1e-12);
+  }
+  EXPECT_GT(Value(run.states[2], "stress_ratio"), 1.3);
+  EXPECT_TRUE(run.summary.staging.rate.has_value());
+  EXPECT_EQ(*run.summary.staging.step, 0.002);
+  EXPECT_EQ(*run.summary.staging.damping_settling, 0.9);
+}
+
+TEST(Oedometric, HasNoLateralStrainAndDissipatesInACycle) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.test = "oedometric";
+  s.path = {{.target = 0.01, .load_step = 0},
+            {.target = 0.006, .load_step = 1},
+            {.target = 0.01, .load_step = 2}};
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  for (const State& state : run.states) {
+    EXPECT_EQ(Value(state, "lateral_strain"), 0);
+  }
+  EXPECT_LT(Value(run.states[1], "axial_stress"), Value(run.states[0], "axial_stress"));
+  EXPECT_NEAR(Value(run.states[2], "axial_stress"), Value(run.states[0], "axial_stress"),
+              0.15 * Value(run.states[0], "axial_stress"));
+}
+
+TEST(Isotropic, ReachesEachMeanStressWithEqualAxes) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.test = "isotropic";
+  s.path = {{.target = 2e5, .load_step = 0},
+            {.target = 8e5, .load_step = 1},
+            {.target = 3e5, .load_step = 2}};
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  const double expected[3] = {2e5, 8e5, 3e5};
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(Value(run.states[k], "mean_stress"), expected[k], 1e-3 * expected[k]);
+    EXPECT_NEAR(Value(run.states[k], "stress_ratio"), 1, 2e-3);
+  }
+  EXPECT_GT(Value(run.states[1], "volumetric_strain"), Value(run.states[2], "volumetric_strain"));
+}
+
+TEST(Consolidation, FrictionIsLoweredUntilThePorosityHolds) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.packing = test::SmallPacking(200);
+  s.path = {{.target = 0, .load_step = 0}};
+  const double loose = Value(test::RunAll(s).states[0], "porosity");
+  s.consolidation.porosity = loose - 0.01;
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  EXPECT_NEAR(Value(run.states[0], "porosity"), loose - 0.01, 3e-4);
+  EXPECT_NEAR(Value(run.states[0], "mean_stress"), 2e5, 2e2);
+
+  s.consolidation.porosity = 0.55;
+  const auto refused = Simulate(s, [](const State&) {}, {});
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kOutOfRange);
+  EXPECT_THAT(std::string(refused.status().message()), HasSubstr("attainable"));
+}
+
+TEST(Consolidation, AnotherFrictionGivesAnotherDensityAndIsRestored) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  const test::Run own = test::RunAll(s);
+  s.consolidation.friction_coefficient = 0.02;
+  const test::Run lubricated = test::RunAll(s);
+  EXPECT_LT(Value(lubricated.states[0], "porosity"), Value(own.states[0], "porosity") - 1e-3);
+  EXPECT_GT(Value(lubricated.states[2], "stress_ratio"), 1.3) << "friction was not restored";
+}
+
+TEST(Consolidation, InitialStressReplacesTheIsotropicStart) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.initial_stress = InitialStress{.axial = 3e5, .lateral = 2e5};
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  EXPECT_NEAR(Value(run.states[0], "axial_stress"), 3e5, 3e2);
+  EXPECT_NEAR(Value(run.states[2], "lateral_stress"), 2e5, 2e2);
+}
+
+TEST(LoadingRate, FastLoadingIsStrongerThanQuasiStatic) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  const test::Run slow = test::RunAll(s);
+  s.loading_rate = 50 * *slow.summary.staging.rate;
+  const test::Run fast = test::RunAll(s);
+  ASSERT_EQ(fast.summary.outcome, Outcome::kCompleted);
+  EXPECT_NEAR(Value(fast.states[2], "axial_strain"), 0.01, 1e-15);
+  EXPECT_LT(fast.summary.steps, slow.summary.steps);
+}
+
+TEST(Failure, ATooSoftModelDivergesWithAReason) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.model.parameters["young_modulus"] = 1e4;
+  const test::Run run = test::RunAll(s);
+  EXPECT_EQ(run.summary.outcome, Outcome::kDiverged);
+  EXPECT_THAT(run.summary.reason, HasSubstr("consolidation: "));
+  EXPECT_THAT(run.summary.reason,
+              testing::ContainsRegex("grains [0-9]+ and [0-9]+ overlap|too short"));
+}
+
+TEST(Failure, StopIsObeyedBetweenTwoSteps) {
+  std::stop_source source;
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  int states = 0;
+  const auto summary = Simulate(
+      s,
+      [&](const State&) {
+        ++states;
+        source.request_stop();
+      },
+      source.get_token());
+  ASSERT_TRUE(summary.ok());
+  EXPECT_EQ(summary->outcome, Outcome::kStopped);
+  EXPECT_EQ(states, 1);
+}
+
+TEST(Vtk, WritesAFilePerLoadStep) {
+  const auto directory = std::filesystem::path(testing::TempDir()) / "calib_dem_vtk";
+  std::filesystem::remove_all(directory);
+  const auto summary = SimulateWithVtk(test::SmallTriaxial(test::HertzModel()), [](const State&) {},
+                                       {}, {.directory = directory.string()});
+  ASSERT_TRUE(summary.ok());
+  const std::string text = test::ReadFile((directory / "grains_0002.vtk").string());
+  EXPECT_THAT(text, HasSubstr("POINTS 60 double"));
+  EXPECT_THAT(text, HasSubstr("VECTORS velocity double"));
+  std::filesystem::remove_all(directory);
+}
+
+TEST(Vtk, NamesTheFileThatCannotBeWritten) {
+  const auto summary = SimulateWithVtk(test::SmallTriaxial(test::HertzModel()), [](const State&) {},
+                                       {}, {.directory = "/proc/nowhere"});
+  EXPECT_EQ(summary.status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(std::string(summary.status().message()), HasSubstr("/proc/nowhere/grains_0000.vtk"));
+}
+
+}  // namespace
+}  // namespace calib::dem

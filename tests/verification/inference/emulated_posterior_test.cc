@@ -1,0 +1,168 @@
+// The emulated posterior where the exact one is known, and where it must refuse.
+
+#include "inference/emulator/emulated_posterior.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <vector>
+
+#include "inference/sampling/halton.h"
+#include "inference/sampling/sobol.h"
+#include "tests/verification/inference/linear_model.h"
+#include "tests/verification/inference/toy_curve.h"
+
+namespace calib::inference {
+namespace {
+
+Iteration PriorRuns(const LinearModel& model, int n) {
+  const Eigen::MatrixXd unit = Halton(n, static_cast<int>(model.priors.size()));
+  Iteration iteration;
+  iteration.parameters = unit;
+  for (Eigen::Index i = 0; i < unit.rows(); ++i) {
+    for (Eigen::Index j = 0; j < unit.cols(); ++j) {
+      iteration.parameters(i, j) = model.priors[static_cast<std::size_t>(j)].Quantile(unit(i, j));
+    }
+  }
+  iteration.predictions = model.Predict(iteration.parameters);
+  return iteration;
+}
+
+// 60 runs of a linear model whose posterior is a tenth to a thirtieth of the prior: weights leave a
+// sample or two.
+TEST(EmulatedPosterior, AgreesWithTheConjugatePosterior) {
+  for (const int d : {2, 5}) {
+    const LinearModel model(30, d, 0.2, 77);
+    const Iteration runs = PriorRuns(model, 60);
+    const auto result =
+        EmulatedPosterior(model.priors, model.Data(), {.draws = 4000, .seed = 1}, {&runs, 1});
+    ASSERT_TRUE(result.ok()) << result.status();
+    EXPECT_TRUE(result->adequate) << result->reason;
+    EXPECT_LT(result->cross_validated_error, 0.1);
+    EXPECT_NEAR(result->log_evidence, model.LogEvidence(),
+                std::max(0.3, 3 * result->log_evidence_se))
+        << "d = " << d;
+    const Eigen::VectorXd mean = model.PosteriorMean();
+    const Eigen::MatrixXd covariance = model.PosteriorCovariance();
+    for (int j = 0; j < d; ++j) {
+      const ParameterSummary& parameter = result->parameters[static_cast<std::size_t>(j)];
+      const double sd = std::sqrt(covariance(j, j));
+      // Monte Carlo error of 4000 draws that share ancestors: effectively about 1000.
+      EXPECT_NEAR(parameter.mean, mean[j], 0.12 * sd) << "d = " << d << ", parameter " << j;
+      EXPECT_NEAR(parameter.sd / sd, 1, 0.1) << "d = " << d << ", parameter " << j;
+      EXPECT_NEAR(parameter.q95 - parameter.q05, 3.29 * sd, 0.35 * sd)
+          << "d = " << d << ", parameter " << j;
+    }
+    const double expected = covariance(0, 1) / std::sqrt(covariance(0, 0) * covariance(1, 1));
+    EXPECT_NEAR(result->correlation(0, 1), expected, 0.1) << "d = " << d;
+    std::cout << "d = " << d << ": log evidence " << result->log_evidence << " +- "
+              << result->log_evidence_se << ", exact " << model.LogEvidence()
+              << ", cross-validated error " << result->cross_validated_error << '\n';
+  }
+}
+
+// The stated noise is wrong by a factor of three: the inferred factor is about nine and widens the
+// posterior.
+TEST(EmulatedPosterior, InfersTheNoise) {
+  LinearModel model(60, 3, 0.3, 5);
+  const Iteration runs = PriorRuns(model, 80);
+  const Eigen::MatrixXd covariance = model.PosteriorCovariance();
+  DataSet data = model.Data();
+  for (Reading& reading : data.readings) reading.sd /= 3;
+  const auto result =
+      EmulatedPosterior(model.priors, data, {.noise = NoiseMode::kInferred, .seed = 2}, {&runs, 1});
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_TRUE(result->adequate) << result->reason;
+  ASSERT_EQ(result->variance_factors.size(), 1);
+  EXPECT_NEAR(std::log(result->variance_factors[0] / 9), 0, 3 * std::sqrt(2.0 / 57));
+  const double factor = std::sqrt(result->variance_factors[0] / 9);
+  for (int j = 0; j < 3; ++j) {
+    const double sd = factor * std::sqrt(covariance(j, j));
+    EXPECT_NEAR(result->parameters[static_cast<std::size_t>(j)].sd / sd, 1, 0.15)
+        << "parameter " << j;
+  }
+}
+
+TEST(EmulatedPosterior, SameSeedSameBitsAndDivergedRunsAreLeftOut) {
+  const LinearModel model(20, 2, 0.3, 3);
+  Iteration runs = PriorRuns(model, 40);
+  const auto first =
+      EmulatedPosterior(model.priors, model.Data(), {.draws = 500, .seed = 4}, {&runs, 1});
+  ASSERT_TRUE(first.ok());
+  Iteration with_diverged = runs;
+  with_diverged.parameters.conservativeResize(41, 2);
+  with_diverged.parameters.row(40) << 100, 100;
+  with_diverged.predictions.conservativeResize(41, 20);
+  with_diverged.predictions.row(40).setConstant(std::nan(""));
+  const auto second =
+      EmulatedPosterior(model.priors, model.Data(), {.draws = 500, .seed = 4}, {&with_diverged, 1});
+  ASSERT_TRUE(second.ok());
+  EXPECT_EQ(first->draws, second->draws);
+  EXPECT_EQ(first->log_evidence, second->log_evidence);
+  EXPECT_EQ(first->predictive_q95, second->predictive_q95);
+}
+
+TEST(EmulatedPosterior, BandHoldsTheHistoryThatWasMeasured) {
+  const ToyCurve toy{.d = 3};
+  const Eigen::VectorXd truth = Eigen::Vector3d(0.4, 0.6, 0.5);
+  Iteration runs;
+  runs.parameters = ScrambledSobol(80, 3, 9);
+  runs.predictions.resize(80, toy.readings);
+  for (int i = 0; i < 80; ++i)
+    runs.predictions.row(i) = toy.Run(runs.parameters.row(i), 9, static_cast<std::uint64_t>(i));
+  const auto result =
+      EmulatedPosterior(toy.Priors(), toy.Measure(truth, 0.01, 9), {.seed = 9}, {&runs, 1});
+  ASSERT_TRUE(result.ok());
+  const Eigen::VectorXd mean_curve = toy.Mean(truth);
+  int inside = 0;
+  for (int t = 0; t < toy.readings; ++t) {
+    EXPECT_LE(result->predictive_q05[t], result->predictive_q50[t]);
+    EXPECT_LE(result->predictive_q50[t], result->predictive_q95[t]);
+    EXPECT_NEAR(result->predictive_mean[t] / mean_curve[t], 1, 0.02);
+    inside +=
+        mean_curve[t] >= result->predictive_q05[t] && mean_curve[t] <= result->predictive_q95[t]
+            ? 1
+            : 0;
+  }
+  EXPECT_GE(inside,
+            toy.readings / 2);  // strongly correlated along the path: one curve is one or two draws
+}
+
+// A response that varies by 6 % between neighbouring runs cannot be learned from 60 of them.
+TEST(EmulatedPosterior, RecognisesARoughFunction) {
+  const ToyCurve toy{.d = 3, .roughness = 0.06};
+  int refused = 0;
+  for (std::uint64_t r = 0; r < 5; ++r) {
+    Iteration runs;
+    runs.parameters = ScrambledSobol(60, 3, r);
+    runs.predictions.resize(60, toy.readings);
+    for (int i = 0; i < 60; ++i)
+      runs.predictions.row(i) = toy.Run(runs.parameters.row(i), r, static_cast<std::uint64_t>(i));
+    const auto result =
+        EmulatedPosterior(toy.Priors(), toy.Measure(Eigen::Vector3d(0.5, 0.4, 0.6), 0.01, r),
+                          {.seed = r}, {&runs, 1});
+    ASSERT_TRUE(result.ok());
+    refused += result->adequate ? 0 : 1;
+    EXPECT_TRUE(result->adequate || result->reason.find("run more") != std::string::npos)
+        << result->reason;
+  }
+  EXPECT_EQ(refused, 5);
+}
+
+TEST(EmulatedPosterior, RecognisesTooFewRuns) {
+  const ToyCurve toy{.d = 5, .scatter = 0.001};
+  Iteration runs;
+  runs.parameters = ScrambledSobol(12, 5, 1);
+  runs.predictions.resize(12, toy.readings);
+  for (int i = 0; i < 12; ++i)
+    runs.predictions.row(i) = toy.Run(runs.parameters.row(i), 1, static_cast<std::uint64_t>(i));
+  const DataSet data = toy.Measure(Eigen::VectorXd::Constant(5, 0.4), 0.002, 1);
+  const auto result = EmulatedPosterior(toy.Priors(), data, {.seed = 1}, {&runs, 1});
+  ASSERT_TRUE(result.ok());
+  EXPECT_FALSE(result->adequate);
+  EXPECT_FALSE(result->reason.empty());
+}
+
+}  // namespace
+}  // namespace calib::inference

@@ -1,0 +1,102 @@
+// The optimiser on functions whose minimum is known, with budgets of an expensive model.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <functional>
+#include <iostream>
+#include <numbers>
+#include <vector>
+
+#include "inference/surrogate/response_surface.h"
+
+namespace calib::inference {
+namespace {
+
+using Function = std::function<double(const Eigen::VectorXd&)>;
+
+double Branin(const Eigen::VectorXd& u) {
+  constexpr double kPi = std::numbers::pi;
+  const double x = 15 * u[0] - 5;
+  const double y = 15 * u[1];
+  const double valley = y - 5.1 / (4 * kPi * kPi) * x * x + 5 / kPi * x - 6;
+  return valley * valley + 10 * (1 - 1 / (8 * kPi)) * std::cos(x) + 10;
+}
+
+double Rosenbrock(const Eigen::VectorXd& u) {
+  const Eigen::VectorXd x = 4 * u.array() - 2;
+  double sum = 0;
+  for (Eigen::Index j = 0; j + 1 < x.size(); ++j) {
+    sum += 100 * std::pow(x[j + 1] - x[j] * x[j], 2) + std::pow(1 - x[j], 2);
+  }
+  return sum;
+}
+
+double Ackley(const Eigen::VectorXd& u) {
+  const Eigen::ArrayXd x = 30 * (u.array() - 0.6);
+  return -20 * std::exp(-0.2 * std::sqrt(x.square().mean())) -
+         std::exp((2 * std::numbers::pi * x).cos().mean()) + 20 + std::numbers::e;
+}
+
+// P workers that finish in the order they began; every value goes back at once.
+double Minimise(const Function& function, const ResponseSurfaceOptions& options) {
+  auto state = StartResponseSurface(options);
+  EXPECT_TRUE(state.ok());
+  CubicRbf surrogate(options.dimensions);
+  std::deque<int> running;
+  while (true) {
+    while (static_cast<int>(running.size()) < options.workers) {
+      if (!NextPoint(options, *state, surrogate).has_value()) break;
+      running.push_back(static_cast<int>(state->evaluations.size()) - 1);
+    }
+    if (running.empty()) break;
+    const int id = running.front();
+    running.pop_front();
+    const double value = function(state->evaluations[static_cast<std::size_t>(id)].point);
+    EXPECT_TRUE(Report(options, id, value, *state).ok());
+  }
+  EXPECT_EQ(static_cast<int>(state->evaluations.size()), options.max_evaluations);
+  return state->evaluations[static_cast<std::size_t>(state->best)].value;
+}
+
+double Median(const Function& function, ResponseSurfaceOptions options) {
+  std::vector<double> values;
+  for (options.seed = 1; options.seed <= 9; ++options.seed)
+    values.push_back(Minimise(function, options));
+  std::sort(values.begin(), values.end());
+  return values[4];
+}
+
+TEST(SurrogateOptimum, Branin) {
+  const double serial = Median(Branin, {.dimensions = 2, .max_evaluations = 60});
+  const double parallel = Median(Branin, {.dimensions = 2, .max_evaluations = 60, .workers = 4});
+  std::cout << "Branin, 60 evaluations: " << serial << ", with 4 workers " << parallel
+            << " (minimum 0.397887)\n";
+  EXPECT_LT(serial, 0.397887 + 0.02);  // of a range of 300
+  EXPECT_LT(parallel, 0.397887 + 0.02);
+}
+
+TEST(SurrogateOptimum, Rosenbrock) {
+  const double serial = Median(Rosenbrock, {.dimensions = 2, .max_evaluations = 100});
+  const double parallel =
+      Median(Rosenbrock, {.dimensions = 2, .max_evaluations = 100, .workers = 4});
+  std::cout << "Rosenbrock, 100 evaluations: " << serial << ", with 4 workers " << parallel
+            << " (minimum 0)\n";
+  EXPECT_LT(serial, 0.5);  // of a range of 3600
+  EXPECT_LT(parallel, 0.5);
+}
+
+TEST(SurrogateOptimum, Ackley) {
+  const double serial = Median(Ackley, {.dimensions = 3, .max_evaluations = 120});
+  const double parallel = Median(Ackley, {.dimensions = 3, .max_evaluations = 120, .workers = 4});
+  std::cout << "Ackley, 120 evaluations: " << serial << ", with 4 workers " << parallel
+            << " (minimum 0)\n";
+  EXPECT_LT(serial, 3);  // of a range of 22
+  EXPECT_LT(parallel, 3);
+}
+
+}  // namespace
+}  // namespace calib::inference

@@ -1,0 +1,83 @@
+// TMCMC where the answer is known in closed form.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "inference/data/gaussian_likelihood.h"
+#include "inference/tmcmc/tmcmc.h"
+#include "tests/verification/inference/linear_model.h"
+
+namespace calib::inference {
+namespace {
+
+// Evidence and its standard error over seeds: the errors must be as large as stated.
+TEST(TmcmcEvidence, LinearGaussianInTwoFiveAndTenDimensions) {
+  for (const int d : {2, 5, 10}) {
+    const LinearModel model(3 * d, d, 0.5, 21);
+    const auto likelihood = GaussianLikelihood::Create(model.Data(), NoiseMode::kGiven);
+    ASSERT_TRUE(likelihood.ok());
+    double squares = 0;
+    constexpr int kSeeds = 5;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      const auto state = RunTmcmc(model.priors, {.samples = 1000, .steps = 15, .seed = seed},
+                                  [&](const Eigen::MatrixXd& rows) {
+                                    return likelihood->LogLikelihood(model.Predict(rows));
+                                  });
+      ASSERT_TRUE(state.ok());
+      const double error = state->log_evidence - model.LogEvidence();
+      EXPECT_NEAR(error, 0, 0.4) << "d = " << d << ", seed " << seed;
+      const double normalised = error / state->LogEvidenceStandardError();
+      squares += normalised * normalised;
+      const Eigen::VectorXd exact = model.PosteriorMean();
+      const Eigen::MatrixXd covariance = model.PosteriorCovariance();
+      for (int j = 0; j < d; ++j) {
+        EXPECT_NEAR(state->samples.col(j).mean(), exact[j], 0.25 * std::sqrt(covariance(j, j)))
+            << "d = " << d;
+      }
+    }
+    EXPECT_LE(squares, 20.5) << "d = " << d;  // chi-square of five, probability 0.001
+  }
+}
+
+// Two modes far apart in a wide box, one narrow: both are kept with their masses.
+TEST(TmcmcEvidence, KeepsBothModes) {
+  const std::vector<Prior> box(2, Prior{.kind = PriorKind::kUniform, .min = -10, .max = 10});
+  const auto log_density = [](double x, double y) {
+    const auto mode = [](double dx, double dy, double sd) {
+      return std::exp(-0.5 * (dx * dx + dy * dy) / (sd * sd)) / (2 * std::numbers::pi * sd * sd);
+    };
+    return std::log(0.6 * mode(x + 4, y + 3, 0.6) + 0.4 * mode(x - 5, y - 2, 0.2));
+  };
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const auto state =
+        RunTmcmc(box, {.samples = 2000, .seed = seed}, [&](const Eigen::MatrixXd& rows) {
+          Eigen::VectorXd result(rows.rows());
+          for (Eigen::Index i = 0; i < rows.rows(); ++i)
+            result[i] = log_density(rows(i, 0), rows(i, 1));
+          return result;
+        });
+    ASSERT_TRUE(state.ok());
+    EXPECT_NEAR(state->log_evidence, -std::log(400.0), 0.3);
+    EXPECT_NEAR((state->samples.col(0).array() < 0).cast<double>().mean(), 0.6, 0.08);
+  }
+}
+
+// A posterior that leans on a corner of its box: exp(-k (x + y)) on the unit square.
+TEST(TmcmcEvidence, BoxPriorCutsThePosterior) {
+  const std::vector<Prior> box(2, Prior{.kind = PriorKind::kUniform, .min = 0, .max = 1});
+  const double k = 40;
+  const auto state = RunTmcmc(box, {.samples = 2000, .seed = 8}, [&](const Eigen::MatrixXd& rows) {
+    return Eigen::VectorXd(-k * rows.rowwise().sum());
+  });
+  ASSERT_TRUE(state.ok());
+  const double one = (1 - std::exp(-k)) / k;
+  EXPECT_NEAR(state->log_evidence, 2 * std::log(one), 0.2);
+  EXPECT_NEAR(state->samples.col(0).mean(), 1 / k, 0.15 / k);
+}
+
+}  // namespace
+}  // namespace calib::inference
