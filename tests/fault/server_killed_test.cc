@@ -18,7 +18,8 @@ TEST(ServerKilled, TenTimesAtRandomMoments) {
   {
     Client client = deployment.client();
     const SmallCampaign campaign = FaultCampaign();
-    ASSERT_TRUE(client.SubmitCampaign(campaign.yaml, campaign.files, "r").ok());
+    const auto id = client.SubmitCampaign(campaign.yaml, campaign.files, "r");
+    ASSERT_TRUE(id.ok()) << id.status();
   }
   std::mt19937 random(20260101);
   std::uniform_int_distribution<int> moment(0, 250);
@@ -60,11 +61,12 @@ TEST(ServerKilled, AtEveryKindOfCommit) {
     {
       Client client = deployment.client();
       const SmallCampaign campaign = FaultCampaign();
-      ASSERT_TRUE(client.SubmitCampaign(campaign.yaml, campaign.files, "r").ok());
+      const auto id = client.SubmitCampaign(campaign.yaml, campaign.files, "r");
+      ASSERT_TRUE(id.ok()) << id.status();
     }
     deployment.server().Kill();
     deployment.StartWorker(2);
-    for (int n = 1; n <= 30; ++n) {
+    for (int n = 1; n <= 12; ++n) {
       ServeUntilCommit(deployment, when, n);
     }
     ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();

@@ -20,7 +20,7 @@ inline SmallCampaign FaultCampaign() {
   return MakeSmallCampaign({.samples = 24,
                             .max_iterations = 2,
                             .load_steps = 6,
-                            .failure_attempts = 1000,
+                            .failure_attempts = 100,
                             .with_validation = true});
 }
 

@@ -14,7 +14,8 @@ namespace {
 void Submit(const Deployment& deployment) {
   Client client = deployment.client();
   const SmallCampaign campaign = FaultCampaign();
-  ASSERT_TRUE(client.SubmitCampaign(campaign.yaml, campaign.files, "r").ok());
+  const auto id = client.SubmitCampaign(campaign.yaml, campaign.files, "r");
+  ASSERT_TRUE(id.ok()) << id.status();
 }
 
 TEST(WorkerLost, KilledTenTimesAtRandomMoments) {
