@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
-#include "proto/rpc/digest.h"
+#include "server/campaign/sha256.h"
 
 namespace calib::scheduler {
 namespace {
@@ -103,7 +103,7 @@ std::string SpecDigest(v1::AttemptSpec spec) {
     coded.SetSerializationDeterministic(true);  // maps in the order of their keys
     spec.SerializeToCodedStream(&coded);
   }
-  return rpc::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", bytes));
+  return campaign::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", bytes));
 }
 
 }  // namespace calib::scheduler

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "server/scheduler/early_stopping.h"
 
 namespace calib::scheduler {
 
@@ -45,9 +46,13 @@ absl::Status CampaignRun::Reload(store::Reader& reader) {
     }
   }
   parameters_.clear();
+  stop_below_.clear();
   Eigen::Index rows = 0;
   for (const store::SampleRecord& sample : *samples) {
     parameters_[sample.sample] = sample.parameters;
+    if (!std::isnan(sample.stop_below)) {
+      stop_below_[sample.sample] = sample.stop_below;
+    }
     rows += sample.iteration == record_.progress.iteration ? 1 : 0;
   }
   predictions_.setConstant(rows, static_cast<Eigen::Index>(definition_->data.readings.size()),
@@ -137,6 +142,21 @@ void CampaignRun::SetStatus(const EvaluationKey& key, EvaluationStatus status, i
       (status == EvaluationStatus::kDiverged || status == EvaluationStatus::kStoppedEarly)) {
     diverged_[static_cast<std::size_t>(position)] = 1;
   }
+}
+
+bool CampaignRun::ShouldStop(const EvaluationKey& key) const {
+  const auto threshold = stop_below_.find(key.sample);
+  const Eigen::Index position = Position(key.sample);
+  if (threshold == stop_below_.end() || position < 0) {
+    return false;
+  }
+  Eigen::RowVectorXd own = predictions_.row(position);
+  for (std::size_t t = 0; t < definition_->data.readings.size(); ++t) {
+    if (definition_->data.readings[t].experiment != key.experiment) {
+      own(static_cast<Eigen::Index>(t)) = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+  return BestPossible(*definition_, own) < threshold->second;
 }
 
 int CampaignRun::Diverged() const {

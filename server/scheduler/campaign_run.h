@@ -61,6 +61,10 @@ class CampaignRun {
                 std::span<const double> observables);
   void SetStatus(const store::EvaluationKey& key, store::EvaluationStatus status, int failures);
 
+  /// True when an evaluation has shown, by its states so far, that its sample cannot count
+  /// (early_stopping.h).
+  bool ShouldStop(const store::EvaluationKey& key) const;
+
   /// Samples of the running iteration of which an evaluation diverged, and those with nothing left
   /// to run.
   int Diverged() const;
@@ -78,6 +82,7 @@ class CampaignRun {
   CampaignState state_ = CampaignState::kQueued;
   std::map<store::EvaluationKey, Evaluation> evaluations_;
   std::map<int, std::vector<double>> parameters_;  // by sample
+  std::map<int, double> stop_below_;               // samples that may be stopped early
   Eigen::MatrixXd predictions_;                    // of the running iteration
   std::vector<char> diverged_;
 };

@@ -9,15 +9,22 @@
 namespace calib::scheduler {
 namespace {
 
-/// The keys of the evaluations that ended with all their states.
-std::set<store::EvaluationKey> Finished(const std::vector<store::EvaluationRecord>& evaluations) {
+std::set<store::EvaluationKey> WithStatus(const std::vector<store::EvaluationRecord>& evaluations,
+                                          store::EvaluationStatus status) {
   std::set<store::EvaluationKey> keys;
   for (const store::EvaluationRecord& evaluation : evaluations) {
-    if (evaluation.status == store::EvaluationStatus::kFinished) {
+    if (evaluation.status == status) {
       keys.insert(evaluation.key);
     }
   }
   return keys;
+}
+
+void PlaceState(const Definition& definition, const store::StateRecord& state, Eigen::Index row,
+                Eigen::MatrixXd& predictions) {
+  Eigen::RowVectorXd values = predictions.row(row);
+  definition.readings.Place(state.key.experiment, state.load_step, state.observables, values);
+  predictions.row(row) = values;
 }
 
 /// Rows of parameters, predictions still unknown, one matrix per iteration.
@@ -33,6 +40,7 @@ void AddSamples(const Definition& definition, History& history) {
     history.iterations[k].parameters.resize(count[k], d);
     history.iterations[k].predictions.setConstant(count[k], t,
                                                   std::numeric_limits<double>::quiet_NaN());
+    history.stopped.push_back(history.iterations[k].predictions);
   }
   for (const store::SampleRecord& sample : history.samples) {
     const auto k = static_cast<std::size_t>(sample.iteration);
@@ -82,29 +90,29 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     const auto k = static_cast<std::size_t>(sample.iteration);
     place[sample.sample] = {k, next[k]++};
   }
-  const auto finished = Finished(*evaluations);
+  const auto finished = WithStatus(*evaluations, store::EvaluationStatus::kFinished);
+  const auto stopped = WithStatus(*evaluations, store::EvaluationStatus::kStoppedEarly);
+  std::set<int> stopped_samples;
+  for (const store::EvaluationKey& key : stopped) {
+    stopped_samples.insert(key.sample);
+  }
   for (const store::StateRecord& state : *states) {
+    const auto [k, row] = place.at(state.key.sample);
     if (finished.count(state.key) > 0) {
-      const auto [k, row] = place.at(state.key.sample);
-      Eigen::RowVectorXd predictions = history.iterations[k].predictions.row(row);
-      definition.readings.Place(state.key.experiment, state.load_step, state.observables,
-                                predictions);
-      history.iterations[k].predictions.row(row) = predictions;
+      PlaceState(definition, state, row, history.iterations[k].predictions);
+    }
+    if (stopped_samples.count(state.key.sample) > 0) {
+      PlaceState(definition, state, row, history.stopped[k]);
     }
   }
+  history.stopped_keys = {stopped.begin(), stopped.end()};
+  history.stopped_early = static_cast<int>(stopped_samples.size());
   for (const inference::Iteration& iteration : history.iterations) {
     std::vector<char>& diverged = history.diverged.emplace_back();
     for (Eigen::Index i = 0; i < iteration.predictions.rows(); ++i) {
       diverged.push_back(iteration.predictions.row(i).allFinite() ? 0 : 1);
     }
   }
-  std::set<int> stopped;
-  for (const store::EvaluationRecord& evaluation : *evaluations) {
-    if (evaluation.status == store::EvaluationStatus::kStoppedEarly) {
-      stopped.insert(evaluation.key.sample);
-    }
-  }
-  history.stopped_early = static_cast<int>(stopped.size());
   return history;
 }
 

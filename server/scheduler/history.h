@@ -14,7 +14,10 @@ namespace calib::scheduler {
 
 struct History {
   std::vector<inference::Iteration>
-      iterations;                            ///< predictions of samples that did not finish are NaN
+      iterations;  ///< predictions of samples that did not finish are NaN
+  /// Rows of samples stopped early as far as they came, NaN beyond; other rows are NaN altogether.
+  std::vector<Eigen::MatrixXd> stopped;
+  std::vector<store::EvaluationKey> stopped_keys;  ///< evaluations stopped early
   std::vector<std::vector<char>> diverged;   ///< [iteration][position]: it has no finite prediction
   std::vector<store::SampleRecord> samples;  ///< of all iterations
   std::optional<std::string> last_posterior;  ///< JSON, of the last iteration that has one

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/scheduler/attempt_spec.h"
+#include "server/scheduler/early_stopping.h"
 #include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
 
@@ -67,6 +68,18 @@ class Planner {
 
   /// Posterior of the iteration that has just ended, then whatever follows from it.
   absl::Status Conclude() {
+    const auto loss = StatedLoss(definition_, history_);
+    if (!loss.ok()) {
+      return Fail(loss.status());
+    }
+    if (!loss->resume.empty()) {
+      plan_.resumed = loss->resume;
+      plan_.log.push_back(absl::StrCat(loss->resume.size(),
+                                       " evaluations stopped early are resumed: with the weights "
+                                       "as they are now they could matter"));
+      return absl::OkStatus();
+    }
+    stated_loss_ = loss->stated;
     const auto posterior = inference::ComputePosterior(definition_.priors, definition_.data,
                                                        campaign_.filter, history_.iterations);
     if (!posterior.ok()) {
@@ -119,6 +132,7 @@ class Planner {
     conclusion.posterior.set_campaign(absl::StrCat("c", record_.submitted.id));
     conclusion.posterior.set_model_evaluations(history_.effort.model_evaluations);
     conclusion.posterior.set_stopped_early(history_.stopped_early);
+    conclusion.posterior.set_stated_loss(stated_loss_);
     const auto view =
         inference::ViewOnline(definition_.data, campaign_.filter,
                               history_.iterations.back().predictions, history_.diverged.back());
@@ -168,12 +182,19 @@ class Planner {
       }
       parameters = *std::move(drawn);
     }
+    const auto thresholds = StopThresholds(
+        definition_, history_,
+        {.proposal = proposal, .parameters = parameters, .predictions = {}, .log_proposal = {}});
+    if (!thresholds.ok()) {
+      return Fail(thresholds.status());
+    }
     const int first = iteration * record_.submitted.samples;
     for (Eigen::Index i = 0; i < parameters.rows(); ++i) {
       const Eigen::VectorXd row = parameters.row(i);
       start.samples.push_back({.sample = first + static_cast<int>(i),
                                .iteration = iteration,
-                               .parameters = {row.begin(), row.end()}});
+                               .parameters = {row.begin(), row.end()},
+                               .stop_below = (*thresholds)[static_cast<std::size_t>(i)]});
     }
     for (const store::SampleRecord& sample : start.samples) {
       if (absl::Status status = campaign_.precomputed.has_value()
@@ -257,6 +278,7 @@ class Planner {
   const store::CampaignRecord& record_;
   store::Reader& reader_;
   History history_;
+  double stated_loss_ = 0;
   Plan plan_;
 };
 
@@ -288,6 +310,10 @@ void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgres
   }
   for (const auto& [from, to] : plan.reused) {
     transaction.ReuseEvaluation(from, to);
+  }
+  for (const store::EvaluationKey& key : plan.resumed) {
+    transaction.NeverStop(campaign, key.sample);
+    transaction.SetEvaluation(key, EvaluationStatus::kWaiting, "", 0);
   }
   for (const store::StateRecord& state : plan.states) {
     transaction.PutState(state, unix_ms);

@@ -38,9 +38,10 @@ struct Plan {
   std::optional<Start> start;
   std::vector<store::EvaluationRecord> evaluations;  ///< new ones
   std::vector<std::pair<store::EvaluationKey, store::EvaluationKey>>
-      reused;                              ///< (done before, the same now)
-  std::vector<store::StateRecord> states;  ///< of runs made elsewhere
-  std::string phase;                       ///< afterwards
+      reused;                                 ///< (done before, the same now)
+  std::vector<store::EvaluationKey> resumed;  ///< stopped early, to be run to their ends after all
+  std::vector<store::StateRecord> states;     ///< of runs made elsewhere
+  std::string phase;                          ///< afterwards
   bool converged = false;
   std::optional<CampaignEvent> event;  ///< start, finish or fail
   std::string reason;                  ///< of a failure

@@ -101,6 +101,9 @@ class Scheduler {
                 bool counts_as_failure);
   void End(std::int64_t session, const LeaseEntry& lease, store::EvaluationStatus status,
            const v1::Finished& finished);
+  /// The sample cannot count any more: stores what decided it and lets the worker stop.
+  void StopEarly(std::int64_t session, const LeaseEntry& lease,
+                 std::vector<store::StateRecord> records);
   store::AttemptEnd ToRecord(const v1::Finished& finished, const std::string& outcome);
 
   // Campaigns (scheduler.cc)

@@ -3,7 +3,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
-#include "proto/rpc/digest.h"
+#include "server/campaign/sha256.h"
 #include "server/scheduler/attempt_spec.h"
 #include "server/scheduler/scheduler.h"
 
@@ -42,7 +42,7 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
         absl::StrCat("worker ", hello.name(), " has mechanics version ", hello.engine_version(),
                      ", the server ", dem::EngineVersion(), ": update the node"));
   }
-  if (hello.catalog_digest() != rpc::Sha256Hex(dem::CatalogText())) {
+  if (hello.catalog_digest() != campaign::Sha256Hex(dem::CatalogText())) {
     return absl::FailedPreconditionError(
         absl::StrCat("worker ", hello.name(),
                      " offers other contacts, effects or tests than the server: update the node"));
@@ -155,10 +155,19 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
     }
     records.push_back(std::move(record));
   }
-  for (const store::StateRecord& record : records) {
-    run.AddState(key, record.load_step, record.observables);
+  bool stop = false;
+  for (std::size_t i = 0; i < records.size() && !stop; ++i) {
+    run.AddState(key, records[i].load_step, records[i].observables);
+    stop = run.ShouldStop(key) && !run.Find(key)->missing.empty();
+    if (stop) {
+      records.resize(i + 1);  // what was computed beyond is not kept: it depends on who was faster
+    }
   }
   ++version_;
+  if (stop) {
+    StopEarly(session, *leases_.Release(batch.attempt()), std::move(records));
+    return;
+  }
   v1::ServerMessage ack;
   ack.mutable_ack()->set_attempt(batch.attempt());
   ack.mutable_ack()->set_up_to(batch.first() + batch.states_size());
@@ -216,6 +225,38 @@ void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
       GiveBack(lease, finished, "failed", true);
       Refuse(session, finished.attempt());
   }
+  Dispatch();
+}
+
+void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
+                          std::vector<store::StateRecord> records) {
+  CampaignRun& run = *FindRun(lease.key.campaign);
+  const int failures = run.Find(lease.key)->failures;
+  const std::string reason =
+      absl::StrCat("cannot reach a weight that counts, by load step ", records.back().load_step);
+  run.SetStatus(lease.key, EvaluationStatus::kStoppedEarly, failures);
+  const std::chrono::duration<double> elapsed = ports_.Now() - lease.started;
+  v1::Finished finished = Because(lease.attempt, reason);
+  if (const WorkerEntry* worker = workers_.OfSession(session); worker != nullptr) {
+    finished.set_core_seconds(elapsed.count() * worker->hello.threads_per_slot());
+  }
+  v1::ServerMessage message;
+  message.mutable_stop()->set_attempt(lease.attempt);
+  ports_.Write(
+      [key = lease.key, failures, reason, records = std::move(records), now = ports_.UnixMs(),
+       end = ToRecord(finished, "stopped_early")](Transaction& transaction) {
+        for (const store::StateRecord& record : records) {
+          transaction.PutState(record, now);
+        }
+        transaction.EndAttempt(end);
+        transaction.SetEvaluation(key, EvaluationStatus::kStoppedEarly, reason, failures);
+      },
+      [this, session, message, campaign = lease.key.campaign](const absl::Status& status) {
+        if (status.ok()) {
+          ports_.Send(session, message);
+          Advance(campaign);
+        }
+      });
   Dispatch();
 }
 

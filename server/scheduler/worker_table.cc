@@ -6,7 +6,8 @@ std::int64_t WorkerTable::Connect(const v1::Hello& hello, std::int64_t session,
                                   Clock::time_point now) {
   WorkerEntry& entry = workers_[hello.name()];
   const std::int64_t before = entry.session;
-  entry.draining = entry.draining && !entry.leaving;  // a drained worker that is started again works
+  entry.draining =
+      entry.draining && !entry.leaving;  // a drained worker that is started again works
   entry.leaving = false;
   entry.hello = hello;
   entry.session = session;

@@ -182,7 +182,7 @@ absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign)
   return Guard([&] {
     std::vector<SampleRecord> records;
     SQLite::Statement& row = connection_->Bind(
-        "SELECT sample, iteration, parameters, log_weight, log_likelihood FROM sample "
+        "SELECT sample, iteration, parameters, log_weight, log_likelihood, stop_below FROM sample "
         "WHERE campaign = ? ORDER BY sample",
         campaign);
     while (row.executeStep()) {
@@ -190,7 +190,8 @@ absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign)
                          .iteration = row.getColumn(1).getInt(),
                          .parameters = ToDoubles(row.getColumn(2)),
                          .log_weight = ToDouble(row.getColumn(3)),
-                         .log_likelihood = ToDouble(row.getColumn(4))});
+                         .log_likelihood = ToDouble(row.getColumn(4)),
+                         .stop_below = ToDouble(row.getColumn(5))});
     }
     return records;
   });

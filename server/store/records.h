@@ -54,6 +54,8 @@ struct SampleRecord {
   std::vector<double> parameters{};
   double log_weight = kUnknown;
   double log_likelihood = kUnknown;
+  double stop_below =
+      kUnknown;  ///< of its largest log likelihood still possible; unknown: never stopped
 };
 
 /// Names one model evaluation; its order is the order in which work is handed out.

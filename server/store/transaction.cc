@@ -90,10 +90,10 @@ void Transaction::SetPosterior(std::int64_t campaign, int number, const std::str
 void Transaction::InsertSample(std::int64_t campaign, const SampleRecord& sample) {
   Guard([&] {
     connection_.Run(
-        "INSERT INTO sample(campaign, sample, iteration, parameters, log_weight, log_likelihood) "
-        "VALUES(?, ?, ?, ?, ?, ?)",
+        "INSERT INTO sample(campaign, sample, iteration, parameters, log_weight, log_likelihood, "
+        "stop_below) VALUES(?, ?, ?, ?, ?, ?, ?)",
         campaign, sample.sample, sample.iteration, DoubleBlob{sample.parameters}, sample.log_weight,
-        sample.log_likelihood);
+        sample.log_likelihood, sample.stop_below);
   });
 }
 
@@ -103,6 +103,13 @@ void Transaction::SetWeight(std::int64_t campaign, int sample, double log_weight
     connection_.Run(
         "UPDATE sample SET log_weight = ?, log_likelihood = ? WHERE campaign = ? AND sample = ?",
         log_weight, log_likelihood, campaign, sample);
+  });
+}
+
+void Transaction::NeverStop(std::int64_t campaign, int sample) {
+  Guard([&] {
+    connection_.Run("UPDATE sample SET stop_below = NULL WHERE campaign = ? AND sample = ?",
+                    campaign, sample);
   });
 }
 

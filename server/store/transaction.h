@@ -38,6 +38,8 @@ class Transaction {
   void SetPosterior(std::int64_t campaign, int number, const std::string& posterior);
   void InsertSample(std::int64_t campaign, const SampleRecord& sample);
   void SetWeight(std::int64_t campaign, int sample, double log_weight, double log_likelihood);
+  /// From now on this sample is run to its end.
+  void NeverStop(std::int64_t campaign, int sample);
   void InsertEvaluation(const EvaluationRecord& evaluation);
   void SetEvaluation(const EvaluationKey& key, EvaluationStatus status, const std::string& reason,
                      int failures);

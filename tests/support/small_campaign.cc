@@ -35,10 +35,11 @@ std::string Data(int load_steps) {
   return text;
 }
 
-std::string Experiment(const std::string& name, const std::string& pressure, bool validate) {
-  return fmt::format(R"(  - name: {}
+std::string Experiment(const std::string& name, const std::string& pressure, double noise,
+                       bool validate) {
+  return fmt::format(R"(  - name: {0}
     test: triaxial_drained
-    confining_pressure: {}
+    confining_pressure: {1}
     packing: {{file: packing.txt}}
     data:
       file: data.txt
@@ -47,10 +48,10 @@ std::string Experiment(const std::string& name, const std::string& pressure, boo
     control: axial_strain
     staging: {{rate: 5 1/s, step: 0.004, damping: [0.4, 0.9], unbalanced: 0.05}}
     observables:
-      stress_ratio: {{noise: {{relative: 0.1, floor: 0.1}}}}
-    role: {}
+      stress_ratio: {{noise: {{relative: {2}, floor: {2}}}}}
+    role: {3}
 )",
-                     name, pressure, validate ? "validate" : "calibrate");
+                     name, pressure, noise, validate ? "validate" : "calibrate");
 }
 
 }  // namespace
@@ -58,8 +59,8 @@ std::string Experiment(const std::string& name, const std::string& pressure, boo
 SmallCampaign MakeSmallCampaign(const SmallCampaignOptions& options) {
   SmallCampaign campaign;
   campaign.files = {{"packing.txt", Packing()}, {"data.txt", Data(options.load_steps)}};
-  campaign.yaml =
-      fmt::format(R"(name: small
+  campaign.yaml = fmt::format(
+      R"(name: small
 model:
   contact: hertz_mindlin
   density: 2650 kg/m^3
@@ -76,9 +77,9 @@ inference:
 failure: {{attempts: {}, pause_above: 0.5}}
 seed: 7
 {})",
-                  Experiment("tx", "0.1 MPa", false),
-                  options.with_validation ? Experiment("tx2", "0.2 MPa", true) : "",
-                  options.samples, options.max_iterations, options.failure_attempts, options.extra);
+      Experiment("tx", "0.1 MPa", options.relative_noise, false),
+      options.with_validation ? Experiment("tx2", "0.2 MPa", options.relative_noise, true) : "",
+      options.samples, options.max_iterations, options.failure_attempts, options.extra);
   return campaign;
 }
 

@@ -17,6 +17,7 @@ struct SmallCampaignOptions {
   int max_iterations = 2;
   int load_steps = 4;
   int failure_attempts = 5;
+  double relative_noise = 0.1;
   bool with_validation = false;  ///< a second experiment at another pressure, held out
   std::string extra{};           ///< further top-level YAML
 };

@@ -1,0 +1,138 @@
+#include "server/scheduler/early_stopping.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace calib::scheduler {
+namespace {
+
+constexpr double kNone = -std::numeric_limits<double>::infinity();
+
+double LogSumExp(const std::vector<double>& terms) {
+  double largest = kNone;
+  for (const double term : terms) {
+    largest = std::max(largest, term);
+  }
+  if (!std::isfinite(largest)) {
+    return kNone;
+  }
+  double sum = 0;
+  for (const double term : terms) {
+    sum += std::exp(term - largest);
+  }
+  return largest + std::log(sum);
+}
+
+/// ln of the summed weight of the finished samples; importance: of all of them, in order.
+absl::StatusOr<double> FinishedMass(const Definition& definition, const History& history,
+                                    const Eigen::VectorXd& importance) {
+  std::vector<double> weights;
+  Eigen::Index at = 0;
+  for (const inference::Iteration& iteration : history.iterations) {
+    const auto likelihood = inference::LogLikelihood(definition.data, definition.campaign.filter,
+                                                     iteration.predictions);
+    if (!likelihood.ok()) {
+      return likelihood.status();
+    }
+    for (Eigen::Index i = 0; i < likelihood->size(); ++i) {
+      weights.push_back(importance(at++) + (*likelihood)(i));
+    }
+  }
+  return LogSumExp(weights);
+}
+
+}  // namespace
+
+bool StopsEarly(const Definition& definition) {
+  return definition.campaign.early_stopping.has_value() &&
+         !definition.campaign.precomputed.has_value() &&
+         definition.campaign.filter.noise != inference::NoiseMode::kEssTarget;
+}
+
+absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
+                                                   const History& history,
+                                                   const inference::Iteration& next) {
+  const Eigen::Index n = next.parameters.rows();
+  std::vector<double> thresholds(static_cast<std::size_t>(n), store::kUnknown);
+  if (!StopsEarly(definition) || history.iterations.empty()) {
+    return thresholds;
+  }
+  std::vector<inference::Iteration> all = history.iterations;
+  all.push_back(next);
+  const Eigen::VectorXd importance = inference::LogImportance(definition.priors, all);
+  const auto mass = FinishedMass(definition, history, importance);
+  if (!mass.ok()) {
+    return mass.status();
+  }
+  if (!std::isfinite(*mass)) {
+    return thresholds;
+  }
+  const double share = definition.campaign.early_stopping->discard_at_most / static_cast<double>(n);
+  const Eigen::Index first = importance.size() - n;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    thresholds[static_cast<std::size_t>(i)] = *mass + std::log(share) - importance(first + i);
+  }
+  return thresholds;
+}
+
+absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& history) {
+  Loss loss;
+  if (history.stopped_keys.empty()) {
+    return loss;
+  }
+  const Eigen::VectorXd importance =
+      inference::LogImportance(definition.priors, history.iterations);
+  const auto mass = FinishedMass(definition, history, importance);
+  if (!mass.ok()) {
+    return mass.status();
+  }
+  std::map<int, std::vector<store::EvaluationKey>> keys;
+  for (const store::EvaluationKey& key : history.stopped_keys) {
+    keys[key.sample].push_back(key);
+  }
+  struct Stopped {
+    double bound;  // of the share of the finished mass that it could have had
+    int sample;
+  };
+  std::vector<Stopped> stopped;
+  std::size_t at = 0;
+  for (std::size_t k = 0; k < history.iterations.size(); ++k) {
+    const auto bound = inference::LogLikelihoodBound(definition.data, definition.campaign.filter,
+                                                     history.stopped[k]);
+    if (!bound.ok()) {
+      return bound.status();
+    }
+    for (Eigen::Index i = 0; i < bound->size(); ++i, ++at) {
+      const int sample = history.samples[at].sample;
+      if (keys.count(sample) > 0) {
+        stopped.push_back(
+            {.bound = std::exp(importance(static_cast<Eigen::Index>(at)) + (*bound)(i) - *mass),
+             .sample = sample});
+      }
+    }
+  }
+  std::stable_sort(stopped.begin(), stopped.end(),
+                   [](const Stopped& a, const Stopped& b) { return a.bound < b.bound; });
+  // The smallest bounds stay stopped while their sum is allowed.
+  for (const Stopped& one : stopped) {
+    if (loss.resume.empty() &&
+        loss.stated + one.bound <= definition.campaign.early_stopping->discard_at_most) {
+      loss.stated += one.bound;
+    } else {
+      const auto& of_sample = keys[one.sample];
+      loss.resume.insert(loss.resume.end(), of_sample.begin(), of_sample.end());
+    }
+  }
+  std::sort(loss.resume.begin(), loss.resume.end());
+  return loss;
+}
+
+double BestPossible(const Definition& definition, const Eigen::RowVectorXd& predictions) {
+  const auto bound = inference::LogLikelihoodBound(definition.data, definition.campaign.filter,
+                                                   Eigen::MatrixXd(predictions));
+  return bound.ok() ? (*bound)(0) : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,42 @@
+#pragma once
+// Early stopping with a bound: an evaluation ends as soon as even perfect agreement with every
+// reading to come could not give its sample a weight that counts.
+//
+// Thresholds are fixed when an iteration starts, from the complete iterations before it, and each
+// evaluation is judged by its own states alone: the same states are stored whatever arrives first.
+// When an iteration ends the bounds are taken again with the weights as they are then, and samples
+// are resumed, largest bound first, until what the others may lose together is within
+// `discard_at_most` of the finished mass.
+
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/scheduler/definition.h"
+#include "server/scheduler/history.h"
+
+namespace calib::scheduler {
+
+/// Whether a campaign may stop samples at all: it asks for it, and its noise is fixed in advance.
+bool StopsEarly(const Definition& definition);
+
+/// Per new sample, the largest LogLikelihoodBound with which it is stopped:
+///   ln(finished weight) + ln(discard_at_most / N) - ln(prior / proposals)_i
+/// where the proposals are those of all iterations and the new one. NaN (never stopped) for all
+/// while no sample has finished.
+absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
+                                                   const History& history,
+                                                   const inference::Iteration& next);
+
+struct Loss {
+  double stated = 0;  ///< of those that stay stopped, relative to the finished mass
+  std::vector<store::EvaluationKey> resume;  ///< to be run to their ends, in order
+};
+
+/// What the samples stopped in all iterations may have lost.
+absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& history);
+
+/// The largest log likelihood that a sample can still reach judged by one evaluation: `predictions`
+/// holds the readings of its experiment so far, NaN everywhere else.
+double BestPossible(const Definition& definition, const Eigen::RowVectorXd& predictions);
+
+}  // namespace calib::scheduler

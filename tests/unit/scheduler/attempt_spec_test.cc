@@ -1,0 +1,51 @@
+#include "server/scheduler/attempt_spec.h"
+
+#include <gtest/gtest.h>
+
+namespace calib::scheduler {
+namespace {
+
+v1::AttemptSpec Spec() {
+  dem::Scenario scenario;
+  scenario.model.contact = "linear";
+  scenario.model.parameters = {{"young_modulus", 1e9}, {"friction_coefficient", 0.5}};
+  scenario.test = "triaxial_drained";
+  scenario.path = {{.target = 0.01, .load_step = 0}};
+  campaign::PackingFile file;
+  file.digest = "abc";
+  return ToSpec(scenario, file, "tx");
+}
+
+TEST(SpecDigest, NamesWhatDeterminesTheStatesAndNothingElse) {
+  const std::string digest = SpecDigest(Spec());
+  EXPECT_EQ(digest.size(), 64U);
+  v1::AttemptSpec other = Spec();
+  other.set_experiment("another name");
+  other.set_threads(8);
+  EXPECT_EQ(SpecDigest(other), digest);
+  other = Spec();
+  (*other.mutable_parameters())["young_modulus"] = 1.0000000000000002e9;
+  EXPECT_NE(SpecDigest(other), digest);
+  other = Spec();
+  other.set_packing_digest("abd");
+  EXPECT_NE(SpecDigest(other), digest);
+  other = Spec();
+  other.set_seed(1);
+  EXPECT_NE(SpecDigest(other), digest);
+  other = Spec();
+  other.mutable_staging()->set_rate(0.1);
+  EXPECT_NE(SpecDigest(other), digest);
+}
+
+TEST(SpecDigest, DoesNotDependOnTheOrderInWhichMapsWereFilled) {
+  v1::AttemptSpec forward;
+  v1::AttemptSpec backward;
+  for (int i = 0; i < 50; ++i) {
+    (*forward.mutable_parameters())["p" + std::to_string(i)] = i;
+    (*backward.mutable_parameters())["p" + std::to_string(49 - i)] = 49 - i;
+  }
+  EXPECT_EQ(SpecDigest(forward), SpecDigest(backward));
+}
+
+}  // namespace
+}  // namespace calib::scheduler

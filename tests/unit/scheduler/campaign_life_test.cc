@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+
+#include "tests/unit/scheduler/simulated_service.h"
+
+namespace calib::scheduler {
+namespace {
+
+using Kind = v1::ServerMessage::MessageCase;
+using std::chrono::milliseconds;
+
+testing::SmallCampaign Small() {
+  return testing::MakeSmallCampaign({.samples = 6, .max_iterations = 2, .failure_attempts = 100});
+}
+
+TEST(CampaignLife, WorkIsHandedOutInOrderAndAcknowledgedAfterItsCommit) {
+  SimulatedService service("order");
+  EXPECT_EQ(service.Submit(Small()), "c1");
+  EXPECT_EQ(service.Campaign().progress.state, "queued");
+  const std::int64_t worker = service.Connect("w", 2);
+  EXPECT_TRUE(service.Next(worker, Kind::kWelcome).has_welcome());
+  const v1::Lease first = service.Next(worker, Kind::kLease).lease();
+  const v1::Lease second = service.Next(worker, Kind::kLease).lease();
+  EXPECT_LT(first.attempt(), second.attempt());
+  EXPECT_FALSE(service.Next(worker, Kind::kLease).has_lease()) << "both slots are busy";
+  EXPECT_EQ(service.Campaign().progress.state, "running");
+  service.SendStates(worker, first, 0, 4);
+  EXPECT_EQ(service.Next(worker, Kind::kAck).ack().up_to(), 4);
+  EXPECT_EQ(service.Read().States(1)->size(), 4U);
+  service.SendEnd(worker, first.attempt(), v1::Finished::OUTCOME_COMPLETED);
+  EXPECT_TRUE(service.Next(worker, Kind::kAck).ack().finished());
+  EXPECT_TRUE(service.Next(worker, Kind::kLease).has_lease());
+}
+
+TEST(CampaignLife, SilentWorkersAttemptGoesToAnotherAndItsLateWordsAreRefused) {
+  SimulatedService service("silent");
+  service.Submit(Small());
+  const std::int64_t silent = service.Connect("silent", 1);
+  const v1::Lease lost = service.Next(silent, Kind::kLease).lease();
+  service.Advance(milliseconds(1001));
+  const std::int64_t other = service.Connect("other", 1);
+  const v1::Lease again = service.Next(other, Kind::kLease).lease();
+  EXPECT_GT(again.attempt(), lost.attempt());
+  EXPECT_EQ(again.spec().SerializeAsString(), lost.spec().SerializeAsString());
+  EXPECT_TRUE(service.Next(silent, Kind::kAck).ack().refused());
+  service.SendStates(silent, lost, 0, 1);
+  EXPECT_TRUE(service.Next(silent, Kind::kAck).ack().refused());
+  EXPECT_TRUE(service.Read().States(1)->empty());
+}
+
+TEST(CampaignLife, WorkerKeepsItsAttemptAcrossARestartOfTheServer) {
+  SimulatedService service("readopt");
+  service.Submit(Small());
+  const std::int64_t before = service.Connect("w", 1);
+  const v1::Lease lease = service.Next(before, Kind::kLease).lease();
+  service.Restart();
+  const std::int64_t after = service.Connect("w", 1, {lease.attempt()});
+  service.SendStates(after, lease, 0, 4);
+  EXPECT_EQ(service.Next(after, Kind::kAck).ack().up_to(), 4);
+  service.SendEnd(after, lease.attempt(), v1::Finished::OUTCOME_COMPLETED);
+  EXPECT_TRUE(service.Next(after, Kind::kAck).ack().finished());
+}
+
+TEST(CampaignLife, LeavingWorkerGivesBackWhatIsOnItsWayToIt) {
+  SimulatedService service("leaving");
+  service.Submit(Small());
+  const std::int64_t leaving = service.Connect("leaving", 1);
+  const std::int64_t lost = service.Next(leaving, Kind::kLease).lease().attempt();
+  service.scheduler().Receive(leaving, v1::Leaving());
+  service.ports().Run();
+  const std::int64_t other = service.Connect("other", 1);
+  EXPECT_GT(service.Next(other, Kind::kLease).lease().attempt(), lost);
+  EXPECT_EQ(service.Read().Evaluations(1)->front().failures, 0) << "leaving is no failure";
+}
+
+TEST(CampaignLife, CancelStopsWhatRuns) {
+  SimulatedService service("cancel");
+  service.Submit(Small());
+  const std::int64_t worker = service.Connect("w", 1);
+  const v1::Lease lease = service.Next(worker, Kind::kLease).lease();
+  absl::Status cancelled = absl::UnknownError("no answer");
+  service.scheduler().Cancel(1, nullptr, [&](const absl::Status& status) { cancelled = status; });
+  service.ports().Run();
+  EXPECT_TRUE(cancelled.ok()) << cancelled;
+  EXPECT_EQ(service.Next(worker, Kind::kStop).stop().attempt(), lease.attempt());
+  EXPECT_EQ(service.Campaign().progress.state, "cancelled");
+  service.SendStates(worker, lease, 0, 1);
+  EXPECT_TRUE(service.Next(worker, Kind::kAck).ack().refused());
+}
+
+TEST(CampaignLife, SameBitsWhateverGoesWrong) {
+  SimulatedService calm("calm");
+  calm.Submit(Small());
+  calm.RunToEnd(1, true);
+  const std::string expected = calm.Fingerprint();
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    SimulatedService service("storm");
+    service.Submit(Small());
+    service.RunToEnd(seed, false);
+    EXPECT_TRUE(service.Fingerprint() == expected) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace calib::scheduler

@@ -1,0 +1,267 @@
+#include "tests/unit/scheduler/simulated_service.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <utility>
+
+#include "dem/catalog/catalog.h"
+#include "server/campaign/sha256.h"
+
+namespace calib::scheduler {
+namespace {
+
+constexpr SchedulerOptions kOptions{.lease = std::chrono::milliseconds(1000),
+                                    .heartbeat = std::chrono::milliseconds(100)};
+
+/// A smooth curve with the parameters in it, in place of the mechanics.
+double Model(const v1::AttemptSpec& spec, int load_step) {
+  const double stiffness = std::log(spec.parameters().at("young_modulus") / 5e7);
+  const double friction = spec.parameters().at("friction_angle");
+  return 1 + friction * 2 * (1 - std::exp(-0.3 * stiffness * (load_step + 1)));
+}
+
+std::string Bytes(const std::vector<double>& values) {
+  std::string bytes(values.size() * sizeof(double), '\0');
+  std::memcpy(bytes.data(), values.data(), bytes.size());
+  return bytes;
+}
+
+}  // namespace
+
+void SimulatedPorts::Run() {
+  while (!tasks_.empty()) {
+    const auto task = std::move(tasks_.front());
+    tasks_.pop_front();
+    task();
+  }
+}
+
+void SimulatedPorts::Write(store::Store::Job job, std::function<void(const absl::Status&)> then) {
+  tasks_.push_back([this, job = std::move(job), then = std::move(then)] {
+    const absl::Status status = store_.WriteNow(job);
+    EXPECT_TRUE(status.ok()) << status;
+    then(status);
+  });
+}
+
+void SimulatedPorts::Compute(std::function<std::function<void()>()> work) {
+  tasks_.push_back([work = std::move(work)] { work()(); });
+}
+
+void SimulatedPorts::Send(std::int64_t session, v1::ServerMessage message) {
+  inbox[session].push_back(std::move(message));
+}
+
+void SimulatedPorts::Close(std::int64_t session, const absl::Status& /*status*/) {
+  closed.push_back(session);
+}
+
+SimulatedService::SimulatedService(const std::string& name)
+    : path_(::testing::TempDir() + "/simulated_" + name + ".db") {
+  for (const char* suffix : {"", "-wal", "-shm"}) {
+    std::filesystem::remove(path_ + suffix);
+  }
+  Restart();
+}
+
+void SimulatedService::Restart() {
+  const auto now = ports_ == nullptr ? std::chrono::steady_clock::time_point{} : ports_->now;
+  scheduler_.reset();
+  ports_.reset();
+  store_.reset();
+  auto opened = store::Store::Open(path_);
+  EXPECT_TRUE(opened.ok()) << opened.status();
+  store_ = *std::move(opened);
+  ports_ = std::make_unique<SimulatedPorts>(*store_);
+  ports_->now = now;
+  scheduler_ = std::make_unique<Scheduler>(*ports_, kOptions);
+  const absl::Status status = scheduler_->Load();
+  EXPECT_TRUE(status.ok()) << status;
+  ports_->Run();
+}
+
+std::string SimulatedService::Submit(const testing::SmallCampaign& campaign) {
+  std::map<std::string, std::string> digests;
+  for (const auto& [path, content] : campaign.files) {
+    digests[path] = campaign::Sha256Hex(content);
+    EXPECT_TRUE(
+        store_->WriteNow([&](store::Transaction& t) { t.PutBlob(digests[path], content); }).ok());
+  }
+  store::Reader reader = Read();
+  const auto outcome =
+      campaign::ReadCampaign(campaign.yaml, "small.yaml", StoredFiles(reader, digests));
+  EXPECT_TRUE(outcome.problems.empty()) << campaign::ToString(outcome.problems.front());
+  std::string id;
+  scheduler_->Submit({.name = "small",
+                      .yaml = campaign.yaml,
+                      .file_name = "small.yaml",
+                      .method = "iterative_bayesian_filter",
+                      .samples = outcome.campaign.samples,
+                      .max_iterations = outcome.campaign.max_iterations},
+                     digests, "", {},
+                     [&id](const absl::StatusOr<std::string>& answer) { id = *answer; });
+  ports_->Run();
+  return id;
+}
+
+std::int64_t SimulatedService::Connect(const std::string& worker, int slots,
+                                       const std::vector<std::int64_t>& held) {
+  v1::Hello hello = testing::MatchingHello(worker, slots);
+  hello.mutable_attempts()->Add(held.begin(), held.end());
+  const absl::Status status = scheduler_->Connected(++last_session_, hello);
+  EXPECT_TRUE(status.ok()) << status;
+  ports_->Run();
+  return last_session_;
+}
+
+v1::ServerMessage SimulatedService::Next(std::int64_t session,
+                                         v1::ServerMessage::MessageCase kind) {
+  auto& inbox = ports_->inbox[session];
+  while (!inbox.empty()) {
+    v1::ServerMessage message = std::move(inbox.front());
+    inbox.pop_front();
+    if (message.message_case() == kind) {
+      return message;
+    }
+  }
+  return {};
+}
+
+void SimulatedService::SendStates(std::int64_t session, const v1::Lease& lease, int first,
+                                  int count) {
+  v1::StateBatch batch;
+  batch.set_attempt(lease.attempt());
+  batch.set_first(first);
+  const std::size_t width = dem::FindTest(lease.spec().test())->observables.size();
+  for (int i = first; i < first + count; ++i) {
+    v1::State& state = *batch.add_states();
+    state.set_load_step(i);
+    for (std::size_t k = 0; k < width; ++k) {
+      state.add_values(Model(lease.spec(), i));
+    }
+  }
+  scheduler_->Receive(session, batch);
+  ports_->Run();
+}
+
+void SimulatedService::SendEnd(std::int64_t session, std::int64_t attempt,
+                               v1::Finished::Outcome outcome, const std::string& reason) {
+  v1::Finished finished;
+  finished.set_attempt(attempt);
+  finished.set_outcome(outcome);
+  finished.set_reason(reason);
+  scheduler_->Receive(session, finished);
+  ports_->Run();
+}
+
+void SimulatedService::Advance(std::chrono::milliseconds time) {
+  ports_->now += time;
+  scheduler_->Tick();
+  ports_->Run();
+}
+
+store::CampaignRecord SimulatedService::Campaign() { return *Read().Campaign(1); }
+
+void SimulatedService::Absorb(Simulated& worker) {
+  for (auto& inbox = ports_->inbox[worker.session]; !inbox.empty(); inbox.pop_front()) {
+    const v1::ServerMessage& message = inbox.front();
+    if (message.has_lease()) {
+      worker.busy[message.lease().attempt()] = {.lease = message.lease()};
+    } else if (message.has_stop()) {
+      worker.busy.erase(message.stop().attempt());
+    } else if (message.has_ack() && (message.ack().refused() || message.ack().finished())) {
+      worker.busy.erase(message.ack().attempt());
+    }
+  }
+}
+
+void SimulatedService::Step(Simulated& worker, std::mt19937& random) {
+  Absorb(worker);
+  if (worker.busy.empty()) {
+    return;
+  }
+  auto chosen = worker.busy.begin();
+  std::advance(chosen, random() % worker.busy.size());
+  Busy& busy = chosen->second;
+  const auto& path = busy.lease.spec().path();
+  const int all =
+      static_cast<int>(std::count_if(path.begin(), path.end(), [](const v1::ControlPoint& point) {
+        return point.load_step() >= 0;
+      }));
+  if (busy.sent < all) {
+    const int count = 1 + static_cast<int>(random() % static_cast<unsigned>(all - busy.sent));
+    SendStates(worker.session, busy.lease, busy.sent, count);
+    busy.sent += count;
+  } else {
+    SendEnd(worker.session, busy.lease.attempt(), v1::Finished::OUTCOME_COMPLETED);
+  }
+}
+
+void SimulatedService::RunToEnd(unsigned seed, bool calm) {
+  std::mt19937 random(seed);
+  std::vector<Simulated> workers(calm ? 1 : 3);
+  const auto name = [](std::size_t i) { return "w" + std::to_string(i); };
+  const auto connect = [&](std::size_t i) {
+    std::vector<std::int64_t> held;
+    for (auto& [attempt, busy] : workers[i].busy) {
+      held.push_back(attempt);
+      busy.sent = 0;  // nothing was acknowledged for certain: all of it again
+    }
+    workers[i].session = Connect(name(i), 2, held);
+  };
+  for (std::size_t i = 0; i < workers.size(); ++i) {
+    connect(i);
+  }
+  for (int step = 0; step < 100'000 && scheduler_->live() > 0; ++step) {
+    const std::size_t i = random() % workers.size();
+    const unsigned trouble = calm ? 1000 : random() % 100;
+    if (trouble == 0) {  // killed and started again
+      workers[i].busy.clear();
+      scheduler_->Disconnected(workers[i].session);
+      connect(i);
+    } else if (trouble == 1) {  // the stream is cut
+      scheduler_->Disconnected(workers[i].session);
+      connect(i);
+    } else if (trouble == 2) {  // silent past its lease
+      Advance(std::chrono::milliseconds(1100));
+      for (Simulated& worker : workers) {
+        scheduler_->Receive(worker.session, v1::Heartbeat());
+      }
+      ports_->Run();
+    } else if (trouble == 3) {  // the server is killed
+      Restart();
+      for (std::size_t k = 0; k < workers.size(); ++k) {
+        connect(k);
+      }
+    } else {
+      Step(workers[i], random);
+    }
+  }
+  EXPECT_EQ(Campaign().progress.state, "finished") << Campaign().progress.reason;
+}
+
+std::string SimulatedService::Fingerprint() {
+  store::Reader reader = Read();
+  std::string text;
+  for (const store::IterationRecord& iteration : *reader.Iterations(1)) {
+    text += iteration.proposal + iteration.posterior.value_or("none") + "\n";
+  }
+  for (const store::SampleRecord& sample : *reader.Samples(1)) {
+    text += std::to_string(sample.sample) + Bytes(sample.parameters) +
+            Bytes({sample.log_weight, sample.log_likelihood}) + "\n";
+  }
+  for (const store::EvaluationRecord& evaluation : *reader.Evaluations(1)) {
+    text += ToString(evaluation.status) + evaluation.reason + "\n";
+  }
+  for (const store::StateRecord& state : *reader.States(1)) {
+    text += std::to_string(state.key.sample) + " " + std::to_string(state.load_step) +
+            Bytes(state.observables) + "\n";
+  }
+  return text;
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,92 @@
+#pragma once
+// The scheduler with everything around it simulated: time, threads, streams and workers. Only the
+// store is real.
+
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "server/scheduler/scheduler.h"
+#include "tests/support/small_campaign.h"
+
+namespace calib::scheduler {
+
+/// Runs continuations when it is told to, in the order in which they were asked for.
+class SimulatedPorts final : public Ports {
+ public:
+  explicit SimulatedPorts(store::Store& store) : store_(store) {}
+
+  /// Until nothing is left to be done.
+  void Run();
+
+  void Write(store::Store::Job job, std::function<void(const absl::Status&)> then) override;
+  absl::StatusOr<store::Reader> Read() override { return store_.Read(); }
+  void Compute(std::function<std::function<void()>()> work) override;
+  void Send(std::int64_t session, v1::ServerMessage message) override;
+  void Close(std::int64_t session, const absl::Status& status) override;
+  std::chrono::steady_clock::time_point Now() override { return now; }
+  std::int64_t UnixMs() override { return 1000; }
+
+  std::chrono::steady_clock::time_point now{};
+  std::map<std::int64_t, std::deque<v1::ServerMessage>> inbox;  ///< by session
+  std::vector<std::int64_t> closed;
+
+ private:
+  store::Store& store_;
+  std::deque<std::function<void()>> tasks_;
+};
+
+/// A store in a fresh file, a scheduler over it and as many workers as wanted; the model is a
+/// closed formula, so that a whole campaign takes milliseconds.
+class SimulatedService {
+ public:
+  explicit SimulatedService(const std::string& name);
+
+  /// A new server process on the same file: memory is gone, streams are cut.
+  void Restart();
+  std::string Submit(const testing::SmallCampaign& campaign);
+  std::int64_t Connect(const std::string& worker, int slots,
+                       const std::vector<std::int64_t>& held = {});
+  /// The next message of this kind for a session, others skipped; an empty message when there is
+  /// none.
+  v1::ServerMessage Next(std::int64_t session, v1::ServerMessage::MessageCase kind);
+  void SendStates(std::int64_t session, const v1::Lease& lease, int first, int count);
+  void SendEnd(std::int64_t session, std::int64_t attempt, v1::Finished::Outcome outcome,
+               const std::string& reason = "");
+  void Advance(std::chrono::milliseconds time);
+  /// Lets workers run, die, fall silent and come back at random until the campaign is over; the
+  /// server is restarted now and then. calm: nothing goes wrong, one worker.
+  void RunToEnd(unsigned seed, bool calm);
+
+  store::CampaignRecord Campaign();
+  /// What the store holds about the campaign's result, with every bit.
+  std::string Fingerprint();
+
+  SimulatedPorts& ports() { return *ports_; }
+  Scheduler& scheduler() { return *scheduler_; }
+  store::Reader Read() { return *store_->Read(); }
+
+ private:
+  struct Busy {
+    v1::Lease lease;
+    int sent = 0;
+  };
+  struct Simulated {
+    std::int64_t session = 0;
+    std::map<std::int64_t, Busy> busy;
+  };
+  void Absorb(Simulated& worker);
+  void Step(Simulated& worker, std::mt19937& random);
+
+  const std::string path_;
+  std::unique_ptr<store::Store> store_;
+  std::unique_ptr<SimulatedPorts> ports_;
+  std::unique_ptr<Scheduler> scheduler_;
+  std::int64_t last_session_ = 0;
+};
+
+}  // namespace calib::scheduler

@@ -1,0 +1,77 @@
+#include "server/scheduler/worker_table.h"
+
+#include <gtest/gtest.h>
+
+namespace calib::scheduler {
+namespace {
+
+using std::chrono::seconds;
+
+constexpr Clock::time_point kStart{};
+
+v1::Hello Hello(const std::string& name, int slots) {
+  v1::Hello hello;
+  hello.set_name(name);
+  hello.set_slots(slots);
+  return hello;
+}
+
+TEST(WorkerTable, WorkGoesToTheWorkerWithMostFreeSlots) {
+  WorkerTable workers;
+  LeaseTable leases(seconds(10));
+  EXPECT_EQ(workers.MostFree(leases, kStart), nullptr);
+  workers.Connect(Hello("a", 1), 1, kStart);
+  workers.Connect(Hello("b", 2), 2, kStart);
+  EXPECT_EQ(workers.MostFree(leases, kStart)->hello.name(), "b");
+  leases.Grant(1, {.campaign = 1, .sample = 0, .experiment = 0}, "b", kStart);
+  EXPECT_EQ(workers.MostFree(leases, kStart)->hello.name(), "a") << "ties go by name";
+  leases.Grant(2, {.campaign = 1, .sample = 1, .experiment = 0}, "a", kStart);
+  leases.Grant(3, {.campaign = 1, .sample = 2, .experiment = 0}, "b", kStart);
+  EXPECT_EQ(workers.MostFree(leases, kStart), nullptr);
+  EXPECT_EQ(workers.Slots(), 3);
+}
+
+TEST(WorkerTable, SilentDrainingAndGoneWorkersGetNothing) {
+  WorkerTable workers;
+  const LeaseTable leases(seconds(10));
+  workers.Connect(Hello("a", 1), 1, kStart);
+  EXPECT_EQ(workers.MostFree(leases, kStart + seconds(1)), nullptr) << "silent";
+  workers.Find("a")->draining = true;
+  EXPECT_EQ(workers.MostFree(leases, kStart), nullptr);
+  workers.Find("a")->draining = false;
+  workers.Disconnect(1);
+  EXPECT_EQ(workers.MostFree(leases, kStart), nullptr);
+}
+
+TEST(WorkerTable, NewStreamReplacesTheOldOne) {
+  WorkerTable workers;
+  EXPECT_EQ(workers.Connect(Hello("a", 1), 1, kStart), 0);
+  EXPECT_EQ(workers.Connect(Hello("a", 1), 2, kStart), 1);
+  workers.Disconnect(1);  // the old stream's end comes late
+  EXPECT_EQ(workers.Find("a")->session, 2);
+  EXPECT_EQ(workers.OfSession(1), nullptr);
+}
+
+TEST(WorkerTable, DrainedWorkerThatIsStartedAgainWorks) {
+  WorkerTable workers;
+  workers.Connect(Hello("a", 1), 1, kStart);
+  workers.Find("a")->draining = true;
+  workers.Connect(Hello("a", 1), 2, kStart);
+  EXPECT_TRUE(workers.Find("a")->draining) << "a lost connection does not end a drain";
+  workers.Find("a")->leaving = true;
+  workers.Connect(Hello("a", 1), 3, kStart);
+  EXPECT_FALSE(workers.Find("a")->draining);
+}
+
+TEST(WorkerTable, GoneWorkersAreForgottenAfterAWhile) {
+  WorkerTable workers;
+  workers.Connect(Hello("a", 1), 1, kStart);
+  workers.ForgetGone(kStart + seconds(1));
+  EXPECT_NE(workers.Find("a"), nullptr) << "it is connected";
+  workers.Disconnect(1);
+  workers.ForgetGone(kStart + seconds(1));
+  EXPECT_EQ(workers.Find("a"), nullptr);
+}
+
+}  // namespace
+}  // namespace calib::scheduler

@@ -1,0 +1,61 @@
+#include "worker/scenario_from_spec.h"
+
+#include <gtest/gtest.h>
+
+#include "server/scheduler/attempt_spec.h"
+
+namespace calib::worker {
+namespace {
+
+TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
+  dem::Scenario scenario;
+  scenario.model = {.contact = "hertz_mindlin",
+                    .effects = {"rolling_resistance", "twisting_resistance"},
+                    .density = 2600.5,
+                    .parameters = {{"young_modulus", 0.1 + 0.2}, {"friction_angle", 0.5}}};
+  scenario.test = "oedometric";
+  scenario.settings = {{"start_pressure", 1e5}};
+  scenario.consolidation.porosity = 0.391;
+  scenario.initial_stress = dem::InitialStress{.axial = 2e5, .lateral = 1e5};
+  scenario.loading_rate = 0.2;
+  scenario.staging = {.rate = 0.1,
+                      .step = 0.002,
+                      .damping_loading = 0.2,
+                      .damping_settling = 0.9,
+                      .unbalanced = 5e-4};
+  scenario.path = {{.target = 0.01, .load_step = 0}, {.target = 0.005, .load_step = -1}};
+  scenario.seed = 18446744073709551615U;
+  const dem::PackingRecipe recipe{.particles = 321, .porosity = 0.4, .seed = 9};
+
+  const v1::AttemptSpec spec = scheduler::ToSpec(scenario, recipe, "oedo");
+  const dem::Scenario back = ScenarioFromSpec(spec);
+  EXPECT_EQ(back.model.contact, scenario.model.contact);
+  EXPECT_EQ(back.model.effects, scenario.model.effects);
+  EXPECT_EQ(back.model.density, scenario.model.density);
+  EXPECT_EQ(back.model.parameters, scenario.model.parameters);
+  EXPECT_EQ(back.settings, scenario.settings);
+  EXPECT_EQ(back.consolidation.porosity, scenario.consolidation.porosity);
+  EXPECT_FALSE(back.consolidation.friction_coefficient.has_value());
+  EXPECT_EQ(back.initial_stress->axial, 2e5);
+  EXPECT_EQ(back.loading_rate, scenario.loading_rate);
+  EXPECT_EQ(back.staging.unbalanced, scenario.staging.unbalanced);
+  ASSERT_EQ(back.path.size(), 2U);
+  EXPECT_EQ(back.path[1].target, 0.005);
+  EXPECT_EQ(back.path[1].load_step, -1);
+  EXPECT_EQ(back.seed, scenario.seed);
+  EXPECT_EQ(RecipeFromMessage(spec.recipe()).particles, 321);
+  // Going round once more changes nothing.
+  EXPECT_EQ(scheduler::SpecDigest(scheduler::ToSpec(back, RecipeFromMessage(spec.recipe()), "x")),
+            scheduler::SpecDigest(spec));
+}
+
+TEST(ScenarioFromSpec, WhatIsNotSetStaysUnset) {
+  const dem::Scenario scenario = ScenarioFromSpec(v1::AttemptSpec());
+  EXPECT_FALSE(scenario.staging.rate.has_value());
+  EXPECT_FALSE(scenario.loading_rate.has_value());
+  EXPECT_FALSE(scenario.initial_stress.has_value());
+  EXPECT_EQ(scenario.threads, 1);
+}
+
+}  // namespace
+}  // namespace calib::worker

@@ -1,0 +1,79 @@
+#include "worker/specimens.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+namespace calib::worker {
+namespace {
+
+constexpr const char* kText = "##PERIODIC:: 1 1 1\n0.5 0.5 0.5 0.1 -1\n";
+
+v1::AttemptSpec Named(const std::string& digest) {
+  v1::AttemptSpec spec;
+  spec.set_packing_digest(digest);
+  return spec;
+}
+
+TEST(Specimens, SlotsShareOneFetch) {
+  std::atomic<int> fetches = 0;
+  Specimens specimens([&](const std::string&, std::stop_token) -> absl::StatusOr<std::string> {
+    ++fetches;
+    return kText;
+  });
+  std::vector<std::shared_ptr<const dem::Packing>> found(4);
+  {
+    std::vector<std::jthread> slots;
+    for (auto& packing : found) {
+      slots.emplace_back([&] { packing = *specimens.Get(Named("a"), {}); });
+    }
+  }
+  EXPECT_EQ(fetches, 1);
+  EXPECT_EQ(found[0]->x.size(), 1U);
+  EXPECT_EQ(found[3], found[0]);
+}
+
+TEST(Specimens, FailureIsNotRemembered) {
+  int fetches = 0;
+  Specimens specimens([&](const std::string&, std::stop_token) -> absl::StatusOr<std::string> {
+    if (++fetches == 1) {
+      return absl::UnavailableError("no server");
+    }
+    return kText;
+  });
+  EXPECT_FALSE(specimens.Get(Named("a"), {}).ok());
+  EXPECT_TRUE(specimens.Get(Named("a"), {}).ok());
+}
+
+TEST(Specimens, UnreadableContentNamesItsLine) {
+  Specimens specimens([](const std::string&, std::stop_token) -> absl::StatusOr<std::string> {
+    return "##PERIODIC:: 1 1 1\n0.5 0.5 x 0.1 -1\n";
+  });
+  const auto packing = specimens.Get(Named("a"), {});
+  EXPECT_EQ(packing.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_NE(packing.status().message().find("line 2"), std::string::npos);
+}
+
+TEST(Specimens, StoppedSlotLeavesWhileTheFetchGoesOn) {
+  std::atomic<bool> fetching = false;
+  Specimens specimens([&](const std::string&, std::stop_token stop) -> absl::StatusOr<std::string> {
+    fetching = true;
+    while (!stop.stop_requested()) {
+      std::this_thread::yield();
+    }
+    return absl::CancelledError("stopped");
+  });
+  absl::Status status;
+  std::jthread slot(
+      [&](std::stop_token stop) { status = specimens.Get(Named("a"), stop).status(); });
+  while (!fetching) {
+    std::this_thread::yield();
+  }
+  slot.request_stop();
+  slot.join();
+  EXPECT_EQ(status.code(), absl::StatusCode::kCancelled);
+}  // the fetch itself ends with the specimens
+
+}  // namespace
+}  // namespace calib::worker
