@@ -1,25 +1,25 @@
 #include "server/campaign/campaign.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace calib::campaign {
-namespace {
-
-// Path length of the control at each reading, from the cleaned path; the reading's index where
-// nothing was controlled.
-std::vector<double> Travelled(const Experiment& experiment) {
+std::vector<double> TravelledControl(const Experiment& experiment, double correlation_length) {
+  constexpr double kClosest = 0.01;
   std::vector<double> travelled;
   double at = experiment.control_start;
   double length = 0;
+  double piece = 0;  // since the last reading
   for (const dem::ControlPoint& point : experiment.path) {
-    length += std::abs(point.target - at);
+    piece += std::abs(point.target - at);
     at = point.target;
-    if (point.load_step >= 0) travelled.push_back(length);
+    if (point.load_step < 0) continue;
+    length += travelled.empty() ? piece : std::max(piece, kClosest * correlation_length);
+    piece = 0;
+    travelled.push_back(length);
   }
   return travelled;
 }
-
-}  // namespace
 
 inference::DataSet MakeDataSet(const Campaign& campaign) {
   inference::DataSet data;
@@ -30,14 +30,17 @@ inference::DataSet MakeDataSet(const Campaign& campaign) {
       data.ess_weights.back().push_back(observable.ess_weight);
     }
     if (experiment.role != Role::kCalibrate) continue;
-    const std::vector<double> travelled = Travelled(experiment);
+    std::vector<std::vector<double>> travelled;
+    for (const MeasuredObservable& observable : experiment.observables) {
+      travelled.push_back(TravelledControl(experiment, observable.correlation_length));
+    }
     for (std::size_t i = 0; i < experiment.control.size(); ++i) {
       for (std::size_t j = 0; j < experiment.observables.size(); ++j) {
         const MeasuredObservable& observable = experiment.observables[j];
         data.readings.push_back({.experiment = static_cast<int>(e),
                                  .observable = static_cast<int>(j),
                                  .load_step = static_cast<int>(i),
-                                 .control = travelled[i],
+                                 .control = travelled[j][i],
                                  .value = observable.values[i],
                                  .sd = observable.sd.empty() ? 0 : observable.sd[i]});
       }

@@ -112,6 +112,11 @@ struct Campaign {
   std::uint64_t seed = 0;
 };
 
+/// Path length of the control at each reading: the distance in the correlation of errors. Readings
+/// closer than 1 % of the correlation length count as that far apart, because errors of two
+/// readings are never quite the same.
+std::vector<double> TravelledControl(const Experiment& experiment, double correlation_length);
+
 /// Readings of the calibrated experiments, flat, in processing order; experiment = index in
 /// campaign.experiments.
 inference::DataSet MakeDataSet(const Campaign& campaign);

@@ -1,6 +1,5 @@
 #include "server/report/comparison.h"
 
-#include <Eigen/Cholesky>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 
@@ -28,17 +27,14 @@ Group MakeGroup(const CampaignView& view, const campaign::Experiment& experiment
   std::vector<double> residual;
   std::vector<double> sd;
   std::vector<double> travelled;
-  double length = 0;
-  double at = experiment.control_start;
+  const std::vector<double> distance =
+      campaign::TravelledControl(experiment, group.observable->correlation_length);
   for (std::size_t i = 0; i < experiment.control.size(); ++i) {
-    const double target = experiment.path[i].target;
-    length += std::abs(target - at);
-    at = target;
     if (!std::isfinite(prediction.mean[i])) continue;
     group.readings.push_back(i);
     residual.push_back(prediction.mean[i] - group.observable->values[i]);
     sd.push_back(ErrorOf(view, *group.observable, i));
-    travelled.push_back(length);
+    travelled.push_back(distance[i]);
   }
   const auto size = static_cast<Eigen::Index>(residual.size());
   group.residual = Eigen::Map<const Eigen::VectorXd>(residual.data(), size);
@@ -47,27 +43,34 @@ Group MakeGroup(const CampaignView& view, const campaign::Experiment& experiment
   return group;
 }
 
-// Sigma_ij = sd_i sd_j exp(-|c_i - c_j| / length).
-Eigen::MatrixXd Covariance(const Group& group, Eigen::Index first, Eigen::Index count) {
+// Correlation of the errors of readings i - 1 and i. exp(-distance / length) along one path is a
+// Markov chain, so that neighbours are all that chi-squared and the variance of a mean need.
+double NeighbourCorrelation(const Group& group, Eigen::Index i) {
   const double length = group.observable->correlation_length;
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(count, count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    for (Eigen::Index j = 0; j < count; ++j) {
-      const double distance = std::abs(group.travelled[first + i] - group.travelled[first + j]);
-      const double rho = i == j ? 1 : (length > 0 ? std::exp(-distance / length) : 0);
-      covariance(i, j) = rho * group.sd[first + i] * group.sd[first + j];
-    }
-    covariance(i, i) *=
-        1 +
-        1e-10;  // readings at one control are perfectly correlated: keep the factorisation alive
-  }
-  return covariance;
+  return length > 0 ? std::exp(-(group.travelled[i] - group.travelled[i - 1]) / length) : 0;
 }
 
+// r^T Sigma^-1 r with Sigma_ij = sd_i sd_j exp(-|c_i - c_j| / length).
 double ChiSquared(const Group& group) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(Covariance(group, 0, group.residual.size()));
-  return factor.info() == Eigen::Success ? factor.matrixL().solve(group.residual).squaredNorm()
-                                         : std::nan("");
+  const Eigen::VectorXd u = group.residual.cwiseQuotient(group.sd);
+  double chi2 = u[0] * u[0];
+  for (Eigen::Index i = 1; i < u.size(); ++i) {
+    const double rho = NeighbourCorrelation(group, i);
+    const double innovation = u[i] - rho * u[i - 1];
+    chi2 += innovation * innovation / (1 - rho * rho);
+  }
+  return chi2;
+}
+
+// Variance of the mean error of readings first .. first + count - 1: the sum of Sigma over count^2.
+double VarianceOfMean(const Group& group, Eigen::Index first, Eigen::Index count) {
+  double sum = 0;
+  double earlier = 0;  // sum over k < i of sd_k correlation(k, i)
+  for (Eigen::Index i = first; i < first + count; ++i) {
+    if (i > first) earlier = (earlier + group.sd[i - 1]) * NeighbourCorrelation(group, i);
+    sum += group.sd[i] * (group.sd[i] + 2 * earlier);
+  }
+  return sum / static_cast<double>(count * count);
 }
 
 double UpperTail(double chi2, double degrees) {
@@ -99,9 +102,7 @@ void AddSegments(const Group& group, bool heldout, bool judged, std::vector<Segm
         .bias = group.residual.segment(first, count).mean(),
         .z = std::nullopt};
     if (judged) {
-      const double variance =
-          Covariance(group, first, count).sum() / static_cast<double>(count * count);
-      misfit.z = misfit.bias / std::sqrt(variance);
+      misfit.z = misfit.bias / std::sqrt(VarianceOfMean(group, first, count));
     }
     out.push_back(std::move(misfit));
     first = end;

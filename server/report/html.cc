@@ -36,7 +36,7 @@ body{margin:0;background:var(--bg);color:var(--ink);font:15px/1.5 system-ui,-app
 main{max-width:1080px;margin:0 auto;padding:28px 24px 60px}
 h1{font-size:26px;line-height:1.25;margin:0 0 4px;overflow-wrap:anywhere}h2{font-size:19px;margin:40px 0 10px;padding-top:14px;border-top:1px solid var(--line)}
 h3{font-size:15px;margin:22px 0 6px}p{margin:6px 0;max-width:75ch}.sub{color:var(--soft)}
-.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:10px;margin:18px 0}
+.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(165px,1fr));gap:10px;margin:18px 0}
 .card{background:var(--card);border:1px solid var(--line);border-radius:8px;padding:10px 12px}
 .card b{display:block;font-size:20px;font-weight:600;font-variant-numeric:tabular-nums}.card span{color:var(--soft);font-size:13px}
 .warn{background:var(--warnbg);border-left:4px solid var(--warn);padding:8px 14px;margin:14px 0;border-radius:0 6px 6px 0}
@@ -47,7 +47,7 @@ th,td{padding:5px 10px;text-align:right;border-bottom:1px solid var(--line);whit
 th{color:var(--soft);font-weight:600;font-size:13px}th:first-child,td:first-child{text-align:left}td.l,th.l{text-align:left}
 td.bad{color:var(--warn);font-weight:600}td.good{color:var(--good)}
 .grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(320px,1fr));gap:16px}
-figure{margin:0}figcaption{font-size:13px;color:var(--soft)}
+figure{margin:0}.fit{grid-template-columns:repeat(auto-fit,minmax(440px,1fr))}figcaption{font-size:13px;color:var(--soft)}
 svg{display:block;max-width:100%;height:auto}svg text{fill:var(--ink);font-size:12px}svg .tick{fill:var(--soft);font-size:11px}
 .axis{stroke:var(--soft);fill:none;stroke-width:1}.gridline{stroke:var(--grid);stroke-width:1}.zero{stroke:var(--soft);stroke-dasharray:3 3}
 .band{fill:var(--band);fill-opacity:.2;stroke:none}.mean{stroke:var(--model);fill:none;stroke-width:2}

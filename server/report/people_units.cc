@@ -25,6 +25,8 @@ DisplayUnit Choose(const std::array<Step, N>& steps, double largest) {
 }
 
 constexpr std::array<Step, 4> kPressures = {{{1, "Pa"}, {1e3, "kPa"}, {1e6, "MPa"}, {1e9, "GPa"}}};
+constexpr std::array<Step, 4> kMoments = {
+    {{1e-9, "nN m/rad"}, {1e-6, "µN m/rad"}, {1e-3, "mN m/rad"}, {1, "N m/rad"}}};
 constexpr std::array<Step, 3> kLengths = {{{1e-6, "µm"}, {1e-3, "mm"}, {1, "m"}}};
 constexpr std::array<Step, 3> kTimes = {{{1e-6, "µs"}, {1e-3, "ms"}, {1, "s"}}};
 
@@ -32,6 +34,7 @@ constexpr std::array<Step, 3> kTimes = {{{1e-6, "µs"}, {1e-3, "ms"}, {1, "s"}}}
 
 DisplayUnit UnitForPeople(const std::string& name, const std::string& si_unit, double largest) {
   if (si_unit == "Pa") return Choose(kPressures, largest);
+  if (si_unit == "N m/rad") return Choose(kMoments, largest);
   if (si_unit == "m") return Choose(kLengths, largest);
   if (si_unit == "s") return Choose(kTimes, largest);
   if (si_unit == "rad") return {180 / std::numbers::pi, "deg"};

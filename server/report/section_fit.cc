@@ -29,6 +29,11 @@ DisplayUnit UnitOf(const std::string& observable, const std::vector<double>& val
   return UnitForPeople(observable, info != nullptr ? info->unit : "1", Largest(values));
 }
 
+// Standard deviations of tempering say nothing about the measurements: they are not drawn.
+bool ErrorsAreKnown(const CampaignView& view) {
+  return view.campaign.filter.noise != inference::NoiseMode::kEssTarget;
+}
+
 struct ControlAxis {
   std::vector<double> values;  // as shown
   std::string label;
@@ -63,7 +68,7 @@ std::string CurvePlot(const ReportData& data, std::size_t e, std::size_t j) {
   plot.AddBand(control.values, Scaled(prediction.q05, unit.factor),
                Scaled(prediction.q95, unit.factor), "band" + css);
   plot.AddLine(control.values, Scaled(prediction.mean, unit.factor), "mean" + css);
-  plot.AddErrorBars(control.values, measured, sd);
+  if (ErrorsAreKnown(data.view)) plot.AddErrorBars(control.values, measured, sd);
   plot.AddPoints(control.values, measured, 2.6);
   return plot.Svg(fmt::format("{}: {}", experiment.name, NameForPeople(observable.name)),
                   "measured points with error bars, posterior mean as a line, 5 to 95 percent of "
@@ -75,33 +80,44 @@ std::string ResidualPlot(const ReportData& data, std::size_t e, std::size_t j) {
   const campaign::MeasuredObservable& observable = experiment.observables[j];
   const ObservablePrediction& prediction = data.predictions[e].observables[j];
   const ControlAxis control = ControlOf(experiment);
+  const bool in_sd = ErrorsAreKnown(data.view);
+  const DisplayUnit unit = UnitOf(observable.name, observable.values);
   std::vector<double> residual;
-  double largest = 3;
+  double largest = in_sd ? 3 : 0;
   for (std::size_t i = 0; i < observable.values.size(); ++i) {
-    residual.push_back((prediction.mean[i] - observable.values[i]) /
-                       ErrorOf(data.view, observable, i));
+    const double scale = in_sd ? 1 / ErrorOf(data.view, observable, i) : unit.factor;
+    residual.push_back((prediction.mean[i] - observable.values[i]) * scale);
     if (std::isfinite(residual.back())) largest = std::max(largest, std::abs(residual.back()));
   }
+  const std::string label =
+      in_sd ? "residual / sd" : "residual" + (unit.label.empty() ? "" : " (" + unit.label + ")");
   Plot plot({.height = 130}, Axis::Covering(control.label, control.values),
-            Axis("residual / sd", -largest, largest, 3));
-  const std::vector<double> ends = {control.values.front(), control.values.back()};
+            Axis(label, -largest, largest, 3));
   plot.AddHorizontal(0);
-  plot.AddHorizontal(2);
-  plot.AddHorizontal(-2);
+  if (in_sd) {
+    plot.AddHorizontal(2);
+    plot.AddHorizontal(-2);
+  }
   plot.AddPoints(control.values, residual, 2.4,
                  experiment.role == campaign::Role::kValidate ? "residual held" : "residual");
   return plot.Svg(
       fmt::format("{}: residuals of {}", experiment.name, NameForPeople(observable.name)),
-      "model minus measurement over the standard deviation of the error; dashed lines at plus and "
-      "minus 2");
+      in_sd ? "model minus measurement over the standard deviation of the error; dashed lines at 0 "
+              "and plus "
+              "and minus 2"
+            : "model minus measurement");
 }
 
 std::string Caption(const ReportData& data, const std::string& experiment,
                     const std::string& observable) {
   for (const ObservableMisfit& misfit : data.comparison.by_observable) {
     if (misfit.experiment != experiment || misfit.observable != observable) continue;
-    std::string text = fmt::format("rms misfit {} sd over {} readings", Number(misfit.rms_error, 3),
-                                   misfit.readings);
+    const dem::ObservableInfo* info = dem::FindObservable(observable);
+    std::string text = fmt::format(
+        "rms residual {} over {} readings",
+        NumberWithUnit(misfit.rms_residual, observable, info != nullptr ? info->unit : "1", 3),
+        misfit.readings);
+    if (ErrorsAreKnown(data.view)) text += fmt::format(", {} sd", Number(misfit.rms_error, 3));
     if (misfit.p_value) text += fmt::format(", p = {}", Number(*misfit.p_value, 2));
     return text;
   }
@@ -153,16 +169,20 @@ std::string SegmentTable(const ReportData& data) {
 }  // namespace
 
 std::string FitSection(const ReportData& data) {
-  std::string html =
-      "<h2>Model against measurements</h2>\n<p class=\"sub\">Points: measured, with one standard "
-      "deviation of the error."
-      "<span class=\"key\" style=\"color:var(--model)\"></span>posterior mean, shaded 5–95&#8201;%."
-      "<span class=\"key\" style=\"color:var(--held)\"></span>held out. Below each curve: "
-      "residuals in standard deviations.</p>\n";
-  if (!data.comparison.note.empty())
+  std::string html = "<h2>Model against measurements</h2>\n<p class=\"sub\">Points: measured";
+  html += ErrorsAreKnown(data.view) ? ", with one standard deviation of the error." : ".";
+  html +=
+      "<span class=\"key\" style=\"color:var(--model)\"></span>posterior mean, shaded: "
+      "5&#8239;%&#8239;to&#8239;95&#8239;%."
+      "<span class=\"key\" style=\"color:var(--held)\"></span>held out. Below each curve: model "
+      "minus "
+      "measurement.</p>\n";
+  if (!data.comparison.note.empty()) {
     html += "<p class=\"sub\">" + Escape(data.comparison.note) + "</p>\n";
-  for (std::size_t e = 0; e < data.view.campaign.experiments.size(); ++e)
+  }
+  for (std::size_t e = 0; e < data.view.campaign.experiments.size(); ++e) {
     html += ExperimentFigures(data, e);
+  }
   return html + SegmentTable(data);
 }
 

@@ -31,8 +31,10 @@ std::string SummarySection(const ReportData& data) {
   if (posterior.parameters_size() > 0) {
     html += "<div class=\"cards\">\n";
     html += Card(posterior.converged() ? "yes" : "not yet", "converged");
-    html += Card(Number(data.comparison.rms_error, 3),
-                 "rms misfit in standard deviations (1: as expected)");
+    if (view.campaign.filter.noise != inference::NoiseMode::kEssTarget) {
+      html += Card(Number(data.comparison.rms_error, 3),
+                   "rms misfit in standard deviations (1: as expected)");
+    }
     if (data.comparison.reduced_chi2)
       html += Card(Number(*data.comparison.reduced_chi2, 3), "reduced chi-squared");
     if (data.comparison.heldout_rms_error) {

@@ -35,12 +35,31 @@ void Plot::AddBand(std::span<const double> x, std::span<const double> low,
                    std::span<const double> high, const std::string& css) {
   std::string there;
   std::string back;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (!std::isfinite(x[i]) || !std::isfinite(low[i]) || !std::isfinite(high[i])) continue;
+  const auto close = [&] {
+    if (!there.empty()) {
+      marks_ += fmt::format("<polygon class=\"{}\" points=\"{}{}\"/>\n", css, there, back);
+    }
+    there.clear();
+    back.clear();
+  };
+  const auto append = [&](std::size_t i) {
     there += fmt::format("{:.2f},{:.2f} ", X(x[i]), Y(high[i]));
     back = fmt::format("{:.2f},{:.2f} ", X(x[i]), Y(low[i])) + back;
+  };
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (!std::isfinite(x[i]) || !std::isfinite(low[i]) || !std::isfinite(high[i])) {
+      close();
+      continue;
+    }
+    // Where x turns back (unloading) a new piece begins, so that no piece folds over itself.
+    const bool turns = i >= 2 && (x[i] - x[i - 1]) * (x[i - 1] - x[i - 2]) < 0;
+    if (turns && !there.empty()) {
+      close();
+      append(i - 1);
+    }
+    append(i);
   }
-  marks_ += fmt::format("<polygon class=\"{}\" points=\"{}{}\"/>\n", css, there, back);
+  close();
 }
 
 void Plot::AddLine(std::span<const double> x, std::span<const double> y, const std::string& css) {

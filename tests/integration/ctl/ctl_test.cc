@@ -62,12 +62,12 @@ seed: 7
 
   Answer Call(const std::string& arguments) const { return CallWith("", arguments); }
 
-  // wrapper: a program that starts calibctl and gives back its exit code (timeout --preserve-status).
+  // wrapper: a program that starts calibctl and gives back its exit code (timeout
+  // --preserve-status).
   Answer CallWith(const std::string& wrapper, const std::string& arguments) const {
-    const std::string command =
-        "cd '" + work_.string() + "' && " + wrapper + " '" + CALIBCTL + "' " + arguments + " >out 2>err </dev/null";
-    const int status = std::system(
-        command.c_str());  // NOLINT(cert-env33-c,concurrency-mt-unsafe): a shell is the point
+    const std::string command = "cd '" + work_.string() + "' && " + wrapper + " '" + CALIBCTL +
+                                "' " + arguments + " >out 2>err </dev/null";
+    const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadAll(work_ / "out"),
             ReadAll(work_ / "err")};
   }
@@ -160,7 +160,8 @@ TEST_F(Calibctl, ACalibrationFromEndToEnd) {
 
 TEST_F(Calibctl, AnInterruptedRunGoesOnToTheSameAnswer) {
   const Json undisturbed = Call("run good.yaml --workers 2 --state s1 --json").json();
-  const Answer stopped = CallWith("timeout --preserve-status -s INT 1.5", "run good.yaml --workers 2 --state s2 --json");
+  const Answer stopped = CallWith("timeout --preserve-status -s INT 1.5",
+                                  "run good.yaml --workers 2 --state s2 --json");
   if (stopped.code != 0) {  // a fast machine may be done already
     EXPECT_EQ(stopped.code, 1) << stopped.err;
     EXPECT_THAT(stopped.err, HasSubstr("`calibctl run good.yaml --state s2` goes on from here"));

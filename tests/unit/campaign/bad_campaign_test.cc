@@ -42,7 +42,8 @@ INSTANTIATE_TEST_SUITE_P(
             "NoSuchContact", "hertz_mindlin\n", "hertz_mindln\n",
             "c.yaml:3: model.contact: 'hertz_mindln' is unknown; did you mean 'hertz_mindlin'?"},
         Mistake{"MistypedEffectIsOneProblem", "[rolling_resistance]", "[roling_resistance]",
-                "c.yaml:4: model.effects: 'roling_resistance' is not an effect of this build; did you mean "
+                "c.yaml:4: model.effects: 'roling_resistance' is not an effect of this build; did "
+                "you mean "
                 "'rolling_resistance'?"},
         Mistake{"EffectTwice", "[rolling_resistance]", "[rolling_resistance, rolling_resistance]",
                 "c.yaml:4: model.effects: rolling_resistance is named twice"},

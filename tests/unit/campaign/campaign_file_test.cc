@@ -90,6 +90,15 @@ TEST(CampaignFile, ValidationDataAreNotFitted) {
   EXPECT_DOUBLE_EQ(data.readings[3].control, -std::log(1 - 0.004));
 }
 
+TEST(CampaignFile, CorrelatedErrorsOfReadingsAtOneControlAreNotTheSame) {
+  Experiment e;
+  e.path = {{.target = 0.01, .load_step = 0},
+            {.target = 0.01, .load_step = 1},
+            {.target = 0.02, .load_step = 2}};
+  EXPECT_THAT(TravelledControl(e, 0), ElementsAre(0.01, 0.01, 0.02));
+  EXPECT_THAT(TravelledControl(e, 0.1), ElementsAre(0.01, 0.011, 0.021));
+}
+
 TEST(CampaignFile, MakesTheScenarioOfASample) {
   const Campaign c = Read(GoodYaml()).campaign;
   const dem::Scenario s = MakeScenario(c, c.experiments[0], {1e9, 0.5, 0.1, 0.2}, 3);

@@ -1,3 +1,5 @@
+#include "server/report/plot/plot.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,6 +31,17 @@ TEST(Axis, SurvivesDegenerateRanges) {
   EXPECT_GT(Axis("", 0, 0).max(), 0);
   EXPECT_FALSE(Axis("", std::nan(""), 1).ticks().empty());
   EXPECT_FALSE(Axis::Covering("", {std::nan("")}).ticks().empty());
+}
+
+TEST(Plot, ABandThatTurnsBackComesInPieces) {
+  Plot plot({}, Axis("x", 0, 4), Axis("y", 0, 2));
+  const std::vector<double> x = {0, 1, 2, 3, 2, 1};
+  plot.AddBand(x, std::vector<double>(6, 0), std::vector<double>(6, 1));
+  const std::string svg = plot.Svg("title <1>", "description");
+  const std::size_t first = svg.find("<polygon");
+  ASSERT_NE(first, std::string::npos);
+  EXPECT_NE(svg.find("<polygon", first + 1), std::string::npos);
+  EXPECT_NE(svg.find("title &lt;1&gt;"), std::string::npos);
 }
 
 TEST(PeopleUnits, ChooseWhatReadsWell) {
