@@ -47,8 +47,9 @@ inference::DataSet MakeDataSet(const Campaign& campaign) {
     }
     for (std::size_t j = 0; j < experiment.observables.size(); ++j) {
       const double length = experiment.observables[j].correlation_length;
-      if (length > 0)
+      if (length > 0) {
         data.correlations.push_back({static_cast<int>(e), static_cast<int>(j), length});
+      }
     }
   }
   return data;
@@ -56,8 +57,9 @@ inference::DataSet MakeDataSet(const Campaign& campaign) {
 
 std::vector<inference::Prior> Priors(const Campaign& campaign) {
   std::vector<inference::Prior> priors;
-  for (const CalibratedParameter& parameter : campaign.parameters)
+  for (const CalibratedParameter& parameter : campaign.parameters) {
     priors.push_back(parameter.prior);
+  }
   return priors;
 }
 
@@ -72,8 +74,9 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
   scenario.settings = experiment.settings;
   if (!experiment.specimens.empty()) {
     const auto index = static_cast<std::size_t>(sample) % experiment.specimens.size();
-    if (const auto* file = std::get_if<PackingFile>(&experiment.specimens[index]))
+    if (const auto* file = std::get_if<PackingFile>(&experiment.specimens[index])) {
       scenario.packing = file->packing;
+    }
   }
   scenario.consolidation = experiment.consolidation;
   scenario.initial_stress = experiment.initial_stress;

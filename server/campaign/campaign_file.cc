@@ -24,8 +24,9 @@ absl::StatusOr<std::string> ExpandPath(const std::string& path) {
   const std::size_t at = path.find(kVariable);
   if (at == std::string::npos) return path;
   const char* value = std::getenv("CALIB_DATA");
-  if (value == nullptr)
+  if (value == nullptr) {
     return absl::NotFoundError("the environment variable CALIB_DATA is not set");
+  }
   return path.substr(0, at) + value + path.substr(at + std::string(kVariable).size());
 }
 
@@ -55,8 +56,9 @@ void ReadName(MapReader& map, Campaign& campaign) {
 // things are left.
 void AskEngine(const MapReader& map, const Campaign& campaign) {
   std::vector<double> middle;
-  for (const CalibratedParameter& parameter : campaign.parameters)
+  for (const CalibratedParameter& parameter : campaign.parameters) {
     middle.push_back(parameter.prior.Quantile(0.5));
+  }
   for (const Experiment& experiment : campaign.experiments) {
     dem::Scenario scenario = MakeScenario(campaign, experiment, middle, 0);
     if (scenario.packing.x.empty()) {  // a recipe, whose packing does not exist yet

@@ -66,8 +66,9 @@ struct HeaderLine {
 
 HeaderLine ReadHeader(int line, std::string_view content) {
   HeaderLine header{line, {}};
-  for (const std::string_view field : SplitFields(content))
+  for (const std::string_view field : SplitFields(content)) {
     header.names.push_back(ColumnName(field));
+  }
   return header;
 }
 

@@ -99,6 +99,7 @@ std::optional<LaboratoryTable> LaboratoryTable::Read(MapReader& experiment,
   const std::string* text = context.ReadNamedFile(*data, "file", *path);
   if (text == nullptr) return std::nullopt;
   std::vector<std::string> wanted_columns;
+  wanted_columns.reserve(wanted.size());
   for (const std::string& name : wanted) wanted_columns.push_back(table.ColumnOf(name));
   std::vector<TableProblem> found;
   table.table_ = std::make_shared<const DataTable>(*text, wanted_columns, found);

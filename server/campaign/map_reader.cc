@@ -161,7 +161,7 @@ std::optional<std::uint64_t> MapReader::Seed(const std::string& key) {
 
 std::optional<std::string> MapReader::Choice(const std::string& key,
                                              const std::vector<std::string>& allowed) {
-  const auto text = Text(key);
+  auto text = Text(key);
   if (!text) return std::nullopt;
   if (std::find(allowed.begin(), allowed.end(), *text) == allowed.end()) {
     Problem(key, absl::StrCat(Quoted(*text), " is unknown; ", Suggestion(*text, allowed)));

@@ -23,8 +23,9 @@ void ProblemList::AddIn(const std::string& file, int line, const std::string& ke
 std::vector<Problem> ProblemList::Sorted() const {
   std::vector<std::string> files = {file_};
   for (const Problem& problem : problems_) {
-    if (std::find(files.begin(), files.end(), problem.file) == files.end())
+    if (std::find(files.begin(), files.end(), problem.file) == files.end()) {
       files.push_back(problem.file);
+    }
   }
   std::vector<Problem> sorted;
   for (const std::string& file : files) {

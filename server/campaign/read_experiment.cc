@@ -23,7 +23,7 @@ std::vector<std::string> TestNames() {
 
 // Names stand in tables, file names and on the command line.
 std::string ReadName(MapReader& map, const Campaign& campaign) {
-  const std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
+  std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
   const auto plain = [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '+';
   };
@@ -34,8 +34,9 @@ std::string ReadName(MapReader& map, const Campaign& campaign) {
                 absl::StrCat(Quoted(name), " is not a short word of letters, digits and _ - . +"));
   }
   for (const Experiment& other : campaign.experiments) {
-    if (!name.empty() && other.name == name)
+    if (!name.empty() && other.name == name) {
       map.Problem("name", absl::StrCat(Quoted(name), " is the name of two experiments"));
+    }
   }
   return name;
 }
@@ -72,13 +73,15 @@ void ReadConsolidation(MapReader& map, Experiment& experiment) {
 void ReadInitialStress(MapReader& map, Experiment& experiment) {
   auto stress = map.Map("initial_stress");
   if (!stress) return;
-  for (const char* key : {"axial", "lateral"})
+  for (const char* key : {"axial", "lateral"}) {
     stress->Require(key, "both principal stresses are needed");
+  }
   const auto axial = stress->Quantity("axial", "Pa", kPositive);
   const auto lateral = stress->Quantity("lateral", "Pa", kPositive);
   stress->Finish();
-  if (axial && lateral)
+  if (axial && lateral) {
     experiment.initial_stress = dem::InitialStress{.axial = *axial, .lateral = *lateral};
+  }
 }
 
 void ReadDamping(MapReader& staging, dem::Staging& out) {
@@ -114,8 +117,9 @@ void ReadStaging(MapReader& map, Experiment& experiment) {
 
 const dem::TestInfo* ReadTest(MapReader& map, const Campaign& campaign, Experiment& experiment) {
   const std::vector<std::string> names = TestNames();
-  if (!campaign.precomputed && map.Require("test", "one of " + Listed(names)) == nullptr)
+  if (!campaign.precomputed && map.Require("test", "one of " + Listed(names)) == nullptr) {
     return nullptr;
+  }
   experiment.test = map.Choice("test", names).value_or("");
   return dem::FindTest(experiment.test);
 }

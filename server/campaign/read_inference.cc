@@ -49,8 +49,9 @@ void ReadFilterOptions(MapReader& map, Campaign& campaign) {
       static_cast<int>(map.Integer("max_components", 1, 1000).value_or(filter.max_components));
   filter.concentration =
       map.Quantity("concentration", "1", kPositive).value_or(filter.concentration);
-  if (map.Choice("design", {"halton", "sobol"}).value_or("halton") == "sobol")
+  if (map.Choice("design", {"halton", "sobol"}).value_or("halton") == "sobol") {
     filter.design = inference::Design::kSobol;
+  }
   if (campaign.filter.noise != NoiseMode::kEssTarget) {
     filter.ess_target = map.Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
   } else if (map.Has("ess_target")) {
@@ -97,8 +98,9 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
   map->Finish();
   // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing
   // to stop.
-  if (campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed)
+  if (campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed) {
     campaign.early_stopping = stopping;
+  }
 }
 
 void ReadFailure(MapReader& campaign_map, Campaign& campaign) {

@@ -23,9 +23,10 @@ ControlSpec ReadControl(MapReader& map, const MeasurementRules& rules, const dem
   const std::string usual = test != nullptr ? test->control : "axial_strain";
   const YamlNode* node = map.Find("control");
   if (node == nullptr) {
-    if (!rules.precomputed)
+    if (!rules.precomputed) {
       map.Problem("control",
                   absl::StrCat("is missing; the model is driven along it, e.g. control: ", usual));
+    }
     return control;
   }
   if (node->kind == YamlNode::Kind::kMap) {
@@ -73,8 +74,9 @@ std::vector<ObservableSpec> ReadObservableNames(MapReader& map) {
   } else if (const auto names = map.TextList("observables")) {
     for (const std::string& name : *names) specs.push_back({name, nullptr});
   }
-  if (specs.empty())
+  if (specs.empty()) {
     map.Problem("observables", "is empty; at least one observable has to be compared");
+  }
   return specs;
 }
 

@@ -26,8 +26,9 @@ std::vector<ModelParameter> ParametersOf(const dem::Model& model) {
   for (const std::string& name : model.effects) {
     const dem::EffectInfo* effect = dem::FindEffect(name);
     if (effect == nullptr) continue;
-    for (const dem::ParameterInfo& info : effect->parameters)
+    for (const dem::ParameterInfo& info : effect->parameters) {
       all.push_back({name + "." + info.name, &info});
+    }
   }
   return all;
 }
@@ -35,6 +36,7 @@ std::vector<ModelParameter> ParametersOf(const dem::Model& model) {
 template <typename Entries>
 std::vector<std::string> NamesOf(const Entries& entries) {
   std::vector<std::string> names;
+  names.reserve(entries.size());
   for (const auto& entry : entries) names.push_back(entry.name);
   return names;
 }
@@ -143,8 +145,9 @@ void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign)
   const dem::ParameterInfo* info =
       dem::FindParameter(campaign.model.contact, campaign.model.effects, name);
   if (info == nullptr) {
-    if (!campaign.model.contact.empty())
+    if (!campaign.model.contact.empty()) {
       parameters.Problem(name, UnknownParameter(name, campaign.model));
+    }
     return;
   }
   parameter.unit = dem::UnitFor(*info, campaign.model.contact);
@@ -226,8 +229,9 @@ void ReadModel(MapReader& campaign_map, Campaign& campaign) {
 
 void ReadParameters(MapReader& campaign_map, Campaign& campaign) {
   if (campaign_map.Require("parameters", "it names what is calibrated, each with its prior") ==
-      nullptr)
+      nullptr) {
     return;
+  }
   auto parameters = campaign_map.Map("parameters");
   if (!parameters) return;
   if (parameters->Keys().empty()) {
@@ -235,14 +239,16 @@ void ReadParameters(MapReader& campaign_map, Campaign& campaign) {
   }
   std::vector<std::string> seen;
   for (const std::string& name : parameters->Keys()) {
-    if (std::find(seen.begin(), seen.end(), name) != seen.end())
+    if (std::find(seen.begin(), seen.end(), name) != seen.end()) {
       continue;  // Finish() reports doubles
-    seen.push_back(name);
+      seen.push_back(name);
+    }
     ReadOne(*parameters, name, campaign);
   }
   parameters->Finish();
-  if (!campaign.precomputed && !campaign.model.contact.empty())
+  if (!campaign.precomputed && !campaign.model.contact.empty()) {
     CheckSources(campaign_map, campaign);
+  }
 }
 
 }  // namespace calib::campaign

@@ -81,6 +81,7 @@ std::vector<double> StandardDeviations(const NoiseSpec& spec, const MapReader& n
     return {};
   }
   std::vector<double> sd;
+  sd.reserve(raw.size());
   for (const double value : raw) sd.push_back(std::hypot(*spec.relative * value, floor));
   return sd;
 }
@@ -123,8 +124,9 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
       noise->Finish();
       if (spec && readable) {
         observable.sd = StandardDeviations(*spec, *noise, name, *table, raw, context);
-        for (std::size_t i = 0; i < observable.sd.size(); ++i)
+        for (std::size_t i = 0; i < observable.sd.size(); ++i) {
           observable.sd[i] *= table->Slope(name, raw[i]);
+        }
       }
     }
     map.Finish();

@@ -108,36 +108,42 @@ class TableReader {
 
   void Read() {
     std::vector<std::string> parameters;
-    for (const CalibratedParameter& parameter : campaign_.parameters)
+    for (const CalibratedParameter& parameter : campaign_.parameters) {
       parameters.push_back(parameter.name);
+    }
     std::vector<std::string> observables;
     for (const Experiment& experiment : campaign_.experiments) {
-      for (const MeasuredObservable& observable : experiment.observables)
+      for (const MeasuredObservable& observable : experiment.observables) {
         observables.push_back(observable.name);
+      }
     }
     CheckNames(map_, "parameter_columns", description_.parameter_columns, parameters);
     CheckNames(map_, "parameter_units", description_.parameter_units, parameters);
     CheckNames(map_, "state_columns", description_.state_columns, observables);
     CheckNames(map_, "state_units", description_.state_units, observables);
     if (const auto table =
-            Open("parameters", description_.parameters, ParameterColumns(parameters)))
+            Open("parameters", description_.parameters, ParameterColumns(parameters))) {
       ReadParameters(*table);
-    if (const auto table = Open("states", description_.states, StateColumns(observables)))
+    }
+    if (const auto table = Open("states", description_.states, StateColumns(observables))) {
       ReadStates(*table);
+    }
   }
 
  private:
   std::vector<std::string> ParameterColumns(const std::vector<std::string>& names) const {
     std::vector<std::string> columns = {description_.sample};
-    for (const std::string& name : names)
+    for (const std::string& name : names) {
       columns.push_back(ColumnOf(description_.parameter_columns, name));
+    }
     return columns;
   }
 
   std::vector<std::string> StateColumns(const std::vector<std::string>& names) const {
     std::vector<std::string> columns = {description_.sample, description_.step};
-    for (const std::string& name : names)
+    for (const std::string& name : names) {
       columns.push_back(ColumnOf(description_.state_columns, name));
+    }
     return columns;
   }
 

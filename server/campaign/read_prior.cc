@@ -28,8 +28,9 @@ PriorKind KindOf(const std::string& name) {
 // A number that has to be there; NaN after a problem.
 double Required(MapReader& map, const std::string& key, const std::string& unit, const Range& range,
                 const std::string& kind) {
-  if (map.Require(key, absl::StrCat("the prior ", kind, " needs it")) == nullptr)
+  if (map.Require(key, absl::StrCat("the prior ", kind, " needs it")) == nullptr) {
     return std::nan("");
+  }
   return map.Quantity(key, unit, range).value_or(std::nan(""));
 }
 

@@ -85,8 +85,9 @@ std::vector<Specimen> ReadFiles(MapReader& experiment, MapReader& packing, const
   if (realizations) paths.resize(static_cast<std::size_t>(*realizations));
   std::vector<Specimen> specimens;
   for (const std::string& path : paths) {
-    if (auto specimen = ReadFile(packing, key, path, context))
+    if (auto specimen = ReadFile(packing, key, path, context)) {
       specimens.push_back(*std::move(specimen));
+    }
   }
   return specimens;
 }
@@ -95,8 +96,10 @@ std::vector<Specimen> ReadFiles(MapReader& experiment, MapReader& packing, const
 
 std::vector<Specimen> ReadSpecimens(MapReader& experiment, ReadContext& context) {
   const auto realizations = experiment.Integer("realizations", 1, kMostRealizations);
-  if (experiment.Require("packing", "{file: ...}, {files: [...]} or {generate: {...}}") == nullptr)
+  if (experiment.Require("packing", "{file: ...}, {files: [...]} or {generate: {...}}") ==
+      nullptr) {
     return {};
+  }
   auto packing = experiment.Map("packing");
   if (!packing) return {};
   const int given = static_cast<int>(packing->Has("file")) +

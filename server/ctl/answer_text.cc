@@ -68,20 +68,23 @@ std::string PosteriorText(const v1::Posterior& posterior,
       posterior.iterations() == 1 ? "" : "s", Number(posterior.ess(), 3),
       Number(posterior.log_evidence(), 5), Number(posterior.log_evidence_se(), 2),
       posterior.model_evaluations());
-  if (posterior.stopped_early() > 0)
+  if (posterior.stopped_early() > 0) {
     text += fmt::format(" ({} stopped early)", posterior.stopped_early());
+  }
   text += ".\n";
   for (const std::string& warning : warnings) text += Wrapped(warning, "! ", "  ");
   return text;
 }
 
 std::string ComparisonText(const report::Comparison& comparison) {
-  if (comparison.by_observable.empty())
+  if (comparison.by_observable.empty()) {
     return "There is nothing to compare yet: no sample with weight has reached a reading.\n";
+  }
   std::string text = fmt::format("Misfit: rms of residual over standard deviation {}",
                                  Number(comparison.rms_error, 3));
-  if (comparison.reduced_chi2)
+  if (comparison.reduced_chi2) {
     text += fmt::format(", reduced chi-squared {}", Number(*comparison.reduced_chi2, 3));
+  }
   if (comparison.p_value) text += fmt::format(" (p = {})", Number(*comparison.p_value, 2));
   text += ".\n";
   if (comparison.heldout_rms_error) {

@@ -17,8 +17,9 @@ using campaign::Quoted;
 
 std::vector<std::string> KnownNames(const campaign::Campaign& campaign) {
   std::vector<std::string> names;
-  for (const campaign::CalibratedParameter& parameter : campaign.parameters)
+  for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
     names.push_back(parameter.name);
+  }
   for (const auto& [name, value] : campaign.model.parameters) names.push_back(name);
   return names;
 }
@@ -59,8 +60,9 @@ absl::StatusOr<std::vector<double>> ApplyAssignments(const std::vector<std::stri
   std::vector<std::string> problems;
   std::map<std::string, double> values;
   for (const std::string& assignment : assignments) {
-    if (std::string problem = Apply(assignment, campaign, values); !problem.empty())
+    if (std::string problem = Apply(assignment, campaign, values); !problem.empty()) {
       problems.push_back(problem);
+    }
   }
   std::vector<double> calibrated;
   for (const campaign::CalibratedParameter& parameter : campaign.parameters) {

@@ -9,8 +9,9 @@ namespace {
 std::string Units(const dem::ParameterInfo& p) {
   if (p.unit_by_contact.empty()) return p.unit;
   std::string text;
-  for (const auto& [contact, unit] : p.unit_by_contact)
+  for (const auto& [contact, unit] : p.unit_by_contact) {
     text += (text.empty() ? "" : ", ") + unit + " (" + contact + ")";
+  }
   return text;
 }
 

@@ -30,8 +30,9 @@ absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const T
   std::vector<std::string> arguments = {"--once", folder + "/spec.json", "-o",
                                         folder + "/states.csv"};
   if (!task.packing.empty()) {
-    if (auto written = WriteFile(folder + "/packing.txt", task.packing); !written.ok())
+    if (auto written = WriteFile(folder + "/packing.txt", task.packing); !written.ok()) {
       return written;
+    }
     arguments.insert(arguments.end(), {"--packing", folder + "/packing.txt"});
   }
   if (!task.vtk.empty()) arguments.insert(arguments.end(), {"--vtk", task.vtk});

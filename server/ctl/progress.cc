@@ -22,19 +22,22 @@ std::string Bar(int done, int of) {
 }  // namespace
 
 std::string ProgressText(const v1::CampaignStatus& s) {
-  if (s.state() != "running" && s.state() != "queued")
+  if (s.state() != "running" && s.state() != "queued") {
     return s.state() + (s.reason().empty() ? "" : ": " + s.reason());
+  }
   std::string text = s.phase() == "validating"
                          ? "held-out tests"
                          : fmt::format("iteration {}/{}", s.iteration() + 1, s.max_iterations());
   text += fmt::format("  {}  {}/{} samples", Bar(s.samples_done(), s.samples()), s.samples_done(),
                       s.samples());
   if (s.samples_running() > 0) text += fmt::format("  {} running", s.samples_running());
-  if (s.samples_stopped_early() > 0)
+  if (s.samples_stopped_early() > 0) {
     text += fmt::format("  {} stopped early", s.samples_stopped_early());
+  }
   if (s.samples_diverged() > 0) text += fmt::format("  {} diverged", s.samples_diverged());
-  if (s.effective_sample_size() > 0)
+  if (s.effective_sample_size() > 0) {
     text += "  ESS " + report::Number(s.effective_sample_size(), 2);
+  }
   if (s.best_misfit() > 0) text += "  best misfit " + report::Number(s.best_misfit(), 2);
   if (s.eta_seconds() > 0) text += "  " + report::Duration(s.eta_seconds()) + " left";
   return text;

@@ -17,8 +17,9 @@ void Print(const std::vector<campaign::Problem>& problems, bool json) {
     std::cout << report::ProblemsJson(problems);
     return;
   }
-  for (const campaign::Problem& problem : problems)
+  for (const campaign::Problem& problem : problems) {
     std::cerr << campaign::ToString(problem) << "\n";
+  }
 }
 
 }  // namespace

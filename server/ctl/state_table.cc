@@ -26,8 +26,9 @@ std::string JoinStateTables(const std::vector<std::pair<std::string, std::string
   csv += "\n";
   for (std::size_t e = 0; e < tables.size(); ++e) {
     std::vector<std::vector<std::string>> columns = {parsed[e]->Texts("load_step")};
-    for (const std::string& observable : observables)
+    for (const std::string& observable : observables) {
       columns.push_back(parsed[e]->Texts(observable));
+    }
     for (std::size_t row = 0; row < parsed[e]->rows(); ++row) {
       csv += tables[e].first;
       for (const auto& column : columns) csv += "," + (column.empty() ? "" : column[row]);

@@ -9,8 +9,9 @@ namespace calib::ctl {
 int Delete(const Arguments& arguments) {
   const auto session = Session::Open(arguments);
   if (!session.ok()) return Fail(session.status());
-  if (auto deleted = (*session)->client().Delete(arguments.campaign); !deleted.ok())
+  if (auto deleted = (*session)->client().Delete(arguments.campaign); !deleted.ok()) {
     return Fail(deleted);
+  }
   if (arguments.json) {
     std::cout << "{\"deleted\": true}\n";
   } else {

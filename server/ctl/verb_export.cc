@@ -18,8 +18,9 @@ namespace {
 std::vector<std::pair<std::string, std::string>> Files(const report::CampaignView& view) {
   const auto predictions = report::PredictReadings(view);
   std::vector<std::string> names;
-  for (const campaign::CalibratedParameter& parameter : view.campaign.parameters)
+  for (const campaign::CalibratedParameter& parameter : view.campaign.parameters) {
     names.push_back(parameter.name);
+  }
   const std::string& id = view.status.campaign();
   return {{"campaign.yaml", view.source.campaign_file()},
           {"status.json", report::StatusJson(view.status)},
@@ -44,13 +45,15 @@ int Export(const Arguments& arguments) {
   const std::filesystem::path folder(arguments.output);
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error)
+  if (error) {
     return Fail(
         absl::PermissionDeniedError(arguments.output + " cannot be made: " + error.message()));
+  }
   const auto files = Files(*view);
   for (const auto& [name, content] : files) {
-    if (auto written = WriteFile((folder / name).string(), content); !written.ok())
+    if (auto written = WriteFile((folder / name).string(), content); !written.ok()) {
       return Fail(written);
+    }
   }
   if (arguments.json) {
     std::cout << "{\"campaign\": \"" << view->status.campaign() << "\", \"files\": " << files.size()

@@ -14,8 +14,9 @@ int Report(const Arguments& arguments) {
   if (!session.ok()) return Fail(session.status());
   const auto view = LoadView((*session)->client(), arguments.campaign);
   if (!view.ok()) return Fail(view.status());
-  if (auto written = WriteFile(arguments.output, report::RenderReport(*view)); !written.ok())
+  if (auto written = WriteFile(arguments.output, report::RenderReport(*view)); !written.ok()) {
     return Fail(written);
+  }
   if (arguments.json) {
     std::cout << "{\"campaign\": \"" << view->status.campaign() << "\", \"written\": true}\n";
   } else {

@@ -88,8 +88,10 @@ int Run(const Arguments& given) {
     const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
     const int workers = given.workers.value_or((*session)->is_guest() ? 0 : cores);
     const bool needed = !source->outcome.campaign.precomputed && workers > 0;
-    if (auto started = needed ? (*session)->StartWorkers(workers) : absl::OkStatus(); !started.ok())
+    if (auto started = needed ? (*session)->StartWorkers(workers) : absl::OkStatus();
+        !started.ok()) {
       return Fail(started);
+    }
     std::cerr << "campaign " << *campaign << " in " << arguments.state << " with "
               << (needed ? workers : 0) << " worker(s)\n";
     status = Follow(**session, *campaign);

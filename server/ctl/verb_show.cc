@@ -37,8 +37,9 @@ int Show(const Arguments& arguments) {
   if (!log.ok()) return Fail(log.status());
   constexpr std::size_t kShown = 10;
   const std::size_t first = log->size() > kShown ? log->size() - kShown : 0;
-  for (std::size_t i = first; i < log->size(); ++i)
+  for (std::size_t i = first; i < log->size(); ++i) {
     std::cout << Clock((*log)[i].unix_ms()) << "  " << (*log)[i].what() << "\n";
+  }
   return kDone;
 }
 

@@ -89,9 +89,10 @@ class Simulation {
     std::error_code error;
     std::filesystem::create_directories(own, error);
     if (!error && !task.vtk.empty()) std::filesystem::create_directories(task.vtk, error);
-    if (error)
+    if (error) {
       return absl::PermissionDeniedError(
           absl::StrCat("a folder cannot be made: ", error.message()));
+    }
     auto started = Evaluation::Start(program, task, own.string());
     if (!started.ok()) return started.status();
     evaluations_.push_back(*std::move(started));
@@ -109,8 +110,9 @@ class Simulation {
                            experiment.control.size());
       done += states;
     }
-    for (const campaign::Experiment& experiment : campaign_.experiments)
+    for (const campaign::Experiment& experiment : campaign_.experiments) {
       of += static_cast<int>(experiment.control.size());
+    }
     line.Show(text + " load steps", 5 * done / std::max(1, of));
   }
 

@@ -25,8 +25,9 @@ int Watch(const Arguments& arguments) {
   if (!ended.ok()) return Fail(ended);
   if (last && arguments.json) std::cout << report::StatusJson(*last);
   const bool good = last && last->state() == "finished";
-  if (last && !arguments.json)
+  if (last && !arguments.json) {
     std::cout << last->campaign() << " is " << ProgressText(*last) << ".\n";
+  }
   return good ? kDone : kFailed;
 }
 

@@ -18,8 +18,9 @@ int Workers(const Arguments& arguments) {
     std::cout << report::WorkersJson(*workers);
     return kDone;
   }
-  if (workers->empty())
+  if (workers->empty()) {
     std::cout << "No worker is connected; start one with `calib-worker --server HOST:PORT`.\n";
+  }
   TextTable table({"<worker", "busy", "slots", "million contacts/s", "<state", "<running"});
   for (const v1::WorkerInfo& w : *workers) {
     std::string running;

@@ -176,8 +176,9 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
     }
   }
   comparison.rms_error = std::sqrt(fitted.squared / fitted.readings);
-  if (heldout.readings > 0)
+  if (heldout.readings > 0) {
     comparison.heldout_rms_error = std::sqrt(heldout.squared / heldout.readings);
+  }
   const int degrees = fitted.readings - static_cast<int>(view.campaign.parameters.size());
   if (judged && degrees > 0) {
     comparison.reduced_chi2 = fitted.chi2 / degrees;

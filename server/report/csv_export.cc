@@ -27,8 +27,9 @@ std::vector<std::string> AllObservables(const CampaignView& view) {
 
 std::string SamplesCsv(const CampaignView& view) {
   std::string csv = "index,iteration,status,weight,log_likelihood";
-  for (const campaign::CalibratedParameter& parameter : view.campaign.parameters)
+  for (const campaign::CalibratedParameter& parameter : view.campaign.parameters) {
     csv += "," + parameter.name;
+  }
   csv += "\n";
   for (const v1::Sample& s : view.samples) {
     csv += fmt::format("{},{},{},{},{}", s.index(), s.iteration(), s.status(), Cell(s.weight()),

@@ -38,8 +38,9 @@ DisplayUnit UnitForPeople(const std::string& name, const std::string& si_unit, d
   if (si_unit == "m") return Choose(kLengths, largest);
   if (si_unit == "s") return Choose(kTimes, largest);
   if (si_unit == "rad") return {180 / std::numbers::pi, "deg"};
-  if (si_unit == "1" || si_unit.empty())
+  if (si_unit == "1" || si_unit.empty()) {
     return name.ends_with("strain") ? DisplayUnit{100, "%"} : DisplayUnit{};
+  }
   return {1, si_unit};
 }
 

@@ -20,8 +20,9 @@ void Place(const campaign::Experiment& experiment, const StateHistory& history, 
     const auto index = static_cast<int>(at - history.observables.begin());
     for (const v1::State& state : history.states) {
       const auto step = static_cast<std::size_t>(state.load_step());
-      if (step < ensemble[j].size() && index < state.values_size())
+      if (step < ensemble[j].size() && index < state.values_size()) {
         ensemble[j][step][column] = state.values(index);
+      }
     }
   }
 }

@@ -53,8 +53,9 @@ std::string CurvePlot(const ReportData& data, std::size_t e, std::size_t j) {
   const ControlAxis control = ControlOf(experiment);
   const bool held = experiment.role == campaign::Role::kValidate;
   std::vector<double> sd;
-  for (std::size_t i = 0; i < observable.values.size(); ++i)
+  for (std::size_t i = 0; i < observable.values.size(); ++i) {
     sd.push_back(ErrorOf(data.view, observable, i) * unit.factor);
+  }
   const std::vector<double> measured = Scaled(observable.values, unit.factor);
   std::vector<double> shown = measured;
   for (const auto* curve : {&prediction.mean, &prediction.q05, &prediction.q95}) {

@@ -51,8 +51,9 @@ std::vector<ParameterPlot> MakeParameterPlots(const CampaignView& view) {
 
 std::vector<double> Weights(const CampaignView& view) {
   std::vector<double> weights;
-  for (const v1::Sample& sample : view.samples)
+  for (const v1::Sample& sample : view.samples) {
     weights.push_back(std::isfinite(sample.weight()) ? sample.weight() : 0);
+  }
   return weights;
 }
 

@@ -76,8 +76,9 @@ std::string RecordSection(const ReportData& data) {
                           experiment.control.size(), SpecimenSentence(experiment),
                           experiment.role == campaign::Role::kValidate ? "held out" : "fitted"));
   }
-  for (const auto& [path, digest] : view.source.files())
+  for (const auto& [path, digest] : view.source.files()) {
     html += Entry("file " + path, "SHA-256 " + digest);
+  }
   html += "</dl>\n";
   if (!view.source.campaign_file().empty()) {
     html += "<details><summary>The campaign file</summary><pre>" +

@@ -35,8 +35,9 @@ std::string SummarySection(const ReportData& data) {
       html += Card(Number(data.comparison.rms_error, 3),
                    "rms misfit in standard deviations (1: as expected)");
     }
-    if (data.comparison.reduced_chi2)
+    if (data.comparison.reduced_chi2) {
       html += Card(Number(*data.comparison.reduced_chi2, 3), "reduced chi-squared");
+    }
     if (data.comparison.heldout_rms_error) {
       html += Card(Number(*data.comparison.heldout_rms_error, 3), "rms misfit of held-out data");
     }

@@ -80,8 +80,9 @@ void Axis::PlaceLogTicks() {
     for (const double digit : {1.0, 2.0, 5.0}) {
       if (many_decades && digit > 1) continue;
       const double value = digit * std::pow(10, decade);
-      if (value >= min_ * (1 - 1e-9) && value <= max_ * (1 + 1e-9))
+      if (value >= min_ * (1 - 1e-9) && value <= max_ * (1 + 1e-9)) {
         ticks_.push_back({value, TickLabel(value)});
+      }
     }
   }
 }

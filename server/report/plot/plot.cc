@@ -65,8 +65,9 @@ void Plot::AddBand(std::span<const double> x, std::span<const double> low,
 void Plot::AddLine(std::span<const double> x, std::span<const double> y, const std::string& css) {
   std::string points;
   for (std::size_t i = 0; i < x.size(); ++i) {
-    if (std::isfinite(x[i]) && std::isfinite(y[i]))
+    if (std::isfinite(x[i]) && std::isfinite(y[i])) {
       points += fmt::format("{:.2f},{:.2f} ", X(x[i]), Y(y[i]));
+    }
   }
   marks_ += fmt::format("<polyline class=\"{}\" points=\"{}\"/>\n", css, points);
 }
@@ -135,19 +136,21 @@ std::string Plot::Frame() const {
     const double at = X(tick.value);
     svg += fmt::format("<path class=\"gridline\" d=\"M{:.2f} {:.2f}V{:.2f}\"/>\n", at, size_.top,
                        floor);
-    if (show_x_)
+    if (show_x_) {
       svg += fmt::format(
           "<text class=\"tick\" x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"middle\">{}</text>\n", at,
           floor + 15, tick.label);
+    }
   }
   for (const Tick& tick : y_.ticks()) {
     const double at = Y(tick.value);
     svg += fmt::format("<path class=\"gridline\" d=\"M{:.2f} {:.2f}H{:.2f}\"/>\n", size_.left, at,
                        right);
-    if (show_y_)
+    if (show_y_) {
       svg += fmt::format(
           "<text class=\"tick\" x=\"{:.2f}\" y=\"{:.2f}\" text-anchor=\"end\">{}</text>\n",
           size_.left - 6, at + 4, tick.label);
+    }
   }
   svg += fmt::format("<path class=\"axis\" d=\"M{:.2f} {:.2f}V{:.2f}H{:.2f}\"/>\n", size_.left,
                      size_.top, floor, right);

@@ -25,8 +25,9 @@ TEST(ControlPath, KeepsAMonotoneControlAsItIs) {
   EXPECT_EQ(Targets(path), readings);
   EXPECT_THAT(path.turning, IsEmpty());
   EXPECT_EQ(path.travelled, readings);
-  for (std::size_t i = 0; i < path.points.size(); ++i)
+  for (std::size_t i = 0; i < path.points.size(); ++i) {
     EXPECT_EQ(path.points[i].load_step, static_cast<int>(i));
+  }
 }
 
 TEST(ControlPath, FindsTurningPointsOfUnloadReloadCycles) {
@@ -66,11 +67,13 @@ TEST(ControlPath, RemovesNoiseButNotTheCycle) {
     ASSERT_EQ(path.turning.size(), 3U);
     EXPECT_NEAR(static_cast<double>(path.turning[0]), 39, 2);
     EXPECT_NEAR(static_cast<double>(path.turning[2]), 119, 2);
-    for (std::size_t i = 0; i < readings.size(); ++i)
+    for (std::size_t i = 0; i < readings.size(); ++i) {
       EXPECT_NEAR(path.points[i].target, readings[i], 1.5e-4);
+    }
     // Monotone between turning points.
-    for (std::size_t i = 1; i < path.turning[0]; ++i)
+    for (std::size_t i = 1; i < path.turning[0]; ++i) {
       EXPECT_GE(path.points[i].target, path.points[i - 1].target);
+    }
   }
 }
 

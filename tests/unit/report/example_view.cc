@@ -54,8 +54,9 @@ StateHistory MakeStates(const double* p, double scale) {
     const double strain = 0.12 * (i + 1) / kReadings;
     v1::State state;
     state.set_load_step(i);
-    for (const double value : {strain, Volume(p, strain), scale * Strength(p, strain)})
+    for (const double value : {strain, Volume(p, strain), scale * Strength(p, strain)}) {
       state.add_values(value);
+    }
     history.states.push_back(std::move(state));
   }
   return history;

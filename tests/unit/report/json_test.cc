@@ -20,8 +20,9 @@ TEST(Json, PosteriorHasTheFieldsOfTheInterface) {
     EXPECT_TRUE(json.contains(field)) << field;
   }
   const Json& p = json["parameters"]["young_modulus"];
-  for (const char* field : {"mean", "sd", "cov", "q05", "q50", "q95", "unit", "at_bound"})
+  for (const char* field : {"mean", "sd", "cov", "q05", "q50", "q95", "unit", "at_bound"}) {
     EXPECT_TRUE(p.contains(field)) << field;
+  }
   EXPECT_EQ(p["mean"].get<double>(), view.posterior.parameters(0).mean());  // bit for bit
 }
 
@@ -41,10 +42,12 @@ TEST(Json, ComparisonHasTheFieldsOfTheInterface) {
                             "by_observable", "by_segment", "parameter_drift"}) {
     EXPECT_TRUE(json.contains(field)) << field;
   }
-  for (const char* field : {"experiment", "observable", "rms_error", "z", "p_value"})
+  for (const char* field : {"experiment", "observable", "rms_error", "z", "p_value"}) {
     EXPECT_TRUE(json["by_observable"][0].contains(field));
-  for (const char* field : {"experiment", "observable", "segment", "from", "to", "bias", "z"})
+  }
+  for (const char* field : {"experiment", "observable", "segment", "from", "to", "bias", "z"}) {
     EXPECT_TRUE(json["by_segment"][0].contains(field));
+  }
 }
 
 TEST(Json, CataloguesHaveNamesAndParameters) {

@@ -27,8 +27,9 @@ TEST(Report, EveryPictureHasATitleForScreenReaders) {
   const std::string html = RenderReport(testing::ExampleView("sand"));
   const auto count = [&html](const std::string& what) {
     int n = 0;
-    for (std::size_t at = html.find(what); at != std::string::npos; at = html.find(what, at + 1))
+    for (std::size_t at = html.find(what); at != std::string::npos; at = html.find(what, at + 1)) {
       ++n;
+    }
     return n;
   };
   EXPECT_GT(count("<svg "), 15);

@@ -39,7 +39,7 @@ TEST(EarlyStopping, SavesStatesAndLosesNoMoreThanItStates) {
   EXPECT_LE(with.stated_loss(), kAllowed);
   EXPECT_LT(stopping.Read().States(1)->size(), full.Read().States(1)->size());
   // The first iteration has nothing to compare with, so none of its samples is stopped.
-  for (const store::EvaluationRecord& evaluation : *stopping.Read().Evaluations(1)) {
+  for (const store::EvaluationRecord& evaluation : Value(stopping.Read().Evaluations(1))) {
     if (evaluation.key.sample < 40) {
       EXPECT_EQ(evaluation.status, store::EvaluationStatus::kFinished);
     }
@@ -69,7 +69,7 @@ TEST(EarlyStopping, SameBitsWhateverGoesWrong) {
 TEST(EarlyStopping, ThresholdIsNeverSetWithoutAFinishedSample) {
   SimulatedService service("thresholds");
   service.Submit(Campaign(kStopping));
-  for (const store::SampleRecord& sample : *service.Read().Samples(1)) {
+  for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
     EXPECT_TRUE(std::isnan(sample.stop_below));
   }
 }

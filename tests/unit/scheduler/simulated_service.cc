@@ -247,17 +247,17 @@ void SimulatedService::RunToEnd(unsigned seed, bool calm) {
 std::string SimulatedService::Fingerprint() {
   store::Reader reader = Read();
   std::string text;
-  for (const store::IterationRecord& iteration : *reader.Iterations(1)) {
+  for (const store::IterationRecord& iteration : Value(reader.Iterations(1))) {
     text += iteration.proposal + iteration.posterior.value_or("none") + "\n";
   }
-  for (const store::SampleRecord& sample : *reader.Samples(1)) {
+  for (const store::SampleRecord& sample : Value(reader.Samples(1))) {
     text += std::to_string(sample.sample) + Bytes(sample.parameters) +
             Bytes({sample.log_weight, sample.log_likelihood}) + "\n";
   }
-  for (const store::EvaluationRecord& evaluation : *reader.Evaluations(1)) {
+  for (const store::EvaluationRecord& evaluation : Value(reader.Evaluations(1))) {
     text += ToString(evaluation.status) + evaluation.reason + "\n";
   }
-  for (const store::StateRecord& state : *reader.States(1)) {
+  for (const store::StateRecord& state : Value(reader.States(1))) {
     text += std::to_string(state.key.sample) + " " + std::to_string(state.load_step) +
             Bytes(state.observables) + "\n";
   }

@@ -8,12 +8,20 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/scheduler/scheduler.h"
+#include "tests/support/client.h"
 #include "tests/support/small_campaign.h"
 
 namespace calib::scheduler {
+
+/// What a test knows to be there, by value.
+template <typename T>
+T Value(absl::StatusOr<T> result) {
+  return *std::move(result);
+}
 
 /// Runs continuations when it is told to, in the order in which they were asked for.
 class SimulatedPorts final : public Ports {
