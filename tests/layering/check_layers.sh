@@ -7,16 +7,16 @@ cd "$root"
 
 # folder | own headers it may include (prefixes) | libraries it may include (regular expression; - for none of the watched)
 table='
-dem/catalog       dem/catalog/                                                        -
+dem/catalog       dem/                                                                -
 dem               dem/                                                                -
 inference         inference/                                                          -
-proto/rpc         proto/rpc/,calib/v1/                                                grpcpp
+proto/rpc         proto/rpc/,calib/v1/                                                grpcpp|chrono
 worker            worker/,dem/,proto/rpc/,calib/v1/                                   grpcpp|spdlog|chrono|CLI
 server/campaign   server/campaign/,dem/,inference/                                    yaml-cpp
 server/store      server/store/,server/campaign/,inference/                           SQLiteCpp|sqlite3|chrono|spdlog
 server/scheduler  server/scheduler/,server/store/,server/campaign/,inference/,dem/,calib/v1/   chrono|spdlog|nlohmann
 server/report     server/report/,server/campaign/,inference/,dem/catalog/,calib/v1/   nlohmann|chrono
-server/service    server/service/,server/scheduler/,server/store/,server/campaign/,inference/,dem/,proto/rpc/,calib/v1/  grpcpp|spdlog|chrono
+server/service    server/service/,server/scheduler/,server/store/,server/campaign/,inference/,dem/,proto/rpc/,calib/v1/  grpcpp|spdlog|chrono|nlohmann
 server/ctl        server/,proto/rpc/,calib/v1/,dem/catalog/,dem/simulation/,inference/  grpcpp|CLI|nlohmann|chrono|spdlog
 server            server/service/,server/store/,server/scheduler/                     spdlog|CLI|chrono
 '

@@ -12,6 +12,7 @@
 namespace calib::campaign {
 namespace {
 
+using ::testing::DoubleEq;
 using ::testing::ElementsAre;
 using testing::GoodFiles;
 using testing::GoodYaml;
@@ -96,7 +97,8 @@ TEST(CampaignFile, CorrelatedErrorsOfReadingsAtOneControlAreNotTheSame) {
             {.target = 0.01, .load_step = 1},
             {.target = 0.02, .load_step = 2}};
   EXPECT_THAT(TravelledControl(e, 0), ElementsAre(0.01, 0.01, 0.02));
-  EXPECT_THAT(TravelledControl(e, 0.1), ElementsAre(0.01, 0.011, 0.021));
+  EXPECT_THAT(TravelledControl(e, 0.1),
+              ElementsAre(DoubleEq(0.01), DoubleEq(0.011), DoubleEq(0.021)));
 }
 
 TEST(CampaignFile, MakesTheScenarioOfASample) {

@@ -8,7 +8,7 @@
 namespace calib::worker {
 namespace {
 
-constexpr const char* kText = "##PERIODIC:: 1 1 1\n0.5 0.5 0.5 0.1 -1\n";
+constexpr const char* kText = "##PERIODIC:: 1 1 1\n0.5 0.5 0.5 0.1 -1\n0.2 0.2 0.2 0.1 -1\n";
 
 v1::AttemptSpec Named(const std::string& digest) {
   v1::AttemptSpec spec;
@@ -30,7 +30,7 @@ TEST(Specimens, SlotsShareOneFetch) {
     }
   }
   EXPECT_EQ(fetches, 1);
-  EXPECT_EQ(found[0]->x.size(), 1U);
+  EXPECT_EQ(found[0]->x.size(), 2U);
   EXPECT_EQ(found[3], found[0]);
 }
 
