@@ -40,30 +40,32 @@ absl::Status Unreachable(double porosity, double lowest, double highest) {
                    lowest, " .. ", highest));
 }
 
-/// One attempt to pass a porosity by lowering friction.
+/// Compaction at constant isotropic pressure by lowering friction, and what stops it.
 class Compaction {
  public:
   Compaction(double pressure, QuasiStatic& stages)
       : target_(Isotropic(pressure)),
         stages_(stages),
-        friction_(stages.assembly().sliding_friction()) {}
+        friction_(stages.assembly().sliding_friction()),
+        lowered_(friction_) {}
 
-  /// Lowers friction until the porosity is at most `threshold` or friction has gone; the assembly
-  /// is left there with the lowered friction. Leaves in `above` the last settled state above the
-  /// threshold.
-  StageEnd LowerTo(double threshold, Assembly& above) {
+  /// Multiplies friction by `factor` again and again, settling roughly in between, until the
+  /// porosity is at most `threshold` or friction has gone. Starts one such step above where the
+  /// last call ended. The assembly keeps the lowered friction.
+  StageEnd LowerTo(double threshold, double factor) {
     Assembly& assembly = stages_.assembly();
     const StageOptions restore = stages_.options();
     stages_.options().unbalanced = kIntermediate * restore.unbalanced;
     stages_.options().least_volume = assembly.solid_volume() / (1 - threshold);
+    assembly.SetSlidingFriction(std::min(friction_, lowered_ / factor));
     StageEnd end = StageEnd::kDone;
     while (end == StageEnd::kDone && Porosity(assembly) > threshold &&
            assembly.sliding_friction() > 0) {
-      above = assembly;
-      const double lower = 0.5 * assembly.sliding_friction();
+      const double lower = factor * assembly.sliding_friction();
       assembly.SetSlidingFriction(lower > kSmallestFriction ? lower : 0.0);
       end = stages_.MoveTo(target_);
     }
+    lowered_ = std::max(assembly.sliding_friction(), kSmallestFriction);
     stages_.options() = restore;
     return end;
   }
@@ -81,56 +83,60 @@ class Compaction {
   }
 
  private:
-  /// Between two halvings a rough balance is enough.
+  /// Between two reductions a rough balance is enough.
   static constexpr double kIntermediate = 10;
 
   CellTarget target_;
   QuasiStatic& stages_;
-  double friction_;
+  double friction_;  ///< that the assembly came with
+  double lowered_;   ///< where the last LowerTo ended
 };
 
 }  // namespace
 
 absl::Status LowerFrictionToPorosity(double porosity, double pressure, QuasiStatic& stages,
                                      StageEnd& end) {
-  constexpr int kAttempts = 20;
+  constexpr int kAttempts = 60;
   Assembly& assembly = stages.assembly();
   const double highest = Porosity(assembly);
   Compaction compaction(pressure, stages);
+  Assembly above = assembly;    // the densest frozen state so far that is not too dense
+  double threshold = porosity;  // porosity at which compaction is stopped; it goes on a little
+  double factor = 0.5;
+  bool passed = highest >= porosity - kPorosityTolerance;
   end = StageEnd::kDone;
-  double threshold = porosity;
-  double closest = highest;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+  for (int attempt = 0; passed && attempt < kAttempts; ++attempt) {
     const double settled = Porosity(assembly);
     if (std::abs(settled - porosity) <= kPorosityTolerance) {
       return absl::OkStatus();
     }
-    closest = settled;
-    if (highest < porosity || (settled > porosity && assembly.sliding_friction() == 0)) {
-      break;
-    }
-    Assembly above = assembly;
-    end = compaction.LowerTo(threshold, above);
-    if (end != StageEnd::kDone) {
-      return absl::OkStatus();
-    }
-    if (Porosity(assembly) > threshold) {
-      break;  // friction has gone and the target lies below
-    }
-    end = compaction.Freeze();
-    if (end != StageEnd::kDone) {
-      return absl::OkStatus();
-    }
-    if (const double frozen = Porosity(assembly); frozen < porosity - kPorosityTolerance) {
-      threshold += porosity - frozen;  // compaction goes on a little while friction comes back
+    if (settled > porosity && settled < Porosity(above)) {
+      above = assembly;
+      threshold = porosity;
+    } else if (settled < porosity) {  // too far: stop earlier, and go more gently
+      threshold = std::min(threshold + (porosity - settled), 0.5 * (threshold + Porosity(above)));
+      factor = std::min(std::sqrt(factor), 0.97);
       assembly = above;
     }
+    end = compaction.LowerTo(threshold, factor);
+    passed = Porosity(assembly) <= threshold;
+    if (end == StageEnd::kDone && passed) {
+      end = compaction.Freeze();
+    }
+    if (end != StageEnd::kDone) {
+      return absl::OkStatus();
+    }
+  }
+  if (passed) {
+    return absl::OutOfRangeError(absl::StrCat("porosity ", porosity,
+                                              " cannot be met: the packing jumps from ",
+                                              Porosity(above), " to ", Porosity(assembly)));
   }
   end = compaction.Densest();
   if (end != StageEnd::kDone) {
     return absl::OkStatus();
   }
-  return Unreachable(porosity, std::min(closest, Porosity(assembly)), highest);
+  return Unreachable(porosity, Porosity(assembly), highest);
 }
 
 absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, StageEnd& end) {

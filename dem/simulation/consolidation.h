@@ -26,11 +26,13 @@ inline constexpr double kPorosityTolerance = 1e-4;
 /// lowering friction cannot reach the porosity.
 absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, StageEnd& end);
 
-/// Halves friction again and again at constant isotropic pressure, settling in between, until the
-/// porosity passes the target; there the friction that the assembly came with is put back, which
-/// stops the compaction. Repeated from the last state above the target with a corrected moment
-/// until the settled porosity is within kPorosityTolerance. Errors: OUT_OF_RANGE as above.
-/// Precondition: settled at the pressure.
+/// Lowers friction step by step at constant isotropic pressure, settling in between, until the
+/// porosity passes a threshold near the target; there the friction that the assembly came with is
+/// put back, which stops the compaction. A state that came out too loose is where the next attempt
+/// starts; one too dense is discarded, and the next attempt stops earlier and goes more gently.
+/// Ends within kPorosityTolerance, with the original friction. Errors: OUT_OF_RANGE with the
+/// attainable range, or with the two states between which a small packing jumps. Precondition:
+/// settled at the pressure.
 absl::Status LowerFrictionToPorosity(double porosity, double pressure, QuasiStatic& stages,
                                      StageEnd& end);
 

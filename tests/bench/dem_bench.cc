@@ -57,7 +57,7 @@ void ContactUpdates(benchmark::State& state, bool moments) {
   const std::int64_t updates = assembly.contact_updates();
   const std::int64_t steps = assembly.steps();
   const Motion motion{.stretch = {0.05, 0.05, -0.1}, .dt = stages.time_step(), .damping = 0.2};
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     assembly.Move(motion);
     if (!assembly.EvaluateForces().ok()) {
       state.SkipWithError("diverged");
