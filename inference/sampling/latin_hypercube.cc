@@ -24,9 +24,10 @@ int Below(PhiloxStream& stream, int n) {
 std::vector<int> Permutation(PhiloxStream& stream, int n) {
   std::vector<int> order(static_cast<std::size_t>(n));
   std::iota(order.begin(), order.end(), 0);
-  for (int i = n - 1; i > 0; --i)
+  for (int i = n - 1; i > 0; --i) {
     std::swap(order[static_cast<std::size_t>(i)],
               order[static_cast<std::size_t>(Below(stream, i + 1))]);
+  }
   return order;
 }
 
