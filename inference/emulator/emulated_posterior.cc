@@ -8,6 +8,7 @@
 #include "absl/strings/str_format.h"
 #include "inference/data/gaussian_likelihood.h"
 #include "inference/emulator/emulated_likelihood.h"
+#include "inference/filter/parameter_summary.h"
 #include "inference/filter/weighted_moments.h"
 #include "inference/sampling/philox.h"
 #include "inference/tmcmc/tmcmc.h"
@@ -64,23 +65,6 @@ absl::StatusOr<Runs> CollectRuns(std::span<const Prior> priors, const DataSet& d
 // f = 1 / z^2 per group; the columns after the parameters hold z.
 Eigen::MatrixXd Factors(const Eigen::MatrixXd& points, Index d) {
   return points.rightCols(points.cols() - d).array().square().max(1e-12).inverse();
-}
-
-ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weights,
-                           const Eigen::VectorXd& values) {
-  ParameterSummary summary;
-  summary.mean = values.mean();
-  summary.sd = std::sqrt((values.array() - summary.mean).square().mean());
-  summary.cov = summary.sd / std::abs(summary.mean);
-  summary.q05 = WeightedQuantile(log_weights, values, 0.05);
-  summary.q50 = WeightedQuantile(log_weights, values, 0.5);
-  summary.q95 = WeightedQuantile(log_weights, values, 0.95);
-  summary.prior_sd = prior.StandardDeviation();
-  const auto tenth = static_cast<double>(values.size()) / 10;
-  summary.at_bound =
-      static_cast<double>((values.array() <= prior.Quantile(0.02)).count()) > tenth ||
-      static_cast<double>((values.array() >= prior.Quantile(0.98)).count()) > tenth;
-  return summary;
 }
 
 // Histories of the model at the draws: the mean history and what is not known of it.

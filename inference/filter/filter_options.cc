@@ -38,7 +38,8 @@ bool MeansConverged(const Posterior& before, const Posterior& now, const FilterO
     const ParameterSummary& parameter = now.parameters[j];
     const double scale = std::max(std::abs(parameter.mean), 0.1 * parameter.prior_sd);
     const double change = std::abs(parameter.mean - before.parameters[j].mean);
-    if (!(change <= options.tolerance * scale)) return false;
+    const double immaterial = options.noise == NoiseMode::kEssTarget ? 0 : parameter.sd / 3;
+    if (!(change <= std::max(options.tolerance * scale, immaterial))) return false;
   }
   return true;
 }

@@ -94,6 +94,14 @@ int MostComponents(const FilterOptions& options, const WeightedPoints& points) {
 
 }  // namespace
 
+absl::StatusOr<double> GuidingExponent(std::span<const Prior> priors, const DataSet& data,
+                                       const FilterOptions& options,
+                                       std::span<const Iteration> iterations) {
+  const auto ensemble = MakeEnsemble(priors, data, options, iterations);
+  if (!ensemble.ok()) return ensemble.status();
+  return TemperingExponent(options, *ensemble);
+}
+
 absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSet& data,
                                      const FilterOptions& options,
                                      std::span<const Iteration> iterations) {

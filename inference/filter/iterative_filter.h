@@ -96,7 +96,12 @@ struct Posterior {
   double pareto_k = 0;          ///< tail index of the weights; > 0.7: they cannot be trusted
   std::optional<double> sigma;  ///< kEssTarget: the sigma found
   PosteriorPath path;
-  std::vector<std::string> warnings;  ///< whole sentences: weight degeneracy and what to do, ...
+  std::vector<std::string> warnings;  ///< whole sentences: diverged samples, tempering, ...
+  /// Empty: the weights carry the posterior. Otherwise a sentence saying why not: fewer than 50
+  /// effective samples or a Pareto index above 0.7; sd, quantiles and evidence above are then
+  /// fiction and the posterior should be sampled on an emulator (emulator/emulated_posterior.h).
+  /// Always empty with kEssTarget, whose weights are tempered until they suffice.
+  std::string degeneracy;
 };
 
 /// ln (prior / proposal) of every sample of all iterations in order, the weight before any reading
@@ -127,6 +132,13 @@ absl::StatusOr<Posterior> ComputePosterior(std::span<const Prior> priors, const 
                                            const FilterOptions& options,
                                            std::span<const Iteration> iterations);
 
+/// The exponent in (0, 1] of the likelihood whose weights guide what comes next (proposal, early
+/// stopping): the largest that leaves ess_target of one iteration's samples effective; 1 where the
+/// plain weights do, and with kEssTarget. Errors as ComputePosterior.
+absl::StatusOr<double> GuidingExponent(std::span<const Prior> priors, const DataSet& data,
+                                       const FilterOptions& options,
+                                       std::span<const Iteration> iterations);
+
 /// Proposal of the next iteration: variational Dirichlet-process mixture fitted to the tempered
 /// weights of all iterations (kEssTarget: the weights of the last). Errors as ComputePosterior.
 absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSet& data,
@@ -135,8 +147,9 @@ absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSe
 
 /// True when every posterior mean moved by less than options.tolerance relative to itself [Table 1,
 /// step 7], or, where it lies closer to zero than a tenth of the prior's sd, relative to that
-/// tenth. It says nothing about the weights: means can stand still because one sample carries them
-/// all, so look at Posterior::ess and pareto_k too.
+/// tenth; or by less than a third of its posterior sd, a move nobody can act on (not with
+/// kEssTarget, whose sd is no uncertainty). It says nothing about the weights: means can stand
+/// still because one sample carries them all, so look at Posterior::degeneracy too.
 bool MeansConverged(const Posterior& before, const Posterior& now, const FilterOptions& options);
 
 /// State of the running iteration from the readings that have arrived, for the live view: only load

@@ -9,6 +9,7 @@
 #include "inference/filter/ensemble.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/filter/log_weights.h"
+#include "inference/filter/parameter_summary.h"
 #include "inference/filter/sequential_filter.h"
 #include "inference/filter/weighted_moments.h"
 
@@ -18,33 +19,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastEss = 50;
 constexpr double kLargestParetoIndex = 0.7;
-constexpr double kOuterShare = 0.02;  // of the prior's probability at one end
-constexpr double kBoundShare = 0.1;   // of the posterior's
-
-double MassWhere(const Eigen::VectorXd& log_weights, const Eigen::VectorXd& values, double low,
-                 double high) {
-  double mass = 0;
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (values[i] >= low && values[i] <= high) mass += std::exp(log_weights[i]);
-  }
-  return mass;
-}
-
-ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weights,
-                           const Eigen::VectorXd& values, double mean, double variance) {
-  ParameterSummary summary;
-  summary.mean = mean;
-  summary.sd = std::sqrt(variance);
-  summary.cov = summary.sd / std::abs(mean);
-  summary.q05 = WeightedQuantile(log_weights, values, 0.05);
-  summary.q50 = WeightedQuantile(log_weights, values, 0.5);
-  summary.q95 = WeightedQuantile(log_weights, values, 0.95);
-  summary.prior_sd = prior.StandardDeviation();
-  summary.at_bound =
-      MassWhere(log_weights, values, -kInfinity, prior.Quantile(kOuterShare)) > kBoundShare ||
-      MassWhere(log_weights, values, prior.Quantile(1 - kOuterShare), kInfinity) > kBoundShare;
-  return summary;
-}
 
 PosteriorPath MakePath(const DataSet& data, const Ensemble& ensemble) {
   const StepOffsets steps = LoadSteps(data);
@@ -93,20 +67,20 @@ std::vector<std::string> Warnings(const FilterOptions& options, const Ensemble& 
                                       "with the most effective samples was taken; "
                                       "more samples or a larger defensive share would help."));
     }
-    return warnings;
-  }
-  const bool heavy = posterior.pareto_k > kLargestParetoIndex;
-  if (posterior.ess < kLeastEss || heavy) {
-    warnings.push_back(
-        absl::StrCat("The posterior rests on ", std::floor(posterior.ess * 10) / 10,
-                     " effective samples of ", total, " and the Pareto index of its weights is ",
-                     std::round(posterior.pareto_k * 100) / 100, " (wanted: at least ", kLeastEss,
-                     " and at most ", kLargestParetoIndex,
-                     "); standard deviations, quantiles and evidence are not reliable. Run more "
-                     "iterations or samples, or "
-                     "sample the posterior on an emulator of the model."));
   }
   return warnings;
+}
+
+// Empty where the weights are enough.
+std::string Degeneracy(const FilterOptions& options, const Ensemble& ensemble,
+                       const Posterior& posterior) {
+  const bool heavy = posterior.pareto_k > kLargestParetoIndex;
+  if (options.noise == NoiseMode::kEssTarget || (posterior.ess >= kLeastEss && !heavy)) return "";
+  return absl::StrCat("The weighted samples alone do not make a posterior: ",
+                      std::floor(posterior.ess * 10) / 10, " of ", ensemble.log_start.size(),
+                      " are effective and the Pareto index of their weights is ",
+                      std::round(posterior.pareto_k * 100) / 100, " (wanted: at least ", kLeastEss,
+                      " and at most ", kLargestParetoIndex, ").");
 }
 
 }  // namespace
@@ -127,7 +101,7 @@ absl::StatusOr<Posterior> ComputePosterior(std::span<const Prior> priors, const 
   const Eigen::MatrixXd covariance = WeightedCovariance(log_weights, ensemble->parameters, mean);
   for (Eigen::Index j = 0; j < mean.size(); ++j) {
     posterior.parameters.push_back(
-        Summarize(priors[j], log_weights, ensemble->parameters.col(j), mean[j], covariance(j, j)));
+        Summarize(priors[j], log_weights, ensemble->parameters.col(j)));
   }
   posterior.correlation = CorrelationOf(covariance);
   const EvidenceEstimate evidence = ImportanceEvidence(unnormalized);
@@ -138,6 +112,7 @@ absl::StatusOr<Posterior> ComputePosterior(std::span<const Prior> priors, const 
   posterior.sigma = ensemble->sigma;
   posterior.path = MakePath(data, *ensemble);
   posterior.warnings = Warnings(options, *ensemble, posterior);
+  posterior.degeneracy = Degeneracy(options, *ensemble, posterior);
   return posterior;
 }
 

@@ -57,15 +57,17 @@ std::string PosteriorText(const v1::Posterior& posterior,
     const auto shown = [&unit](double value, int digits) {
       return Number(value * unit.factor, digits);
     };
-    table.AddRow({p.name(), shown(p.mean(), 4), shown(p.sd(), 2), Number(100 * p.cov(), 2) + " %",
+    table.AddRow({p.name(), shown(p.mean(), 4), shown(p.sd(), 2), report::Percent(p.cov(), 2),
                   shown(p.q05(), 4), shown(p.q50(), 4), shown(p.q95(), 4), unit.label,
                   p.at_bound() ? "at a bound of the prior" : ""});
   }
   std::string text = table.ToString();
   text += fmt::format(
-      "\n{} after {} iteration{}; {} effective samples, log evidence {} ± {}, {} model evaluations",
+      "\n{} after {} iteration{}; {} effective samples{}, log evidence {} ± {}, {} model "
+      "evaluations",
       posterior.converged() ? "Converged" : "Not converged", posterior.iterations(),
       posterior.iterations() == 1 ? "" : "s", Number(posterior.ess(), 3),
+      posterior.posterior_from() == "emulator" ? ", posterior sampled on an emulator" : "",
       Number(posterior.log_evidence(), 5), Number(posterior.log_evidence_se(), 2),
       posterior.model_evaluations());
   if (posterior.stopped_early() > 0) {

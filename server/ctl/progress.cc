@@ -25,9 +25,8 @@ std::string ProgressText(const v1::CampaignStatus& s) {
   if (s.state() != "running" && s.state() != "queued") {
     return s.state() + (s.reason().empty() ? "" : ": " + s.reason());
   }
-  std::string text = s.phase() == "validating"
-                         ? "held-out tests"
-                         : fmt::format("iteration {}/{}", s.iteration() + 1, s.max_iterations());
+  if (s.phase() == "validating") return "held-out tests";
+  std::string text = fmt::format("iteration {}/{}", s.iteration() + 1, s.max_iterations());
   text += fmt::format("  {}  {}/{} samples", Bar(s.samples_done(), s.samples()), s.samples_done(),
                       s.samples());
   if (s.samples_running() > 0) text += fmt::format("  {} running", s.samples_running());

@@ -49,6 +49,15 @@ Json Status(const v1::CampaignStatus& s) {
           {"created_unix_ms", s.created_unix_ms()}};
 }
 
+Json Emulator(const v1::Posterior& p) {
+  if (!p.has_emulator()) return nullptr;
+  const v1::Posterior::Emulator& e = p.emulator();
+  return {{"adequate", e.adequate()},     {"reason", e.reason()},
+          {"runs", e.runs()},             {"components", e.components()},
+          {"cross_validated_error", e.error()}, {"scatter", e.scatter()},
+          {"calibration", e.calibration()}};
+}
+
 }  // namespace
 
 std::string PosteriorJson(const v1::Posterior& p) {
@@ -84,6 +93,8 @@ std::string PosteriorJson(const v1::Posterior& p) {
                {"correlation", correlation},
                {"ess", p.ess()},
                {"pareto_k", p.pareto_k()},
+               {"posterior_from", p.posterior_from()},
+               {"emulator", Emulator(p)},
                {"sigma", p.has_sigma() ? Json(p.sigma()) : Json(nullptr)},
                {"noise", p.noise()},
                {"model_evaluations", p.model_evaluations()},

@@ -78,6 +78,10 @@ std::string NumberWithUnit(double value, const std::string& name, const std::str
   return unit.label.empty() ? number : number + (unit.label == "%" ? "" : " ") + unit.label;
 }
 
+std::string Percent(double share, int digits) {
+  return std::isnan(share) ? Number(share) : Number(100 * share, digits) + " %";
+}
+
 std::string Duration(double seconds) {
   if (!(seconds >= 0)) return "–";
   const auto whole = static_cast<long>(std::llround(seconds));

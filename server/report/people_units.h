@@ -24,6 +24,9 @@ std::string NameForPeople(const std::string& name);
 /// NaN.
 std::string Number(double value, int digits = 4);
 
+/// A share in percent: "4.1 %"; "–" for NaN.
+std::string Percent(double share, int digits);
+
 /// Number with its display unit: "4.1 GPa".
 std::string NumberWithUnit(double value, const std::string& name, const std::string& si_unit,
                            int digits = 4);

@@ -27,39 +27,95 @@ void Place(const campaign::Experiment& experiment, const StateHistory& history, 
   }
 }
 
+struct Counted {
+  std::vector<const v1::Sample*> samples;
+  std::vector<double> weights;
+};
+
+Counted WeightedSamples(const CampaignView& view) {
+  Counted counted;
+  for (const v1::Sample& sample : view.samples) {
+    if (!(sample.weight() > 0)) continue;
+    counted.samples.push_back(&sample);
+    counted.weights.push_back(sample.weight());
+  }
+  return counted;
+}
+
+// Runs at equally weighted draws from the posterior, made after the last iteration.
+Counted PosteriorDraws(const CampaignView& view) {
+  Counted counted;
+  for (const v1::Sample& sample : view.samples) {
+    if (sample.iteration() < view.posterior.iterations()) continue;
+    counted.samples.push_back(&sample);
+    counted.weights.push_back(1);
+  }
+  return counted;
+}
+
+ExperimentPrediction FromRuns(const CampaignView& view, const campaign::Experiment& experiment,
+                              const Counted& counted, bool band) {
+  Ensemble ensemble(experiment.observables.size(),
+                    std::vector<std::vector<double>>(
+                        experiment.control.size(),
+                        std::vector<double>(counted.samples.size(), std::nan(""))));
+  ExperimentPrediction prediction;
+  for (std::size_t s = 0; s < counted.samples.size(); ++s) {
+    const auto history = view.states.find({experiment.name, counted.samples[s]->index()});
+    if (history == view.states.end()) continue;
+    ++prediction.samples;
+    Place(experiment, history->second, s, ensemble);
+  }
+  for (const auto& observable : ensemble) {
+    ObservablePrediction out;
+    for (const std::vector<double>& values : observable) {
+      out.mean.push_back(WeightedMean(values, counted.weights));
+      out.q05.push_back(band ? WeightedQuantile(values, counted.weights, 0.05) : std::nan(""));
+      out.q95.push_back(band ? WeightedQuantile(values, counted.weights, 0.95) : std::nan(""));
+    }
+    prediction.observables.push_back(std::move(out));
+  }
+  return prediction;
+}
+
+ExperimentPrediction FromBands(const v1::Posterior& posterior,
+                               const campaign::Experiment& experiment) {
+  ExperimentPrediction prediction;
+  prediction.samples = posterior.emulator().runs();
+  for (const campaign::MeasuredObservable& observable : experiment.observables) {
+    const std::vector<double> none(experiment.control.size(), std::nan(""));
+    ObservablePrediction& out =
+        prediction.observables.emplace_back(ObservablePrediction{none, none, none});
+    for (const v1::Posterior::Band& band : posterior.bands()) {
+      if (band.experiment() != experiment.name || band.observable() != observable.name) continue;
+      for (int i = 0; i < band.load_step_size(); ++i) {
+        const auto step = static_cast<std::size_t>(band.load_step(i));
+        if (step >= none.size()) continue;
+        out.mean[step] = band.mean(i);
+        out.q05[step] = band.q05(i);
+        out.q95[step] = band.q95(i);
+      }
+    }
+  }
+  return prediction;
+}
+
 }  // namespace
 
 std::vector<ExperimentPrediction> PredictReadings(const CampaignView& view) {
-  std::vector<const v1::Sample*> counted;
-  std::vector<double> weights;
-  for (const v1::Sample& sample : view.samples) {
-    if (!(sample.weight() > 0)) continue;
-    counted.push_back(&sample);
-    weights.push_back(sample.weight());
-  }
+  const bool emulated = view.posterior.posterior_from() == "emulator";
+  const bool band = view.posterior.posterior_from() != "none";
+  const Counted weighted = WeightedSamples(view);
+  const Counted draws = emulated ? PosteriorDraws(view) : Counted{};
   std::vector<ExperimentPrediction> predictions;
   for (const campaign::Experiment& experiment : view.campaign.experiments) {
-    const std::size_t readings = experiment.control.size();
-    Ensemble ensemble(experiment.observables.size(),
-                      std::vector<std::vector<double>>(
-                          readings, std::vector<double>(counted.size(), std::nan(""))));
-    ExperimentPrediction prediction;
-    for (std::size_t s = 0; s < counted.size(); ++s) {
-      const auto history = view.states.find({experiment.name, counted[s]->index()});
-      if (history == view.states.end()) continue;
-      ++prediction.samples;
-      Place(experiment, history->second, s, ensemble);
+    if (!emulated) {
+      predictions.push_back(FromRuns(view, experiment, weighted, band));
+    } else if (experiment.role == campaign::Role::kValidate) {
+      predictions.push_back(FromRuns(view, experiment, draws, band));
+    } else {
+      predictions.push_back(FromBands(view.posterior, experiment));
     }
-    for (const auto& observable : ensemble) {
-      ObservablePrediction out;
-      for (const std::vector<double>& values : observable) {
-        out.mean.push_back(WeightedMean(values, weights));
-        out.q05.push_back(WeightedQuantile(values, weights, 0.05));
-        out.q95.push_back(WeightedQuantile(values, weights, 0.95));
-      }
-      prediction.observables.push_back(std::move(out));
-    }
-    predictions.push_back(std::move(prediction));
   }
   return predictions;
 }

@@ -7,17 +7,19 @@
 
 namespace calib::report {
 
-/// One entry per reading; NaN where no sample of positive weight has got there.
+/// One entry per reading; NaN where no run that counts has got there. Without a posterior
+/// (posterior_from: none) the quantiles are NaN and the mean is that of the weighted samples.
 struct ObservablePrediction {
   std::vector<double> mean, q05, q95;
 };
 
 struct ExperimentPrediction {
   std::vector<ObservablePrediction> observables;  ///< in the order of the campaign's experiment
-  int samples = 0;  ///< samples of positive weight that have states of this experiment
+  int samples = 0;  ///< runs of this experiment that count, or that the emulator learned from
 };
 
-/// One entry per experiment of the campaign.
+/// One entry per experiment of the campaign. Posterior from an emulator: its bands for what was
+/// calibrated, the runs at draws from it for what was held out.
 std::vector<ExperimentPrediction> PredictReadings(const CampaignView& view);
 
 }  // namespace calib::report

@@ -18,6 +18,7 @@ std::string RangeBar(const v1::Posterior::Parameter& p, bool log) {
     return std::clamp(f, 0.0, 1.0);
   };
   constexpr double kWidth = 150;
+  if (std::isnan(p.q05())) return "–";
   const double left = kWidth * fraction(p.q05());
   const double width = std::max(1.5, kWidth * fraction(p.q95()) - left);
   return fmt::format(
@@ -47,11 +48,11 @@ std::string Row(const v1::Posterior::Parameter& p, bool log) {
   };
   return fmt::format(
       "<tr><td>{}</td><td "
-      "class=\"l\">{}</td><td>{}</td><td>{}</td><td>{}&#8201;%</td><td>{}</td><td>{}</td><td>{}</"
+      "class=\"l\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</"
       "td>"
       "<td>{} – {}</td><td class=\"l\">{}</td><td class=\"l{}\">{}</td></tr>\n",
       Escape(NameForPeople(p.name())), Escape(unit.label.empty() ? "–" : unit.label),
-      shown(p.mean(), 4), shown(p.sd(), 2), Number(100 * p.cov(), 2), shown(p.q05(), 4),
+      shown(p.mean(), 4), shown(p.sd(), 2), Percent(p.cov(), 2), shown(p.q05(), 4),
       shown(p.q50(), 4), shown(p.q95(), 4), shown(p.prior_min(), 3), shown(p.prior_max(), 3),
       RangeBar(p, log), p.at_bound() ? " bad" : "", p.at_bound() ? "at a bound" : "");
 }

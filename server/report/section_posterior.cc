@@ -18,8 +18,9 @@ struct ParameterPlot {
   std::string name, label;
   DisplayUnit unit;
   bool log = false;
-  double min = 0, max = 1;     // as shown
-  std::vector<double> values;  // as shown, one per sample
+  double min = 0, max = 1;      // as shown
+  std::vector<double> samples;  // as shown, the runs
+  std::vector<double> draws;    // as shown, of the posterior sampled on an emulator; else empty
   const inference::Prior* prior = nullptr;
 
   Axis MakeAxis(int ticks) const {
@@ -41,15 +42,24 @@ std::vector<ParameterPlot> MakeParameterPlots(const CampaignView& view) {
     plot.min = p.prior_min() * plot.unit.factor;
     plot.max = p.prior_max() * plot.unit.factor;
     for (const v1::Sample& sample : view.samples) {
-      plot.values.push_back(k < sample.parameters_size() ? sample.parameters(k) * plot.unit.factor
-                                                         : std::nan(""));
+      plot.samples.push_back(k < sample.parameters_size() ? sample.parameters(k) * plot.unit.factor
+                                                          : std::nan(""));
+    }
+    for (int i = k; i < view.posterior.draws_size(); i += view.posterior.parameters_size()) {
+      plot.draws.push_back(view.posterior.draws(i) * plot.unit.factor);
     }
     plots.push_back(std::move(plot));
   }
   return plots;
 }
 
+// Of the draws where there are any, else of the samples.
 std::vector<double> Weights(const CampaignView& view) {
+  if (view.posterior.draws_size() > 0) {
+    return std::vector<double>(
+        static_cast<std::size_t>(view.posterior.draws_size() / view.posterior.parameters_size()),
+        1.0);
+  }
   std::vector<double> weights;
   for (const v1::Sample& sample : view.samples) {
     weights.push_back(std::isfinite(sample.weight()) ? sample.weight() : 0);
@@ -67,7 +77,9 @@ std::string Marginal(const ParameterPlot& parameter, const std::vector<double>& 
   const double low = coordinate(parameter.min);
   const double high = coordinate(parameter.max);
   std::vector<double> values;
-  for (const double value : parameter.values) values.push_back(coordinate(value));
+  for (const double value : parameter.draws.empty() ? parameter.samples : parameter.draws) {
+    values.push_back(coordinate(value));
+  }
   const std::vector<double> density = WeightedHistogram(values, weights, low, high, kBins);
   std::vector<double> edges;
   for (int i = 0; i <= kBins; ++i) edges.push_back(back(low + (high - low) * i / kBins));
@@ -99,11 +111,16 @@ std::string Marginal(const ParameterPlot& parameter, const std::vector<double>& 
 std::string Pair(const ParameterPlot& x, const ParameterPlot& y, const std::vector<double>& weights,
                  double correlation) {
   Plot plot({.width = 330, .height = 260}, x.MakeAxis(4), y.MakeAxis(4));
-  plot.AddPoints(x.values, y.values, 1.1, "faint");
-  plot.AddWeightedPoints(x.values, y.values, weights, 7);
+  plot.AddPoints(x.samples, y.samples, 1.1, "faint");
+  if (x.draws.empty()) {
+    plot.AddWeightedPoints(x.samples, y.samples, weights, 7);
+  } else {
+    plot.AddPoints(x.draws, y.draws, 1.4, "residual");
+  }
   return "<figure>" +
          plot.Svg(NameForPeople(x.name) + " against " + NameForPeople(y.name),
-                  "samples; area in proportion to posterior weight") +
+                  x.draws.empty() ? "samples; area in proportion to posterior weight"
+                                  : "runs as faint dots, draws from the posterior") +
          fmt::format("<figcaption>correlation {}</figcaption></figure>\n", Number(correlation, 2));
 }
 
@@ -112,17 +129,21 @@ std::string Pair(const ParameterPlot& x, const ParameterPlot& y, const std::vect
 std::string PosteriorSection(const ReportData& data) {
   const std::vector<ParameterPlot> parameters = MakeParameterPlots(data.view);
   const std::vector<double> weights = Weights(data.view);
-  std::string html =
-      "<h2>Posterior</h2>\n<p class=\"sub\">Columns: weighted samples of all iterations over the "
-      "prior's range."
-      "<span class=\"key\" style=\"color:var(--prior)\"></span>prior.</p>\n<div class=\"grid\">\n";
+  const v1::Posterior& posterior = data.view.posterior;
+  if (posterior.posterior_from() == "none") return "";
+  const bool emulated = posterior.draws_size() > 0;
+  std::string html = fmt::format(
+      "<h2>Posterior</h2>\n<p class=\"sub\">Columns: {} over the prior's range."
+      "<span class=\"key\" style=\"color:var(--prior)\"></span>prior.</p>\n<div class=\"grid\">\n",
+      emulated ? "draws from the posterior, sampled on an emulator of the runs,"
+               : "weighted samples of all iterations");
   for (const ParameterPlot& parameter : parameters) html += Marginal(parameter, weights);
   html += "</div>\n";
   if (parameters.size() < 2) return html;
-  html +=
-      "<h3>Pairs</h3>\n<p class=\"sub\">Every sample as a faint dot; the area of a blue disc is "
-      "its posterior weight.</p>\n"
-      "<div class=\"grid\">\n";
+  html += fmt::format(
+      "<h3>Pairs</h3>\n<p class=\"sub\">Every run as a faint dot; {}.</p>\n<div class=\"grid\">\n",
+      emulated ? "draws from the posterior in blue"
+               : "the area of a blue disc is its posterior weight");
   const auto d = static_cast<int>(parameters.size());
   for (int i = 0; i < d; ++i) {
     for (int j = i + 1; j < d; ++j) {

@@ -10,7 +10,8 @@ std::vector<std::string> Warnings(const CampaignView& view) {
   const v1::Posterior& posterior = view.posterior;
   std::vector<std::string> warnings(posterior.warnings().begin(), posterior.warnings().end());
   if (posterior.parameters_size() == 0) return warnings;
-  if (!posterior.converged() && view.status.state() == "finished") {
+  if (!posterior.converged() && posterior.posterior_from() != "none" &&
+      view.status.state() == "finished") {
     warnings.emplace_back(
         "The iterations ended before the posterior means settled: treat the intervals as "
         "provisional, or go on with more "

@@ -25,9 +25,22 @@ double LogSumExp(const std::vector<double>& terms) {
   return largest + std::log(sum);
 }
 
-/// ln of the summed weight of the finished samples; importance: of all of them, in order.
-absl::StatusOr<double> FinishedMass(const Definition& definition, const History& history,
-                                    const Eigen::VectorXd& importance) {
+struct Finished {
+  double exponent = 1;   // of the likelihood in all weights
+  double log_mass = 0;   // ln of the summed weight of the finished samples
+};
+
+/// importance: of all samples, in order.
+absl::StatusOr<Finished> FinishedMass(const Definition& definition, const History& history,
+                                      const Eigen::VectorXd& importance) {
+  const auto exponent = inference::GuidingExponent(
+      definition.priors, definition.data, definition.campaign.filter, history.iterations);
+  if (absl::IsFailedPrecondition(exponent.status())) {  // no sample has weight
+    return Finished{.exponent = 1, .log_mass = kNone};
+  }
+  if (!exponent.ok()) {
+    return exponent.status();
+  }
   std::vector<double> weights;
   Eigen::Index at = 0;
   for (const inference::Iteration& iteration : history.iterations) {
@@ -37,10 +50,12 @@ absl::StatusOr<double> FinishedMass(const Definition& definition, const History&
       return likelihood.status();
     }
     for (Eigen::Index i = 0; i < likelihood->size(); ++i) {
-      weights.push_back(importance(at++) + (*likelihood)(i));
+      const bool counts = std::isfinite((*likelihood)(i)) && std::isfinite(importance(at));
+      weights.push_back(counts ? importance(at) + *exponent * (*likelihood)(i) : kNone);
+      ++at;
     }
   }
-  return LogSumExp(weights);
+  return Finished{.exponent = *exponent, .log_mass = LogSumExp(weights)};
 }
 
 }  // namespace
@@ -62,17 +77,18 @@ absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
   std::vector<inference::Iteration> all = history.iterations;
   all.push_back(next);
   const Eigen::VectorXd importance = inference::LogImportance(definition.priors, all);
-  const auto mass = FinishedMass(definition, history, importance);
-  if (!mass.ok()) {
-    return mass.status();
+  const auto finished = FinishedMass(definition, history, importance);
+  if (!finished.ok()) {
+    return finished.status();
   }
-  if (!std::isfinite(*mass)) {
+  if (!std::isfinite(finished->log_mass)) {
     return thresholds;
   }
   const double share = definition.campaign.early_stopping->discard_at_most / static_cast<double>(n);
   const Eigen::Index first = importance.size() - n;
   for (Eigen::Index i = 0; i < n; ++i) {
-    thresholds[static_cast<std::size_t>(i)] = *mass + std::log(share) - importance(first + i);
+    thresholds[static_cast<std::size_t>(i)] =
+        (finished->log_mass + std::log(share) - importance(first + i)) / finished->exponent;
   }
   return thresholds;
 }
@@ -84,9 +100,9 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
   }
   const Eigen::VectorXd importance =
       inference::LogImportance(definition.priors, history.iterations);
-  const auto mass = FinishedMass(definition, history, importance);
-  if (!mass.ok()) {
-    return mass.status();
+  const auto finished = FinishedMass(definition, history, importance);
+  if (!finished.ok()) {
+    return finished.status();
   }
   std::map<int, std::vector<store::EvaluationKey>> keys;
   for (const store::EvaluationKey& key : history.stopped_keys) {
@@ -108,7 +124,8 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
       const int sample = history.samples[at].sample;
       if (keys.count(sample) > 0) {
         stopped.push_back(
-            {.bound = std::exp(importance(static_cast<Eigen::Index>(at)) + (*bound)(i) - *mass),
+            {.bound = std::exp(importance(static_cast<Eigen::Index>(at)) +
+                               finished->exponent * (*bound)(i) - finished->log_mass),
              .sample = sample});
       }
     }

@@ -4,6 +4,11 @@
 //
 // Thresholds are fixed when an iteration starts, from the complete iterations before it, and each
 // evaluation is judged by its own states alone: the same states are stored whatever arrives first.
+// Weights are those that guide the campaign (inference::GuidingExponent): the plain ones where they
+// carry the posterior, otherwise tempered until a fifth of the samples count. A posterior sampled
+// on an emulator needs those samples' states: a run's own likelihood is a lottery of tens of nats,
+// so that untempered weights would stop runs in the very middle of the posterior.
+//
 // When an iteration ends the bounds are taken again with the weights as they are then, and samples
 // are resumed, largest bound first, until what the others may lose together is within
 // `discard_at_most` of the finished mass.
@@ -20,8 +25,8 @@ namespace calib::scheduler {
 bool StopsEarly(const Definition& definition);
 
 /// Per new sample, the largest LogLikelihoodBound with which it is stopped:
-///   ln(finished weight) + ln(discard_at_most / N) - ln(prior / proposals)_i
-/// where the proposals are those of all iterations and the new one. NaN (never stopped) for all
+///   [ln(finished weight) + ln(discard_at_most / N) - ln(prior / proposals)_i] / exponent
+/// where exponent is the guiding one and the proposals are those of all iterations and the new one. NaN (never stopped) for all
 /// while no sample has finished.
 absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
                                                    const History& history,

@@ -66,6 +66,9 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     }
   }
   for (store::IterationRecord& record : *iterations) {
+    if (record.proposal == kHeldOutDraws) {
+      break;  // the last
+    }
     auto proposal = ProposalFromJson(record.proposal);
     if (!proposal.ok()) {
       return proposal.status();
@@ -80,6 +83,9 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     }
   }
   history.samples = *std::move(samples);
+  std::erase_if(history.samples, [&history](const store::SampleRecord& sample) {
+    return static_cast<std::size_t>(sample.iteration) >= history.iterations.size();
+  });
   history.effort = *effort;
   AddSamples(definition, history);
 
@@ -97,7 +103,11 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     stopped_samples.insert(key.sample);
   }
   for (const store::StateRecord& state : *states) {
-    const auto [k, row] = place.at(state.key.sample);
+    const auto found = place.find(state.key.sample);
+    if (found == place.end()) {
+      continue;
+    }
+    const auto [k, row] = found->second;
     if (finished.count(state.key) > 0) {
       PlaceState(definition, state, row, history.iterations[k].predictions);
     }

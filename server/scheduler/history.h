@@ -13,8 +13,9 @@
 namespace calib::scheduler {
 
 struct History {
-  std::vector<inference::Iteration>
-      iterations;  ///< predictions of samples that did not finish are NaN
+  /// Predictions of samples that did not finish are NaN. Draws from the posterior, on which
+  /// held-out experiments are run (HeldOutDraws), are not part of any of this.
+  std::vector<inference::Iteration> iterations;
   /// Rows of samples stopped early as far as they came, NaN beyond; other rows are NaN altogether.
   std::vector<Eigen::MatrixXd> stopped;
   std::vector<store::EvaluationKey> stopped_keys;  ///< evaluations stopped early
@@ -24,6 +25,10 @@ struct History {
   int stopped_early = 0;
   store::Effort effort;
 };
+
+/// Stands in the place of an iteration's proposal when its samples are draws from the posterior,
+/// made for held-out experiments alone.
+inline constexpr const char* kHeldOutDraws = "\"draws from the posterior\"";
 
 /// Reads every record in the order of its natural key.
 absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t campaign,

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
 
 #include "absl/strings/str_cat.h"
+#include "server/scheduler/answer.h"
 #include "server/scheduler/attempt_spec.h"
 #include "server/scheduler/early_stopping.h"
 #include "server/scheduler/history.h"
@@ -18,9 +20,10 @@ namespace {
 using campaign::Role;
 using store::EvaluationStatus;
 
-// Held-out experiments are run for the samples that carry the posterior.
+// Held-out experiments are run for the samples that carry the posterior: so many at most, and no
+// more of the weighted ones than hold this share.
+constexpr std::size_t kHeldOutRuns = 20;
 constexpr double kValidatedMass = 0.99;
-constexpr std::size_t kMostValidatedSamples = 20;
 
 class Planner {
  public:
@@ -80,23 +83,22 @@ class Planner {
       return absl::OkStatus();
     }
     stated_loss_ = loss->stated;
-    const auto posterior = inference::ComputePosterior(definition_.priors, definition_.data,
-                                                       campaign_.filter, history_.iterations);
-    if (!posterior.ok()) {
-      return Fail(posterior.status());
+    const auto answer = FindAnswer(definition_, history_.iterations);
+    if (!answer.ok()) {
+      return Fail(answer.status());
     }
     const int iteration = static_cast<int>(history_.iterations.size()) - 1;
-    absl::StatusOr<bool> converged = IsConverged(*posterior);
+    absl::StatusOr<bool> converged = IsConverged(*answer);
     if (!converged.ok()) {
       return converged.status();
     }
     plan_.converged = *converged;
-    AddConclusion(*posterior, iteration);
+    AddConclusion(*answer, iteration);
     const bool last = *converged || campaign_.method == campaign::Method::kSqmc ||
                       campaign_.precomputed.has_value() ||
                       iteration + 1 >= campaign_.max_iterations || BudgetSpent();
     if (last) {
-      return Validate();
+      return Validate(*answer);
     }
     const auto proposal = inference::FitProposal(definition_.priors, definition_.data,
                                                  campaign_.filter, history_.iterations);
@@ -106,8 +108,8 @@ class Planner {
     return Begin(iteration + 1, *proposal);
   }
 
-  absl::StatusOr<bool> IsConverged(const inference::Posterior& posterior) {
-    if (!IsTrustworthy(posterior)) {
+  absl::StatusOr<bool> IsConverged(const Answer& answer) {
+    if (!answer.HasIntervals()) {
       return false;
     }
     if (campaign_.method == campaign::Method::kSqmc || campaign_.precomputed.has_value()) {
@@ -120,13 +122,19 @@ class Planner {
     if (!before.ok()) {
       return before.status();
     }
-    return inference::MeansConverged(MeansOf(*before), posterior, campaign_.filter);
+    if (before->posterior_from() == "none") {
+      return false;
+    }
+    inference::Posterior now;
+    now.parameters = answer.Parameters();
+    return inference::MeansConverged(MeansOf(*before), now, campaign_.filter);
   }
 
-  void AddConclusion(const inference::Posterior& posterior, int iteration) {
+  void AddConclusion(const Answer& answer, int iteration) {
+    const inference::Posterior& posterior = answer.weighted;
     Conclusion conclusion{
         .iteration = iteration,
-        .posterior = ToMessage(definition_, posterior, iteration, plan_.converged),
+        .posterior = ToMessage(definition_, answer, iteration, plan_.converged),
         .log_weights = {posterior.log_weights.begin(), posterior.log_weights.end()},
         .log_likelihoods = LogLikelihoods()};
     conclusion.posterior.set_campaign(absl::StrCat("c", record_.submitted.id));
@@ -138,7 +146,9 @@ class Planner {
                               history_.iterations.back().predictions, history_.diverged.back());
     conclusion.posterior.set_best_misfit(view.best_rms);
     plan_.log.push_back(absl::StrCat("iteration ", iteration, " complete: ", posterior.ess,
-                                     " effective samples, log evidence ", posterior.log_evidence));
+                                     " effective samples, posterior from ",
+                                     conclusion.posterior.posterior_from(), ", log evidence ",
+                                     conclusion.posterior.log_evidence()));
     plan_.conclusion = std::move(conclusion);
   }
 
@@ -249,13 +259,43 @@ class Planner {
     return absl::OkStatus();
   }
 
-  /// Held-out experiments for the samples with the largest weights (ties: the earlier sample).
-  absl::Status Validate() {
+  /// Held-out experiments for the samples that carry the posterior.
+  absl::Status Validate(const Answer& answer) {
     const auto experiments = definition_.ExperimentsOf(Role::kValidate);
     if (experiments.empty() || campaign_.precomputed.has_value()) {
       Finish();
       return absl::OkStatus();
     }
+    plan_.phase = "validating";
+    return answer.FromEmulator() ? ValidateDraws(answer.emulated->draws, experiments)
+                                 : ValidateSamples(experiments);
+  }
+
+  /// Draws evenly spaced in the population, as samples of an iteration of their own.
+  absl::Status ValidateDraws(const Eigen::MatrixXd& draws, const std::vector<int>& experiments) {
+    Start start{.iteration = static_cast<int>(history_.iterations.size()),
+                .proposal = kHeldOutDraws,
+                .samples = {}};
+    const auto count = static_cast<Eigen::Index>(
+        std::min({kHeldOutRuns, static_cast<std::size_t>(campaign_.samples),
+                  static_cast<std::size_t>(draws.rows())}));
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Eigen::VectorXd row = draws.row(i * draws.rows() / count);
+      start.samples.push_back(
+          {.sample = start.iteration * record_.submitted.samples + static_cast<int>(i),
+           .iteration = start.iteration,
+           .parameters = {row.begin(), row.end()},
+           .log_weight = -std::numeric_limits<double>::infinity()});  // not of the ensemble
+      if (absl::Status status = Ask(start.samples.back(), experiments); !status.ok()) {
+        return status;
+      }
+    }
+    plan_.draws = std::move(start);
+    return absl::OkStatus();
+  }
+
+  /// The samples with the largest weights (ties: the earlier sample).
+  absl::Status ValidateSamples(const std::vector<int>& experiments) {
     const std::vector<double>& log_weights = plan_.conclusion->log_weights;
     std::vector<std::size_t> order(log_weights.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
@@ -263,13 +303,12 @@ class Planner {
                      [&](std::size_t a, std::size_t b) { return log_weights[a] > log_weights[b]; });
     double mass = 0;
     for (std::size_t i = 0;
-         i < std::min(order.size(), kMostValidatedSamples) && mass < kValidatedMass; ++i) {
+         i < std::min(order.size(), kHeldOutRuns) && mass < kValidatedMass; ++i) {
       mass += std::exp(log_weights[order[i]]);
       if (absl::Status status = Ask(history_.samples[order[i]], experiments); !status.ok()) {
         return status;
       }
     }
-    plan_.phase = "validating";
     return absl::OkStatus();
   }
 
@@ -299,10 +338,12 @@ void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgres
                             conclusion.log_likelihoods[i]);
     }
   }
-  if (plan.start.has_value()) {
-    transaction.InsertIteration(campaign, plan.start->iteration, plan.start->proposal);
-    for (const store::SampleRecord& sample : plan.start->samples) {
-      transaction.InsertSample(campaign, sample);
+  for (const std::optional<Start>& start : {plan.start, plan.draws}) {
+    if (start.has_value()) {
+      transaction.InsertIteration(campaign, start->iteration, start->proposal);
+      for (const store::SampleRecord& sample : start->samples) {
+        transaction.InsertSample(campaign, sample);
+      }
     }
   }
   for (const store::EvaluationRecord& evaluation : plan.evaluations) {

@@ -36,6 +36,7 @@ struct Start {
 struct Plan {
   std::optional<Conclusion> conclusion;
   std::optional<Start> start;
+  std::optional<Start> draws;  ///< from the posterior, for held-out experiments
   std::vector<store::EvaluationRecord> evaluations;  ///< new ones
   std::vector<std::pair<store::EvaluationKey, store::EvaluationKey>>
       reused;                                 ///< (done before, the same now)

@@ -2,18 +2,21 @@
 
 #include <google/protobuf/util/json_util.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 
 namespace calib::scheduler {
 namespace {
 
-constexpr double kLargestParetoIndex = 0.7;
-constexpr double kSmallestEffectiveSamples = 10;
 constexpr double kTail = 1e-3;  // shown as the range of an unbounded prior
+constexpr Eigen::Index kDraws = 400;
 
 const char* ToString(inference::NoiseMode mode) {
   switch (mode) {
@@ -27,10 +30,10 @@ const char* ToString(inference::NoiseMode mode) {
   return "ess_target";
 }
 
-void AddParameters(const Definition& definition, const inference::Posterior& posterior,
-                   v1::Posterior& message) {
-  for (std::size_t i = 0; i < posterior.parameters.size(); ++i) {
-    const inference::ParameterSummary& summary = posterior.parameters[i];
+void AddParameters(const Definition& definition, const Answer& answer, v1::Posterior& message) {
+  const std::vector<inference::ParameterSummary> summaries = answer.Parameters();
+  for (std::size_t i = 0; i < summaries.size(); ++i) {
+    const inference::ParameterSummary& summary = summaries[i];
     const campaign::CalibratedParameter& parameter = definition.campaign.parameters[i];
     const inference::Prior& prior = parameter.prior;
     v1::Posterior::Parameter& out = *message.add_parameters();
@@ -64,6 +67,53 @@ void AddPath(const Definition& definition, const inference::PosteriorPath& path,
   }
 }
 
+// The draws of the emulated posterior, thinned evenly.
+void AddDraws(const Eigen::MatrixXd& draws, v1::Posterior& message) {
+  const Eigen::Index stride = std::max<Eigen::Index>(1, draws.rows() / kDraws);
+  for (Eigen::Index i = 0; i < draws.rows(); i += stride) {
+    for (Eigen::Index j = 0; j < draws.cols(); ++j) {
+      message.add_draws(draws(i, j));
+    }
+  }
+}
+
+void AddBands(const Definition& definition, const inference::EmulatedResult& emulated,
+              v1::Posterior& message) {
+  std::map<std::pair<int, int>, v1::Posterior::Band> bands;  // by (experiment, observable)
+  for (std::size_t t = 0; t < definition.data.readings.size(); ++t) {
+    const inference::Reading& reading = definition.data.readings[t];
+    const auto row = static_cast<Eigen::Index>(t);
+    const campaign::Experiment& experiment =
+        definition.campaign.experiments[static_cast<std::size_t>(reading.experiment)];
+    v1::Posterior::Band& band = bands[{reading.experiment, reading.observable}];
+    band.set_experiment(experiment.name);
+    band.set_observable(experiment.observables[static_cast<std::size_t>(reading.observable)].name);
+    band.add_load_step(reading.load_step);
+    band.add_mean(emulated.predictive_mean[row]);
+    band.add_q05(emulated.predictive_q05[row]);
+    band.add_q95(emulated.predictive_q95[row]);
+  }
+  for (auto& [key, band] : bands) {
+    *message.add_bands() = std::move(band);
+  }
+}
+
+void AddEmulator(const Definition& definition, const inference::EmulatedResult& emulated,
+                 v1::Posterior& message) {
+  v1::Posterior::Emulator& out = *message.mutable_emulator();
+  out.set_adequate(emulated.adequate);
+  out.set_reason(emulated.reason);
+  out.set_runs(emulated.runs);
+  out.set_components(emulated.components);
+  out.set_error(emulated.cross_validated_error);
+  out.set_scatter(emulated.scatter);
+  out.set_calibration(emulated.calibration);
+  if (emulated.adequate) {
+    AddDraws(emulated.draws, message);
+    AddBands(definition, emulated, message);
+  }
+}
+
 using Json = nlohmann::json;
 
 Json ToJson(const Eigen::VectorXd& values) {
@@ -77,27 +127,37 @@ Eigen::VectorXd ToVector(const Json& json) {
 
 }  // namespace
 
-v1::Posterior ToMessage(const Definition& definition, const inference::Posterior& posterior,
-                        int iteration, bool converged) {
+v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int iteration,
+                        bool converged) {
+  const inference::Posterior& posterior = answer.weighted;
+  const bool emulated = answer.FromEmulator();
   v1::Posterior message;
+  message.set_posterior_from(emulated ? "emulator" : answer.FromWeights() ? "weights" : "none");
   message.set_iteration(iteration);
   message.set_iterations(iteration + 1);
   message.set_converged(converged);
-  message.set_log_evidence(posterior.log_evidence);
-  message.set_log_evidence_se(posterior.log_evidence_se);
+  message.set_log_evidence(emulated ? answer.emulated->log_evidence : posterior.log_evidence);
+  message.set_log_evidence_se(!answer.HasIntervals() ? std::numeric_limits<double>::quiet_NaN()
+                              : emulated             ? answer.emulated->log_evidence_se
+                                                     : posterior.log_evidence_se);
   message.set_ess(posterior.ess);
   message.set_pareto_k(posterior.pareto_k);
   if (posterior.sigma.has_value()) {
     message.set_sigma(*posterior.sigma);
   }
-  AddParameters(definition, posterior, message);
-  for (Eigen::Index i = 0; i < posterior.correlation.rows(); ++i) {
-    for (Eigen::Index j = 0; j < posterior.correlation.cols(); ++j) {
-      message.add_correlation(posterior.correlation(i, j));
+  AddParameters(definition, answer, message);
+  if (answer.HasIntervals()) {
+    const Eigen::MatrixXd& correlation =
+        emulated ? answer.emulated->correlation : posterior.correlation;
+    for (const double value : correlation.reshaped()) {  // symmetric
+      message.add_correlation(value);
     }
   }
+  if (answer.emulated.has_value()) {
+    AddEmulator(definition, *answer.emulated, message);
+  }
   AddPath(definition, posterior.path, message);
-  message.mutable_warnings()->Add(posterior.warnings.begin(), posterior.warnings.end());
+  message.mutable_warnings()->Add(answer.warnings.begin(), answer.warnings.end());
   message.set_noise(ToString(definition.campaign.filter.noise));
   return message;
 }
@@ -161,10 +221,6 @@ inference::Posterior MeansOf(const v1::Posterior& posterior) {
     summary.cov = parameter.cov();
   }
   return means;
-}
-
-bool IsTrustworthy(const inference::Posterior& posterior) {
-  return posterior.pareto_k <= kLargestParetoIndex && posterior.ess >= kSmallestEffectiveSamples;
 }
 
 }  // namespace calib::scheduler

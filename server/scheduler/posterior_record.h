@@ -6,13 +6,14 @@
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
 #include "inference/filter/iterative_filter.h"
+#include "server/scheduler/answer.h"
 #include "server/scheduler/definition.h"
 
 namespace calib::scheduler {
 
 /// The message for users; counts of effort are left to whoever knows them.
-v1::Posterior ToMessage(const Definition& definition, const inference::Posterior& posterior,
-                        int iteration, bool converged);
+v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int iteration,
+                        bool converged);
 
 std::string PosteriorToJson(const v1::Posterior& posterior);
 /// DATA_LOSS when the text is not what PosteriorToJson() wrote.
@@ -23,9 +24,5 @@ absl::StatusOr<inference::Proposal> ProposalFromJson(const std::string& json);
 
 /// The part of an earlier posterior that convergence looks at: the means.
 inference::Posterior MeansOf(const v1::Posterior& posterior);
-
-/// Weights good enough to call the result an answer: Pareto index at most 0.7 [Vehtari 2024,
-/// sec. 2.4], at least ten effective samples.
-bool IsTrustworthy(const inference::Posterior& posterior);
 
 }  // namespace calib::scheduler

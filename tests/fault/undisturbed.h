@@ -60,10 +60,14 @@ inline void ExpectUndisturbed(const Deployment& deployment) {
   const auto samples = client.Samples("c1");
   ASSERT_TRUE(samples.ok()) << samples.status();
   std::set<int> indices;
+  double total = 0;
   for (const v1::Sample& sample : *samples) {
     EXPECT_TRUE(indices.insert(sample.index()).second) << "sample " << sample.index();
+    total += sample.weight();
   }
-  EXPECT_EQ(indices.size(), 48U);
+  EXPECT_NEAR(total, 1, 1e-12);
+  // Two iterations of 24, and 20 draws from the posterior for the held-out test.
+  EXPECT_EQ(indices.size(), 68U);
   const auto log = client.Log("c1");
   ASSERT_TRUE(log.ok()) << log.status();
   for (const v1::LogEntry& entry : *log) {

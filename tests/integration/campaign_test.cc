@@ -47,23 +47,27 @@ TEST(Campaign, RunsToAPosteriorWithHeldOutExperiment) {
 
   const auto samples = client.Samples("c1");
   ASSERT_TRUE(samples.ok());
-  EXPECT_EQ(samples->size(), 16U);
+  EXPECT_EQ(samples->size(), 24U);
   double total = 0;
   for (const v1::Sample& sample : *samples) {
     EXPECT_EQ(sample.status(), "finished");
     EXPECT_EQ(sample.attempts() >= 1, true);
-    EXPECT_TRUE(std::isfinite(sample.log_likelihood()));
+    EXPECT_EQ(std::isfinite(sample.log_likelihood()), sample.iteration() < 2);
+    if (sample.iteration() == 2) {
+      EXPECT_EQ(sample.weight(), 0);
+    }
     total += sample.weight();
   }
   EXPECT_NEAR(total, 1, 1e-12);
-  // Held out: run for the samples that carry the posterior, none of them counted in it.
+  // Held out: run for draws from the posterior (16 samples have to be emulated), none of them
+  // counted in it.
   const auto states = client.States("c1");
   std::size_t held_out = 0;
   for (const v1::SampleStates& of_sample : *states) {
     EXPECT_EQ(of_sample.states_size(), 4);
     held_out += of_sample.experiment() == "tx2" ? 1 : 0;
   }
-  EXPECT_GE(held_out, 1U);
+  EXPECT_EQ(held_out, 8U);
   EXPECT_EQ(states->size(), 16 + held_out);
   EXPECT_EQ(status->model_evaluations(), static_cast<std::int64_t>(16 + held_out));
 }

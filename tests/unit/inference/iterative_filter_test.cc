@@ -100,7 +100,8 @@ TEST(ComputePosterior, TinyNoiseStaysFinite) {
   EXPECT_NEAR(posterior->ess, 1, 1e-9);
   EXPECT_EQ(posterior->parameters[0].sd, 0);
   EXPECT_EQ(posterior->path.load_step, (std::vector<int>{0, 1}));
-  EXPECT_THAT(posterior->warnings, testing::ElementsAre(HasSubstr("not reliable")));
+  EXPECT_THAT(posterior->warnings, testing::IsEmpty());
+  EXPECT_THAT(posterior->degeneracy, HasSubstr("1 of 100 are effective"));
 }
 
 TEST(ComputePosterior, AllDivergedIsAnErrorThatSaysSo) {
@@ -153,8 +154,8 @@ TEST(ComputePosterior, AtBoundWhenTheDataPullOutOfThePrior) {
 
 TEST(MeansConverged, RelativeToTheMeanOrToTheScaleOfThePrior) {
   Posterior before;
-  before.parameters = {{.mean = 100, .sd = 1, .prior_sd = 20},
-                       {.mean = 0.001, .sd = 1, .prior_sd = 20}};
+  before.parameters = {{.mean = 100, .sd = 0.1, .prior_sd = 20},
+                       {.mean = 0.001, .sd = 0.01, .prior_sd = 20}};
   Posterior now = before;
   const FilterOptions options{.tolerance = 0.01};
   now.parameters[0].mean = 100.9;
@@ -164,6 +165,17 @@ TEST(MeansConverged, RelativeToTheMeanOrToTheScaleOfThePrior) {
   EXPECT_FALSE(MeansConverged(before, now, options));
   now.parameters[0].mean = NAN;
   EXPECT_FALSE(MeansConverged(before, now, options));
+}
+
+TEST(MeansConverged, AMoveWithinAThirdOfThePosteriorSdIsImmaterial) {
+  Posterior before;
+  before.parameters = {{.mean = 100, .sd = 9, .prior_sd = 200}};
+  Posterior now = before;
+  now.parameters[0].mean = 102.9;
+  EXPECT_TRUE(MeansConverged(before, now, {.tolerance = 0.01}));
+  EXPECT_FALSE(MeansConverged(before, now, {.noise = NoiseMode::kEssTarget, .tolerance = 0.01}));
+  now.parameters[0].mean = 103.1;
+  EXPECT_FALSE(MeansConverged(before, now, {.tolerance = 0.01}));
 }
 
 TEST(ViewOnline, CountsWhatEveryUndivergedSampleHasReached) {

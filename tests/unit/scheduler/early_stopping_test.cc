@@ -4,18 +4,19 @@
 
 #include <cmath>
 
+#include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {
 namespace {
 
-testing::SmallCampaign Campaign(const std::string& extra) {
+testing::SmallCampaign Campaign(const std::string& extra, double noise = 0.01) {
   return testing::MakeSmallCampaign({.samples = 40,
                                      .max_iterations = 3,
                                      .load_steps = 12,
                                      .failure_attempts = 100,
-                                     .relative_noise = 0.01,
+                                     .relative_noise = noise,
                                      .extra = extra});
 }
 
@@ -53,6 +54,74 @@ TEST(EarlyStopping, SavesStatesAndLosesNoMoreThanItStates) {
     // same posterior: their means agree to its width, not to the stated loss.
     EXPECT_NEAR(with.parameters(i).mean(), parameter.mean(), parameter.sd());
   }
+}
+
+Eigen::VectorXd GuidingWeights(const Definition& definition, const History& history,
+                               double exponent) {
+  const Eigen::VectorXd importance =
+      inference::LogImportance(definition.priors, history.iterations);
+  Eigen::VectorXd weights = Eigen::VectorXd::Zero(importance.size());
+  Eigen::Index at = 0;
+  for (const inference::Iteration& iteration : history.iterations) {
+    const Eigen::VectorXd likelihood = *inference::LogLikelihood(
+        definition.data, definition.campaign.filter, iteration.predictions);
+    for (const double value : likelihood) {
+      if (std::isfinite(value)) weights[at] = importance[at] + exponent * value;
+      ++at;
+    }
+  }
+  const double largest = weights.maxCoeff();
+  weights = (weights.array() == 0).select(0.0, (weights.array() - largest).exp()).eval();
+  return weights / weights.sum();
+}
+
+// The same samples from the same proposals, once complete and once with every sample of the last
+// iteration ended where its bound fell below the threshold; so much loss is allowed that it shows.
+TEST(EarlyStopping, TotalVariationIsWithinTheStatedLoss) {
+  SimulatedService full("variation");
+  full.Submit(Campaign("", 0.2));
+  full.RunToEnd(1, true);
+  store::Reader reader = full.Read();
+  campaign::Campaign allowed =
+      (*LoadDefinition(reader, Value(reader.Campaign(1)).submitted))->campaign;
+  allowed.early_stopping.emplace().discard_at_most = 0.1;
+  const auto definition = MakeDefinition(std::move(allowed));
+  const History complete = *LoadHistory(*definition, 1, reader);
+  History before = complete;
+  const inference::Iteration last = complete.iterations.back();
+  before.iterations.pop_back();
+  const auto thresholds = *StopThresholds(*definition, before, last);
+
+  History stopped = complete;
+  stopped.stopped_keys.clear();
+  const Eigen::Index readings = last.predictions.cols();
+  int saved = 0;
+  for (Eigen::Index i = 0; i < last.predictions.rows(); ++i) {
+    const Eigen::RowVectorXd run = last.predictions.row(i);
+    Eigen::RowVectorXd seen = Eigen::RowVectorXd::Constant(readings, std::nan(""));
+    for (Eigen::Index t = 0; t + 1 < readings; ++t) {
+      seen[t] = run[t];
+      if (BestPossible(*definition, seen) >= thresholds[static_cast<std::size_t>(i)]) continue;
+      stopped.iterations.back().predictions.row(i).setConstant(std::nan(""));
+      stopped.stopped.back().row(i) = seen;
+      const auto first = static_cast<int>((stopped.iterations.size() - 1) * 40);
+      stopped.stopped_keys.push_back({1, first + static_cast<int>(i), 0});
+      saved += static_cast<int>(readings - 1 - t);
+      break;
+    }
+  }
+  ASSERT_GT(saved, 0);
+  const auto loss = *StatedLoss(*definition, stopped);
+  ASSERT_TRUE(loss.resume.empty());
+  EXPECT_GT(loss.stated, 1e-6);
+  EXPECT_LE(loss.stated, 0.1);
+  const double exponent = *inference::GuidingExponent(
+      definition->priors, definition->data, definition->campaign.filter, stopped.iterations);
+  const Eigen::VectorXd with = GuidingWeights(*definition, complete, exponent);
+  const Eigen::VectorXd without = GuidingWeights(*definition, stopped, exponent);
+  const double variation = 0.5 * (with - without).cwiseAbs().sum();
+  EXPECT_GT(variation, 0);
+  EXPECT_LE(variation, loss.stated);
 }
 
 TEST(EarlyStopping, SameBitsWhateverGoesWrong) {

@@ -44,17 +44,5 @@ TEST(PosteriorRecord, DamagedTextIsDataLoss) {
   EXPECT_EQ(ProposalFromJson("{}").status().code(), absl::StatusCode::kDataLoss);
 }
 
-TEST(PosteriorRecord, DegenerateWeightsAreNotTrusted) {
-  inference::Posterior posterior;
-  posterior.ess = 30;
-  posterior.pareto_k = 0.5;
-  EXPECT_TRUE(IsTrustworthy(posterior));
-  posterior.pareto_k = 0.71;
-  EXPECT_FALSE(IsTrustworthy(posterior));
-  posterior.pareto_k = 0.5;
-  posterior.ess = 9.9;
-  EXPECT_FALSE(IsTrustworthy(posterior));
-}
-
 }  // namespace
 }  // namespace calib::scheduler

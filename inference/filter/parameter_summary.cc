@@ -1,0 +1,43 @@
+#include "inference/filter/parameter_summary.h"
+
+#include <cmath>
+#include <limits>
+
+#include "inference/filter/weighted_moments.h"
+
+namespace calib::inference {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kOuterShare = 0.02;  // of the prior's probability at one end
+constexpr double kBoundShare = 0.1;   // of the posterior's
+
+double MassWhere(const Eigen::VectorXd& log_weights, const Eigen::VectorXd& values, double low,
+                 double high) {
+  double mass = 0;
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    if (values[i] >= low && values[i] <= high) mass += std::exp(log_weights[i]);
+  }
+  return mass;
+}
+
+}  // namespace
+
+ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weights,
+                           const Eigen::VectorXd& values) {
+  const Eigen::VectorXd mean = WeightedMean(log_weights, values);
+  ParameterSummary summary;
+  summary.mean = mean[0];
+  summary.sd = std::sqrt(WeightedCovariance(log_weights, values, mean)(0, 0));
+  summary.cov = summary.sd / std::abs(summary.mean);
+  summary.q05 = WeightedQuantile(log_weights, values, 0.05);
+  summary.q50 = WeightedQuantile(log_weights, values, 0.5);
+  summary.q95 = WeightedQuantile(log_weights, values, 0.95);
+  summary.prior_sd = prior.StandardDeviation();
+  summary.at_bound =
+      MassWhere(log_weights, values, -kInfinity, prior.Quantile(kOuterShare)) > kBoundShare ||
+      MassWhere(log_weights, values, prior.Quantile(1 - kOuterShare), kInfinity) > kBoundShare;
+  return summary;
+}
+
+}  // namespace calib::inference

@@ -1,0 +1,74 @@
+#include "server/scheduler/answer.h"
+
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+
+namespace calib::scheduler {
+namespace {
+
+constexpr const char* kNothingGiven =
+    "No standard deviations, quantiles or held-out judgement are given. ";
+
+void ExplainEmulator(const Answer& answer, std::vector<std::string>& warnings) {
+  const inference::EmulatedResult& emulated = *answer.emulated;
+  if (emulated.adequate) {
+    warnings.push_back(absl::StrFormat(
+        "%s The posterior was therefore sampled on an emulator of %d runs, which predicts a run "
+        "left out to %.2f standard deviations of the readings' noise (%.2f of them scatter of "
+        "single runs); this error is part of the intervals.",
+        answer.weighted.degeneracy, emulated.runs, emulated.cross_validated_error,
+        emulated.scatter));
+  } else {
+    warnings.push_back(absl::StrCat(answer.weighted.degeneracy, " ", kNothingGiven,
+                                    "Not even an emulator of the runs gives a posterior: ",
+                                    emulated.reason));
+  }
+}
+
+}  // namespace
+
+std::vector<inference::ParameterSummary> Answer::Parameters() const {
+  if (FromEmulator()) {
+    return emulated->parameters;
+  }
+  if (FromWeights()) {
+    return weighted.parameters;
+  }
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<inference::ParameterSummary> means = weighted.parameters;
+  for (inference::ParameterSummary& mean : means) {
+    mean.sd = mean.cov = mean.q05 = mean.q50 = mean.q95 = kNone;
+  }
+  return means;
+}
+
+absl::StatusOr<Answer> FindAnswer(const Definition& definition,
+                                  std::span<const inference::Iteration> iterations) {
+  const inference::FilterOptions& filter = definition.campaign.filter;
+  auto weighted =
+      inference::ComputePosterior(definition.priors, definition.data, filter, iterations);
+  if (!weighted.ok()) {
+    return weighted.status();
+  }
+  Answer answer{.weighted = *std::move(weighted), .emulated = std::nullopt, .warnings = {}};
+  answer.warnings = answer.weighted.warnings;
+  if (answer.FromWeights()) {
+    return answer;
+  }
+  auto emulated = inference::EmulatedPosterior(
+      definition.priors, definition.data, {.noise = filter.noise, .seed = filter.seed}, iterations);
+  if (emulated.ok()) {
+    answer.emulated = *std::move(emulated);
+    ExplainEmulator(answer, answer.warnings);
+  } else {
+    answer.warnings.push_back(absl::StrCat(answer.weighted.degeneracy, " ", kNothingGiven,
+                                           "An emulator of the runs is not possible: ",
+                                           std::string(emulated.status().message())));
+  }
+  return answer;
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,37 @@
+#pragma once
+// The posterior that a campaign reports: that of the weighted samples where those suffice, else one
+// sampled on an emulator of their states, else none.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/emulator/emulated_posterior.h"
+#include "inference/filter/iterative_filter.h"
+#include "server/scheduler/definition.h"
+
+namespace calib::scheduler {
+
+struct Answer {
+  inference::Posterior weighted;
+  /// Where the weights do not suffice and the states could be emulated, adequately or not.
+  std::optional<inference::EmulatedResult> emulated;
+  std::vector<std::string> warnings;  ///< whole sentences
+
+  bool FromWeights() const { return weighted.degeneracy.empty(); }
+  bool FromEmulator() const { return emulated.has_value() && emulated->adequate; }
+  /// False: no posterior can be given, only the best samples; nothing has converged.
+  bool HasIntervals() const { return FromWeights() || FromEmulator(); }
+  /// Summaries of the posterior that is reported. Without intervals: the weighted means, everything
+  /// else NaN.
+  std::vector<inference::ParameterSummary> Parameters() const;
+};
+
+/// Deterministic. Errors as inference::ComputePosterior; an emulator that cannot be had is no
+/// error but a warning.
+absl::StatusOr<Answer> FindAnswer(const Definition& definition,
+                                  std::span<const inference::Iteration> iterations);
+
+}  // namespace calib::scheduler

@@ -1,0 +1,110 @@
+#include "server/scheduler/answer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/scheduler/posterior_record.h"
+#include "tests/unit/scheduler/simulated_service.h"
+
+namespace calib::scheduler {
+namespace {
+
+using ::testing::HasSubstr;
+
+testing::SmallCampaign Campaign(int samples, double noise) {
+  return testing::MakeSmallCampaign({.samples = samples,
+                                     .max_iterations = 2,
+                                     .load_steps = 12,
+                                     .failure_attempts = 100,
+                                     .relative_noise = noise,
+                                     .with_validation = true});
+}
+
+v1::Posterior RunCampaign(SimulatedService& service, int samples, double noise) {
+  service.Submit(Campaign(samples, noise));
+  service.RunToEnd(1, true);
+  v1::Posterior last;
+  for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
+    if (iteration.posterior.has_value()) last = *PosteriorFromJson(*iteration.posterior);
+  }
+  return last;
+}
+
+int HeldOutDraws(SimulatedService& service, int samples) {
+  int draws = 0;
+  for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
+    if (sample.iteration == 2) {
+      EXPECT_EQ(sample.sample, 2 * samples + draws);
+      EXPECT_EQ(sample.log_weight, -INFINITY);
+      ++draws;
+    }
+  }
+  return draws;
+}
+
+TEST(Answer, WideNoiseLeavesWeightsThatSuffice) {
+  SimulatedService service("answer_weights");
+  const v1::Posterior posterior = RunCampaign(service, 200, 0.3);
+  EXPECT_EQ(posterior.posterior_from(), "weights");
+  EXPECT_FALSE(posterior.has_emulator());
+  EXPECT_EQ(posterior.draws_size(), 0);
+  EXPECT_GT(posterior.ess(), 50);
+  EXPECT_EQ(HeldOutDraws(service, 200), 0);
+}
+
+TEST(Answer, FewEffectiveSamplesAreEmulatedAndHeldOutTestsRunOnDraws) {
+  SimulatedService service("answer_emulator");
+  const v1::Posterior posterior = RunCampaign(service, 40, 0.02);
+  EXPECT_EQ(posterior.posterior_from(), "emulator");
+  EXPECT_LT(posterior.ess(), 50);
+  EXPECT_TRUE(posterior.emulator().adequate());
+  EXPECT_EQ(posterior.draws_size(), 2 * 400);
+  ASSERT_EQ(posterior.bands_size(), 1);
+  EXPECT_EQ(posterior.bands(0).experiment(), "tx");
+  EXPECT_EQ(posterior.bands(0).observable(), "stress_ratio");
+  ASSERT_EQ(posterior.bands(0).mean_size(), 12);
+  EXPECT_LT(posterior.bands(0).q05(11), posterior.bands(0).q95(11));
+  for (const auto& parameter : posterior.parameters()) {
+    EXPECT_LT(parameter.q05(), parameter.mean());
+    EXPECT_LT(parameter.mean(), parameter.q95());
+  }
+  EXPECT_EQ(HeldOutDraws(service, 40), 20);
+  for (const store::EvaluationRecord& evaluation : Value(service.Read().Evaluations(1))) {
+    EXPECT_EQ(evaluation.key.sample >= 80, evaluation.key.experiment == 1)
+        << "held-out tests are run for draws alone, and draws for nothing else";
+    EXPECT_EQ(evaluation.status, store::EvaluationStatus::kFinished);
+  }
+}
+
+TEST(Answer, WithTooFewRunsToEmulateNoIntervalIsGiven) {
+  SimulatedService service("answer_none");
+  const v1::Posterior posterior = RunCampaign(service, 4, 0.001);
+  EXPECT_EQ(posterior.posterior_from(), "none");
+  EXPECT_FALSE(posterior.converged());
+  EXPECT_TRUE(std::isnan(posterior.log_evidence_se()));
+  EXPECT_EQ(posterior.correlation_size(), 0);
+  for (const auto& parameter : posterior.parameters()) {
+    EXPECT_TRUE(std::isfinite(parameter.mean()));
+    EXPECT_TRUE(std::isnan(parameter.sd()));
+    EXPECT_TRUE(std::isnan(parameter.q05()));
+    EXPECT_TRUE(std::isnan(parameter.q95()));
+  }
+  ASSERT_EQ(posterior.warnings_size(), 1);
+  EXPECT_THAT(posterior.warnings(0), HasSubstr("No standard deviations, quantiles"));
+  EXPECT_EQ(HeldOutDraws(service, 4), 0);
+}
+
+TEST(Answer, ARestartInTheMiddleChangesNoBit) {
+  SimulatedService calm("answer_calm");
+  calm.Submit(Campaign(40, 0.02));
+  calm.RunToEnd(1, true);
+  SimulatedService storm("answer_storm");
+  storm.Submit(Campaign(40, 0.02));
+  storm.RunToEnd(3, false);
+  EXPECT_TRUE(storm.Fingerprint() == calm.Fingerprint());
+}
+
+}  // namespace
+}  // namespace calib::scheduler
