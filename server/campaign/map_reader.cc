@@ -84,7 +84,7 @@ std::vector<std::string> MapReader::Keys() const {
 }
 
 const YamlNode* MapReader::Find(const std::string& key) {
-  known_.push_back(key);
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
   const YamlEntry* entry = FindEntry(key);
   return entry != nullptr ? &entry->value : nullptr;
 }

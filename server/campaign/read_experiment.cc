@@ -41,7 +41,8 @@ std::string ReadName(MapReader& map, const Campaign& campaign) {
   return name;
 }
 
-void ReadSettings(MapReader& map, const dem::TestInfo& test, Experiment& experiment) {
+// Runs made elsewhere need no settings; what is given is read.
+void ReadSettings(MapReader& map, const dem::TestInfo& test, bool needed, Experiment& experiment) {
   for (const dem::ParameterInfo& setting : test.settings) {
     const Range range{.min = setting.min, .max = setting.max, .min_open = setting.min_open};
     if (const auto value = map.Quantity(setting.name, setting.unit, range)) {
@@ -49,7 +50,7 @@ void ReadSettings(MapReader& map, const dem::TestInfo& test, Experiment& experim
     } else if (!map.Has(setting.name)) {
       if (setting.default_value) {
         experiment.settings[setting.name] = *setting.default_value;
-      } else {
+      } else if (needed) {
         map.Problem(setting.name,
                     absl::StrCat("is missing; ", test.name, " needs it: ", setting.description));
       }
@@ -136,7 +137,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   Experiment experiment;
   experiment.name = ReadName(map, campaign);
   const dem::TestInfo* test = ReadTest(map, campaign, experiment);
-  if (test != nullptr) ReadSettings(map, *test, experiment);
+  if (test != nullptr) ReadSettings(map, *test, !campaign.precomputed, experiment);
   experiment.role =
       map.Choice("role", {"calibrate", "validate"}).value_or("calibrate") == "validate"
           ? Role::kValidate
