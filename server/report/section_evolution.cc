@@ -29,7 +29,8 @@ std::string OverIterations(const CampaignView& view, int k) {
     high.push_back(posterior.parameters(k).q95() * unit.factor);
   }
   const std::vector<double> x = Counting(mean.size());
-  std::vector<double> shown = low;
+  std::vector<double> shown = mean;  // alone where no interval was given
+  shown.insert(shown.end(), low.begin(), low.end());
   shown.insert(shown.end(), high.begin(), high.end());
   Plot plot({.width = 330, .height = 200},
             Axis("iterations", 0.7, static_cast<double>(x.size()) + 0.3, static_cast<int>(x.size()),
@@ -117,7 +118,13 @@ std::string EvolutionSection(const ReportData& data) {
         "<h3>Along the loading path</h3>\n<p class=\"sub\">What the readings say when they are "
         "taken in one load step after the "
         "other: a parameter that keeps drifting is asked to play different roles in different "
-        "stages.</p>\n<div class=\"grid\">\n";
+        "stages.";
+    if (view.posterior.posterior_from() != "weights") {
+      html +=
+          " By the weighted samples alone, few of which count at the end: look at the effective "
+          "sample size beside.";
+    }
+    html += "</p>\n<div class=\"grid\">\n";
     for (int k = 0; k < view.posterior.parameters_size(); ++k) html += AlongPath(view, k);
     html += EssAlongPath(view) + "</div>\n";
   }

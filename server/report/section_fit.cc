@@ -172,12 +172,13 @@ std::string SegmentTable(const ReportData& data) {
 std::string FitSection(const ReportData& data) {
   std::string html = "<h2>Model against measurements</h2>\n<p class=\"sub\">Points: measured";
   html += ErrorsAreKnown(data.view) ? ", with one standard deviation of the error." : ".";
-  html +=
-      "<span class=\"key\" style=\"color:var(--model)\"></span>posterior mean, shaded: "
-      "5&#8239;%&#8239;to&#8239;95&#8239;%."
+  html += fmt::format(
+      "<span class=\"key\" style=\"color:var(--model)\"></span>{}."
       "<span class=\"key\" style=\"color:var(--held)\"></span>held out. Below each curve: model "
-      "minus "
-      "measurement.</p>\n";
+      "minus measurement.</p>\n",
+      data.view.posterior.posterior_from() == "none"
+          ? "mean of the weighted samples, without a band since there is no posterior"
+          : "posterior mean, shaded: 5&#8239;%&#8239;to&#8239;95&#8239;%");
   if (!data.comparison.note.empty()) {
     html += "<p class=\"sub\">" + Escape(data.comparison.note) + "</p>\n";
   }
