@@ -21,7 +21,8 @@ struct DefaultPrior {
   double max = 0;
 };
 
-/// What makes strengths of effects comparable between grain sizes and stresses.
+/// What makes strengths of effects comparable between grain sizes and stresses; one for a whole
+/// campaign, since some effects have parameters that must not differ between experiments.
 struct ReferenceState {
   double pressure = 0;  ///< p, at which the test starts [Pa] > 0
   double diameter = 0;  ///< d, mean of the grains [m] > 0
@@ -72,7 +73,7 @@ struct ContactInfo {
 
 /// One way to turn an effect up from nothing: a parameter leaves its null while others are held.
 struct StrengthRay {
-  std::string parameter;                ///< undotted; has a null value
+  std::string parameter;                 ///< undotted; has a null value
   std::array<double, 2> steps = {0, 0};  ///< two moderate distances from the null, ascending, in
                                          ///< units of the parameter's scale; of a two-sided effect
                                          ///< -steps are as good where they are admissible

@@ -13,6 +13,9 @@ MomentLaw MomentLawFrom(const KernelContext& context) {
   // An infinite coefficient would make inf * 0 of an unloaded contact; the largest number does the
   // same and stays finite.
   law.friction = std::min(context.parameters.Get("friction"), 1e100);
+  if (law.friction == 0) {
+    return law;  // no stiffness either, so that the time step is that of the model without
+  }
   if (const auto ratio = context.parameters.Find("stiffness_ratio")) {
     law.ratio = *ratio;
   } else if (linear) {
