@@ -19,6 +19,7 @@ struct alignas(64) ContactBlock {
   int count = 0;  ///< lanes in use
   double dt = 0;  ///< time since the last evaluation [s]; 0: evaluate without moving on
   double sliding_friction = 0;  ///< tan(phi_mu), or what replaces it during consolidation [-] >= 0
+  double viscous = 1;           ///< 1: viscous effects act; 0: not, as during consolidation
   double stretch[3] = {0, 0, 0};  ///< homogeneous velocity gradient of the cell, diagonal [1/s]
 
   // Set by the caller per contact.
@@ -31,7 +32,8 @@ struct alignas(64) ContactBlock {
 
   // Kinematics (contact_kinematics).
   Lane nx, ny, nz;              ///< unit normal from i to j
-  Lane overlap;                 ///< u = r_i + r_j - distance [m] > 0
+  Lane overlap;                 ///< u = r_i + r_j - distance [m]; below zero only where a kernel
+                                ///< holds the contact
   Lane effective_radius;        ///< r* = r_i r_j / (r_i + r_j) [m]
   Lane normal_velocity;         ///< rate of separation [m/s]
   Lane slip_x, slip_y, slip_z;  ///< tangential displacement of j against i during dt [m]
@@ -44,11 +46,16 @@ struct alignas(64) ContactBlock {
   Lane normal_force;          ///< repulsion positive [N]
   Lane normal_stiffness;      ///< tangent dFn/du [N/m]
   Lane tangential_stiffness;  ///< ks [N/m]
-  Lane sliding_limit;         ///< largest |Fs| [N]
-  Lane fx, fy, fz;            ///< shear force [N]
-  Lane mx, my, mz;            ///< moment [N m]
-  Lane rolling_stiffness;     ///< bending stiffness, for the time step [N m/rad]
-  Lane twisting_stiffness;    ///< [N m/rad]
+  Lane attraction;            ///< part of the normal force that pulls, which friction does not feel
+                              ///< missing: its limit is tan(phi_mu) (normal_force + attraction) [N]
+  Lane holds;                 ///< above zero: the contact goes on acting although overlap <= 0
+  Lane normal_damping;        ///< viscous coefficients, for the time step [N s/m]
+  Lane tangential_damping;
+  Lane sliding_limit;       ///< largest |Fs| [N]
+  Lane fx, fy, fz;          ///< shear force [N]
+  Lane mx, my, mz;          ///< moment [N m]
+  Lane rolling_stiffness;   ///< bending stiffness, for the time step [N m/rad]
+  Lane twisting_stiffness;  ///< [N m/rad]
 
   // Totals (contact_kinematics), after the last kernel.
   Lane force_x, force_y, force_z;        ///< on j [N]

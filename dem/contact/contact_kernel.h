@@ -15,6 +15,7 @@ enum class ContactStage {
   kNormalExtra,   ///< adds to the normal force (adhesion, viscosity, plasticity)
   kSlidingLimit,  ///< sets or changes sliding_limit
   kTangential,    ///< integrates the shear force
+  kShearExtra,    ///< adds to the shear force (viscosity)
   kMoment,        ///< adds moments
 };
 
@@ -29,6 +30,11 @@ class ContactKernel {
   /// Doubles that each contact remembers for this kernel between steps; zero when a contact forms.
   [[nodiscard]] virtual int HistorySize() const { return 0; }
 
+  /// Largest gap between surfaces at which a contact, once formed, may go on acting, for grains up
+  /// to this radius [m]; there the kernel sets block.holds or lets the contact open. Contacts form
+  /// on touching only.
+  [[nodiscard]] virtual double Reach(double /*largest_radius*/) const { return 0; }
+
   /// Acts on all kBlock lanes. `first` is the kernel's first history column. With block.dt = 0
   /// increments vanish and the call only evaluates: the engine uses it to read stiffnesses.
   virtual void Apply(ContactBlock& block, int first) const = 0;
@@ -37,6 +43,8 @@ class ContactKernel {
 /// What a law or an effect may know when it is made: its own parameters and the law it joins.
 struct KernelContext {
   std::string contact;  ///< name of the contact law
+  double density = 0;   ///< of the grains [kg/m^3]
+  ParameterSet law;     ///< parameters of the law, defaults filled in
   ParameterSet
       parameters;  ///< of the law, or of the effect (without its prefix), defaults filled in
 };

@@ -42,20 +42,25 @@ ContactModel::ContactModel(const Model& model)
     : sliding_friction_(SlidingFriction(model.parameters)) {
   std::vector<std::pair<ContactStage, std::shared_ptr<const ContactKernel>>> kernels;
   const ContactEntry& law = LawNamed(model.contact);
-  kernels.emplace_back(
-      ContactStage::kNormal,
-      law.make({.contact = model.contact,
-                .parameters = Resolve(law.info.parameters, "", model.parameters)}));
+  const ParameterSet law_parameters = Resolve(law.info.parameters, "", model.parameters);
+  kernels.emplace_back(ContactStage::kNormal, law.make({.contact = model.contact,
+                                                        .density = model.density,
+                                                        .law = law_parameters,
+                                                        .parameters = law_parameters}));
   kernels.emplace_back(ContactStage::kSlidingLimit, MakeCoulombLimit());
   kernels.emplace_back(ContactStage::kTangential, MakeTangentialSpring());
   for (const EffectEntry& effect :
        EffectEntries()) {  // in catalogue order, however the user lists them
     const std::string& name = effect.info.name;
     if (std::find(model.effects.begin(), model.effects.end(), name) != model.effects.end()) {
-      kernels.emplace_back(effect.stage,
-                           effect.make({.contact = model.contact,
-                                        .parameters = Resolve(effect.info.parameters, name + ".",
-                                                              model.parameters)}));
+      const KernelContext context{
+          .contact = model.contact,
+          .density = model.density,
+          .law = law_parameters,
+          .parameters = Resolve(effect.info.parameters, name + ".", model.parameters)};
+      for (const EffectKernel& kernel : effect.kernels) {
+        kernels.emplace_back(kernel.stage, kernel.make(context));
+      }
     }
   }
   std::stable_sort(kernels.begin(), kernels.end(),
@@ -68,10 +73,19 @@ ContactModel::ContactModel(const Model& model)
   assert(history_size_ <= kMaxHistory);
 }
 
+double ContactModel::Reach(double largest_radius) const {
+  double reach = 0;
+  for (const Link& link : chain_) {
+    reach = std::max(reach, link.kernel->Reach(largest_radius));
+  }
+  return reach;
+}
+
 void ContactModel::Evaluate(ContactBlock& block) const {
   ComputeKinematics(block);
   for (ContactBlock::Lane* lane :
-       {&block.mx, &block.my, &block.mz, &block.rolling_stiffness, &block.twisting_stiffness}) {
+       {&block.attraction, &block.holds, &block.normal_damping, &block.tangential_damping,
+        &block.mx, &block.my, &block.mz, &block.rolling_stiffness, &block.twisting_stiffness}) {
     std::fill(*lane, *lane + kBlock, 0.0);
   }
   for (const Link& link : chain_) {

@@ -18,6 +18,9 @@ class ContactModel {
   /// Doubles that each contact remembers, <= kMaxHistory.
   [[nodiscard]] int history_size() const { return history_size_; }
 
+  /// Largest gap at which a contact of grains up to this radius may still act [m].
+  [[nodiscard]] double Reach(double largest_radius) const;
+
   /// tan(phi_mu) of the model itself; consolidation may put another one into the block.
   [[nodiscard]] double sliding_friction() const { return sliding_friction_; }
 

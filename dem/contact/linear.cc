@@ -14,7 +14,8 @@ struct LinearModuli {
 CALIB_DEM_CLONES void EvaluateLinear(const LinearModuli moduli, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
     const double kn = moduli.normal * b.effective_radius[k];  // Eq. 3
-    b.normal_force[k] = kn * b.overlap[k];                    // Eq. 1
+    const double u = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
+    b.normal_force[k] = kn * u;  // Eq. 1
     b.normal_stiffness[k] = kn;
     b.tangential_stiffness[k] = moduli.ratio * kn;  // Eq. 4
   }

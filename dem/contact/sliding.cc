@@ -11,7 +11,8 @@ namespace {
 CALIB_DEM_CLONES void LimitByCoulomb(ContactBlock& b) {
   const double friction = b.sliding_friction;
   for (int k = 0; k < kBlock; ++k) {
-    b.sliding_limit[k] = b.normal_force[k] > 0 ? friction * b.normal_force[k] : 0.0;
+    const double load = b.normal_force[k] + b.attraction[k];
+    b.sliding_limit[k] = load > 0 ? friction * load : 0.0;
   }
 }
 

@@ -7,7 +7,7 @@
 
 namespace calib::dem {
 
-/// Largest shear force tan(phi_mu) Fn, zero in tension. [Cheng 2018, Table 1]
+/// Largest shear force tan(phi_mu) (Fn + attraction), zero where that pulls. [Cheng 2018, Table 1]
 std::unique_ptr<ContactKernel> MakeCoulombLimit();
 
 /// Incremental shear force dFs = -ks slip, carried along with the contact and cut back to

@@ -18,6 +18,13 @@ namespace {
 /// narrower one searches more often. Measured best on dense packings of 1000 to 10 000 grains.
 constexpr double kSkin = 0.03;
 
+/// Largest rate that the explicit step must follow, of an oscillator with a dashpot: the root of
+/// (w/r)^2 + 2 (c/m)/r = 1, since forces use velocities half a step old; w without a dashpot.
+/// w = sqrt(K/m) [1/s], damping c/m [1/s]
+double DampedRate(double w, double damping) {
+  return damping > 0 ? damping + std::sqrt(damping * damping + w * w) : w;
+}
+
 /// sqrt(m/K) of the smallest grain, held by one like it at an overlap of 1e-4 radii.
 double NominalStep(const ContactModel& model, const ParticleArrays& p) {
   const auto smallest = static_cast<std::size_t>(
@@ -33,7 +40,10 @@ double NominalStep(const ContactModel& model, const ParticleArrays& p) {
   const double rotation = (block.tangential_stiffness[0] * p.radius[smallest] * p.radius[smallest] +
                            block.rolling_stiffness[0] + block.twisting_stiffness[0]) *
                           p.inverse_inertia[smallest];
-  return 1.0 / std::sqrt(std::max(translation, rotation));
+  const double slowest = std::sqrt(std::max(translation, rotation));
+  const double damping =
+      (block.normal_damping[0] + block.tangential_damping[0]) * p.inverse_mass[smallest];
+  return 1.0 / DampedRate(slowest, damping);
 }
 
 /// Repeats lane 0 in the unused lanes, so that kernels meet valid numbers everywhere.
@@ -57,9 +67,10 @@ struct PairInput {
   const double* z;
   const double* radius;
   const std::array<double, 3>* shift;
+  double reach;  ///< 0, or the gap up to which contacts act
 };
 
-/// depth: (r_i + r_j)^2 - |d|^2 of each pair [m^2]; positive: touching.
+/// depth: (r_i + r_j + reach)^2 - |d|^2 of each pair [m^2]; positive: within reach, or touching.
 void MeasureDistances(const PairInput& in, std::size_t begin, std::size_t end, double* depth) {
   for (std::size_t s = begin; s < end; ++s) {
     const int i = in.first[s];
@@ -68,7 +79,7 @@ void MeasureDistances(const PairInput& in, std::size_t begin, std::size_t end, d
     const double dx = in.x[j] + shift[0] - in.x[i];
     const double dy = in.y[j] + shift[1] - in.y[i];
     const double dz = in.z[j] + shift[2] - in.z[i];
-    const double reach = in.radius[i] + in.radius[j];
+    const double reach = in.radius[i] + in.radius[j] + in.reach;
     depth[s - begin] = reach * reach - (dx * dx + dy * dy + dz * dz);
   }
 }
@@ -126,7 +137,8 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model, i
   }
   mean_diameter_ = 2 * radii / particles_.size();
   largest_radius_ = *std::max_element(particles_.radius.begin(), particles_.radius.end());
-  skin_ = kSkin * mean_diameter_;
+  reach_ = model_.Reach(largest_radius_);
+  skin_ = kSkin * mean_diameter_ + reach_;
   nominal_critical_step_ = NominalStep(model_, particles_);
 }
 
@@ -239,20 +251,26 @@ void Assembly::OpenContact(std::size_t slot) {
   std::fill_n(history_.begin() + static_cast<std::ptrdiff_t>(slot * width), width, 0.0);
 }
 
-void Assembly::EvaluateChunk(int chunk) {
-  const auto begin = static_cast<std::size_t>(chunk) * kPairChunk;
-  const auto end = std::min(begin + kPairChunk, list_.second.size());
+int Assembly::CollectActive(std::size_t begin, std::size_t end, int* active) {
+  PairInput input{.first = list_.first.data(),
+                  .second = list_.second.data(),
+                  .image = list_.image.data(),
+                  .x = particles_.x.data(),
+                  .y = particles_.y.data(),
+                  .z = particles_.z.data(),
+                  .radius = particles_.radius.data(),
+                  .shift = shift_.data(),
+                  .reach = 0};
   double depth[kPairChunk];
-  MeasureDistances({.first = list_.first.data(),
-                    .second = list_.second.data(),
-                    .image = list_.image.data(),
-                    .x = particles_.x.data(),
-                    .y = particles_.y.data(),
-                    .z = particles_.z.data(),
-                    .radius = particles_.radius.data(),
-                    .shift = shift_.data()},
-                   begin, end, depth);
-  int active[kPairChunk];
+  MeasureDistances(input, begin, end, depth);
+  if (reach_ > 0) {  // formed contacts go on as far as a kernel may hold them
+    double within[kPairChunk];
+    input.reach = reach_;
+    MeasureDistances(input, begin, end, within);
+    for (std::size_t s = begin; s < end; ++s) {
+      depth[s - begin] = touching_[s] != 0 ? within[s - begin] : depth[s - begin];
+    }
+  }
   int count = 0;
   for (std::size_t s = begin; s < end;
        ++s) {  // without branches: which pairs touch cannot be predicted
@@ -263,9 +281,18 @@ void Assembly::EvaluateChunk(int chunk) {
       OpenContact(s);
     }
   }
+  return count;
+}
+
+void Assembly::EvaluateChunk(int chunk) {
+  const auto begin = static_cast<std::size_t>(chunk) * kPairChunk;
+  const auto end = std::min(begin + kPairChunk, list_.second.size());
+  int active[kPairChunk];
+  const int count = CollectActive(begin, end, active);
   ContactBlock block;
   block.dt = last_dt_;
   block.sliding_friction = sliding_friction_;
+  block.viscous = viscous_ ? 1.0 : 0.0;
   std::copy(std::begin(cell_.stretch), std::end(cell_.stretch), std::begin(block.stretch));
   ChunkSums sums;
   for (int a = 0; a < count; ++a) {
@@ -286,6 +313,11 @@ void Assembly::StoreBlock(ContactBlock& b, ChunkSums& sums) {
   const int width = model_.history_size();
   for (int k = 0; k < b.count; ++k) {
     const int slot = b.pair[k];
+    const bool overlaps = b.overlap[k] > 0;
+    if (reach_ > 0 && !overlaps && !(b.holds[k] > 0)) {
+      OpenContact(static_cast<std::size_t>(slot));
+      continue;
+    }
     const double fx = b.force_x[k];
     const double fy = b.force_y[k];
     const double fz = b.force_z[k];
@@ -296,13 +328,13 @@ void Assembly::StoreBlock(ContactBlock& b, ChunkSums& sums) {
     sums.stress[0] += fx * b.dx[k];
     sums.stress[1] += fy * b.dy[k];
     sums.stress[2] += fz * b.dz[k];
+    sums.contacts += reach_ > 0 && !overlaps ? 0 : 1;
     touching_.data()[slot] = 1;
     double* const remembered = history_.data() + static_cast<std::ptrdiff_t>(slot) * width;
     for (int c = 0; c < width; ++c) {
       remembered[c] = b.history[c][k];
     }
   }
-  sums.contacts += b.count;
   b.count = 0;
 }
 
@@ -362,9 +394,29 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
   const ParticleArrays& p = particles_;
   const auto n = p.x.size();
   std::vector<std::array<double, 6>> stiffness(n, {0, 0, 0, 0, 0, 0});  // translation, rotation
+  std::vector<std::array<double, 6>> damping;  // as stiffness; empty without dashpots
   std::array<double, 3> modulus = {0, 0, 0};
+  std::array<double, 3> viscosity = {0, 0, 0};
   ContactBlock b;
+  b.viscous = viscous_ ? 1.0 : 0.0;
   absl::Status status;
+  const auto add_damping = [&](int k, std::size_t i, std::size_t j) {
+    if (!(b.normal_damping[k] + b.tangential_damping[k] > 0)) {
+      return;
+    }
+    damping.resize(n, {0, 0, 0, 0, 0, 0});
+    const double n2[3] = {b.nx[k] * b.nx[k], b.ny[k] * b.ny[k], b.nz[k] * b.nz[k]};
+    const double d[3] = {b.dx[k], b.dy[k], b.dz[k]};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double across = b.tangential_damping[k] * (1.0 - n2[a]);
+      const double translation = b.normal_damping[k] * n2[a] + across;
+      viscosity[a] += translation * d[a] * d[a];
+      damping[i][a] += translation;
+      damping[j][a] += translation;
+      damping[i][a + 3] += across * b.radius_i[k] * b.radius_i[k];
+      damping[j][a + 3] += across * b.radius_j[k] * b.radius_j[k];
+    }
+  };
   const auto add = [&] {
     PadLanes(model_.history_size(), b);
     model_.Evaluate(b);
@@ -377,6 +429,7 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
                                                     " overlap by ", b.overlap[k],
                                                     " m, more than half the smaller radius"));
       }
+      add_damping(k, i, j);
       const double kn = b.normal_stiffness[k];
       const double ks = b.tangential_stiffness[k];
       const double n2[3] = {b.nx[k] * b.nx[k], b.ny[k] * b.ny[k], b.nz[k] * b.nz[k]};
@@ -413,9 +466,18 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
           {rate2, stiffness[g][a] * p.inverse_mass[g], stiffness[g][a + 3] * p.inverse_inertia[g]});
     }
   }
-  estimate.critical_step = rate2 > 0 ? 1.0 / std::sqrt(rate2) : 0.0;
+  double rate = std::sqrt(rate2);
+  for (std::size_t g = 0; g < damping.size(); ++g) {
+    for (std::size_t a = 0; a < 6; ++a) {
+      const double inverse = a < 3 ? p.inverse_mass[g] : p.inverse_inertia[g];
+      rate =
+          std::max(rate, DampedRate(std::sqrt(stiffness[g][a] * inverse), damping[g][a] * inverse));
+    }
+  }
+  estimate.critical_step = rate > 0 ? 1.0 / rate : 0.0;
   for (std::size_t a = 0; a < 3; ++a) {
     estimate.modulus[a] = modulus[a] / cell_.Volume();
+    estimate.viscosity[a] = viscosity[a] / cell_.Volume();
   }
   return status;
 }

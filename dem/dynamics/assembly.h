@@ -27,7 +27,8 @@ struct GrainLoad {
 struct StiffnessEstimate {
   double critical_step =
       0;  ///< min over grains of sqrt(m/K), translation and rotation [s]; 0: no contact
-  std::array<double, 3> modulus = {0, 0, 0};  ///< affine (Voigt) stiffness of each axis [Pa]
+  std::array<double, 3> modulus = {0, 0, 0};    ///< affine (Voigt) stiffness of each axis [Pa]
+  std::array<double, 3> viscosity = {0, 0, 0};  ///< the same of the dashpots [Pa s]
 };
 
 /// Copyable: a copy is a snapshot that goes on to the same bits. Not thread-safe; uses `threads`
@@ -62,6 +63,9 @@ class Assembly {
 
   /// Grains whose net force is not a number, in words; empty: none.
   [[nodiscard]] std::string FirstNotFinite() const;
+
+  /// Whether viscous effects act; they do until told otherwise.
+  void SetViscous(bool viscous) { viscous_ = viscous; }
 
   void SetSlidingFriction(double friction) { sliding_friction_ = friction; }
   [[nodiscard]] double sliding_friction() const { return sliding_friction_; }
@@ -103,6 +107,7 @@ class Assembly {
   void LoadLane(int slot, ContactBlock& block) const;
   void StoreBlock(ContactBlock& block, ChunkSums& sums);
   void OpenContact(std::size_t slot);
+  int CollectActive(std::size_t begin, std::size_t end, int* active);
   void GatherLoads(std::size_t begin, std::size_t end);
   double MoveChunk(int chunk, const Motion& motion);
   [[nodiscard]] bool ListMayMissPairs() const;
@@ -112,6 +117,8 @@ class Assembly {
   ContactModel model_;
   int threads_ = 1;
   double sliding_friction_ = 0;
+  bool viscous_ = true;
+  double reach_ = 0;  ///< gap up to which formed contacts may act [m]
   double last_dt_ = 0;
 
   NeighborList list_;

@@ -64,7 +64,11 @@ StageEnd QuasiStatic::Inspect() {
       std::min(kMaxStrainPerStep / options_.rate, assembly_->NominalCriticalStep());
   dt_ =
       kSafety * (estimate.critical_step > 0 ? std::min(largest, estimate.critical_step) : largest);
-  modulus_ = estimate.modulus;
+  for (std::size_t a = 0; a < 3; ++a) {
+    // A dashpot answers a strain rate at once, in the same step: the servo must see it as
+    // stiffness.
+    modulus_[a] = estimate.modulus[a] + 2.0 * estimate.viscosity[a] / dt_;
+  }
   return StageEnd::kDone;
 }
 

@@ -66,9 +66,11 @@ class ElementTestRun {
     const ConsolidationPlan plan{.pressure = scenario_.settings.at("confining_pressure"),
                                  .consolidation = scenario_.consolidation,
                                  .initial_stress = scenario_.initial_stress};
+    assembly_.SetViscous(false);
     if (auto s = Consolidate(plan, stages_, end); !s.ok()) {
       return s;
     }
+    assembly_.SetViscous(true);
     if (end != StageEnd::kDone) {
       return Finish(end, "consolidation");
     }

@@ -1,0 +1,59 @@
+#include "dem/effects/adhesion_dmt.h"
+
+#include <numbers>
+
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+CALIB_DEM_CLONES void Attract(double work, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const double pull_off = 2.0 * std::numbers::pi * work * b.effective_radius[k];
+    const double pull = b.overlap[k] > 0 ? pull_off : 0.0;
+    b.normal_force[k] -= pull;
+    b.attraction[k] += pull;
+  }
+}
+
+class DmtKernel final : public ContactKernel {
+ public:
+  explicit DmtKernel(double work) : work_(work) {}
+  void Apply(ContactBlock& block, int /*first*/) const override { Attract(work_, block); }
+
+ private:
+  double work_;  ///< [J/m^2]
+};
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  return std::make_unique<DmtKernel>(context.parameters.Get("work_of_adhesion"));
+}
+
+}  // namespace
+
+EffectEntry AdhesionDmt() {
+  ParameterInfo work;
+  work.name = "work_of_adhesion";
+  work.unit = "J/m^2";
+  work.max = 1e6;
+  work.default_prior = {.kind = "log_uniform", .min = 1e-3, .max = 10};
+  work.null_value = 0;
+  work.scale = {.pressure = 1, .diameter = 1};  // pull-off over p d^2 is then about one
+  work.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 10};
+  work.description =
+      "W, energy to part two surfaces, per area (twice the surface energy of one material)";
+  return {
+      .info = {.name = "adhesion_dmt",
+               .kind = "contact",
+               .description = "Attraction 2 pi W R* while grains touch, sliding limit mu (F + 2 "
+                              "pi W R*); one-sided, vanishes at work_of_adhesion 0",
+               .contacts = {},
+               .parameters = {work},
+               .reference = "Derjaguin, Muller & Toporov, J. Colloid Interface Sci. 53 (1975) "
+                            "314",
+               .two_sided = false,
+               .rays = {{.parameter = "work_of_adhesion", .steps = {0.1, 0.4}}}},
+      .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
+}
+
+}  // namespace calib::dem

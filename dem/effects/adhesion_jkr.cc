@@ -1,0 +1,117 @@
+#include "dem/effects/adhesion_jkr.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "dem/contact/power.h"
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+struct Adhesion {
+  double work = 0;        ///< W [J/m^2] > 0
+  double modulus = 0;     ///< E* [Pa]
+  double tangential = 0;  ///< ks/a of the law [Pa]
+};
+
+/// Root z >= 1 of z^4 - 4z = u for u >= -3. The start lies above it and the curve is convex, so
+/// that Newton's steps come down without passing it; twelve reach rounding from wherever they
+/// start, except within 1e-6 of the double root z = 1, where they reach 1e-4.
+inline double ContactWidth(double u) {
+  double z = std::sqrt(std::sqrt(u + 3.0)) + (1.0 + 1e-9);
+  for (int n = 0; n < 12; ++n) {
+    const double z3 = z * z * z;
+    z -= (z * (z3 - 4.0) - u) / (4.0 * (z3 - 1.0) + 1e-30);
+    z = z > 1.0 ? z : 1.0;
+  }
+  return z;
+}
+
+/// a_c = (pi W R*^2/(8 E*))^(1/3), the smallest radius of a contact [m].
+inline double SmallestRadius(const Adhesion& law, double radius) {
+  return Power(std::numbers::pi * law.work * radius * radius / (8.0 * law.modulus), 1.0 / 3.0);
+}
+
+CALIB_DEM_CLONES void Adhere(const Adhesion law, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const double radius = b.effective_radius[k];
+    const double smallest = SmallestRadius(law, radius);
+    const double width = smallest * smallest / radius;  // unit of overlap
+    const double u = b.overlap[k] / width;
+    const double z = ContactWidth(u > -3.0 ? u : -3.0);
+    const double z3 = z * z * z;
+    const double unit = std::numbers::pi * law.work * radius;
+    const double positive = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
+    const double hertz_radius = std::sqrt(radius * positive);
+    const double hertz = 4.0 / 3.0 * law.modulus * hertz_radius * positive;
+    const double on = u > -3.0 ? 1.0 : 0.0;
+    const double more = smallest * (z * z) - hertz_radius;  // of the contact radius
+    b.normal_force[k] += on * (unit * (z3 * z3 / 6.0 - z3) - hertz);
+    b.normal_stiffness[k] += on * (2.0 * law.modulus * more);  // bounds the tangent from above
+    b.tangential_stiffness[k] += on * (law.tangential * more);
+    b.attraction[k] += on * (1.5 * unit);
+    b.holds[k] += on;
+  }
+}
+
+class JkrKernel final : public ContactKernel {
+ public:
+  explicit JkrKernel(const Adhesion& law) : law_(law) {}
+  [[nodiscard]] double Reach(double largest_radius) const override {
+    const double radius = 0.5 * largest_radius;
+    const double smallest = SmallestRadius(law_, radius);
+    return 3.0 * smallest * smallest / radius;  // grows with R*^(1/3)
+  }
+  void Apply(ContactBlock& block, int /*first*/) const override { Adhere(law_, block); }
+
+ private:
+  Adhesion law_;
+};
+
+class NoAdhesion final : public ContactKernel {
+ public:
+  void Apply(ContactBlock& /*block*/, int /*first*/) const override {}
+};
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  const double work = context.parameters.Get("work_of_adhesion");
+  if (work == 0) {
+    return std::make_unique<NoAdhesion>();
+  }
+  const double e = context.law.Get("young_modulus");
+  const double nu = context.law.Get("poisson_ratio");
+  return std::make_unique<JkrKernel>(Adhesion{.work = work,
+                                              .modulus = e / (2.0 * (1.0 - nu * nu)),
+                                              .tangential = 2.0 * e / ((1.0 + nu) * (2.0 - nu))});
+}
+
+}  // namespace
+
+EffectEntry AdhesionJkr() {
+  ParameterInfo work;
+  work.name = "work_of_adhesion";
+  work.unit = "J/m^2";
+  work.max = 1e6;
+  work.default_prior = {.kind = "log_uniform", .min = 1e-3, .max = 10};
+  work.null_value = 0;
+  work.scale = {.pressure = 1, .diameter = 1};  // pull-off over p d^2 is then about one
+  work.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 10};
+  work.description =
+      "W, energy to part two surfaces, per area (twice the surface energy of one material)";
+  return {.info = {.name = "adhesion_jkr",
+                   .kind = "contact",
+                   .description =
+                       "Adhesion of soft elastic spheres, pull-off 3/2 pi W R*, contacts hold to a "
+                       "gap of 3 a_c^2/R*, sliding limit mu (F + 3/2 pi W R*); one-sided, vanishes "
+                       "at work_of_adhesion 0",
+                   .contacts = {"hertz_mindlin"},
+                   .parameters = {work},
+                   .reference = "Johnson, Kendall & Roberts, Proc. R. Soc. Lond. A 324 (1971) 301; "
+                                "Johnson, Contact Mechanics (1985), sec. 5.5",
+                   .two_sided = false,
+                   .rays = {{.parameter = "work_of_adhesion", .steps = {0.1, 0.4}}}},
+          .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,132 @@
+#include "dem/effects/capillary_bridges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "dem/contact/power.h"
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+struct Liquid {
+  double tension = 0;  ///< gamma cos(theta) [N/m]
+  double stretch = 1;  ///< 1 + theta/2
+  double volume = 0;   ///< of every bridge [m^3]
+  double ratio = 0;    ///< of volume to R^3; one of the two is zero
+};
+
+/// Gap at which the bridge of two grains with mean radius R ruptures [m].
+inline double RuptureGap(const Liquid& liquid, double radius) {
+  const double volume = liquid.volume + liquid.ratio * (radius * radius * radius);
+  return liquid.stretch * Power(volume, 1.0 / 3.0);
+}
+
+CALIB_DEM_CLONES void Bridge(const Liquid liquid, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const double radius = 2.0 * b.effective_radius[k];
+    const double gap = b.overlap[k] < 0 ? -b.overlap[k] : 0.0;
+    const double volume = liquid.volume + liquid.ratio * (radius * radius * radius);
+    const double scaled = gap * std::sqrt(radius / volume);
+    const double bridge = 2.0 * std::numbers::pi * liquid.tension * radius /
+                          (1.0 + 1.05 * scaled + 2.5 * (scaled * scaled));
+    const double on = gap < RuptureGap(liquid, radius) ? 1.0 : 0.0;
+    const double pull = on * bridge;
+    b.normal_force[k] -= pull;
+    b.attraction[k] += pull;
+    b.holds[k] += on;
+  }
+}
+
+class BridgeKernel final : public ContactKernel {
+ public:
+  explicit BridgeKernel(const Liquid& liquid) : liquid_(liquid) {}
+  [[nodiscard]] double Reach(double largest_radius) const override {
+    return RuptureGap(liquid_, largest_radius);
+  }
+  void Apply(ContactBlock& block, int /*first*/) const override { Bridge(liquid_, block); }
+
+ private:
+  Liquid liquid_;
+};
+
+class NoBridges final : public ContactKernel {
+ public:
+  void Apply(ContactBlock& /*block*/, int /*first*/) const override {}
+};
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  const double tension = context.parameters.Get("surface_tension");
+  if (tension == 0) {
+    return std::make_unique<NoBridges>();
+  }
+  const double angle = context.parameters.Get("contact_angle");
+  Liquid liquid{.tension = tension * std::cos(angle), .stretch = 1.0 + 0.5 * angle};
+  if (const auto volume = context.parameters.Find("liquid_volume")) {
+    liquid.volume = *volume;
+  } else {
+    liquid.ratio = context.parameters.Get("volume_ratio");
+  }
+  return std::make_unique<BridgeKernel>(liquid);
+}
+
+std::vector<ParameterInfo> Parameters() {
+  ParameterInfo tension;
+  tension.name = "surface_tension";
+  tension.unit = "N/m";
+  tension.max = 1e6;
+  tension.default_prior = {.kind = "log_uniform", .min = 1e-3, .max = 10};
+  tension.null_value = 0;
+  tension.scale = {.pressure = 1, .diameter = 1};  // force over p d^2 is then pi
+  tension.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.003, .max = 10};
+  tension.description = "gamma of the liquid (water 0.073)";
+  ParameterInfo ratio;
+  ratio.name = "volume_ratio";
+  ratio.unit = "1";
+  ratio.min = 1e-9;
+  ratio.max = 0.1;
+  ratio.default_prior = {.kind = "log_uniform", .min = 1e-5, .max = 1e-2};
+  ratio.description = "volume of a bridge over R^3, R = 2 r1 r2/(r1 + r2)";
+  ParameterInfo volume;
+  volume.name = "liquid_volume";
+  volume.unit = "m^3";
+  volume.max = 1e-3;
+  volume.min_open = true;
+  volume.default_prior = {.kind = "log_uniform", .min = 1e-16, .max = 1e-9};
+  volume.scale = {.factor = 1e-3, .diameter = 3};
+  volume.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 10};
+  volume.alternative_to = "volume_ratio";
+  volume.description = "volume of every bridge, whatever the grains";
+  ParameterInfo angle;
+  angle.name = "contact_angle";
+  angle.unit = "rad";
+  angle.max = 0.9;
+  angle.default_prior = {.kind = "uniform", .min = 0, .max = 0.9};
+  angle.default_value = 0;
+  angle.description = "theta between liquid and grain";
+  return {tension, ratio, volume, angle};
+}
+
+}  // namespace
+
+EffectEntry CapillaryBridges() {
+  return {
+      .info = {.name = "capillary_bridges",
+               .kind = "contact",
+               .description =
+                   "Liquid bridges: F = 2 pi R gamma cos(theta)/(1 + 1.05 S + 2.5 S^2), S = gap "
+                   "sqrt(R/V), formed on touching, ruptured at (1 + theta/2) V^(1/3); "
+                   "one-sided, vanishes at surface_tension 0",
+               .contacts = {},
+               .parameters = Parameters(),
+               .reference = "Willett et al., Langmuir 16 (2000) 9396, Eq. 12; Lian, Thornton & "
+                            "Adams, J. Colloid Interface Sci. 161 (1993) 138",
+               .two_sided = false,
+               .rays = {{.parameter = "surface_tension",
+                         .steps = {0.05, 0.2},
+                         .held = {{"volume_ratio", 1e-3}}}}},
+      .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,61 @@
+#include "dem/effects/contact_plasticity.h"
+
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+CALIB_DEM_CLONES void Yield(double stiffer, ContactBlock& b, int first) {
+  double* const largest = b.history[first];
+#pragma GCC ivdep
+  for (int k = 0; k < kBlock; ++k) {
+    const double force = b.normal_force[k];
+    const double most = force > largest[k] ? force : largest[k];
+    const double unloading = force - stiffer * (most - force);
+    largest[k] = most;
+    b.normal_force[k] = unloading > 0 ? unloading : 0.0;
+    b.normal_stiffness[k] *= force < most ? 1.0 + stiffer : 1.0;
+  }
+}
+
+class PlasticityKernel final : public ContactKernel {
+ public:
+  explicit PlasticityKernel(double stiffer) : stiffer_(stiffer) {}
+  [[nodiscard]] int HistorySize() const override { return 1; }
+  void Apply(ContactBlock& block, int first) const override { Yield(stiffer_, block, first); }
+
+ private:
+  double stiffer_;  ///< kappa - 1
+};
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  return std::make_unique<PlasticityKernel>(context.parameters.Get("stiffness_ratio") - 1.0);
+}
+
+}  // namespace
+
+EffectEntry ContactPlasticity() {
+  ParameterInfo ratio;
+  ratio.name = "stiffness_ratio";
+  ratio.unit = "1";
+  ratio.min = 1;
+  ratio.max = 100;
+  ratio.default_prior = {.kind = "log_uniform", .min = 1, .max = 11};
+  ratio.null_value = 1;
+  ratio.description = "kappa = k2/k1, stiffness of unloading over that of first loading";
+  return {.info = {.name = "contact_plasticity",
+                   .kind = "contact",
+                   .description =
+                       "Hysteretic normal force on any law: F = F_law while it grows, F = max(0, "
+                       "F_law - (kappa-1)(F_max - F_law)) below the largest F_law so far; "
+                       "one-sided, vanishes at stiffness_ratio 1",
+                   .contacts = {},
+                   .parameters = {ratio},
+                   .reference = "Walton & Braun, J. Rheol. 30 (1986) 949; Luding, Granular Matter "
+                                "10 (2008) 235, sec. 2.2",
+                   .two_sided = false,
+                   .rays = {{.parameter = "stiffness_ratio", .steps = {0.5, 2}}}},
+          .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
+}
+
+}  // namespace calib::dem

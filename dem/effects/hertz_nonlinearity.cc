@@ -1,0 +1,88 @@
+#include "dem/effects/hertz_nonlinearity.h"
+
+#include "dem/contact/power.h"
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+struct Exponent {
+  double force = 0;               ///< (n - m)/m
+  double stiffness = 1;           ///< n/m
+  double reference_pressure = 0;  ///< [Pa]
+  double least = 0;               ///< F/F(u_ref) below which the factor is held
+};
+
+CALIB_DEM_CLONES void Bend(const Exponent law, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const double size = 4.0 * b.effective_radius[k];
+    const double load = b.normal_force[k] / (law.reference_pressure * size * size);
+    const double factor = Power(load > law.least ? load : law.least, law.force);
+    b.normal_force[k] *= factor;
+    b.normal_stiffness[k] *= law.stiffness * factor;
+    b.tangential_stiffness[k] *= factor;
+  }
+}
+
+class NonlinearityKernel final : public ContactKernel {
+ public:
+  explicit NonlinearityKernel(const Exponent& law) : law_(law) {}
+  void Apply(ContactBlock& block, int /*first*/) const override { Bend(law_, block); }
+
+ private:
+  Exponent law_;
+};
+
+double ExponentOf(const std::string& contact) { return contact == "linear" ? 1.0 : 1.5; }
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  const double base = ExponentOf(context.contact);
+  const double exponent = context.parameters.Get("exponent");
+  return std::make_unique<NonlinearityKernel>(
+      Exponent{.force = (exponent - base) / base,
+               .stiffness = exponent / base,
+               .reference_pressure = context.parameters.Get("reference_pressure"),
+               .least = exponent < base ? 1e-3 : 1e-12});
+}
+
+}  // namespace
+
+EffectEntry HertzNonlinearity() {
+  ParameterInfo exponent;
+  exponent.name = "exponent";
+  exponent.unit = "1";
+  exponent.min = 0.5;
+  exponent.max = 4;
+  exponent.default_prior = {.kind = "uniform", .min = 0.75, .max = 3};
+  exponent.null_value = 1.5;
+  exponent.null_by_contact = {{"linear", 1.0}, {"hertz_mindlin", 1.5}};
+  exponent.description =
+      "n in F ~ u^n; 1 linear, 1.5 Hertz, 2 to 3 rough or conical; null 1 with linear, 1.5 with "
+      "hertz_mindlin";
+  ParameterInfo pressure;
+  pressure.name = "reference_pressure";
+  pressure.unit = "Pa";
+  pressure.max = 1e10;
+  pressure.min_open = true;
+  pressure.default_prior = {.kind = "log_uniform", .min = 1e4, .max = 1e7};
+  pressure.default_value = 1e5;
+  pressure.scale = {.pressure = 1};
+  pressure.description = "p_ref, at which forces are those of the law itself";
+  return {.info = {.name = "hertz_nonlinearity",
+                   .kind = "contact",
+                   .description =
+                       "F = F_law(u_ref) (u/u_ref)^n with F_law(u_ref) = p_ref (4 r*)^2, shear "
+                       "stiffness in proportion to F; two-sided, vanishes at the exponent of the "
+                       "law (linear 1, hertz_mindlin 1.5)",
+                   .contacts = {"hertz_mindlin", "linear"},
+                   .parameters = {exponent, pressure},
+                   .reference = "Walton, J. Mech. Phys. Solids 35 (1987) 213; Agnolin & Roux, "
+                                "Phys. Rev. E 76 (2007) 061304",
+                   .two_sided = true,
+                   .rays = {{.parameter = "exponent",
+                             .steps = {0.2, 0.4},
+                             .held = {{"reference_pressure", 1}}}}},
+          .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
+}
+
+}  // namespace calib::dem

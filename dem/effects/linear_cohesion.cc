@@ -1,0 +1,58 @@
+#include "dem/effects/linear_cohesion.h"
+
+#include <numbers>
+
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+CALIB_DEM_CLONES void Attract(double density, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const double u = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
+    const double pull = 2.0 * std::numbers::pi * density * (b.effective_radius[k] * u);
+    b.normal_force[k] -= pull;
+    b.attraction[k] += pull;
+  }
+}
+
+class CohesionKernel final : public ContactKernel {
+ public:
+  explicit CohesionKernel(double density) : density_(density) {}
+  void Apply(ContactBlock& block, int /*first*/) const override { Attract(density_, block); }
+
+ private:
+  double density_;  ///< [J/m^3]
+};
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  return std::make_unique<CohesionKernel>(context.parameters.Get("energy_density"));
+}
+
+}  // namespace
+
+EffectEntry LinearCohesion() {
+  ParameterInfo density;
+  density.name = "energy_density";
+  density.unit = "J/m^3";
+  density.max = 1e12;
+  density.default_prior = {.kind = "log_uniform", .min = 1e3, .max = 1e8};
+  density.null_value = 0;
+  // With Hertz contacts carrying p d^2 the attraction is about the tenth part of the force there.
+  density.scale = {.factor = 0.03, .pressure = 1.0 / 3.0, .modulus = 2.0 / 3.0};
+  density.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 10};
+  density.description = "C, attraction over the area of contact";
+  return {.info = {.name = "linear_cohesion",
+                   .kind = "contact",
+                   .description = "Attraction C A with A = 2 pi r* u, sliding limit mu (F + C A); "
+                                  "one-sided, vanishes at energy_density 0",
+                   .contacts = {},
+                   .parameters = {density},
+                   .reference = "Luding, Granular Matter 10 (2008) 235, sec. 2.2; Johnson, Contact "
+                                "Mechanics (1985), sec. 5.5",
+                   .two_sided = false,
+                   .rays = {{.parameter = "energy_density", .steps = {1, 3}}}},
+          .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,75 @@
+#include "dem/effects/pressure_dependent_friction.h"
+
+#include "dem/contact/power.h"
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+struct PressureLaw {
+  double exponent = 0;   ///< -m
+  double reference = 0;  ///< p_ref [Pa]
+};
+
+CALIB_DEM_CLONES void ScaleLimit(const PressureLaw law, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const double size = 4.0 * b.effective_radius[k];
+    const double ratio = (b.normal_force[k] + b.attraction[k]) / (law.reference * (size * size));
+    b.sliding_limit[k] *= Power(ratio > 1e-6 ? ratio : 1e-6, law.exponent);
+  }
+}
+
+class PressureFriction final : public ContactKernel {
+ public:
+  explicit PressureFriction(const PressureLaw& law) : law_(law) {}
+  void Apply(ContactBlock& block, int /*first*/) const override { ScaleLimit(law_, block); }
+
+ private:
+  PressureLaw law_;
+};
+
+std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
+  return std::make_unique<PressureFriction>(
+      PressureLaw{.exponent = -context.parameters.Get("exponent"),
+                  .reference = context.parameters.Get("reference_pressure")});
+}
+
+}  // namespace
+
+EffectEntry PressureDependentFriction() {
+  ParameterInfo exponent;
+  exponent.name = "exponent";
+  exponent.unit = "1";
+  exponent.min = -0.9;
+  exponent.max = 0.9;
+  exponent.default_prior = {.kind = "uniform", .min = -0.6, .max = 0.6};
+  exponent.null_value = 0;
+  exponent.description = "m; friction falls with pressure where it is positive";
+  ParameterInfo pressure;
+  pressure.name = "reference_pressure";
+  pressure.unit = "Pa";
+  pressure.max = 1e10;
+  pressure.min_open = true;
+  pressure.default_prior = {.kind = "log_uniform", .min = 1e4, .max = 1e7};
+  pressure.default_value = 1e5;
+  pressure.scale = {.pressure = 1};
+  pressure.description = "p_ref, at which friction is tan(phi_mu)";
+  return {.info = {.name = "pressure_dependent_friction",
+                   .kind = "contact",
+                   .description =
+                       "mu = tan(phi_mu) (sigma/p_ref)^(-m) with the contact's nominal pressure "
+                       "sigma = Fn/(4 r*)^2, about the mean stress on average; two-sided, vanishes "
+                       "at exponent 0; shows between pressures",
+                   .contacts = {},
+                   .parameters = {exponent, pressure},
+                   .reference = "Bowden & Tabor, The Friction and Lubrication of Solids (1950); "
+                                "Archard, Proc. R. Soc. Lond. A 243 (1957) 190",
+                   .two_sided = true,
+                   .rays = {{.parameter = "exponent",
+                             .steps = {0.1, 0.25},
+                             .held = {{"reference_pressure", 1}}}},
+                   .across_pressures = true},
+          .kernels = {{.stage = ContactStage::kSlidingLimit, .make = &Make}}};
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,115 @@
+#include "dem/effects/viscous_damping.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "dem/contact/simd.h"
+
+namespace calib::dem {
+namespace {
+
+struct Dashpot {
+  double twice_ratio = 0;  ///< 2 beta
+  double mass = 0;         ///< of a sphere over r^3 [kg/m^3]
+};
+
+/// m1 m2/(m1 + m2)
+inline double EffectiveMass(double mass, double ri, double rj) {
+  const double i3 = ri * ri * ri;
+  const double j3 = rj * rj * rj;
+  return mass * (i3 * j3 / (i3 + j3));
+}
+
+CALIB_DEM_CLONES void DampNormal(const Dashpot dashpot, ContactBlock& b) {
+  const double scale = dashpot.twice_ratio * b.viscous;
+  for (int k = 0; k < kBlock; ++k) {
+    const double mass = EffectiveMass(dashpot.mass, b.radius_i[k], b.radius_j[k]);
+    const double stiffness = b.normal_stiffness[k] > 0 ? b.normal_stiffness[k] : 0.0;
+    const double c = scale * std::sqrt(mass * stiffness);
+    const double elastic = b.normal_force[k];
+    const double least = elastic < 0 ? elastic : 0.0;
+    const double total = elastic - c * b.normal_velocity[k];
+    b.normal_force[k] = total > least ? total : least;
+    b.normal_damping[k] += c;
+  }
+}
+
+CALIB_DEM_CLONES void DampShear(const Dashpot dashpot, ContactBlock& b) {
+  const double scale = dashpot.twice_ratio * b.viscous;
+  const double per_time = b.dt > 0 ? 1.0 / b.dt : 0.0;
+  for (int k = 0; k < kBlock; ++k) {
+    const double mass = EffectiveMass(dashpot.mass, b.radius_i[k], b.radius_j[k]);
+    const double c = scale * std::sqrt(mass * b.tangential_stiffness[k]);
+    const double limit = b.sliding_limit[k];
+    const double spring = std::sqrt(b.fx[k] * b.fx[k] + b.fy[k] * b.fy[k] + b.fz[k] * b.fz[k]);
+    const double rate = spring < limit ? c * per_time : 0.0;
+    const double x = b.fx[k] - rate * b.slip_x[k];
+    const double y = b.fy[k] - rate * b.slip_y[k];
+    const double z = b.fz[k] - rate * b.slip_z[k];
+    const double size = std::sqrt(x * x + y * y + z * z);
+    const double cut = rate > 0 && size > limit ? limit / size : 1.0;
+    b.fx[k] = cut * x;
+    b.fy[k] = cut * y;
+    b.fz[k] = cut * z;
+    b.tangential_damping[k] += c;
+  }
+}
+
+class NormalDashpot final : public ContactKernel {
+ public:
+  explicit NormalDashpot(const Dashpot& dashpot) : dashpot_(dashpot) {}
+  void Apply(ContactBlock& block, int /*first*/) const override { DampNormal(dashpot_, block); }
+
+ private:
+  Dashpot dashpot_;
+};
+
+class ShearDashpot final : public ContactKernel {
+ public:
+  explicit ShearDashpot(const Dashpot& dashpot) : dashpot_(dashpot) {}
+  void Apply(ContactBlock& block, int /*first*/) const override { DampShear(dashpot_, block); }
+
+ private:
+  Dashpot dashpot_;
+};
+
+Dashpot DashpotFrom(const KernelContext& context) {
+  return {.twice_ratio = 2.0 * context.parameters.Get("ratio"),
+          .mass = 4.0 / 3.0 * std::numbers::pi * context.density};
+}
+
+std::unique_ptr<ContactKernel> MakeNormal(const KernelContext& context) {
+  return std::make_unique<NormalDashpot>(DashpotFrom(context));
+}
+
+std::unique_ptr<ContactKernel> MakeShear(const KernelContext& context) {
+  return std::make_unique<ShearDashpot>(DashpotFrom(context));
+}
+
+}  // namespace
+
+EffectEntry ViscousDamping() {
+  ParameterInfo ratio;
+  ratio.name = "ratio";
+  ratio.unit = "1";
+  ratio.max = 10;
+  ratio.default_prior = {.kind = "log_uniform", .min = 0.01, .max = 10};
+  ratio.null_value = 0;
+  ratio.description = "damping ratio beta of both dashpots; 1 is critical for two equal grains";
+  return {.info = {.name = "viscous_damping",
+                   .kind = "contact",
+                   .description =
+                       "Dashpots c = 2 beta sqrt(m* k) beside the normal and, while it sticks, the "
+                       "shear spring; no tension; off during consolidation; one-sided, vanishes at "
+                       "ratio 0; shows in tests with a loading_rate",
+                   .contacts = {},
+                   .parameters = {ratio},
+                   .reference = "Tsuji, Tanaka & Ishida, Powder Technol. 71 (1992) 239; Schwager & "
+                                "Poeschel, Granular Matter 9 (2007) 465",
+                   .two_sided = false,
+                   .rays = {{.parameter = "ratio", .steps = {0.3, 2}}}},
+          .kernels = {{.stage = ContactStage::kNormalExtra, .make = &MakeNormal},
+                      {.stage = ContactStage::kShearExtra, .make = &MakeShear}}};
+}
+
+}  // namespace calib::dem
