@@ -160,7 +160,8 @@ TEST_F(Calibctl, ACalibrationFromEndToEnd) {
 
 TEST_F(Calibctl, AnInterruptedRunGoesOnToTheSameAnswer) {
   const Json undisturbed = Call("run good.yaml --workers 2 --state s1 --json").json();
-  const Answer stopped = CallWith("timeout --preserve-status -s INT 1.5",
+  // --foreground: one signal, not a second one to the group, which would end it at once.
+  const Answer stopped = CallWith("timeout --foreground --preserve-status -s INT 1.5",
                                   "run good.yaml --workers 2 --state s2 --json");
   if (stopped.code != 0) {  // a fast machine may be done already
     EXPECT_EQ(stopped.code, 1) << stopped.err;
