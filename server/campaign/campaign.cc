@@ -4,6 +4,48 @@
 #include <cmath>
 
 namespace calib::campaign {
+
+const char* ToString(Method method) {
+  switch (method) {
+    case Method::kSqmc:
+      return "sqmc";
+    case Method::kIterativeBayesianFilter:
+      return "iterative_bayesian_filter";
+    case Method::kTmcmc:
+      return "tmcmc";
+    case Method::kSurrogateMsrs:
+      break;
+  }
+  return "surrogate_msrs";
+}
+
+bool IsFilter(Method method) {
+  return method == Method::kSqmc || method == Method::kIterativeBayesianFilter;
+}
+
+int LaterBatch(const Campaign& campaign) {
+  return campaign.method == Method::kSurrogateMsrs ? std::min(kSurrogateBatch, campaign.samples)
+                                                   : campaign.samples;
+}
+
+int MostBatches(const Campaign& campaign) {
+  switch (campaign.method) {
+    case Method::kTmcmc:
+      return 1 + campaign.max_iterations * campaign.tmcmc.steps;
+    case Method::kSurrogateMsrs: {
+      const std::int64_t later =
+          (static_cast<std::int64_t>(campaign.max_iterations) - 1) * campaign.samples;
+      const int batch = LaterBatch(campaign);
+      return static_cast<int>(1 + (later + batch - 1) / batch);
+    }
+    case Method::kSqmc:
+      return 1;
+    case Method::kIterativeBayesianFilter:
+      break;
+  }
+  return campaign.precomputed ? 1 : campaign.max_iterations;
+}
+
 std::vector<double> TravelledControl(const Experiment& experiment, double correlation_length) {
   constexpr double kClosest = 0.01;
   std::vector<double> travelled;

@@ -13,6 +13,7 @@
 #include "inference/data/data_set.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/prior.h"
+#include "inference/tmcmc/tmcmc.h"
 
 namespace calib::campaign {
 
@@ -82,7 +83,11 @@ struct Precomputed {
   std::optional<Eigen::VectorXd> log_proposal;
 };
 
-enum class Method { kSqmc, kIterativeBayesianFilter };
+enum class Method { kSqmc, kIterativeBayesianFilter, kTmcmc, kSurrogateMsrs };
+/// As users write it: "sqmc", "iterative_bayesian_filter", "tmcmc", "surrogate_msrs".
+const char* ToString(Method method);
+/// True for the two filters, whose posterior is that of weighted samples.
+bool IsFilter(Method method);
 
 struct EarlyStopping {
   double discard_at_most = 1e-3;
@@ -104,13 +109,24 @@ struct Campaign {
   std::vector<Experiment> experiments;
   Method method = Method::kIterativeBayesianFilter;
   int samples = 100;
+  /// tmcmc: tempering stages; surrogate_msrs: its evaluations are at most this times `samples`.
   int max_iterations = 4;
   inference::FilterOptions filter;
+  inference::TmcmcOptions tmcmc;  ///< steps and target_cv; the rest is set where it is used
   std::optional<EarlyStopping> early_stopping;
   Failure failure;
   Budget budget;
   std::uint64_t seed = 0;
 };
+
+/// Points of surrogate_msrs chosen together, whatever the number of workers.
+inline constexpr int kSurrogateBatch = 8;
+
+/// Samples that the campaign draws at once after the first `samples` of them.
+int LaterBatch(const Campaign& campaign);
+/// The most batches it can come to: iterations of a filter, Metropolis steps of tmcmc and its prior
+/// draws, rounds of surrogate_msrs.
+int MostBatches(const Campaign& campaign);
 
 /// Path length of the control at each reading: the distance in the correlation of errors. Readings
 /// closer than 1 % of the correlation length count as that far apart, because errors of two

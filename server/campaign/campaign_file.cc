@@ -104,6 +104,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     ReadModel(map, campaign);
     ReadInference(map, campaign);
     ReadParameters(map, campaign);
+    CheckSamples(map, campaign);
     ReadExperiments(map, context, campaign);
     if (campaign.precomputed) ReadPrecomputed(map, context, campaign);
     map.Finish();

@@ -1,5 +1,7 @@
 #include "server/campaign/read_inference.h"
 
+#include <array>
+
 #include "absl/strings/str_cat.h"
 #include "server/campaign/suggestion.h"
 
@@ -27,16 +29,44 @@ void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
   if (mode == "ess_target") filter.noise = NoiseMode::kEssTarget;
 }
 
+constexpr std::array kMethods = {Method::kSqmc, Method::kIterativeBayesianFilter, Method::kTmcmc,
+                                 Method::kSurrogateMsrs};
+constexpr int kMostStages = 100;  // of tmcmc, unless max_iterations says otherwise
+
 void ReadMethod(MapReader& map, Campaign& campaign) {
-  const std::vector<std::string> have = {"sqmc", "iterative_bayesian_filter"};
-  const auto method = map.Text("method");
-  if (method == "tmcmc" || method == "surrogate_msrs") {
-    map.Problem("method",
-                absl::StrCat(*method, " is not available in this build, which has ", Listed(have)));
-  } else if (method) {
-    map.Choice("method", have);
+  std::vector<std::string> names;
+  for (const Method method : kMethods) names.emplace_back(ToString(method));
+  const auto chosen = map.Choice("method", names);
+  for (const Method method : kMethods) {
+    if (chosen == ToString(method)) campaign.method = method;
   }
-  campaign.method = method == "sqmc" ? Method::kSqmc : Method::kIterativeBayesianFilter;
+  if (campaign.method == Method::kTmcmc) campaign.max_iterations = kMostStages;
+  if (IsFilter(campaign.method)) return;
+  if (campaign.precomputed) {
+    map.Problem("method", absl::StrCat(*chosen,
+                                       " chooses its own samples, and runs that exist "
+                                       "already are what they are; use sqmc"));
+  } else if (campaign.filter.noise == NoiseMode::kEssTarget) {
+    map.Problem("method", absl::StrCat(*chosen,
+                                       " needs the errors of the readings; use noise: "
+                                       "given or noise: inferred with it"));
+  }
+}
+
+void ReadDesign(MapReader& map, inference::FilterOptions& filter) {
+  using inference::Design;
+  const auto design =
+      map.Choice("design", {"halton", "sobol", "latin_hypercube", "symmetric_latin_hypercube"});
+  if (design == "sobol") filter.design = Design::kSobol;
+  if (design == "latin_hypercube") filter.design = Design::kLatinHypercube;
+  if (design == "symmetric_latin_hypercube") filter.design = Design::kSymmetricLatinHypercube;
+}
+
+void ReadTmcmcOptions(MapReader& map, inference::TmcmcOptions& tmcmc) {
+  constexpr int kMostSteps = 1000;
+  tmcmc.steps = static_cast<int>(map.Integer("steps", 1, kMostSteps).value_or(tmcmc.steps));
+  tmcmc.target_cv = map.Quantity("target_cv", "1", {.min = 0, .max = 2, .min_open = true})
+                        .value_or(tmcmc.target_cv);
 }
 
 void ReadFilterOptions(MapReader& map, Campaign& campaign) {
@@ -49,9 +79,7 @@ void ReadFilterOptions(MapReader& map, Campaign& campaign) {
       static_cast<int>(map.Integer("max_components", 1, 1000).value_or(filter.max_components));
   filter.concentration =
       map.Quantity("concentration", "1", kPositive).value_or(filter.concentration);
-  if (map.Choice("design", {"halton", "sobol"}).value_or("halton") == "sobol") {
-    filter.design = inference::Design::kSobol;
-  }
+  ReadDesign(map, filter);
   if (campaign.filter.noise != NoiseMode::kEssTarget) {
     filter.ess_target = map.Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
   } else if (map.Has("ess_target")) {
@@ -63,14 +91,17 @@ void ReadFilterOptions(MapReader& map, Campaign& campaign) {
 void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
   constexpr std::int64_t kMostSamples = 1'000'000;
   constexpr std::int64_t kMostIterations = 1000;
+  constexpr int kFewestChains = 20;
   auto map = campaign_map.Map("inference");
   if (map) {
     ReadMethod(*map, campaign);
+    const int fewest = campaign.method == Method::kTmcmc ? kFewestChains : 2;
     campaign.samples =
-        static_cast<int>(map->Integer("samples", 2, kMostSamples).value_or(campaign.samples));
+        static_cast<int>(map->Integer("samples", fewest, kMostSamples).value_or(campaign.samples));
     campaign.max_iterations = static_cast<int>(
         map->Integer("max_iterations", 1, kMostIterations).value_or(campaign.max_iterations));
-    ReadFilterOptions(*map, campaign);
+    if (IsFilter(campaign.method)) ReadFilterOptions(*map, campaign);
+    if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
     if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&
         campaign.max_iterations != 1) {
       map->Problem(
@@ -97,8 +128,9 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
       map->Quantity("discard_at_most", "1", kFraction).value_or(stopping.discard_at_most);
   map->Finish();
   // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing
-  // to stop.
-  if (campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed) {
+  // to stop; the surrogate would take a bound for a value.
+  if (campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed &&
+      campaign.method != Method::kSurrogateMsrs) {
     campaign.early_stopping = stopping;
   }
 }
@@ -133,6 +165,18 @@ void ReadInference(MapReader& campaign_map, Campaign& campaign) {
   ReadBudget(campaign_map, campaign);
   campaign.seed = campaign_map.Seed("seed").value_or(campaign.seed);
   campaign.filter.seed = campaign.seed;
+}
+
+void CheckSamples(MapReader& campaign_map, const Campaign& campaign) {
+  const std::size_t fewest = 2 * campaign.parameters.size() + 1;
+  if (campaign.method == Method::kSurrogateMsrs &&
+      static_cast<std::size_t>(campaign.samples) < fewest) {
+    campaign_map.Problem("inference", absl::StrCat("samples is ", campaign.samples,
+                                                   "; surrogate_msrs starts from "
+                                                   "at least ",
+                                                   fewest, " for ", campaign.parameters.size(),
+                                                   " parameters (two each and one)"));
+  }
 }
 
 }  // namespace calib::campaign

@@ -7,4 +7,7 @@ namespace calib::campaign {
 
 void ReadInference(MapReader& campaign_map, Campaign& campaign);
 
+/// What can be said only once the parameters are known.
+void CheckSamples(MapReader& campaign_map, const Campaign& campaign);
+
 }  // namespace calib::campaign

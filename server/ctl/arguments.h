@@ -19,6 +19,7 @@ struct Arguments {
   // Of some.
   std::string file;      ///< campaign file
   std::string campaign;  ///< id
+  std::vector<std::string> campaigns{};  ///< ids
   std::string worker;    ///< name
   int sample = 0;
   std::optional<int> iteration;

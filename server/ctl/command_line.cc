@@ -115,6 +115,10 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->check(CLI::NonNegativeNumber);
   b.AddOnCampaign("compare", &Compare,
                   "Model against measurements: where it fits and where it fails");
+  b.Add("models", &Models, "Which model do the data favour: evidence, Bayes factors, probabilities",
+        "models c1 c2 --state calib-state")
+      ->add_option("ID", b.arguments().campaigns, "campaigns on the same data, two or more")
+      ->required();
   b.AddOnCampaign("report", &Report, "One self-contained HTML file with plots")
       ->add_option("-o,--output", b.arguments().output, "HTML file")
       ->required();

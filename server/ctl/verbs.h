@@ -15,6 +15,7 @@ int Watch(const Arguments& arguments);
 int Posterior(const Arguments& arguments);
 int Samples(const Arguments& arguments);
 int States(const Arguments& arguments);
+int Models(const Arguments& arguments);
 int Compare(const Arguments& arguments);
 int Report(const Arguments& arguments);
 int Export(const Arguments& arguments);
