@@ -7,4 +7,8 @@ namespace calib::campaign {
 
 void ReadInference(MapReader& campaign_map, Campaign& campaign);
 
+/// What needs the parameters: rows of a table, the first proposal; and where the campaign comes
+/// from.
+void ReadStart(MapReader& campaign_map, Campaign& campaign);
+
 }  // namespace calib::campaign

@@ -40,10 +40,12 @@ class Planner {
     plan_.converged = record_.progress.converged;
     absl::Status status;
     if (history_.iterations.empty()) {
-      status = Begin(0, inference::Proposal{});
+      status = Begin(0, campaign::FirstProposalOf(campaign_));
       if (campaign_.precomputed.has_value()) {
         plan_.event = CampaignEvent::kStart;
       }
+    } else if (campaign_.table.has_value()) {
+      Finish();  // its runs are all there is
     } else if (plan_.phase == "calibrating") {
       status = Conclude();
     } else {
@@ -184,6 +186,8 @@ class Planner {
     Eigen::MatrixXd parameters;
     if (campaign_.precomputed.has_value()) {
       parameters = campaign_.precomputed->parameters;
+    } else if (campaign_.table.has_value()) {
+      parameters = campaign_.table->parameters;
     } else {
       auto drawn = inference::DrawSamples(proposal, definition_.priors, campaign_.filter, iteration,
                                           campaign_.samples);

@@ -10,6 +10,21 @@
 #include "server/scheduler/definition.h"
 
 namespace calib::service {
+namespace {
+
+const char* ToString(campaign::Method method) {
+  switch (method) {
+    case campaign::Method::kSqmc:
+      return "sqmc";
+    case campaign::Method::kTable:
+      return "table";
+    case campaign::Method::kIterativeBayesianFilter:
+      break;
+  }
+  return "iterative_bayesian_filter";
+}
+
+}  // namespace
 
 absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmission(
     const v1::SubmitRequest& request, store::Reader& reader) {
@@ -47,13 +62,13 @@ absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmissio
       .yaml = request.campaign_file(),
       .file_name = request.file_name(),
       .seed = seed,
-      .method = campaign.method == campaign::Method::kSqmc ? "sqmc" : "iterative_bayesian_filter",
+      .method = ToString(campaign.method),
       .samples = campaign.samples,
       .max_iterations = campaign.max_iterations};
   if (campaign.precomputed.has_value()) {
     accepted.samples = static_cast<int>(campaign.precomputed->parameters.rows());
   }
-  if (campaign.precomputed.has_value() || campaign.method == campaign::Method::kSqmc) {
+  if (campaign.precomputed.has_value()) {
     accepted.max_iterations = 1;
   }
   return accepted;
