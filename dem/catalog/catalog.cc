@@ -1,6 +1,8 @@
 #include "dem/catalog/catalog.h"
 
 #include <algorithm>
+#include <cassert>
+#include <cmath>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -35,6 +37,12 @@ void Append(std::string& text, const ParameterInfo& p) {
                   " ", p.default_prior.min, " ", p.default_prior.max);
   if (p.default_value) {
     absl::StrAppend(&text, " default ", *p.default_value);
+  }
+  if (p.null_value) {
+    absl::StrAppend(&text, " null ", *p.null_value);
+  }
+  for (const auto& [contact, null] : p.null_by_contact) {
+    absl::StrAppend(&text, " ", contact, ":null ", null);
   }
   absl::StrAppend(&text, p.alternative_to.empty() ? "" : " alternative to ", p.alternative_to, ": ",
                   p.description, "\n");
@@ -95,6 +103,70 @@ const ObservableInfo* FindObservable(const std::string& name) {
 const std::string& UnitFor(const ParameterInfo& parameter, const std::string& contact) {
   const auto it = parameter.unit_by_contact.find(contact);
   return it == parameter.unit_by_contact.end() ? parameter.unit : it->second;
+}
+
+double ScaleOf(const ParameterInfo& parameter, const std::string& contact,
+               const ReferenceState& state) {
+  const auto it = parameter.scale_by_contact.find(contact);
+  const ReferenceScale& s = it == parameter.scale_by_contact.end() ? parameter.scale : it->second;
+  return s.factor * std::pow(state.pressure, s.pressure) * std::pow(state.diameter, s.diameter) *
+         std::pow(state.modulus, s.modulus);
+}
+
+std::optional<double> NullValueOf(const ParameterInfo& parameter, const std::string& contact) {
+  const auto it = parameter.null_by_contact.find(contact);
+  return it == parameter.null_by_contact.end() ? parameter.null_value
+                                               : std::optional<double>(it->second);
+}
+
+DefaultPrior PriorOf(const ParameterInfo& parameter, const std::string& contact,
+                     const ReferenceState& state) {
+  if (!parameter.scaled_prior) {
+    return parameter.default_prior;
+  }
+  const double scale = ScaleOf(parameter, contact, state);
+  return {.kind = parameter.scaled_prior->kind,
+          .min = std::max(parameter.min, parameter.scaled_prior->min * scale),
+          .max = std::min(parameter.max, parameter.scaled_prior->max * scale)};
+}
+
+namespace {
+
+/// The ray's parameter and its value at a distance from the null.
+double ValueOnRay(const ParameterInfo& parameter, double step, const std::string& contact,
+                  const ReferenceState& state) {
+  const auto null = NullValueOf(parameter, contact);
+  assert(null);
+  return step == 0 ? *null : *null + step * ScaleOf(parameter, contact, state);
+}
+
+const ParameterInfo& ParameterOf(const EffectInfo& effect, const std::string& name) {
+  const auto* info = FindByName(std::span<const ParameterInfo>(effect.parameters), name);
+  assert(info != nullptr);
+  return *info;
+}
+
+}  // namespace
+
+std::map<std::string, double> ParametersOnRay(const EffectInfo& effect, const StrengthRay& ray,
+                                              double step, const std::string& contact,
+                                              const ReferenceState& state) {
+  const std::string prefix = effect.name + ".";
+  std::map<std::string, double> values;
+  values[prefix + ray.parameter] =
+      ValueOnRay(ParameterOf(effect, ray.parameter), step, contact, state);
+  for (const auto& [name, scaled] : ray.held) {
+    values[prefix + name] = scaled * ScaleOf(ParameterOf(effect, name), contact, state);
+  }
+  return values;
+}
+
+bool RayAdmits(const EffectInfo& effect, const StrengthRay& ray, double step,
+               const std::string& contact, const ReferenceState& state) {
+  const ParameterInfo& parameter = ParameterOf(effect, ray.parameter);
+  const double value = ValueOnRay(parameter, step, contact, state);
+  return (parameter.min_open ? value > parameter.min : value >= parameter.min) &&
+         value <= parameter.max;
 }
 
 const ParameterInfo* FindParameter(const std::string& contact, std::span<const std::string> effects,

@@ -4,6 +4,7 @@
 // `calibctl effects|tests|contacts`, reports and the engine read; adding an entry here and its
 // .h/.cc pair is all that a new one needs.
 
+#include <array>
 #include <map>
 #include <optional>
 #include <span>
@@ -18,6 +19,22 @@ struct DefaultPrior {
   std::string kind;
   double min = 0;
   double max = 0;
+};
+
+/// What makes strengths of effects comparable between grain sizes and stresses.
+struct ReferenceState {
+  double pressure = 0;  ///< p, at which the test starts [Pa] > 0
+  double diameter = 0;  ///< d, mean of the grains [m] > 0
+  double modulus = 0;   ///< E, young_modulus [Pa] > 0
+};
+
+/// Value at which a parameter begins to matter: factor p^pressure d^diameter E^modulus. Powers of
+/// zero: the parameter is dimensionless already.
+struct ReferenceScale {
+  double factor = 1;
+  double pressure = 0;
+  double diameter = 0;
+  double modulus = 0;
 };
 
 /// One scalar parameter of a contact, an effect or a lab test (there called a setting).
@@ -36,6 +53,14 @@ struct ParameterInfo {
   std::string alternative_to;  ///< gives the same quantity as this other parameter (friction_angle
                                ///< <-> friction_coefficient)
   std::string description;
+
+  // Of an effect's parameters only.
+  std::optional<double> null_value;  ///< the effect vanishes when this parameter alone has this
+                                     ///< value; empty: it shapes the effect but cannot remove it
+  std::map<std::string, double> null_by_contact;  ///< where the null depends on the contact law
+  ReferenceScale scale;                           ///< see ScaleOf()
+  std::map<std::string, ReferenceScale> scale_by_contact;  ///< where it depends on the contact law
+  std::optional<DefaultPrior> scaled_prior;  ///< of value / scale, 0.01 .. 10 and wider; PriorOf()
 };
 
 struct ContactInfo {
@@ -43,6 +68,15 @@ struct ContactInfo {
   std::string description;
   std::vector<ParameterInfo> parameters;
   std::string reference;
+};
+
+/// One way to turn an effect up from nothing: a parameter leaves its null while others are held.
+struct StrengthRay {
+  std::string parameter;                ///< undotted; has a null value
+  std::array<double, 2> steps = {0, 0};  ///< two moderate distances from the null, ascending, in
+                                         ///< units of the parameter's scale; of a two-sided effect
+                                         ///< -steps are as good where they are admissible
+  std::map<std::string, double> held = {};  ///< other parameters / scale; not listed: their default
 };
 
 struct EffectInfo {
@@ -53,6 +87,10 @@ struct EffectInfo {
   std::vector<std::string> contacts;  ///< contact laws it can join; empty: all
   std::vector<ParameterInfo> parameters;
   std::string reference;
+  bool two_sided = false;              ///< parameters of the rays may leave their null either way
+  std::vector<StrengthRay> rays = {};  ///< 1 .. 3, for paired runs with and without the effect
+  std::vector<std::string> excited_by = {};  ///< tests whose curves it can change; empty: all
+  bool across_pressures = false;  ///< shows only between experiments at different pressures
 };
 
 struct ObservableInfo {
@@ -84,6 +122,30 @@ const ObservableInfo* FindObservable(const std::string& name);
 
 /// Unit of a parameter under a contact law.
 const std::string& UnitFor(const ParameterInfo& parameter, const std::string& contact);
+
+/// Reference scale of an effect's parameter under a contact law, in the parameter's SI unit.
+double ScaleOf(const ParameterInfo& parameter, const std::string& contact,
+               const ReferenceState& state);
+
+/// Null value under a contact law; empty when the parameter has none.
+std::optional<double> NullValueOf(const ParameterInfo& parameter, const std::string& contact);
+
+/// scaled_prior times ScaleOf() where there is one, default_prior otherwise, cut to [min, max]; SI.
+DefaultPrior PriorOf(const ParameterInfo& parameter, const std::string& contact,
+                     const ReferenceState& state);
+
+/// Dotted parameters and their SI values that turn `effect` on at a distance `step` (in units of
+/// scale) from the null of a ray; step 0: the model without the effect, bit for bit. Add the
+/// effect's name to Model::effects and these to Model::parameters. Parameters at their default are
+/// left out. The value may leave [min, max] for steps other than the ray's own: see
+/// RayAdmits().
+std::map<std::string, double> ParametersOnRay(const EffectInfo& effect, const StrengthRay& ray,
+                                              double step, const std::string& contact,
+                                              const ReferenceState& state);
+
+/// Whether the ray's parameter is in its admissible range at that step.
+bool RayAdmits(const EffectInfo& effect, const StrengthRay& ray, double step,
+               const std::string& contact, const ReferenceState& state);
 
 /// Parameter by its dotted campaign name ("friction_angle", "rolling_resistance.stiffness") for a
 /// contact and a set of effects, or nullptr when that model has no such parameter.

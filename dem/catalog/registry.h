@@ -3,6 +3,7 @@
 // known to everything that reads the catalogue and to the engine.
 
 #include <span>
+#include <vector>
 
 #include "dem/catalog/catalog.h"
 #include "dem/contact/contact_kernel.h"
@@ -17,11 +18,17 @@ struct ContactEntry {
   MakeKernel make = nullptr;
 };
 
-/// An effect of kind "contact".
-struct EffectEntry {
-  EffectInfo info;
+/// One kernel of an effect and where in the chain it acts.
+struct EffectKernel {
   ContactStage stage = ContactStage::kMoment;
   MakeKernel make = nullptr;
+};
+
+/// An effect; those that do not act between grains have no kernels. Effects of one stage act in the
+/// order of the registry.
+struct EffectEntry {
+  EffectInfo info;
+  std::vector<EffectKernel> kernels = {};
 };
 
 /// A test of one specimen in its periodic cell.

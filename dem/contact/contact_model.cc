@@ -52,10 +52,12 @@ ContactModel::ContactModel(const Model& model)
        EffectEntries()) {  // in catalogue order, however the user lists them
     const std::string& name = effect.info.name;
     if (std::find(model.effects.begin(), model.effects.end(), name) != model.effects.end()) {
-      kernels.emplace_back(effect.stage,
-                           effect.make({.contact = model.contact,
-                                        .parameters = Resolve(effect.info.parameters, name + ".",
-                                                              model.parameters)}));
+      const KernelContext context{
+          .contact = model.contact,
+          .parameters = Resolve(effect.info.parameters, name + ".", model.parameters)};
+      for (const EffectKernel& kernel : effect.kernels) {
+        kernels.emplace_back(kernel.stage, kernel.make(context));
+      }
     }
   }
   std::stable_sort(kernels.begin(), kernels.end(),

@@ -55,6 +55,9 @@ std::vector<ParameterInfo> MomentParameters(const std::string& motion) {
       motion +
       " stiffness: the constant k_m [N m/rad] with hertz_mindlin (its effect "
       "depends on grain size), the factor in k_m = stiffness r1 r2 ks with linear";
+  stiffness.null_value = 0;
+  stiffness.scale_by_contact = {{"hertz_mindlin", {.pressure = 1, .diameter = 3}}};
+  stiffness.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 100};
   ParameterInfo ratio;
   ratio.name = "stiffness_ratio";
   ratio.unit = "1";
@@ -62,6 +65,7 @@ std::vector<ParameterInfo> MomentParameters(const std::string& motion) {
   ratio.default_prior = {.kind = "uniform", .min = 0, .max = 1};
   ratio.alternative_to = "stiffness";
   ratio.description = motion + " stiffness over r1 r2 ks with the current ks, for any contact law";
+  ratio.null_value = 0;
   ParameterInfo friction;
   friction.name = "friction";
   friction.unit = "1";
@@ -70,7 +74,13 @@ std::vector<ParameterInfo> MomentParameters(const std::string& motion) {
   friction.description = "limit eta of the " + motion +
                          " moment over Fn (r1+r2)/2 (hertz_mindlin) or Fn min(r1,r2) (linear); "
                          "infinite: no limit";
+  friction.null_value = 0;
   return {stiffness, ratio, friction};
+}
+
+std::vector<StrengthRay> MomentRays() {
+  return {{.parameter = "friction", .steps = {0.1, 0.3}, .held = {{"stiffness_ratio", 1}}},
+          {.parameter = "stiffness_ratio", .steps = {0.1, 0.5}, .held = {{"friction", 0.3}}}};
 }
 
 }  // namespace calib::dem

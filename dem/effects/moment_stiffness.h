@@ -25,6 +25,10 @@ MomentLaw MomentLawFrom(const KernelContext& context);
 /// descriptions.
 std::vector<ParameterInfo> MomentParameters(const std::string& motion);
 
+/// Two ways to turn a moment on: its limit with a stiffness like that of sliding, and its stiffness
+/// with a limit that is hardly reached.
+std::vector<StrengthRay> MomentRays();
+
 /// Stiffness [N m/rad] and limit [N m] of every lane.
 struct MomentResponse {
   ContactBlock::Lane stiffness;

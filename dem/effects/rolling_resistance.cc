@@ -62,9 +62,10 @@ EffectEntry RollingResistance() {
                .contacts = {},
                .parameters = MomentParameters("rolling"),
                .reference = "Cheng et al. 2018, Table 1; Iwashita & Oda, J. Eng. Mech. 124 "
-                            "(1998) 285"},
-      .stage = ContactStage::kMoment,
-      .make = &Make};
+                            "(1998) 285",
+               .two_sided = false,
+               .rays = MomentRays()},
+      .kernels = {{.stage = ContactStage::kMoment, .make = &Make}}};
 }
 
 }  // namespace calib::dem

@@ -52,9 +52,10 @@ EffectEntry TwistingResistance() {
                               "|M| <= eta Fn l; one-sided, vanishes at stiffness 0 or friction 0",
                .contacts = {},
                .parameters = MomentParameters("twisting"),
-               .reference = "Cheng et al. 2018, Table 1"},
-      .stage = ContactStage::kMoment,
-      .make = &Make};
+               .reference = "Cheng et al. 2018, Table 1",
+               .two_sided = false,
+               .rays = MomentRays()},
+      .kernels = {{.stage = ContactStage::kMoment, .make = &Make}}};
 }
 
 }  // namespace calib::dem

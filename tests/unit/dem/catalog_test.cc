@@ -44,9 +44,51 @@ TEST(Catalog, DefaultPriorsLieInTheAdmissibleRange) {
   }
   for (const EffectInfo& e : Effects()) {
     check(e.parameters);
-    EXPECT_EQ(e.kind, "contact");
     EXPECT_FALSE(e.reference.empty());
   }
+}
+
+TEST(Catalog, RaysLeaveTheNullByAdmissibleSteps) {
+  const ReferenceState state{.pressure = 2e5, .diameter = 3e-4, .modulus = 1e9};
+  for (const EffectInfo& e : Effects()) {
+    const std::string contact = e.contacts.empty() ? "hertz_mindlin" : e.contacts.front();
+    ASSERT_FALSE(e.rays.empty()) << e.name;
+    for (const StrengthRay& ray : e.rays) {
+      EXPECT_LT(0, ray.steps[0]) << e.name;
+      EXPECT_LT(ray.steps[0], ray.steps[1]) << e.name;
+      const auto off = ParametersOnRay(e, ray, 0, contact, state);
+      const std::string dotted = e.name + "." + ray.parameter;
+      const auto* info = FindParameter(contact, std::vector{e.name}, dotted);
+      ASSERT_NE(info, nullptr) << dotted;
+      EXPECT_EQ(off.at(dotted), NullValueOf(*info, contact)) << dotted;
+      EXPECT_TRUE(RayAdmits(e, ray, ray.steps[0], contact, state)) << dotted;
+      EXPECT_TRUE(RayAdmits(e, ray, ray.steps[1], contact, state)) << dotted;
+      EXPECT_EQ(RayAdmits(e, ray, -ray.steps[0], contact, state), e.two_sided) << dotted;
+      for (const auto& [name, value] : ParametersOnRay(e, ray, ray.steps[1], contact, state)) {
+        const auto* held = FindParameter(contact, std::vector{e.name}, name);
+        ASSERT_NE(held, nullptr) << name;
+        EXPECT_TRUE(held->min <= value && value <= held->max) << name << " " << value;
+      }
+    }
+    for (const ParameterInfo& p : e.parameters) {
+      const DefaultPrior prior = PriorOf(p, contact, state);
+      EXPECT_LT(prior.min, prior.max) << e.name << "." << p.name;
+      EXPECT_LE(p.min, prior.min) << e.name << "." << p.name;
+      EXPECT_GE(p.max, prior.max) << e.name << "." << p.name;
+    }
+    for (const std::string& test : e.excited_by) {
+      EXPECT_NE(FindTest(test), nullptr) << e.name << " " << test;
+    }
+  }
+}
+
+TEST(Catalog, ScalesFollowPressureAndGrainSize) {
+  const ReferenceState state{.pressure = 2e5, .diameter = 3e-4, .modulus = 1e9};
+  const std::vector<std::string> effects = {"rolling_resistance"};
+  const auto* p = FindParameter("hertz_mindlin", effects, "rolling_resistance.stiffness");
+  ASSERT_NE(p, nullptr);
+  EXPECT_NEAR(ScaleOf(*p, "hertz_mindlin", state), 2e5 * 2.7e-11, 1e-18);
+  EXPECT_EQ(ScaleOf(*p, "linear", state), 1);
 }
 
 TEST(Catalog, RollingStiffnessHasTheUnitOfItsContactLaw) {
