@@ -18,6 +18,7 @@ enum class StreamPurpose : std::uint64_t {
   kEmulatorBand = 17,
   kLatinHypercube = 18,
   kResponseSurface = 19,
+  kDiagnosisNull = 20,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

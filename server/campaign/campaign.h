@@ -101,7 +101,7 @@ struct FirstProposal {
   struct Place {
     double center = 0, sd = 0;  ///< in the parameter's SI unit, sd > 0
   };
-  std::map<std::string, Place> places;
+  std::map<std::string, Place> places{};
 };
 
 /// Where a campaign comes from.

@@ -24,8 +24,10 @@ void ChangeModel(const Derivation& derivation, YamlNode& root) {
     YamlAt(model, "effects") = YamlList(std::move(effects));
   }
   YamlNode& parameters = YamlAt(root, "parameters");
-  for (const std::string& name : derivation.parameters) {
-    YamlAt(parameters, name) = YamlScalar("default");
+  for (const auto& [name, prior] : derivation.parameters) {
+    YamlAt(parameters, name) = YamlMap({{"prior", YamlScalar(prior.kind)},
+                                        {"min", YamlNumber(prior.min)},
+                                        {"max", YamlNumber(prior.max)}});
   }
   for (const auto& [name, value] : derivation.fixed) {
     YamlErase(parameters, name);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "dem/catalog/catalog.h"
 #include "server/campaign/campaign.h"
 
 namespace calib::campaign {
@@ -16,20 +17,20 @@ namespace calib::campaign {
 struct Derivation {
   std::string name;
   Lineage lineage;
-  std::vector<std::string> effects;  ///< joined to the model, in addition to the parent's
-  /// Parameters of these effects that are calibrated, with their default priors (dotted names).
-  std::vector<std::string> parameters;
+  std::vector<std::string> effects{};  ///< joined to the model, in addition to the parent's
+  /// Parameters that are calibrated in addition (dotted names), with their priors in SI.
+  std::map<std::string, dem::DefaultPrior> parameters{};
   /// Held constant; replaces what the parent calibrates or fixes under the name.
-  std::map<std::string, double> fixed;
+  std::map<std::string, double> fixed{};
   bool held_out = true;  ///< false: experiments with role validate are left out
-  std::optional<int> samples, max_iterations;
-  std::optional<FirstProposal> first_proposal;
+  std::optional<int> samples{}, max_iterations{};
+  std::optional<FirstProposal> first_proposal{};
   /// Makes it a table: parameter values by name, and whose specimen and seed they take.
   struct Row {
     int like = 0;
-    std::map<std::string, double> values;
+    std::map<std::string, double> values{};
   };
-  std::vector<Row> rows;
+  std::vector<Row> rows{};
   double rate_factor = 1;  ///< multiplies staging.rate where the parent gives one
 };
 
