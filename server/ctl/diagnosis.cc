@@ -21,7 +21,7 @@ using Eigen::Index;
 constexpr int kMostRuns = 4;           // of one effect in the screen, or
 constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all effects
 constexpr std::size_t kWarmFits = 3;
-constexpr int kWarmIterations = 2;
+constexpr int kWarmIterations = 3;
 constexpr int kLeastWarmSamples = 12;
 constexpr std::size_t kMostNames = 3;
 
@@ -67,6 +67,12 @@ class Inquiry {
     diagnosis_.scatter = base_.scatter;
     const auto t = static_cast<double>(base_.model.histories.cols());
     diagnosis_.rms = base_.model.histories.row(adequacy->best).norm() / std::sqrt(t);
+    if (!base_.trustworthy) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "the emulator misses the runs of ", diagnosis_.campaign,
+          " by more than twice the noise beyond their scatter, too much to judge the model by; run "
+          "more samples"));
+    }
     const bool fits = adequacy->p_value >= options_.level;
     if (options_.only_adequacy) {
       diagnosis_.verdict = fits ? "adequate" : "unexplained";
@@ -207,7 +213,7 @@ class Inquiry {
     if (effects.empty()) return absl::OkStatus();
     const int experiments = std::max(1, FittedExperiments());
     const double share = kScreenShare *
-                         static_cast<double>(view_.posterior.model_evaluations()) /
+                         static_cast<double>(table_.sample.size()) * experiments /
                          static_cast<double>(effects.size());
     const auto rows = static_cast<std::size_t>(
         std::clamp(static_cast<int>(std::max<double>(kMostRuns, share)) / experiments, 1, 2));
@@ -293,8 +299,7 @@ class Inquiry {
   absl::Status FitWarm() {
     const std::size_t count = std::min(kWarmFits, diagnosis_.candidates.size());
     if (count == 0) return absl::OkStatus();
-    const auto runs = static_cast<int>(view_.posterior.model_evaluations() /
-                                       std::max(1, FittedExperiments()));
+    const auto runs = static_cast<int>(table_.sample.size());
     const int samples = std::max(
         kLeastWarmSamples, runs / (static_cast<int>(count) * kWarmIterations));
     for (std::size_t c = 0; c < count; ++c) {
@@ -310,8 +315,9 @@ class Inquiry {
       if (!view.ok()) return view.status();
       candidate.campaign = view->status.campaign();
       diagnosis_.warm_evaluations += view->status.model_evaluations();
-      const auto response = RespondTo(*view, nuisance_);
-      if (!response.ok()) continue;  // no emulator: the effect is not judged by a fit
+      const auto response = RespondTo(
+          *view, nuisance_, RunsWithoutEffect(table_, view_.campaign, view->campaign));
+      if (!response.ok() || !response->trustworthy) continue;  // no emulator: the effect is not judged by a fit
       const auto adequacy = inference::TestAdequacy(response->model);
       const auto advantage = inference::Compare(response->model, base_.model);
       if (!adequacy.ok() || !advantage.ok()) continue;

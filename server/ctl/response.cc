@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
 #include "server/scheduler/definition.h"
@@ -18,6 +20,8 @@ using Eigen::Index;
 constexpr int kSpread = 3000;   // points over the prior
 constexpr int kRefined = 1000;  // about the best of them, in each round
 constexpr int kRounds = 4;
+// Of an emulator to judge by, noise sd: its error beyond the scatter of single runs.
+constexpr double kMostUncovered = 2;
 constexpr double kMostUnknown = 3;  // noise sd of what the emulator may not know of a point
 
 Eigen::VectorXd NoiseOf(const inference::DataSet& data) {
@@ -98,12 +102,61 @@ RunTable RunsOf(const report::CampaignView& view) {
   return table;
 }
 
+RunTable RunsWithoutEffect(const RunTable& without, const campaign::Campaign& parent,
+                           const campaign::Campaign& extended) {
+  const auto d = static_cast<Index>(extended.parameters.size());
+  std::vector<Index> from(static_cast<std::size_t>(d), -1);  // column of the parent
+  std::vector<std::pair<Index, double>> nulls;
+  for (Index j = 0; j < d; ++j) {
+    const campaign::CalibratedParameter& own = extended.parameters[static_cast<std::size_t>(j)];
+    for (std::size_t k = 0; k < parent.parameters.size(); ++k) {
+      if (parent.parameters[k].name == own.name) {
+        from[static_cast<std::size_t>(j)] = static_cast<Index>(k);
+      }
+    }
+    if (from[static_cast<std::size_t>(j)] >= 0) continue;
+    const dem::ParameterInfo* info =
+        dem::FindParameter(extended.model.contact, extended.model.effects, own.name);
+    const auto null = info == nullptr
+                          ? std::nullopt
+                          : dem::NullValueOf(*info, extended.model.contact);
+    // A prior over orders of magnitude ends where the effect no longer matters.
+    if (null) nulls.emplace_back(j, std::clamp(*null, own.prior.min, own.prior.max));
+  }
+  RunTable table;
+  if (nulls.empty()) return table;
+  const auto spread = inference::DrawSamples(inference::Proposal{}, campaign::Priors(extended),
+                                             extended.filter, 0,
+                                             static_cast<int>(without.parameters.rows()));
+  if (!spread.ok()) return table;
+  table.parameters = *spread;
+  table.histories = without.histories;
+  table.sample = without.sample;
+  for (Index i = 0; i < table.parameters.rows(); ++i) {
+    for (Index j = 0; j < d; ++j) {
+      const Index k = from[static_cast<std::size_t>(j)];
+      if (k >= 0) table.parameters(i, j) = without.parameters(i, k);
+    }
+    const auto& [j, null] = nulls[static_cast<std::size_t>(i) % nulls.size()];
+    table.parameters(i, j) = null;
+  }
+  return table;
+}
+
 absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
-                                   const std::vector<Eigen::VectorXd>& nuisance) {
+                                   const std::vector<Eigen::VectorXd>& nuisance,
+                                   const RunTable& further) {
   const campaign::Campaign& campaign = view.campaign;
   const inference::DataSet data = campaign::MakeDataSet(campaign);
   const std::vector<inference::Prior> priors = campaign::Priors(campaign);
-  const RunTable table = RunsOf(view);
+  RunTable table = RunsOf(view);
+  if (further.parameters.rows() > 0) {
+    const Index own = table.parameters.rows();
+    table.parameters.conservativeResize(own + further.parameters.rows(), further.parameters.cols());
+    table.histories.conservativeResize(own + further.parameters.rows(), further.histories.cols());
+    table.parameters.bottomRows(further.parameters.rows()) = further.parameters;
+    table.histories.bottomRows(further.parameters.rows()) = further.histories;
+  }
   const auto trained = inference::TrainEmulator(
       {.inputs = Standard(priors, table.parameters), .histories = table.histories}, data, {});
   if (!trained.ok()) {
@@ -118,6 +171,9 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
   Response response;
   response.emulator_error = emulator.cross_validation().rms;
   response.scatter = emulator.cross_validation().scatter_rms;
+  response.trustworthy =
+      std::sqrt(std::max(0.0, response.emulator_error * response.emulator_error -
+                                  response.scatter * response.scatter)) <= kMostUncovered;
   response.model.parameters = static_cast<int>(d);
   Eigen::MatrixXd points(0, d);
   Eigen::MatrixXd histories(0, t);
