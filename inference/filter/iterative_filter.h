@@ -58,6 +58,10 @@ struct Iteration {
   std::optional<Eigen::VectorXd> log_proposal;
 };
 
+/// ln of the mass that a mixture has inside the support of the priors: log_acceptance of a proposal.
+double LogMassInSupport(std::span<const MixtureComponent> components,
+                        std::span<const Prior> priors);
+
 /// Draws n samples (n x d). Deterministic in (options.seed, iteration, sample index), and row i
 /// does not depend on n (except of a Latin hypercube, which is made for n). Iteration 0 without a mixture: the quasi-random design through the prior's
 /// quantiles. Otherwise each sample has its own Philox stream; draws of the mixture outside the

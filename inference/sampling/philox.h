@@ -19,6 +19,7 @@ enum class StreamPurpose : std::uint64_t {
   kLatinHypercube = 18,
   kResponseSurface = 19,
   kEvidenceErrors = 20,
+  kDiagnosisNull = 21,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

@@ -14,9 +14,11 @@ const char* ToString(Method method) {
     case Method::kTmcmc:
       return "tmcmc";
     case Method::kSurrogateMsrs:
+      return "surrogate_msrs";
+    case Method::kTable:
       break;
   }
-  return "surrogate_msrs";
+  return "table";
 }
 
 bool IsFilter(Method method) {
@@ -39,6 +41,7 @@ int MostBatches(const Campaign& campaign) {
       return static_cast<int>(1 + (later + batch - 1) / batch);
     }
     case Method::kSqmc:
+    case Method::kTable:
       return 1;
     case Method::kIterativeBayesianFilter:
       break;
@@ -105,6 +108,34 @@ std::vector<inference::Prior> Priors(const Campaign& campaign) {
   return priors;
 }
 
+int StreamOf(const Campaign& campaign, int sample) {
+  const auto row = static_cast<std::size_t>(sample);
+  return campaign.table && row < campaign.table->like.size() ? campaign.table->like[row] : sample;
+}
+
+inference::Proposal FirstProposalOf(const Campaign& campaign) {
+  inference::Proposal proposal;
+  if (!campaign.first_proposal) return proposal;
+  const auto d = static_cast<Eigen::Index>(campaign.parameters.size());
+  const std::vector<inference::Prior> priors = Priors(campaign);
+  inference::MixtureComponent component{.weight = 1,
+                                        .mean = Eigen::VectorXd::Zero(d),
+                                        .covariance = Eigen::MatrixXd::Identity(d, d)};
+  for (Eigen::Index j = 0; j < d; ++j) {
+    const auto index = static_cast<std::size_t>(j);
+    const auto place = campaign.first_proposal->places.find(campaign.parameters[index].name);
+    if (place == campaign.first_proposal->places.end()) continue;
+    const inference::Prior& prior = priors[index];
+    component.mean[j] = prior.ToStandard(place->second.center);
+    const double sd = place->second.sd * std::exp(prior.LogJacobian(place->second.center));
+    component.covariance(j, j) = std::min(1.0, sd * sd);
+  }
+  proposal.components.push_back(std::move(component));
+  proposal.defensive_share = campaign.first_proposal->prior_share;
+  proposal.log_acceptance = inference::LogMassInSupport(proposal.components, priors);
+  return proposal;
+}
+
 dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
                            const std::vector<double>& values, int sample) {
   dem::Scenario scenario;
@@ -114,8 +145,9 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
   }
   scenario.test = experiment.test;
   scenario.settings = experiment.settings;
+  const int stream = StreamOf(campaign, sample);
   if (!experiment.specimens.empty()) {
-    const auto index = static_cast<std::size_t>(sample) % experiment.specimens.size();
+    const auto index = static_cast<std::size_t>(stream) % experiment.specimens.size();
     if (const auto* file = std::get_if<PackingFile>(&experiment.specimens[index])) {
       scenario.packing = file->packing;
     }
@@ -125,7 +157,7 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
   scenario.loading_rate = experiment.loading_rate;
   scenario.staging = experiment.staging;
   scenario.path = experiment.path;
-  scenario.seed = campaign.seed + static_cast<std::uint64_t>(sample);
+  scenario.seed = campaign.seed + static_cast<std::uint64_t>(stream);
   return scenario;
 }
 

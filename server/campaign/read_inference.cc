@@ -30,7 +30,7 @@ void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
 }
 
 constexpr std::array kMethods = {Method::kSqmc, Method::kIterativeBayesianFilter, Method::kTmcmc,
-                                 Method::kSurrogateMsrs};
+                                 Method::kSurrogateMsrs, Method::kTable};
 constexpr int kMostStages = 100;  // of tmcmc, unless max_iterations says otherwise
 
 void ReadMethod(MapReader& map, Campaign& campaign) {
@@ -41,7 +41,7 @@ void ReadMethod(MapReader& map, Campaign& campaign) {
     if (chosen == ToString(method)) campaign.method = method;
   }
   if (campaign.method == Method::kTmcmc) campaign.max_iterations = kMostStages;
-  if (IsFilter(campaign.method)) return;
+  if (IsFilter(campaign.method) || campaign.method == Method::kTable) return;
   if (campaign.precomputed) {
     map.Problem("method", absl::StrCat(*chosen,
                                        " chooses its own samples, and runs that exist "
@@ -102,6 +102,7 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
         map->Integer("max_iterations", 1, kMostIterations).value_or(campaign.max_iterations));
     if (IsFilter(campaign.method)) ReadFilterOptions(*map, campaign);
     if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
+    map->Ignore({"rows", "first_proposal"});  // read once the parameters are known
     if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&
         campaign.max_iterations != 1) {
       map->Problem(
@@ -110,7 +111,8 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
     }
     map->Finish();
   }
-  if (campaign.method == Method::kSqmc) campaign.max_iterations = 1;
+  if (campaign.method == Method::kSqmc || campaign.method == Method::kTable)
+    campaign.max_iterations = 1;
 }
 
 void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
@@ -155,7 +157,92 @@ void ReadBudget(MapReader& campaign_map, Campaign& campaign) {
   map->Finish();
 }
 
+// One row of the table: a value for every parameter, and the sample it is to be like.
+void ReadRow(const YamlNode& node, const std::string& path, Eigen::Index row, Campaign& campaign,
+             ProblemList& problems) {
+  MapReader map(node, path, problems);
+  constexpr std::int64_t kMostSamples = 1'000'000;
+  campaign.table->like.push_back(
+      static_cast<int>(map.Integer("like", 0, kMostSamples).value_or(row)));
+  for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
+    const CalibratedParameter& parameter = campaign.parameters[j];
+    const auto value = map.Require(parameter.name, "every row gives every parameter") != nullptr
+                           ? map.Quantity(parameter.name, parameter.unit, {})
+                           : std::nullopt;
+    campaign.table->parameters(row, static_cast<Eigen::Index>(j)) = value.value_or(0);
+  }
+  map.Finish();
+}
+
+void ReadTable(MapReader& map, Campaign& campaign) {
+  if (campaign.method != Method::kTable) {
+    if (map.Has("rows")) map.Problem("rows", "belongs to method: table");
+    return;
+  }
+  const YamlNode* rows = map.Require("rows", "the parameter values to run, a list of maps");
+  if (rows == nullptr) return;
+  if (rows->kind != YamlNode::Kind::kSequence || rows->items.empty()) {
+    map.Problem("rows", "has to be a list of maps, one per run");
+    return;
+  }
+  campaign.samples = static_cast<int>(rows->items.size());
+  campaign.table.emplace();
+  campaign.table->parameters.setZero(static_cast<Eigen::Index>(rows->items.size()),
+                                     static_cast<Eigen::Index>(campaign.parameters.size()));
+  for (std::size_t i = 0; i < rows->items.size(); ++i) {
+    ReadRow(rows->items[i], absl::StrCat(map.PathOf("rows"), "[", i, "]"),
+            static_cast<Eigen::Index>(i), campaign, map.problems());
+  }
+}
+
+void ReadFirstProposal(MapReader& inference_map, Campaign& campaign) {
+  if (!inference_map.Has("first_proposal")) return;
+  auto map = inference_map.Map("first_proposal");
+  if (!map) return;
+  FirstProposal proposal;
+  proposal.prior_share =
+      map->Quantity("prior_share", "1", {.min = 0, .max = 1}).value_or(proposal.prior_share);
+  for (const CalibratedParameter& parameter : campaign.parameters) {
+    if (!map->Has(parameter.name)) continue;
+    auto place = map->Map(parameter.name);
+    if (!place) continue;
+    place->Require("center", "where samples of this parameter are drawn");
+    place->Require("sd", "how widely samples of this parameter are drawn");
+    const auto center = place->Quantity("center", parameter.unit, {});
+    const auto sd = place->Quantity("sd", parameter.unit, kPositive);
+    place->Finish();
+    if (!center || !sd) continue;
+    if (!parameter.prior.InSupport(*center)) {
+      place->Problem("center", "lies outside the prior of the parameter");
+      continue;
+    }
+    proposal.places[parameter.name] = {.center = *center, .sd = *sd};
+  }
+  map->Finish();
+  campaign.first_proposal = std::move(proposal);
+}
+
+void ReadLineage(MapReader& campaign_map, Campaign& campaign) {
+  auto map = campaign_map.Map("lineage");
+  if (!map) return;
+  Lineage lineage;
+  lineage.parent =
+      map->RequiredText("parent", "id of the campaign this one comes from").value_or("");
+  lineage.purpose = map->RequiredText("purpose", "why it was derived").value_or("");
+  map->Finish();
+  campaign.lineage = std::move(lineage);
+}
+
 }  // namespace
+
+void ReadStart(MapReader& campaign_map, Campaign& campaign) {
+  ReadLineage(campaign_map, campaign);
+  if (!campaign_map.Has("inference")) return;
+  auto map = campaign_map.Map("inference");
+  if (!map) return;
+  ReadTable(*map, campaign);
+  ReadFirstProposal(*map, campaign);
+}
 
 void ReadInference(MapReader& campaign_map, Campaign& campaign) {
   ReadNoiseMode(campaign_map, campaign.filter);

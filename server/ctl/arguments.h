@@ -25,6 +25,8 @@ struct Arguments {
   std::optional<int> iteration;
   std::optional<std::uint64_t> seed;
   std::vector<std::string> set;  ///< NAME=VALUE
+  std::vector<std::string> effects;  ///< to join the model
+  int max_effects = 3;
   std::string output;            ///< file or folder; empty: standard output
   std::string vtk;               ///< folder
 };

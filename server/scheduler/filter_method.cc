@@ -14,7 +14,9 @@ class FilterMethod final : public Method {
   explicit FilterMethod(const Definition& definition)
       : definition_(definition), campaign_(definition.campaign) {}
 
-  absl::StatusOr<Batch> First() const override { return Draw({}, inference::Proposal{}); }
+  absl::StatusOr<Batch> First() const override {
+    return Draw({}, campaign::FirstProposalOf(campaign_));
+  }
 
   absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const override {
     auto answer = FindAnswer(definition_, history.iterations);

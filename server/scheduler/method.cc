@@ -10,6 +10,7 @@ std::unique_ptr<Method> MakeMethod(const Definition& definition) {
       return MakeSurrogateMethod(definition);
     case campaign::Method::kSqmc:
     case campaign::Method::kIterativeBayesianFilter:
+    case campaign::Method::kTable:  // the planner runs its rows and concludes nothing
       break;
   }
   return MakeFilterMethod(definition);

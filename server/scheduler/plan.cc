@@ -41,10 +41,12 @@ class Planner {
     plan_.converged = record_.progress.converged;
     absl::Status status;
     if (history_.iterations.empty()) {
-      status = Begin(MakeMethod(definition_)->First());
+      status = Begin(campaign_.table.has_value() ? TableBatch() : MakeMethod(definition_)->First());
       if (campaign_.precomputed.has_value()) {
         plan_.event = CampaignEvent::kStart;
       }
+    } else if (campaign_.table.has_value()) {
+      Finish();  // its runs are all there is
     } else if (plan_.phase == "calibrating") {
       status = Conclude();
     } else {
@@ -154,6 +156,16 @@ class Planner {
             history_.effort.model_evaluations + next > *budget.model_evaluations) ||
            (budget.core_hours.has_value() &&
             history_.effort.core_seconds > *budget.core_hours * 3600);
+  }
+
+  /// The rows that a table campaign runs.
+  Batch TableBatch() const {
+    const Eigen::MatrixXd& rows = campaign_.table->parameters;
+    return {
+        .proposal = ProposalToJson({}),
+        .parameters = rows,
+        .stop_below = std::vector<double>(static_cast<std::size_t>(rows.rows()), store::kUnknown),
+        .refused = {}};
   }
 
   absl::Status Begin(const absl::StatusOr<Batch>& batch) {

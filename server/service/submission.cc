@@ -10,6 +10,21 @@
 #include "server/scheduler/definition.h"
 
 namespace calib::service {
+namespace {
+
+const char* ToString(campaign::Method method) {
+  switch (method) {
+    case campaign::Method::kSqmc:
+      return "sqmc";
+    case campaign::Method::kTable:
+      return "table";
+    case campaign::Method::kIterativeBayesianFilter:
+      break;
+  }
+  return "iterative_bayesian_filter";
+}
+
+}  // namespace
 
 absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmission(
     const v1::SubmitRequest& request, store::Reader& reader) {
