@@ -215,6 +215,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "2"; }
+std::string EngineVersion() { return "3"; }
 
 }  // namespace calib::dem

@@ -1,17 +1,24 @@
 #include "dem/catalog/registry.h"
 
+#include <utility>
 #include <vector>
 
 #include "dem/contact/hertz_mindlin.h"
 #include "dem/contact/linear.h"
 #include "dem/effects/adhesion_dmt.h"
 #include "dem/effects/adhesion_jkr.h"
+#include "dem/effects/apparatus_compliance.h"
 #include "dem/effects/capillary_bridges.h"
 #include "dem/effects/contact_plasticity.h"
 #include "dem/effects/hertz_nonlinearity.h"
+#include "dem/effects/initial_density.h"
+#include "dem/effects/initial_fabric.h"
 #include "dem/effects/linear_cohesion.h"
+#include "dem/effects/load_cell_error.h"
+#include "dem/effects/membrane_stiffness.h"
 #include "dem/effects/pressure_dependent_friction.h"
 #include "dem/effects/rolling_resistance.h"
+#include "dem/effects/strain_offset.h"
 #include "dem/effects/twisting_resistance.h"
 #include "dem/effects/viscous_damping.h"
 #include "dem/lab_tests/isotropic.h"
@@ -20,6 +27,19 @@
 
 namespace calib::dem {
 
+ParameterSet ResolveParameters(const std::vector<ParameterInfo>& infos, const std::string& prefix,
+                               const std::map<std::string, double>& given) {
+  std::map<std::string, double> values;
+  for (const ParameterInfo& info : infos) {
+    if (const auto it = given.find(prefix + info.name); it != given.end()) {
+      values[info.name] = it->second;
+    } else if (info.default_value) {
+      values[info.name] = *info.default_value;
+    }
+  }
+  return ParameterSet(std::move(values));
+}
+
 std::span<const ContactEntry> ContactEntries() {
   static const std::vector<ContactEntry> entries = {HertzMindlin(), Linear()};
   return entries;
@@ -27,9 +47,10 @@ std::span<const ContactEntry> ContactEntries() {
 
 std::span<const EffectEntry> EffectEntries() {
   static const std::vector<EffectEntry> entries = {
-      HertzNonlinearity(), ContactPlasticity(), LinearCohesion(), AdhesionDmt(),
-      AdhesionJkr(),       CapillaryBridges(),  ViscousDamping(), PressureDependentFriction(),
-      RollingResistance(), TwistingResistance()};
+      HertzNonlinearity(),   ContactPlasticity(),  LinearCohesion(),    AdhesionDmt(),
+      AdhesionJkr(),         CapillaryBridges(),   ViscousDamping(),    PressureDependentFriction(),
+      RollingResistance(),   TwistingResistance(), InitialDensity(),    InitialFabric(),
+      ApparatusCompliance(), StrainOffset(),       MembraneStiffness(), LoadCellError()};
   return entries;
 }
 

@@ -8,6 +8,7 @@
 #include "dem/catalog/catalog.h"
 #include "dem/contact/contact_kernel.h"
 #include "dem/lab_tests/element_test.h"
+#include "dem/measure/apparatus.h"
 
 namespace calib::dem {
 
@@ -24,18 +25,31 @@ struct EffectKernel {
   MakeKernel make = nullptr;
 };
 
-/// An effect; those that do not act between grains have no kernels. Effects of one stage act in the
-/// order of the registry.
+/// How the initial state differs from consolidation as asked for.
+struct Preparation {
+  double densification = 0;      ///< fall of porosity [-]
+  double stress_anisotropy = 0;  ///< q/p during consolidation [-]
+};
+
+/// An effect acts between grains, on the readings, or on the initial state: it sets what it needs.
+/// Effects of one stage act in the order of the registry.
 struct EffectEntry {
   EffectInfo info;
   std::vector<EffectKernel> kernels = {};
+  void (*alter)(const ParameterSet& parameters, Apparatus& apparatus) = nullptr;
+  void (*prepare)(const ParameterSet& parameters, Preparation& preparation) = nullptr;
 };
 
 /// A test of one specimen in its periodic cell.
 struct ElementTestEntry {
   TestInfo info;
   PlanElementTest plan = nullptr;
+  RigLoad rig_load = RigLoad::kNone;
 };
+
+/// Given values of one law or effect without their prefix, and the defaults of what was not given.
+ParameterSet ResolveParameters(const std::vector<ParameterInfo>& infos, const std::string& prefix,
+                               const std::map<std::string, double>& given);
 
 std::span<const ContactEntry> ContactEntries();
 std::span<const EffectEntry> EffectEntries();

@@ -14,20 +14,6 @@
 namespace calib::dem {
 namespace {
 
-/// Given values of one law or effect without their prefix, and the defaults of what was not given.
-ParameterSet Resolve(const std::vector<ParameterInfo>& infos, const std::string& prefix,
-                     const std::map<std::string, double>& given) {
-  std::map<std::string, double> values;
-  for (const ParameterInfo& info : infos) {
-    if (const auto it = given.find(prefix + info.name); it != given.end()) {
-      values[info.name] = it->second;
-    } else if (info.default_value) {
-      values[info.name] = *info.default_value;
-    }
-  }
-  return ParameterSet(std::move(values));
-}
-
 const ContactEntry& LawNamed(const std::string& name) {
   const auto entries = ContactEntries();
   const auto it = std::find_if(entries.begin(), entries.end(),
@@ -42,7 +28,7 @@ ContactModel::ContactModel(const Model& model)
     : sliding_friction_(SlidingFriction(model.parameters)) {
   std::vector<std::pair<ContactStage, std::shared_ptr<const ContactKernel>>> kernels;
   const ContactEntry& law = LawNamed(model.contact);
-  const ParameterSet law_parameters = Resolve(law.info.parameters, "", model.parameters);
+  const ParameterSet law_parameters = ResolveParameters(law.info.parameters, "", model.parameters);
   kernels.emplace_back(ContactStage::kNormal, law.make({.contact = model.contact,
                                                         .density = model.density,
                                                         .law = law_parameters,
@@ -57,7 +43,7 @@ ContactModel::ContactModel(const Model& model)
           .contact = model.contact,
           .density = model.density,
           .law = law_parameters,
-          .parameters = Resolve(effect.info.parameters, name + ".", model.parameters)};
+          .parameters = ResolveParameters(effect.info.parameters, name + ".", model.parameters)};
       for (const EffectKernel& kernel : effect.kernels) {
         kernels.emplace_back(kernel.stage, kernel.make(context));
       }

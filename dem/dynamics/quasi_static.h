@@ -3,8 +3,10 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/stress_servo.h"
@@ -33,6 +35,15 @@ struct StageOptions {
   std::int64_t max_loading_steps = 20'000'000;
 };
 
+/// A target that follows the specimen: looked at before every step. `target` is what was asked for
+/// and becomes what to do now, given the affine stiffness of each axis [Pa]; the answer is how far
+/// the stage is from its end, in tolerances (settled when at most one) and in strain still to go.
+struct FollowGap {
+  double tolerances = 0;  ///< >= 0
+  double strain = 0;      ///< >= 0
+};
+using Follow = std::function<FollowGap(const std::array<double, 3>& modulus, CellTarget& target)>;
+
 enum class StageEnd { kDone, kStopped, kDiverged };
 
 /// Drives an assembly. Between calls its forces are those of its present configuration. Looks at
@@ -56,6 +67,9 @@ class QuasiStatic {
   /// within tolerance.
   StageEnd Settle(const CellTarget& target);
 
+  /// Lets every target from now on be followed; empty: targets are what they are.
+  void SetFollow(Follow follow) { follow_ = std::move(follow); }
+
   [[nodiscard]] StageOptions& options() { return options_; }
   [[nodiscard]] Assembly& assembly() { return *assembly_; }
   [[nodiscard]] double time_step() const { return dt_; }
@@ -69,6 +83,7 @@ class QuasiStatic {
   StageEnd Step(const CellTarget& target, double damping, double max_servo_rate);
   StageEnd Inspect();
   StageEnd Diverge(std::string reason);
+  [[nodiscard]] CellTarget Current(const CellTarget& asked, FollowGap& gap) const;
   [[nodiscard]] bool StressesWithin(const CellTarget& target, double tolerance) const;
   [[nodiscard]] double MaxServoRate(const CellTarget& target) const;
 
@@ -80,6 +95,7 @@ class QuasiStatic {
   double dt_ = 0;
   std::int64_t since_inspection_ = 0;
   bool begun_ = false;
+  Follow follow_;
   std::string reason_;
 };
 

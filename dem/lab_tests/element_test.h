@@ -30,6 +30,13 @@ struct ElementTestContext {
 /// Goal of the cell for one value of the control observable. Pure.
 using PlanElementTest = CellGoal (*)(const ElementTestContext& context, double target);
 
+/// What loads the frame that strains the specimen, and with it where effects of the apparatus act.
+enum class RigLoad {
+  kNone,        ///< no axial loading frame
+  kDeviatoric,  ///< q against the cell pressure; volume is measured apart
+  kAxial,       ///< the axial stress; volume follows from the axial strain
+};
+
 /// Observables that every element test produces, in the order of their states.
 std::vector<std::string> ElementObservables();
 

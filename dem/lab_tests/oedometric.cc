@@ -21,7 +21,8 @@ ElementTestEntry Oedometric() {
                    .control = "axial_strain",
                    .may_reverse = true,
                    .reference = "Cheng et al. 2019, sec. 4"},
-          .plan = &Plan};
+          .plan = &Plan,
+          .rig_load = RigLoad::kAxial};
 }
 
 }  // namespace calib::dem

@@ -22,7 +22,8 @@ ElementTestEntry TriaxialDrained() {
                    .control = "axial_strain",
                    .may_reverse = true,
                    .reference = "Cheng et al. 2018, sec. 4"},
-          .plan = &Plan};
+          .plan = &Plan,
+          .rig_load = RigLoad::kDeviatoric};
 }
 
 }  // namespace calib::dem

@@ -10,6 +10,38 @@ double Porosity(const Assembly& assembly) {
   return 1.0 - assembly.solid_volume() / assembly.cell().Volume();
 }
 
+namespace {
+
+/// What follows from the two stresses and from porosity.
+void Derive(Measurement& m) {
+  m.mean_stress = (m.axial_stress + 2.0 * m.lateral_stress) / 3.0;
+  m.deviatoric_stress = m.axial_stress - m.lateral_stress;
+  m.stress_ratio = m.axial_stress / m.lateral_stress;
+  m.q_over_p = m.deviatoric_stress / m.mean_stress;
+  m.void_ratio = m.porosity / (1.0 - m.porosity);
+}
+
+}  // namespace
+
+Measurement ReadThrough(const Apparatus& apparatus, double x, bool by_axial, Measurement m) {
+  if (!apparatus.Alters()) {
+    return m;
+  }
+  m.lateral_stress -= apparatus.MembraneStress(m.lateral_strain);
+  m.axial_stress += apparatus.load_gain * x + apparatus.load_offset;
+  if (apparatus.AltersStrain()) {
+    const double rig = apparatus.RigStrain(x);
+    m.axial_strain += rig;
+    if (by_axial) {
+      m.volumetric_strain += rig;
+      m.porosity = 1.0 - (1.0 - m.porosity) * std::exp(rig);
+    }
+    m.lateral_strain = 0.5 * (m.volumetric_strain - m.axial_strain);
+  }
+  Derive(m);
+  return m;
+}
+
 Measurement Measure(const Assembly& assembly, const double reference[3]) {
   const PeriodicCell& cell = assembly.cell();
   double strain[3];
@@ -23,12 +55,8 @@ Measurement Measure(const Assembly& assembly, const double reference[3]) {
   m.lateral_strain = 0.5 * (strain[0] + strain[1]);
   m.axial_stress = stress[2];
   m.lateral_stress = 0.5 * (stress[0] + stress[1]);
-  m.mean_stress = (m.axial_stress + 2.0 * m.lateral_stress) / 3.0;
-  m.deviatoric_stress = m.axial_stress - m.lateral_stress;
-  m.stress_ratio = m.axial_stress / m.lateral_stress;
-  m.q_over_p = m.deviatoric_stress / m.mean_stress;
   m.porosity = Porosity(assembly);
-  m.void_ratio = m.porosity / (1.0 - m.porosity);
+  Derive(m);
   m.coordination_number =
       2.0 * static_cast<double>(assembly.contacts()) / assembly.particles().size();
   return m;

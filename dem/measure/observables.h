@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dem/dynamics/assembly.h"
+#include "dem/measure/apparatus.h"
 
 namespace calib::dem {
 
@@ -21,6 +22,11 @@ struct Measurement {
 /// of sphere volumes, coordination number 2 Nc/Np over all grains. axial = z. reference: three
 /// lengths [m] > 0 of zero strain.
 Measurement Measure(const Assembly& assembly, const double reference[3]);
+
+/// The measurement as the laboratory reads it through an apparatus that loads the specimen with x
+/// [Pa]; `by_axial` where volume follows from the axial strain. Readings derived from others
+/// follow.
+Measurement ReadThrough(const Apparatus& apparatus, double x, bool by_axial, Measurement m);
 
 /// Values of the named observables. Precondition: every name is a member of Measurement.
 std::vector<double> Select(const Measurement& measurement, const std::vector<std::string>& names);

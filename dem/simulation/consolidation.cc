@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -139,20 +140,67 @@ absl::Status LowerFrictionToPorosity(double porosity, double pressure, QuasiStat
   return Unreachable(porosity, Porosity(assembly), highest);
 }
 
+namespace {
+
+CellTarget PreparedUnder(double pressure, double anisotropy) {
+  CellTarget target = Isotropic(pressure);
+  if (anisotropy != 0) {
+    target[0].value = target[1].value = pressure * (1.0 - anisotropy / 3.0);
+    target[2].value = pressure * (1.0 + anisotropy * 2.0 / 3.0);
+  }
+  return target;
+}
+
+/// Compresses through the pressure stages with the friction that the assembly has.
+StageEnd Compress(const ConsolidationPlan& plan, QuasiStatic& stages) {
+  StageEnd end = StageEnd::kDone;
+  for (const double pressure : PressureStages(plan.pressure)) {
+    end = stages.MoveTo(PreparedUnder(pressure, plan.preparation.stress_anisotropy));
+    if (end != StageEnd::kDone) {
+      return end;
+    }
+  }
+  return plan.preparation.stress_anisotropy != 0 ? stages.MoveTo(Isotropic(plan.pressure)) : end;
+}
+
+/// Porosity to reach after compression, or nothing where it is left as it comes.
+std::optional<double> PorosityToReach(const ConsolidationPlan& plan, const Assembly& compressed) {
+  const double densification = plan.preparation.densification;
+  if (densification == 0) {
+    return plan.consolidation.porosity;
+  }
+  return plan.consolidation.porosity.value_or(Porosity(compressed)) - densification;
+}
+
+}  // namespace
+
 absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, StageEnd& end) {
   Assembly& assembly = stages.assembly();
+  const double own_friction = assembly.model().sliding_friction();
   if (plan.consolidation.friction_coefficient) {
     assembly.SetSlidingFriction(*plan.consolidation.friction_coefficient);
   }
-  for (const double pressure : PressureStages(plan.pressure)) {
-    end = stages.MoveTo(Isotropic(pressure));
-    if (end != StageEnd::kDone) {
-      return absl::OkStatus();
-    }
+  std::optional<Assembly> start;
+  if (plan.preparation.densification < 0 && assembly.sliding_friction() < own_friction) {
+    start = assembly;  // looser than with lowered friction: begin again with the model's own
   }
-  if (plan.consolidation.porosity) {
-    if (auto s = LowerFrictionToPorosity(*plan.consolidation.porosity, plan.pressure, stages, end);
-        !s.ok()) {
+  end = Compress(plan, stages);
+  if (end != StageEnd::kDone) {
+    return absl::OkStatus();
+  }
+  if (const auto porosity = PorosityToReach(plan, assembly)) {
+    if (start && Porosity(assembly) < *porosity) {
+      assembly = *start;
+      assembly.SetSlidingFriction(own_friction);
+      if (auto s = assembly.EvaluateForces(); !s.ok()) {
+        return s;
+      }
+      end = Compress(plan, stages);
+      if (end != StageEnd::kDone) {
+        return absl::OkStatus();
+      }
+    }
+    if (auto s = LowerFrictionToPorosity(*porosity, plan.pressure, stages, end); !s.ok()) {
       return s;
     }
     if (end != StageEnd::kDone) {
@@ -164,7 +212,7 @@ absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, Sta
     target[0].value = target[1].value = plan.initial_stress->lateral;
     target[2].value = plan.initial_stress->axial;
   }
-  assembly.SetSlidingFriction(assembly.model().sliding_friction());
+  assembly.SetSlidingFriction(own_friction);
   end = stages.MoveTo(target);
   return absl::OkStatus();
 }

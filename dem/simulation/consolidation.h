@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "absl/status/status.h"
+#include "dem/catalog/registry.h"
 #include "dem/dynamics/quasi_static.h"
 #include "dem/simulation/scenario.h"
 
@@ -14,6 +15,7 @@ struct ConsolidationPlan {
   double pressure = 0;          ///< isotropic, > 0 [Pa]
   Consolidation consolidation;  ///< friction while compressing, or the porosity to reach
   std::optional<InitialStress> initial_stress;
+  Preparation preparation;  ///< by effects of kind "initial_state"
 };
 
 /// Porosity counts as reached within this.

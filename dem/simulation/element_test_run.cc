@@ -22,6 +22,10 @@ constexpr double kDampingLoading = 0.2;
 constexpr double kDampingSettling = 0.9;
 constexpr double kUnbalanced = 5e-4;
 
+/// Share of the strain to a reading that one step may take, and how near a reading must come.
+constexpr double kFollowGain = 0.3;
+constexpr double kReadingTolerance = 1e-6;
+
 const ElementTestEntry& EntryOf(const std::string& test) {
   const auto entries = ElementTestEntries();
   return *std::find_if(entries.begin(), entries.end(),
@@ -58,6 +62,21 @@ class ElementTestRun {
         stages_(assembly_, OptionsFrom(staging_), std::move(stop)) {
     context_.settings = scenario.settings;
     const double pressure = scenario.settings.at("confining_pressure");
+    for (const EffectEntry& effect : EffectEntries()) {
+      const std::string& name = effect.info.name;
+      const auto& chosen = scenario.model.effects;
+      if (std::find(chosen.begin(), chosen.end(), name) == chosen.end()) {
+        continue;
+      }
+      const ParameterSet parameters =
+          ResolveParameters(effect.info.parameters, name + ".", scenario.model.parameters);
+      if (effect.alter != nullptr && entry_.rig_load != RigLoad::kNone) {
+        effect.alter(parameters, apparatus_);
+      }
+      if (effect.prepare != nullptr) {
+        effect.prepare(parameters, preparation_);
+      }
+    }
     context_.lateral_stress = scenario.initial_stress ? scenario.initial_stress->lateral : pressure;
   }
 
@@ -65,16 +84,23 @@ class ElementTestRun {
     StageEnd end = StageEnd::kDone;
     const ConsolidationPlan plan{.pressure = scenario_.settings.at("confining_pressure"),
                                  .consolidation = scenario_.consolidation,
-                                 .initial_stress = scenario_.initial_stress};
+                                 .initial_stress = scenario_.initial_stress,
+                                 .preparation = preparation_};
     assembly_.SetViscous(false);
     if (auto s = Consolidate(plan, stages_, end); !s.ok()) {
-      return s;
+      if (preparation_.densification == 0) {
+        return s;
+      }
+      Summary summary = Finish(StageEnd::kDiverged, "");  // of a calibrated parameter: a result
+      summary.reason = absl::StrCat("consolidation, initial_density: ", s.message());
+      return summary;
     }
     assembly_.SetViscous(true);
     if (end != StageEnd::kDone) {
       return Finish(end, "consolidation");
     }
     std::copy_n(assembly_.cell().length, 3, reference_);
+    FollowReadings();
     if (scenario_.loading_rate) {
       stages_.options().rate = *scenario_.loading_rate;
     }
@@ -89,8 +115,7 @@ class ElementTestRun {
       if (point.load_step < 0) {
         continue;
       }
-      State state{.load_step = point.load_step,
-                  .values = Select(Measure(assembly_, reference_), entry_.info.observables)};
+      State state{.load_step = point.load_step, .values = Select(Read(), entry_.info.observables)};
       for (std::size_t v = 0; v < state.values.size(); ++v) {
         if (!std::isfinite(state.values[v])) {
           Summary summary = Finish(StageEnd::kDiverged, where);
@@ -125,6 +150,59 @@ class ElementTestRun {
                    .value = strain ? reference_[a] * std::exp(-goal[a].value) : goal[a].value};
     }
     return target;
+  }
+
+  /// Stresses that load the rig, by the kind of the test [Pa].
+  [[nodiscard]] double RigStress() const {
+    const auto& stress = assembly_.stress();
+    if (entry_.rig_load == RigLoad::kAxial) {
+      return stress[2];
+    }
+    return stress[2] - 0.5 * (stress[0] + stress[1]) + apparatus_.MembraneStress(LateralStrain());
+  }
+
+  [[nodiscard]] double LateralStrain() const {
+    const PeriodicCell& cell = assembly_.cell();
+    return 0.5 *
+           (std::log(reference_[0] / cell.length[0]) + std::log(reference_[1] / cell.length[1]));
+  }
+
+  /// The present state as the laboratory reads it.
+  [[nodiscard]] Measurement Read() const {
+    return ReadThrough(apparatus_, RigStress() - rig_start_, entry_.rig_load == RigLoad::kAxial,
+                       Measure(assembly_, reference_));
+  }
+
+  /// Lets the stages be driven by readings where the apparatus alters them.
+  void FollowReadings() {
+    rig_start_ = RigStress();
+    if (apparatus_.AltersStrain() || apparatus_.membrane != 0) {
+      stages_.SetFollow([this](const std::array<double, 3>& modulus, CellTarget& target) {
+        return FollowReading(modulus, target);
+      });
+    }
+  }
+
+  /// Axial strain that brings the reading to the control, and lateral stress with the membrane's
+  /// part. With the affine stiffness, an upper bound of the real one, the reading is approached
+  /// from one side.
+  FollowGap FollowReading(const std::array<double, 3>& modulus, CellTarget& target) const {
+    const double strain = std::log(reference_[2] / assembly_.cell().length[2]);
+    FollowGap gap{.tolerances = 0, .strain = std::abs(control_ - strain)};
+    if (apparatus_.AltersStrain()) {
+      const double x = RigStress() - rig_start_;
+      const double error = control_ - strain - apparatus_.RigStrain(x);
+      const double change = error / (1.0 + modulus[2] * apparatus_.RigSlope(x));
+      target = TargetFor(strain + kFollowGain * change);
+      gap = {.tolerances = std::abs(error) / kReadingTolerance,
+             .strain = std::abs(kFollowGain * change)};
+    }
+    for (std::size_t a = 0; a < 2; ++a) {
+      if (target[a].mode == AxisTarget::Mode::kStress) {
+        target[a].value += apparatus_.MembraneStress(LateralStrain());
+      }
+    }
+    return gap;
   }
 
   /// From the present control value to the next: at once when loading at a real rate or by stress,
@@ -168,6 +246,9 @@ class ElementTestRun {
   Staging staging_;
   QuasiStatic stages_;
   ElementTestContext context_;
+  Apparatus apparatus_;
+  Preparation preparation_;
+  double rig_start_ = 0;  ///< RigStress() at the start of loading [Pa]
   double reference_[3] = {0, 0, 0};
   double control_ = 0;
 };

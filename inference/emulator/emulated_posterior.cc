@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -212,7 +213,17 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
       sampled, sampler,
       [&](const Eigen::MatrixXd& points) {
         const ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, points));
-        return likelihood->LogLikelihood(prediction, Factors(points, d));
+        Eigen::VectorXd values = likelihood->LogLikelihood(prediction, Factors(points, d));
+        // Where no run has been, nothing can be said: a model that fits nowhere would otherwise
+        // prefer the corner of which the emulator knows least.
+        const double most = options.max_error * options.max_error *
+                            static_cast<double>(data.readings.size());
+        for (Index i = 0; i < values.size(); ++i) {
+          if (prediction.sd.row(i).squaredNorm() > most) {
+            values[i] = -std::numeric_limits<double>::infinity();
+          }
+        }
+        return values;
       },
       stop);
   if (!state.ok()) return state.status();

@@ -102,6 +102,20 @@ absl::StatusOr<double> GuidingExponent(std::span<const Prior> priors, const Data
   return TemperingExponent(options, *ensemble);
 }
 
+double LogMassInSupport(std::span<const MixtureComponent> components,
+                        std::span<const Prior> priors) {
+  const auto d = static_cast<Eigen::Index>(priors.size());
+  Eigen::VectorXd low(d);
+  Eigen::VectorXd high(d);
+  for (Eigen::Index j = 0; j < d; ++j) {
+    const Prior& prior = priors[static_cast<std::size_t>(j)];
+    const double least = prior.kind == PriorKind::kLogNormal ? std::max(prior.min, 0.0) : prior.min;
+    low[j] = prior.ToStandard(least);
+    high[j] = prior.ToStandard(prior.max);
+  }
+  return GaussianMixture(components).LogBoxMass(low, high);
+}
+
 absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSet& data,
                                      const FilterOptions& options,
                                      std::span<const Iteration> iterations) {
@@ -120,16 +134,7 @@ absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSe
   Proposal proposal;
   proposal.components = mixture->Predictive(kNegligibleWeight);
   proposal.defensive_share = options.defensive_share;
-  const auto d = static_cast<Eigen::Index>(priors.size());
-  Eigen::VectorXd low(d);
-  Eigen::VectorXd high(d);
-  for (Eigen::Index j = 0; j < d; ++j) {
-    const Prior& prior = priors[j];
-    const double least = prior.kind == PriorKind::kLogNormal ? std::max(prior.min, 0.0) : prior.min;
-    low[j] = prior.ToStandard(least);
-    high[j] = prior.ToStandard(prior.max);
-  }
-  proposal.log_acceptance = GaussianMixture(proposal.components).LogBoxMass(low, high);
+  proposal.log_acceptance = LogMassInSupport(proposal.components, priors);
   return proposal;
 }
 

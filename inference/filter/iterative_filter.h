@@ -18,7 +18,9 @@
 
 namespace calib::inference {
 
-enum class Design { kHalton, kSobol };
+/// kSymmetricLatinHypercube: the maximin one of 1000 [Samuelsson 2023, sec. 3.2]; of fewer where
+/// samples^2 x parameters exceeds 4e6, so that the choice stays within seconds.
+enum class Design { kHalton, kSobol, kLatinHypercube, kSymmetricLatinHypercube };
 
 struct FilterOptions {
   NoiseMode noise = NoiseMode::kGiven;
@@ -56,8 +58,12 @@ struct Iteration {
   std::optional<Eigen::VectorXd> log_proposal;
 };
 
+/// ln of the mass that a mixture has inside the support of the priors: log_acceptance of a proposal.
+double LogMassInSupport(std::span<const MixtureComponent> components,
+                        std::span<const Prior> priors);
+
 /// Draws n samples (n x d). Deterministic in (options.seed, iteration, sample index), and row i
-/// does not depend on n. Iteration 0 without a mixture: the quasi-random design through the prior's
+/// does not depend on n (except of a Latin hypercube, which is made for n). Iteration 0 without a mixture: the quasi-random design through the prior's
 /// quantiles. Otherwise each sample has its own Philox stream; draws of the mixture outside the
 /// support are redrawn, never clipped. Errors: FAILED_PRECONDITION when a mixture has next to no
 /// mass (below 1e-3) inside the support.

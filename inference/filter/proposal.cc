@@ -1,12 +1,15 @@
 // Drawing samples and the density they were drawn from.
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/filter/log_weights.h"
 #include "inference/sampling/halton.h"
+#include "inference/sampling/latin_hypercube.h"
 #include "inference/sampling/philox.h"
 #include "inference/sampling/sobol.h"
 
@@ -60,6 +63,22 @@ bool DrawOne(const GaussianMixture& mixture, double defensive_share, std::span<c
   return false;
 }
 
+// The design of the first iteration in the unit cube, n x d.
+absl::StatusOr<Eigen::MatrixXd> UnitDesign(const FilterOptions& options, int n, int d) {
+  if (options.design == Design::kHalton) return Halton(n, d);
+  if (options.design == Design::kSobol) return ScrambledSobol(n, d, options.seed);
+  constexpr double kMostDistances = 2e9;  // squared differences of coordinates; a few seconds
+  const bool symmetric = options.design == Design::kSymmetricLatinHypercube;
+  const double designs = kMostDistances / (0.5 * n * n * d);
+  return LatinHypercube(
+      {.points = n,
+       .dimensions = d,
+       .symmetric = symmetric,
+       .centred = symmetric,
+       .candidates = symmetric ? static_cast<int>(std::clamp(designs, 1.0, 1e3)) : 1,
+       .seed = options.seed});
+}
+
 }  // namespace
 
 absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, std::span<const Prior> priors,
@@ -75,8 +94,9 @@ absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, std::span<
     // A design may be used once only: a later iteration that falls back to the prior draws new
     // points.
     if (iteration == 0) {
-      samples =
-          options.design == Design::kHalton ? Halton(n, d) : ScrambledSobol(n, d, options.seed);
+      auto design = UnitDesign(options, n, d);
+      if (!design.ok()) return design;
+      samples = *std::move(design);
     }
     for (int i = 0; i < n; ++i) {
       PhiloxStream stream({.seed = options.seed,

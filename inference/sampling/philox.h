@@ -18,6 +18,8 @@ enum class StreamPurpose : std::uint64_t {
   kEmulatorBand = 17,
   kLatinHypercube = 18,
   kResponseSurface = 19,
+  kEvidenceErrors = 20,
+  kDiagnosisNull = 21,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

@@ -69,6 +69,7 @@ void Accept(std::span<const Prior> priors, const Eigen::VectorXd& log_likelihood
     state.samples.row(i) = state.proposals.row(i);
     state.log_likelihood[i] = log_likelihood[i];
     state.log_prior[i] = LogPrior(priors, state.samples.row(i));
+    state.origin[static_cast<std::size_t>(i)] = state.evaluated + i;
     ++accepted;
   }
   state.accepted += accepted;
@@ -138,6 +139,7 @@ absl::Status BeginStage(std::span<const Prior> priors, const TmcmcOptions& optio
     state.log_prior[i] = before.log_prior[parent];
     state.log_likelihood[i] = before.log_likelihood[parent];
     state.ancestor[i] = before.ancestor[parent];
+    state.origin[i] = before.origin[parent];
   }
   state.step = 0;
   state.accepted = 0;
@@ -216,15 +218,18 @@ absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& opt
     next.log_likelihood = finite;
     next.log_prior.resize(n);
     next.ancestor.resize(static_cast<std::size_t>(n));
+    next.origin.resize(static_cast<std::size_t>(n));
     for (Index i = 0; i < n; ++i) {
       next.log_prior[i] = LogPrior(priors, next.samples.row(i));
       next.ancestor[static_cast<std::size_t>(i)] = static_cast<int>(i);
+      next.origin[static_cast<std::size_t>(i)] = i;
     }
   } else {
     const int before = next.accepted;
     Accept(priors, finite, next);
     AdaptScale(options, next.accepted - before, next);
   }
+  next.evaluated += n;
   if (next.stages.empty() || next.step == options.steps) {
     if (!next.stages.empty()) {
       next.stages.back().acceptance = next.accepted / (static_cast<double>(n) * options.steps);

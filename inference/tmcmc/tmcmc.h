@@ -44,6 +44,9 @@ struct TmcmcState {
   Eigen::VectorXd log_prior;       ///< N, in standardised coordinates
   Eigen::VectorXd log_likelihood;  ///< N; -inf: diverged
   std::vector<int> ancestor;       ///< N: index of the prior draw each sample descends from
+  /// N: the evaluation that each sample is, all proposals of all batches counted in order from 0.
+  std::vector<std::int64_t> origin;
+  std::int64_t evaluated = 0;  ///< proposals taken so far
   double exponent = 0;
   double scale = 0;  ///< of the proposal's covariance factor, 2.38 / sqrt(d) at first
   Eigen::MatrixXd

@@ -4,6 +4,51 @@
 #include <cmath>
 
 namespace calib::campaign {
+
+const char* ToString(Method method) {
+  switch (method) {
+    case Method::kSqmc:
+      return "sqmc";
+    case Method::kIterativeBayesianFilter:
+      return "iterative_bayesian_filter";
+    case Method::kTmcmc:
+      return "tmcmc";
+    case Method::kSurrogateMsrs:
+      return "surrogate_msrs";
+    case Method::kTable:
+      break;
+  }
+  return "table";
+}
+
+bool IsFilter(Method method) {
+  return method == Method::kSqmc || method == Method::kIterativeBayesianFilter;
+}
+
+int LaterBatch(const Campaign& campaign) {
+  return campaign.method == Method::kSurrogateMsrs ? std::min(kSurrogateBatch, campaign.samples)
+                                                   : campaign.samples;
+}
+
+int MostBatches(const Campaign& campaign) {
+  switch (campaign.method) {
+    case Method::kTmcmc:
+      return 1 + campaign.max_iterations * campaign.tmcmc.steps;
+    case Method::kSurrogateMsrs: {
+      const std::int64_t later =
+          (static_cast<std::int64_t>(campaign.max_iterations) - 1) * campaign.samples;
+      const int batch = LaterBatch(campaign);
+      return static_cast<int>(1 + (later + batch - 1) / batch);
+    }
+    case Method::kSqmc:
+    case Method::kTable:
+      return 1;
+    case Method::kIterativeBayesianFilter:
+      break;
+  }
+  return campaign.precomputed ? 1 : campaign.max_iterations;
+}
+
 std::vector<double> TravelledControl(const Experiment& experiment, double correlation_length) {
   constexpr double kClosest = 0.01;
   std::vector<double> travelled;
@@ -63,6 +108,34 @@ std::vector<inference::Prior> Priors(const Campaign& campaign) {
   return priors;
 }
 
+int StreamOf(const Campaign& campaign, int sample) {
+  const auto row = static_cast<std::size_t>(sample);
+  return campaign.table && row < campaign.table->like.size() ? campaign.table->like[row] : sample;
+}
+
+inference::Proposal FirstProposalOf(const Campaign& campaign) {
+  inference::Proposal proposal;
+  if (!campaign.first_proposal) return proposal;
+  const auto d = static_cast<Eigen::Index>(campaign.parameters.size());
+  const std::vector<inference::Prior> priors = Priors(campaign);
+  inference::MixtureComponent component{.weight = 1,
+                                        .mean = Eigen::VectorXd::Zero(d),
+                                        .covariance = Eigen::MatrixXd::Identity(d, d)};
+  for (Eigen::Index j = 0; j < d; ++j) {
+    const auto index = static_cast<std::size_t>(j);
+    const auto place = campaign.first_proposal->places.find(campaign.parameters[index].name);
+    if (place == campaign.first_proposal->places.end()) continue;
+    const inference::Prior& prior = priors[index];
+    component.mean[j] = prior.ToStandard(place->second.center);
+    const double sd = place->second.sd * std::exp(prior.LogJacobian(place->second.center));
+    component.covariance(j, j) = std::min(1.0, sd * sd);
+  }
+  proposal.components.push_back(std::move(component));
+  proposal.defensive_share = campaign.first_proposal->prior_share;
+  proposal.log_acceptance = inference::LogMassInSupport(proposal.components, priors);
+  return proposal;
+}
+
 dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
                            const std::vector<double>& values, int sample) {
   dem::Scenario scenario;
@@ -72,8 +145,9 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
   }
   scenario.test = experiment.test;
   scenario.settings = experiment.settings;
+  const int stream = StreamOf(campaign, sample);
   if (!experiment.specimens.empty()) {
-    const auto index = static_cast<std::size_t>(sample) % experiment.specimens.size();
+    const auto index = static_cast<std::size_t>(stream) % experiment.specimens.size();
     if (const auto* file = std::get_if<PackingFile>(&experiment.specimens[index])) {
       scenario.packing = file->packing;
     }
@@ -83,7 +157,7 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
   scenario.loading_rate = experiment.loading_rate;
   scenario.staging = experiment.staging;
   scenario.path = experiment.path;
-  scenario.seed = campaign.seed + static_cast<std::uint64_t>(sample);
+  scenario.seed = campaign.seed + static_cast<std::uint64_t>(stream);
   return scenario;
 }
 

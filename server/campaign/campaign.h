@@ -13,6 +13,7 @@
 #include "inference/data/data_set.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/prior.h"
+#include "inference/tmcmc/tmcmc.h"
 
 namespace calib::campaign {
 
@@ -82,7 +83,37 @@ struct Precomputed {
   std::optional<Eigen::VectorXd> log_proposal;
 };
 
-enum class Method { kSqmc, kIterativeBayesianFilter };
+/// kTable: the rows of `table` are run, nothing is inferred.
+enum class Method { kSqmc, kIterativeBayesianFilter, kTmcmc, kSurrogateMsrs, kTable };
+/// As users write it: "sqmc", "iterative_bayesian_filter", "tmcmc", "surrogate_msrs", "table".
+const char* ToString(Method method);
+/// True for the two filters, whose posterior is that of weighted samples.
+bool IsFilter(Method method);
+
+/// Parameter values to run, given one by one.
+struct Table {
+  Eigen::MatrixXd parameters;  ///< N x d, the campaign's parameters in order
+  /// Number of the sample whose specimen and seed each row takes, so that a run can be paired with
+  /// one of another campaign.
+  std::vector<int> like;
+};
+
+/// Where the first iteration looks: a share of the prior, the rest independent normals about
+/// `center` in the coordinate of the prior. Parameters that are not named are drawn from the width
+/// of their prior.
+struct FirstProposal {
+  double prior_share = 0.5;
+  struct Place {
+    double center = 0, sd = 0;  ///< in the parameter's SI unit, sd > 0
+  };
+  std::map<std::string, Place> places{};
+};
+
+/// Where a campaign comes from.
+struct Lineage {
+  std::string parent;   ///< id of the campaign it was derived from
+  std::string purpose;  ///< screen, nuisance, warm_fit, extension
+};
 
 struct EarlyStopping {
   double discard_at_most = 1e-3;
@@ -104,13 +135,27 @@ struct Campaign {
   std::vector<Experiment> experiments;
   Method method = Method::kIterativeBayesianFilter;
   int samples = 100;
+  /// tmcmc: tempering stages; surrogate_msrs: its evaluations are at most this times `samples`.
   int max_iterations = 4;
+  std::optional<Table> table;  ///< with kTable
+  std::optional<FirstProposal> first_proposal;
+  std::optional<Lineage> lineage;
   inference::FilterOptions filter;
+  inference::TmcmcOptions tmcmc;  ///< steps and target_cv; the rest is set where it is used
   std::optional<EarlyStopping> early_stopping;
   Failure failure;
   Budget budget;
   std::uint64_t seed = 0;
 };
+
+/// Points of surrogate_msrs chosen together, whatever the number of workers.
+inline constexpr int kSurrogateBatch = 8;
+
+/// Samples that the campaign draws at once after the first `samples` of them.
+int LaterBatch(const Campaign& campaign);
+/// The most batches it can come to: iterations of a filter, Metropolis steps of tmcmc and its prior
+/// draws, rounds of surrogate_msrs.
+int MostBatches(const Campaign& campaign);
 
 /// Path length of the control at each reading: the distance in the correlation of errors. Readings
 /// closer than 1 % of the correlation length count as that far apart, because errors of two
@@ -123,6 +168,12 @@ inference::DataSet MakeDataSet(const Campaign& campaign);
 
 /// The priors of the calibrated parameters in order.
 std::vector<inference::Prior> Priors(const Campaign& campaign);
+
+/// The sample number that decides on specimen and seed: its own, or the one a table's row names.
+int StreamOf(const Campaign& campaign, int sample);
+
+/// What first_proposal says, in the coordinates of the priors; the prior alone without it.
+inference::Proposal FirstProposalOf(const Campaign& campaign);
 
 /// The scenario of one evaluation. values: SI, in the order of campaign.parameters. With a recipe
 /// the packing is left empty for the worker to generate.

@@ -104,8 +104,15 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     ReadModel(map, campaign);
     ReadInference(map, campaign);
     ReadParameters(map, campaign);
+    CheckSamples(map, campaign);
+    ReadStart(map, campaign);
     ReadExperiments(map, context, campaign);
-    if (campaign.precomputed) ReadPrecomputed(map, context, campaign);
+    if (campaign.precomputed) {
+      ReadPrecomputed(map, context, campaign);
+      if (campaign.table || campaign.first_proposal) {
+        map.Problem("inference", "runs that exist already can neither be a table nor be proposed");
+      }
+    }
     map.Finish();
     if (problems.size() == 0 && !campaign.precomputed) AskEngine(map, campaign);
   }

@@ -1,10 +1,13 @@
 #pragma once
-// The digest by which a campaign is recognised when it is submitted again.
+// Digests by which a campaign is recognised when it is submitted again, and its data in another
+// campaign.
 
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
+
+#include "server/campaign/campaign.h"
 
 namespace calib::campaign {
 
@@ -18,5 +21,10 @@ struct Submission {
 
 /// SHA-256 (hex) over all of it; equal exactly when two submissions are equal.
 std::string IdentityDigest(const Submission& submission);
+
+/// SHA-256 (hex) of the readings that a campaign is fitted to: names of control and observables and
+/// their values, whatever the order of experiments and observables. Not of their errors, which are
+/// part of a model of the data, nor of names of experiments and held-out ones.
+std::string DataDigest(const Campaign& campaign);
 
 }  // namespace calib::campaign

@@ -1,5 +1,7 @@
 #include "server/campaign/read_inference.h"
 
+#include <array>
+
 #include "absl/strings/str_cat.h"
 #include "server/campaign/suggestion.h"
 
@@ -27,16 +29,44 @@ void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
   if (mode == "ess_target") filter.noise = NoiseMode::kEssTarget;
 }
 
+constexpr std::array kMethods = {Method::kSqmc, Method::kIterativeBayesianFilter, Method::kTmcmc,
+                                 Method::kSurrogateMsrs, Method::kTable};
+constexpr int kMostStages = 100;  // of tmcmc, unless max_iterations says otherwise
+
 void ReadMethod(MapReader& map, Campaign& campaign) {
-  const std::vector<std::string> have = {"sqmc", "iterative_bayesian_filter"};
-  const auto method = map.Text("method");
-  if (method == "tmcmc" || method == "surrogate_msrs") {
-    map.Problem("method",
-                absl::StrCat(*method, " is not available in this build, which has ", Listed(have)));
-  } else if (method) {
-    map.Choice("method", have);
+  std::vector<std::string> names;
+  for (const Method method : kMethods) names.emplace_back(ToString(method));
+  const auto chosen = map.Choice("method", names);
+  for (const Method method : kMethods) {
+    if (chosen == ToString(method)) campaign.method = method;
   }
-  campaign.method = method == "sqmc" ? Method::kSqmc : Method::kIterativeBayesianFilter;
+  if (campaign.method == Method::kTmcmc) campaign.max_iterations = kMostStages;
+  if (IsFilter(campaign.method) || campaign.method == Method::kTable) return;
+  if (campaign.precomputed) {
+    map.Problem("method", absl::StrCat(*chosen,
+                                       " chooses its own samples, and runs that exist "
+                                       "already are what they are; use sqmc"));
+  } else if (campaign.filter.noise == NoiseMode::kEssTarget) {
+    map.Problem("method", absl::StrCat(*chosen,
+                                       " needs the errors of the readings; use noise: "
+                                       "given or noise: inferred with it"));
+  }
+}
+
+void ReadDesign(MapReader& map, inference::FilterOptions& filter) {
+  using inference::Design;
+  const auto design =
+      map.Choice("design", {"halton", "sobol", "latin_hypercube", "symmetric_latin_hypercube"});
+  if (design == "sobol") filter.design = Design::kSobol;
+  if (design == "latin_hypercube") filter.design = Design::kLatinHypercube;
+  if (design == "symmetric_latin_hypercube") filter.design = Design::kSymmetricLatinHypercube;
+}
+
+void ReadTmcmcOptions(MapReader& map, inference::TmcmcOptions& tmcmc) {
+  constexpr int kMostSteps = 1000;
+  tmcmc.steps = static_cast<int>(map.Integer("steps", 1, kMostSteps).value_or(tmcmc.steps));
+  tmcmc.target_cv = map.Quantity("target_cv", "1", {.min = 0, .max = 2, .min_open = true})
+                        .value_or(tmcmc.target_cv);
 }
 
 void ReadFilterOptions(MapReader& map, Campaign& campaign) {
@@ -49,9 +79,7 @@ void ReadFilterOptions(MapReader& map, Campaign& campaign) {
       static_cast<int>(map.Integer("max_components", 1, 1000).value_or(filter.max_components));
   filter.concentration =
       map.Quantity("concentration", "1", kPositive).value_or(filter.concentration);
-  if (map.Choice("design", {"halton", "sobol"}).value_or("halton") == "sobol") {
-    filter.design = inference::Design::kSobol;
-  }
+  ReadDesign(map, filter);
   if (campaign.filter.noise != NoiseMode::kEssTarget) {
     filter.ess_target = map.Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
   } else if (map.Has("ess_target")) {
@@ -63,14 +91,18 @@ void ReadFilterOptions(MapReader& map, Campaign& campaign) {
 void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
   constexpr std::int64_t kMostSamples = 1'000'000;
   constexpr std::int64_t kMostIterations = 1000;
+  constexpr int kFewestChains = 20;
   auto map = campaign_map.Map("inference");
   if (map) {
     ReadMethod(*map, campaign);
+    const int fewest = campaign.method == Method::kTmcmc ? kFewestChains : 2;
     campaign.samples =
-        static_cast<int>(map->Integer("samples", 2, kMostSamples).value_or(campaign.samples));
+        static_cast<int>(map->Integer("samples", fewest, kMostSamples).value_or(campaign.samples));
     campaign.max_iterations = static_cast<int>(
         map->Integer("max_iterations", 1, kMostIterations).value_or(campaign.max_iterations));
-    ReadFilterOptions(*map, campaign);
+    if (IsFilter(campaign.method)) ReadFilterOptions(*map, campaign);
+    if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
+    map->Ignore({"rows", "first_proposal"});  // read once the parameters are known
     if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&
         campaign.max_iterations != 1) {
       map->Problem(
@@ -79,7 +111,8 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
     }
     map->Finish();
   }
-  if (campaign.method == Method::kSqmc) campaign.max_iterations = 1;
+  if (campaign.method == Method::kSqmc || campaign.method == Method::kTable)
+    campaign.max_iterations = 1;
 }
 
 void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
@@ -97,8 +130,9 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
       map->Quantity("discard_at_most", "1", kFraction).value_or(stopping.discard_at_most);
   map->Finish();
   // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing
-  // to stop.
-  if (campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed) {
+  // to stop; the surrogate would take a bound for a value.
+  if (campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed &&
+      campaign.method != Method::kSurrogateMsrs) {
     campaign.early_stopping = stopping;
   }
 }
@@ -123,7 +157,92 @@ void ReadBudget(MapReader& campaign_map, Campaign& campaign) {
   map->Finish();
 }
 
+// One row of the table: a value for every parameter, and the sample it is to be like.
+void ReadRow(const YamlNode& node, const std::string& path, Eigen::Index row, Campaign& campaign,
+             ProblemList& problems) {
+  MapReader map(node, path, problems);
+  constexpr std::int64_t kMostSamples = 1'000'000;
+  campaign.table->like.push_back(
+      static_cast<int>(map.Integer("like", 0, kMostSamples).value_or(row)));
+  for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
+    const CalibratedParameter& parameter = campaign.parameters[j];
+    const auto value = map.Require(parameter.name, "every row gives every parameter") != nullptr
+                           ? map.Quantity(parameter.name, parameter.unit, {})
+                           : std::nullopt;
+    campaign.table->parameters(row, static_cast<Eigen::Index>(j)) = value.value_or(0);
+  }
+  map.Finish();
+}
+
+void ReadTable(MapReader& map, Campaign& campaign) {
+  if (campaign.method != Method::kTable) {
+    if (map.Has("rows")) map.Problem("rows", "belongs to method: table");
+    return;
+  }
+  const YamlNode* rows = map.Require("rows", "the parameter values to run, a list of maps");
+  if (rows == nullptr) return;
+  if (rows->kind != YamlNode::Kind::kSequence || rows->items.empty()) {
+    map.Problem("rows", "has to be a list of maps, one per run");
+    return;
+  }
+  campaign.samples = static_cast<int>(rows->items.size());
+  campaign.table.emplace();
+  campaign.table->parameters.setZero(static_cast<Eigen::Index>(rows->items.size()),
+                                     static_cast<Eigen::Index>(campaign.parameters.size()));
+  for (std::size_t i = 0; i < rows->items.size(); ++i) {
+    ReadRow(rows->items[i], absl::StrCat(map.PathOf("rows"), "[", i, "]"),
+            static_cast<Eigen::Index>(i), campaign, map.problems());
+  }
+}
+
+void ReadFirstProposal(MapReader& inference_map, Campaign& campaign) {
+  if (!inference_map.Has("first_proposal")) return;
+  auto map = inference_map.Map("first_proposal");
+  if (!map) return;
+  FirstProposal proposal;
+  proposal.prior_share =
+      map->Quantity("prior_share", "1", {.min = 0, .max = 1}).value_or(proposal.prior_share);
+  for (const CalibratedParameter& parameter : campaign.parameters) {
+    if (!map->Has(parameter.name)) continue;
+    auto place = map->Map(parameter.name);
+    if (!place) continue;
+    place->Require("center", "where samples of this parameter are drawn");
+    place->Require("sd", "how widely samples of this parameter are drawn");
+    const auto center = place->Quantity("center", parameter.unit, {});
+    const auto sd = place->Quantity("sd", parameter.unit, kPositive);
+    place->Finish();
+    if (!center || !sd) continue;
+    if (!parameter.prior.InSupport(*center)) {
+      place->Problem("center", "lies outside the prior of the parameter");
+      continue;
+    }
+    proposal.places[parameter.name] = {.center = *center, .sd = *sd};
+  }
+  map->Finish();
+  campaign.first_proposal = std::move(proposal);
+}
+
+void ReadLineage(MapReader& campaign_map, Campaign& campaign) {
+  auto map = campaign_map.Map("lineage");
+  if (!map) return;
+  Lineage lineage;
+  lineage.parent =
+      map->RequiredText("parent", "id of the campaign this one comes from").value_or("");
+  lineage.purpose = map->RequiredText("purpose", "why it was derived").value_or("");
+  map->Finish();
+  campaign.lineage = std::move(lineage);
+}
+
 }  // namespace
+
+void ReadStart(MapReader& campaign_map, Campaign& campaign) {
+  ReadLineage(campaign_map, campaign);
+  if (!campaign_map.Has("inference")) return;
+  auto map = campaign_map.Map("inference");
+  if (!map) return;
+  ReadTable(*map, campaign);
+  ReadFirstProposal(*map, campaign);
+}
 
 void ReadInference(MapReader& campaign_map, Campaign& campaign) {
   ReadNoiseMode(campaign_map, campaign.filter);
@@ -133,6 +252,18 @@ void ReadInference(MapReader& campaign_map, Campaign& campaign) {
   ReadBudget(campaign_map, campaign);
   campaign.seed = campaign_map.Seed("seed").value_or(campaign.seed);
   campaign.filter.seed = campaign.seed;
+}
+
+void CheckSamples(MapReader& campaign_map, const Campaign& campaign) {
+  const std::size_t fewest = 2 * campaign.parameters.size() + 1;
+  if (campaign.method == Method::kSurrogateMsrs &&
+      static_cast<std::size_t>(campaign.samples) < fewest) {
+    campaign_map.Problem("inference", absl::StrCat("samples is ", campaign.samples,
+                                                   "; surrogate_msrs starts from "
+                                                   "at least ",
+                                                   fewest, " for ", campaign.parameters.size(),
+                                                   " parameters (two each and one)"));
+  }
 }
 
 }  // namespace calib::campaign

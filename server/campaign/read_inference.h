@@ -7,4 +7,10 @@ namespace calib::campaign {
 
 void ReadInference(MapReader& campaign_map, Campaign& campaign);
 
+/// What can be said only once the parameters are known.
+void CheckSamples(MapReader& campaign_map, const Campaign& campaign);
+/// What needs the parameters: rows of a table, the first proposal; and where the campaign comes
+/// from.
+void ReadStart(MapReader& campaign_map, Campaign& campaign);
+
 }  // namespace calib::campaign

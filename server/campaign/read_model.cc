@@ -241,8 +241,8 @@ void ReadParameters(MapReader& campaign_map, Campaign& campaign) {
   for (const std::string& name : parameters->Keys()) {
     if (std::find(seen.begin(), seen.end(), name) != seen.end()) {
       continue;  // Finish() reports doubles
-      seen.push_back(name);
     }
+    seen.push_back(name);
     ReadOne(*parameters, name, campaign);
   }
   parameters->Finish();

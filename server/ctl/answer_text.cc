@@ -112,6 +112,21 @@ std::string ComparisonText(const report::Comparison& comparison) {
   return text + "\n" + observables.ToString() + "\n" + segments.ToString();
 }
 
+std::string ModelsText(const report::ModelComparison& comparison) {
+  TextTable table({"<campaign", "<name", "log evidence", "± se", "ln Bayes factor", "± se",
+                   "probability", "5 %", "95 %"});
+  for (const report::ComparedModel& m : comparison.models) {
+    const inference::ModelProbability& p = m.probability;
+    table.AddRow({m.campaign, m.name, Number(m.log_evidence, 6), Number(m.log_evidence_se, 2),
+                  Number(p.log_bayes_factor, 4), Number(p.log_bayes_factor_se, 2),
+                  Number(p.probability, 3), Number(p.q05, 3), Number(p.q95, 3)});
+  }
+  std::string text = table.ToString();
+  text += "\nBayes factors are to the first; all models are equally probable before the data.\n";
+  for (const std::string& warning : comparison.warnings) text += Wrapped(warning, "! ", "  ");
+  return text;
+}
+
 std::string StatusText(const v1::CampaignStatus& s) {
   return fmt::format("{}  {}\n{}\n{} model evaluations so far, {} core hours, method {}.\n",
                      s.campaign(), s.name(), ProgressText(s), s.model_evaluations(),

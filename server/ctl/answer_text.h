@@ -6,6 +6,7 @@
 
 #include "calib/v1/campaign.pb.h"
 #include "server/report/comparison.h"
+#include "server/report/model_comparison.h"
 
 namespace calib::ctl {
 
@@ -14,6 +15,9 @@ std::string PosteriorText(const v1::Posterior& posterior, const std::vector<std:
 
 /// Overall misfit in a sentence, then per observable and per loading stage.
 std::string ComparisonText(const report::Comparison& comparison);
+
+/// Rival models with evidence, Bayes factor to the best and probability.
+std::string ModelsText(const report::ModelComparison& comparison);
 
 /// One campaign in a few lines.
 std::string StatusText(const v1::CampaignStatus& status);

@@ -19,11 +19,14 @@ struct Arguments {
   // Of some.
   std::string file;      ///< campaign file
   std::string campaign;  ///< id
+  std::vector<std::string> campaigns{};  ///< ids
   std::string worker;    ///< name
   int sample = 0;
   std::optional<int> iteration;
   std::optional<std::uint64_t> seed;
   std::vector<std::string> set;  ///< NAME=VALUE
+  std::vector<std::string> effects;  ///< to join the model
+  int max_effects = 3;
   std::string output;            ///< file or folder; empty: standard output
   std::string vtk;               ///< folder
 };

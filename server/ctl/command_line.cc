@@ -115,6 +115,21 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->check(CLI::NonNegativeNumber);
   b.AddOnCampaign("compare", &Compare,
                   "Model against measurements: where it fits and where it fails");
+  b.Add("models", &Models, "Which model do the data favour: evidence, Bayes factors, probabilities",
+        "models c1 c2 --state calib-state")
+      ->add_option("ID", b.arguments().campaigns, "campaigns on the same data, two or more")
+      ->required();
+  b.AddOnCampaign("diagnose", static_cast<int (*)(const Arguments&)>(&Diagnose),
+                  "Which physical effect is missing; runs what it needs, and goes on when killed");
+  b.AddOnCampaign("extend", &Extend,
+                  "A new campaign: this one joined by effects, started from its posterior")
+      ->add_option("--effect", b.arguments().effects, "name, as shown by `calibctl effects`")
+      ->required()
+      ->allow_extra_args(false);
+  b.AddOnCampaign("improve", &Improve,
+                  "Compare, diagnose, extend until the misfit is explained or nothing helps")
+      ->add_option("--max-effects", b.arguments().max_effects, "at most so many are added [3]")
+      ->check(CLI::Range(1, 10));
   b.AddOnCampaign("report", &Report, "One self-contained HTML file with plots")
       ->add_option("-o,--output", b.arguments().output, "HTML file")
       ->required();

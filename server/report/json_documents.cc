@@ -144,6 +144,23 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                {"note", c.note}});
 }
 
+std::string ModelsJson(const ModelComparison& comparison) {
+  Json models = Json::array();
+  for (const ComparedModel& m : comparison.models) {
+    models.push_back({{"campaign", m.campaign},
+                      {"name", m.name},
+                      {"log_evidence", m.log_evidence},
+                      {"log_evidence_se", m.log_evidence_se},
+                      {"probability", m.probability.probability},
+                      {"probability_q05", m.probability.q05},
+                      {"probability_q95", m.probability.q95},
+                      {"bayes_factor", std::exp(m.probability.log_bayes_factor)},
+                      {"log_bayes_factor", m.probability.log_bayes_factor},
+                      {"log_bayes_factor_se", m.probability.log_bayes_factor_se}});
+  }
+  return Dump({{"models", models}, {"warnings", comparison.warnings}});
+}
+
 std::string StatusJson(const v1::CampaignStatus& status) { return Dump(Status(status)); }
 
 std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses) {

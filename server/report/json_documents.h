@@ -7,11 +7,13 @@
 #include "server/campaign/campaign.h"
 #include "server/report/campaign_view.h"
 #include "server/report/comparison.h"
+#include "server/report/model_comparison.h"
 
 namespace calib::report {
 
 std::string PosteriorJson(const v1::Posterior& posterior);
 std::string ComparisonJson(const std::string& campaign, const Comparison& comparison);
+std::string ModelsJson(const ModelComparison& comparison);
 std::string StatusJson(const v1::CampaignStatus& status);
 std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses);
 /// parameters: names in the order of each sample's values.

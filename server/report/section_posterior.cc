@@ -20,7 +20,7 @@ struct ParameterPlot {
   bool log = false;
   double min = 0, max = 1;      // as shown
   std::vector<double> samples;  // as shown, the runs
-  std::vector<double> draws;    // as shown, of the posterior sampled on an emulator; else empty
+  std::vector<double> draws;    // as shown, equally weighted, of the posterior; else empty
   const inference::Prior* prior = nullptr;
 
   Axis MakeAxis(int ticks) const {
@@ -131,19 +131,21 @@ std::string PosteriorSection(const ReportData& data) {
   const std::vector<double> weights = Weights(data.view);
   const v1::Posterior& posterior = data.view.posterior;
   if (posterior.posterior_from() == "none") return "";
-  const bool emulated = posterior.draws_size() > 0;
+  const bool drawn = posterior.draws_size() > 0;
+  const bool emulated = posterior.posterior_from() == "emulator";
   std::string html = fmt::format(
       "<h2>Posterior</h2>\n<p class=\"sub\">Columns: {} over the prior's range."
       "<span class=\"key\" style=\"color:var(--prior)\"></span>prior.</p>\n<div class=\"grid\">\n",
       emulated ? "draws from the posterior, sampled on an emulator of the runs,"
+      : drawn  ? "draws from the posterior, one per chain,"
                : "weighted samples of all iterations");
   for (const ParameterPlot& parameter : parameters) html += Marginal(parameter, weights);
   html += "</div>\n";
   if (parameters.size() < 2) return html;
   html += fmt::format(
       "<h3>Pairs</h3>\n<p class=\"sub\">Every run as a faint dot; {}.</p>\n<div class=\"grid\">\n",
-      emulated ? "draws from the posterior in blue"
-               : "the area of a blue disc is its posterior weight");
+      drawn ? "draws from the posterior in blue"
+            : "the area of a blue disc is its posterior weight");
   const auto d = static_cast<int>(parameters.size());
   for (int i = 0; i < d; ++i) {
     for (int j = i + 1; j < d; ++j) {

@@ -17,7 +17,7 @@ std::string StateSentence(const CampaignView& view) {
   std::string text = fmt::format("Campaign {} is {}", status.campaign(), status.state());
   if (!status.reason().empty()) text += ": " + status.reason();
   return text + fmt::format(". {} of at most {} iterations, {} samples each, method {}.",
-                            view.posterior.iterations(), view.campaign.max_iterations,
+                            view.posterior.iterations(), view.status.max_iterations(),
                             view.campaign.samples, NameForPeople(status.method()));
 }
 

@@ -22,9 +22,9 @@ void ExplainEmulator(const Answer& answer, std::vector<std::string>& warnings) {
         answer.weighted.degeneracy, emulated.runs, emulated.cross_validated_error,
         emulated.scatter));
   } else {
-    warnings.push_back(absl::StrCat(answer.weighted.degeneracy, " ", kNothingGiven,
-                                    "Not even an emulator of the runs gives a posterior: ",
-                                    emulated.reason));
+    warnings.push_back(
+        absl::StrCat(answer.weighted.degeneracy, " ", kNothingGiven,
+                     "Not even an emulator of the runs gives a posterior: ", emulated.reason));
   }
 }
 
@@ -45,28 +45,33 @@ std::vector<inference::ParameterSummary> Answer::Parameters() const {
   return means;
 }
 
-absl::StatusOr<Answer> FindAnswer(const Definition& definition,
-                                  std::span<const inference::Iteration> iterations) {
+void AskEmulator(const Definition& definition, std::span<const inference::Iteration> iterations,
+                 Answer& answer) {
   const inference::FilterOptions& filter = definition.campaign.filter;
-  auto weighted =
-      inference::ComputePosterior(definition.priors, definition.data, filter, iterations);
-  if (!weighted.ok()) {
-    return weighted.status();
-  }
-  Answer answer{.weighted = *std::move(weighted), .emulated = std::nullopt, .warnings = {}};
-  answer.warnings = answer.weighted.warnings;
-  if (answer.FromWeights()) {
-    return answer;
-  }
   auto emulated = inference::EmulatedPosterior(
       definition.priors, definition.data, {.noise = filter.noise, .seed = filter.seed}, iterations);
   if (emulated.ok()) {
     answer.emulated = *std::move(emulated);
     ExplainEmulator(answer, answer.warnings);
   } else {
-    answer.warnings.push_back(absl::StrCat(answer.weighted.degeneracy, " ", kNothingGiven,
-                                           "An emulator of the runs is not possible: ",
-                                           std::string(emulated.status().message())));
+    answer.warnings.push_back(absl::StrCat(
+        answer.weighted.degeneracy, " ", kNothingGiven,
+        "An emulator of the runs is not possible: ", std::string(emulated.status().message())));
+  }
+}
+
+absl::StatusOr<Answer> FindAnswer(const Definition& definition,
+                                  std::span<const inference::Iteration> iterations) {
+  auto weighted = inference::ComputePosterior(definition.priors, definition.data,
+                                              definition.campaign.filter, iterations);
+  if (!weighted.ok()) {
+    return weighted.status();
+  }
+  Answer answer;
+  answer.weighted = *std::move(weighted);
+  answer.warnings = answer.weighted.warnings;
+  if (!answer.FromWeights()) {
+    AskEmulator(definition, iterations, answer);
   }
   return answer;
 }

@@ -1,6 +1,6 @@
 #pragma once
-// The posterior that a campaign reports: that of the weighted samples where those suffice, else one
-// sampled on an emulator of their states, else none.
+// The posterior that a campaign reports: that of the weighted samples (or chains) where those
+// suffice, else one sampled on an emulator of their states, else none.
 
 #include <optional>
 #include <span>
@@ -16,6 +16,8 @@ namespace calib::scheduler {
 
 struct Answer {
   inference::Posterior weighted;
+  const char* weights_source = "weights";  ///< what `weighted` comes from: weights or tmcmc
+  Eigen::MatrixXd draws;                   ///< equally weighted, of tmcmc; else empty
   /// Where the weights do not suffice and the states could be emulated, adequately or not.
   std::optional<inference::EmulatedResult> emulated;
   std::vector<std::string> warnings;  ///< whole sentences
@@ -29,8 +31,12 @@ struct Answer {
   std::vector<inference::ParameterSummary> Parameters() const;
 };
 
-/// Deterministic. Errors as inference::ComputePosterior; an emulator that cannot be had is no
-/// error but a warning.
+/// Adds to the answer what an emulator of the runs gives, and the warnings that go with it.
+void AskEmulator(const Definition& definition, std::span<const inference::Iteration> iterations,
+                 Answer& answer);
+
+/// Of the filters. Deterministic. Errors as inference::ComputePosterior; an emulator that cannot be
+/// had is no error but a warning.
 absl::StatusOr<Answer> FindAnswer(const Definition& definition,
                                   std::span<const inference::Iteration> iterations);
 

@@ -88,7 +88,8 @@ v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& 
 v1::AttemptSpec SpecOf(const campaign::Campaign& campaign, int experiment,
                        const std::vector<double>& values, int sample) {
   const campaign::Experiment& measured = campaign.experiments[static_cast<std::size_t>(experiment)];
-  const auto specimen = static_cast<std::size_t>(sample) % measured.specimens.size();
+  const auto specimen =
+      static_cast<std::size_t>(campaign::StreamOf(campaign, sample)) % measured.specimens.size();
   return ToSpec(campaign::MakeScenario(campaign, measured, values, sample),
                 measured.specimens[specimen], measured.name);
 }

@@ -26,15 +26,15 @@ double LogSumExp(const std::vector<double>& terms) {
 }
 
 struct Finished {
-  double exponent = 1;   // of the likelihood in all weights
-  double log_mass = 0;   // ln of the summed weight of the finished samples
+  double exponent = 1;  // of the likelihood in all weights
+  double log_mass = 0;  // ln of the summed weight of the finished samples
 };
 
 /// importance: of all samples, in order.
 absl::StatusOr<Finished> FinishedMass(const Definition& definition, const History& history,
                                       const Eigen::VectorXd& importance) {
-  const auto exponent = inference::GuidingExponent(
-      definition.priors, definition.data, definition.campaign.filter, history.iterations);
+  const auto exponent = inference::GuidingExponent(definition.priors, definition.data,
+                                                   definition.campaign.filter, history.iterations);
   if (absl::IsFailedPrecondition(exponent.status())) {  // no sample has weight
     return Finished{.exponent = 1, .log_mass = kNone};
   }
@@ -123,10 +123,9 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
     for (Eigen::Index i = 0; i < bound->size(); ++i, ++at) {
       const int sample = history.samples[at].sample;
       if (keys.count(sample) > 0) {
-        stopped.push_back(
-            {.bound = std::exp(importance(static_cast<Eigen::Index>(at)) +
-                               finished->exponent * (*bound)(i) - finished->log_mass),
-             .sample = sample});
+        stopped.push_back({.bound = std::exp(importance(static_cast<Eigen::Index>(at)) +
+                                             finished->exponent * (*bound)(i)-finished->log_mass),
+                           .sample = sample});
       }
     }
   }

@@ -69,12 +69,15 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     if (record.proposal == kHeldOutDraws) {
       break;  // the last
     }
-    auto proposal = ProposalFromJson(record.proposal);
-    if (!proposal.ok()) {
-      return proposal.status();
-    }
     inference::Iteration& iteration = history.iterations.emplace_back();
-    iteration.proposal = *std::move(proposal);
+    if (campaign::IsFilter(definition.campaign.method)) {
+      auto proposal = ProposalFromJson(record.proposal);
+      if (!proposal.ok()) {
+        return proposal.status();
+      }
+      iteration.proposal = *std::move(proposal);
+    }
+    history.proposals.push_back(std::move(record.proposal));
     if (definition.campaign.precomputed.has_value()) {
       iteration.log_proposal = definition.campaign.precomputed->log_proposal;
     }
@@ -99,6 +102,7 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
   const auto finished = WithStatus(*evaluations, store::EvaluationStatus::kFinished);
   const auto stopped = WithStatus(*evaluations, store::EvaluationStatus::kStoppedEarly);
   std::set<int> stopped_samples;
+  std::set<int> begun;  // of those: the others were rejected without a run
   for (const store::EvaluationKey& key : stopped) {
     stopped_samples.insert(key.sample);
   }
@@ -113,10 +117,11 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     }
     if (stopped_samples.count(state.key.sample) > 0) {
       PlaceState(definition, state, row, history.stopped[k]);
+      begun.insert(state.key.sample);
     }
   }
   history.stopped_keys = {stopped.begin(), stopped.end()};
-  history.stopped_early = static_cast<int>(stopped_samples.size());
+  history.stopped_early = static_cast<int>(begun.size());
   for (const inference::Iteration& iteration : history.iterations) {
     std::vector<char>& diverged = history.diverged.emplace_back();
     for (Eigen::Index i = 0; i < iteration.predictions.rows(); ++i) {

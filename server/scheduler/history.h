@@ -16,13 +16,14 @@ struct History {
   /// Predictions of samples that did not finish are NaN. Draws from the posterior, on which
   /// held-out experiments are run (HeldOutDraws), are not part of any of this.
   std::vector<inference::Iteration> iterations;
+  std::vector<std::string> proposals;  ///< JSON of each, as its method wrote it
   /// Rows of samples stopped early as far as they came, NaN beyond; other rows are NaN altogether.
   std::vector<Eigen::MatrixXd> stopped;
   std::vector<store::EvaluationKey> stopped_keys;  ///< evaluations stopped early
   std::vector<std::vector<char>> diverged;   ///< [iteration][position]: it has no finite prediction
   std::vector<store::SampleRecord> samples;  ///< of all iterations
   std::optional<std::string> last_posterior;  ///< JSON, of the last iteration that has one
-  int stopped_early = 0;
+  int stopped_early = 0;  ///< samples; those rejected without a run are not among them
   store::Effort effort;
 };
 

@@ -12,6 +12,7 @@
 #include "server/scheduler/attempt_spec.h"
 #include "server/scheduler/early_stopping.h"
 #include "server/scheduler/history.h"
+#include "server/scheduler/method.h"
 #include "server/scheduler/posterior_record.h"
 
 namespace calib::scheduler {
@@ -40,10 +41,12 @@ class Planner {
     plan_.converged = record_.progress.converged;
     absl::Status status;
     if (history_.iterations.empty()) {
-      status = Begin(0, inference::Proposal{});
+      status = Begin(campaign_.table.has_value() ? TableBatch() : MakeMethod(definition_)->First());
       if (campaign_.precomputed.has_value()) {
         plan_.event = CampaignEvent::kStart;
       }
+    } else if (campaign_.table.has_value()) {
+      Finish();  // its runs are all there is
     } else if (plan_.phase == "calibrating") {
       status = Conclude();
     } else {
@@ -71,70 +74,42 @@ class Planner {
 
   /// Posterior of the iteration that has just ended, then whatever follows from it.
   absl::Status Conclude() {
-    const auto loss = StatedLoss(definition_, history_);
-    if (!loss.ok()) {
-      return Fail(loss.status());
+    if (campaign::IsFilter(campaign_.method)) {
+      const auto loss = StatedLoss(definition_, history_);
+      if (!loss.ok()) {
+        return Fail(loss.status());
+      }
+      if (!loss->resume.empty()) {
+        plan_.resumed = loss->resume;
+        plan_.log.push_back(absl::StrCat(loss->resume.size(),
+                                         " evaluations stopped early are resumed: with the weights "
+                                         "as they are now they could matter"));
+        return absl::OkStatus();
+      }
+      stated_loss_ = loss->stated;
     }
-    if (!loss->resume.empty()) {
-      plan_.resumed = loss->resume;
-      plan_.log.push_back(absl::StrCat(loss->resume.size(),
-                                       " evaluations stopped early are resumed: with the weights "
-                                       "as they are now they could matter"));
-      return absl::OkStatus();
+    auto outcome = MakeMethod(definition_)->Conclude(history_, !BudgetSpent());
+    if (!outcome.ok()) {
+      return Fail(outcome.status());
     }
-    stated_loss_ = loss->stated;
-    const auto answer = FindAnswer(definition_, history_.iterations);
-    if (!answer.ok()) {
-      return Fail(answer.status());
+    plan_.converged = outcome->converged;
+    AddConclusion(*outcome);
+    if (!outcome->next.has_value()) {
+      if (!outcome->converged && BudgetSpent()) {
+        plan_.log.emplace_back("no further iteration: it would exceed the budget");
+      }
+      return Validate(outcome->answer);
     }
+    return Begin(*std::move(outcome->next));
+  }
+
+  void AddConclusion(const Outcome& outcome) {
+    const inference::Posterior& posterior = outcome.answer.weighted;
     const int iteration = static_cast<int>(history_.iterations.size()) - 1;
-    absl::StatusOr<bool> converged = IsConverged(*answer);
-    if (!converged.ok()) {
-      return converged.status();
-    }
-    plan_.converged = *converged;
-    AddConclusion(*answer, iteration);
-    const bool last = *converged || campaign_.method == campaign::Method::kSqmc ||
-                      campaign_.precomputed.has_value() ||
-                      iteration + 1 >= campaign_.max_iterations || BudgetSpent();
-    if (last) {
-      return Validate(*answer);
-    }
-    const auto proposal = inference::FitProposal(definition_.priors, definition_.data,
-                                                 campaign_.filter, history_.iterations);
-    if (!proposal.ok()) {
-      return Fail(proposal.status());
-    }
-    return Begin(iteration + 1, *proposal);
-  }
-
-  absl::StatusOr<bool> IsConverged(const Answer& answer) {
-    if (!answer.HasIntervals()) {
-      return false;
-    }
-    if (campaign_.method == campaign::Method::kSqmc || campaign_.precomputed.has_value()) {
-      return true;  // one iteration is all there is
-    }
-    if (!history_.last_posterior.has_value()) {
-      return false;
-    }
-    const auto before = PosteriorFromJson(*history_.last_posterior);
-    if (!before.ok()) {
-      return before.status();
-    }
-    if (before->posterior_from() == "none") {
-      return false;
-    }
-    inference::Posterior now;
-    now.parameters = answer.Parameters();
-    return inference::MeansConverged(MeansOf(*before), now, campaign_.filter);
-  }
-
-  void AddConclusion(const Answer& answer, int iteration) {
-    const inference::Posterior& posterior = answer.weighted;
     Conclusion conclusion{
         .iteration = iteration,
-        .posterior = ToMessage(definition_, answer, iteration, plan_.converged),
+        .posterior = ToMessage(definition_, outcome.answer, iteration, plan_.converged),
+        .samples = SampleNumbers(),
         .log_weights = {posterior.log_weights.begin(), posterior.log_weights.end()},
         .log_likelihoods = LogLikelihoods()};
     conclusion.posterior.set_campaign(absl::StrCat("c", record_.submitted.id));
@@ -145,11 +120,19 @@ class Planner {
         inference::ViewOnline(definition_.data, campaign_.filter,
                               history_.iterations.back().predictions, history_.diverged.back());
     conclusion.posterior.set_best_misfit(view.best_rms);
-    plan_.log.push_back(absl::StrCat("iteration ", iteration, " complete: ", posterior.ess,
-                                     " effective samples, posterior from ",
-                                     conclusion.posterior.posterior_from(), ", log evidence ",
-                                     conclusion.posterior.log_evidence()));
+    plan_.log.push_back(absl::StrCat(
+        "iteration ", iteration, " complete: ", outcome.log, outcome.log.empty() ? "" : ", ",
+        posterior.ess, " effective samples, posterior from ", conclusion.posterior.posterior_from(),
+        ", log evidence ", conclusion.posterior.log_evidence()));
     plan_.conclusion = std::move(conclusion);
+  }
+
+  std::vector<int> SampleNumbers() const {
+    std::vector<int> numbers;
+    for (const store::SampleRecord& sample : history_.samples) {
+      numbers.push_back(sample.sample);
+    }
+    return numbers;
   }
 
   std::vector<double> LogLikelihoods() {
@@ -165,56 +148,62 @@ class Planner {
   }
 
   /// True when the next iteration would exceed what the user allowed.
-  bool BudgetSpent() {
+  bool BudgetSpent() const {
     const campaign::Budget& budget = campaign_.budget;
-    const auto next = static_cast<std::int64_t>(campaign_.samples) *
+    const auto next = static_cast<std::int64_t>(campaign::LaterBatch(campaign_)) *
                       static_cast<std::int64_t>(definition_.ExperimentsOf(Role::kCalibrate).size());
-    const bool spent =
-        (budget.model_evaluations.has_value() &&
-         history_.effort.model_evaluations + next > *budget.model_evaluations) ||
-        (budget.core_hours.has_value() && history_.effort.core_seconds > *budget.core_hours * 3600);
-    if (spent) {
-      plan_.log.emplace_back("no further iteration: it would exceed the budget");
-    }
-    return spent;
+    return (budget.model_evaluations.has_value() &&
+            history_.effort.model_evaluations + next > *budget.model_evaluations) ||
+           (budget.core_hours.has_value() &&
+            history_.effort.core_seconds > *budget.core_hours * 3600);
   }
 
-  absl::Status Begin(int iteration, const inference::Proposal& proposal) {
-    Start start{.iteration = iteration, .proposal = ProposalToJson(proposal), .samples = {}};
-    Eigen::MatrixXd parameters;
-    if (campaign_.precomputed.has_value()) {
-      parameters = campaign_.precomputed->parameters;
-    } else {
-      auto drawn = inference::DrawSamples(proposal, definition_.priors, campaign_.filter, iteration,
-                                          campaign_.samples);
-      if (!drawn.ok()) {
-        return Fail(drawn.status());
-      }
-      parameters = *std::move(drawn);
+  /// The rows that a table campaign runs.
+  Batch TableBatch() const {
+    const Eigen::MatrixXd& rows = campaign_.table->parameters;
+    return {
+        .proposal = ProposalToJson({}),
+        .parameters = rows,
+        .stop_below = std::vector<double>(static_cast<std::size_t>(rows.rows()), store::kUnknown),
+        .refused = {}};
+  }
+
+  absl::Status Begin(const absl::StatusOr<Batch>& batch) {
+    if (!batch.ok()) {
+      return Fail(batch.status());
     }
-    const auto thresholds = StopThresholds(
-        definition_, history_,
-        {.proposal = proposal, .parameters = parameters, .predictions = {}, .log_proposal = {}});
-    if (!thresholds.ok()) {
-      return Fail(thresholds.status());
-    }
-    const int first = iteration * record_.submitted.samples;
-    for (Eigen::Index i = 0; i < parameters.rows(); ++i) {
-      const Eigen::VectorXd row = parameters.row(i);
-      start.samples.push_back({.sample = first + static_cast<int>(i),
-                               .iteration = iteration,
-                               .parameters = {row.begin(), row.end()},
-                               .stop_below = (*thresholds)[static_cast<std::size_t>(i)]});
-    }
-    for (const store::SampleRecord& sample : start.samples) {
-      if (absl::Status status = campaign_.precomputed.has_value()
-                                    ? TakeFromTables(sample)
-                                    : Ask(sample, definition_.ExperimentsOf(Role::kCalibrate));
-          !status.ok()) {
+    const auto iteration = static_cast<int>(history_.iterations.size());
+    Start start{.iteration = iteration, .proposal = batch->proposal, .samples = {}};
+    for (Eigen::Index i = 0; i < batch->parameters.rows(); ++i) {
+      const Eigen::VectorXd row = batch->parameters.row(i);
+      const auto position = static_cast<std::size_t>(i);
+      start.samples.push_back(
+          {.sample = iteration * record_.submitted.samples + static_cast<int>(i),
+           .iteration = iteration,
+           .parameters = {row.begin(), row.end()},
+           .stop_below = batch->stop_below[position]});
+      const bool refused = !batch->refused.empty() && batch->refused[position] != 0;
+      if (absl::Status status = AddEvaluations(start.samples.back(), refused); !status.ok()) {
         return status;
       }
     }
     plan_.start = std::move(start);
+    return absl::OkStatus();
+  }
+
+  absl::Status AddEvaluations(const store::SampleRecord& sample, bool refused) {
+    if (campaign_.precomputed.has_value()) {
+      return TakeFromTables(sample);
+    }
+    if (!refused) {
+      return Ask(sample, definition_.ExperimentsOf(Role::kCalibrate));
+    }
+    for (const int experiment : definition_.ExperimentsOf(Role::kCalibrate)) {
+      plan_.evaluations.push_back({.key = {record_.submitted.id, sample.sample, experiment},
+                                   .status = EvaluationStatus::kStoppedEarly,
+                                   .reason = "outside the prior: rejected without a run",
+                                   .reused = true});  // no effort of this campaign
+    }
     return absl::OkStatus();
   }
 
@@ -267,8 +256,28 @@ class Planner {
       return absl::OkStatus();
     }
     plan_.phase = "validating";
-    return answer.FromEmulator() ? ValidateDraws(answer.emulated->draws, experiments)
-                                 : ValidateSamples(experiments);
+    if (answer.FromEmulator()) {
+      return ValidateDraws(answer.emulated->draws, experiments);
+    }
+    return answer.draws.rows() > 0 ? ValidateEvenly(experiments) : ValidateSamples(experiments);
+  }
+
+  /// The runs on which evenly spaced shares of the weight fall.
+  absl::Status ValidateEvenly(const std::vector<int>& experiments) {
+    const std::vector<double>& log_weights = plan_.conclusion->log_weights;
+    double mass = 0;
+    double next = 0.5;
+    for (std::size_t i = 0; i < log_weights.size(); ++i) {
+      mass += std::exp(log_weights[i]) * static_cast<double>(kHeldOutRuns);
+      if (mass <= next) {
+        continue;
+      }
+      next = std::floor(mass - 0.5) + 1.5;
+      if (absl::Status status = Ask(history_.samples[i], experiments); !status.ok()) {
+        return status;
+      }
+    }
+    return absl::OkStatus();
   }
 
   /// Draws evenly spaced in the population, as samples of an iteration of their own.
@@ -302,8 +311,8 @@ class Planner {
     std::stable_sort(order.begin(), order.end(),
                      [&](std::size_t a, std::size_t b) { return log_weights[a] > log_weights[b]; });
     double mass = 0;
-    for (std::size_t i = 0;
-         i < std::min(order.size(), kHeldOutRuns) && mass < kValidatedMass; ++i) {
+    for (std::size_t i = 0; i < std::min(order.size(), kHeldOutRuns) && mass < kValidatedMass;
+         ++i) {
       mass += std::exp(log_weights[order[i]]);
       if (absl::Status status = Ask(history_.samples[order[i]], experiments); !status.ok()) {
         return status;
@@ -334,7 +343,7 @@ void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgres
     const Conclusion& conclusion = *plan.conclusion;
     transaction.SetPosterior(campaign, conclusion.iteration, PosteriorToJson(conclusion.posterior));
     for (std::size_t i = 0; i < conclusion.log_weights.size(); ++i) {
-      transaction.SetWeight(campaign, static_cast<int>(i), conclusion.log_weights[i],
+      transaction.SetWeight(campaign, conclusion.samples[i], conclusion.log_weights[i],
                             conclusion.log_likelihoods[i]);
     }
   }

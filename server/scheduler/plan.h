@@ -21,7 +21,8 @@ namespace calib::scheduler {
 struct Conclusion {
   int iteration = 0;
   v1::Posterior posterior;
-  std::vector<double> log_weights;      ///< of all samples of the campaign so far
+  std::vector<int> samples;             ///< of the campaign so far, by number
+  std::vector<double> log_weights;      ///< of each
   std::vector<double> log_likelihoods;  ///< likewise; NaN with ess_target
 };
 

@@ -67,7 +67,7 @@ void AddPath(const Definition& definition, const inference::PosteriorPath& path,
   }
 }
 
-// The draws of the emulated posterior, thinned evenly.
+// Thinned evenly.
 void AddDraws(const Eigen::MatrixXd& draws, v1::Posterior& message) {
   const Eigen::Index stride = std::max<Eigen::Index>(1, draws.rows() / kDraws);
   for (Eigen::Index i = 0; i < draws.rows(); i += stride) {
@@ -132,7 +132,9 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
   const inference::Posterior& posterior = answer.weighted;
   const bool emulated = answer.FromEmulator();
   v1::Posterior message;
-  message.set_posterior_from(emulated ? "emulator" : answer.FromWeights() ? "weights" : "none");
+  message.set_posterior_from(emulated               ? "emulator"
+                             : answer.FromWeights() ? answer.weights_source
+                                                    : "none");
   message.set_iteration(iteration);
   message.set_iterations(iteration + 1);
   message.set_converged(converged);
@@ -153,6 +155,7 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
       message.add_correlation(value);
     }
   }
+  AddDraws(answer.draws, message);
   if (answer.emulated.has_value()) {
     AddEmulator(definition, *answer.emulated, message);
   }

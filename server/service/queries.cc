@@ -1,5 +1,6 @@
 #include "server/service/queries.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <map>
@@ -237,9 +238,10 @@ absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, st
     if (!samples.ok()) {
       return samples.status();
     }
-    if (*sample < 0 || static_cast<std::size_t>(*sample) >= samples->size()) {
+    if (std::none_of(samples->begin(), samples->end(),
+                     [&](const auto& one) { return one.sample == *sample; })) {
       return absl::NotFoundError(absl::StrCat("campaign c", campaign, " has no sample ", *sample,
-                                              ", only 0 .. ", samples->size() - 1));
+                                              "; see samples for the numbers there are"));
     }
   }
   const campaign::Campaign& read = (*definition)->campaign;

@@ -10,7 +10,6 @@
 #include "server/scheduler/definition.h"
 
 namespace calib::service {
-
 absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmission(
     const v1::SubmitRequest& request, store::Reader& reader) {
   const std::map<std::string, std::string> files(request.files().begin(), request.files().end());
@@ -42,19 +41,15 @@ absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmissio
     return reply;
   }
   const campaign::Campaign& campaign = outcome.campaign;
-  store::NewCampaign accepted{
-      .name = campaign.name,
-      .yaml = request.campaign_file(),
-      .file_name = request.file_name(),
-      .seed = seed,
-      .method = campaign.method == campaign::Method::kSqmc ? "sqmc" : "iterative_bayesian_filter",
-      .samples = campaign.samples,
-      .max_iterations = campaign.max_iterations};
+  store::NewCampaign accepted{.name = campaign.name,
+                              .yaml = request.campaign_file(),
+                              .file_name = request.file_name(),
+                              .seed = seed,
+                              .method = campaign::ToString(campaign.method),
+                              .samples = campaign.samples,
+                              .max_iterations = campaign::MostBatches(campaign)};
   if (campaign.precomputed.has_value()) {
     accepted.samples = static_cast<int>(campaign.precomputed->parameters.rows());
-  }
-  if (campaign.precomputed.has_value() || campaign.method == campaign::Method::kSqmc) {
-    accepted.max_iterations = 1;
   }
   return accepted;
 }

@@ -71,15 +71,16 @@ parameters:
 experiments:
 {}{}noise: given
 inference:
-  method: iterative_bayesian_filter
+  method: {}
   samples: {}
   max_iterations: {}
-failure: {{attempts: {}, pause_above: 0.5}}
+{}failure: {{attempts: {}, pause_above: 0.5}}
 seed: 7
 {})",
       Experiment("tx", "0.1 MPa", options.relative_noise, false),
       options.with_validation ? Experiment("tx2", "0.2 MPa", options.relative_noise, true) : "",
-      options.samples, options.max_iterations, options.failure_attempts, options.extra);
+      options.method, options.samples, options.max_iterations, options.inference,
+      options.failure_attempts, options.extra);
   return campaign;
 }
 

@@ -19,6 +19,8 @@ struct SmallCampaignOptions {
   int failure_attempts = 5;
   double relative_noise = 0.1;
   bool with_validation = false;  ///< a second experiment at another pressure, held out
+  std::string method = "iterative_bayesian_filter";
+  std::string inference{};  ///< further lines under inference, each "  key: value\n"
   std::string extra{};           ///< further top-level YAML
 };
 

@@ -144,6 +144,10 @@ TEST_F(Calibctl, ACalibrationFromEndToEnd) {
     EXPECT_FALSE(answer.out.empty()) << verb;
   }
 
+  const Answer twice = Call("models " + id + " " + id + " --state s");
+  EXPECT_EQ(twice.code, 2);
+  EXPECT_THAT(twice.err, HasSubstr("is named twice"));
+
   EXPECT_EQ(Call("report " + id + " --state s -o r.html").code, 0);
   EXPECT_THAT(ReadAll(work_ / "r.html"), HasSubstr("<h2>Identified parameters</h2>"));
   EXPECT_EQ(Call("export " + id + " --state s -o all").code, 0);

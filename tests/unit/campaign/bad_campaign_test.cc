@@ -163,13 +163,27 @@ INSTANTIATE_TEST_SUITE_P(
                 "(excluded) and 0.6 (excluded)"},
         Mistake{"NoSuchNoiseMode", "noise: given", "noise: guessed",
                 "c.yaml:35: noise: 'guessed' is unknown; allowed: given, inferred, ess_target"},
-        Mistake{
-            "MethodOfALaterBuild", "method: iterative_bayesian_filter", "method: tmcmc",
-            "c.yaml:36: inference.method: tmcmc is not available in this build, which has sqmc, "
-            "iterative_bayesian_filter"},
+        Mistake{"FewChains", "method: iterative_bayesian_filter, samples: 20",
+                "method: tmcmc, samples: 10",
+                "c.yaml:36: inference.samples: '10' is not a whole number from 20 to 1000000"},
+        Mistake{"FewPointsToStartFrom", "method: iterative_bayesian_filter, samples: 20",
+                "method: surrogate_msrs, samples: 8",
+                "c.yaml:36: inference: samples is 8; surrogate_msrs starts from at least 9 for 4 "
+                "parameters (two each and one)"},
+        Mistake{"TemperedErrorsForChains",
+                "noise: given\ninference: {method: iterative_bayesian_filter",
+                "noise: ess_target\ninference: {method: tmcmc",
+                "c.yaml:22: experiments[1].observables.volumetric_strain: is zero in data.txt:3, "
+                "but ess_target scales errors with the reading; leave the row out or use noise: "
+                "given\n"
+                "c.yaml:36: inference.method: tmcmc needs the errors of the readings; use noise: "
+                "given or noise: inferred with it"},
+        Mistake{"NoSuchDesign", "samples: 20,", "samples: 20, design: lattice,",
+                "c.yaml:36: inference.design: 'lattice' is unknown; allowed: halton, sobol, "
+                "latin_hypercube, symmetric_latin_hypercube"},
         Mistake{"NoSuchMethod", "method: iterative_bayesian_filter", "method: iterative_filter",
                 "c.yaml:36: inference.method: 'iterative_filter' is unknown; allowed: sqmc, "
-                "iterative_bayesian_filter"},
+                "iterative_bayesian_filter, tmcmc, surrogate_msrs"},
         Mistake{"HalfASample", "samples: 20", "samples: 20.5",
                 "c.yaml:36: inference.samples: '20.5' is not a whole number from 2 to 1000000"},
         Mistake{"DiscardTooMuch", "discard_at_most: 1e-3", "discard_at_most: 2",

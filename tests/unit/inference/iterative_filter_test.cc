@@ -202,5 +202,32 @@ TEST(ViewOnline, BeforeAnythingHasArrived) {
   EXPECT_EQ(ViewOnline(Data(0.1), {}, predictions, std::vector<char>{1, 1}).ess, 0);
 }
 
+// Each column of a Latin hypercube has one point in each of n cells of equal prior probability; the
+// symmetric one holds the mirror image of every point.
+TEST(DrawSamples, LatinHypercubeDesignsStratifyThePrior) {
+  const std::vector<Prior> priors = {
+      {.kind = PriorKind::kUniform, .min = 2, .max = 4},
+      {.kind = PriorKind::kLogUniform, .min = 1, .max = std::exp(1.0)}};
+  for (const Design design : {Design::kLatinHypercube, Design::kSymmetricLatinHypercube}) {
+    const auto drawn = DrawSamples({}, priors, {.design = design, .seed = 3}, 0, 12);
+    ASSERT_TRUE(drawn.ok()) << drawn.status();
+    Eigen::MatrixXd unit(12, 2);
+    unit.col(0) = (drawn->col(0).array() - 2) / 2;
+    unit.col(1) = drawn->col(1).array().log();
+    for (Eigen::Index j = 0; j < 2; ++j) {
+      std::vector<int> count(12, 0);
+      for (const double u : unit.col(j)) ++count[static_cast<std::size_t>(u * 12)];
+      EXPECT_EQ(count, std::vector<int>(12, 1));
+    }
+    if (design != Design::kSymmetricLatinHypercube) continue;
+    for (Eigen::Index i = 0; i < 12; ++i) {
+      const Eigen::RowVectorXd mirror = 1 - unit.row(i).array();
+      EXPECT_LT((unit.rowwise() - mirror).rowwise().norm().minCoeff(), 1e-12);
+    }
+    EXPECT_EQ(*DrawSamples({}, priors, {.design = design, .seed = 3}, 0, 12), *drawn);
+    EXPECT_NE(*DrawSamples({}, priors, {.design = design, .seed = 4}, 0, 12), *drawn);
+  }
+}
+
 }  // namespace
 }  // namespace calib::inference

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "inference/evidence/importance_evidence.h"
+#include "inference/evidence/model_probabilities.h"
 #include "inference/evidence/pareto_tail.h"
 #include "inference/filter/log_weights.h"
 #include "inference/filter/tempering.h"
@@ -151,6 +152,33 @@ TEST(ParetoTail, EdgeCases) {
   Eigen::VectorXd one = Eigen::VectorXd::Constant(100, -INFINITY);
   one[3] = 0;
   EXPECT_EQ(ParetoTailIndex(one), INFINITY);
+}
+
+TEST(ModelProbabilities, ExactEvidenceGivesTheRatioOfEvidences) {
+  const std::vector<EvidenceEstimate> evidence = {{.log_evidence = -1000},
+                                                  {.log_evidence = -1000 + std::log(3.0)}};
+  const auto models = ModelProbabilities(evidence);
+  ASSERT_EQ(models.size(), 2U);
+  EXPECT_NEAR(models[0].probability, 0.25, 1e-12);
+  EXPECT_NEAR(models[1].probability, 0.75, 1e-12);
+  EXPECT_NEAR(models[0].q05, 0.25, 1e-12);
+  EXPECT_NEAR(models[0].log_bayes_factor, -std::log(3.0), 1e-12);
+  EXPECT_EQ(models[1].log_bayes_factor, 0);
+  EXPECT_EQ(models[1].log_bayes_factor_se, 0);
+}
+
+TEST(ModelProbabilities, ErrorsOfTheEvidenceWidenTheProbabilities) {
+  const std::vector<EvidenceEstimate> evidence = {
+      {.log_evidence = 0, .standard_error = 0.6}, {.log_evidence = 1, .standard_error = 0.8}};
+  const auto models = ModelProbabilities(evidence);
+  EXPECT_NEAR(models[0].probability + models[1].probability, 1, 1e-12);
+  EXPECT_NEAR(models[0].log_bayes_factor_se, 1, 1e-12);
+  // The difference of the evidences is normal, mean 1 and sd 1: quantiles 1 -+ 1.645 through the
+  // logistic function; 10 000 draws know them to about 0.01.
+  EXPECT_NEAR(models[1].q05, 1 / (1 + std::exp(0.645)), 0.02);
+  EXPECT_NEAR(models[1].q95, 1 / (1 + std::exp(-2.645)), 0.02);
+  EXPECT_LT(models[1].probability, 1 / (1 + std::exp(-1.0))) << "less sure than without errors";
+  EXPECT_GT(models[1].probability, 0.5);
 }
 
 }  // namespace

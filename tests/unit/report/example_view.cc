@@ -101,6 +101,7 @@ CampaignView ExampleView(const std::string& name) {
   view.campaign.model.parameters = {{"poisson_ratio", 0.2}};
   view.campaign.samples = 60;
   view.campaign.max_iterations = 4;
+  view.status.set_max_iterations(4);
   view.campaign.seed = 7;
   view.campaign.experiments = {MakeExperiment("tx02", campaign::Role::kCalibrate, 1, 1),
                                MakeExperiment("tx05", campaign::Role::kValidate, 0.97, 2)};

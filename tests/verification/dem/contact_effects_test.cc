@@ -353,6 +353,10 @@ TEST(Effects, AModerateStrengthRunsAndShows) {
           scenario.test = effect.excited_by.front();
         }
         const test::Run run = test::RunAll(scenario);
+        if (effect.name == "initial_density" && step < 0) {
+          EXPECT_EQ(run.summary.outcome, Outcome::kDiverged) << "nothing was lowered to begin with";
+          continue;
+        }
         ASSERT_EQ(run.summary.outcome, Outcome::kCompleted)
             << effect.name << " " << step << ": " << run.summary.reason;
         EXPECT_NE(run.states.back().values, plain.states.back().values) << effect.name;

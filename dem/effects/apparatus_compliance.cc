@@ -1,0 +1,36 @@
+#include "dem/effects/apparatus_compliance.h"
+
+namespace calib::dem {
+namespace {
+
+void Alter(const ParameterSet& parameters, Apparatus& apparatus) {
+  apparatus.compliance += parameters.Get("compliance");
+}
+
+}  // namespace
+
+EffectEntry ApparatusCompliance() {
+  ParameterInfo compliance;
+  compliance.name = "compliance";
+  compliance.unit = std::string("1/Pa");
+  compliance.max = 1;
+  compliance.default_prior = {.kind = "log_uniform", .min = 1e-11, .max = 1e-6};
+  compliance.null_value = 0;
+  compliance.scale = {.factor = 0.01, .pressure = -1};  // a strain of 1 % at a load of p
+  compliance.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 10};
+  compliance.description = "1/K, axial strain read per load on the frame";
+  return {.info = {.name = "apparatus_compliance",
+                   .kind = "measurement",
+                   .description = "Axial strain is read as eps + x/K and drives the test, x = q "
+                                  "(triaxial) or sigma_a - "
+                                  "sigma_a0 (oedometric); one-sided, vanishes at compliance 0",
+                   .contacts = {},
+                   .parameters = {compliance},
+                   .reference = "Jardine, Symes & Burland, Geotechnique 34 (1984) 323",
+                   .two_sided = false,
+                   .rays = {{.parameter = "compliance", .steps = {0.1, 0.5}}},
+                   .excited_by = {"triaxial_drained", "oedometric"}},
+          .alter = &Alter};
+}
+
+}  // namespace calib::dem

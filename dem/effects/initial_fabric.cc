@@ -1,0 +1,36 @@
+#include "dem/effects/initial_fabric.h"
+
+namespace calib::dem {
+namespace {
+
+void Prepare(const ParameterSet& parameters, Preparation& preparation) {
+  preparation.stress_anisotropy += parameters.Get("stress_anisotropy");
+}
+
+}  // namespace
+
+EffectEntry InitialFabric() {
+  ParameterInfo anisotropy;
+  anisotropy.name = "stress_anisotropy";
+  anisotropy.unit = std::string("1");
+  anisotropy.min = -1.2;
+  anisotropy.max = 1.5;
+  anisotropy.default_prior = {.kind = "uniform", .min = -0.5, .max = 0.8};
+  anisotropy.null_value = 0;
+  anisotropy.description = "q/p during consolidation";
+  return {.info = {.name = "initial_fabric",
+                   .kind = "initial_state",
+                   .description = "Consolidation at q/p = stress_anisotropy, then back to the "
+                                  "stress asked for; two-sided, "
+                                  "vanishes at stress_anisotropy 0",
+                   .contacts = {},
+                   .parameters = {anisotropy},
+                   .reference =
+                       "Oda, Soils Found. 12 (1972) 1; Yimsiri & Soga, Geotechnique 60 (2010) 699",
+                   .two_sided = true,
+                   .rays = {{.parameter = "stress_anisotropy", .steps = {0.2, 0.5}}},
+                   .excited_by = {}},
+          .prepare = &Prepare};
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,237 @@
+#include "inference/diagnosis/screen.h"
+
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/special_functions/gamma.hpp>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+#include "inference/sampling/philox.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+// The model in coordinates in which a measurement scatters as a standard normal.
+struct Whitened {
+  Eigen::LLT<Eigen::MatrixXd> factor;
+  Eigen::MatrixXd points;   // T x G
+  Eigen::VectorXd squares;  // G
+};
+
+absl::StatusOr<Whitened> Whiten(const FittedModel& model) {
+  const Index t = model.histories.cols();
+  if (model.histories.rows() < 1 || t < 1 || model.covariance.rows() != t ||
+      model.covariance.cols() != t || !model.histories.allFinite()) {
+    return absl::InvalidArgumentError("diagnosis: histories and covariance do not fit together");
+  }
+  Whitened whitened{.factor = Eigen::LLT<Eigen::MatrixXd>(model.covariance), .points = {}, .squares = {}};
+  if (whitened.factor.info() != Eigen::Success) {
+    return absl::InvalidArgumentError("diagnosis: the covariance is not positive definite");
+  }
+  whitened.points = whitened.factor.matrixL().solve(model.histories.transpose());
+  whitened.squares = whitened.points.colwise().squaredNorm();
+  return whitened;
+}
+
+// A difference seen from every point.
+struct Direction {
+  Eigen::VectorXd whitened;  // T
+  double square = 0;
+  Eigen::VectorXd along;  // G, points . whitened
+};
+
+double Amplitude(double slope, double square, bool two_sided, double limit) {
+  if (!(square > 0)) return 0;
+  return std::clamp(-slope / square, two_sided ? -limit : 0.0, limit);
+}
+
+struct Fit {
+  double chi2 = std::numeric_limits<double>::infinity();
+  double amplitude = 0;
+  int difference = 0;
+  Index point = 0;
+};
+
+// Smallest |point + u + a w|^2; `distances` holds |point + u|^2 for all points.
+Fit BestFit(const std::vector<Direction>& directions, const Eigen::VectorXd& distances,
+            const Eigen::VectorXd* offset, bool two_sided, double limit) {
+  Fit best;
+  for (std::size_t k = 0; k < directions.size(); ++k) {
+    const Direction& direction = directions[k];
+    const double shift = offset == nullptr ? 0 : direction.whitened.dot(*offset);
+    for (Index g = 0; g < distances.size(); ++g) {
+      const double slope = direction.along[g] + shift;
+      const double a = Amplitude(slope, direction.square, two_sided, limit);
+      const double chi2 = distances[g] + a * (2 * slope + a * direction.square);
+      if (chi2 < best.chi2) {
+        best = {.chi2 = chi2, .amplitude = a, .difference = static_cast<int>(k), .point = g};
+      }
+    }
+  }
+  return best;
+}
+
+// Holm's step-down adjustment of ascending p values.
+void Holm(std::vector<Score>& scores) {
+  double running = 0;
+  const std::size_t n = scores.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    running = std::max(running, std::min(1.0, static_cast<double>(n - i) * scores[i].p_value));
+    scores[i].adjusted = running;
+  }
+}
+
+// Chance of a fall at least as large: counted where the simulations reach, the tail of one degree
+// of freedom per difference beyond them.
+double TailOf(double gain, const std::vector<double>& simulated, std::size_t differences) {
+  const auto n = static_cast<double>(simulated.size());
+  const auto above = static_cast<double>(
+      std::count_if(simulated.begin(), simulated.end(), [&](double s) { return s >= gain; }));
+  constexpr double kEnough = 10;
+  if (above >= kEnough) return (1 + above) / (1 + n);
+  const double tail = static_cast<double>(differences) *
+                      boost::math::gamma_q(0.5, 0.5 * std::max(gain, 0.0));
+  return std::min((1 + above) / (1 + n), std::max(tail, std::numeric_limits<double>::min()));
+}
+
+}  // namespace
+
+absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
+  const auto whitened = Whiten(model);
+  if (!whitened.ok()) return whitened.status();
+  Adequacy adequacy;
+  adequacy.chi2 = whitened->squares.minCoeff(&adequacy.best);
+  adequacy.degrees = static_cast<double>(model.histories.cols() - model.parameters);
+  adequacy.p_value = adequacy.degrees > 0
+                         ? boost::math::gamma_q(0.5 * adequacy.degrees, 0.5 * adequacy.chi2)
+                         : 1;
+  return adequacy;
+}
+
+absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
+                                          const std::vector<Signature>& candidates,
+                                          const ScreenOptions& options) {
+  const auto whitened = Whiten(model);
+  if (!whitened.ok()) return whitened.status();
+  const auto adequacy = TestAdequacy(model);
+  const Index t = model.histories.cols();
+  std::vector<std::vector<Direction>> directions;
+  for (const Signature& candidate : candidates) {
+    std::vector<Direction>& own = directions.emplace_back();
+    for (const Eigen::VectorXd& difference : candidate.differences) {
+      if (difference.size() != t || !difference.allFinite()) {
+        return absl::InvalidArgumentError("diagnosis: a signature does not fit the histories");
+      }
+      Direction direction{.whitened = whitened->factor.matrixL().solve(difference), .square = 0, .along = {}};
+      direction.square = direction.whitened.squaredNorm();
+      direction.along = whitened->points.transpose() * direction.whitened;
+      own.push_back(std::move(direction));
+    }
+  }
+  // Measurements of the fitted model itself.
+  const Eigen::VectorXd fitted = whitened->points.col(adequacy->best);
+  std::vector<std::vector<double>> simulated(candidates.size());
+  Eigen::VectorXd offset(t);
+  for (int s = 0; s < options.simulations; ++s) {
+    PhiloxStream stream({.seed = options.seed,
+                         .purpose = StreamPurpose::kDiagnosisNull,
+                         .iteration = 0,
+                         .sample = static_cast<std::uint64_t>(s)});
+    for (Index k = 0; k < t; ++k) offset[k] = stream.Normal() - fitted[k];
+    const Eigen::VectorXd distances =
+        (whitened->squares + 2 * (whitened->points.transpose() * offset)).array() +
+        offset.squaredNorm();
+    const double base = distances.minCoeff();
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      simulated[c].push_back(base - BestFit(directions[c], distances, &offset,
+                                            candidates[c].two_sided, options.max_amplitude)
+                                        .chi2);
+    }
+  }
+  std::vector<Score> scores;
+  std::vector<Eigen::VectorXd> visible;  // what no choice of the parameters imitates
+  const double excess = std::max(adequacy->chi2 - adequacy->degrees, 1.0);
+  const boost::math::normal normal;
+  const double reach = boost::math::quantile(normal, 1 - options.level /
+                                                             static_cast<double>(std::max<std::size_t>(
+                                                                 1, candidates.size()))) +
+                       boost::math::quantile(normal, 0.9);
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    Score score{.name = candidates[c].name};
+    const Fit fit = BestFit(directions[c], whitened->squares, nullptr, candidates[c].two_sided,
+                            options.max_amplitude);
+    if (std::isfinite(fit.chi2)) {
+      score.gain = std::max(0.0, adequacy->chi2 - fit.chi2);
+      score.amplitude = fit.amplitude;
+      score.difference = fit.difference;
+      score.explained = std::clamp(score.gain / excess, 0.0, 1.0);
+      const Eigen::VectorXd left =
+          model.histories.row(fit.point).transpose() +
+          fit.amplitude * candidates[c].differences[static_cast<std::size_t>(fit.difference)];
+      score.rms = std::sqrt(left.squaredNorm() / static_cast<double>(t));
+    }
+    score.p_value = TailOf(score.gain, simulated[c], candidates[c].differences.size());
+    Eigen::VectorXd strongest = Eigen::VectorXd::Zero(t);
+    for (const Direction& direction : directions[c]) {
+      // The point that imitates the effect best, seen from the fitted one.
+      Index imitation = 0;
+      (whitened->squares - 2 * (whitened->points.transpose() * (fitted + direction.whitened)))
+          .minCoeff(&imitation);
+      const Eigen::VectorXd rest =
+          fitted + direction.whitened - whitened->points.col(imitation);
+      if (rest.squaredNorm() > strongest.squaredNorm()) strongest = rest;
+    }
+    const double norm = strongest.norm();
+    score.detectable = norm > 0 ? reach / norm : std::numeric_limits<double>::infinity();
+    visible.push_back(norm > 0 ? Eigen::VectorXd(strongest / norm) : strongest);
+    scores.push_back(std::move(score));
+  }
+  const double close = std::cos(25 * std::numbers::pi / 180);
+  for (std::size_t a = 0; a < scores.size(); ++a) {
+    for (std::size_t b = 0; b < scores.size(); ++b) {
+      const double cosine = visible[a].dot(visible[b]);
+      const bool either_sign = candidates[a].two_sided || candidates[b].two_sided;
+      if (a != b && (either_sign ? std::abs(cosine) : cosine) > close) {
+        scores[a].confusable_with.push_back(scores[b].name);
+      }
+    }
+  }
+  std::stable_sort(scores.begin(), scores.end(), [](const Score& a, const Score& b) {
+    return a.p_value != b.p_value ? a.p_value < b.p_value : a.gain > b.gain;
+  });
+  Holm(scores);
+  return scores;
+}
+
+absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, int block) {
+  std::vector<Eigen::VectorXd> terms;  // minus log density, reading given the earlier ones
+  for (const FittedModel* model : {&a, &b}) {
+    const auto whitened = Whiten(*model);
+    if (!whitened.ok()) return whitened.status();
+    Index best = 0;
+    whitened->squares.minCoeff(&best);
+    const Eigen::MatrixXd lower = whitened->factor.matrixL();
+    terms.emplace_back(0.5 * whitened->points.col(best).array().square() +
+                       lower.diagonal().array().log());
+  }
+  if (terms[0].size() != terms[1].size() || block < 1) {
+    return absl::InvalidArgumentError("diagnosis: the models describe different readings");
+  }
+  const Eigen::VectorXd difference = terms[1] - terms[0];
+  std::vector<double> sums;
+  for (Index k = 0; k < difference.size(); k += block) {
+    sums.push_back(difference.segment(k, std::min<Index>(block, difference.size() - k)).sum());
+  }
+  // Resampling n blocks with replacement: the standard deviation of the sum in closed form.
+  const auto n = static_cast<double>(sums.size());
+  const double mean = std::accumulate(sums.begin(), sums.end(), 0.0) / n;
+  double square = 0;
+  for (const double sum : sums) square += (sum - mean) * (sum - mean);
+  return Advantage{.nats = difference.sum(), .sd = std::sqrt(square)};
+}
+
+}  // namespace calib::inference

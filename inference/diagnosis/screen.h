@@ -1,0 +1,76 @@
+#pragma once
+// Is a fitted model adequate, and if not, the signature of which candidate explains the misfit?
+// Matrices in, statistics out. What a signature is and where runs come from: README.md.
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+namespace calib::inference {
+
+/// A model as a cloud of what it can do. Histories are (prediction - reading) / noise sd.
+struct FittedModel {
+  Eigen::MatrixXd histories;   ///< G x T, mean history at G points of its parameter space
+  Eigen::MatrixXd covariance;  ///< T x T, of a measurement about the true mean history: noise,
+                               ///< scatter, error of the emulator, numerical nuisance
+  int parameters = 0;
+};
+
+/// How an effect would change the histories.
+struct Signature {
+  std::string name{};                          ///< of the effect
+  std::vector<Eigen::VectorXd> differences{};  ///< T each: with minus without the effect, one per ray
+                                             ///< and strength tried
+  bool two_sided = false;
+};
+
+struct Adequacy {
+  double chi2 = 0;  ///< smallest |W history|^2 over the points, W W^T = covariance^-1
+  double degrees = 0;
+  double p_value = 1;
+  Eigen::Index best = 0;  ///< the point
+};
+
+/// One effect judged by its signature.
+struct Score {
+  std::string name{};
+  double gain = 0;       ///< fall of chi2 when the effect may join, all parameters refitted
+  double p_value = 1;    ///< of such a fall without the effect
+  double adjusted = 1;   ///< p_value by Holm over all candidates
+  double explained = 0;  ///< share of the excess chi2 - degrees that goes
+  double amplitude = 0;  ///< in units of the difference that fits best
+  int difference = 0;    ///< which one that is
+  double rms = 0;        ///< of the history left, in noise sd
+  /// Smallest amplitude of the strongest difference found with 90 % power at this test's level;
+  /// infinite when the parameters imitate the effect completely.
+  double detectable = 0;
+  std::vector<std::string> confusable_with{};  ///< signatures less than 25 degrees away
+};
+
+struct ScreenOptions {
+  int simulations = 500;      ///< of the null, [50, 1e5]
+  double max_amplitude = 4;   ///< of a difference, > 0
+  double level = 0.01;        ///< of the test, (0, 0.5)
+  std::uint64_t seed = 0;
+};
+
+/// Errors: INVALID_ARGUMENT for shapes that do not fit, a covariance that is not positive definite.
+absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model);
+
+/// Scores in the order of p_value, then of gain. Deterministic. Errors as above.
+absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
+                                          const std::vector<Signature>& candidates,
+                                          const ScreenOptions& options = {});
+
+/// How much better model `a` describes the readings than `b`, in nats of its best log density, and
+/// the standard deviation of that by resampling blocks of readings.
+struct Advantage {
+  double nats = 0;
+  double sd = 0;
+};
+absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, int block = 8);
+
+}  // namespace calib::inference

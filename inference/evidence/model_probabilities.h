@@ -1,0 +1,25 @@
+#pragma once
+// Bayesian comparison of models from estimates of their evidence on the same data.
+
+#include <span>
+#include <vector>
+
+#include "inference/evidence/importance_evidence.h"
+
+namespace calib::inference {
+
+struct ModelProbability {
+  /// Posterior probability of the model, all equally probable before: Z_k / sum_j Z_j, averaged
+  /// over what is not known of the evidence. Sums to one over the models.
+  double probability = 0;
+  double q05 = 0, q95 = 0;      ///< of it over the same errors
+  double log_bayes_factor = 0;  ///< ln Z_k - ln Z_best, 0 for the best (the first of equals)
+  /// sqrt(se_k^2 + se_best^2); 0 for the best.
+  double log_bayes_factor_se = 0;
+};
+
+/// Errors of ln Z are taken as independent and normal; averages and quantiles are over 10 000 fixed
+/// draws of them, so that equal input gives equal bits. in: finite values, standard errors >= 0
+std::vector<ModelProbability> ModelProbabilities(std::span<const EvidenceEstimate> evidence);
+
+}  // namespace calib::inference

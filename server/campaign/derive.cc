@@ -1,0 +1,109 @@
+#include "server/campaign/derive.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/campaign/quantity.h"
+#include "server/campaign/yaml_text.h"
+
+namespace calib::campaign {
+namespace {
+
+using Kind = YamlNode::Kind;
+
+void ChangeModel(const Derivation& derivation, YamlNode& root) {
+  YamlNode& model = YamlAt(root, "model");
+  if (!derivation.effects.empty()) {
+    std::vector<YamlNode> effects;
+    if (const YamlNode* given = YamlFind(model, "effects"); given != nullptr) {
+      if (given->kind == Kind::kSequence) effects = given->items;
+      if (given->kind == Kind::kScalar && given->scalar != "none") effects = {*given};
+    }
+    for (const std::string& effect : derivation.effects) effects.push_back(YamlScalar(effect));
+    YamlAt(model, "effects") = YamlList(std::move(effects));
+  }
+  YamlNode& parameters = YamlAt(root, "parameters");
+  for (const auto& [name, prior] : derivation.parameters) {
+    YamlAt(parameters, name) = YamlMap({{"prior", YamlScalar(prior.kind)},
+                                        {"min", YamlNumber(prior.min)},
+                                        {"max", YamlNumber(prior.max)}});
+  }
+  for (const auto& [name, value] : derivation.fixed) {
+    YamlErase(parameters, name);
+    YamlAt(YamlAt(model, "fixed"), name) = YamlNumber(value);
+  }
+}
+
+bool IsHeldOut(const YamlNode& experiment) {
+  const YamlNode* role = YamlFind(experiment, "role");
+  return role != nullptr && role->scalar == "validate";
+}
+
+void ChangeExperiments(const Derivation& derivation, YamlNode& root) {
+  YamlNode& experiments = YamlAt(root, "experiments");
+  if (!derivation.held_out) std::erase_if(experiments.items, IsHeldOut);
+  if (derivation.rate_factor == 1) return;
+  for (YamlNode& experiment : experiments.items) {
+    const YamlNode* staging = YamlFind(experiment, "staging");
+    const YamlNode* rate = staging != nullptr ? YamlFind(*staging, "rate") : nullptr;
+    if (rate == nullptr) continue;
+    const auto value = ParseQuantity(rate->scalar, "1/s");
+    if (!value.ok()) continue;
+    YamlAt(YamlAt(experiment, "staging"), "rate") = YamlNumber(*value * derivation.rate_factor);
+  }
+}
+
+YamlNode Rows(const Derivation& derivation) {
+  std::vector<YamlNode> rows;
+  for (const Derivation::Row& row : derivation.rows) {
+    YamlNode node = YamlMap({{"like", YamlScalar(absl::StrCat(row.like))}});
+    for (const auto& [name, value] : row.values) YamlAt(node, name) = YamlNumber(value);
+    rows.push_back(std::move(node));
+  }
+  return YamlList(std::move(rows));
+}
+
+void ChangeInference(const Derivation& derivation, YamlNode& root) {
+  if (!derivation.rows.empty()) {
+    YamlAt(root, "inference") =
+        YamlMap({{"method", YamlScalar("table")}, {"rows", Rows(derivation)}});
+    YamlErase(root, "early_stopping");
+    YamlErase(root, "budget");
+    return;
+  }
+  YamlNode& inference = YamlAt(root, "inference");
+  if (derivation.samples) {
+    YamlAt(inference, "samples") = YamlScalar(absl::StrCat(*derivation.samples));
+  }
+  if (derivation.max_iterations) {
+    YamlAt(inference, "max_iterations") = YamlScalar(absl::StrCat(*derivation.max_iterations));
+  }
+  if (!derivation.first_proposal) return;
+  YamlNode proposal =
+      YamlMap({{"prior_share", YamlNumber(derivation.first_proposal->prior_share)}});
+  for (const auto& [name, place] : derivation.first_proposal->places) {
+    YamlAt(proposal, name) =
+        YamlMap({{"center", YamlNumber(place.center)}, {"sd", YamlNumber(place.sd)}});
+  }
+  YamlAt(inference, "first_proposal") = std::move(proposal);
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> Derive(const std::string& parent_yaml, const Derivation& derivation) {
+  YamlParse parse = ParseYaml(parent_yaml);
+  if (parse.error || parse.root->kind != Kind::kMap) {
+    return absl::InvalidArgumentError("the campaign it is derived from is not a YAML map");
+  }
+  YamlNode& root = *parse.root;
+  YamlAt(root, "name") = YamlScalar(derivation.name);
+  YamlAt(root, "lineage") = YamlMap({{"parent", YamlScalar(derivation.lineage.parent)},
+                                     {"purpose", YamlScalar(derivation.lineage.purpose)}});
+  ChangeModel(derivation, root);
+  ChangeExperiments(derivation, root);
+  ChangeInference(derivation, root);
+  return ToYaml(root);
+}
+
+}  // namespace calib::campaign

@@ -1,0 +1,41 @@
+#pragma once
+// The text of a campaign that follows from another one: the same experiments, model and settings,
+// with what is said here changed. Pure: the same parent and changes give the same text, by which it
+// is recognised when it is asked for again.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "dem/catalog/catalog.h"
+#include "server/campaign/campaign.h"
+
+namespace calib::campaign {
+
+struct Derivation {
+  std::string name;
+  Lineage lineage;
+  std::vector<std::string> effects{};  ///< joined to the model, in addition to the parent's
+  /// Parameters that are calibrated in addition (dotted names), with their priors in SI.
+  std::map<std::string, dem::DefaultPrior> parameters{};
+  /// Held constant; replaces what the parent calibrates or fixes under the name.
+  std::map<std::string, double> fixed{};
+  bool held_out = true;  ///< false: experiments with role validate are left out
+  std::optional<int> samples{}, max_iterations{};
+  std::optional<FirstProposal> first_proposal{};
+  /// Makes it a table: parameter values by name, and whose specimen and seed they take.
+  struct Row {
+    int like = 0;
+    std::map<std::string, double> values{};
+  };
+  std::vector<Row> rows{};
+  double rate_factor = 1;  ///< multiplies staging.rate where the parent gives one
+};
+
+/// INVALID_ARGUMENT when the parent's text cannot be read; whether the result is a valid campaign
+/// is seen when it is read.
+absl::StatusOr<std::string> Derive(const std::string& parent_yaml, const Derivation& derivation);
+
+}  // namespace calib::campaign

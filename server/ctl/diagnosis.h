@@ -1,0 +1,57 @@
+#pragma once
+// Which physical effect is missing in a calibrated model: the chain of adequacy test, screen and
+// warm fits, each made of campaigns that are stored like any other.
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/diagnosis/screen.h"
+#include "server/ctl/laboratory.h"
+
+namespace calib::ctl {
+
+struct CandidateEffect {
+  std::string effect{};
+  double p_value = 1;             ///< of the screen, adjusted for the number of candidates
+  double explained_fraction = 0;  ///< of the misfit beyond noise and scatter
+  std::map<std::string, double> amplitude{};  ///< parameter -> strength that explains it best [SI]
+  double predicted_rms_error = 0;           ///< residual over noise sd with the effect
+  std::vector<std::string> confusable_with{};
+  // Of the warm fit, where there was one.
+  std::string campaign{};         ///< id
+  double refit_p_value = -1;    ///< adequacy of the extended model
+  double refit_chi2 = 0;
+  inference::Advantage over_base{};
+};
+
+struct Diagnosis {
+  std::string campaign{};
+  std::string verdict;  ///< adequate | missing_effect | ambiguous | unexplained
+  std::string effect;   ///< named, with missing_effect
+  std::vector<CandidateEffect> candidates;  ///< best first
+  std::vector<std::pair<std::string, std::string>> not_excitable;  ///< effect, why
+  std::map<std::string, std::map<std::string, double>> detectable;  ///< effect -> parameter -> SI
+  std::string best_partial;  ///< with unexplained: the effect that helps most, if any does
+  inference::Adequacy adequacy;
+  double rms = 0;  ///< of the best fit, residual over noise sd
+  double emulator_error = 0, scatter = 0;
+  std::int64_t screen_evaluations = 0, warm_evaluations = 0;
+};
+
+struct DiagnosisOptions {
+  double level = 0.01;         ///< of the adequacy test and of the screen
+  bool only_adequacy = false;  ///< no runs: says adequate or unexplained
+};
+
+/// Errors: FAILED_PRECONDITION with a sentence when nothing can be said (no posterior, noise not
+/// given independently, runs made elsewhere); those of the runs.
+absl::StatusOr<Diagnosis> Diagnose(Laboratory& laboratory, const report::CampaignView& view,
+                                   const DiagnosisOptions& options = {});
+
+std::string DiagnosisJson(const Diagnosis& diagnosis);
+std::string DiagnosisText(const Diagnosis& diagnosis);
+
+}  // namespace calib::ctl

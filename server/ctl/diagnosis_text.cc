@@ -1,0 +1,124 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "server/ctl/diagnosis.h"
+#include "server/ctl/text_table.h"
+#include "server/report/people_units.h"
+
+namespace calib::ctl {
+namespace {
+
+using Json = nlohmann::json;
+using report::Number;
+
+Json OrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+
+Json CandidateJson(const CandidateEffect& c) {
+  Json json = {{"effect", c.effect},
+               {"p_value", c.p_value},
+               {"explained_fraction", c.explained_fraction},
+               {"amplitude", c.amplitude},
+               {"predicted_rms_error", c.predicted_rms_error},
+               {"confusable_with", c.confusable_with}};
+  if (!c.campaign.empty()) {
+    json["warm_fit"] = {{"campaign", c.campaign},
+                        {"p_value", c.refit_p_value < 0 ? Json(nullptr) : Json(c.refit_p_value)},
+                        {"chi2", c.refit_chi2},
+                        {"advantage_nats", c.over_base.nats},
+                        {"advantage_sd", c.over_base.sd}};
+  }
+  return json;
+}
+
+std::string Strength(const std::map<std::string, double>& amplitude) {
+  std::string text;
+  for (const auto& [name, value] : amplitude) {
+    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name, Number(value, 3));
+  }
+  return text;
+}
+
+std::string Sentence(const Diagnosis& d) {
+  if (d.verdict == "adequate") {
+    return "Adequate: noise, scatter and the emulator's error explain what is left.";
+  }
+  if (d.verdict == "missing_effect") {
+    return fmt::format("Missing: {}. With it the model fits, and no other effect does as well.",
+                       d.effect);
+  }
+  if (d.verdict == "ambiguous") {
+    std::string names = d.candidates.front().effect;
+    for (const std::string& other : d.candidates.front().confusable_with) names += " or " + other;
+    return fmt::format("Ambiguous: {}; these tests do not tell them apart.", names);
+  }
+  return "Unexplained: the model misses the data, and with no known effect does it fit" +
+         (d.best_partial.empty() ? "."
+                                 : fmt::format("; {} helps most.", d.best_partial));
+}
+
+}  // namespace
+
+std::string DiagnosisJson(const Diagnosis& d) {
+  Json candidates = Json::array();
+  for (const CandidateEffect& c : d.candidates) candidates.push_back(CandidateJson(c));
+  Json not_excitable = Json::array();
+  for (const auto& [effect, reason] : d.not_excitable) {
+    not_excitable.push_back({{"effect", effect}, {"reason", reason}});
+  }
+  Json json = {{"campaign", d.campaign},
+               {"verdict", d.verdict},
+               {"effect", OrNull(d.effect)},
+               {"candidates", candidates},
+               {"not_excitable", not_excitable},
+               {"next_experiment", nullptr},
+               {"model_evaluations", d.screen_evaluations},
+               {"warm_fit_evaluations", d.warm_evaluations},
+               {"adequacy",
+                {{"chi2", d.adequacy.chi2},
+                 {"degrees", d.adequacy.degrees},
+                 {"p_value", d.adequacy.p_value},
+                 {"rms", d.rms},
+                 {"emulator_error", d.emulator_error},
+                 {"scatter", d.scatter}}}};
+  if (d.verdict == "adequate") json["detectable"] = d.detectable;
+  if (d.verdict == "unexplained") json["best_partial"] = OrNull(d.best_partial);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string DiagnosisText(const Diagnosis& d) {
+  std::string text = Sentence(d) + "\n";
+  text += fmt::format(
+      "Best fit: residual {} noise sd (rms); chi-squared {} for {} degrees of freedom with scatter "
+      "and emulator error (p = {}).\n",
+      Number(d.rms, 3), Number(d.adequacy.chi2, 4), Number(d.adequacy.degrees, 4),
+      Number(d.adequacy.p_value, 2));
+  if (!d.candidates.empty()) {
+    TextTable table({"<effect", "p (screen)", "explains", "rms with it", "refitted p",
+                     "<strength", "<like"});
+    for (const CandidateEffect& c : d.candidates) {
+      std::string like;
+      for (const std::string& name : c.confusable_with) like += (like.empty() ? "" : ", ") + name;
+      table.AddRow({c.effect, Number(c.p_value, 2), report::Percent(c.explained_fraction, 2),
+                    Number(c.predicted_rms_error, 3),
+                    c.refit_p_value < 0 ? "–" : Number(c.refit_p_value, 2), Strength(c.amplitude),
+                    like});
+    }
+    text += "\n" + table.ToString();
+  }
+  if (d.verdict == "adequate" && !d.detectable.empty()) {
+    text += "\nWould have been found with 90 % power from:\n";
+    for (const auto& [effect, strength] : d.detectable) {
+      text += fmt::format("  {}: {}\n", effect, Strength(strength));
+    }
+  }
+  for (const auto& [effect, reason] : d.not_excitable) {
+    text += fmt::format("Not tried: {} ({}).\n", effect, reason);
+  }
+  text += fmt::format("{} model evaluations for the screen, {} for warm fits.\n",
+                      d.screen_evaluations, d.warm_evaluations);
+  return text;
+}
+
+}  // namespace calib::ctl

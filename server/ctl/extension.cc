@@ -1,0 +1,147 @@
+#include "server/ctl/extension.h"
+
+#include <algorithm>
+#include <cmath>
+#include <variant>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "server/campaign/derive.h"
+#include "server/campaign/suggestion.h"
+
+namespace calib::ctl {
+namespace {
+
+constexpr double kTempered = 10;  // times the parent's standard deviation
+constexpr double kPriorShare = 0.5;
+
+double DiameterOf(const campaign::Experiment& experiment) {
+  for (const campaign::Specimen& specimen : experiment.specimens) {
+    if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
+      return 2 * recipe->mean_radius;
+    }
+    const auto& radius = std::get<campaign::PackingFile>(specimen).packing.radius;
+    double sum = 0;
+    for (const double r : radius) sum += r;
+    if (!radius.empty()) return 2 * sum / static_cast<double>(radius.size());
+  }
+  return 1e-3;
+}
+
+// What is calibrated of an effect: everything without a default or with a null, alternatives once.
+std::map<std::string, dem::DefaultPrior> ParametersOf(const dem::EffectInfo& effect,
+                                                      const std::string& contact,
+                                                      const dem::ReferenceState& state) {
+  std::map<std::string, dem::DefaultPrior> chosen;
+  std::vector<std::string> covered;
+  const auto on_ray = [&effect](const std::string& name) {
+    return std::any_of(effect.rays.begin(), effect.rays.end(),
+                       [&name](const dem::StrengthRay& ray) { return ray.parameter == name; });
+  };
+  for (const bool strengths : {true, false}) {
+    for (const dem::ParameterInfo& parameter : effect.parameters) {
+      if (on_ray(parameter.name) != strengths) continue;
+      if (!strengths && parameter.default_value) continue;
+      const std::string& other = parameter.alternative_to;
+      const bool said =
+          std::any_of(covered.begin(), covered.end(), [&](const std::string& name) {
+            const auto same = std::find_if(
+                effect.parameters.begin(), effect.parameters.end(),
+                [&name](const dem::ParameterInfo& p) { return p.name == name; });
+            return name == other || same->alternative_to == parameter.name;
+          });
+      if (said) continue;
+      covered.push_back(parameter.name);
+      chosen[absl::StrCat(effect.name, ".", parameter.name)] =
+          dem::PriorOf(parameter, contact, state);
+    }
+  }
+  return chosen;
+}
+
+}  // namespace
+
+dem::ReferenceState ReferenceOf(const report::CampaignView& view) {
+  dem::ReferenceState state{.pressure = 1e5, .diameter = 1e-3, .modulus = 1e9};
+  double sum = 0;
+  int count = 0;
+  for (const campaign::Experiment& experiment : view.campaign.experiments) {
+    if (experiment.role != campaign::Role::kCalibrate) continue;
+    state.diameter = DiameterOf(experiment);
+    for (const char* name : {"confining_pressure", "start_pressure", "pressure"}) {
+      const auto found = experiment.settings.find(name);
+      if (found == experiment.settings.end() || !(found->second > 0)) continue;
+      sum += std::log(found->second);
+      ++count;
+      break;
+    }
+  }
+  if (count > 0) state.pressure = std::exp(sum / count);
+  const auto fixed = view.campaign.model.parameters.find("young_modulus");
+  if (fixed != view.campaign.model.parameters.end()) state.modulus = fixed->second;
+  for (const auto& parameter : view.posterior.parameters()) {
+    if (parameter.name() == "young_modulus") state.modulus = parameter.mean();
+  }
+  return state;
+}
+
+std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& name) {
+  const dem::EffectInfo* effect = dem::FindEffect(name);
+  if (effect == nullptr) {
+    std::vector<std::string> names;
+    for (const dem::EffectInfo& info : dem::Effects()) names.push_back(info.name);
+    return absl::StrCat("there is no effect ", name, "; this build has ", absl::StrJoin(names, ", "));
+  }
+  if (campaign.precomputed) return "runs that were made elsewhere cannot be joined by an effect";
+  const auto& has = campaign.model.effects;
+  if (std::find(has.begin(), has.end(), name) != has.end()) {
+    return absl::StrCat(name, " is part of the model already");
+  }
+  if (!effect->contacts.empty() &&
+      std::find(effect->contacts.begin(), effect->contacts.end(), campaign.model.contact) ==
+          effect->contacts.end()) {
+    return absl::StrCat(name, " cannot join the contact ", campaign.model.contact, "; it works with ",
+                        absl::StrJoin(effect->contacts, ", "));
+  }
+  return "";
+}
+
+absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
+                                          const ExtensionPlan& plan) {
+  if (parent.posterior.posterior_from().empty() || parent.posterior.posterior_from() == "none") {
+    return absl::FailedPreconditionError(
+        absl::StrCat("campaign ", parent.status.campaign(),
+                     " has no posterior to start from (see `calibctl posterior ",
+                     parent.status.campaign(), "`)"));
+  }
+  const dem::ReferenceState state = ReferenceOf(parent);
+  campaign::Derivation derivation{
+      .name = absl::StrCat(parent.campaign.name, " + ", absl::StrJoin(plan.effects, " + ")),
+      .lineage = {.parent = parent.status.campaign(), .purpose = plan.purpose},
+      .effects = plan.effects,
+      .parameters = {},
+      .fixed = {},
+      .held_out = plan.held_out,
+      .samples = plan.samples,
+      .max_iterations = plan.iterations,
+      .first_proposal = campaign::FirstProposal{.prior_share = kPriorShare, .places = {}},
+      .rows = {}};
+  for (const std::string& name : plan.effects) {
+    if (const std::string why = WhyNotJoin(parent.campaign, name); !why.empty()) {
+      return absl::InvalidArgumentError(why);
+    }
+    derivation.parameters.merge(
+        ParametersOf(*dem::FindEffect(name), parent.campaign.model.contact, state));
+  }
+  for (int j = 0; j < parent.posterior.parameters_size(); ++j) {
+    const v1::Posterior::Parameter& parameter = parent.posterior.parameters(j);
+    const inference::Prior& prior =
+        parent.campaign.parameters[static_cast<std::size_t>(j)].prior;
+    if (!(parameter.sd() > 0) || !prior.InSupport(parameter.mean())) continue;
+    derivation.first_proposal->places[parameter.name()] = {.center = parameter.mean(),
+                                                           .sd = kTempered * parameter.sd()};
+  }
+  return campaign::Derive(parent.source.campaign_file(), derivation);
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,35 @@
+#pragma once
+// A campaign joined by effects: its text, warm-started from the posterior of the campaign without.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "dem/catalog/catalog.h"
+#include "server/report/campaign_view.h"
+
+namespace calib::ctl {
+
+/// Pressure, grain size and stiffness that make strengths of effects comparable.
+dem::ReferenceState ReferenceOf(const report::CampaignView& view);
+
+/// Why an effect cannot join the model of a campaign, in a sentence; empty: it can.
+std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& effect);
+
+struct ExtensionPlan {
+  std::vector<std::string> effects{};
+  std::string purpose{};            ///< extension | warm_fit
+  bool held_out = true;           ///< false: held-out experiments stay closed
+  std::optional<int> samples{};     ///< as the parent
+  std::optional<int> iterations{};  ///< as the parent
+};
+
+/// Half of the first samples from the prior, half about the parent's posterior ten times as wide:
+/// parameters that were bent to hide an effect lie far from where they belong.
+/// Errors: INVALID_ARGUMENT for effects that are unknown or cannot join; FAILED_PRECONDITION when
+/// the parent has no posterior.
+absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
+                                          const ExtensionPlan& plan);
+
+}  // namespace calib::ctl

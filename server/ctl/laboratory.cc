@@ -1,0 +1,107 @@
+#include "server/ctl/laboratory.h"
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/campaign/campaign_file.h"
+#include "server/campaign/identity.h"
+#include "server/ctl/interrupt.h"
+#include "server/ctl/load_view.h"
+#include "server/ctl/progress.h"
+
+namespace calib::ctl {
+namespace {
+
+constexpr std::chrono::milliseconds kPoll{100};
+
+bool IsOver(const std::string& state) {
+  return state == "finished" || state == "failed" || state == "cancelled";
+}
+
+}  // namespace
+
+absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& campaign) {
+  const auto status = session_.client().Show(campaign);
+  if (!status.ok()) return status.status();
+  if (status->state() != "finished") {
+    return absl::FailedPreconditionError(
+        absl::StrCat("campaign ", campaign, " is ", status->state(), ", not finished",
+                     status->reason().empty() ? "" : ": " + status->reason()));
+  }
+  return LoadView(session_.client(), campaign);
+}
+
+absl::Status Laboratory::Wait(const std::string& campaign, const std::string& what) {
+  std::cerr << what << ": campaign " << campaign << "\n";
+  ProgressLine line;
+  for (;;) {
+    const auto status = session_.client().Show(campaign);
+    if (!status.ok()) return status.status();
+    constexpr int kMilestones = 5;
+    line.Show(ProgressText(*status),
+              kMilestones * 2 * status->iteration() +
+                  kMilestones * status->samples_done() / std::max(1, status->samples()));
+    if (status->state() == "finished") return absl::OkStatus();
+    if (IsOver(status->state()) || status->state() == "paused") {
+      return absl::AbortedError(absl::StrCat("campaign ", campaign, " (", what, ") is ",
+                                             status->state(),
+                                             status->reason().empty() ? "" : ": ",
+                                             status->reason()));
+    }
+    if (Interrupted()) {
+      return absl::CancelledError(
+          "stopped; nothing is lost, the same command goes on from here");
+    }
+    if (auto alive = session_.CheckWorkers(); !alive.ok()) return alive;
+    std::this_thread::sleep_for(kPoll);
+  }
+}
+
+absl::StatusOr<report::CampaignView> Laboratory::Run(const report::CampaignView& parent,
+                                                     const std::string& yaml,
+                                                     const std::string& what) {
+  v1::SubmitRequest request;
+  request.set_campaign_file(yaml);
+  request.set_file_name(parent.source.file_name());
+  if (parent.source.has_seed()) request.set_seed(parent.source.seed());
+  *request.mutable_files() = parent.source.files();
+  campaign::Submission submission{.campaign_file = yaml,
+                                  .file_name = parent.source.file_name(),
+                                  .files = {},
+                                  .seed = std::nullopt};
+  if (parent.source.has_seed()) submission.seed = parent.source.seed();
+  submission.files.insert(parent.source.files().begin(), parent.source.files().end());
+  request.set_request_id(campaign::IdentityDigest(submission));
+  const auto reply = session_.client().Submit(request);
+  if (!reply.ok()) return reply.status();
+  if (!reply->problems().empty()) {
+    const v1::Problem& problem = reply->problems(0);
+    return absl::InvalidArgumentError(absl::StrCat(
+        what, " cannot be run: ",
+        campaign::ToString(
+            {problem.file(), problem.line(), problem.key(), problem.message()})));
+  }
+  const std::string& campaign = reply->campaign();
+  auto status = session_.client().Show(campaign);
+  if (!status.ok()) return status.status();
+  if (status->state() == "paused") {
+    status = session_.client().Resume(campaign);
+    if (!status.ok()) return status.status();
+  }
+  if (!IsOver(status->state())) {
+    if (!workers_started_ && !arguments_.workers && !arguments_.state.empty() &&
+        !session_.is_guest()) {
+      const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+      if (auto started = session_.StartWorkers(cores); !started.ok()) return started;
+    }
+    workers_started_ = true;
+  }
+  if (auto ended = Wait(campaign, what); !ended.ok()) return ended;
+  return LoadView(session_.client(), campaign);
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,38 @@
+#pragma once
+// Where a verb has further campaigns run: it hands over their text and waits. A campaign is
+// recognised by its text, so that a verb that is issued again finds what it has run already.
+
+#include <set>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "server/ctl/arguments.h"
+#include "server/ctl/session.h"
+#include "server/report/campaign_view.h"
+
+namespace calib::ctl {
+
+class Laboratory {
+ public:
+  /// The session must outlive it. Starts local workers when there is something to run and the state
+  /// folder is this process's own.
+  Laboratory(Session& session, const Arguments& arguments)
+      : session_(session), arguments_(arguments) {}
+
+  /// A finished campaign. FAILED_PRECONDITION with a sentence when it is not finished.
+  absl::StatusOr<report::CampaignView> Finished(const std::string& campaign);
+
+  /// Submits the text with the parent's files and waits for the end, progress on standard error.
+  /// ABORTED when the campaign failed or was cancelled, CANCELLED on Ctrl-C (nothing is lost).
+  absl::StatusOr<report::CampaignView> Run(const report::CampaignView& parent,
+                                           const std::string& yaml, const std::string& what);
+
+ private:
+  absl::Status Wait(const std::string& campaign, const std::string& what);
+
+  Session& session_;
+  const Arguments& arguments_;
+  bool workers_started_ = false;
+};
+
+}  // namespace calib::ctl

@@ -1,0 +1,252 @@
+#include "server/ctl/response.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
+#include "inference/emulator/training_set.h"
+#include "inference/filter/iterative_filter.h"
+#include "server/scheduler/definition.h"
+
+namespace calib::ctl {
+namespace {
+
+using Eigen::Index;
+
+constexpr int kSpread = 3000;   // points over the prior
+constexpr int kRefined = 1000;  // about the best of them, in each round
+constexpr int kRounds = 4;
+// Of an emulator to judge by, noise sd: its error beyond the scatter of single runs.
+constexpr double kMostUncovered = 2;
+constexpr double kMostUnknown = 3;  // noise sd of what the emulator may not know of a point
+
+Eigen::VectorXd NoiseOf(const inference::DataSet& data) {
+  Eigen::VectorXd sd(static_cast<Index>(data.readings.size()));
+  for (Index k = 0; k < sd.size(); ++k) sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+  return sd;
+}
+
+Eigen::MatrixXd Standard(const std::vector<inference::Prior>& priors,
+                         const Eigen::MatrixXd& values) {
+  Eigen::MatrixXd standard(values.rows(), values.cols());
+  for (Index j = 0; j < values.cols(); ++j) {
+    for (Index i = 0; i < values.rows(); ++i) {
+      standard(i, j) = priors[static_cast<std::size_t>(j)].ToStandard(values(i, j));
+    }
+  }
+  return standard;
+}
+
+// Correlated errors of the readings, one as variance.
+Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
+  const auto t = static_cast<Index>(data.readings.size());
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(t, t);
+  for (const inference::Correlation& c : data.correlations) {
+    for (Index i = 0; i < t; ++i) {
+      const inference::Reading& a = data.readings[static_cast<std::size_t>(i)];
+      if (a.experiment != c.experiment || a.observable != c.observable) continue;
+      for (Index j = 0; j < i; ++j) {
+        const inference::Reading& b = data.readings[static_cast<std::size_t>(j)];
+        if (b.experiment != c.experiment || b.observable != c.observable) continue;
+        correlation(i, j) = correlation(j, i) =
+            std::exp(-std::abs(a.control - b.control) / c.length);
+      }
+    }
+  }
+  return correlation;
+}
+
+}  // namespace
+
+RunTable RunsOf(const report::CampaignView& view) {
+  const auto definition = scheduler::MakeDefinition(view.campaign);
+  const auto t = static_cast<Index>(definition->data.readings.size());
+  const auto d = static_cast<Index>(view.campaign.parameters.size());
+  Eigen::RowVectorXd value(t);
+  for (Index k = 0; k < t; ++k) {
+    value[k] = definition->data.readings[static_cast<std::size_t>(k)].value;
+  }
+  const Eigen::RowVectorXd sd = NoiseOf(definition->data).transpose();
+  RunTable table;
+  std::vector<Eigen::RowVectorXd> parameters;
+  std::vector<Eigen::RowVectorXd> histories;
+  for (const v1::Sample& sample : view.samples) {
+    Eigen::RowVectorXd row =
+        Eigen::RowVectorXd::Constant(t, std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t e = 0; e < view.campaign.experiments.size(); ++e) {
+      const auto found = view.states.find({view.campaign.experiments[e].name, sample.index()});
+      if (found == view.states.end()) continue;
+      for (const v1::State& state : found->second.states) {
+        const std::vector<double> values(state.values().begin(), state.values().end());
+        definition->readings.Place(static_cast<int>(e), state.load_step(), values, row);
+      }
+    }
+    if (!row.allFinite() || sample.parameters_size() != d) continue;
+    table.sample.push_back(sample.index());
+    histories.emplace_back((row - value).cwiseQuotient(sd));
+    Eigen::RowVectorXd own(d);
+    for (Index j = 0; j < d; ++j) own[j] = sample.parameters(static_cast<int>(j));
+    parameters.push_back(own);
+  }
+  const auto n = static_cast<Index>(histories.size());
+  table.parameters.resize(n, d);
+  table.histories.resize(n, t);
+  for (Index i = 0; i < n; ++i) {
+    table.parameters.row(i) = parameters[static_cast<std::size_t>(i)];
+    table.histories.row(i) = histories[static_cast<std::size_t>(i)];
+  }
+  return table;
+}
+
+RunTable RunsWithoutEffect(const RunTable& without, const campaign::Campaign& parent,
+                           const campaign::Campaign& extended) {
+  const auto d = static_cast<Index>(extended.parameters.size());
+  std::vector<Index> from(static_cast<std::size_t>(d), -1);  // column of the parent
+  std::vector<std::pair<Index, double>> nulls;
+  for (Index j = 0; j < d; ++j) {
+    const campaign::CalibratedParameter& own = extended.parameters[static_cast<std::size_t>(j)];
+    for (std::size_t k = 0; k < parent.parameters.size(); ++k) {
+      if (parent.parameters[k].name == own.name) {
+        from[static_cast<std::size_t>(j)] = static_cast<Index>(k);
+      }
+    }
+    if (from[static_cast<std::size_t>(j)] >= 0) continue;
+    const dem::ParameterInfo* info =
+        dem::FindParameter(extended.model.contact, extended.model.effects, own.name);
+    const auto null = info == nullptr
+                          ? std::nullopt
+                          : dem::NullValueOf(*info, extended.model.contact);
+    // A prior over orders of magnitude ends where the effect no longer matters.
+    if (null) nulls.emplace_back(j, std::clamp(*null, own.prior.min, own.prior.max));
+  }
+  RunTable table;
+  if (nulls.empty()) return table;
+  const auto spread = inference::DrawSamples(inference::Proposal{}, campaign::Priors(extended),
+                                             extended.filter, 0,
+                                             static_cast<int>(without.parameters.rows()));
+  if (!spread.ok()) return table;
+  table.parameters = *spread;
+  table.histories = without.histories;
+  table.sample = without.sample;
+  for (Index i = 0; i < table.parameters.rows(); ++i) {
+    for (Index j = 0; j < d; ++j) {
+      const Index k = from[static_cast<std::size_t>(j)];
+      if (k >= 0) table.parameters(i, j) = without.parameters(i, k);
+    }
+    const auto& [j, null] = nulls[static_cast<std::size_t>(i) % nulls.size()];
+    table.parameters(i, j) = null;
+  }
+  return table;
+}
+
+absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
+                                   const std::vector<Eigen::VectorXd>& nuisance,
+                                   const RunTable& further) {
+  const campaign::Campaign& campaign = view.campaign;
+  const inference::DataSet data = campaign::MakeDataSet(campaign);
+  const std::vector<inference::Prior> priors = campaign::Priors(campaign);
+  RunTable table = RunsOf(view);
+  if (further.parameters.rows() > 0) {
+    const Index own = table.parameters.rows();
+    table.parameters.conservativeResize(own + further.parameters.rows(), further.parameters.cols());
+    table.histories.conservativeResize(own + further.parameters.rows(), further.histories.cols());
+    table.parameters.bottomRows(further.parameters.rows()) = further.parameters;
+    table.histories.bottomRows(further.parameters.rows()) = further.histories;
+  }
+  const auto trained = inference::TrainEmulator(
+      {.inputs = Standard(priors, table.parameters), .histories = table.histories}, data, {});
+  if (!trained.ok()) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the runs of ", view.status.campaign(), " cannot be emulated: ", trained.status().message()));
+  }
+  const inference::StateEmulator& emulator = trained->emulator;
+  const inference::PrincipalComponents& components = emulator.components();
+  const auto t = static_cast<Index>(data.readings.size());
+  const auto d = static_cast<Index>(priors.size());
+
+  Response response;
+  response.emulator_error = emulator.cross_validation().rms;
+  response.scatter = emulator.cross_validation().scatter_rms;
+  response.trustworthy =
+      std::sqrt(std::max(0.0, response.emulator_error * response.emulator_error -
+                                  response.scatter * response.scatter)) <= kMostUncovered;
+  response.model.parameters = static_cast<int>(d);
+  Eigen::MatrixXd points(0, d);
+  Eigen::MatrixXd histories(0, t);
+  Eigen::MatrixXd unknown(0, emulator.scatter_sd().size());
+  const auto add = [&](const Eigen::MatrixXd& values) {
+    const inference::ScorePrediction prediction = emulator.Predict(Standard(priors, values));
+    std::vector<Index> known;
+    for (Index i = 0; i < values.rows(); ++i) {
+      if (prediction.sd.row(i).squaredNorm() <= kMostUnknown * kMostUnknown * static_cast<double>(t)) {
+        known.push_back(i);
+      }
+    }
+    const Index before = points.rows();
+    const auto more = static_cast<Index>(known.size());
+    points.conservativeResize(before + more, d);
+    histories.conservativeResize(before + more, t);
+    unknown.conservativeResize(before + more, unknown.cols());
+    for (Index i = 0; i < more; ++i) {
+      const Index from = known[static_cast<std::size_t>(i)];
+      points.row(before + i) = values.row(from);
+      unknown.row(before + i) = prediction.sd.row(from);
+      histories.row(before + i) =
+          components.mean + prediction.mean.row(from) * components.basis.transpose();
+    }
+  };
+  const auto spread =
+      inference::DrawSamples(inference::Proposal{}, priors, campaign.filter, 0, kSpread);
+  if (!spread.ok()) return spread.status();
+  add(*spread);
+  add(table.parameters);
+  if (const int n = view.posterior.draws_size() / std::max<int>(1, static_cast<int>(d)); n > 0) {
+    Eigen::MatrixXd draws(n, d);
+    for (Index i = 0; i < n; ++i) {
+      for (Index j = 0; j < d; ++j) draws(i, j) = view.posterior.draws(static_cast<int>(i * d + j));
+    }
+    add(draws);
+  }
+  // Ever closer about the best point so far, so that the smallest misfit is met.
+  double width = 0.2;
+  for (int round = 0; round < kRounds && points.rows() > 0; ++round, width *= 0.4) {
+    Index best = 0;
+    histories.rowwise().squaredNorm().minCoeff(&best);
+    inference::Proposal proposal;
+    inference::MixtureComponent component{.weight = 1, .mean = {}, .covariance = {}};
+    component.mean = Standard(priors, points.row(best)).transpose();
+    component.covariance = width * width * Eigen::MatrixXd::Identity(d, d);
+    proposal.components.push_back(component);
+    proposal.log_acceptance = inference::LogMassInSupport(proposal.components, priors);
+    const auto refined =
+        inference::DrawSamples(proposal, priors, campaign.filter, 1000 + round, kRefined);
+    if (!refined.ok()) break;  // next to no mass inside the prior: the corner is the best point
+    add(*refined);
+  }
+  if (points.rows() == 0) {
+    return absl::FailedPreconditionError("the emulator knows no point of the prior well enough");
+  }
+  // What is not known of the mean history at the best point, and the scatter of a measurement.
+  Index best = 0;
+  histories.rowwise().squaredNorm().minCoeff(&best);
+  const Eigen::VectorXd sd =
+      (unknown.row(best).transpose().array().square() + emulator.scatter_sd().array().square())
+          .sqrt();
+  const Eigen::MatrixXd spread_basis = components.basis * sd.asDiagonal();
+  response.model.covariance = NoiseCorrelation(data);
+  response.model.covariance.diagonal() += components.remainder;
+  response.model.covariance +=
+      spread_basis * emulator.correlation() * spread_basis.transpose();
+  for (const Eigen::VectorXd& direction : nuisance) {
+    response.model.covariance += direction * direction.transpose();
+  }
+  response.model.histories = std::move(histories);
+  response.points = std::move(points);
+  return response;
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,23 @@
+#include <iostream>
+
+#include "server/ctl/diagnosis.h"
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/interrupt.h"
+#include "server/ctl/verbs.h"
+
+namespace calib::ctl {
+
+int Diagnose(const Arguments& arguments) {
+  CatchInterrupts();
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  Laboratory laboratory(**session, arguments);
+  const auto view = laboratory.Finished(arguments.campaign);
+  if (!view.ok()) return Fail(view.status());
+  const auto diagnosis = Diagnose(laboratory, *view);
+  if (!diagnosis.ok()) return Fail(diagnosis.status());
+  std::cout << (arguments.json ? DiagnosisJson(*diagnosis) : DiagnosisText(*diagnosis));
+  return kDone;
+}
+
+}  // namespace calib::ctl

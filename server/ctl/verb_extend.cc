@@ -1,0 +1,38 @@
+#include <iostream>
+
+#include "server/ctl/answer_text.h"
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/extension.h"
+#include "server/ctl/interrupt.h"
+#include "server/ctl/laboratory.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+#include "server/report/warnings.h"
+
+namespace calib::ctl {
+
+int Extend(const Arguments& arguments) {
+  CatchInterrupts();
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  Laboratory laboratory(**session, arguments);
+  const auto parent = laboratory.Finished(arguments.campaign);
+  if (!parent.ok()) return Fail(parent.status());
+  const auto text = ExtensionText(*parent, {.effects = arguments.effects,
+                                            .purpose = "extension",
+                                            .samples = std::nullopt,
+                                            .iterations = std::nullopt});
+  if (!text.ok()) return Fail(text.status());
+  const auto view = laboratory.Run(*parent, *text, "extension of " + arguments.campaign);
+  if (!view.ok()) return Fail(view.status());
+  if (arguments.json) {
+    std::cout << report::PosteriorJson(view->posterior);
+    return kDone;
+  }
+  std::cout << view->campaign.name << ": campaign " << view->status.campaign() << "\n\n"
+            << PosteriorText(view->posterior, report::Warnings(*view)) << "\n"
+            << ComparisonText(report::Compare(*view, report::PredictReadings(*view)));
+  return kDone;
+}
+
+}  // namespace calib::ctl

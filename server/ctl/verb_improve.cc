@@ -1,0 +1,164 @@
+// compare -> diagnose -> extend until the misfit is explained or nothing helps. Held-out data are
+// looked at for the first and the last model alone, after the verdict.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "server/campaign/sha256.h"
+#include "server/ctl/diagnosis.h"
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/extension.h"
+#include "server/ctl/interrupt.h"
+#include "server/ctl/text_table.h"
+#include "server/ctl/verbs.h"
+#include "server/report/comparison.h"
+#include "server/report/people_units.h"
+
+namespace calib::ctl {
+namespace {
+
+using Json = nlohmann::json;
+
+struct ImproveStep {
+  std::string campaign;
+  std::vector<std::string> effects;
+  double rms_error = 0;
+  std::optional<double> heldout_rms_error;
+  double log_evidence = 0;
+  std::string verdict;
+};
+
+// The effect to try next: named, or the best of a group, or what helps most.
+std::string NextEffect(const Diagnosis& diagnosis) {
+  if (!diagnosis.effect.empty()) return diagnosis.effect;
+  if (diagnosis.verdict == "ambiguous") return diagnosis.candidates.front().effect;
+  return diagnosis.best_partial;
+}
+
+Json ToJson(const std::vector<ImproveStep>& steps, const std::string& digest) {
+  Json list = Json::array();
+  for (const ImproveStep& step : steps) {
+    list.push_back({{"campaign", step.campaign},
+                    {"effects", step.effects},
+                    {"rms_error", step.rms_error},
+                    {"heldout_rms_error", step.heldout_rms_error ? Json(*step.heldout_rms_error)
+                                                                 : Json(nullptr)},
+                    {"log_evidence", step.log_evidence},
+                    {"verdict", step.verdict}});
+  }
+  return {{"steps", list},
+          {"verdict", steps.back().verdict},
+          {"final_campaign", steps.back().campaign},
+          {"verdict_digest", digest}};
+}
+
+std::string ToText(const std::vector<ImproveStep>& steps) {
+  TextTable table({"<campaign", "<effects", "error", "held out", "log evidence", "<verdict"});
+  for (const ImproveStep& step : steps) {
+    std::string effects;
+    for (const std::string& name : step.effects) effects += (effects.empty() ? "" : " + ") + name;
+    table.AddRow({step.campaign, effects.empty() ? "none" : effects,
+                  report::Number(step.rms_error, 3),
+                  step.heldout_rms_error ? report::Number(*step.heldout_rms_error, 3) : "–",
+                  report::Number(step.log_evidence, 5), step.verdict});
+  }
+  std::string text = table.ToString();
+  if (steps.size() > 1) {
+    text += fmt::format("\nError {} before, {} after", report::Number(steps.front().rms_error, 3),
+                        report::Number(steps.back().rms_error, 3));
+    if (steps.front().heldout_rms_error && steps.back().heldout_rms_error) {
+      text += fmt::format("; on held-out data {} before, {} after",
+                          report::Number(*steps.front().heldout_rms_error, 3),
+                          report::Number(*steps.back().heldout_rms_error, 3));
+    }
+    text += ".\n";
+  }
+  return text;
+}
+
+class Improvement {
+ public:
+  Improvement(Laboratory& laboratory, Client& client, int max_effects)
+      : laboratory_(laboratory), client_(client), max_effects_(max_effects) {}
+
+  absl::Status From(report::CampaignView view) {
+    first_ = view;
+    for (int added = 0;; ++added) {
+      const bool last = added >= max_effects_;
+      const auto diagnosis =
+          Diagnose(laboratory_, view, {.only_adequacy = last || (added > 0 && Fits(view))});
+      if (!diagnosis.ok()) return diagnosis.status();
+      const auto comparison = report::Compare(view, report::PredictReadings(view));
+      steps_.push_back({.campaign = view.status.campaign(),
+                        .effects = view.campaign.model.effects,
+                        .rms_error = comparison.rms_error,
+                        .heldout_rms_error = std::nullopt,
+                        .log_evidence = view.posterior.log_evidence(),
+                        .verdict = diagnosis->verdict});
+      const std::string next = NextEffect(*diagnosis);
+      if (diagnosis->verdict == "adequate" || last || next.empty()) break;
+      const auto text = ExtensionText(view, {.effects = {next},
+                                             .purpose = "extension",
+                                             .samples = std::nullopt,
+                                             .iterations = std::nullopt});
+      if (!text.ok()) return text.status();
+      auto extended = laboratory_.Run(view, *text, "calibration with " + next);
+      if (!extended.ok()) return extended.status();
+      if (extended->posterior.posterior_from() == "none") break;
+      view = *std::move(extended);
+    }
+    last_ = std::move(view);
+    return Open();
+  }
+
+  const std::vector<ImproveStep>& steps() const { return steps_; }
+  const std::string& digest() const { return digest_; }
+
+ private:
+  bool Fits(const report::CampaignView& view) {
+    const auto quick = Diagnose(laboratory_, view, {.only_adequacy = true});
+    return quick.ok() && quick->verdict == "adequate";
+  }
+
+  // The verdict is stored by its digest before held-out data are looked at.
+  absl::Status Open() {
+    const std::string verdict = ToJson(steps_, "").dump();
+    if (auto stored = client_.PutBlob(verdict); !stored.ok()) return stored;
+    digest_ = campaign::Sha256Hex(verdict);
+    steps_.front().heldout_rms_error =
+        report::Compare(*first_, report::PredictReadings(*first_)).heldout_rms_error;
+    steps_.back().heldout_rms_error =
+        report::Compare(*last_, report::PredictReadings(*last_)).heldout_rms_error;
+    return absl::OkStatus();
+  }
+
+  Laboratory& laboratory_;
+  Client& client_;
+  int max_effects_;
+  std::vector<ImproveStep> steps_;
+  std::optional<report::CampaignView> first_, last_;
+  std::string digest_;
+};
+
+}  // namespace
+
+int Improve(const Arguments& arguments) {
+  CatchInterrupts();
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  Laboratory laboratory(**session, arguments);
+  auto view = laboratory.Finished(arguments.campaign);
+  if (!view.ok()) return Fail(view.status());
+  Improvement improvement(laboratory, (*session)->client(), arguments.max_effects);
+  if (auto status = improvement.From(*std::move(view)); !status.ok()) return Fail(status);
+  std::cout << (arguments.json
+                    ? ToJson(improvement.steps(), improvement.digest()).dump(2) + "\n"
+                    : ToText(improvement.steps()));
+  return kDone;
+}
+
+}  // namespace calib::ctl

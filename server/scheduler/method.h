@@ -1,0 +1,57 @@
+#pragma once
+// A calibration method as the planner sees it: which samples come first, and what follows from all
+// that have ended. One .cc per family: filter_method, tmcmc_method, surrogate_method.
+
+#include <Eigen/Dense>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/scheduler/answer.h"
+#include "server/scheduler/definition.h"
+#include "server/scheduler/history.h"
+
+namespace calib::scheduler {
+
+/// Samples to be evaluated together: one iteration of the store.
+struct Batch {
+  std::string proposal;            ///< JSON, what the method wants to know of it again
+  Eigen::MatrixXd parameters;      ///< n x d
+  std::vector<double> stop_below;  ///< n: see store::SampleRecord
+  /// n or empty: needs no evaluation, whatever its likelihood it counts for nothing.
+  std::vector<char> refused;
+};
+
+/// What a campaign has come to with the batch that has just ended.
+struct Outcome {
+  Answer answer;
+  bool converged = false;
+  std::string log;            ///< for the campaign's log, a clause
+  std::optional<Batch> next;  ///< empty: the calibration is over
+};
+
+/// Pure functions of what the store holds. Errors: what inference cannot do, in a sentence;
+/// DATA_LOSS where the records do not belong together.
+class Method {
+ public:
+  virtual ~Method() = default;
+  virtual absl::StatusOr<Batch> First() const = 0;
+  /// history: at least one batch, all of it ended. affordable: another batch is within the budget.
+  virtual absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const = 0;
+};
+
+/// Of definition.campaign.method; keeps a reference to the definition.
+std::unique_ptr<Method> MakeMethod(const Definition& definition);
+
+/// The families behind MakeMethod().
+std::unique_ptr<Method> MakeFilterMethod(const Definition& definition);
+std::unique_ptr<Method> MakeTmcmcMethod(const Definition& definition);
+std::unique_ptr<Method> MakeSurrogateMethod(const Definition& definition);
+
+/// ln p(data | sample) of every sample of the history in order; -inf: it has no finite prediction.
+absl::StatusOr<std::vector<Eigen::VectorXd>> LogLikelihoodsByBatch(const Definition& definition,
+                                                                   const History& history);
+
+}  // namespace calib::scheduler

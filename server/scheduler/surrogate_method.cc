@@ -1,0 +1,230 @@
+// surrogate_msrs: a symmetric Latin hypercube, then rounds of points chosen on a response surface
+// of the misfit. Rounds are of one size, whatever the number of workers, so that the same points
+// are chosen everywhere.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "inference/surrogate/response_surface.h"
+#include "server/scheduler/method.h"
+#include "server/scheduler/posterior_record.h"
+
+namespace calib::scheduler {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kUnitPoints = "unit_points";
+
+/// A point of the unit cube in the parameters' units, through the prior's quantiles. A face is the
+/// prior's bound; where there is none, its outermost 1e-4.
+double FromUnit(const inference::Prior& prior, double u) {
+  constexpr double kOutermost = 1e-4;
+  if (u <= 0 && std::isfinite(prior.min)) {
+    return prior.min;
+  }
+  if (u >= 1 && std::isfinite(prior.max)) {
+    return prior.max;
+  }
+  return prior.Quantile(std::clamp(u, kOutermost, 1 - kOutermost));
+}
+
+class SurrogateMethod final : public Method {
+ public:
+  explicit SurrogateMethod(const Definition& definition)
+      : definition_(definition), campaign_(definition.campaign) {
+    options_.dimensions = static_cast<int>(definition.priors.size());
+    options_.initial_points = campaign_.samples;
+    options_.max_evaluations = MostEvaluations();
+    options_.workers = campaign::LaterBatch(campaign_);
+    options_.seed = campaign_.seed;
+  }
+
+  absl::StatusOr<Batch> First() const override {
+    auto state = inference::StartResponseSurface(options_);
+    if (!state.ok()) {
+      return state.status();
+    }
+    return MakeBatch(state->design);
+  }
+
+  absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const override {
+    const auto misfits = Misfits(history);
+    if (!misfits.ok()) {
+      return misfits.status();
+    }
+    auto state = Rebuild(history, *misfits);
+    if (!state.ok()) {
+      return state.status();
+    }
+    if (state->best < 0) {
+      return absl::FailedPreconditionError(
+          "every run so far has diverged, so that there is nothing to fit: look at the reasons of "
+          "the samples, then narrow the priors or change the model");
+    }
+    Outcome outcome{.answer = AnswerOf(history, *state), .converged = false, .log = "", .next = {}};
+    outcome.log = absl::StrCat("best chi-squared per reading ",
+                               state->evaluations[static_cast<std::size_t>(state->best)].value,
+                               ", step ", state->step);
+    const Eigen::MatrixXd points = affordable ? ChoosePoints(*state) : Eigen::MatrixXd{};
+    if (points.rows() > 0) {
+      outcome.answer.warnings.push_back(outcome.answer.weighted.degeneracy);
+      outcome.next = MakeBatch(points);
+    } else {
+      AskEmulator(definition_, history.iterations, outcome.answer);
+      outcome.converged = outcome.answer.FromEmulator();
+    }
+    return outcome;
+  }
+
+ private:
+  int MostEvaluations() const {
+    const auto most = static_cast<std::int64_t>(campaign_.samples) * campaign_.max_iterations;
+    return static_cast<int>(std::min<std::int64_t>(most, std::numeric_limits<int>::max()));
+  }
+
+  Batch MakeBatch(const Eigen::MatrixXd& unit) const {
+    Json rows = Json::array();
+    Batch batch;
+    batch.parameters.resize(unit.rows(), unit.cols());
+    for (Eigen::Index i = 0; i < unit.rows(); ++i) {
+      const Eigen::VectorXd row = unit.row(i);
+      rows.push_back(std::vector<double>(row.begin(), row.end()));
+      for (Eigen::Index j = 0; j < unit.cols(); ++j) {
+        batch.parameters(i, j) =
+            FromUnit(definition_.priors[static_cast<std::size_t>(j)], unit(i, j));
+      }
+    }
+    batch.proposal = Json{{kUnitPoints, rows}}.dump();
+    batch.stop_below.assign(static_cast<std::size_t>(unit.rows()), store::kUnknown);
+    return batch;
+  }
+
+  /// Chi-squared per reading of every sample: twice what its log likelihood lacks to that of
+  /// perfect agreement; NaN: diverged.
+  absl::StatusOr<std::vector<Eigen::VectorXd>> Misfits(const History& history) const {
+    const auto readings = static_cast<Eigen::Index>(definition_.data.readings.size());
+    const auto perfect = inference::LogLikelihoodBound(
+        definition_.data, campaign_.filter, Eigen::MatrixXd::Constant(1, readings, kNone));
+    auto batches = LogLikelihoodsByBatch(definition_, history);
+    if (!perfect.ok() || !batches.ok()) {
+      return perfect.ok() ? batches.status() : perfect.status();
+    }
+    for (Eigen::VectorXd& values : *batches) {
+      values = values.unaryExpr([&](double value) {
+        return std::isfinite(value) ? 2 * ((*perfect)(0) - value) / static_cast<double>(readings)
+                                    : kNone;
+      });
+    }
+    return batches;
+  }
+
+  /// The optimiser as it was after everything in the history, results reported round by round in
+  /// order.
+  absl::StatusOr<inference::ResponseSurfaceState> Rebuild(
+      const History& history, const std::vector<Eigen::VectorXd>& misfits) const {
+    inference::ResponseSurfaceState state;
+    state.step = options_.max_step;
+    for (std::size_t k = 0; k < misfits.size(); ++k) {
+      const auto points = UnitPoints(history.proposals[k]);
+      if (!points.ok()) {
+        return points.status();
+      }
+      if (points->rows() != misfits[k].size()) {
+        return absl::DataLossError(absl::StrCat("batch ", k, " has ", misfits[k].size(),
+                                                " samples but ", points->rows(), " points"));
+      }
+      if (k == 0) {
+        state.design = *points;
+      }
+      const auto first = static_cast<int>(state.evaluations.size());
+      for (Eigen::Index i = 0; i < points->rows(); ++i) {
+        state.evaluations.push_back({.point = points->row(i)});
+      }
+      for (Eigen::Index i = 0; i < points->rows(); ++i) {
+        const double value = misfits[k](i);
+        if (auto status = inference::Report(
+                options_, first + static_cast<int>(i),
+                std::isfinite(value) ? std::optional<double>(value) : std::nullopt, state);
+            !status.ok()) {
+          return status;
+        }
+      }
+    }
+    return state;
+  }
+
+  absl::StatusOr<Eigen::MatrixXd> UnitPoints(const std::string& proposal) const {
+    try {
+      const auto rows =
+          Json::parse(proposal).at(kUnitPoints).get<std::vector<std::vector<double>>>();
+      Eigen::MatrixXd points(static_cast<Eigen::Index>(rows.size()), options_.dimensions);
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (rows[i].size() != static_cast<std::size_t>(options_.dimensions)) {
+          return absl::DataLossError("a stored point has the wrong number of coordinates");
+        }
+        points.row(static_cast<Eigen::Index>(i)) =
+            Eigen::Map<const Eigen::RowVectorXd>(rows[i].data(), points.cols());
+      }
+      return points;
+    } catch (const Json::exception& error) {
+      return absl::DataLossError(absl::StrCat("stored points: ", error.what()));
+    }
+  }
+
+  /// The next round; no rows: the budget is used up, or too few runs have a value.
+  Eigen::MatrixXd ChoosePoints(inference::ResponseSurfaceState& state) const {
+    inference::CubicRbf surrogate(options_.dimensions);
+    std::vector<Eigen::VectorXd> chosen;
+    while (static_cast<int>(chosen.size()) < campaign::LaterBatch(campaign_)) {
+      const auto point = inference::NextPoint(options_, state, surrogate);
+      if (!point.has_value()) {
+        break;
+      }
+      chosen.push_back(*point);
+    }
+    Eigen::MatrixXd points(static_cast<Eigen::Index>(chosen.size()), options_.dimensions);
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      points.row(static_cast<Eigen::Index>(i)) = chosen[i];
+    }
+    return points;
+  }
+
+  /// The best run, and no posterior.
+  Answer AnswerOf(const History& history, const inference::ResponseSurfaceState& state) const {
+    Answer answer;
+    inference::Posterior& posterior = answer.weighted;
+    posterior.log_weights =
+        Eigen::VectorXd::Constant(static_cast<Eigen::Index>(history.samples.size()),
+                                  -std::numeric_limits<double>::infinity());
+    posterior.log_weights(state.best) = 0;
+    const auto& best = history.samples[static_cast<std::size_t>(state.best)].parameters;
+    for (const double value : best) {
+      posterior.parameters.push_back(
+          {.mean = value, .sd = kNone, .cov = kNone, .q05 = kNone, .q50 = kNone, .q95 = kNone});
+    }
+    posterior.log_evidence = posterior.log_evidence_se = posterior.pareto_k = kNone;
+    posterior.ess = 1;
+    posterior.degeneracy =
+        "An optimiser looks for the best fit and gives no posterior: the values stand for the best "
+        "run.";
+    return answer;
+  }
+
+  const Definition& definition_;
+  const campaign::Campaign& campaign_;
+  inference::ResponseSurfaceOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Method> MakeSurrogateMethod(const Definition& definition) {
+  return std::make_unique<SurrogateMethod>(definition);
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,169 @@
+// tmcmc: every Metropolis step of every stage is one batch, the proposals of all chains. Where the
+// chains stand is computed again from the stored samples and states each time; whether a proposal
+// is accepted was decided by a number drawn before it ran, so neither order nor restarts matter.
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "inference/filter/log_weights.h"
+#include "inference/filter/parameter_summary.h"
+#include "inference/filter/weighted_moments.h"
+#include "inference/tmcmc/tmcmc.h"
+#include "server/scheduler/early_stopping.h"
+#include "server/scheduler/method.h"
+#include "server/scheduler/posterior_record.h"
+
+namespace calib::scheduler {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+/// Quantiles of fewer different draws say nothing (the limit that the filter's weights have to
+/// meet).
+constexpr double kFewestDraws = 50;
+
+class TmcmcMethod final : public Method {
+ public:
+  explicit TmcmcMethod(const Definition& definition)
+      : definition_(definition), options_(definition.campaign.tmcmc) {
+    options_.samples = definition.campaign.samples;
+    options_.seed = definition.campaign.seed;
+    options_.max_stages = std::numeric_limits<int>::max();  // the cap is looked at here
+  }
+
+  absl::StatusOr<Batch> First() const override {
+    const auto state = inference::StartTmcmc(definition_.priors, options_);
+    if (!state.ok()) {
+      return state.status();
+    }
+    return NextBatch(*state);
+  }
+
+  absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const override {
+    const auto state = Replay(history);
+    if (!state.ok()) {
+      return state.status();
+    }
+    Outcome outcome{
+        .answer = AnswerOf(*state), .converged = false, .log = Describe(*state), .next = {}};
+    outcome.converged = state->finished() && outcome.answer.HasIntervals();
+    const auto stages = static_cast<int>(state->stages.size());
+    if (!state->finished() && affordable && stages <= definition_.campaign.max_iterations) {
+      outcome.next = NextBatch(*state);
+    }
+    return outcome;
+  }
+
+ private:
+  absl::StatusOr<inference::TmcmcState> Replay(const History& history) const {
+    auto state = inference::StartTmcmc(definition_.priors, options_);
+    const auto likelihoods = LogLikelihoodsByBatch(definition_, history);
+    if (!likelihoods.ok()) {
+      return likelihoods.status();
+    }
+    for (std::size_t k = 0; state.ok() && k < likelihoods->size(); ++k) {
+      if (state->proposals != history.iterations[k].parameters) {
+        return absl::DataLossError(
+            absl::StrCat("the stored samples of batch ", k,
+                         " are not those that follow from the ones before; "
+                         "was the campaign begun by another version of this program?"));
+      }
+      if (auto advanced =
+              inference::AdvanceTmcmc(definition_.priors, options_, (*likelihoods)[k], *state);
+          !advanced.ok()) {
+        return advanced;
+      }
+    }
+    return state;
+  }
+
+  Batch NextBatch(const inference::TmcmcState& state) const {
+    Batch batch{.proposal = ProposalToJson(inference::Proposal{}),
+                .parameters = state.proposals,
+                .stop_below = {},
+                .refused = {}};
+    const bool stops = StopsEarly(definition_);
+    for (const double needed : state.accept_above) {
+      batch.refused.push_back(needed == kInfinity ? 1 : 0);
+      batch.stop_below.push_back(stops && std::isfinite(needed) ? needed : store::kUnknown);
+    }
+    return batch;
+  }
+
+  /// "stage 3, step 2 of 10, exponent 0.05"
+  std::string Describe(const inference::TmcmcState& state) const {
+    if (state.finished()) {
+      return absl::StrCat("exponent 1 reached in ", state.stages.size(), " stages");
+    }
+    return absl::StrFormat("stage %d, step %d of %d, exponent %.3g", state.stages.size(),
+                           state.step, options_.steps, state.exponent);
+  }
+
+  /// Each run weighs as many shares as chains stand on it.
+  static Eigen::VectorXd LogWeights(const inference::TmcmcState& state) {
+    Eigen::VectorXd counts = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(state.evaluated));
+    for (const std::int64_t run : state.origin) {
+      counts(static_cast<Eigen::Index>(run)) += 1;
+    }
+    return (counts / static_cast<double>(state.origin.size())).array().log();
+  }
+
+  Answer AnswerOf(const inference::TmcmcState& state) const {
+    Answer answer;
+    answer.weights_source = "tmcmc";
+    inference::Posterior& posterior = answer.weighted;
+    const Eigen::Index n = state.samples.rows();
+    const Eigen::VectorXd equal = Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
+    posterior.log_weights = LogWeights(state);
+    for (std::size_t j = 0; j < definition_.priors.size(); ++j) {
+      posterior.parameters.push_back(inference::Summarize(
+          definition_.priors[j], equal, state.samples.col(static_cast<Eigen::Index>(j))));
+    }
+    const Eigen::VectorXd mean = inference::WeightedMean(equal, state.samples);
+    posterior.correlation =
+        inference::CorrelationOf(inference::WeightedCovariance(equal, state.samples, mean));
+    posterior.log_evidence = state.finished() ? state.log_evidence : kNone;
+    posterior.log_evidence_se = state.finished() ? state.LogEvidenceStandardError() : kNone;
+    posterior.ess = inference::EffectiveSampleSize(posterior.log_weights);
+    posterior.pareto_k = kNone;
+    posterior.degeneracy = Degeneracy(state, posterior.ess);
+    if (posterior.degeneracy.empty()) {
+      answer.draws = state.samples;
+    } else {
+      answer.warnings.push_back(posterior.degeneracy);
+    }
+    return answer;
+  }
+
+  std::string Degeneracy(const inference::TmcmcState& state, double different) const {
+    if (!state.finished()) {
+      return absl::StrCat(
+          "The chains have not reached the posterior: they stand at ", Describe(state),
+          " of 1, and the means are those of that tempered population. No standard "
+          "deviations, quantiles or evidence are given; allow more model evaluations "
+          "or a larger max_iterations (of stages).");
+    }
+    if (different < kFewestDraws) {
+      return absl::StrFormat(
+          "The %d chains stand on only %.0f effectively different samples, too "
+          "few for standard deviations and quantiles: run more chains (samples) "
+          "or more steps per stage.",
+          state.samples.rows(), different);
+    }
+    return "";
+  }
+
+  const Definition& definition_;
+  inference::TmcmcOptions options_;
+};
+
+}  // namespace
+
+std::unique_ptr<Method> MakeTmcmcMethod(const Definition& definition) {
+  return std::make_unique<TmcmcMethod>(definition);
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,52 @@
+#include "server/campaign/derive.h"
+
+#include <gtest/gtest.h>
+
+#include "server/campaign/campaign_file.h"
+#include "server/campaign/yaml_text.h"
+#include "tests/unit/campaign/good_campaign.h"
+
+namespace calib::campaign {
+namespace {
+
+TEST(YamlText, ReadsBackToTheSameTree) {
+  const std::string text =
+      "a: {b: [1, 'x: y', \"q\\\"uote\", ''], c: null}\nd:\n  - e: 1e-3\n    f: [-1, .inf]\n";
+  const auto once = ParseYaml(text);
+  ASSERT_TRUE(once.root);
+  const std::string written = ToYaml(*once.root);
+  const auto again = ParseYaml(written);
+  ASSERT_TRUE(again.root) << written;
+  EXPECT_EQ(ToYaml(*again.root), written);
+  EXPECT_EQ(again.root->entries[0].value.entries[0].value.items[2].scalar, "q\"uote");
+  EXPECT_EQ(again.root->entries[1].value.items[0].entries[1].value.items[0].scalar, "-1");
+}
+
+TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
+  const auto text = Derive(
+      "name: a\nmodel: {contact: linear}\nparameters: {young_modulus: default}\n"
+      "experiments:\n  - {name: x, staging: {rate: 0.2 1/s}}\n  - {name: y, role: validate}\n",
+      {.name = "a + rolling_resistance",
+       .lineage = {.parent = "c1", .purpose = "warm_fit"},
+       .effects = {"rolling_resistance"},
+       .parameters = {{"rolling_resistance.friction", {.kind = "uniform", .min = 0, .max = 1}}},
+       .held_out = false,
+       .samples = 12,
+       .first_proposal = FirstProposal{.prior_share = 0.5,
+                                       .places = {{"young_modulus", {.center = 1e9, .sd = 1e7}}}},
+       .rate_factor = 2});
+  ASSERT_TRUE(text.ok()) << text.status();
+  EXPECT_EQ(*text,
+            "name: a + rolling_resistance\n"
+            "model: {contact: linear, effects: [rolling_resistance]}\n"
+            "parameters: {young_modulus: default, rolling_resistance.friction: {prior: uniform, min: "
+            "0, max: 1}}\n"
+            "experiments: [{name: x, staging: {rate: 0.4}}]\n"
+            "lineage: {parent: c1, purpose: warm_fit}\n"
+            "inference: {samples: 12, first_proposal: {prior_share: 0.5, young_modulus: {center: "
+            "1e+09, sd: 1e+07}}}\n")
+      << *text;
+}
+
+}  // namespace
+}  // namespace calib::campaign

@@ -1,0 +1,113 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "inference/diagnosis/screen.h"
+#include "inference/sampling/philox.h"
+
+namespace calib::inference {
+namespace {
+
+constexpr int kReadings = 40;
+
+// A straight line through the origin; the effects are a parabola, a sine and something like the
+// parabola.
+Eigen::VectorXd Curve(int kind) {
+  Eigen::VectorXd curve(kReadings);
+  for (int k = 0; k < kReadings; ++k) {
+    const double x = (k + 1.0) / kReadings;
+    curve[k] = kind == 0 ? x : kind == 1 ? x * x : kind == 2 ? std::sin(9 * x) : std::pow(x, 2.1);
+  }
+  return curve;
+}
+
+Eigen::VectorXd Noise(int seed) {
+  PhiloxStream stream({.seed = static_cast<std::uint64_t>(seed)});
+  Eigen::VectorXd noise(kReadings);
+  for (double& value : noise) value = stream.Normal();
+  return noise;
+}
+
+FittedModel Line(const Eigen::VectorXd& measured) {
+  FittedModel model;
+  model.histories.resize(2001, kReadings);
+  for (int g = 0; g < 2001; ++g) {
+    model.histories.row(g) = (g - 1000) * 0.05 * Curve(0) - measured;
+  }
+  model.covariance.setIdentity(kReadings, kReadings);
+  model.parameters = 1;
+  return model;
+}
+
+const std::vector<Signature> kCandidates = {{"parabola", {5 * Curve(1)}, false},
+                                            {"sine", {2 * Curve(2)}, true},
+                                            {"power", {5 * Curve(3)}, false}};
+
+TEST(Diagnosis, NothingMissingIsAdequateAtTheStatedRate) {
+  int adequate = 0;
+  int flagged = 0;
+  constexpr int kDraws = 100;
+  for (int seed = 0; seed < kDraws; ++seed) {
+    const FittedModel model = Line(12 * Curve(0) + Noise(seed));
+    adequate += TestAdequacy(model)->p_value >= 0.01 ? 1 : 0;
+    const auto scores = Screen(model, kCandidates, {.simulations = 200});
+    flagged += scores->front().adjusted < 0.05 ? 1 : 0;
+  }
+  EXPECT_GE(adequate, 96);
+  EXPECT_LE(flagged, 12);
+}
+
+TEST(Diagnosis, PresentEffectComesFirstWithItsAmplitude) {
+  const FittedModel model = Line(12 * Curve(0) + 30 * Curve(2) + Noise(1));
+  EXPECT_LT(TestAdequacy(model)->p_value, 1e-6);
+  const auto scores = Screen(model, kCandidates, {.max_amplitude = 20});
+  ASSERT_TRUE(scores.ok());
+  EXPECT_EQ(scores->front().name, "sine");
+  EXPECT_NEAR(scores->front().amplitude, 15, 0.5);
+  EXPECT_LT(scores->front().adjusted, 1e-6);
+  EXPECT_GT(scores->front().explained, 0.95);
+}
+
+TEST(Diagnosis, OneSidedEffectIsNotUsedBackwards) {
+  const auto scores = Screen(Line(40 * Curve(0) - 20 * Curve(1) + Noise(2)), kCandidates);
+  for (const Score& score : *scores) {
+    if (score.name != "sine") {
+      EXPECT_GE(score.amplitude, 0);
+      EXPECT_LT(score.gain, 1);
+    }
+  }
+}
+
+TEST(Diagnosis, ParallelSignaturesAreConfusable) {
+  const auto scores = Screen(Line(12 * Curve(0) + 30 * Curve(1) + Noise(3)), kCandidates);
+  ASSERT_EQ(scores->size(), 3U);
+  EXPECT_NE(scores->front().name, "sine");
+  ASSERT_EQ(scores->front().confusable_with.size(), 1U);
+  EXPECT_NE(scores->front().confusable_with.front(), "sine");
+}
+
+TEST(Diagnosis, SignatureThatTheParametersImitateIsNotDetectable) {
+  const auto scores = Screen(Line(12 * Curve(0) + Noise(4)), {{"line", {3 * Curve(0)}, true}});
+  EXPECT_GT(scores->front().detectable, 10);
+  const auto sine = Screen(Line(12 * Curve(0) + Noise(4)), {{"sine", {2 * Curve(2)}, true}});
+  EXPECT_LT(sine->front().detectable, 1);
+}
+
+TEST(Diagnosis, BetterModelHasTheAdvantage) {
+  const Eigen::VectorXd measured = 12 * Curve(0) + 30 * Curve(2) + Noise(5);
+  FittedModel extended = Line(measured);
+  extended.histories.rowwise() += 30 * Curve(2).transpose();
+  const auto advantage = Compare(extended, Line(measured));
+  EXPECT_GT(advantage->nats, 2 * advantage->sd);
+  EXPECT_EQ(Compare(extended, extended)->nats, 0);
+}
+
+TEST(Diagnosis, ShapesThatDoNotFitAreRefused) {
+  FittedModel model = Line(Curve(0));
+  EXPECT_FALSE(Screen(model, {{"short", {Eigen::VectorXd::Ones(3)}, false}}).ok());
+  model.covariance.setZero();
+  EXPECT_FALSE(TestAdequacy(model).ok());
+}
+
+}  // namespace
+}  // namespace calib::inference

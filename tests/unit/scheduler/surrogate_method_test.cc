@@ -1,0 +1,105 @@
+// surrogate_msrs as a campaign: rounds of points through simulated workers and the store.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "server/scheduler/posterior_record.h"
+#include "tests/unit/scheduler/simulated_service.h"
+
+namespace calib::scheduler {
+namespace {
+
+using ::testing::HasSubstr;
+
+testing::SmallCampaign Campaign(int samples, int times, double noise,
+                                const std::string& extra = "") {
+  return testing::MakeSmallCampaign({.samples = samples,
+                                     .max_iterations = times,
+                                     .load_steps = 12,
+                                     .failure_attempts = 100,
+                                     .relative_noise = noise,
+                                     .method = "surrogate_msrs",
+                                     .extra = extra});
+}
+
+v1::Posterior Posterior(SimulatedService& service, std::size_t iteration) {
+  return *PosteriorFromJson(*Value(service.Read().Iterations(1)).at(iteration).posterior);
+}
+
+TEST(SurrogateCampaign, RoundsOfEightFindABetterFitThanTheDesign) {
+  SimulatedService service("surrogate");
+  service.Submit(Campaign(10, 5, 0.02));
+  service.RunToEnd(1, true);
+  const auto iterations = Value(service.Read().Iterations(1));
+  ASSERT_EQ(iterations.size(), 6U) << "10 points, then 40 in rounds of eight";
+  double first = std::numeric_limits<double>::infinity();  // of -ln likelihood
+  double best = first;
+  double weight = 0;
+  for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
+    EXPECT_EQ(sample.sample / 10, sample.iteration);
+    EXPECT_LT(sample.sample % 10, sample.iteration == 0 ? 10 : 8);
+    best = std::min(best, -sample.log_likelihood);
+    if (sample.iteration == 0) first = best;
+    weight += std::exp(sample.log_weight);
+  }
+  EXPECT_LT(best, first);
+  EXPECT_EQ(weight, 1) << "the best run alone";
+}
+
+TEST(SurrogateCampaign, WithoutAnEmulatorTheBestRunIsGivenAndNoInterval) {
+  SimulatedService service("surrogate_none");
+  service.Submit(Campaign(5, 1, 0.02));
+  service.RunToEnd(1, true);
+  const v1::Posterior posterior = Posterior(service, 0);
+  EXPECT_EQ(posterior.posterior_from(), "none");
+  EXPECT_FALSE(posterior.converged());
+  EXPECT_TRUE(std::isnan(posterior.log_evidence()));
+  ASSERT_GE(posterior.warnings_size(), 1);
+  EXPECT_THAT(posterior.warnings(0), HasSubstr("optimiser"));
+  for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
+    if (sample.log_weight != 0) continue;
+    EXPECT_EQ(posterior.parameters(0).mean(), sample.parameters[0]);
+    EXPECT_EQ(posterior.parameters(1).mean(), sample.parameters[1]);
+  }
+  EXPECT_TRUE(std::isnan(posterior.parameters(0).sd()));
+}
+
+TEST(SurrogateCampaign, AnAdequateEmulatorOfItsRunsGivesThePosterior) {
+  SimulatedService service("surrogate_emulated");
+  service.Submit(Campaign(20, 3, 0.05));
+  service.RunToEnd(1, true);
+  const auto last = Value(service.Read().Iterations(1)).size() - 1;
+  const v1::Posterior posterior = Posterior(service, last);
+  EXPECT_EQ(posterior.posterior_from(), "emulator");
+  EXPECT_TRUE(posterior.converged());
+  EXPECT_GT(posterior.draws_size(), 0);
+  EXPECT_LT(posterior.parameters(1).q05(), posterior.parameters(1).q95());
+  EXPECT_EQ(Posterior(service, 0).posterior_from(), "none") << "asked at the end alone";
+}
+
+TEST(SurrogateCampaign, SameBitsWhateverGoesWrong) {
+  SimulatedService calm("surrogate_calm");
+  calm.Submit(Campaign(10, 3, 0.02));
+  calm.RunToEnd(1, true);
+  const std::string expected = calm.Fingerprint();
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SimulatedService storm("surrogate_storm");
+    storm.Submit(Campaign(10, 3, 0.02));
+    storm.RunToEnd(seed, false);
+    EXPECT_TRUE(storm.Fingerprint() == expected) << "seed " << seed;
+  }
+}
+
+TEST(SurrogateCampaign, TheBudgetOfModelEvaluationsEndsIt) {
+  SimulatedService service("surrogate_budget");
+  service.Submit(Campaign(10, 100, 0.02, "budget: {model_evaluations: 30}\n"));
+  service.RunToEnd(1, true);
+  EXPECT_EQ(Value(service.Read().Evaluations(1)).size(), 26U) << "10 + 8 + 8; eight more are 34";
+}
+
+}  // namespace
+}  // namespace calib::scheduler

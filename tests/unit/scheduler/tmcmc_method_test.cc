@@ -1,0 +1,184 @@
+// tmcmc as a campaign: batches of proposals through simulated workers and the store.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/scheduler/history.h"
+#include "server/scheduler/posterior_record.h"
+#include "tests/unit/scheduler/simulated_service.h"
+
+namespace calib::scheduler {
+namespace {
+
+using ::testing::HasSubstr;
+
+testing::SmallCampaign Campaign(int samples, int most_stages, const std::string& extra = "") {
+  return testing::MakeSmallCampaign({.samples = samples,
+                                     .max_iterations = most_stages,
+                                     .load_steps = 12,
+                                     .failure_attempts = 100,
+                                     .relative_noise = 0.1,
+                                     .method = "tmcmc",
+                                     .inference = "  steps: 3\n",
+                                     .extra = extra});
+}
+
+v1::Posterior LastPosterior(SimulatedService& service) {
+  v1::Posterior last;
+  for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
+    if (iteration.posterior.has_value()) last = *PosteriorFromJson(*iteration.posterior);
+  }
+  return last;
+}
+
+std::vector<store::EvaluationRecord> EvaluationsOf(SimulatedService& service, int experiment) {
+  auto evaluations = Value(service.Read().Evaluations(1));
+  std::erase_if(evaluations, [experiment](const store::EvaluationRecord& evaluation) {
+    return evaluation.key.experiment != experiment;
+  });
+  return evaluations;
+}
+
+// One campaign looked at from several sides, because it takes seconds.
+class FinishedTmcmcCampaign : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    service_ = new SimulatedService("tmcmc");
+    service_->Submit(testing::MakeSmallCampaign({.samples = 80,
+                                                 .max_iterations = 50,
+                                                 .load_steps = 12,
+                                                 .relative_noise = 0.1,
+                                                 .with_validation = true,
+                                                 .method = "tmcmc",
+                                                 .inference = "  steps: 3\n"}));
+    service_->RunToEnd(1, true);
+  }
+  static void TearDownTestSuite() { delete service_; }
+
+  static inline SimulatedService* service_ = nullptr;
+};
+
+TEST_F(FinishedTmcmcCampaign, HasEquallyWeightedDrawsAndTheirEvidence) {
+  const v1::Posterior posterior = LastPosterior(*service_);
+  EXPECT_EQ(posterior.posterior_from(), "tmcmc");
+  EXPECT_TRUE(posterior.converged());
+  EXPECT_EQ(posterior.draws_size(), 2 * 80);
+  EXPECT_EQ(posterior.correlation_size(), 4);
+  EXPECT_TRUE(std::isfinite(posterior.log_evidence()));
+  EXPECT_GT(posterior.log_evidence_se(), 0);
+  EXPECT_GT(posterior.ess(), 50);
+  EXPECT_EQ(posterior.iterations() % 3, 1) << "prior draws, then three steps per stage";
+  double mass = 0;
+  for (const store::SampleRecord& sample : Value(service_->Read().Samples(1))) {
+    mass += std::exp(sample.log_weight);
+  }
+  EXPECT_NEAR(mass, 1, 1e-12) << "chains stand on runs of the campaign";
+}
+
+TEST_F(FinishedTmcmcCampaign, HasNotRunProposalsOutsideThePrior) {
+  int refused = 0;
+  int runs = 0;
+  for (const store::EvaluationRecord& evaluation : EvaluationsOf(*service_, 0)) {
+    if (evaluation.status != store::EvaluationStatus::kStoppedEarly) {
+      ++runs;
+      continue;
+    }
+    EXPECT_THAT(evaluation.reason, HasSubstr("outside the prior"));
+    EXPECT_GE(evaluation.key.sample, 80) << "the first batch is drawn from the prior";
+    ++refused;
+  }
+  EXPECT_GT(refused, 0);
+  EXPECT_EQ(LastPosterior(*service_).model_evaluations(), runs);
+  EXPECT_EQ(LastPosterior(*service_).stopped_early(), 0);
+}
+
+TEST_F(FinishedTmcmcCampaign, HasRunHeldOutTestsOnSomeOfTheChains) {
+  const auto samples = Value(service_->Read().Samples(1));
+  const auto held_out = EvaluationsOf(*service_, 1);
+  for (const store::EvaluationRecord& evaluation : held_out) {
+    EXPECT_GT(samples[static_cast<std::size_t>(evaluation.key.sample)].log_weight, -INFINITY);
+  }
+  EXPECT_GE(held_out.size(), 15U);
+  EXPECT_LE(held_out.size(), 20U);
+}
+
+// Of the same data: the weighted posterior of many samples drawn from the prior.
+TEST(TmcmcCampaign, AgreesWithManyWeightedSamples) {
+  SimulatedService chains("tmcmc_many");
+  chains.Submit(Campaign(150, 50));
+  chains.RunToEnd(1, true);
+  SimulatedService weights("weights_many");
+  weights.Submit(testing::MakeSmallCampaign({.samples = 800,
+                                             .max_iterations = 1,
+                                             .load_steps = 12,
+                                             .relative_noise = 0.1,
+                                             .method = "sqmc"}));
+  weights.RunToEnd(1, true);
+  const v1::Posterior found = LastPosterior(chains);
+  const v1::Posterior expected = LastPosterior(weights);
+  ASSERT_EQ(expected.posterior_from(), "weights");
+  // Four standard errors of what 150 draws and 800 weighted samples know.
+  const double error = 4 * std::sqrt(1 / found.ess() + 1 / expected.ess());
+  for (int i = 0; i < found.parameters_size(); ++i) {
+    const double sd = expected.parameters(i).sd();
+    EXPECT_NEAR(found.parameters(i).mean(), expected.parameters(i).mean(), error * sd);
+    EXPECT_NEAR(found.parameters(i).sd(), sd, error * sd);
+  }
+  EXPECT_NEAR(found.log_evidence(), expected.log_evidence(),
+              4 * std::hypot(found.log_evidence_se(), expected.log_evidence_se()));
+}
+
+TEST(TmcmcCampaign, SameBitsWhateverGoesWrong) {
+  SimulatedService calm("tmcmc_calm");
+  calm.Submit(Campaign(20, 2));
+  calm.RunToEnd(1, true);
+  const std::string expected = calm.Fingerprint();
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    SimulatedService storm("tmcmc_storm");
+    storm.Submit(Campaign(20, 2));
+    storm.RunToEnd(seed, false);
+    EXPECT_TRUE(storm.Fingerprint() == expected) << "seed " << seed;
+  }
+}
+
+TEST(TmcmcCampaign, StagesOrBudgetUsedUpMeansNoIntervals) {
+  for (const bool budget : {false, true}) {
+    SimulatedService service("tmcmc_cap");
+    service.Submit(
+        Campaign(60, budget ? 50 : 1, budget ? "budget: {model_evaluations: 150}\n" : ""));
+    service.RunToEnd(1, true);
+    const v1::Posterior posterior = LastPosterior(service);
+    EXPECT_EQ(posterior.posterior_from(), "none");
+    EXPECT_FALSE(posterior.converged());
+    EXPECT_TRUE(std::isnan(posterior.log_evidence()));
+    EXPECT_TRUE(std::isnan(posterior.parameters(0).sd()));
+    EXPECT_EQ(posterior.draws_size(), 0);
+    ASSERT_EQ(posterior.warnings_size(), 1);
+    EXPECT_THAT(posterior.warnings(0), HasSubstr("have not reached the posterior"));
+    EXPECT_LE(posterior.model_evaluations(), budget ? 150 : 60 * 4);
+  }
+}
+
+// The uniform number is drawn before the run, and a run ends once its bound stays below what it
+// needs: the chains are the same, with fewer states.
+TEST(TmcmcCampaign, StoppingEarlyChangesNothingInTheChains) {
+  SimulatedService full("tmcmc_full");
+  full.Submit(Campaign(60, 50));
+  full.RunToEnd(1, true);
+  SimulatedService stopping("tmcmc_stopping");
+  stopping.Submit(Campaign(60, 50, "early_stopping: {discard_at_most: 1e-3}\n"));
+  stopping.RunToEnd(1, true);
+  const v1::Posterior expected = LastPosterior(full);
+  const v1::Posterior found = LastPosterior(stopping);
+  EXPECT_GT(found.stopped_early(), 0);
+  EXPECT_EQ(found.stated_loss(), 0);
+  EXPECT_EQ(found.log_evidence(), expected.log_evidence());
+  ASSERT_EQ(found.draws_size(), expected.draws_size());
+  for (int i = 0; i < found.draws_size(); ++i) EXPECT_EQ(found.draws(i), expected.draws(i));
+  EXPECT_LT(stopping.Read().States(1)->size(), full.Read().States(1)->size());
+}
+
+}  // namespace
+}  // namespace calib::scheduler
