@@ -43,8 +43,9 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
             "0, max: 1}}\n"
             "experiments: [{name: x, staging: {rate: 0.4}}]\n"
             "lineage: {parent: c1, purpose: warm_fit}\n"
-            "inference: {samples: 12, first_proposal: {prior_share: 0.5, young_modulus: {center: "
-            "1e+09, sd: 1e+07}}}\n")
+            "inference:\n"
+            "  samples: 12\n"
+            "  first_proposal: {prior_share: 0.5, young_modulus: {center: 1e+09, sd: 1e+07}}\n")
       << *text;
 }
 
