@@ -197,8 +197,9 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST(BadCampaigns, UnknownEffectsAndParametersSayWhatThereIs) {
-  EXPECT_THAT(ProblemsOf(Spoiled("[rolling_resistance]", "[rolling_resistance, tea]")),
-              StartsWith("c.yaml:4: model.effects: 'tea' is not an effect of this build; allowed: "));
+  EXPECT_THAT(
+      ProblemsOf(Spoiled("[rolling_resistance]", "[rolling_resistance, tea]")),
+      StartsWith("c.yaml:4: model.effects: 'tea' is not an effect of this build; allowed: "));
   EXPECT_EQ(
       ProblemsOf(Spoiled("  rolling_resistance.friction: {prior: uniform, min: 0, max: 1}\n",
                          "  rolling_resistance.friction: {prior: uniform, min: 0, max: 1}\n"
