@@ -3,6 +3,8 @@
 // contact, one array per quantity, so that every kernel is a plain loop over lanes that the
 // compiler turns into vector instructions.
 
+#include <algorithm>
+
 namespace calib::dem {
 
 inline constexpr int kBlock = 32;       ///< lanes; a block stays well inside the first-level cache
@@ -65,5 +67,17 @@ struct alignas(64) ContactBlock {
   /// What the contacts remember; a kernel owns the columns from the `first` it was given on.
   double history[kMaxHistory][kBlock];
 };
+
+/// Repeats lane 0 in the unused lanes, so that kernels meet valid numbers everywhere;
+/// history: the first `width` columns.
+inline void PadLanes(int width, ContactBlock& b) {
+  for (ContactBlock::Lane* lane : {&b.dx, &b.dy, &b.dz, &b.radius_i, &b.radius_j, &b.vx, &b.vy,
+                                   &b.vz, &b.wix, &b.wiy, &b.wiz, &b.wjx, &b.wjy, &b.wjz}) {
+    std::fill(*lane + b.count, *lane + kBlock, (*lane)[0]);
+  }
+  for (int c = 0; c < width; ++c) {
+    std::fill(b.history[c] + b.count, b.history[c] + kBlock, b.history[c][0]);
+  }
+}
 
 }  // namespace calib::dem

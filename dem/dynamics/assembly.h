@@ -57,6 +57,9 @@ class Assembly {
   /// bounds the step where contacts are few or about to form.
   [[nodiscard]] double NominalCriticalStep() const { return nominal_critical_step_; }
 
+  /// The same at any overlap, in radii > 0.
+  [[nodiscard]] double CriticalStepAt(double overlap) const;
+
   /// Mean net force of the loaded grains over mean contact force [-]; 0 without contacts, infinite
   /// when not finite.
   [[nodiscard]] double UnbalancedForce() const;

@@ -1,0 +1,178 @@
+// What is asked of an assembly between steps: stiffness and the time step it allows, balance,
+// finiteness.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "absl/strings/str_cat.h"
+#include "dem/dynamics/assembly.h"
+
+namespace calib::dem {
+namespace {
+
+/// Largest rate that the explicit step must follow, of an oscillator with a dashpot: the root of
+/// (w/r)^2 + 2 (c/m)/r = 1, since forces use velocities half a step old; w without a dashpot.
+/// w = sqrt(K/m) [1/s], damping c/m [1/s]
+double DampedRate(double w, double damping) {
+  return damping > 0 ? damping + std::sqrt(damping * damping + w * w) : w;
+}
+
+/// sqrt(m/K) of the smallest grain, held by one like it at an overlap given in radii.
+double NominalStep(const ContactModel& model, const ParticleArrays& p, double overlap) {
+  const auto smallest = static_cast<std::size_t>(
+      std::min_element(p.radius.begin(), p.radius.end()) - p.radius.begin());
+  ContactBlock block{};
+  for (int k = 0; k < kBlock; ++k) {
+    block.radius_i[k] = block.radius_j[k] = p.radius[smallest];
+    block.dx[k] = (2.0 - overlap) * p.radius[smallest];
+  }
+  model.Evaluate(block);
+  const double translation =
+      (block.normal_stiffness[0] + block.tangential_stiffness[0]) * p.inverse_mass[smallest];
+  const double rotation = (block.tangential_stiffness[0] * p.radius[smallest] * p.radius[smallest] +
+                           block.rolling_stiffness[0] + block.twisting_stiffness[0]) *
+                          p.inverse_inertia[smallest];
+  const double slowest = std::sqrt(std::max(translation, rotation));
+  const double damping =
+      (block.normal_damping[0] + block.tangential_damping[0]) * p.inverse_mass[smallest];
+  return 1.0 / DampedRate(slowest, damping);
+}
+
+}  // namespace
+
+double Assembly::CriticalStepAt(double overlap) const {
+  return NominalStep(model_, particles_, overlap);
+}
+
+absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
+  const ParticleArrays& p = particles_;
+  const auto n = p.x.size();
+  std::vector<std::array<double, 6>> stiffness(n, {0, 0, 0, 0, 0, 0});  // translation, rotation
+  std::vector<std::array<double, 6>> damping;  // as stiffness; empty without dashpots
+  std::array<double, 3> modulus = {0, 0, 0};
+  std::array<double, 3> viscosity = {0, 0, 0};
+  ContactBlock b;
+  b.viscous = viscous_ ? 1.0 : 0.0;
+  absl::Status status;
+  const auto add_damping = [&](int k, std::size_t i, std::size_t j) {
+    if (!(b.normal_damping[k] + b.tangential_damping[k] > 0)) {
+      return;
+    }
+    damping.resize(n, {0, 0, 0, 0, 0, 0});
+    const double n2[3] = {b.nx[k] * b.nx[k], b.ny[k] * b.ny[k], b.nz[k] * b.nz[k]};
+    const double d[3] = {b.dx[k], b.dy[k], b.dz[k]};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double across = b.tangential_damping[k] * (1.0 - n2[a]);
+      const double translation = b.normal_damping[k] * n2[a] + across;
+      viscosity[a] += translation * d[a] * d[a];
+      damping[i][a] += translation;
+      damping[j][a] += translation;
+      damping[i][a + 3] += across * b.radius_i[k] * b.radius_i[k];
+      damping[j][a + 3] += across * b.radius_j[k] * b.radius_j[k];
+    }
+  };
+  const auto add = [&] {
+    PadLanes(model_.history_size(), b);
+    model_.Evaluate(b);
+    for (int k = 0; k < b.count; ++k) {
+      const auto slot = static_cast<std::size_t>(b.pair[k]);
+      const auto i = static_cast<std::size_t>(list_.first[slot]);
+      const auto j = static_cast<std::size_t>(list_.second[slot]);
+      if (!(b.overlap[k] <= 0.5 * std::min(b.radius_i[k], b.radius_j[k])) && status.ok()) {
+        status = absl::OutOfRangeError(absl::StrCat("grains ", p.id[i], " and ", p.id[j],
+                                                    " overlap by ", b.overlap[k],
+                                                    " m, more than half the smaller radius"));
+      }
+      add_damping(k, i, j);
+      const double kn = b.normal_stiffness[k];
+      const double ks = b.tangential_stiffness[k];
+      const double n2[3] = {b.nx[k] * b.nx[k], b.ny[k] * b.ny[k], b.nz[k] * b.nz[k]};
+      const double d[3] = {b.dx[k], b.dy[k], b.dz[k]};
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double across = 1.0 - n2[a];
+        const double translation = kn * n2[a] + ks * across;
+        const double moment = b.rolling_stiffness[k] * across + b.twisting_stiffness[k] * n2[a];
+        stiffness[i][a] += translation;
+        stiffness[j][a] += translation;
+        stiffness[i][a + 3] += ks * across * b.radius_i[k] * b.radius_i[k] + moment;
+        stiffness[j][a + 3] += ks * across * b.radius_j[k] * b.radius_j[k] + moment;
+        modulus[a] += translation * d[a] * d[a];
+      }
+    }
+    b.count = 0;
+  };
+  for (int s = 0; s < list_.size(); ++s) {
+    if (!touching(s)) {
+      continue;
+    }
+    LoadLane(s, b);
+    if (b.count == kBlock) {
+      add();
+    }
+  }
+  if (b.count > 0) {
+    add();
+  }
+  double rate2 = 0;  // largest K/m
+  for (std::size_t g = 0; g < n; ++g) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      rate2 = std::max(
+          {rate2, stiffness[g][a] * p.inverse_mass[g], stiffness[g][a + 3] * p.inverse_inertia[g]});
+    }
+  }
+  double rate = std::sqrt(rate2);
+  for (std::size_t g = 0; g < damping.size(); ++g) {
+    for (std::size_t a = 0; a < 6; ++a) {
+      const double inverse = a < 3 ? p.inverse_mass[g] : p.inverse_inertia[g];
+      rate =
+          std::max(rate, DampedRate(std::sqrt(stiffness[g][a] * inverse), damping[g][a] * inverse));
+    }
+  }
+  estimate.critical_step = rate > 0 ? 1.0 / rate : 0.0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    estimate.modulus[a] = modulus[a] / cell_.Volume();
+    estimate.viscosity[a] = viscosity[a] / cell_.Volume();
+  }
+  return status;
+}
+
+double Assembly::UnbalancedForce() const {
+  const ParticleArrays& p = particles_;
+  double net = 0;
+  std::int64_t loaded = 0;
+  for (std::size_t g = 0; g < p.x.size(); ++g) {
+    const double f2 = p.fx[g] * p.fx[g] + p.fy[g] * p.fy[g] + p.fz[g] * p.fz[g];
+    if (f2 != 0) {
+      net += std::sqrt(f2);
+      ++loaded;
+    }
+  }
+  double contact = 0;
+  std::int64_t contacts = 0;
+  for (std::size_t s = 0; s < touching_.size(); ++s) {
+    if (touching_[s] != 0) {
+      const double* f = load_on_j(static_cast<int>(s)).force;
+      contact += std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+      ++contacts;
+    }
+  }
+  if (loaded == 0 || contacts == 0) {
+    return 0;
+  }
+  const double ratio =
+      (net / static_cast<double>(loaded)) / (contact / static_cast<double>(contacts));
+  return std::isfinite(ratio) ? ratio : std::numeric_limits<double>::infinity();
+}
+
+std::string Assembly::FirstNotFinite() const {
+  const ParticleArrays& p = particles_;
+  for (std::size_t g = 0; g < p.x.size(); ++g) {
+    if (!std::isfinite(p.fx[g] + p.fy[g] + p.fz[g] + p.tx[g] + p.ty[g] + p.tz[g] + p.x[g] + p.y[g] +
+                       p.z[g])) {
+      return absl::StrCat("grain ", p.id[g], " has no finite force or position (NaN or lost)");
+    }
+  }
+  return {};
+}
+
+}  // namespace calib::dem

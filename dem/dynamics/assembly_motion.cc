@@ -1,0 +1,103 @@
+// One leapfrog step of grains and cell under the loads that the contacts have left.
+#include <algorithm>
+#include <cmath>
+
+#include "dem/contact/simd.h"
+#include "dem/dynamics/assembly.h"
+#include "dem/dynamics/chunks.h"
+
+namespace calib::dem {
+namespace {
+
+/// Largest squared distance between centres and the affine image of where they were; NaN if there
+/// is one.
+CALIB_DEM_CLONES double LargestShift2(const ParticleArrays& p,
+                                      const std::array<std::vector<double>, 3>& searched,
+                                      const double* scale, std::size_t begin, std::size_t end) {
+  constexpr std::size_t kLanes = 8;
+  const double* const x = p.x.data();
+  const double* const y = p.y.data();
+  const double* const z = p.z.data();
+  const double* const x0 = searched[0].data();
+  const double* const y0 = searched[1].data();
+  const double* const z0 = searched[2].data();
+  double largest[kLanes] = {};
+  const auto shift2 = [&](std::size_t g) {
+    const double ux = x[g] - scale[0] * x0[g];
+    const double uy = y[g] - scale[1] * y0[g];
+    const double uz = z[g] - scale[2] * z0[g];
+    return ux * ux + uy * uy + uz * uz;
+  };
+  std::size_t g = begin;
+  for (; g + kLanes <= end; g += kLanes) {
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      const double u2 = shift2(g + l);
+      largest[l] = u2 <= largest[l] ? largest[l] : u2;  // a NaN enters and stays
+    }
+  }
+  double result = 0;
+  for (; g < end; ++g) {
+    const double u2 = shift2(g);
+    result = u2 <= result ? result : u2;
+  }
+  for (const double l : largest) {
+    result = l <= result ? result : l;
+  }
+  return result;
+}
+
+}  // namespace
+
+void Assembly::GatherLoads(std::size_t begin, std::size_t end) {
+  ParticleArrays& p = particles_;
+  const GrainLoad* load = loads_.data() + list_.place_row[begin];
+  for (std::size_t g = begin; g < end; ++g) {
+    const GrainLoad* const row_end = loads_.data() + list_.place_row.data()[g + 1];
+    GrainLoad sum{};
+    for (; load != row_end; ++load) {
+      for (int a = 0; a < 3; ++a) {
+        sum.force[a] += load->force[a];
+        sum.torque[a] += load->torque[a];
+      }
+    }
+    p.fx.data()[g] = sum.force[0];
+    p.fy.data()[g] = sum.force[1];
+    p.fz.data()[g] = sum.force[2];
+    p.tx.data()[g] = sum.torque[0];
+    p.ty.data()[g] = sum.torque[1];
+    p.tz.data()[g] = sum.torque[2];
+  }
+}
+
+double Assembly::MoveChunk(int chunk, const Motion& motion) {
+  const auto begin = static_cast<std::size_t>(chunk) * kGrainChunk;
+  const auto end = std::min(begin + kGrainChunk, particles_.x.size());
+  double scale[3];
+  for (int a = 0; a < 3; ++a) {
+    scale[a] = cell_.length[a] / searched_length_[a];
+  }
+  GatherLoads(begin, end);
+  AdvanceGrains(motion, static_cast<int>(begin), static_cast<int>(end), particles_);
+  return LargestShift2(particles_, searched_, scale, begin, end);
+}
+
+void Assembly::Move(const Motion& motion) {
+  for (int a = 0; a < 3; ++a) {
+    cell_.stretch[a] = motion.stretch[a];
+    cell_.length[a] += motion.dt * motion.stretch[a] * cell_.length[a];
+  }
+  last_dt_ = motion.dt;
+  const int chunks = ChunkCount(particles_.size(), kGrainChunk);
+  std::vector<double> moved2(static_cast<std::size_t>(chunks), 0.0);
+  ForEachChunk(chunks, threads_, [&](int chunk) {
+    moved2[static_cast<std::size_t>(chunk)] = MoveChunk(chunk, motion);
+  });
+  double largest = 0;
+  for (const double m : moved2) {
+    largest = m <= largest ? largest : m;
+  }
+  moved_ = std::sqrt(largest);
+  ++steps_;
+}
+
+}  // namespace calib::dem
