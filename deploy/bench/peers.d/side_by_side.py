@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times YADE, LAMMPS, LIGGGHTS and this engine on the same packings: see deploy/bench/peers.
 
-usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--quick]
+usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--only speed|evaluation] [--quick]
 Every round runs all codes once, one after the other, so that what disturbs the machine disturbs all of them; the tables
 hold medians over the rounds. Prints Markdown.
 """
@@ -204,6 +204,7 @@ def main():
     parser.add_argument("binaries")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--grains", default="1000,5000,10000")
+    parser.add_argument("--only", choices=("speed", "evaluation"), help="one of the two parts")
     parser.add_argument("--quick", action="store_true", help="few steps, one repeat: shows that all programs run")
     arguments = parser.parse_args()
     repeats = 1 if arguments.quick else arguments.repeats
@@ -213,8 +214,10 @@ def main():
         parser.error(f"no packing of {unknown} grains; there are {sorted(SKIN)}")
     with tempfile.TemporaryDirectory(prefix="calib-peers-") as folder:
         work = Work(os.path.abspath(arguments.binaries), folder, arguments.quick)
-        speed(work, grains, repeats)
-        evaluation(work, repeats)
+        if arguments.only != "evaluation":
+            speed(work, grains, repeats)
+        if arguments.only != "speed":
+            evaluation(work, repeats)
 
 
 if __name__ == "__main__":
