@@ -112,9 +112,8 @@ void AddPredictive(const DataSet& data, const StateEmulator& emulator,
   }
 }
 
-// The errors in units of the noise sd, the inferred one with kInferred, and the verdict.
-void Judge(const EmulatorOptions& options, const TrainedEmulator& trained,
-           const ScorePrediction& prediction, double noise_variance, EmulatedResult& result) {
+// The errors in units of the noise sd, the inferred one with kInferred.
+void StateErrors(const TrainedEmulator& trained, double noise_variance, EmulatedResult& result) {
   const CrossValidation& check = trained.emulator.cross_validation();
   const double unit = std::sqrt(noise_variance);
   result.cross_validated_error = check.rms / unit;
@@ -122,10 +121,27 @@ void Judge(const EmulatorOptions& options, const TrainedEmulator& trained,
       check.error.colwise().norm() / (unit * std::sqrt(static_cast<double>(check.error.rows())));
   result.scatter = check.scatter_rms / unit;
   result.calibration = check.calibration;
-  const auto readings = static_cast<double>(check.error.cols());
-  result.emulator_sd = std::sqrt(prediction.sd.squaredNorm() /
-                                 (static_cast<double>(prediction.sd.rows()) * readings)) /
-                       unit;
+  result.runs = trained.runs;
+  result.components = static_cast<int>(trained.emulator.components().basis.cols());
+  result.local = trained.local;
+}
+
+// Of no use anywhere: not one prior draw lies where the emulator knows the model's history.
+EmulatedResult KnowsNothing(const EmulatorOptions& options, const TrainedEmulator& trained) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  EmulatedResult result;
+  StateErrors(trained, 1, result);
+  result.log_evidence = result.log_evidence_se = result.emulator_sd = kNone;
+  result.reason = absl::StrFormat(
+      "Nowhere in the prior does an emulator of %d runs know the mean history of the model to "
+      "within %g standard deviations of the readings' noise: run more samples, or fewer "
+      "parameters.",
+      trained.runs, options.max_error);
+  return result;
+}
+
+// The verdict.
+void Judge(const EmulatorOptions& options, EmulatedResult& result) {
   const double shared = options.training.scatter_share * result.scatter * result.scatter;
   const double uncovered = std::sqrt(
       std::max(0.0, result.cross_validated_error * result.cross_validated_error - shared));
@@ -198,6 +214,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
   if (!likelihood.ok()) return likelihood.status();
 
   const auto d = static_cast<Index>(priors.size());
+  int known = 0;  // points sampled where the emulator knows the model's history
   std::vector<Prior> sampled(priors.begin(), priors.end());
   if (options.noise == NoiseMode::kInferred) {
     // An inverse gamma of shape and rate 1/2 is the law of 1 / z^2, z standard normal.
@@ -216,16 +233,22 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
         Eigen::VectorXd values = likelihood->LogLikelihood(prediction, Factors(points, d));
         // Where no run has been, nothing can be said: a model that fits nowhere would otherwise
         // prefer the corner of which the emulator knows least.
-        const double most = options.max_error * options.max_error *
-                            static_cast<double>(data.readings.size());
+        const double most =
+            options.max_error * options.max_error * static_cast<double>(data.readings.size());
         for (Index i = 0; i < values.size(); ++i) {
           if (prediction.sd.row(i).squaredNorm() > most) {
             values[i] = -std::numeric_limits<double>::infinity();
+          } else {
+            ++known;
           }
         }
         return values;
       },
       stop);
+  // The sampler needs two to begin with.
+  if (!state.ok() && known < 2 && absl::IsFailedPrecondition(state.status())) {
+    return KnowsNothing(options, *trained);
+  }
   if (!state.ok()) return state.status();
 
   EmulatedResult result;
@@ -250,12 +273,14 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
     }
     noise_variance = result.variance_factors.mean();
   }
-  result.runs = trained->runs;
-  result.components = static_cast<int>(trained->emulator.components().basis.cols());
-  result.local = trained->local;
+  StateErrors(*trained, noise_variance, result);
   const ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, result.draws));
+  result.emulator_sd =
+      std::sqrt(prediction.sd.squaredNorm() /
+                (static_cast<double>(n) * static_cast<double>(data.readings.size()))) /
+      std::sqrt(noise_variance);
   AddPredictive(data, trained->emulator, prediction, options.seed, result);
-  Judge(options, *trained, prediction, noise_variance, result);
+  Judge(options, result);
   return result;
 }
 

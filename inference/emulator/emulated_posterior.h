@@ -66,7 +66,9 @@ struct EmulatedResult {
   int components = 0;
   bool local = false;  ///< see TrainedEmulator
   /// False: the emulator is not good enough for an interval; report no posterior (converged:
-  /// false). `reason` then says why and what helps, in a sentence.
+  /// false). `reason` then says why and what helps, in a sentence. Where it knows the model's
+  /// history nowhere in the prior, nothing has been sampled: draws, parameters, correlation and the
+  /// predictive histories are empty, the evidence is NaN.
   bool adequate = false;
   std::string reason;
 };

@@ -12,16 +12,27 @@
 namespace calib::dem {
 namespace {
 
-Model BenchModel(bool moments) {
-  Model model = moments ? test::LinearModel() : test::HertzModel();
-  if (moments) {
+enum class Law { kHertz, kHertzRolling, kLinearMoments };
+
+Model BenchModel(Law law) {
+  if (law == Law::kHertz) {
+    return test::HertzModel();
+  }
+  Model model = law == Law::kHertzRolling ? test::HertzModel() : test::LinearModel();
+  if (law == Law::kHertzRolling) {  // as deploy/bench/peers gives it to other codes
     model.parameters = {
-        {"young_modulus", 1e9}, {"poisson_ratio", 0.25}, {"friction_coefficient", 0.5}};
-    model.effects = {"rolling_resistance", "twisting_resistance"};
-    for (const std::string& effect : model.effects) {
-      model.parameters[effect + ".stiffness"] = 0.13;
-      model.parameters[effect + ".friction"] = 0.13;
-    }
+        {"young_modulus", 7e9}, {"poisson_ratio", 0.2}, {"friction_coefficient", 0.5}};
+    model.effects = {"rolling_resistance"};
+    model.parameters["rolling_resistance.stiffness_ratio"] = 0.7;
+    model.parameters["rolling_resistance.friction"] = 0.13;
+    return model;
+  }
+  model.parameters = {
+      {"young_modulus", 1e9}, {"poisson_ratio", 0.25}, {"friction_coefficient", 0.5}};
+  model.effects = {"rolling_resistance", "twisting_resistance"};
+  for (const std::string& effect : model.effects) {
+    model.parameters[effect + ".stiffness"] = 0.13;
+    model.parameters[effect + ".friction"] = 0.13;
   }
   return model;
 }
@@ -41,8 +52,8 @@ const Packing& PackingOf(int grains) {
 }
 
 /// Dense at 0.5 MPa, then compressed along z at 0.1/s: every iteration is one step of the engine.
-void ContactUpdates(benchmark::State& state, bool moments) {
-  const Model model = BenchModel(moments);
+void ContactUpdates(benchmark::State& state, Law law) {
+  const Model model = BenchModel(law);
   const int threads = static_cast<int>(state.range(1));
   Assembly assembly(PackingOf(static_cast<int>(state.range(0))), model.density, ContactModel(model),
                     threads);
@@ -82,8 +93,9 @@ void Arguments(benchmark::internal::Benchmark* bench) {
   bench->UseRealTime();
 }
 
-BENCHMARK_CAPTURE(ContactUpdates, hertz, false)->Apply(Arguments);
-BENCHMARK_CAPTURE(ContactUpdates, linear_moments, true)->Apply(Arguments);
+BENCHMARK_CAPTURE(ContactUpdates, hertz, Law::kHertz)->Apply(Arguments);
+BENCHMARK_CAPTURE(ContactUpdates, hertz_rolling, Law::kHertzRolling)->Apply(Arguments);
+BENCHMARK_CAPTURE(ContactUpdates, linear_moments, Law::kLinearMoments)->Apply(Arguments);
 
 }  // namespace
 }  // namespace calib::dem

@@ -159,9 +159,12 @@ TEST(EmulatedPosterior, RecognisesTooFewRuns) {
     runs.predictions.row(i) = toy.Run(runs.parameters.row(i), 1, static_cast<std::uint64_t>(i));
   const DataSet data = toy.Measure(Eigen::VectorXd::Constant(5, 0.4), 0.002, 1);
   const auto result = EmulatedPosterior(toy.Priors(), data, {.seed = 1}, {&runs, 1});
-  ASSERT_TRUE(result.ok());
+  ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_FALSE(result->adequate);
-  EXPECT_FALSE(result->reason.empty());
+  EXPECT_NE(result->reason.find("Nowhere in the prior"), std::string::npos) << result->reason;
+  EXPECT_EQ(result->draws.rows(), 0);
+  EXPECT_TRUE(std::isnan(result->log_evidence));
+  EXPECT_EQ(result->runs, 12);
 }
 
 }  // namespace

@@ -1,0 +1,221 @@
+#!/usr/bin/env python3
+"""Times YADE, LAMMPS, LIGGGHTS and this engine on the same packings: see deploy/bench/peers.
+
+usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--quick]
+Every round runs all codes once, one after the other, so that what disturbs the machine disturbs all of them; the tables
+hold medians over the rounds. Prints Markdown.
+"""
+import argparse
+import csv
+import json
+import os
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+DATA = os.path.join(os.environ["CALIB_DATA"], "toyoura_triaxial")
+THREADS = (1, 2)
+SKIN = {1000: 2e-4, 5000: 1e-4, 10000: 8e-5}  # m, near the fastest of LAMMPS and LIGGGHTS
+STEP = {1000: 4e-5, 5000: 1.5e-5, 10000: 1e-5}  # s, of LAMMPS and LIGGGHTS
+
+
+def run(command, environment=None):
+    """Runs to the end; wall time [s], largest resident memory [MiB], output. Ends the program with the output on failure."""
+    start = time.time()
+    with tempfile.TemporaryFile("w+") as output:
+        child = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+            env={**os.environ, **(environment or {})})
+        _, status, usage = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        wall = time.time() - start
+        output.seek(0)
+        text = output.read()
+    if child.returncode != 0:
+        sys.exit(f"{' '.join(command)} ended with {child.returncode}:\n{text[-2000:]}")
+    return wall, usage.ru_maxrss / 1024, text
+
+
+class Work:
+    def __init__(self, binaries, folder, quick):
+        self.binaries, self.folder, self.quick = binaries, folder, quick
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def packing(self, grains):
+        return os.path.join(DATA, f"packing_{grains}.txt")
+
+    def steps(self, grains):
+        return (400 if self.quick else 4000) * 1000 // grains
+
+    def yade(self, grains, threads):
+        out = self.path(f"dense_{grains}")
+        _, memory, _ = run(["yade", "-n", "-x", f"-j{threads}", os.path.join(HERE, "yade_dense.py"), self.packing(grains),
+                            out, str(self.steps(grains))])
+        with open(out + ".json") as file:
+            timed = json.load(file)
+        return timed["contacts"] * timed["steps"] / timed["wall"] / 1e6, memory
+
+    def data_file(self, grains):
+        """The dense state as LAMMPS and LIGGGHTS read it."""
+        path = self.path(f"dense_{grains}.data")
+        if not os.path.exists(path):
+            with open(self.path(f"dense_{grains}.geometry")) as file:
+                count, *lengths, _ = file.readline().split()
+                grains_at = [line.split() for line in file]
+            with open(path, "w") as file:
+                print(f"dense state\n\n{count} atoms\n1 atom types\n", file=file)
+                for length, axis in zip(lengths, "xyz"):
+                    print(f"0 {length} {axis}lo {axis}hi", file=file)
+                print("\nAtoms\n", file=file)
+                for number, (x, y, z, radius) in enumerate(grains_at, 1):
+                    print(number, 1, 2 * float(radius), 2650000, x, y, z, file=file)
+        return path
+
+    def lammps_like(self, program, script, grains, threads):
+        steps = 10 * self.steps(grains)
+        command = [program, "-in", os.path.join(HERE, script), "-log", "none", "-var", "data", self.data_file(grains),
+                   "-var", "skin", str(SKIN[grains]), "-var", "dt", str(STEP[grains]), "-var", "steps", str(steps)]
+        if threads > 1:
+            command = ["mpirun", "--allow-run-as-root", "--bind-to", "core", "-np", str(threads)] + command
+        _, memory, text = run(command, {"OMP_NUM_THREADS": "1"})
+        loop = [float(word) for word in re.findall(r"^Loop time of ([\d.eE+-]+)", text, re.M)][-1]
+        rows = [line.split() for line in text.splitlines() if re.fullmatch(r"\s*\d+(\s+[\d.eE+-]+){2,}\s*", line)]
+        rows = [row for row in rows if len(row) == 3][-2:]
+        twice = statistics.mean(float(row[2]) for row in rows)
+        return 0.5 * twice * steps / loop / 1e6, memory
+
+    def ours(self, grains, threads):
+        _, memory, text = run(
+            [os.path.join(self.binaries, "dem_bench"), f"--benchmark_filter=ContactUpdates/hertz_rolling/{grains}/{threads}/",
+             "--benchmark_format=json", f"--benchmark_min_time={0.3 if self.quick else 1.5}"],
+            {"OMP_WAIT_POLICY": "active"})
+        found = json.loads(text[text.index("{"):])["benchmarks"][0]
+        return found["contact_updates/s"] / 1e6, memory
+
+    def rate(self, code, grains, threads):
+        if code == "YADE":
+            return self.yade(grains, threads)
+        if code == "LAMMPS":
+            return self.lammps_like("lmp", "dense.lammps", grains, threads)
+        if code == "LIGGGHTS":
+            return self.lammps_like("liggghts", "dense.liggghts", grains, threads)
+        return self.ours(grains, threads)
+
+    def yade_evaluation(self, repeat):
+        out = self.path("triaxial_yade.txt")
+        wall, _, _ = run(["yade", "-n", "-x", "-j1", os.path.join(HERE, "yade_triaxial.py"), self.packing(1000), out, str(repeat)])
+        with open(out) as file:
+            rows = [[float(word) for word in line.split()] for line in file]
+        return rows[-1][4], int(rows[-1][3]), [row[2] for row in rows], [row[1] for row in rows]
+
+    def our_evaluation(self, repeat):
+        campaign, out = self.path("triaxial.yaml"), self.path("triaxial.csv")
+        with open(self.path("packing.txt"), "w") as file, open(self.packing(1000)) as source:
+            file.write(source.readline())
+            for line in source:
+                words = line.split()
+                if words:
+                    moved = [repr(float(x) * (1 + 1e-9 * ((repeat * 7919 + 31 * k) % 97) / 97)) for k, x in enumerate(words[:3])]
+                    print(*moved, *words[3:], file=file)
+        with open(self.path("triaxial_data.csv"), "w") as file:
+            print("axial_strain,stress_ratio,volumetric_strain", file=file)
+            for stage in range(1, 51):
+                print(0.004 * stage, 3, 0, sep=",", file=file)
+        with open(campaign, "w") as file:
+            file.write("""name: complete evaluation
+model:
+  contact: linear
+  effects: [rolling_resistance, twisting_resistance]
+  density: 2650000 kg/m^3
+  fixed: {young_modulus: 1 GPa, poisson_ratio: 0.25, rolling_resistance.stiffness: 0.13, rolling_resistance.friction: 0.13,
+          twisting_resistance.stiffness: 0.13, twisting_resistance.friction: 0.13}
+parameters: {friction_angle: {prior: uniform, min: 10 deg, max: 45 deg}}
+experiments:
+  - name: triaxial
+    test: triaxial_drained
+    confining_pressure: 0.5 MPa
+    packing: {file: packing.txt}
+    data: {file: triaxial_data.csv, strain: logarithmic}
+    control: axial_strain
+    staging: {rate: 0.1 1/s, step: 0.004, damping: [0.2, 0.9], unbalanced: 1e-3}
+    observables: {stress_ratio: {noise: {absolute: 0.1}}, volumetric_strain: {noise: {absolute: 1e-3}}}
+""")
+        wall, _, _ = run([os.path.join(self.binaries, "calibctl"), "simulate", campaign, "--set", "friction_angle=29deg", "-o", out],
+                         {"OMP_NUM_THREADS": "1"})
+        with open(out) as file:
+            rows = list(csv.DictReader(file))
+        return wall, None, [float(row["stress_ratio"]) for row in rows], [float(row["volumetric_strain"]) for row in rows]
+
+
+def speed(work, grains_list, repeats):
+    codes = ("YADE", "LAMMPS", "LIGGGHTS", "calib")
+    found = {}
+    for repeat in range(repeats):
+        for grains in grains_list:
+            for threads in THREADS:
+                for code in codes:
+                    rate, memory = work.rate(code, grains, threads)
+                    found.setdefault((code, grains, threads), []).append((rate, memory))
+                    print(f"round {repeat + 1}, {grains} grains, {threads} threads, {code}: {rate:.2f}", file=sys.stderr, flush=True)
+    median = {key: statistics.median(rate for rate, _ in values) for key, values in found.items()}
+    print(f"\nHertz-Mindlin with rolling resistance, million contact updates per second of wall time, medians of {repeats}:\n")
+    print("| grains | threads | " + " | ".join(codes) + " | calib / fastest peer | calib / YADE | calib against its one thread |")
+    print("|---" * (len(codes) + 5) + "|")
+    for grains in grains_list:
+        for threads in THREADS:
+            values = [median[code, grains, threads] for code in codes]
+            print(f"| {grains} | {threads} | " + " | ".join(f"{value:.2f}" for value in values)
+                  + f" | {values[3] / max(values[:3]):.2f} | {values[3] / values[0]:.1f} | {values[3] / median['calib', grains, 1]:.2f} |")
+    print("\nLargest resident memory of one process, MiB, one thread:\n")
+    print("| grains | " + " | ".join(codes) + " |")
+    print("|---" * (len(codes) + 1) + "|")
+    for grains in grains_list:
+        print(f"| {grains} | " + " | ".join(
+            f"{statistics.median(memory for _, memory in found[code, grains, 1]):.0f}" for code in codes) + " |")
+
+
+def evaluation(work, repeats):
+    rows = {"YADE": [], "calib": []}
+    for repeat in range(repeats):
+        rows["YADE"].append(work.yade_evaluation(repeat))
+        rows["calib"].append(work.our_evaluation(repeat))
+        print(f"evaluation {repeat + 1}: YADE {rows['YADE'][-1][0]:.1f} s, calib {rows['calib'][-1][0]:.1f} s", file=sys.stderr, flush=True)
+    print(f"\nOne drained triaxial evaluation, 1000 grains, linear contacts with rolling and twisting, 50 stages to 20 %, one thread, "
+          f"{repeats} repeats of shifted grains:\n")
+    print("| | wall time, median [s] | peak stress ratio, mean (least .. largest) | mean over 16-20 % | volumetric strain at 20 % |")
+    print("|---|---|---|---|---|")
+    for code, values in rows.items():
+        peaks, late, volume = ([max(v[2]) for v in values], [statistics.mean(v[2][40:]) for v in values], [v[3][-1] for v in values])
+        print(f"| {code} | {statistics.median(v[0] for v in values):.2f} | " + " | ".join(
+            f"{statistics.mean(x):.{digits}f} ({min(x):.{digits}f} .. {max(x):.{digits}f})"
+            for x, digits in ((peaks, 2), (late, 2), (volume, 4))) + " |")
+    ratio = statistics.median(y[0] / c[0] for y, c in zip(rows["YADE"], rows["calib"]))
+    print(f"\nratio of wall times, median of pairs: {ratio:.1f}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("binaries")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--grains", default="1000,5000,10000")
+    parser.add_argument("--quick", action="store_true", help="few steps, one repeat: shows that all programs run")
+    arguments = parser.parse_args()
+    repeats = 1 if arguments.quick else arguments.repeats
+    grains = [int(word) for word in arguments.grains.split(",")]
+    unknown = sorted(set(grains) - set(SKIN))
+    if unknown:
+        parser.error(f"no packing of {unknown} grains; there are {sorted(SKIN)}")
+    with tempfile.TemporaryDirectory(prefix="calib-peers-") as folder:
+        work = Work(os.path.abspath(arguments.binaries), folder, arguments.quick)
+        speed(work, grains, repeats)
+        evaluation(work, repeats)
+
+
+if __name__ == "__main__":
+    main()
