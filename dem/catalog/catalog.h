@@ -48,6 +48,7 @@ struct ParameterInfo {
   double min = 0;         ///< smallest admissible value [unit]
   double max = 0;         ///< largest admissible value [unit]; may be infinite
   bool min_open = false;  ///< min itself is not admissible
+  bool whole = false;     ///< only whole numbers are admissible
   DefaultPrior default_prior;
   std::optional<double>
       default_value;           ///< used when neither calibrated nor fixed; empty: must be given

@@ -23,7 +23,9 @@
 #include "dem/effects/viscous_damping.h"
 #include "dem/lab_tests/isotropic.h"
 #include "dem/lab_tests/oedometric.h"
+#include "dem/lab_tests/simple_shear.h"
 #include "dem/lab_tests/triaxial_drained.h"
+#include "dem/lab_tests/triaxial_undrained.h"
 
 namespace calib::dem {
 
@@ -55,8 +57,8 @@ std::span<const EffectEntry> EffectEntries() {
 }
 
 std::span<const ElementTestEntry> ElementTestEntries() {
-  static const std::vector<ElementTestEntry> entries = {Isotropic(), Oedometric(),
-                                                        TriaxialDrained()};
+  static const std::vector<ElementTestEntry> entries = {
+      Isotropic(), Oedometric(), TriaxialDrained(), TriaxialUndrained(), SimpleShear()};
   return entries;
 }
 

@@ -23,6 +23,7 @@ struct alignas(64) ContactBlock {
   double sliding_friction = 0;  ///< tan(phi_mu), or what replaces it during consolidation [-] >= 0
   double viscous = 1;           ///< 1: viscous effects act; 0: not, as during consolidation
   double stretch[3] = {0, 0, 0};  ///< homogeneous velocity gradient of the cell, diagonal [1/s]
+  double shear = 0;               ///< its component dvx/dz [1/s]
 
   // Set by the caller per contact.
   int pair[kBlock];         ///< slot in the neighbour list

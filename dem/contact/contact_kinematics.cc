@@ -11,6 +11,7 @@ CALIB_DEM_CLONES void ComputeKinematics(ContactBlock& b) {
   const double lx = b.stretch[0];
   const double ly = b.stretch[1];
   const double lz = b.stretch[2];
+  const double shear = b.shear;
   for (int k = 0; k < kBlock; ++k) {
     const double ri = b.radius_i[k];
     const double rj = b.radius_j[k];
@@ -26,7 +27,7 @@ CALIB_DEM_CLONES void ComputeKinematics(ContactBlock& b) {
     b.overlap[k] = sum - distance;
     b.effective_radius[k] = ri * rj / sum;
 
-    const double vx = b.vx[k] + lx * b.dx[k];
+    const double vx = b.vx[k] + lx * b.dx[k] + shear * b.dz[k];
     const double vy = b.vy[k] + ly * b.dy[k];
     const double vz = b.vz[k] + lz * b.dz[k];
     const double vn = nx * vx + ny * vy + nz * vz;

@@ -49,6 +49,9 @@ class Assembly {
   /// Sets one cell length exactly, after a Move that reached it up to rounding.
   void SetLength(int axis, double length) { cell_.length[axis] = length; }
 
+  /// The same for the displacement of the top along x.
+  void SetDisplacement(double displacement) { cell_.displacement = displacement; }
+
   /// Stiffnesses of the present contacts; their memory is not touched. Errors: OUT_OF_RANGE when
   /// two grains overlap by more than half the smaller radius: the model is too soft for the stress.
   [[nodiscard]] absl::Status EstimateStiffness(StiffnessEstimate& estimate) const;
@@ -90,6 +93,9 @@ class Assembly {
 
   /// Love-Weber stress sum_c f_a d_a / V of the last EvaluateForces, compression positive [Pa].
   [[nodiscard]] const std::array<double, 3>& stress() const { return stress_; }
+  /// Its component xz (mean of xz and zx), positive where the top is pushed along +x by what is
+  /// below: shearing the top along +x against friction makes it positive [Pa].
+  [[nodiscard]] double shear_stress() const { return shear_stress_; }
   [[nodiscard]] std::int64_t contacts() const { return contacts_; }
   [[nodiscard]] double solid_volume() const { return solid_volume_; }
   [[nodiscard]] double mean_diameter() const { return mean_diameter_; }
@@ -102,6 +108,7 @@ class Assembly {
  private:
   struct ChunkSums {
     double stress[3] = {0, 0, 0};
+    double shear = 0;
     std::int64_t contacts = 0;
   };
 
@@ -114,6 +121,7 @@ class Assembly {
   void GatherLoads(std::size_t begin, std::size_t end);
   double MoveChunk(int chunk, const Motion& motion);
   [[nodiscard]] bool ListMayMissPairs() const;
+  [[nodiscard]] double ShearSinceSearch() const;
 
   PeriodicCell cell_;
   ParticleArrays particles_;
@@ -127,6 +135,7 @@ class Assembly {
   NeighborList list_;
   std::array<std::vector<double>, 3> searched_;  ///< centres at the last search
   double searched_length_[3] = {0, 0, 0};
+  double searched_tilt_ = 0;
   double moved_ = 0;  ///< largest non-affine displacement since the last search [m]
   double skin_ = 0;
   double largest_radius_ = 0;
@@ -137,6 +146,7 @@ class Assembly {
   std::array<std::array<double, 3>, kImages> shift_{};  ///< translation of each image now [m]
   std::vector<ChunkSums> sums_;
   std::array<double, 3> stress_ = {0, 0, 0};
+  double shear_stress_ = 0;
   std::int64_t contacts_ = 0;
 
   double solid_volume_ = 0;

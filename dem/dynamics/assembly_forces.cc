@@ -48,14 +48,17 @@ absl::Status Assembly::EvaluateForces() {
     for (std::size_t a = 0; a < 3; ++a) {
       shift_[static_cast<std::size_t>(code)][a] = s[a] * cell_.length[a];
     }
+    shift_[static_cast<std::size_t>(code)][0] += s[2] * cell_.Tilt();
   }
   ForEachChunk(static_cast<int>(sums_.size()), threads_,
                [this](int chunk) { EvaluateChunk(chunk); });
   stress_ = {0, 0, 0};
+  shear_stress_ = 0;
   contacts_ = 0;
   const double volume = cell_.Volume();
   for (const ChunkSums& sums : sums_) {
     contacts_ += sums.contacts;
+    shear_stress_ -= sums.shear;
     for (std::size_t a = 0; a < 3; ++a) {
       stress_[a] += sums.stress[a];
     }
@@ -63,6 +66,7 @@ absl::Status Assembly::EvaluateForces() {
   for (double& s : stress_) {
     s /= volume;
   }
+  shear_stress_ /= volume;
   contact_updates_ += contacts_;
   return absl::OkStatus();
 }
@@ -146,6 +150,7 @@ void Assembly::EvaluateChunk(int chunk) {
   block.sliding_friction = sliding_friction_;
   block.viscous = viscous_ ? 1.0 : 0.0;
   std::copy(std::begin(cell_.stretch), std::end(cell_.stretch), std::begin(block.stretch));
+  block.shear = cell_.shear;
   ChunkSums sums;
   for (int a = 0; a < count; ++a) {
     LoadLane(active[a], block);
@@ -180,6 +185,7 @@ void Assembly::StoreBlock(ContactBlock& b, ChunkSums& sums) {
     sums.stress[0] += fx * b.dx[k];
     sums.stress[1] += fy * b.dy[k];
     sums.stress[2] += fz * b.dz[k];
+    sums.shear += 0.5 * (fx * b.dz[k] + fz * b.dx[k]);
     sums.contacts += reach_ > 0 && !overlaps ? 0 : 1;
     touching_.data()[slot] = 1;
     double* const remembered = history_.data() + static_cast<std::ptrdiff_t>(slot) * width;

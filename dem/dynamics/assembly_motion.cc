@@ -13,7 +13,8 @@ namespace {
 /// is one.
 CALIB_DEM_CLONES double LargestShift2(const ParticleArrays& p,
                                       const std::array<std::vector<double>, 3>& searched,
-                                      const double* scale, std::size_t begin, std::size_t end) {
+                                      const double* scale, double shear, std::size_t begin,
+                                      std::size_t end) {
   constexpr std::size_t kLanes = 8;
   const double* const x = p.x.data();
   const double* const y = p.y.data();
@@ -23,7 +24,7 @@ CALIB_DEM_CLONES double LargestShift2(const ParticleArrays& p,
   const double* const z0 = searched[2].data();
   double largest[kLanes] = {};
   const auto shift2 = [&](std::size_t g) {
-    const double ux = x[g] - scale[0] * x0[g];
+    const double ux = x[g] - scale[0] * x0[g] - shear * z0[g];
     const double uy = y[g] - scale[1] * y0[g];
     const double uz = z[g] - scale[2] * z0[g];
     return ux * ux + uy * uy + uz * uz;
@@ -78,10 +79,13 @@ double Assembly::MoveChunk(int chunk, const Motion& motion) {
   }
   GatherLoads(begin, end);
   AdvanceGrains(motion, static_cast<int>(begin), static_cast<int>(end), particles_);
-  return LargestShift2(particles_, searched_, scale, begin, end);
+  return LargestShift2(particles_, searched_, scale, ShearSinceSearch(), begin, end);
 }
 
 void Assembly::Move(const Motion& motion) {
+  cell_.shear = motion.shear;
+  cell_.displacement +=
+      motion.dt * (motion.stretch[0] * cell_.displacement + motion.shear * cell_.length[2]);
   for (int a = 0; a < 3; ++a) {
     cell_.stretch[a] = motion.stretch[a];
     cell_.length[a] += motion.dt * motion.stretch[a] * cell_.length[a];

@@ -1,5 +1,6 @@
 // When the list of neighbours may miss a pair, and carrying what contacts remember to a new one.
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "dem/dynamics/assembly.h"
@@ -12,11 +13,19 @@ bool Assembly::ListMayMissPairs() const {
   for (int a = 0; a < 3; ++a) {
     shrink = std::max(shrink, 1.0 - cell_.length[a] / searched_length_[a]);
   }
+  shrink += std::abs(ShearSinceSearch());
   // Two surfaces approach by at most both displacements and the affine shortening of their branch.
   return !(2 * moved_ + shrink * (2 * largest_radius_ + skin_) < skin_);
 }
 
+double Assembly::ShearSinceSearch() const {
+  // F_xz of the map F = H H0^-1 from the lattice of the search to that of now.
+  return (cell_.Tilt() - cell_.length[0] / searched_length_[0] * searched_tilt_) /
+         searched_length_[2];
+}
+
 absl::Status Assembly::SearchNeighbors() {
+  cell_.Reduce();
   NeighborList old = std::exchange(list_, {});
   if (auto s = BuildNeighborList(cell_, skin_, particles_, list_); !s.ok()) {
     return s;
@@ -25,6 +34,7 @@ absl::Status Assembly::SearchNeighbors() {
   searched_[1] = particles_.y;
   searched_[2] = particles_.z;
   std::copy(std::begin(cell_.length), std::end(cell_.length), std::begin(searched_length_));
+  searched_tilt_ = cell_.Tilt();
   moved_ = 0;
 
   const auto slots = static_cast<std::size_t>(list_.size());

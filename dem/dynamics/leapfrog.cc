@@ -36,6 +36,14 @@ CALIB_DEM_CLONES void Drift(const double* __restrict v, double stretch, double d
   }
 }
 
+/// The share of x in the shear of the cell.
+CALIB_DEM_CLONES void ShearDrift(const double* __restrict z, double shear, double dt, int begin,
+                                 int end, double* __restrict x) {
+  for (int g = begin; g < end; ++g) {
+    x[g] += dt * (shear * z[g]);
+  }
+}
+
 }  // namespace
 
 void AdvanceGrains(const Motion& motion, int begin, int end, ParticleArrays& p) {
@@ -52,6 +60,9 @@ void AdvanceGrains(const Motion& motion, int begin, int end, ParticleArrays& p) 
   }
   Drift(p.vx.data(), motion.stretch[0], motion.dt, begin, end, p.x.data());
   Drift(p.vy.data(), motion.stretch[1], motion.dt, begin, end, p.y.data());
+  if (motion.shear != 0) {  // z is still that of the beginning of the step
+    ShearDrift(p.z.data(), motion.shear, motion.dt, begin, end, p.x.data());
+  }
   Drift(p.vz.data(), motion.stretch[2], motion.dt, begin, end, p.z.data());
 }
 

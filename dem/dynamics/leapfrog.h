@@ -8,6 +8,7 @@ namespace calib::dem {
 /// How the cell and the grains move during one time step.
 struct Motion {
   double stretch[3] = {0, 0, 0};  ///< velocity gradient of the cell, compression negative [1/s]
+  double shear = 0;               ///< velocity gradient dvx/dz [1/s]
   double dt = 0;                  ///< [s] > 0
   double damping = 0;             ///< local damping, 0 .. 1 [-]
 };

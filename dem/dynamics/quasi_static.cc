@@ -27,12 +27,12 @@ bool Drives(const CellTarget& target, const PeriodicCell& cell) {
       return true;
     }
   }
-  return false;
+  return target.displacement != cell.displacement;
 }
 
-/// Largest relative change of length that the driven axes still have before them.
+/// Largest relative change of length, or shear strain, that is still to be driven.
 double FurthestToGo(const CellTarget& target, const PeriodicCell& cell) {
-  double furthest = 0;
+  double furthest = std::abs(target.displacement - cell.displacement) / cell.length[2];
   for (std::size_t a = 0; a < 3; ++a) {
     if (target[a].mode == AxisTarget::Mode::kLength) {
       furthest = std::max(furthest, std::abs(target[a].value / cell.length[a] - 1.0));
@@ -123,11 +123,20 @@ StageEnd QuasiStatic::Step(const CellTarget& target, double damping, double max_
     reached[a] = std::abs(remaining) <= largest;
     motion.stretch[a] = std::clamp(remaining, -largest, largest) / dt_;
   }
+  const double shear = (target.displacement - cell.displacement) / cell.length[2];
+  const double shear_limit =
+      options_.rate * dt_ * (furthest > 0 ? std::abs(shear) / furthest : 1.0);
+  const bool sheared = std::abs(shear) <= shear_limit;
+  motion.shear = std::clamp(shear, -shear_limit, shear_limit) / dt_ -
+                 motion.stretch[0] * cell.displacement / cell.length[2];
   assembly_->Move(motion);
   for (std::size_t a = 0; a < 3; ++a) {
     if (reached[a]) {  // the last step ends at the target exactly, without rounding
       assembly_->SetLength(static_cast<int>(a), target[a].value);
     }
+  }
+  if (sheared) {
+    assembly_->SetDisplacement(target.displacement);
   }
   if (auto s = assembly_->EvaluateForces(); !s.ok()) {
     return Diverge(std::string(s.message()));

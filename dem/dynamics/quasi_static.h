@@ -19,11 +19,15 @@ struct AxisTarget {
   Mode mode = Mode::kLength;
   double value = 0;  ///< [m] or [Pa]
 };
-using CellTarget = std::array<AxisTarget, 3>;
+
+/// Goals of the axes x, y, z and the displacement of the top along x to reach exactly [m].
+struct CellTarget : std::array<AxisTarget, 3> {
+  double displacement = 0;
+};
 
 /// How stages are walked.
 struct StageOptions {
-  double rate = 0.1;              ///< logarithmic strain rate of the driven axes [1/s] > 0
+  double rate = 0.1;  ///< logarithmic strain rate of the driven axes, or shear rate [1/s] > 0
   double damping_loading = 0.2;   ///< local damping while moving [-], 0 .. 1
   double damping_settling = 0.9;  ///< while settling [-], 0 .. 1
   double unbalanced =

@@ -29,7 +29,7 @@ EffectEntry ApparatusCompliance() {
                    .reference = "Jardine, Symes & Burland, Geotechnique 34 (1984) 323",
                    .two_sided = false,
                    .rays = {{.parameter = "compliance", .steps = {0.1, 0.5}}},
-                   .excited_by = {"triaxial_drained", "oedometric"}},
+                   .excited_by = {"triaxial_drained", "triaxial_undrained", "oedometric"}},
           .alter = &Alter};
 }
 

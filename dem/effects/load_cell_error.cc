@@ -43,7 +43,7 @@ EffectEntry LoadCellError() {
                    .two_sided = true,
                    .rays = {{.parameter = "gain", .steps = {0.05, 0.15}},
                             {.parameter = "offset", .steps = {0.03, 0.1}}},
-                   .excited_by = {"triaxial_drained", "oedometric"}},
+                   .excited_by = {"triaxial_drained", "triaxial_undrained", "oedometric"}},
           .alter = &Alter};
 }
 

@@ -29,7 +29,7 @@ EffectEntry MembraneStiffness() {
                    .reference = "Henkel & Gilbert, Geotechnique 3 (1952) 20",
                    .two_sided = false,
                    .rays = {{.parameter = "stiffness", .steps = {0.5, 2}}},
-                   .excited_by = {"triaxial_drained"}},
+                   .excited_by = {"triaxial_drained", "triaxial_undrained"}},
           .alter = &Alter};
 }
 

@@ -43,7 +43,7 @@ EffectEntry StrainOffset() {
                "(1991) 169",
            .two_sided = false,
            .rays = {{.parameter = "offset", .steps = {0.1, 0.4}, .held = {{"stress", 0.3}}}},
-           .excited_by = {"triaxial_drained", "oedometric"}},
+           .excited_by = {"triaxial_drained", "triaxial_undrained", "oedometric"}},
       .alter = &Alter};
 }
 

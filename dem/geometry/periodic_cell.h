@@ -1,6 +1,8 @@
 #pragma once
-// The orthorhombic periodic cell: three lengths and the homogeneous velocity gradient that changes
-// them.
+// The periodic cell: three lengths, one shear of z planes along x, and the homogeneous velocity
+// gradient that changes them.
+
+#include <cmath>
 
 namespace calib::dem {
 
@@ -12,12 +14,23 @@ inline constexpr int ImageCode(int sx, int sy, int sz) {
   return (sx + 1) + 3 * (sy + 1) + 9 * (sz + 1);
 }
 
+/// Lattice vectors (Lx, 0, 0), (0, Ly, 0), (tilt, 0, Lz). Adding whole lengths Lx to the tilt gives
+/// the same lattice: images are found in the least tilted description, Tilt().
 struct PeriodicCell {
-  double length[3] = {0, 0, 0};  ///< [m]
-  double stretch[3] = {0, 0,
-                       0};  ///< velocity gradient of the last move, compression negative [1/s]
+  double length[3] = {0, 0, 0};   ///< [m]
+  double stretch[3] = {0, 0, 0};  ///< diagonal velocity gradient of the last move, compression
+                                  ///< negative [1/s]
+  double displacement = 0;        ///< of the top against the bottom along x, all of it [m]
+  double shear = 0;               ///< velocity gradient dvx/dz of the last move [1/s]
+  int turns = 0;                  ///< lengths Lx of the displacement that the images leave out
 
   [[nodiscard]] double Volume() const { return length[0] * length[1] * length[2]; }
+
+  /// x component of the third lattice vector, |tilt| <= Lx/2 after Reduce() [m].
+  [[nodiscard]] double Tilt() const { return displacement - turns * length[0]; }
+
+  /// Chooses the least tilted lattice; to be followed by a search of neighbours.
+  void Reduce() { turns = static_cast<int>(std::lround(displacement / length[0])); }
 };
 
 }  // namespace calib::dem

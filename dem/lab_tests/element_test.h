@@ -19,12 +19,17 @@ struct AxisGoal {
                      ///< compression positive
 };
 
-using CellGoal = std::array<AxisGoal, 3>;  ///< x, y lateral; z axial
+/// x, y lateral; z axial; and the displacement of the top along x over the height at the end of
+/// consolidation [-].
+struct CellGoal : std::array<AxisGoal, 3> {
+  double shear_strain = 0;
+};
 
 /// What a plan may know beside the control target.
 struct ElementTestContext {
   std::map<std::string, double> settings;  ///< of the test, defaults filled in
   double lateral_stress = 0;               ///< at the end of consolidation [Pa]
+  double axial_stress = 0;                 ///< the same [Pa]
 };
 
 /// Goal of the cell for one value of the control observable. Pure.

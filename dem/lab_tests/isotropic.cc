@@ -5,7 +5,7 @@ namespace {
 
 CellGoal Plan(const ElementTestContext& /*context*/, double mean_stress) {
   const AxisGoal goal{.mode = AxisGoal::Mode::kStress, .value = mean_stress};
-  return {goal, goal, goal};
+  return {{goal, goal, goal}};
 }
 
 }  // namespace

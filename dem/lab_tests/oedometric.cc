@@ -5,7 +5,7 @@ namespace {
 
 CellGoal Plan(const ElementTestContext& /*context*/, double axial_strain) {
   const AxisGoal fixed{.mode = AxisGoal::Mode::kStrain, .value = 0};
-  return {fixed, fixed, AxisGoal{.mode = AxisGoal::Mode::kStrain, .value = axial_strain}};
+  return {{fixed, fixed, AxisGoal{.mode = AxisGoal::Mode::kStrain, .value = axial_strain}}};
 }
 
 }  // namespace

@@ -5,7 +5,7 @@ namespace {
 
 CellGoal Plan(const ElementTestContext& context, double axial_strain) {
   const AxisGoal lateral{.mode = AxisGoal::Mode::kStress, .value = context.lateral_stress};
-  return {lateral, lateral, AxisGoal{.mode = AxisGoal::Mode::kStrain, .value = axial_strain}};
+  return {{lateral, lateral, AxisGoal{.mode = AxisGoal::Mode::kStrain, .value = axial_strain}}};
 }
 
 }  // namespace

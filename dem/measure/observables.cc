@@ -18,6 +18,7 @@ void Derive(Measurement& m) {
   m.deviatoric_stress = m.axial_stress - m.lateral_stress;
   m.stress_ratio = m.axial_stress / m.lateral_stress;
   m.q_over_p = m.deviatoric_stress / m.mean_stress;
+  m.shear_stress_ratio = m.shear_stress / m.axial_stress;
   m.void_ratio = m.porosity / (1.0 - m.porosity);
 }
 
@@ -55,6 +56,8 @@ Measurement Measure(const Assembly& assembly, const double reference[3]) {
   m.lateral_strain = 0.5 * (strain[0] + strain[1]);
   m.axial_stress = stress[2];
   m.lateral_stress = 0.5 * (stress[0] + stress[1]);
+  m.shear_strain = cell.displacement / reference[2];
+  m.shear_stress = assembly.shear_stress();
   m.porosity = Porosity(assembly);
   Derive(m);
   m.coordination_number =
@@ -73,6 +76,10 @@ std::vector<double> Select(const Measurement& m, const std::vector<std::string>&
       {"deviatoric_stress", &Measurement::deviatoric_stress},
       {"stress_ratio", &Measurement::stress_ratio},
       {"q_over_p", &Measurement::q_over_p},
+      {"shear_strain", &Measurement::shear_strain},
+      {"shear_stress", &Measurement::shear_stress},
+      {"shear_stress_ratio", &Measurement::shear_stress_ratio},
+      {"pore_pressure", &Measurement::pore_pressure},
       {"porosity", &Measurement::porosity},
       {"void_ratio", &Measurement::void_ratio},
       {"coordination_number", &Measurement::coordination_number},

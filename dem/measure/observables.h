@@ -15,12 +15,14 @@ struct Measurement {
   double axial_strain = 0, volumetric_strain = 0, lateral_strain = 0;
   double axial_stress = 0, lateral_stress = 0, mean_stress = 0, deviatoric_stress = 0;
   double stress_ratio = 0, q_over_p = 0;
+  double shear_strain = 0, shear_stress = 0, shear_stress_ratio = 0;
+  double pore_pressure = 0;  ///< left at zero by Measure(): it needs the cell pressure
   double porosity = 0, void_ratio = 0, coordination_number = 0;
 };
 
 /// Strains from the cell, Love-Weber stresses of the last force evaluation, porosity from the sum
 /// of sphere volumes, coordination number 2 Nc/Np over all grains. axial = z. reference: three
-/// lengths [m] > 0 of zero strain.
+/// lengths [m] > 0 of zero strain; shear strain is the displacement of the top over reference[2].
 Measurement Measure(const Assembly& assembly, const double reference[3]);
 
 /// The measurement as the laboratory reads it through an apparatus that loads the specimen with x

@@ -2,22 +2,26 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 namespace calib::dem {
 
 CellGrid::CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, double range) {
   assert(range > 0);
+  const double slope = cell.Tilt() / cell.length[2];
+  // Two grains within range differ by up to range sqrt(1 + slope^2) in x - slope z.
+  const double ranges[3] = {range * std::sqrt(1.0 + slope * slope), range, range};
   for (std::size_t a = 0; a < 3; ++a) {
-    count_[a] = std::clamp(static_cast<int>(cell.length[a] / range), 1, 1024);
+    count_[a] = std::clamp(static_cast<int>(cell.length[a] / ranges[a]), 1, 1024);
   }
   const auto n = static_cast<std::size_t>(particles.size());
   const auto index = [this, &cell](double s, std::size_t a) {
-    return std::min(static_cast<int>(s / cell.length[a] * count_[a]), count_[a] - 1);
+    return std::clamp(static_cast<int>(s / cell.length[a] * count_[a]), 0, count_[a] - 1);
   };
   cell_of_.resize(n);
   begin_.assign(static_cast<std::size_t>(count_[0]) * count_[1] * count_[2] + 1, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    const int c = index(particles.x[i], 0) +
+    const int c = index(particles.x[i] - slope * particles.z[i], 0) +
                   count_[0] * (index(particles.y[i], 1) + count_[1] * index(particles.z[i], 2));
     cell_of_[i] = c;
     ++begin_[static_cast<std::size_t>(c) + 1];

@@ -17,7 +17,8 @@ struct GridNeighbor {
 
 class CellGrid {
  public:
-  /// Sorts wrapped centres (0 <= x < L) into grid cells of at least `range` [m] > 0 per edge.
+  /// Sorts wrapped centres (0 <= z < Lz, 0 <= x - z tilt/Lz < Lx) into grid cells of at least
+  /// `range` [m] > 0 per edge; in a sheared cell the edges along x follow its tilt and are longer.
   CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, double range);
 
   /// Grains of one grid cell in ascending order: grains()[begin(c)] .. grains()[begin(c + 1) - 1].

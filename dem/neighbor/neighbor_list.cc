@@ -25,9 +25,16 @@ absl::Status WrapAll(const PeriodicCell& cell, ParticleArrays& p) {
       return absl::OutOfRangeError(
           absl::StrCat("grain ", p.id[i], " has no finite position (NaN or lost)"));
     }
-    p.x[i] = Wrap(p.x[i], cell.length[0]);
     p.y[i] = Wrap(p.y[i], cell.length[1]);
-    p.z[i] = Wrap(p.z[i], cell.length[2]);
+    const double z = Wrap(p.z[i], cell.length[2]);
+    if (cell.Tilt() != 0) {
+      const double across = std::round((z - p.z[i]) / cell.length[2]);
+      const double skew = z / cell.length[2] * cell.Tilt();
+      p.x[i] = Wrap(p.x[i] + across * cell.Tilt() - skew, cell.length[0]) + skew;
+    } else {
+      p.x[i] = Wrap(p.x[i], cell.length[0]);
+    }
+    p.z[i] = z;
   }
   return absl::OkStatus();
 }
@@ -75,6 +82,7 @@ absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleAr
   list.second.clear();
   list.image.clear();
   std::vector<std::pair<int, std::uint8_t>> found;  // neighbour j > i, image
+  const double tilt = cell.Tilt();
   int grid_cell = -1;
   std::vector<GridNeighbor> around;
   for (int i = 0; i < p.size(); ++i) {
@@ -84,7 +92,7 @@ absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleAr
     }
     found.clear();
     for (const GridNeighbor& neighbor : around) {
-      const double sx = neighbor.shift[0] * cell.length[0] - p.x[i];
+      const double sx = neighbor.shift[0] * cell.length[0] + neighbor.shift[2] * tilt - p.x[i];
       const double sy = neighbor.shift[1] * cell.length[1] - p.y[i];
       const double sz = neighbor.shift[2] * cell.length[2] - p.z[i];
       const double reach = p.radius[i] + skin;

@@ -16,7 +16,7 @@ constexpr double kSmallestFriction = 1e-3;
 
 CellTarget Isotropic(double pressure) {
   const AxisTarget target{.mode = AxisTarget::Mode::kStress, .value = pressure};
-  return {target, target, target};
+  return {{target, target, target}};
 }
 
 /// 1-2-5 x 10^k in [pressure/20, pressure), then the pressure itself.

@@ -61,6 +61,11 @@ class ElementTestRun {
         staging_(ResolveStaging(scenario, assembly_)),
         stages_(assembly_, OptionsFrom(staging_), std::move(stop)) {
     context_.settings = scenario.settings;
+    for (const ParameterInfo& setting : entry_.info.settings) {
+      if (setting.default_value) {
+        context_.settings.emplace(setting.name, *setting.default_value);
+      }
+    }
     const double pressure = scenario.settings.at("confining_pressure");
     for (const EffectEntry& effect : EffectEntries()) {
       const std::string& name = effect.info.name;
@@ -78,6 +83,7 @@ class ElementTestRun {
       }
     }
     context_.lateral_stress = scenario.initial_stress ? scenario.initial_stress->lateral : pressure;
+    context_.axial_stress = scenario.initial_stress ? scenario.initial_stress->axial : pressure;
   }
 
   absl::StatusOr<Summary> Run(const LoadStepSink& sink) {
@@ -149,6 +155,7 @@ class ElementTestRun {
       target[a] = {.mode = strain ? AxisTarget::Mode::kLength : AxisTarget::Mode::kStress,
                    .value = strain ? reference_[a] * std::exp(-goal[a].value) : goal[a].value};
     }
+    target.displacement = goal.shear_strain * reference_[2];
     return target;
   }
 
@@ -169,8 +176,10 @@ class ElementTestRun {
 
   /// The present state as the laboratory reads it.
   [[nodiscard]] Measurement Read() const {
-    return ReadThrough(apparatus_, RigStress() - rig_start_, entry_.rig_load == RigLoad::kAxial,
-                       Measure(assembly_, reference_));
+    Measurement m = ReadThrough(apparatus_, RigStress() - rig_start_,
+                                entry_.rig_load == RigLoad::kAxial, Measure(assembly_, reference_));
+    m.pore_pressure = context_.lateral_stress - m.lateral_stress;
+    return m;
   }
 
   /// Lets the stages be driven by readings where the apparatus alters them.

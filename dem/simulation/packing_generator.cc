@@ -88,7 +88,7 @@ absl::StatusOr<Packing> GeneratePacking(const PackingRecipe& recipe, int threads
   options.unbalanced = 1e-3;
   QuasiStatic stages(assembly, options, std::move(stop));
   const AxisTarget axis{.mode = AxisTarget::Mode::kStress, .value = recipe.pressure};
-  StageEnd end = stages.MoveTo({axis, axis, axis});
+  StageEnd end = stages.MoveTo({{axis, axis, axis}});
   if (end == StageEnd::kDone) {
     if (auto s = LowerFrictionToPorosity(recipe.porosity, recipe.pressure, stages, end); !s.ok()) {
       return s;

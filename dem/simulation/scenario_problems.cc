@@ -28,6 +28,9 @@ void CheckRange(const std::string& name, double value, const ParameterInfo& info
   if (!(above && value <= info.max)) {
     problems.push_back(absl::StrCat(name, " is ", value, ", allowed is ", info.min_open ? "(" : "[",
                                     info.min, ", ", info.max, "] ", unit));
+  } else if (info.whole && value != std::round(value)) {
+    problems.push_back(absl::StrCat(name, " is ", value, ", allowed are whole numbers from ",
+                                    info.min, " to ", info.max));
   }
 }
 

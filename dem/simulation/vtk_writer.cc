@@ -27,8 +27,11 @@ absl::Status WriteVtk(const Assembly& assembly, const std::string& directory, in
       "POINTS %d double\n",
       load_step, cell.length[0], cell.length[1], cell.length[2], n);
   for (const std::size_t k : at) {
-    absl::StrAppendFormat(&text, "%.12g %.12g %.12g\n", wrapped(p.x[k], cell.length[0]),
-                          wrapped(p.y[k], cell.length[1]), wrapped(p.z[k], cell.length[2]));
+    const double layers = std::floor(p.z[k] / cell.length[2]);  // wraps along (tilt, 0, Lz)
+    const double z = p.z[k] - layers * cell.length[2];
+    const double skew = z / cell.length[2] * cell.Tilt();
+    const double x = wrapped(p.x[k] - layers * cell.Tilt() - skew, cell.length[0]) + skew;
+    absl::StrAppendFormat(&text, "%.12g %.12g %.12g\n", x, wrapped(p.y[k], cell.length[1]), z);
   }
   absl::StrAppendFormat(&text, "VERTICES %d %d\n", n, 2 * n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -40,7 +43,8 @@ absl::Status WriteVtk(const Assembly& assembly, const std::string& directory, in
   }
   text += "VECTORS velocity double\n";
   for (const std::size_t k : at) {
-    absl::StrAppendFormat(&text, "%.9g %.9g %.9g\n", p.vx[k] + cell.stretch[0] * p.x[k],
+    absl::StrAppendFormat(&text, "%.9g %.9g %.9g\n",
+                          p.vx[k] + cell.stretch[0] * p.x[k] + cell.shear * p.z[k],
                           p.vy[k] + cell.stretch[1] * p.y[k], p.vz[k] + cell.stretch[2] * p.z[k]);
   }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
@@ -46,6 +47,10 @@ void ReadSettings(MapReader& map, const dem::TestInfo& test, bool needed, Experi
   for (const dem::ParameterInfo& setting : test.settings) {
     const Range range{.min = setting.min, .max = setting.max, .min_open = setting.min_open};
     if (const auto value = map.Quantity(setting.name, setting.unit, range)) {
+      if (setting.whole && *value != std::round(*value)) {
+        map.Problem(setting.name, absl::StrCat("is ", *value, ", allowed are whole numbers from ",
+                                               setting.min, " to ", setting.max));
+      }
       experiment.settings[setting.name] = *value;
     } else if (!map.Has(setting.name)) {
       if (setting.default_value) {

@@ -122,7 +122,8 @@ double StartOf(const std::string& control, const Experiment& experiment) {
 
 // The observable whose peak divides the loading, if it was measured.
 std::vector<double> Strength(const Experiment& experiment) {
-  for (const char* name : {"q_over_p", "stress_ratio", "deviatoric_stress"}) {
+  for (const char* name :
+       {"q_over_p", "stress_ratio", "deviatoric_stress", "shear_stress_ratio", "shear_stress"}) {
     for (const MeasuredObservable& observable : experiment.observables) {
       if (observable.name == name) return observable.values;
     }

@@ -28,6 +28,42 @@ Packing RandomGrains(unsigned seed, int n, double height) {
   return p;
 }
 
+TEST(NeighborList, FindsWhatBruteForceFindsInShearedCells) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const Packing packing = RandomGrains(seed, 150, seed % 2 == 0 ? 0.8e-2 : 2.3e-2);
+    ParticleArrays p = MakeParticles(packing, 2650);
+    PeriodicCell cell{.length = {packing.length[0], packing.length[1], packing.length[2]}};
+    cell.displacement = (0.17 * seed - 1.7) * cell.length[0];
+    cell.Reduce();
+    ASSERT_LE(std::abs(cell.Tilt()), 0.5 * cell.length[0] * (1 + 1e-12));
+    const double skin = 0.3e-3;
+    NeighborList list;
+    ASSERT_TRUE(BuildNeighborList(cell, skin, p, list).ok());
+    std::set<std::pair<int, int>> expected;
+    for (int i = 0; i < p.size(); ++i) {
+      for (int j = i + 1; j < p.size(); ++j) {
+        for (int image = 0; image < 125; ++image) {  // by the full displacement, without reduction
+          const int sz = image / 25 - 2;
+          const double wraps = std::round(sz * cell.displacement / cell.length[0]);
+          const double dx =
+              p.x[j] - p.x[i] + (image % 5 - 2 - wraps) * cell.length[0] + sz * cell.displacement;
+          const double dy = p.y[j] - p.y[i] + (image / 5 % 5 - 2) * cell.length[1];
+          const double dz = p.z[j] - p.z[i] + sz * cell.length[2];
+          if (std::hypot(dx, dy, dz) < p.radius[i] + p.radius[j] + skin) {
+            expected.emplace(i, j);
+          }
+        }
+      }
+    }
+    std::set<std::pair<int, int>> found;
+    for (int s = 0; s < list.size(); ++s) {
+      found.emplace(list.first[s], list.second[s]);
+    }
+    EXPECT_EQ(found.size(), static_cast<std::size_t>(list.size())) << "a pair is listed twice";
+    EXPECT_EQ(found, expected) << "seed " << seed;
+  }
+}
+
 TEST(NeighborList, FindsWhatBruteForceFinds) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const Packing packing = RandomGrains(seed, 150, seed % 2 == 0 ? 0.8e-2 : 2.3e-2);
