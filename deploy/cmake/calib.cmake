@@ -22,10 +22,20 @@ target_compile_options(calib_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -
                                              $<$<CONFIG:Release>:-Wno-restrict>)
 target_include_directories(calib_flags INTERFACE ${CMAKE_SOURCE_DIR})
 
-# calib_library(NAME SOURCES a.cc ... LINKS x ...): a static library of this tree; sources by name, no globs.
+# Shortens a first build; off where builds are incremental and ccache keeps objects.
+option(CALIB_PRECOMPILE "precompile the large headers of others" OFF)
+function(calib_precompile name)
+  if(ARGN AND CALIB_PRECOMPILE)
+    target_precompile_headers(${name} PRIVATE ${ARGN})
+  endif()
+endfunction()
+
+# calib_library(NAME SOURCES a.cc ... LINKS x ... [PRECOMPILE <header> ...]): a static library of this tree; sources by name,
+# no globs. PRECOMPILE: large headers of others that most of its files include anyway.
 function(calib_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRECOMPILE" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
+  calib_precompile(${name} ${ARG_PRECOMPILE})
   target_link_libraries(${name} PUBLIC ${ARG_LINKS} PRIVATE calib_flags)
   target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
 endfunction()
