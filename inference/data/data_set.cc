@@ -70,7 +70,84 @@ absl::Status ValidateCorrelations(const DataSet& data) {
   return absl::OkStatus();
 }
 
+absl::Status ValidateCovariances(const DataSet& data) {
+  const ReadingGroups groups = GroupsOf(data);
+  std::map<Group, int> seen;
+  for (const Correlation& correlation : data.correlations) {
+    ++seen[{correlation.experiment, correlation.observable}];
+  }
+  for (const GroupCovariance& covariance : data.covariances) {
+    const Group key{covariance.experiment, covariance.observable};
+    const std::string name =
+        absl::StrCat("the covariance of observable ", key.second, " of experiment ", key.first);
+    const auto group = groups.find(key);
+    const Eigen::Index size =
+        group == groups.end() ? 0 : static_cast<Eigen::Index>(group->second.size());
+    const Eigen::MatrixXd& matrix = covariance.matrix;
+    if (matrix.rows() != size || matrix.cols() != size) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          name, " is ", matrix.rows(), " x ", matrix.cols(), "; it has ", size, " readings."));
+    }
+    if (++seen[key] > 1) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(name, " is given twice, or beside a correlation length."));
+    }
+    for (Eigen::Index i = 0; i < size; ++i) {
+      const double sd = data.readings[group->second[i]].sd;
+      if (!(std::abs(matrix(i, i) - sd * sd) <= 1e-9 * sd * sd)) {
+        return absl::InvalidArgumentError(absl::StrCat(name, " has the variance ", matrix(i, i),
+                                                       " for reading ", i,
+                                                       " whose standard deviation is ", sd, "."));
+      }
+    }
+    const Eigen::VectorXd sd = matrix.diagonal().cwiseSqrt();
+    const Eigen::MatrixXd asymmetry = (matrix - matrix.transpose()).cwiseAbs();
+    if (!matrix.allFinite() || (asymmetry.array() > 1e-9 * (sd * sd.transpose()).array()).any()) {
+      return absl::InvalidArgumentError(absl::StrCat(name, " is not finite and symmetric."));
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
+
+ReadingGroups GroupsOf(const DataSet& data) {
+  ReadingGroups groups;
+  for (int t = 0; t < static_cast<int>(data.readings.size()); ++t) {
+    groups[{data.readings[t].experiment, data.readings[t].observable}].push_back(t);
+  }
+  return groups;
+}
+
+bool IsCorrelated(const DataSet& data, std::pair<int, int> group) {
+  const auto is_of = [&group](const auto& entry) {
+    return entry.experiment == group.first && entry.observable == group.second;
+  };
+  return std::any_of(data.correlations.begin(), data.correlations.end(), is_of) ||
+         std::any_of(data.covariances.begin(), data.covariances.end(), is_of);
+}
+
+Eigen::MatrixXd ErrorCorrelation(const DataSet& data, std::pair<int, int> group,
+                                 const std::vector<int>& readings) {
+  const auto size = static_cast<Eigen::Index>(readings.size());
+  for (const GroupCovariance& covariance : data.covariances) {
+    if (Group(covariance.experiment, covariance.observable) != group) continue;
+    const Eigen::VectorXd inverse = covariance.matrix.diagonal().cwiseSqrt().cwiseInverse();
+    return inverse.asDiagonal() * covariance.matrix * inverse.asDiagonal();
+  }
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(size, size);
+  for (const Correlation& c : data.correlations) {
+    if (Group(c.experiment, c.observable) != group) continue;
+    for (Eigen::Index i = 0; i < size; ++i) {
+      for (Eigen::Index j = 0; j < i; ++j) {
+        const double distance =
+            data.readings[readings[i]].control - data.readings[readings[j]].control;
+        correlation(i, j) = correlation(j, i) = std::exp(-std::abs(distance) / c.length);
+      }
+    }
+  }
+  return correlation;
+}
 
 absl::Status ValidateData(const DataSet& data, NoiseMode noise) {
   if (data.readings.empty()) return absl::InvalidArgumentError("there are no readings.");
@@ -89,12 +166,34 @@ absl::Status ValidateData(const DataSet& data, NoiseMode noise) {
                                                      reading.sd, "; it must be positive."));
     }
   }
-  return noise == NoiseMode::kEssTarget ? absl::OkStatus() : ValidateCorrelations(data);
+  if (noise == NoiseMode::kEssTarget) return absl::OkStatus();
+  if (auto valid = ValidateCorrelations(data); !valid.ok()) return valid;
+  return ValidateCovariances(data);
+}
+
+DataSet Restricted(const DataSet& data, const std::vector<int>& readings) {
+  DataSet part = data;
+  part.readings.clear();
+  for (const int t : readings) part.readings.push_back(data.readings[t]);
+  const ReadingGroups groups = GroupsOf(data);
+  for (GroupCovariance& covariance : part.covariances) {
+    const auto group = groups.find({covariance.experiment, covariance.observable});
+    std::vector<Eigen::Index> kept;
+    for (std::size_t i = 0; group != groups.end() && i < group->second.size(); ++i) {
+      if (std::binary_search(readings.begin(), readings.end(), group->second[i])) {
+        kept.push_back(static_cast<Eigen::Index>(i));
+      }
+    }
+    covariance.matrix = Eigen::MatrixXd(covariance.matrix(kept, kept));
+  }
+  std::erase_if(part.covariances, [](const GroupCovariance& c) { return c.matrix.size() == 0; });
+  return part;
 }
 
 DataSet WithRelativeErrors(const DataSet& data, double sigma) {
   DataSet scaled = data;
   scaled.correlations.clear();
+  scaled.covariances.clear();
   for (Reading& reading : scaled.readings) {
     reading.sd = std::sqrt(sigma * EssWeight(data, reading)) * std::abs(reading.value);
   }

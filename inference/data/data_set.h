@@ -1,7 +1,10 @@
 #pragma once
 // The measurements as the inference sees them: a flat vector of readings with Gaussian errors.
 
+#include <Eigen/Dense>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -27,6 +30,15 @@ struct Correlation {
   double length = 0;
 };
 
+/// Covariance of the errors of one observable of one experiment, in the place of their correlation
+/// length: n x n for its n readings in processing order, in the square of their unit; the sd of
+/// each reading is the root of its diagonal.
+struct GroupCovariance {
+  int experiment = 0;
+  int observable = 0;
+  Eigen::MatrixXd matrix;
+};
+
 enum class NoiseMode {
   kGiven,  ///< the sd of each reading
   /// sd of each reading times sqrt(f), one variance factor f per (experiment, observable) group,
@@ -39,16 +51,33 @@ enum class NoiseMode {
 
 struct DataSet {
   std::vector<Reading> readings;
-  std::vector<Correlation> correlations;  ///< only those with length > 0
+  std::vector<Correlation> correlations;     ///< only those with length > 0
+  std::vector<GroupCovariance> covariances;  ///< of groups that have one
   /// w_j of kEssTarget, indexed [experiment][observable]; multiplies the variance. Empty: all one.
   std::vector<std::vector<double>> ess_weights;
 };
 
 /// INVALID_ARGUMENT with one sentence: no readings, negative index, value or control that is not
 /// finite, sd that is not positive (value zero with kEssTarget), correlation length that is not
-/// positive or given twice, correlated readings at one and the same control, ess_weights that are
-/// not positive or missing for an observable.
+/// positive or given twice, correlated readings at one and the same control, a covariance that is
+/// not symmetric, does not fit its readings or stands beside another one or a correlation length,
+/// ess_weights that are not positive or missing for an observable.
 absl::Status ValidateData(const DataSet& data, NoiseMode noise);
+
+/// Indices of the readings of each (experiment, observable), in processing order.
+using ReadingGroups = std::map<std::pair<int, int>, std::vector<int>>;
+ReadingGroups GroupsOf(const DataSet& data);
+
+/// True where the errors of a group are correlated.
+bool IsCorrelated(const DataSet& data, std::pair<int, int> group);
+
+/// Correlation matrix of the errors of a group's readings: the identity, exp(-distance / length) or
+/// that of its covariance.
+Eigen::MatrixXd ErrorCorrelation(const DataSet& data, std::pair<int, int> group,
+                                 const std::vector<int>& readings);
+
+/// Some of the readings, ascending indices, with the errors that go with them.
+DataSet Restricted(const DataSet& data, const std::vector<int>& readings);
 
 /// The same readings with independent errors of variance sigma w_j y^2, the Sigma of kEssTarget, so
 /// that the likelihood of kGiven serves both. sigma > 0; multiplies the variance. Needs

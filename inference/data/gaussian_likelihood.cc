@@ -1,10 +1,10 @@
 #include "inference/data/gaussian_likelihood.h"
 
+#include <algorithm>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <utility>
 
@@ -17,17 +17,16 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
 
-// Lower Cholesky factor of S; its smallest pivot tells how much of the last reading the earlier
+// Lower Cholesky factor of Sigma; its smallest pivot tells how much of the last reading the earlier
 // ones leave open.
-absl::StatusOr<Eigen::MatrixXd> CorrelatedCholesky(const DataSet& data,
-                                                   const std::vector<int>& members, double length) {
-  const auto size = static_cast<Eigen::Index>(members.size());
+absl::StatusOr<Eigen::MatrixXd> CorrelatedCholesky(const DataSet& data, std::pair<int, int> key,
+                                                   const std::vector<int>& members) {
+  const Eigen::MatrixXd correlation = ErrorCorrelation(data, key, members);
+  const Eigen::Index size = correlation.rows();
   Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(size, size);
   for (Eigen::Index i = 0; i < size; ++i) {
-    const Reading& row = data.readings[members[i]];
     for (Eigen::Index j = 0; j <= i; ++j) {
-      const Reading& column = data.readings[members[j]];
-      double value = std::exp(-std::abs(row.control - column.control) / length);
+      double value = correlation(i, j);
       for (Eigen::Index k = 0; k < j; ++k) value -= factor(i, k) * factor(j, k);
       if (i > j) {
         factor(i, j) = value / factor(j, j);
@@ -35,9 +34,10 @@ absl::StatusOr<Eigen::MatrixXd> CorrelatedCholesky(const DataSet& data,
         factor(i, i) = std::sqrt(value);
       } else {
         return absl::InvalidArgumentError(absl::StrCat(
-            "readings of observable ", row.observable, " of experiment ", row.experiment,
-            " near the control ", row.control, " lie too close for the correlation length ", length,
-            ": leave out some of them."));
+            "the errors of the readings of observable ", key.second, " of experiment ", key.first,
+            " have a singular covariance: the one near the control ",
+            data.readings[members[i]].control,
+            " follows from those before it; leave out readings that lie too close together."));
       }
     }
   }
@@ -54,21 +54,13 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
   GaussianLikelihood likelihood;
   likelihood.readings_ = static_cast<int>(data.readings.size());
   likelihood.inferred_ = noise == NoiseMode::kInferred;
-  std::map<std::pair<int, int>, std::vector<int>> members;
-  for (int t = 0; t < likelihood.readings_; ++t) {
-    const Reading& reading = data.readings[t];
-    likelihood.values_.push_back(reading.value);
-    members[{reading.experiment, reading.observable}].push_back(t);
-  }
-  std::map<std::pair<int, int>, double> lengths;
-  for (const Correlation& c : data.correlations) lengths[{c.experiment, c.observable}] = c.length;
+  for (const Reading& reading : data.readings) likelihood.values_.push_back(reading.value);
 
-  for (auto& [key, indices] : members) {
+  for (auto& [key, indices] : GroupsOf(data)) {
     Group group;
     const auto size = static_cast<Eigen::Index>(indices.size());
-    const auto length = lengths.find(key);
-    if (length != lengths.end()) {
-      auto factor = CorrelatedCholesky(data, indices, length->second);
+    if (IsCorrelated(data, key)) {
+      auto factor = CorrelatedCholesky(data, key, indices);
       if (!factor.ok()) return factor.status();
       group.log_diagonal = factor->diagonal().array().log();
       group.cholesky = *std::move(factor);
@@ -80,7 +72,14 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
         group.inverse_sd[k] = 1 / data.readings[indices[k]].sd;
       }
     }
-    group.readings = std::move(indices);
+    group.log_constant.resize(size);
+    for (Eigen::Index k = 0; k < size; ++k) {
+      // ln Gamma(after) - ln Gamma(before), without the cancellation of their difference.
+      const double before = likelihood.factor_prior_.shape + 0.5 * static_cast<double>(k);
+      group.log_constant[k] = -kLogSqrtTwoPi - group.log_diagonal[k] -
+                              std::log(boost::math::tgamma_delta_ratio(before, 0.5));
+    }
+    group.readings = indices;
     likelihood.groups_.push_back(std::move(group));
   }
   return likelihood;
@@ -92,94 +91,89 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
 // pi)^(-n/2) |L|^-1 (rate + q_n/2)^-(a + n/2).
 double GaussianLikelihood::LogFactor(const Group& group, int k, double square_before,
                                      double square_after) const {
-  const double normaliser = -kLogSqrtTwoPi - group.log_diagonal[k];
-  if (!inferred_) return normaliser - 0.5 * (square_after - square_before);
   const double before = factor_prior_.shape + 0.5 * k;
   const double after = before + 0.5;
-  // ln Gamma(after) - ln Gamma(before), without the cancellation of their difference.
-  const double gamma_ratio = -std::log(boost::math::tgamma_delta_ratio(before, 0.5));
-  return normaliser + gamma_ratio + before * std::log(factor_prior_.rate + 0.5 * square_before) -
+  return group.log_constant[k] + before * std::log(factor_prior_.rate + 0.5 * square_before) -
          after * std::log(factor_prior_.rate + 0.5 * square_after);
 }
 
-void GaussianLikelihood::Scan(const Eigen::MatrixXd& predictions, Eigen::Index row, Missing missing,
-                              std::vector<double>& increments) const {
-  increments.assign(readings_, kNaN);
-  std::vector<double> z;
+// Column by column: every operation is on one element of a column at a time, so that a row's bits
+// do not depend on the other rows.
+Eigen::MatrixXd GaussianLikelihood::Fill(const Eigen::MatrixXd& predictions,
+                                         Missing missing) const {
+  assert(predictions.cols() == readings_);
+  const Eigen::Index n = predictions.rows();
+  Eigen::MatrixXd increments(n, readings_);
+  std::vector<char> reached(static_cast<std::size_t>(n));
+  std::vector<double> square(static_cast<std::size_t>(inferred_ ? n : 0));
+  Eigen::MatrixXd whitened;  // z of a correlated group's readings so far
+  Eigen::VectorXd z(n);
   for (const Group& group : groups_) {
-    z.clear();
-    double square = 0;
-    bool reached = true;
-    for (int k = 0; k < static_cast<int>(group.readings.size()); ++k) {
-      const int t = group.readings[k];
-      const double residual = values_[t] - predictions(row, t);
-      reached = reached && std::isfinite(residual);
-      if (!reached && missing == Missing::kStop) break;
-      double whitened = 0;
-      if (reached && group.cholesky.size() == 0) {
-        whitened = residual * group.inverse_sd[k];
-      } else if (reached) {
-        whitened = residual;  // forward substitution, one row
-        for (int l = 0; l < k; ++l) whitened -= group.cholesky(k, l) * z[l];
-        whitened /= group.cholesky(k, k);
-        z.push_back(whitened);
+    const bool correlated = group.cholesky.size() > 0;
+    const auto size = static_cast<Eigen::Index>(group.readings.size());
+    if (correlated) whitened.resize(n, size);
+    std::fill(reached.begin(), reached.end(), 1);
+    std::fill(square.begin(), square.end(), 0.0);
+    for (Eigen::Index k = 0; k < size; ++k) {
+      const int t = group.readings[static_cast<std::size_t>(k)];
+      z = values_[static_cast<std::size_t>(t)] - predictions.col(t).array();
+      for (Eigen::Index i = 0; i < n; ++i) {
+        char& row = reached[static_cast<std::size_t>(i)];
+        row = static_cast<char>(row & static_cast<char>(std::isfinite(z[i])));
+        if (row == 0) z[i] = 0;
       }
-      const double after = square + whitened * whitened;
-      increments[t] = inferred_ ? LogFactor(group, k, square, after)
-                                : LogFactor(group, k, 0, whitened * whitened);
-      square = after;
+      if (correlated) {  // forward substitution
+        for (Eigen::Index l = 0; l < k; ++l) z -= group.cholesky(k, l) * whitened.col(l);
+        z /= group.cholesky(k, k);
+        for (Eigen::Index i = 0; i < n; ++i) {
+          if (reached[static_cast<std::size_t>(i)] == 0) z[i] = 0;
+        }
+        whitened.col(k) = z;
+      } else {
+        z *= group.inverse_sd[k];
+      }
+      auto out = increments.col(t);
+      if (!inferred_) {
+        out = (-kLogSqrtTwoPi - group.log_diagonal[k]) - 0.5 * z.array().square();
+      } else {
+        for (Eigen::Index i = 0; i < n; ++i) {
+          double& before = square[static_cast<std::size_t>(i)];
+          const double after = before + z[i] * z[i];
+          out[i] = LogFactor(group, static_cast<int>(k), before, after);
+          before = after;
+        }
+      }
+      if (missing == Missing::kZeroResidual) continue;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        if (reached[static_cast<std::size_t>(i)] == 0) out[i] = kNaN;
+      }
     }
   }
+  return increments;
 }
 
 Eigen::MatrixXd GaussianLikelihood::Increments(const Eigen::MatrixXd& predictions) const {
-  assert(predictions.cols() == readings_);
-  Eigen::MatrixXd result(predictions.rows(), readings_);
-  std::vector<double> increments;
-  for (Eigen::Index i = 0; i < predictions.rows(); ++i) {
-    Scan(predictions, i, Missing::kStop, increments);
-    for (int t = 0; t < readings_; ++t) result(i, t) = increments[t];
-  }
-  return result;
+  return Fill(predictions, Missing::kStop);
+}
+
+Eigen::VectorXd GaussianLikelihood::Sum(const Eigen::MatrixXd& increments) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(increments.rows());
+  for (const auto& column : increments.colwise()) sum += column;
+  return sum.unaryExpr([](double value) { return std::isnan(value) ? -kInfinity : value; });
 }
 
 Eigen::VectorXd GaussianLikelihood::LogLikelihood(const Eigen::MatrixXd& predictions) const {
-  assert(predictions.cols() == readings_);
-  Eigen::VectorXd result(predictions.rows());
-  std::vector<double> increments;
-  for (Eigen::Index i = 0; i < predictions.rows(); ++i) {
-    Scan(predictions, i, Missing::kStop, increments);
-    double sum = 0;
-    for (const double increment : increments) sum += increment;
-    result[i] = std::isnan(sum) ? -kInfinity : sum;
-  }
-  return result;
+  return Sum(Increments(predictions));
 }
 
 Eigen::VectorXd GaussianLikelihood::ReachedLogLikelihood(const Eigen::MatrixXd& predictions) const {
-  assert(predictions.cols() == readings_);
-  Eigen::VectorXd result(predictions.rows());
-  std::vector<double> increments;
-  for (Eigen::Index i = 0; i < predictions.rows(); ++i) {
-    Scan(predictions, i, Missing::kStop, increments);
-    double sum = 0;
-    for (const double increment : increments) sum += std::isnan(increment) ? 0 : increment;
-    result[i] = sum;
-  }
-  return result;
+  return Sum(Increments(predictions).unaryExpr([](double value) {
+    return std::isnan(value) ? 0.0 : value;
+  }));
 }
 
 Eigen::VectorXd GaussianLikelihood::LogLikelihoodBound(const Eigen::MatrixXd& predictions) const {
-  assert(predictions.cols() == readings_);
-  Eigen::VectorXd result(predictions.rows());
-  std::vector<double> increments;
-  for (Eigen::Index i = 0; i < predictions.rows(); ++i) {
-    Scan(predictions, i, Missing::kZeroResidual, increments);
-    double sum = 0;
-    for (const double increment : increments) sum += increment;
-    result[i] = sum;
-  }
-  return result;
+  return Sum(Fill(predictions, Missing::kZeroResidual));
 }
 
 }  // namespace calib::inference

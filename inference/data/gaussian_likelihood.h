@@ -40,6 +40,9 @@ class GaussianLikelihood {
   /// finite on, the increments of that group are NaN.
   Eigen::MatrixXd Increments(const Eigen::MatrixXd& predictions) const;
 
+  /// Sum of each row of increments in the order of readings, N; -inf where one is NaN.
+  static Eigen::VectorXd Sum(const Eigen::MatrixXd& increments);
+
   /// ln p(y | x) of each row, N; -inf where any prediction is not finite (a diverged sample).
   Eigen::VectorXd LogLikelihood(const Eigen::MatrixXd& predictions) const;
 
@@ -58,13 +61,13 @@ class GaussianLikelihood {
     std::vector<int> readings;     // indices in processing order
     Eigen::MatrixXd cholesky;      // L, lower; empty: diagonal
     Eigen::VectorXd log_diagonal;  // ln L_kk
+    Eigen::VectorXd log_constant;  // kInferred: what of an increment does not depend on z
     Eigen::VectorXd inverse_sd;    // diagonal groups only
   };
   enum class Missing { kStop, kZeroResidual };
 
-  // Fills the increments of one sample, T; NaN where not reached.
-  void Scan(const Eigen::MatrixXd& predictions, Eigen::Index row, Missing missing,
-            std::vector<double>& increments) const;
+  // Increments, N x T; NaN where not reached, or with zero residual there.
+  Eigen::MatrixXd Fill(const Eigen::MatrixXd& predictions, Missing missing) const;
   double LogFactor(const Group& group, int k, double square_before, double square_after) const;
 
   int readings_ = 0;

@@ -1,7 +1,6 @@
 #include "inference/emulator/emulated_likelihood.h"
 
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <utility>
 
@@ -25,33 +24,18 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
   likelihood.scatter_variance_ = options.scatter_share * emulator.scatter_sd().array().square();
   likelihood.correlation_factor_ = Eigen::LLT<Eigen::MatrixXd>(emulator.correlation()).matrixL();
 
-  std::map<std::pair<int, int>, std::vector<Index>> groups;
-  for (std::size_t t = 0; t < data.readings.size(); ++t) {
-    groups[{data.readings[t].experiment, data.readings[t].observable}].push_back(
-        static_cast<Index>(t));
-  }
-  std::map<std::pair<int, int>, double> lengths;
-  if (options.correlated_noise) {
-    for (const Correlation& c : data.correlations) lengths[{c.experiment, c.observable}] = c.length;
-  }
-  for (auto& [key, readings] : groups) {
+  for (const auto& [key, members] : GroupsOf(data)) {
     Form form;
-    const auto size = static_cast<Index>(readings.size());
-    Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(size, size);
-    const auto length = lengths.find(key);
+    const auto size = static_cast<Index>(members.size());
+    Eigen::MatrixXd covariance = options.correlated_noise ? ErrorCorrelation(data, key, members)
+                                                          : Eigen::MatrixXd::Identity(size, size);
     Eigen::MatrixXd basis(size, components.basis.cols());
     for (Index i = 0; i < size; ++i) {
-      const Index t = readings[static_cast<std::size_t>(i)];
-      const Reading& reading = data.readings[static_cast<std::size_t>(t)];
-      for (Index j = 0; length != lengths.end() && j < i; ++j) {
-        const Index earlier = readings[static_cast<std::size_t>(j)];
-        const double distance =
-            std::abs(reading.control - data.readings[static_cast<std::size_t>(earlier)].control);
-        covariance(i, j) = covariance(j, i) = std::exp(-distance / length->second);
-      }
+      const int t = members[static_cast<std::size_t>(i)];
       covariance(i, i) += components.remainder[t];
       basis.row(i) = components.basis.row(t);
-      form.log_normaliser -= std::log(reading.sd) + kLogSqrtTwoPi;
+      form.log_normaliser -=
+          std::log(data.readings[static_cast<std::size_t>(t)].sd) + kLogSqrtTwoPi;
     }
     const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
     if (factor.info() != Eigen::Success) {
@@ -63,7 +47,7 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
     form.whitening = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
     form.whitened_basis = form.whitening * basis;
     form.gram = form.whitened_basis.transpose() * form.whitened_basis;
-    form.readings = std::move(readings);
+    form.readings.assign(members.begin(), members.end());
     likelihood.Project(form, Eigen::VectorXd::Zero(components.mean.size()), form.projection,
                        form.square);
     likelihood.forms_.push_back(std::move(form));

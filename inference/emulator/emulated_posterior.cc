@@ -112,6 +112,16 @@ void AddPredictive(const DataSet& data, const StateEmulator& emulator,
   }
 }
 
+void AddScatter(const DataSet& data, const StateEmulator& emulator, EmulatedResult& result) {
+  const auto t = static_cast<Index>(data.readings.size());
+  Eigen::VectorXd sd(t);
+  for (Index k = 0; k < t; ++k) sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+  const Eigen::MatrixXd factor = Eigen::LLT<Eigen::MatrixXd>(emulator.correlation()).matrixL();
+  result.scatter_factor = sd.asDiagonal() * emulator.components().basis *
+                          emulator.scatter_sd().asDiagonal() * factor;
+  result.scatter_white = sd.array().square() * emulator.components().remainder.array();
+}
+
 // The errors in units of the noise sd, the inferred one with kInferred.
 void StateErrors(const TrainedEmulator& trained, double noise_variance, EmulatedResult& result) {
   const CrossValidation& check = trained.emulator.cross_validation();
@@ -279,6 +289,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
       std::sqrt(prediction.sd.squaredNorm() /
                 (static_cast<double>(n) * static_cast<double>(data.readings.size()))) /
       std::sqrt(noise_variance);
+  AddScatter(data, trained->emulator, result);
   AddPredictive(data, trained->emulator, prediction, options.seed, result);
   Judge(options, result);
   return result;

@@ -62,6 +62,11 @@ struct EmulatedResult {
   double emulator_sd = 0;
   double calibration = 0;  ///< see CrossValidation
 
+  /// Scatter of a single run about the mean history, in units of the readings: covariance
+  /// scatter_factor scatter_factor^T + diag(scatter_white).
+  Eigen::MatrixXd scatter_factor;  ///< T x q
+  Eigen::VectorXd scatter_white;   ///< T
+
   int runs = 0;  ///< the emulator learned from
   int components = 0;
   bool local = false;  ///< see TrainedEmulator

@@ -87,8 +87,11 @@ absl::StatusOr<Ensemble> MakeEnsemble(std::span<const Prior> priors, const DataS
     row += iteration.parameters.rows();
   }
   ensemble.log_start = LogImportance(priors, used);
+  Eigen::Array<bool, Eigen::Dynamic, 1> finite =
+      Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(n, true);
+  for (const auto& column : predictions.colwise()) finite = finite && column.array().isFinite();
   for (Eigen::Index i = 0; i < n; ++i) {
-    if (!predictions.row(i).allFinite()) {
+    if (!finite[i]) {
       ensemble.log_start[i] = -kInfinity;
       ++ensemble.diverged;
     } else if (ensemble.log_start[i] == -kInfinity) {
@@ -104,7 +107,7 @@ absl::StatusOr<Ensemble> MakeEnsemble(std::span<const Prior> priors, const DataS
           : GaussianLikelihood::Create(data, options.noise);
   if (!likelihood.ok()) return likelihood.status();
   ensemble.increments = likelihood->Increments(predictions);
-  ensemble.log_likelihood = likelihood->LogLikelihood(predictions);
+  ensemble.log_likelihood = GaussianLikelihood::Sum(ensemble.increments);
   for (Eigen::Index i = 0; i < n; ++i) {
     if (ensemble.log_start[i] > -kInfinity && ensemble.log_likelihood[i] > -kInfinity)
       return ensemble;

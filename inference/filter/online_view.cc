@@ -54,12 +54,9 @@ OnlineView ViewOnline(const DataSet& data, const FilterOptions& options,
   if (common.empty()) return view;
 
   const bool ess_target = options.noise == NoiseMode::kEssTarget;
-  DataSet part = ess_target ? WithRelativeErrors(data, 1) : data;
-  part.readings.clear();
-  const DataSet errors = ess_target ? WithRelativeErrors(data, 1) : data;
+  const DataSet part = Restricted(ess_target ? WithRelativeErrors(data, 1) : data, common);
   Eigen::MatrixXd reached(rows.size(), common.size());
   for (std::size_t t = 0; t < common.size(); ++t) {
-    part.readings.push_back(errors.readings[common[t]]);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       reached(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(t)) =
           predictions(rows[i], common[t]);

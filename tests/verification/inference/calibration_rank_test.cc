@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iostream>
 #include <vector>
 
 #include "tests/verification/inference/linear_model.h"
@@ -12,17 +13,32 @@
 namespace calib::inference {
 namespace {
 
-// Largest distance of the empirical distribution from the uniform one (Kolmogorov-Smirnov), times
-// sqrt(n).
-double KolmogorovDistance(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const auto n = static_cast<double>(values.size());
-  double largest = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    largest = std::max({largest, std::abs(values[i] - static_cast<double>(i) / n),
-                        std::abs(values[i] - static_cast<double>(i + 1) / n)});
+constexpr int kDraws = 99;  // independent ones of each posterior: ranks 0 ... 99
+constexpr int kBins = 20;
+
+// Pearson's statistic of ranks against the uniform distribution.
+double ChiSquared(const std::vector<int>& ranks) {
+  std::vector<int> count(kBins, 0);
+  for (const int rank : ranks) ++count[static_cast<std::size_t>(rank * kBins / (kDraws + 1))];
+  const double expected = static_cast<double>(ranks.size()) / kBins;
+  double sum = 0;
+  for (const int one : count) sum += (one - expected) * (one - expected) / expected;
+  return sum;
+}
+
+// How many of kDraws independent draws from the weighted samples lie below the truth.
+int RankOf(double truth, const Eigen::VectorXd& values, const Eigen::VectorXd& log_weights,
+           PhiloxStream& stream) {
+  Eigen::VectorXd cumulative(values.size());
+  double sum = 0;
+  for (Eigen::Index i = 0; i < values.size(); ++i) cumulative[i] = sum += std::exp(log_weights[i]);
+  int rank = 0;
+  for (int k = 0; k < kDraws; ++k) {
+    const double u = sum * stream.Uniform();
+    const auto at = std::upper_bound(cumulative.begin(), cumulative.end(), u) - cumulative.begin();
+    rank += values[std::min<Eigen::Index>(at, values.size() - 1)] < truth ? 1 : 0;
   }
-  return largest * std::sqrt(n);
+  return rank;
 }
 
 // A nonlinear model with correlated noise and two iterations: the ranks see a wrong prior in the
@@ -30,9 +46,9 @@ double KolmogorovDistance(std::vector<double> values) {
 TEST(CalibrationRank, TruthIsUniformUnderThePosterior) {
   const std::vector<Prior> priors{{.kind = PriorKind::kLogUniform, .min = 0.5, .max = 5},
                                   {.kind = PriorKind::kUniform, .min = -1, .max = 1}};
-  constexpr int kTrials = 150;
+  constexpr int kTrials = 500;
   constexpr int kReadings = 6;
-  std::vector<double> ranks[2];
+  std::vector<int> ranks[2];
   for (int trial = 0; trial < kTrials; ++trial) {
     PhiloxStream stream({.seed = 1000, .sample = static_cast<std::uint64_t>(trial)});
     const double truth[2] = {priors[0].Quantile(stream.Uniform()),
@@ -60,21 +76,19 @@ TEST(CalibrationRank, TruthIsUniformUnderThePosterior) {
     const FilterOptions options{.seed = static_cast<std::uint64_t>(trial)};
     const auto iterations = RunIterations(priors, data, options, 2, 250, predict);
     const auto posterior = ComputePosterior(priors, data, options, iterations);
+    ASSERT_TRUE(posterior.ok()) << posterior.status();
+    Eigen::MatrixXd parameters(posterior->log_weights.size(), 2);
+    parameters << iterations[0].parameters, iterations[1].parameters;
     for (int j = 0; j < 2; ++j) {
-      double below = 0;
-      Eigen::Index row = 0;
-      for (const Iteration& iteration : iterations) {
-        for (Eigen::Index i = 0; i < iteration.parameters.rows(); ++i, ++row) {
-          if (iteration.parameters(i, j) < truth[j]) below += std::exp(posterior->log_weights[row]);
-        }
-      }
-      ranks[j].push_back(below);
+      ranks[j].push_back(RankOf(truth[j], parameters.col(j), posterior->log_weights, stream));
     }
   }
-  // 1.63: one in a hundred for a correct posterior; the seeds are fixed, so this passes or fails
-  // for good.
-  EXPECT_LT(KolmogorovDistance(ranks[0]), 1.63);
-  EXPECT_LT(KolmogorovDistance(ranks[1]), 1.63);
+  // Chi-squared of 19 degrees of freedom exceeds 43.8 once in a thousand.
+  EXPECT_LT(ChiSquared(ranks[0]), 43.82);
+  EXPECT_LT(ChiSquared(ranks[1]), 43.82);
+  std::cout << "chi-squared of " << kTrials
+            << " ranks, 19 degrees of freedom: " << ChiSquared(ranks[0]) << ", "
+            << ChiSquared(ranks[1]) << "\n";
 }
 
 }  // namespace

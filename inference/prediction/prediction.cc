@@ -1,0 +1,106 @@
+#include "inference/prediction/prediction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "absl/strings/str_cat.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+// Pr(Q_t >= level), the mean over draws of the normal tails.
+double Exceeds(const QuantityPrediction& prediction, Index t, double level) {
+  const double sd = prediction.conditional_sd[t];
+  double sum = 0;
+  for (const double mean : prediction.conditional_mean.col(t)) {
+    sum += sd > 0 ? 0.5 * std::erfc((level - mean) / (sd * std::sqrt(2.0)))
+                  : (mean >= level ? 1.0 : 0.0);
+  }
+  return sum / static_cast<double>(prediction.conditional_mean.rows());
+}
+
+// Quantile of the mixture by bisection between all that its components reach.
+double Quantile(const QuantityPrediction& prediction, Index t, double p) {
+  constexpr double kReach = 8;  // sd
+  const double sd = prediction.conditional_sd[t];
+  double low = prediction.conditional_mean.col(t).minCoeff() - kReach * sd;
+  double high = prediction.conditional_mean.col(t).maxCoeff() + kReach * sd;
+  for (int step = 0; step < 100 && low < high; ++step) {
+    const double middle = low + 0.5 * (high - low);
+    if (middle <= low || middle >= high) break;
+    (Exceeds(prediction, t, middle) > 1 - p ? low : high) = middle;
+  }
+  return low + 0.5 * (high - low);
+}
+
+}  // namespace
+
+absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parameters,
+                                                   const Eigen::MatrixXd& runs,
+                                                   const Eigen::VectorXd& error_sd) {
+  const Index n = runs.rows();
+  const Index t = runs.cols();
+  const Index d = parameters.cols();
+  if (n < 2 || parameters.rows() != n || error_sd.size() != t) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "a prediction from ", n, " x ", t, " runs at ", parameters.rows(), " x ", d,
+        " parameters with ", error_sd.size(),
+        " errors: two runs or more, a row of parameters for each and an error for each quantity "
+        "are needed."));
+  }
+  if (!parameters.allFinite() || !runs.allFinite() || !error_sd.allFinite() ||
+      (error_sd.array() < 0).any()) {
+    return absl::InvalidArgumentError(
+        "a prediction's parameters, runs and errors have to be finite, errors not negative.");
+  }
+  QuantityPrediction result;
+  result.mean = runs.colwise().mean();
+  const Eigen::MatrixXd departure = runs.rowwise() - result.mean.transpose();
+  const Eigen::ArrayXd variance =
+      departure.colwise().squaredNorm().transpose().array() / static_cast<double>(n - 1);
+  result.separated = n >= d + 4;
+  result.sd = (variance + error_sd.array().square()).sqrt();
+  result.sd_parameters = result.sd_model = Eigen::VectorXd::Constant(t, kNone);
+  result.conditional_mean = runs;
+  result.conditional_sd = error_sd;
+  if (result.separated) {
+    const Eigen::MatrixXd centred = parameters.rowwise() - parameters.colwise().mean();
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> regression(centred);
+    const Eigen::MatrixXd fitted = centred * regression.solve(departure);
+    const auto rank = static_cast<double>(regression.rank());
+    const Eigen::ArrayXd scatter =
+        (departure - fitted).colwise().squaredNorm().transpose().array() /
+        (static_cast<double>(n - 1) - rank);
+    const Eigen::ArrayXd raw =
+        fitted.colwise().squaredNorm().transpose().array() / static_cast<double>(n - 1);
+    const Eigen::ArrayXd own = (raw - scatter * rank / static_cast<double>(n - 1)).max(0);
+    result.sd_parameters = own.sqrt();
+    result.sd_model = scatter.sqrt();
+    result.sd = (own + scatter + error_sd.array().square()).sqrt();
+    result.conditional_sd = (scatter + error_sd.array().square()).sqrt();
+    const Eigen::VectorXd shrink = (raw > 0).select(own / raw.max(1e-300), 0.0).sqrt();
+    result.conditional_mean = (fitted * shrink.asDiagonal()).rowwise() + result.mean.transpose();
+  }
+  result.q05.resize(t);
+  result.q50.resize(t);
+  result.q95.resize(t);
+  for (Index k = 0; k < t; ++k) {
+    result.q05[k] = Quantile(result, k, 0.05);
+    result.q50[k] = Quantile(result, k, 0.5);
+    result.q95[k] = Quantile(result, k, 0.95);
+  }
+  return result;
+}
+
+Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, double level) {
+  Eigen::VectorXd probability(prediction.mean.size());
+  for (Index k = 0; k < probability.size(); ++k) probability[k] = Exceeds(prediction, k, level);
+  return probability;
+}
+
+}  // namespace calib::inference

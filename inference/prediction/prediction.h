@@ -1,0 +1,39 @@
+#pragma once
+// A quantity predicted from runs at draws of the posterior [Hadjidoukas 2014, Eqs. 11-15].
+
+#include <Eigen/Dense>
+
+#include "absl/status/statusor.h"
+
+namespace calib::inference {
+
+/// Q | theta ~ N(mu(theta), model_sd^2), theta from its posterior. T quantities, N runs.
+struct QuantityPrediction {
+  Eigen::VectorXd mean;           ///< T, posterior mean of mu                              [Eq. 14]
+  Eigen::VectorXd sd;             ///< T, of Q: both parts and the error of a reading       [Eq. 15]
+  Eigen::VectorXd sd_parameters;  ///< T, of mu over the posterior; NaN where not separated
+  Eigen::VectorXd sd_model;       ///< T, of a run about mu: scatter of packings; NaN likewise
+  Eigen::VectorXd q05, q50, q95;  ///< T, of Q, from the mixture over draws                 [Eq. 12]
+  /// False: too few runs (fewer than d + 4) to tell the two parts apart; sd holds both.
+  bool separated = false;
+
+  Eigen::MatrixXd conditional_mean;  ///< N x T: mu at each draw
+  Eigen::VectorXd conditional_sd;    ///< T: of Q there
+};
+
+/// A run is one draw's history on one packing: mu(theta) + scatter. Over a posterior mu is nearly
+/// linear in the parameters, so that a linear regression on them tells its variance from that of
+/// the scatter (residual variance, unbiased; the noise that the fit picks up is taken off the
+/// parameters' part).
+/// in: parameters N x d, any linear scale (the prior's standardised one); runs N x T; error_sd T,
+/// >= 0, of a reading that would be taken (0: of the model alone). N >= 2, all finite.
+/// Errors: INVALID_ARGUMENT naming what does not fit.
+absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parameters,
+                                                   const Eigen::MatrixXd& runs,
+                                                   const Eigen::VectorXd& error_sd);
+
+/// Pr(Q_t >= level) for each of the T quantities                                       [Eqs. 11,
+/// 12]
+Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, double level);
+
+}  // namespace calib::inference

@@ -1,0 +1,51 @@
+#pragma once
+// Scatter of the model: what two runs of one parameter vector differ by, because their packings do.
+// Strongly correlated along the path, so a covariance and not a number.
+
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "inference/data/data_set.h"
+
+namespace calib::inference {
+
+/// Second moments of a run's departure from the mean history, along the n readings of one
+/// observable of one experiment. Units of the readings.
+struct ScatterMoments {
+  Eigen::VectorXd variance;   ///< n
+  Eigen::VectorXd neighbour;  ///< n - 1: covariance of readings i and i + 1
+};
+
+/// Of R >= 2 runs (R x n, finite) of one parameter vector on R packings, unbiased (R - 1).
+ScatterMoments MomentsOfReplicates(const Eigen::MatrixXd& runs);
+
+/// Scatter of one observable of one experiment: S_ij = sd_i sd_j exp(-|c_i - c_j| / length).
+struct GroupScatter {
+  int experiment = 0;
+  int observable = 0;
+  Eigen::VectorXd sd;  ///< n, one value per loading stage, >= 0
+  double length = 0;   ///< in the control; 0: independent
+  /// Part of the variance that the measurement has as well: 1 for a specimen as small as the
+  /// model's, grains of the model over grains of the specimen otherwise, [0, 1].
+  double share = 1;
+};
+
+/// sd pooled over the readings of each stage, length of largest likelihood of a Markov chain with
+/// these moments among 200 between a tenth of the closest and a hundred times the whole distance;
+/// a likelihood of zero-mean normals needs no more than neighbours. Deterministic.
+/// in: stage, one number per reading (equal within a loading stage); control, n, ascending path
+///     length. Few replicates know the sd to 1/sqrt(2 (R - 1)) of itself at worst: readings of a
+///     stage are no independent witnesses.
+GroupScatter FitScatter(const ScatterMoments& moments, const std::vector<int>& stage,
+                        const Eigen::VectorXd& control);
+
+/// The covariance of a group's scatter for the path lengths of its readings, n x n.
+Eigen::MatrixXd ScatterCovariance(const GroupScatter& scatter, const Eigen::VectorXd& control);
+
+/// The readings with scatter in their errors: Sigma + (runs + share) S per group that has one.
+/// runs: 1 where the likelihood of a single run is asked for, 0 for that of the mean history.
+/// Groups without scatter keep their errors.
+DataSet WithScatter(const DataSet& data, const std::vector<GroupScatter>& scatter, double runs);
+
+}  // namespace calib::inference

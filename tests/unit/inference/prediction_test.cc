@@ -1,0 +1,91 @@
+#include "inference/prediction/prediction.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "inference/sampling/philox.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+// mu = 5 + 2 a - b, a and b standard normal: sd of mu sqrt(5); scatter of a run 1.5.
+struct Sample {
+  Eigen::MatrixXd parameters, runs;
+};
+Sample Draw(Index n, double scatter, std::uint64_t seed) {
+  Sample sample{.parameters = Eigen::MatrixXd(n, 2), .runs = Eigen::MatrixXd(n, 1)};
+  for (Index i = 0; i < n; ++i) {
+    PhiloxStream stream({.seed = seed,
+                         .purpose = StreamPurpose::kTest,
+                         .iteration = 1,
+                         .sample = static_cast<std::uint64_t>(i)});
+    sample.parameters.row(i) << stream.Normal(), stream.Normal();
+    sample.runs(i, 0) =
+        5 + 2 * sample.parameters(i, 0) - sample.parameters(i, 1) + scatter * stream.Normal();
+  }
+  return sample;
+}
+
+TEST(Prediction, TellsParametersFromScatterFromTheErrorOfAReading) {
+  const Index n = 4000;  // a sample sd is known to 1/sqrt(2 n) = 1.1 %
+  const Sample sample = Draw(n, 1.5, 1);
+  const auto p = PredictQuantity(sample.parameters, sample.runs, Eigen::VectorXd::Constant(1, 2));
+  ASSERT_TRUE(p.ok()) << p.status();
+  EXPECT_TRUE(p->separated);
+  const double sd = std::sqrt(5 + 2.25 + 4);
+  EXPECT_NEAR(p->mean[0], 5, 4 * sd / std::sqrt(n));
+  EXPECT_NEAR(p->sd_parameters[0] / std::sqrt(5.0), 1, 0.05);
+  EXPECT_NEAR(p->sd_model[0] / 1.5, 1, 0.05);
+  EXPECT_NEAR(p->sd[0] / sd, 1, 0.05);
+  // Q is normal here.
+  EXPECT_NEAR(p->q05[0], 5 - 1.645 * sd, 0.06 * sd);
+  EXPECT_NEAR(p->q50[0], 5, 0.06 * sd);
+  EXPECT_NEAR(p->q95[0], 5 + 1.645 * sd, 0.06 * sd);
+  EXPECT_NEAR(ExceedanceProbability(*p, 5 + sd)[0], 0.1587, 0.015);
+  EXPECT_NEAR(ExceedanceProbability(*p, 5 + 100 * sd)[0], 0, 1e-12);
+}
+
+TEST(Prediction, TwentyRunsAreUnbiased) {
+  double own = 0;
+  double model = 0;
+  constexpr int kTimes = 400;
+  for (int k = 0; k < kTimes; ++k) {
+    const Sample sample = Draw(20, 1.5, 100 + static_cast<std::uint64_t>(k));
+    const auto p = PredictQuantity(sample.parameters, sample.runs, Eigen::VectorXd::Zero(1));
+    ASSERT_TRUE(p.ok());
+    own += p->sd_parameters[0] * p->sd_parameters[0] / kTimes;
+    model += p->sd_model[0] * p->sd_model[0] / kTimes;
+  }
+  // Variances of 20 runs scatter by a factor sqrt(2 / 19) and sqrt(2 / 17): 4 sd of 400 of them.
+  EXPECT_NEAR(own / 5, 1, 4 * std::sqrt(2.0 / 19 / kTimes) * 1.5);
+  EXPECT_NEAR(model / 2.25, 1, 4 * std::sqrt(2.0 / 17 / kTimes));
+}
+
+TEST(Prediction, FewRunsAreNotTakenApart) {
+  const Sample sample = Draw(5, 1.5, 3);
+  const auto p = PredictQuantity(sample.parameters, sample.runs, Eigen::VectorXd::Zero(1));
+  ASSERT_TRUE(p.ok());
+  EXPECT_FALSE(p->separated);
+  EXPECT_TRUE(std::isnan(p->sd_parameters[0]));
+  EXPECT_TRUE(std::isfinite(p->sd[0]));
+  EXPECT_LE(p->q05[0], p->q95[0]);
+  EXPECT_GE(p->q05[0], sample.runs.minCoeff() - 1e-9);
+}
+
+TEST(Prediction, RefusesWhatDoesNotFit) {
+  const Sample sample = Draw(5, 1, 3);
+  EXPECT_FALSE(
+      PredictQuantity(sample.parameters.topRows(4), sample.runs, Eigen::VectorXd::Zero(1)).ok());
+  EXPECT_FALSE(PredictQuantity(sample.parameters, sample.runs, Eigen::VectorXd::Zero(2)).ok());
+  EXPECT_FALSE(
+      PredictQuantity(sample.parameters, sample.runs, Eigen::VectorXd::Constant(1, -1)).ok());
+  Eigen::MatrixXd broken = sample.runs;
+  broken(2, 0) = std::nan("");
+  EXPECT_FALSE(PredictQuantity(sample.parameters, broken, Eigen::VectorXd::Zero(1)).ok());
+}
+
+}  // namespace
+}  // namespace calib::inference

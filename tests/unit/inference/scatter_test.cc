@@ -1,0 +1,123 @@
+#include "inference/scatter/scatter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "inference/data/gaussian_likelihood.h"
+#include "inference/sampling/philox.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+// Runs whose departures are a Markov chain of the given sd (double beyond half way) and length.
+Eigen::MatrixXd Chains(Index runs, Index n, double sd, double length, std::uint64_t seed) {
+  Eigen::MatrixXd result(runs, n);
+  const double rho = std::exp(-1 / length);
+  for (Index r = 0; r < runs; ++r) {
+    PhiloxStream stream({.seed = seed,
+                         .purpose = StreamPurpose::kTest,
+                         .iteration = 1,
+                         .sample = static_cast<std::uint64_t>(r)});
+    double u = stream.Normal();
+    for (Index i = 0; i < n; ++i) {
+      if (i > 0) u = rho * u + std::sqrt(1 - rho * rho) * stream.Normal();
+      result(r, i) = 3 + (2 * i < n ? sd : 2 * sd) * u;
+    }
+  }
+  return result;
+}
+
+std::vector<int> TwoStages(Index n) {
+  std::vector<int> stage;
+  for (Index i = 0; i < n; ++i) stage.push_back(2 * i < n ? 0 : 1);
+  return stage;
+}
+
+TEST(Scatter, FindsSdOfEachStageAndLength) {
+  // 400 chains of 40 readings, about 8 correlation lengths: sd to 1/sqrt(2 * 400 * 4), 2 %.
+  const Index n = 40;
+  const auto scatter = FitScatter(MomentsOfReplicates(Chains(400, n, 0.1, 5, 1)), TwoStages(n),
+                                  Eigen::VectorXd::LinSpaced(n, 1, n));
+  EXPECT_NEAR(scatter.sd[0], 0.1, 4 * 0.1 * 0.02);
+  EXPECT_NEAR(scatter.sd[n - 1], 0.2, 4 * 0.2 * 0.02);
+  EXPECT_EQ(scatter.sd[0], scatter.sd[n / 2 - 1]);
+  EXPECT_NEAR(scatter.length, 5, 0.5);
+}
+
+TEST(Scatter, FourPackingsAreUnbiasedOnAverage) {
+  const Index n = 30;
+  double variance = 0;
+  constexpr int kTimes = 300;
+  for (int k = 0; k < kTimes; ++k) {
+    const auto scatter =
+        FitScatter(MomentsOfReplicates(Chains(4, n, 0.1, 10, 10 + static_cast<std::uint64_t>(k))),
+                   TwoStages(n), Eigen::VectorXd::LinSpaced(n, 1, n));
+    variance += scatter.sd[0] * scatter.sd[0] / kTimes;
+    EXPECT_GT(scatter.length, 0) << k;
+  }
+  // The variance of one estimate is at most 2/3 of its square: 4 sd of the mean of 300.
+  EXPECT_NEAR(variance, 0.01, 4 * 0.01 * std::sqrt(2.0 / 3 / kTimes));
+}
+
+TEST(Scatter, IndependentReadingsHaveNextToNoLength) {
+  const Index n = 40;
+  const auto scatter = FitScatter(MomentsOfReplicates(Chains(200, n, 0.1, 0.05, 2)), TwoStages(n),
+                                  Eigen::VectorXd::LinSpaced(n, 1, n));
+  EXPECT_LT(std::exp(-1 / std::max(scatter.length, 1e-9)), 0.05);
+}
+
+TEST(Scatter, EqualRunsHaveNone) {
+  const auto scatter = FitScatter(MomentsOfReplicates(Eigen::MatrixXd::Constant(3, 5, 2)),
+                                  {0, 0, 0, 1, 1}, Eigen::VectorXd::LinSpaced(5, 0, 1));
+  EXPECT_EQ(scatter.sd.maxCoeff(), 0);
+  EXPECT_EQ(scatter.length, 0);
+}
+
+DataSet ThreeReadings() {
+  DataSet data;
+  for (int i = 0; i < 3; ++i) {
+    data.readings.push_back({.load_step = i, .control = 1.0 * i, .value = 1.0 + i, .sd = 0.3});
+  }
+  return data;
+}
+
+TEST(Scatter, JoinsTheErrorsOnceForTheRunAndOnceForTheSpecimen) {
+  const GroupScatter scatter{.sd = Eigen::Vector3d(0.4, 0.4, 0.8), .length = 2, .share = 0.25};
+  const DataSet with = WithScatter(ThreeReadings(), {scatter}, 1);
+  ASSERT_EQ(with.covariances.size(), 1U);
+  EXPECT_NEAR(with.readings[0].sd, std::sqrt(0.09 + 1.25 * 0.16), 1e-12);
+  EXPECT_NEAR(with.covariances[0].matrix(0, 2), 1.25 * 0.4 * 0.8 * std::exp(-1.0), 1e-12);
+  // The density is that of the multivariate normal with this covariance.
+  const auto likelihood = GaussianLikelihood::Create(with, NoiseMode::kGiven);
+  ASSERT_TRUE(likelihood.ok()) << likelihood.status();
+  Eigen::MatrixXd prediction(1, 3);
+  prediction << 1.5, 2.2, 2;
+  const Eigen::Vector3d residual(0.5, 0.2, -1);
+  const Eigen::MatrixXd& sigma = with.covariances[0].matrix;
+  const double expected = -0.5 * residual.dot(sigma.inverse() * residual) -
+                          0.5 * std::log(sigma.determinant()) - 1.5 * std::log(2 * M_PI);
+  EXPECT_NEAR(likelihood->LogLikelihood(prediction)[0], expected, 1e-12);
+  EXPECT_NEAR(likelihood->Increments(prediction).sum(), expected, 1e-12);
+}
+
+TEST(Scatter, WrongCovariancesAreRefusedWithASentence) {
+  DataSet data = ThreeReadings();
+  data.covariances.push_back({0, 0, 0.09 * Eigen::MatrixXd::Identity(2, 2)});
+  EXPECT_FALSE(ValidateData(data, NoiseMode::kGiven).ok());
+  data.covariances[0].matrix = 0.08 * Eigen::MatrixXd::Identity(3, 3);
+  EXPECT_FALSE(ValidateData(data, NoiseMode::kGiven).ok());
+  data.covariances[0].matrix = 0.09 * Eigen::MatrixXd::Identity(3, 3);
+  EXPECT_TRUE(ValidateData(data, NoiseMode::kGiven).ok());
+  data.covariances[0].matrix(0, 1) = 0.01;
+  EXPECT_FALSE(ValidateData(data, NoiseMode::kGiven).ok());
+  data.covariances[0].matrix.setConstant(0.09);
+  const auto singular = GaussianLikelihood::Create(data, NoiseMode::kGiven);
+  ASSERT_FALSE(singular.ok());
+  EXPECT_NE(singular.status().message().find("singular"), std::string_view::npos);
+}
+
+}  // namespace
+}  // namespace calib::inference

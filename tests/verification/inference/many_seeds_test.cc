@@ -1,0 +1,238 @@
+// Errors over many seeds are as large as stated, no larger and no smaller, where the answer is
+// known. $CALIB_SEEDS sets their number (10 in the suite, 50 for the full check):
+//   CALIB_SEEDS=50 build/dev/bin/inference_many_seeds_test
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <iostream>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "inference/data/gaussian_likelihood.h"
+#include "inference/tmcmc/tmcmc.h"
+#include "tests/verification/inference/linear_model.h"
+
+namespace calib::inference {
+namespace {
+
+constexpr double kAlpha = 1e-3;  // of each check
+
+int Seeds() {
+  const char* text = std::getenv("CALIB_SEEDS");
+  return text != nullptr ? std::max(2, std::atoi(text)) : 10;
+}
+
+// Sum of squares of `n` standard normal errors lies below this with probability 1 - alpha.
+double MostSquares(int n) {
+  return boost::math::quantile(boost::math::complement(
+      boost::math::chi_squared_distribution<double>(static_cast<double>(n)), kAlpha));
+}
+
+// What one seed found, as errors over what they should be.
+struct Found {
+  double evidence_error = 0;      // ln
+  double evidence_se = 0;         // as stated
+  std::vector<double> mean_over;  // error of each mean over posterior sd
+  std::vector<double> sd_ratio;   // found over exact
+  double independent = 0;         // effective number of draws
+};
+
+// Evidence: normalised errors have mean zero and the stated size. Means: sd / sqrt(n). sd:
+// 1 / sqrt(2 n) of itself.
+void Judge(const std::string& name, const std::vector<Found>& all) {
+  const auto seeds = static_cast<int>(all.size());
+  double sum = 0;
+  double squares = 0;
+  double absolute = 0;
+  for (const Found& one : all) {
+    const double z = one.evidence_error / one.evidence_se;
+    sum += z;
+    squares += z * z;
+    absolute += one.evidence_error / seeds;
+  }
+  std::cout << name << ": ln evidence off by " << absolute << " on average, rms error over stated "
+            << std::sqrt(squares / seeds) << " (" << seeds << " seeds)\n";
+  EXPECT_LE(squares, MostSquares(seeds)) << name << ": evidence";
+  EXPECT_LE(std::abs(sum) / std::sqrt(seeds), 3.3) << name << ": evidence is biased";
+  for (std::size_t j = 0; j < all.front().mean_over.size(); ++j) {
+    double means = 0;
+    double sds = 0;
+    for (const Found& one : all) {
+      means += std::pow(one.mean_over[j], 2) * one.independent;
+      sds += std::pow(one.sd_ratio[j] - 1, 2) * 2 * one.independent;
+    }
+    EXPECT_LE(means, MostSquares(seeds)) << name << ": mean of parameter " << j;
+    EXPECT_LE(sds, MostSquares(seeds)) << name << ": sd of parameter " << j;
+  }
+}
+
+struct Exact {
+  double log_evidence = 0;
+  Eigen::VectorXd mean, sd;
+};
+
+Exact ExactOf(const LinearModel& model) {
+  return {.log_evidence = model.LogEvidence(),
+          .mean = model.PosteriorMean(),
+          .sd = model.PosteriorCovariance().diagonal().cwiseSqrt()};
+}
+
+// Readings y of a model that is a function of one row of parameters.
+struct Problem {
+  std::vector<Prior> priors;
+  DataSet data;
+  std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)> predict;
+  Exact exact;
+};
+
+Problem Linear(int d) {
+  const LinearModel model(3 * d, d, 0.5, 21);
+  return {.priors = model.priors,
+          .data = model.Data(),
+          .predict = [model](const Eigen::MatrixXd& p) { return model.Predict(p); },
+          .exact = ExactOf(model)};
+}
+
+// y1 = a, y2 = b + a^2 / 2 with errors 1 and 0.2, prior N(0, 2^2): a banana ten times as long as it
+// is wide. The exact answer by quadrature.
+Problem Banana() {
+  Problem problem{
+      .priors = std::vector<Prior>(2, Prior{.kind = PriorKind::kNormal, .mean = 0, .sd = 2}),
+      .data = {},
+      .predict =
+          [](const Eigen::MatrixXd& p) {
+            Eigen::MatrixXd y(p.rows(), 2);
+            y.col(0) = p.col(0);
+            y.col(1) = p.col(1).array() + 0.5 * p.col(0).array().square();
+            return y;
+          },
+      .exact = {.log_evidence = 0, .mean = Eigen::Vector2d::Zero(), .sd = Eigen::Vector2d::Zero()}};
+  problem.data.readings = {{.load_step = 0, .value = 0.5, .sd = 1},
+                           {.load_step = 1, .value = 0.3, .sd = 0.2}};
+  constexpr int kCells = 1500;
+  constexpr double kHalf = 8;  // four sd of the prior
+  const double cell = 2 * kHalf / kCells;
+  double mass = 0;
+  Eigen::Vector2d first = Eigen::Vector2d::Zero();
+  Eigen::Vector2d second = Eigen::Vector2d::Zero();
+  for (int i = 0; i < kCells; ++i) {
+    const double a = -kHalf + (i + 0.5) * cell;
+    for (int k = 0; k < kCells; ++k) {
+      const double b = -kHalf + (k + 0.5) * cell;
+      const double squares =
+          (a * a + b * b) / 4 + std::pow(0.5 - a, 2) + std::pow((0.3 - b - 0.5 * a * a) / 0.2, 2);
+      const double weight = std::exp(-0.5 * squares) * cell * cell /
+                            (4 * std::numbers::pi * std::numbers::pi * 4 * 0.2);
+      mass += weight;
+      first += weight * Eigen::Vector2d(a, b);
+      second += weight * Eigen::Vector2d(a * a, b * b);
+    }
+  }
+  problem.exact.log_evidence = std::log(mass);
+  problem.exact.mean = first / mass;
+  problem.exact.sd = (second / mass - problem.exact.mean.cwiseAbs2()).cwiseSqrt();
+  return problem;
+}
+
+Found Filter(const Problem& problem, int iterations, int samples, std::uint64_t seed) {
+  const FilterOptions options{.design = Design::kSobol, .seed = seed};
+  const auto runs =
+      RunIterations(problem.priors, problem.data, options, iterations, samples, problem.predict);
+  const auto posterior = ComputePosterior(problem.priors, problem.data, options, runs);
+  EXPECT_TRUE(posterior.ok() && posterior->degeneracy.empty())
+      << (posterior.ok() ? posterior->degeneracy : posterior.status().ToString());
+  Found found{.evidence_error = posterior->log_evidence - problem.exact.log_evidence,
+              .evidence_se = posterior->log_evidence_se,
+              .mean_over = {},
+              .sd_ratio = {},
+              .independent = posterior->ess};
+  for (std::size_t j = 0; j < problem.priors.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    const ParameterSummary& p = posterior->parameters[j];
+    found.mean_over.push_back((p.mean - problem.exact.mean[k]) / problem.exact.sd[k]);
+    found.sd_ratio.push_back(p.sd / problem.exact.sd[k]);
+  }
+  return found;
+}
+
+// Draws that share ancestors are not independent: the effective number is that of the moves that
+// the last stage has made, taken as a tenth of the draws.
+Found Tmcmc(const Problem& problem, int samples, std::uint64_t seed) {
+  const auto likelihood = GaussianLikelihood::Create(problem.data, NoiseMode::kGiven);
+  const auto state = RunTmcmc(problem.priors, {.samples = samples, .steps = 15, .seed = seed},
+                              [&](const Eigen::MatrixXd& rows) {
+                                return likelihood->LogLikelihood(problem.predict(rows));
+                              });
+  EXPECT_TRUE(state.ok()) << state.status();
+  Found found{.evidence_error = state->log_evidence - problem.exact.log_evidence,
+              .evidence_se = state->LogEvidenceStandardError(),
+              .mean_over = {},
+              .sd_ratio = {},
+              .independent = 0.1 * samples};
+  for (Eigen::Index j = 0; j < state->samples.cols(); ++j) {
+    const double mean = state->samples.col(j).mean();
+    const double sd = std::sqrt((state->samples.col(j).array() - mean).square().mean());
+    found.mean_over.push_back((mean - problem.exact.mean[j]) / problem.exact.sd[j]);
+    found.sd_ratio.push_back(sd / problem.exact.sd[j]);
+  }
+  return found;
+}
+
+// In ten dimensions the weights of thousands of samples carry no posterior, and the filter says so
+// (FilterSaysWhenTenDimensionsAreTooMany); that is what tmcmc and the emulator are for.
+TEST(ManySeeds, FilterOnLinearGaussianModels) {
+  struct Size {
+    int d, iterations, samples;
+  };
+  for (const Size& size : {Size{2, 3, 500}, Size{5, 4, 700}}) {
+    const Problem problem = Linear(size.d);
+    std::vector<Found> all;
+    for (int seed = 1; seed <= Seeds(); ++seed) {
+      all.push_back(
+          Filter(problem, size.iterations, size.samples, static_cast<std::uint64_t>(seed)));
+    }
+    Judge("filter, d = " + std::to_string(size.d), all);
+  }
+}
+
+TEST(ManySeeds, FilterSaysWhenTenDimensionsAreTooMany) {
+  const Problem problem = Linear(10);
+  const FilterOptions options{.design = Design::kSobol, .seed = 1};
+  const auto runs = RunIterations(problem.priors, problem.data, options, 3, 500, problem.predict);
+  const auto posterior = ComputePosterior(problem.priors, problem.data, options, runs);
+  ASSERT_TRUE(posterior.ok());
+  EXPECT_NE(posterior->degeneracy.find("do not make a posterior"), std::string::npos);
+}
+
+TEST(ManySeeds, TmcmcOnLinearGaussianModels) {
+  for (const int d : {2, 5, 10}) {
+    const Problem problem = Linear(d);
+    std::vector<Found> all;
+    for (int seed = 1; seed <= Seeds(); ++seed) {
+      all.push_back(Tmcmc(problem, 1000, static_cast<std::uint64_t>(seed)));
+    }
+    Judge("tmcmc, d = " + std::to_string(d), all);
+  }
+}
+
+TEST(ManySeeds, Banana) {
+  const Problem problem = Banana();
+  std::vector<Found> filter;
+  std::vector<Found> tmcmc;
+  for (int seed = 1; seed <= Seeds(); ++seed) {
+    filter.push_back(Filter(problem, 4, 600, static_cast<std::uint64_t>(seed)));
+    tmcmc.push_back(Tmcmc(problem, 1000, static_cast<std::uint64_t>(seed)));
+  }
+  Judge("filter, banana", filter);
+  Judge("tmcmc, banana", tmcmc);
+}
+
+}  // namespace
+}  // namespace calib::inference
