@@ -102,6 +102,8 @@ void CleanBranch(std::vector<double>& values, std::size_t first, std::size_t las
   }
 }
 
+constexpr double kClearDrop = 0.03;  // of the rise: less is a plateau with noise on it
+
 // Index of the peak of a noisy curve within readings 0..last, or `last` when there is none that
 // stands out.
 std::size_t ClearPeak(const std::vector<double>& strength, std::size_t last) {
@@ -110,10 +112,52 @@ std::size_t ClearPeak(const std::vector<double>& strength, std::size_t last) {
   const auto peak = static_cast<std::size_t>(peak_at - strength.begin());
   const double start = strength.front();
   const double drop = *peak_at - strength[last];
-  constexpr double kClearDrop = 0.03;  // of the rise: less is a plateau with noise on it
   constexpr std::size_t kFewest = 2;
   return drop > kClearDrop * (*peak_at - start) && last - peak >= kFewest && peak >= 1 ? peak
                                                                                        : last;
+}
+
+// Change along readings first..last of the line through y over x.
+double TrendOver(const ControlPath& path, const std::vector<double>& y, std::size_t first,
+                 std::size_t last) {
+  const auto n = static_cast<double>(last - first + 1);
+  double mean_x = 0;
+  double mean_y = 0;
+  for (std::size_t i = first; i <= last; ++i) {
+    mean_x += path.points[i].target / n;
+    mean_y += y[i] / n;
+  }
+  double xx = 0;
+  double xy = 0;
+  for (std::size_t i = first; i <= last; ++i) {
+    const double x = path.points[i].target - mean_x;
+    xx += x * x;
+    xy += x * (y[i] - mean_y);
+  }
+  return xx > 0 ? xy / xx * (path.points[last].target - path.points[first].target) : 0;
+}
+
+// First reading of the steady state within first..last; last + 1: there is none.
+std::size_t SteadyFrom(const ControlPath& path, const StageCurves& curves, std::size_t first,
+                       std::size_t last) {
+  constexpr double kShare = 0.2;
+  constexpr std::size_t kFewest = 5;
+  constexpr double kDilatancy = 0.05;
+  const auto [low, high] = std::minmax_element(
+      curves.strength.begin(), curves.strength.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+  const double rise = *high - *low;
+  const double way = path.points[last].target - path.points.front().target;
+  for (std::size_t i = first; i + kFewest <= last + 1; ++i) {
+    const double part = path.points[last].target - path.points[i].target;
+    if (!(std::abs(part) >= kShare * std::abs(way)) || part == 0) break;
+    if (std::abs(TrendOver(path, curves.strength, i, last)) > kClearDrop * rise) continue;
+    if (curves.volume.size() == curves.strength.size() &&
+        std::abs(TrendOver(path, curves.volume, i, last)) > kDilatancy * std::abs(part)) {
+      continue;
+    }
+    return i;
+  }
+  return last + 1;
 }
 
 }  // namespace
@@ -141,23 +185,38 @@ ControlPath CleanControl(const std::vector<double>& readings, double start,
   return path;
 }
 
-std::vector<std::string> NameSegments(const ControlPath& path,
-                                      const std::vector<double>& strength) {
+std::vector<std::string> NameSegments(const ControlPath& path, const StageCurves& curves) {
   std::vector<std::string> names(path.points.size(), "initial_loading");
   if (names.empty()) return names;
   for (std::size_t k = 0; k < path.turning.size(); ++k) {
     const std::string name = (k % 2 == 0 ? "unload_" : "reload_") + std::to_string(k / 2 + 1);
     std::fill(names.begin() + static_cast<std::ptrdiff_t>(path.turning[k]) + 1, names.end(), name);
   }
+  const std::vector<double>& strength = curves.strength;
   if (strength.size() != names.size()) return names;
   const std::size_t last = path.turning.empty() ? names.size() - 1 : path.turning.front();
   const std::size_t peak = ClearPeak(strength, last);
-  if (peak == last) return names;
   const double half = 0.5 * (strength.front() + strength[peak]);
-  std::size_t i = 0;
-  while (strength[i] < half) ++i;
-  for (; i <= peak; ++i) names[i] = "pre_peak";
-  for (; i <= last; ++i) names[i] = "post_peak";
+  std::size_t rising = 0;
+  while (strength[rising] < half) ++rising;
+  std::size_t settled = rising;  // where a steady state may begin
+  if (peak != last) {
+    const double near = strength[peak] - kClearDrop * (strength[peak] - strength.front());
+    std::size_t before = peak;
+    while (before > rising && strength[before - 1] >= near) --before;
+    std::size_t behind = peak;
+    while (behind < last && strength[behind + 1] >= near) ++behind;
+    for (std::size_t i = rising; i <= last; ++i) {
+      names[i] = i < before ? "pre_peak" : (i <= behind ? "peak" : "post_peak");
+    }
+    settled = behind + 1;
+  }
+  // Of monotonic loading only: on unloading nothing is steady.
+  if (path.turning.empty()) {
+    for (std::size_t i = SteadyFrom(path, curves, settled, last); i <= last; ++i) {
+      names[i] = "steady_state";
+    }
+  }
   return names;
 }
 

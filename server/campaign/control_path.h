@@ -28,10 +28,18 @@ struct ControlPath {
 ControlPath CleanControl(const std::vector<double>& readings, double start,
                          std::optional<double> noise);
 
+/// What the stages are found from, one value per reading; empty: not measured.
+struct StageCurves {
+  std::vector<double> strength = {};  ///< a deviatoric observable
+  std::vector<double> volume = {};    ///< volumetric strain
+};
+
 /// Loading stage of each reading: initial_loading, then unload_1, reload_1, unload_2, ... at the
-/// turning points. Where `strength` (a deviatoric observable at each reading; empty: none) has a
-/// clear peak within the first stage, the part beyond half of the peak is pre_peak and the part
-/// behind it post_peak.
-std::vector<std::string> NameSegments(const ControlPath& path, const std::vector<double>& strength);
+/// turning points. Within the first stage, where strength has a clear peak (it falls by 3 % of its
+/// rise behind it): pre_peak beyond half of the peak, peak within 3 % of the rise about it,
+/// post_peak behind. The end of monotonic loading is steady_state where over its last fifth
+/// or more the trend of strength is below 3 % of its rise and that of volumetric strain below 5 %
+/// of the control's.
+std::vector<std::string> NameSegments(const ControlPath& path, const StageCurves& curves);
 
 }  // namespace calib::campaign

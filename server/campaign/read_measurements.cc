@@ -131,6 +131,13 @@ std::vector<double> Strength(const Experiment& experiment) {
   return {};
 }
 
+std::vector<double> Volume(const Experiment& experiment) {
+  for (const MeasuredObservable& observable : experiment.observables) {
+    if (observable.name == "volumetric_strain") return observable.values;
+  }
+  return {};
+}
+
 }  // namespace
 
 void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
@@ -168,7 +175,7 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
       CleanControl(experiment.control, experiment.control_start, control.noise);
   if (!control.name.empty()) CheckPath(experiment_map, *table, test, control, path);
   experiment.path = path.points;
-  experiment.segment = NameSegments(path, Strength(experiment));
+  experiment.segment = NameSegments(path, {.strength = Strength(experiment), .volume = Volume(experiment)});
 }
 
 }  // namespace calib::campaign

@@ -8,6 +8,7 @@
 #include "server/ctl/progress.h"
 #include "server/ctl/text_table.h"
 #include "server/report/people_units.h"
+#include "server/report/residual_words.h"
 
 namespace calib::ctl {
 namespace {
@@ -103,13 +104,32 @@ std::string ComparisonText(const report::Comparison& comparison) {
          m.z ? Number(*m.z, 2) : "–", m.p_value ? Number(*m.p_value, 2) : "–",
          m.z ? Verdict(m.rms_error, m.p_value) : ""});
   }
-  TextTable segments({"<experiment", "<observable", "<stage", "model − measured", "z"});
+  TextTable segments({"<experiment", "<observable", "<stage", "model − measured", "z", "rms/sd",
+                      "chi2", "<shape"});
   for (const report::SegmentMisfit& m : comparison.by_segment) {
     segments.AddRow({m.experiment + (m.heldout ? " (held out)" : ""), m.observable, m.segment,
                      report::NumberWithUnit(m.bias, m.observable, UnitOf(m.observable), 3),
-                     m.z ? Number(*m.z, 3) : "–"});
+                     m.z ? Number(*m.z, 3) : "–", Number(m.rms_error, 3),
+                     m.chi2_share ? report::Percent(*m.chi2_share, 2) : "–",
+                     m.pattern.name == "none" ? "" : m.pattern.name});
   }
-  return text + "\n" + observables.ToString() + "\n" + segments.ToString();
+  text += "\n" + observables.ToString() + "\n" + segments.ToString();
+  for (const std::string& line : report::WhereItFails(comparison)) {
+    text += Wrapped(line, "\n! ", "  ");
+  }
+  if (comparison.parameter_drift.empty()) return text;
+  TextTable drift({"<parameter", "<experiment", "<stage", "fitted alone", "± sd", "z"});
+  for (const report::ParameterDrift& d : comparison.parameter_drift) {
+    for (const report::PartialFit& fit : d.fits) {
+      const report::DisplayUnit unit =
+          report::UnitForPeople(d.parameter, d.unit, std::abs(fit.mean));
+      drift.AddRow(
+          {d.parameter, fit.experiment, fit.segment.empty() ? "all" : fit.segment,
+           Number(fit.mean * unit.factor, 4) + (unit.label.empty() ? "" : " " + unit.label),
+           Number(fit.sd * unit.factor, 2), Number(fit.z, 2)});
+    }
+  }
+  return text + "\n" + drift.ToString();
 }
 
 std::string ModelsText(const report::ModelComparison& comparison) {

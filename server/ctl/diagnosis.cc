@@ -17,6 +17,8 @@ namespace calib::ctl {
 namespace {
 
 using Eigen::Index;
+using report::RunsOf;
+using report::RunTable;
 
 constexpr int kMostRuns = 4;           // of one effect in the screen, or
 constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all effects

@@ -10,12 +10,13 @@
 #include "dem/catalog/catalog.h"
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
-#include "server/scheduler/definition.h"
 
 namespace calib::ctl {
 namespace {
 
 using Eigen::Index;
+using report::RunTable;
+using report::RunsOf;
 
 constexpr int kSpread = 3000;   // points over the prior
 constexpr int kRefined = 1000;  // about the best of them, in each round
@@ -23,12 +24,6 @@ constexpr int kRounds = 4;
 // Of an emulator to judge by, noise sd: its error beyond the scatter of single runs.
 constexpr double kMostUncovered = 2;
 constexpr double kMostUnknown = 3;  // noise sd of what the emulator may not know of a point
-
-Eigen::VectorXd NoiseOf(const inference::DataSet& data) {
-  Eigen::VectorXd sd(static_cast<Index>(data.readings.size()));
-  for (Index k = 0; k < sd.size(); ++k) sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
-  return sd;
-}
 
 Eigen::MatrixXd Standard(const std::vector<inference::Prior>& priors,
                          const Eigen::MatrixXd& values) {
@@ -61,46 +56,6 @@ Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
 }
 
 }  // namespace
-
-RunTable RunsOf(const report::CampaignView& view) {
-  const auto definition = scheduler::MakeDefinition(view.campaign);
-  const auto t = static_cast<Index>(definition->data.readings.size());
-  const auto d = static_cast<Index>(view.campaign.parameters.size());
-  Eigen::RowVectorXd value(t);
-  for (Index k = 0; k < t; ++k) {
-    value[k] = definition->data.readings[static_cast<std::size_t>(k)].value;
-  }
-  const Eigen::RowVectorXd sd = NoiseOf(definition->data).transpose();
-  RunTable table;
-  std::vector<Eigen::RowVectorXd> parameters;
-  std::vector<Eigen::RowVectorXd> histories;
-  for (const v1::Sample& sample : view.samples) {
-    Eigen::RowVectorXd row =
-        Eigen::RowVectorXd::Constant(t, std::numeric_limits<double>::quiet_NaN());
-    for (std::size_t e = 0; e < view.campaign.experiments.size(); ++e) {
-      const auto found = view.states.find({view.campaign.experiments[e].name, sample.index()});
-      if (found == view.states.end()) continue;
-      for (const v1::State& state : found->second.states) {
-        const std::vector<double> values(state.values().begin(), state.values().end());
-        definition->readings.Place(static_cast<int>(e), state.load_step(), values, row);
-      }
-    }
-    if (!row.allFinite() || sample.parameters_size() != d) continue;
-    table.sample.push_back(sample.index());
-    histories.emplace_back((row - value).cwiseQuotient(sd));
-    Eigen::RowVectorXd own(d);
-    for (Index j = 0; j < d; ++j) own[j] = sample.parameters(static_cast<int>(j));
-    parameters.push_back(own);
-  }
-  const auto n = static_cast<Index>(histories.size());
-  table.parameters.resize(n, d);
-  table.histories.resize(n, t);
-  for (Index i = 0; i < n; ++i) {
-    table.parameters.row(i) = parameters[static_cast<std::size_t>(i)];
-    table.histories.row(i) = histories[static_cast<std::size_t>(i)];
-  }
-  return table;
-}
 
 RunTable RunsWithoutEffect(const RunTable& without, const campaign::Campaign& parent,
                            const campaign::Campaign& extended) {

@@ -10,16 +10,9 @@
 #include "inference/data/data_set.h"
 #include "inference/diagnosis/screen.h"
 #include "server/report/campaign_view.h"
+#include "server/report/run_table.h"
 
 namespace calib::ctl {
-
-/// Predictions of the readings by the finished samples, in noise units about the measurement.
-struct RunTable {
-  std::vector<int> sample;     ///< numbers, ascending
-  Eigen::MatrixXd parameters;  ///< N x d, SI
-  Eigen::MatrixXd histories;   ///< N x T, (prediction - reading) / sd
-};
-RunTable RunsOf(const report::CampaignView& view);
 
 struct Response {
   inference::FittedModel model;
@@ -36,12 +29,12 @@ struct Response {
 /// further: runs in addition to the campaign's own, parameters in its order.
 absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
                                    const std::vector<Eigen::VectorXd>& nuisance,
-                                   const RunTable& further = {});
+                                   const report::RunTable& further = {});
 
 /// Runs of the model without the effects that `extended` has on top, as runs of `extended`: where a
 /// parameter of an effect has its null value the others do not matter, so that they are spread over
 /// their priors. Runs that cannot be expressed so are left out.
-RunTable RunsWithoutEffect(const RunTable& without, const campaign::Campaign& parent,
+report::RunTable RunsWithoutEffect(const report::RunTable& without, const campaign::Campaign& parent,
                            const campaign::Campaign& extended);
 
 }  // namespace calib::ctl

@@ -1,4 +1,6 @@
 #include <iostream>
+#include <string>
+#include <utility>
 
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
@@ -6,6 +8,7 @@
 #include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
+#include "server/report/parameter_drift.h"
 
 namespace calib::ctl {
 
@@ -18,7 +21,13 @@ int Compare(const Arguments& arguments) {
     return Fail(absl::FailedPreconditionError("no iteration of " + arguments.campaign +
                                               " is complete yet: nothing to compare"));
   }
-  const report::Comparison comparison = report::Compare(*view, report::PredictReadings(*view));
+  report::Comparison comparison = report::Compare(*view, report::PredictReadings(*view));
+  if (auto drifts = report::ParameterDrifts(*view); drifts.ok()) {
+    comparison.parameter_drift = *std::move(drifts);
+  } else {
+    comparison.note += (comparison.note.empty() ? "" : " ") +
+                       ("Drift of the parameters: " + std::string(drifts.status().message()) + ".");
+  }
   std::cout << (arguments.json ? report::ComparisonJson(arguments.campaign, comparison)
                                : ComparisonText(comparison));
   return kDone;

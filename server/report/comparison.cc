@@ -2,6 +2,8 @@
 
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
+#include <map>
+#include <set>
 
 namespace calib::report {
 namespace {
@@ -14,6 +16,7 @@ struct Group {
   Eigen::VectorXd residual;  // model - measurement
   Eigen::VectorXd sd;
   Eigen::VectorXd travelled;  // path length of the control
+  Eigen::VectorXd model;
 };
 
 Group MakeGroup(const CampaignView& view, const campaign::Experiment& experiment, std::size_t j,
@@ -23,10 +26,12 @@ Group MakeGroup(const CampaignView& view, const campaign::Experiment& experiment
               .readings = {},
               .residual = {},
               .sd = {},
-              .travelled = {}};
+              .travelled = {},
+              .model = {}};
   std::vector<double> residual;
   std::vector<double> sd;
   std::vector<double> travelled;
+  std::vector<double> model;
   const std::vector<double> distance =
       campaign::TravelledControl(experiment, group.observable->correlation_length);
   for (std::size_t i = 0; i < experiment.control.size(); ++i) {
@@ -35,11 +40,13 @@ Group MakeGroup(const CampaignView& view, const campaign::Experiment& experiment
     residual.push_back(prediction.mean[i] - group.observable->values[i]);
     sd.push_back(ErrorOf(view, *group.observable, i));
     travelled.push_back(distance[i]);
+    model.push_back(prediction.mean[i]);
   }
   const auto size = static_cast<Eigen::Index>(residual.size());
   group.residual = Eigen::Map<const Eigen::VectorXd>(residual.data(), size);
   group.sd = Eigen::Map<const Eigen::VectorXd>(sd.data(), size);
   group.travelled = Eigen::Map<const Eigen::VectorXd>(travelled.data(), size);
+  group.model = Eigen::Map<const Eigen::VectorXd>(model.data(), size);
   return group;
 }
 
@@ -50,16 +57,24 @@ double NeighbourCorrelation(const Group& group, Eigen::Index i) {
   return length > 0 ? std::exp(-(group.travelled[i] - group.travelled[i - 1]) / length) : 0;
 }
 
-// r^T Sigma^-1 r with Sigma_ij = sd_i sd_j exp(-|c_i - c_j| / length).
-double ChiSquared(const Group& group) {
-  const Eigen::VectorXd u = group.residual.cwiseQuotient(group.sd);
-  double chi2 = u[0] * u[0];
-  for (Eigen::Index i = 1; i < u.size(); ++i) {
-    const double rho = NeighbourCorrelation(group, i);
-    const double innovation = u[i] - rho * u[i - 1];
-    chi2 += innovation * innovation / (1 - rho * rho);
+ResidualCurve CurveOf(const Group& group, Eigen::Index first, Eigen::Index count) {
+  ResidualCurve curve{.residual = group.residual.segment(first, count),
+                      .sd = group.sd.segment(first, count),
+                      .correlation = Eigen::VectorXd::Zero(count),
+                      .control = Eigen::VectorXd(count),
+                      .model = group.model.segment(first, count)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    if (i > 0) curve.correlation[i] = NeighbourCorrelation(group, first + i);
+    curve.control[i] =
+        group.experiment->control[group.readings[static_cast<std::size_t>(first + i)]];
   }
-  return chi2;
+  return curve;
+}
+
+// r^T Sigma^-1 r with Sigma_ij = sd_i sd_j exp(-|c_i - c_j| / length), of readings first ...
+double ChiSquared(const Group& group, Eigen::Index first, Eigen::Index count) {
+  const ResidualCurve curve = CurveOf(group, first, count);
+  return Whitened(curve, curve.residual).squaredNorm();
 }
 
 // Variance of the mean error of readings first .. first + count - 1: the sum of Sigma over count^2.
@@ -71,6 +86,18 @@ double VarianceOfMean(const Group& group, Eigen::Index first, Eigen::Index count
     sum += group.sd[i] * (group.sd[i] + 2 * earlier);
   }
   return sum / static_cast<double>(count * count);
+}
+
+// n^2 / sum of the correlations of the errors.
+double EffectiveReadings(const Group& group) {
+  double sum = 0;
+  double earlier = 0;  // sum over k < i of correlation(k, i)
+  const Eigen::Index n = group.residual.size();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    if (i > 0) earlier = (earlier + 1) * NeighbourCorrelation(group, i);
+    sum += 1 + 2 * earlier;
+  }
+  return static_cast<double>(n * n) / sum;
 }
 
 double UpperTail(double chi2, double degrees) {
@@ -100,29 +127,84 @@ void AddSegments(const Group& group, bool heldout, bool judged, std::vector<Segm
         .from = group.experiment->control[group.readings[static_cast<std::size_t>(first)]],
         .to = group.experiment->control[group.readings[static_cast<std::size_t>(end - 1)]],
         .bias = group.residual.segment(first, count).mean(),
-        .z = std::nullopt};
+        .z = std::nullopt,
+        .readings = static_cast<int>(count),
+        .rms_error = std::sqrt(group.residual.segment(first, count)
+                                   .cwiseQuotient(group.sd.segment(first, count))
+                                   .squaredNorm() /
+                               static_cast<double>(count)),
+        .chi2_share = std::nullopt};
     if (judged) {
       misfit.z = misfit.bias / std::sqrt(VarianceOfMean(group, first, count));
+      misfit.chi2_share = ChiSquared(group, first, count);  // divided by their sum in the end
+      misfit.pattern = PatternOf(CurveOf(group, first, count));
     }
     out.push_back(std::move(misfit));
     first = end;
   }
 }
 
-std::vector<ParameterDrift> Drifts(const v1::Posterior& posterior) {
-  std::vector<ParameterDrift> drifts;
-  if (posterior.path_size() < 2) return drifts;
-  const auto& half = posterior.path(posterior.path_size() / 2 - 1);
-  const auto& end = posterior.path(posterior.path_size() - 1);
-  for (int k = 0; k < posterior.parameters_size() && k < half.mean_size() && k < end.mean_size();
-       ++k) {
-    const double sd = posterior.parameters(k).sd();
-    drifts.push_back({.parameter = posterior.parameters(k).name(),
-                      .half_way = half.mean(k),
-                      .end = end.mean(k),
-                      .change_over_sd = sd > 0 ? (end.mean(k) - half.mean(k)) / sd : std::nan("")});
+void ToShares(std::vector<SegmentMisfit>& segments) {
+  double fitted = 0;
+  double heldout = 0;
+  for (const SegmentMisfit& m : segments)
+    (m.heldout ? heldout : fitted) += m.chi2_share.value_or(0);
+  for (SegmentMisfit& m : segments) {
+    const double sum = m.heldout ? heldout : fitted;
+    if (m.chi2_share && sum > 0) *m.chi2_share /= sum;
   }
-  return drifts;
+}
+
+// Weighted regression of a stage's bias on the logarithm of each setting that differs.
+std::vector<BiasTrend> TrendsOf(const campaign::Campaign& campaign,
+                                const std::vector<SegmentMisfit>& segments) {
+  std::map<std::pair<std::string, std::string>, std::vector<const SegmentMisfit*>> stages;
+  for (const SegmentMisfit& m : segments) {
+    if (!m.heldout && m.z && *m.z != 0) stages[{m.observable, m.segment}].push_back(&m);
+  }
+  std::vector<BiasTrend> trends;
+  for (const auto& [stage, misfits] : stages) {
+    std::set<std::string> names;
+    for (const campaign::Experiment& e : campaign.experiments) {
+      for (const auto& setting : e.settings) names.insert(setting.first);
+    }
+    for (const std::string& name : names) {
+      double sw = 0;
+      double sx = 0;
+      double sxx = 0;
+      double sy = 0;
+      double sxy = 0;
+      std::size_t used = 0;
+      for (const SegmentMisfit* m : misfits) {
+        for (const campaign::Experiment& e : campaign.experiments) {
+          const auto found = e.settings.find(name);
+          if (e.name != m->experiment || found == e.settings.end() || !(found->second > 0))
+            continue;
+          const double x = std::log10(found->second);
+          const double w = std::pow(*m->z / m->bias, 2);  // 1 / variance of the bias
+          sw += w;
+          sx += w * x;
+          sxx += w * x * x;
+          sy += w * m->bias;
+          sxy += w * x * m->bias;
+          ++used;
+        }
+      }
+      const double spread = sxx - sx * sx / sw;
+      constexpr double kDistinct = 1e-9;
+      if (used < 2 || used != misfits.size() || !(spread > kDistinct * sxx)) continue;
+      const double slope = (sxy - sx * sy / sw) / spread;
+      const double z = slope * std::sqrt(spread);
+      constexpr double kClear = 3;
+      if (std::abs(z) < kClear) continue;
+      trends.push_back({.observable = stage.first,
+                        .segment = stage.second,
+                        .with = name,
+                        .per_decade = slope,
+                        .z = z});
+    }
+  }
+  return trends;
 }
 
 struct Sums {
@@ -161,12 +243,14 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
                               .rms_error = std::sqrt(squared / n),
                               .rms_residual = std::sqrt(group.residual.squaredNorm() / n),
                               .z = std::nullopt,
-                              .p_value = std::nullopt};
+                              .p_value = std::nullopt,
+                              .effective_readings = EffectiveReadings(group)};
       Sums& sums = validation ? heldout : fitted;
       sums.squared += squared;
       sums.readings += misfit.readings;
       if (judged) {
-        const double chi2 = ChiSquared(group);
+        const double chi2 = ChiSquared(group, 0, group.residual.size());
+        misfit.pattern = PatternOf(CurveOf(group, 0, group.residual.size()));
         misfit.z = NormalDeviate(chi2, n);
         misfit.p_value = UpperTail(chi2, n);
         sums.chi2 += chi2;
@@ -192,7 +276,11 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
     comparison.note =
         "There are fewer readings than parameters: nothing is left to judge the fit by.";
   }
-  comparison.parameter_drift = Drifts(view.posterior);
+  ToShares(comparison.by_segment);
+  comparison.trends = TrendsOf(view.campaign, comparison.by_segment);
+  for (const auto& parameter : view.posterior.parameters()) {
+    if (parameter.at_bound()) comparison.at_bound.push_back(parameter.name());
+  }
   return comparison;
 }
 

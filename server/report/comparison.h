@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "server/report/campaign_view.h"
+#include "server/report/parameter_drift.h"
 #include "server/report/predictions.h"
+#include "server/report/residual_pattern.h"
 
 namespace calib::report {
 
@@ -21,6 +23,10 @@ struct ObservableMisfit {
       z;  ///< chi-squared of the group as a standard normal deviate [Wilson & Hilferty 1931]
   std::optional<double>
       p_value;  ///< probability of a chi-squared at least as large if the model is right
+  /// Independent readings that would fix the mean of the residual as well: n^2 / sum of the
+  /// correlations of the errors.
+  double effective_readings = 0;
+  ResidualPattern pattern = {};  ///< over all stages; none where the errors are not known
 };
 
 struct SegmentMisfit {
@@ -30,13 +36,19 @@ struct SegmentMisfit {
   double bias = 0;          ///< mean of model minus measurement [SI]
   std::optional<double>
       z;  ///< bias over its standard deviation, correlation of the errors included
+  int readings = 0;
+  double rms_error = 0;  ///< rms of residual / standard deviation
+  /// Of the chi-squared of everything fitted, or of everything held out.
+  std::optional<double> chi2_share;
+  ResidualPattern pattern = {};  ///< none where the errors are not known
 };
 
-/// How far a parameter's mean still moves while the second half of the readings is taken in.
-struct ParameterDrift {
-  std::string parameter;
-  double half_way = 0, end = 0;  ///< posterior mean [SI]
-  double change_over_sd = 0;     ///< in units of the final standard deviation
+/// The bias of an observable in one stage over experiments that differ in a setting.
+struct BiasTrend {
+  std::string observable, segment;
+  std::string with;       ///< confining_pressure, loading_rate, ...
+  double per_decade = 0;  ///< change of the bias per factor ten in it [SI]
+  double z = 0;           ///< over its standard deviation
 };
 
 struct Comparison {
@@ -46,8 +58,10 @@ struct Comparison {
   std::optional<double> heldout_rms_error;  ///< over all validation readings
   std::vector<ObservableMisfit> by_observable;
   std::vector<SegmentMisfit> by_segment;
-  std::vector<ParameterDrift> parameter_drift;
-  std::string note;  ///< why something is not given; may be empty
+  std::vector<BiasTrend> trends;      ///< those beyond 3 sd, calibrated experiments only
+  std::vector<std::string> at_bound;  ///< parameters pressed against a bound of their prior
+  std::vector<ParameterDrift> parameter_drift;  ///< filled by whoever has the time: ParameterDrifts
+  std::string note;                             ///< why something is not given; may be empty
 };
 
 /// Errors are those stated in the campaign, correlated where a correlation length is given. Without

@@ -20,7 +20,9 @@ Json Parameter(const dem::ParameterInfo& p) {
                  {"min", p.default_prior.min},
                  {"max", p.default_prior.max}}},
                {"default_value", p.default_value ? Json(*p.default_value) : Json(nullptr)},
+               {"null_value", p.null_value ? Json(*p.null_value) : Json(nullptr)},
                {"description", p.description}};
+  if (!p.null_by_contact.empty()) json["null_by_contact"] = p.null_by_contact;
   if (!p.unit_by_contact.empty()) json["unit_by_contact"] = p.unit_by_contact;
   if (!p.alternative_to.empty()) json["alternative_to"] = p.alternative_to;
   return json;

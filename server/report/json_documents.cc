@@ -52,10 +52,38 @@ Json Status(const v1::CampaignStatus& s) {
 Json Emulator(const v1::Posterior& p) {
   if (!p.has_emulator()) return nullptr;
   const v1::Posterior::Emulator& e = p.emulator();
-  return {{"adequate", e.adequate()},     {"reason", e.reason()},
-          {"runs", e.runs()},             {"components", e.components()},
-          {"cross_validated_error", e.error()}, {"scatter", e.scatter()},
+  return {{"adequate", e.adequate()},
+          {"reason", e.reason()},
+          {"runs", e.runs()},
+          {"components", e.components()},
+          {"cross_validated_error", e.error()},
+          {"scatter", e.scatter()},
           {"calibration", e.calibration()}};
+}
+
+Json Pattern(const ResidualPattern& p) {
+  return {{"name", p.name}, {"size", p.size}, {"z", p.z}, {"explained", p.explained}};
+}
+
+Json Drift(const ParameterDrift& d) {
+  Json fits = Json::array();
+  for (const PartialFit& fit : d.fits) {
+    fits.push_back({{"experiment", fit.experiment},
+                    {"segment", fit.segment.empty() ? Json(nullptr) : Json(fit.segment)},
+                    {"mean", fit.mean},
+                    {"sd", fit.sd},
+                    {"z", fit.z}});
+  }
+  Json json = {{"parameter", d.parameter},
+               {"unit", d.unit},
+               {"p_experiments", OrNull(d.p_experiments)},
+               {"p_segments", OrNull(d.p_segments)},
+               {"trend", nullptr},
+               {"fits", fits}};
+  if (!d.trend_with.empty()) {
+    json["trend"] = {{"with", d.trend_with}, {"per_decade", d.trend}, {"sd", d.trend_sd}};
+  }
+  return json;
 }
 
 }  // namespace
@@ -113,6 +141,8 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                              {"p_value", OrNull(m.p_value)},
                              {"rms_residual", m.rms_residual},
                              {"readings", m.readings},
+                             {"effective_readings", m.effective_readings},
+                             {"pattern", Pattern(m.pattern)},
                              {"role", m.heldout ? "validate" : "calibrate"}});
   }
   Json by_segment = Json::array();
@@ -124,14 +154,21 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                           {"to", m.to},
                           {"bias", m.bias},
                           {"z", OrNull(m.z)},
+                          {"readings", m.readings},
+                          {"rms_error", m.rms_error},
+                          {"chi2_share", OrNull(m.chi2_share)},
+                          {"pattern", Pattern(m.pattern)},
                           {"role", m.heldout ? "validate" : "calibrate"}});
   }
   Json drift = Json::array();
-  for (const ParameterDrift& d : c.parameter_drift) {
-    drift.push_back({{"parameter", d.parameter},
-                     {"half_way", d.half_way},
-                     {"end", d.end},
-                     {"change_over_sd", d.change_over_sd}});
+  for (const ParameterDrift& d : c.parameter_drift) drift.push_back(Drift(d));
+  Json trends = Json::array();
+  for (const BiasTrend& t : c.trends) {
+    trends.push_back({{"observable", t.observable},
+                      {"segment", t.segment},
+                      {"with", t.with},
+                      {"per_decade", t.per_decade},
+                      {"z", t.z}});
   }
   return Dump({{"campaign", campaign},
                {"rms_error", c.rms_error},
@@ -141,6 +178,8 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                {"by_observable", by_observable},
                {"by_segment", by_segment},
                {"parameter_drift", drift},
+               {"trends", trends},
+               {"at_bound", c.at_bound},
                {"note", c.note}});
 }
 

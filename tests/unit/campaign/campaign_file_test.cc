@@ -63,7 +63,7 @@ TEST(CampaignFile, ConvertsEngineeringStrainAndItsNoise) {
   EXPECT_DOUBLE_EQ(volume.sd[5], 1e-3 / (1 + 0.029));
   EXPECT_DOUBLE_EQ(volume.correlation_length, 0.005);
   EXPECT_DOUBLE_EQ(e.observables[0].sd[1], std::hypot(0.02 * 2.1, 0.01));
-  EXPECT_THAT(e.segment, ElementsAre("initial_loading", "initial_loading", "pre_peak", "pre_peak",
+  EXPECT_THAT(e.segment, ElementsAre("initial_loading", "initial_loading", "pre_peak", "peak",
                                      "post_peak", "post_peak"));
 }
 

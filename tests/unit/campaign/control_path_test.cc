@@ -85,11 +85,34 @@ TEST(ControlPath, StressControlStartsAtTheStartPressure) {
 
 TEST(ControlPath, NamesThePeak) {
   const ControlPath path = CleanControl({0, 0.01, 0.02, 0.04, 0.08, 0.12}, 0, std::nullopt);
-  EXPECT_THAT(NameSegments(path, {0, 0.4, 1.0, 1.4, 1.2, 1.0}),
-              ElementsAre("initial_loading", "initial_loading", "pre_peak", "pre_peak", "post_peak",
+  EXPECT_THAT(NameSegments(path, {.strength = {0, 0.4, 1.0, 1.4, 1.2, 1.0}}),
+              ElementsAre("initial_loading", "initial_loading", "pre_peak", "peak", "post_peak",
                           "post_peak"));
   // A plateau has no peak.
-  EXPECT_THAT(NameSegments(path, {0, 0.4, 1.0, 1.4, 1.39, 1.39}), Each("initial_loading"));
+  EXPECT_THAT(NameSegments(path, {.strength = {0, 0.4, 1.0, 1.4, 1.39, 1.39}}),
+              Each("initial_loading"));
+}
+
+TEST(ControlPath, NamesTheSteadyState) {
+  std::vector<double> strain;
+  StageCurves curves;
+  for (int i = 0; i <= 40; ++i) {
+    const double x = 0.005 * i;
+    strain.push_back(x);
+    // Peak at 3 %, constant from about 12 % on; dilation until then, with scatter of the readings.
+    const double jitter = 0.002 * (i % 2 == 0 ? 1 : -1);
+    curves.strength.push_back(1 - std::exp(-150 * x) + 20 * x * std::exp(-33 * x) + jitter);
+    curves.volume.push_back(-0.05 * (1 - std::exp(-40 * x)));
+  }
+  const ControlPath path = CleanControl(strain, 0, 1e-6);
+  const auto names = NameSegments(path, curves);
+  EXPECT_EQ(names.front(), "initial_loading");
+  EXPECT_EQ(names[6], "peak");
+  EXPECT_EQ(names[14], "post_peak");
+  EXPECT_EQ(names.back(), "steady_state");
+  // Where the volume still changes it is no steady state.
+  for (std::size_t i = 0; i < strain.size(); ++i) curves.volume[i] = -0.2 * strain[i];
+  EXPECT_EQ(NameSegments(path, curves).back(), "post_peak");
 }
 
 TEST(ControlPath, OneReadingAndNone) {

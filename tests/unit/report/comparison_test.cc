@@ -72,7 +72,13 @@ TEST(Comparison, HeldOutDataAreReportedApart) {
   const Comparison c = Compare(view, PredictReadings(view));
   ASSERT_TRUE(c.heldout_rms_error.has_value());
   EXPECT_NEAR(c.rms_error, 1, 0.3);
-  EXPECT_EQ(c.parameter_drift.size(), 3U);
+  EXPECT_DOUBLE_EQ(c.by_observable[0].effective_readings, 40);  // independent
+  EXPECT_LT(c.by_observable[1].effective_readings, 30);
+  double share = 0;
+  for (const SegmentMisfit& m : c.by_segment) {
+    if (!m.heldout) share += *m.chi2_share;
+  }
+  EXPECT_NEAR(share, 1, 1e-12);
 }
 
 TEST(WeightedStatistics, QuantilesAndHistogram) {

@@ -1,0 +1,87 @@
+#include "server/report/run_table.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <utility>
+
+namespace calib::report {
+namespace {
+
+using Eigen::Index;
+
+// Readings by (experiment, load step).
+using Places = std::map<std::pair<int, int>, std::vector<Index>>;
+
+Places PlacesOf(const inference::DataSet& data) {
+  Places places;
+  for (std::size_t k = 0; k < data.readings.size(); ++k) {
+    const inference::Reading& reading = data.readings[k];
+    places[{reading.experiment, reading.load_step}].push_back(static_cast<Index>(k));
+  }
+  return places;
+}
+
+void PlaceStates(const campaign::Experiment& experiment, int e, const StateHistory& history,
+                 const inference::DataSet& data, const Places& places, Eigen::RowVectorXd& row) {
+  std::vector<int> column;  // of each measured observable in a state; -1: not there
+  for (const campaign::MeasuredObservable& observable : experiment.observables) {
+    const auto at =
+        std::find(history.observables.begin(), history.observables.end(), observable.name);
+    column.push_back(
+        at == history.observables.end() ? -1 : static_cast<int>(at - history.observables.begin()));
+  }
+  for (const v1::State& state : history.states) {
+    const auto found = places.find({e, state.load_step()});
+    if (found == places.end()) continue;
+    for (const Index k : found->second) {
+      const int at =
+          column[static_cast<std::size_t>(data.readings[static_cast<std::size_t>(k)].observable)];
+      if (at >= 0 && at < state.values_size()) row[k] = state.values(at);
+    }
+  }
+}
+
+}  // namespace
+
+RunTable RunsOf(const CampaignView& view) {
+  const inference::DataSet data = campaign::MakeDataSet(view.campaign);
+  const Places places = PlacesOf(data);
+  const auto t = static_cast<Index>(data.readings.size());
+  const auto d = static_cast<Index>(view.campaign.parameters.size());
+  Eigen::RowVectorXd value(t);
+  Eigen::RowVectorXd sd(t);
+  for (Index k = 0; k < t; ++k) {
+    value[k] = data.readings[static_cast<std::size_t>(k)].value;
+    sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+  }
+  RunTable table;
+  std::vector<Eigen::RowVectorXd> parameters;
+  std::vector<Eigen::RowVectorXd> histories;
+  for (const v1::Sample& sample : view.samples) {
+    if (sample.parameters_size() != d) continue;
+    Eigen::RowVectorXd row =
+        Eigen::RowVectorXd::Constant(t, std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t e = 0; e < view.campaign.experiments.size(); ++e) {
+      const auto found = view.states.find({view.campaign.experiments[e].name, sample.index()});
+      if (found == view.states.end()) continue;
+      PlaceStates(view.campaign.experiments[e], static_cast<int>(e), found->second, data, places,
+                  row);
+    }
+    if (!row.allFinite()) continue;
+    table.sample.push_back(sample.index());
+    histories.emplace_back((row - value).cwiseQuotient(sd));
+    Eigen::RowVectorXd& own = parameters.emplace_back(d);
+    for (Index j = 0; j < d; ++j) own[j] = sample.parameters(static_cast<int>(j));
+  }
+  const auto n = static_cast<Index>(histories.size());
+  table.parameters.resize(n, d);
+  table.histories.resize(n, t);
+  for (Index i = 0; i < n; ++i) {
+    table.parameters.row(i) = parameters[static_cast<std::size_t>(i)];
+    table.histories.row(i) = histories[static_cast<std::size_t>(i)];
+  }
+  return table;
+}
+
+}  // namespace calib::report
