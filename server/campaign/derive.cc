@@ -42,6 +42,7 @@ bool IsHeldOut(const YamlNode& experiment) {
 
 void ChangeExperiments(const Derivation& derivation, YamlNode& root) {
   YamlNode& experiments = YamlAt(root, "experiments");
+  if (!derivation.experiments.empty()) experiments = YamlList(derivation.experiments);
   if (!derivation.held_out) std::erase_if(experiments.items, IsHeldOut);
   if (derivation.rate_factor == 1) return;
   for (YamlNode& experiment : experiments.items) {

@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "dem/catalog/catalog.h"
 #include "server/campaign/campaign.h"
+#include "server/campaign/yaml_tree.h"
 
 namespace calib::campaign {
 
@@ -22,7 +23,8 @@ struct Derivation {
   std::map<std::string, dem::DefaultPrior> parameters{};
   /// Held constant; replaces what the parent calibrates or fixes under the name.
   std::map<std::string, double> fixed{};
-  bool held_out = true;  ///< false: experiments with role validate are left out
+  bool held_out = true;                 ///< false: experiments with role validate are left out
+  std::vector<YamlNode> experiments{};  ///< in the place of the parent's, if there are any
   std::optional<int> samples{}, max_iterations{};
   std::optional<FirstProposal> first_proposal{};
   /// Makes it a table: parameter values by name, and whose specimen and seed they take.

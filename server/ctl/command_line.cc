@@ -120,7 +120,9 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->add_option("ID", b.arguments().campaigns, "campaigns on the same data, two or more")
       ->required();
   b.AddOnCampaign("diagnose", static_cast<int (*)(const Arguments&)>(&Diagnose),
-                  "Which physical effect is missing; runs what it needs, and goes on when killed");
+                  "Which physical effect is missing; runs what it needs, and goes on when killed")
+      ->add_option("--without", b.arguments().effects, "effect that is not to be thought of")
+      ->allow_extra_args(false);
   b.AddOnCampaign("extend", &Extend,
                   "A new campaign: this one joined by effects, started from its posterior")
       ->add_option("--effect", b.arguments().effects, "name, as shown by `calibctl effects`")

@@ -17,8 +17,8 @@ namespace calib::ctl {
 namespace {
 
 using Eigen::Index;
-using report::RunsOf;
 using report::RunTable;
+using report::RunsOf;
 
 constexpr int kMostRuns = 4;           // of one effect in the screen, or
 constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all effects
@@ -89,6 +89,9 @@ class Inquiry {
     }
     if (auto status = FitWarm(); !status.ok()) return status;
     Conclude(fits);
+    if (options_.next_experiment && diagnosis_.verdict != "adequate") {
+      if (auto status = PlanNext(); !status.ok()) return status;
+    }
     return diagnosis_;
   }
 
@@ -205,6 +208,11 @@ class Inquiry {
     std::vector<const dem::EffectInfo*> effects;
     for (const dem::EffectInfo& effect : dem::Effects()) {
       if (!WhyNotJoin(view_.campaign, effect.name).empty()) continue;
+      if (std::find(options_.without.begin(), options_.without.end(), effect.name) !=
+          options_.without.end()) {
+        diagnosis_.not_excitable.emplace_back(effect.name, "left out as asked for");
+        continue;
+      }
       const std::string why = WhyNotExcitable(effect);
       if (!why.empty()) {
         diagnosis_.not_excitable.emplace_back(effect.name, why);
@@ -338,6 +346,8 @@ class Inquiry {
           candidate.amplitude[name] = response->points(adequacy->best, j);
         }
       }
+      warm_.emplace(candidate.effect,
+                    WarmFit{.view = *view, .best = PointOf(*view, *response, adequacy->best)});
       fitted_.emplace(candidate.effect, response->model);
     }
     // Refitted ones first, by how well they describe the readings.
@@ -347,6 +357,45 @@ class Inquiry {
                        const bool fb = fitted_.contains(b.effect);
                        return fa != fb ? fa : fa && a.over_base.nats > b.over_base.nats;
                      });
+    return absl::OkStatus();
+  }
+
+  static std::map<std::string, double> PointOf(const report::CampaignView& view,
+                                               const Response& response, Index row) {
+    std::map<std::string, double> values;
+    for (Index j = 0; j < response.points.cols(); ++j) {
+      values[view.campaign.parameters[static_cast<std::size_t>(j)].name] = response.points(row, j);
+    }
+    return values;
+  }
+
+  // The named effect, or the best, against what comes next; the base model where there is no second.
+  absl::Status PlanNext() {
+    std::vector<Rival> rivals;
+    for (const CandidateEffect& candidate : diagnosis_.candidates) {
+      const auto found = warm_.find(candidate.effect);
+      if (found == warm_.end() || rivals.size() >= kMostNames) continue;
+      const bool named = diagnosis_.verdict != "ambiguous" || rivals.empty() ||
+                         std::find(diagnosis_.candidates.front().confusable_with.begin(),
+                                   diagnosis_.candidates.front().confusable_with.end(),
+                                   candidate.effect) !=
+                             diagnosis_.candidates.front().confusable_with.end();
+      if (!named) continue;
+      rivals.push_back({.name = candidate.effect,
+                        .view = &found->second.view,
+                        .values = found->second.best});
+      if (diagnosis_.verdict != "ambiguous" && rivals.size() == 2) break;
+    }
+    if (rivals.size() == 1) {
+      rivals.push_back({.name = "base",
+                        .view = &view_,
+                        .values = PointOf(view_, base_, diagnosis_.adequacy.best)});
+    }
+    auto next = PlanNextExperiment(laboratory_, rivals,
+                                   table_.sample[static_cast<std::size_t>(BestRuns(1).front())],
+                                   base_.scatter);
+    if (!next.ok()) return next.status();
+    diagnosis_.next_experiment = *std::move(next);
     return absl::OkStatus();
   }
 
@@ -404,6 +453,11 @@ class Inquiry {
   std::map<std::string, std::vector<Step>> steps_;
   std::vector<inference::Score> scores_;
   std::map<std::string, inference::FittedModel> fitted_;
+  struct WarmFit {
+    report::CampaignView view;
+    std::map<std::string, double> best;
+  };
+  std::map<std::string, WarmFit> warm_;
   Diagnosis diagnosis_;
 };
 

@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "inference/diagnosis/screen.h"
 #include "server/ctl/laboratory.h"
+#include "server/ctl/next_experiment.h"
 
 namespace calib::ctl {
 
@@ -39,11 +41,14 @@ struct Diagnosis {
   double rms = 0;  ///< of the best fit, residual over noise sd
   double emulator_error = 0, scatter = 0;
   std::int64_t screen_evaluations = 0, warm_evaluations = 0;
+  std::optional<NextExperiment> next_experiment;
 };
 
 struct DiagnosisOptions {
   double level = 0.01;         ///< of the adequacy test and of the screen
   bool only_adequacy = false;  ///< no runs: says adequate or unexplained
+  std::vector<std::string> without = {};  ///< effects that do not take part
+  bool next_experiment = true;  ///< where the model is not adequate: the test that separates rivals
 };
 
 /// Errors: FAILED_PRECONDITION with a sentence when nothing can be said (no posterior, noise not

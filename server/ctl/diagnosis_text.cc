@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dem/catalog/catalog.h"
 #include "server/ctl/diagnosis.h"
 #include "server/ctl/text_table.h"
 #include "server/report/people_units.h"
@@ -32,6 +33,58 @@ Json CandidateJson(const CandidateEffect& c) {
   return json;
 }
 
+Json PlannedJson(const PlannedExperiment& planned) {
+  return {{"test", planned.test},
+          {"settings", planned.settings},
+          {"unloading", planned.unloading},
+          {"expected_power", planned.expected_power},
+          {"distance_sd", planned.distance}};
+}
+
+Json NextJson(const std::optional<NextExperiment>& next) {
+  if (!next) return nullptr;
+  Json json = PlannedJson(next->best);
+  json["separates"] = next->separates;
+  json["cost"] = {{"core_seconds_per_evaluation", next->core_seconds}};
+  json["snippet"] = next->snippet;
+  json["evaluations_for_planning"] = next->evaluations;
+  json["considered"] = Json::array();
+  for (const PlannedExperiment& planned : next->considered) {
+    json["considered"].push_back(PlannedJson(planned));
+  }
+  return json;
+}
+
+std::string InWords(const PlannedExperiment& planned) {
+  std::string text = planned.test;
+  for (const auto& [name, value] : planned.settings) {
+    const dem::TestInfo* test = dem::FindTest(planned.test);
+    std::string unit = "1";
+    for (const dem::ParameterInfo& setting : test->settings) {
+      if (setting.name == name) unit = setting.unit;
+    }
+    text += fmt::format(", {} {}", report::NameForPeople(name),
+                        report::NumberWithUnit(value, name, unit, 3));
+  }
+  return text + (planned.unloading ? ", one unloading and reloading half-way" : "");
+}
+
+std::string NextText(const NextExperiment& next) {
+  std::string names;
+  for (const std::string& name : next.separates) names += (names.empty() ? "" : " and ") + name;
+  std::string text = fmt::format(
+      "\nNext experiment: {}. It separates {} with a power of {} ({} sd apart); an evaluation "
+      "costs "
+      "about {} core seconds. For the campaign file:\n\n{}\nAlso tried:\n",
+      InWords(next.best), names, report::Percent(next.best.expected_power, 3),
+      Number(next.best.distance, 3), Number(next.core_seconds, 2), next.snippet);
+  for (std::size_t k = 1; k < next.considered.size(); ++k) {
+    text += fmt::format("  {}: {} sd apart\n", InWords(next.considered[k]),
+                        Number(next.considered[k].distance, 3));
+  }
+  return text;
+}
+
 std::string Strength(const std::map<std::string, double>& amplitude) {
   std::string text;
   for (const auto& [name, value] : amplitude) {
@@ -54,8 +107,7 @@ std::string Sentence(const Diagnosis& d) {
     return fmt::format("Ambiguous: {}; these tests do not tell them apart.", names);
   }
   return "Unexplained: the model misses the data, and with no known effect does it fit" +
-         (d.best_partial.empty() ? "."
-                                 : fmt::format("; {} helps most.", d.best_partial));
+         (d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
 }
 
 }  // namespace
@@ -72,7 +124,7 @@ std::string DiagnosisJson(const Diagnosis& d) {
                {"effect", OrNull(d.effect)},
                {"candidates", candidates},
                {"not_excitable", not_excitable},
-               {"next_experiment", nullptr},
+               {"next_experiment", NextJson(d.next_experiment)},
                {"model_evaluations", d.screen_evaluations},
                {"warm_fit_evaluations", d.warm_evaluations},
                {"adequacy",
@@ -95,8 +147,8 @@ std::string DiagnosisText(const Diagnosis& d) {
       Number(d.rms, 3), Number(d.adequacy.chi2, 4), Number(d.adequacy.degrees, 4),
       Number(d.adequacy.p_value, 2));
   if (!d.candidates.empty()) {
-    TextTable table({"<effect", "p (screen)", "explains", "rms with it", "refitted p",
-                     "<strength", "<like"});
+    TextTable table(
+        {"<effect", "p (screen)", "explains", "rms with it", "refitted p", "<strength", "<like"});
     for (const CandidateEffect& c : d.candidates) {
       std::string like;
       for (const std::string& name : c.confusable_with) like += (like.empty() ? "" : ", ") + name;
@@ -116,6 +168,7 @@ std::string DiagnosisText(const Diagnosis& d) {
   for (const auto& [effect, reason] : d.not_excitable) {
     text += fmt::format("Not tried: {} ({}).\n", effect, reason);
   }
+  if (d.next_experiment) text += NextText(*d.next_experiment);
   text += fmt::format("{} model evaluations for the screen, {} for warm fits.\n",
                       d.screen_evaluations, d.warm_evaluations);
   return text;

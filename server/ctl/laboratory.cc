@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/campaign/campaign_file.h"
 #include "server/campaign/identity.h"
+#include "server/campaign/sha256.h"
 #include "server/ctl/interrupt.h"
 #include "server/ctl/load_view.h"
 #include "server/ctl/progress.h"
@@ -48,22 +49,20 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
     if (status->state() == "finished") return absl::OkStatus();
     if (IsOver(status->state()) || status->state() == "paused") {
       return absl::AbortedError(absl::StrCat("campaign ", campaign, " (", what, ") is ",
-                                             status->state(),
-                                             status->reason().empty() ? "" : ": ",
+                                             status->state(), status->reason().empty() ? "" : ": ",
                                              status->reason()));
     }
     if (Interrupted()) {
-      return absl::CancelledError(
-          "stopped; nothing is lost, the same command goes on from here");
+      return absl::CancelledError("stopped; nothing is lost, the same command goes on from here");
     }
     if (auto alive = session_.CheckWorkers(); !alive.ok()) return alive;
     std::this_thread::sleep_for(kPoll);
   }
 }
 
-absl::StatusOr<report::CampaignView> Laboratory::Run(const report::CampaignView& parent,
-                                                     const std::string& yaml,
-                                                     const std::string& what) {
+absl::StatusOr<report::CampaignView> Laboratory::Run(
+    const report::CampaignView& parent, const std::string& yaml, const std::string& what,
+    const std::map<std::string, std::string>& further) {
   v1::SubmitRequest request;
   request.set_campaign_file(yaml);
   request.set_file_name(parent.source.file_name());
@@ -74,7 +73,11 @@ absl::StatusOr<report::CampaignView> Laboratory::Run(const report::CampaignView&
                                   .files = {},
                                   .seed = std::nullopt};
   if (parent.source.has_seed()) submission.seed = parent.source.seed();
-  submission.files.insert(parent.source.files().begin(), parent.source.files().end());
+  for (const auto& [path, content] : further) {
+    if (auto put = session_.client().PutBlob(content); !put.ok()) return put;
+    (*request.mutable_files())[path] = campaign::Sha256Hex(content);
+  }
+  submission.files.insert(request.files().begin(), request.files().end());
   request.set_request_id(campaign::IdentityDigest(submission));
   const auto reply = session_.client().Submit(request);
   if (!reply.ok()) return reply.status();
@@ -82,8 +85,7 @@ absl::StatusOr<report::CampaignView> Laboratory::Run(const report::CampaignView&
     const v1::Problem& problem = reply->problems(0);
     return absl::InvalidArgumentError(absl::StrCat(
         what, " cannot be run: ",
-        campaign::ToString(
-            {problem.file(), problem.line(), problem.key(), problem.message()})));
+        campaign::ToString({problem.file(), problem.line(), problem.key(), problem.message()})));
   }
   const std::string& campaign = reply->campaign();
   auto status = session_.client().Show(campaign);

@@ -2,7 +2,7 @@
 // Where a verb has further campaigns run: it hands over their text and waits. A campaign is
 // recognised by its text, so that a verb that is issued again finds what it has run already.
 
-#include <set>
+#include <map>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -23,9 +23,11 @@ class Laboratory {
   absl::StatusOr<report::CampaignView> Finished(const std::string& campaign);
 
   /// Submits the text with the parent's files and waits for the end, progress on standard error.
+  /// further: files by the path that the text names them by, in addition to the parent's.
   /// ABORTED when the campaign failed or was cancelled, CANCELLED on Ctrl-C (nothing is lost).
   absl::StatusOr<report::CampaignView> Run(const report::CampaignView& parent,
-                                           const std::string& yaml, const std::string& what);
+                                           const std::string& yaml, const std::string& what,
+                                           const std::map<std::string, std::string>& further = {});
 
  private:
   absl::Status Wait(const std::string& campaign, const std::string& what);

@@ -1,5 +1,6 @@
 #include <iostream>
 
+#include "dem/catalog/catalog.h"
 #include "server/ctl/diagnosis.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/interrupt.h"
@@ -14,7 +15,13 @@ int Diagnose(const Arguments& arguments) {
   Laboratory laboratory(**session, arguments);
   const auto view = laboratory.Finished(arguments.campaign);
   if (!view.ok()) return Fail(view.status());
-  const auto diagnosis = Diagnose(laboratory, *view);
+  for (const std::string& name : arguments.effects) {
+    if (dem::FindEffect(name) == nullptr) {
+      return Fail(absl::InvalidArgumentError("there is no effect " + name +
+                                             " to leave out; see `calibctl effects`"));
+    }
+  }
+  const auto diagnosis = Diagnose(laboratory, *view, {.without = arguments.effects});
   if (!diagnosis.ok()) return Fail(diagnosis.status());
   std::cout << (arguments.json ? DiagnosisJson(*diagnosis) : DiagnosisText(*diagnosis));
   return kDone;

@@ -90,7 +90,8 @@ class Improvement {
     for (int added = 0;; ++added) {
       const bool last = added >= max_effects_;
       const auto diagnosis =
-          Diagnose(laboratory_, view, {.only_adequacy = last || (added > 0 && Fits(view))});
+          Diagnose(laboratory_, view, {.only_adequacy = last || (added > 0 && Fits(view)),
+                                        .next_experiment = false});
       if (!diagnosis.ok()) return diagnosis.status();
       const auto comparison = report::Compare(view, report::PredictReadings(view));
       steps_.push_back({.campaign = view.status.campaign(),

@@ -1,6 +1,7 @@
 #include <iostream>
 
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/load_story.h"
 #include "server/ctl/load_view.h"
 #include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
@@ -14,7 +15,10 @@ int Report(const Arguments& arguments) {
   if (!session.ok()) return Fail(session.status());
   const auto view = LoadView((*session)->client(), arguments.campaign);
   if (!view.ok()) return Fail(view.status());
-  if (auto written = WriteFile(arguments.output, report::RenderReport(*view)); !written.ok()) {
+  const auto story = LoadStory((*session)->client(), *view);
+  if (!story.ok()) return Fail(story.status());
+  if (auto written = WriteFile(arguments.output, report::RenderReport(*view, *story));
+      !written.ok()) {
     return Fail(written);
   }
   if (arguments.json) {

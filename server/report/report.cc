@@ -8,14 +8,16 @@
 
 namespace calib::report {
 
-std::string RenderReport(const CampaignView& view) {
+std::string RenderReport(const CampaignView& view, const Story& story) {
   std::vector<ExperimentPrediction> predictions = PredictReadings(view);
   Comparison comparison = Compare(view, predictions);
-  const ReportData data{view, std::move(predictions), std::move(comparison)};
+  comparison.parameter_drift = story.drift;
+  const ReportData data{view, std::move(predictions), std::move(comparison), story};
   std::string body = SummarySection(data);
   if (view.posterior.parameters_size() > 0) {
     body +=
-        ParameterSection(data) + FitSection(data) + PosteriorSection(data) + EvolutionSection(data);
+        ParameterSection(data) + FitSection(data) + MissingPhysicsSection(data) +
+        PosteriorSection(data) + EvolutionSection(data);
   } else {
     body += "<p>No iteration is complete yet, so there is no posterior to show.</p>\n";
   }

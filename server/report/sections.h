@@ -8,6 +8,7 @@
 #include "server/report/comparison.h"
 #include "server/report/people_units.h"
 #include "server/report/predictions.h"
+#include "server/report/story.h"
 
 namespace calib::report {
 
@@ -16,6 +17,7 @@ struct ReportData {
   const CampaignView& view;
   std::vector<ExperimentPrediction> predictions;
   Comparison comparison;
+  const Story& story;
 };
 
 std::string SummarySection(
@@ -24,6 +26,8 @@ std::string ParameterSection(
     const ReportData& data);  ///< section_parameters.cc: the table of identified parameters
 std::string FitSection(
     const ReportData& data);  ///< section_fit.cc: curves, residuals, misfit by stage
+std::string MissingPhysicsSection(
+    const ReportData& data);  ///< section_missing_physics.cc: where it fails, what was tried on it
 std::string PosteriorSection(
     const ReportData& data);  ///< section_posterior.cc: marginals and pairs
 std::string EvolutionSection(

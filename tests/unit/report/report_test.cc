@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <regex>
 
 #include "server/report/html.h"
@@ -48,6 +49,44 @@ TEST(Report, AHostileNameStaysText) {
   EXPECT_THAT(html, Not(HasSubstr("<script")));
   EXPECT_THAT(html, Not(HasSubstr("<img")));
   EXPECT_THAT(html, HasSubstr("&lt;script&gt;"));
+}
+
+TEST(Report, TellsTheStoryOfAnAddedEffect) {
+  const CampaignView view = testing::ExampleView("sand");
+  ObservableMisfit misfit;
+  misfit.experiment = "tx02";
+  misfit.observable = "q_over_p";
+  misfit.rms_error = 4.25;
+  const auto relative = [](const std::string& id, const std::string& purpose,
+                           const std::string& effect, double log_evidence) {
+    Relative r;
+    r.campaign = id;
+    if (!effect.empty()) {
+      r.parent = "c0";
+      r.effects = {effect};
+    }
+    r.purpose = purpose;
+    r.log_evidence = log_evidence;
+    return r;
+  };
+  Story story;
+  story.family = {relative("c0", "", "", -80),
+                  relative("c1", "extension", "rolling_resistance", 12),
+                  relative("c2", "warm_fit", "<b>membrane", std::nan(""))};
+  story.steps.resize(2);
+  story.steps[0].campaign = "c0";
+  story.steps[0].rms_error = 4.25;
+  story.steps[0].heldout_rms_error = 5;
+  story.steps[0].by_observable = {misfit};
+  story.steps[1].campaign = "c1";
+  story.steps[1].effects = {"rolling_resistance"};
+  story.steps[1].rms_error = 1;
+  const std::string html = RenderReport(view, story);
+  EXPECT_THAT(html, HasSubstr("Error before and after"));
+  EXPECT_THAT(html, HasSubstr("<strong>c1: rolling resistance</strong>, log evidence 12"));
+  EXPECT_THAT(html, HasSubstr("c2: &lt;b&gt;membrane (tried)"));
+  EXPECT_THAT(html, HasSubstr("<td>4.25</td>"));
+  EXPECT_THAT(html, Not(HasSubstr("nan")));
 }
 
 TEST(Report, ACampaignWithoutAnIterationSaysSo) {

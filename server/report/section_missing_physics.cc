@@ -1,0 +1,139 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/report/html.h"
+#include "server/report/plot/plot.h"
+#include "server/report/residual_words.h"
+#include "server/report/sections.h"
+
+namespace calib::report {
+namespace {
+
+std::string Joined(const std::vector<std::string>& effects) {
+  std::string text;
+  for (const std::string& name : effects) text += (text.empty() ? "" : " + ") + NameForPeople(name);
+  return text.empty() ? "no effect" : text;
+}
+
+std::string Failures(const Comparison& comparison) {
+  const std::vector<std::string> said = WhereItFails(comparison);
+  if (said.empty()) {
+    return comparison.p_value ? "<p>No stage of loading stands out.</p>\n" : "";
+  }
+  std::string html = "<ul>\n";
+  for (const std::string& sentence : said) html += "<li>" + Escape(sentence) + "</li>\n";
+  return html + "</ul>\n";
+}
+
+std::string DriftTable(const std::vector<ParameterDrift>& drifts) {
+  std::string rows;
+  for (const ParameterDrift& d : drifts) {
+    for (const PartialFit& fit : d.fits) {
+      constexpr double kClear = 3;
+      rows += fmt::format(
+          "<tr><td>{}</td><td class=\"l\">{}</td><td class=\"l\">{}</td><td>{} ± {}</td><td "
+          "class=\"{}\">{}</td></tr>\n",
+          Escape(NameForPeople(d.parameter)), Escape(fit.experiment),
+          fit.segment.empty() ? "all" : Escape(NameForPeople(fit.segment)),
+          Escape(NumberWithUnit(fit.mean, d.parameter, d.unit, 3)),
+          Escape(NumberWithUnit(fit.sd, d.parameter, d.unit, 2)),
+          std::abs(fit.z) > kClear ? "bad" : "", Number(fit.z, 2));
+    }
+  }
+  if (rows.empty()) return "";
+  return "<h3>Parameters fitted part by part</h3>\n<p class=\"sub\">What each parameter would be "
+         "if "
+         "only that experiment, or that stage of it, had been measured; z is the distance from the "
+         "common value. A parameter that has to change is bent to hide something.</p>\n"
+         "<div class=\"scroll\"><table><tr><th>parameter</th><th class=\"l\">experiment</th><th "
+         "class=\"l\">stage</th><th>fitted alone</th><th>z</th></tr>\n" +
+         rows + "</table></div>\n";
+}
+
+// Children below their parents, indented.
+void AddBranch(const std::vector<Relative>& family, const std::string& parent,
+               const std::string& shown, std::string& html) {
+  html += "<ul>\n";
+  for (const Relative& r : family) {
+    if (r.parent != parent) continue;
+    const std::string name = Escape(r.campaign + ": " + Joined(r.effects));
+    html += fmt::format("<li>{}{}{}{}</li>\n", r.campaign == shown ? "<strong>" : "", name,
+                        r.campaign == shown ? "</strong>" : "",
+                        (r.purpose == "warm_fit" ? " (tried)" : "") +
+                            (std::isfinite(r.log_evidence)
+                                 ? fmt::format(", log evidence {}", Number(r.log_evidence, 5))
+                                 : std::string()));
+    const bool has_children =
+        std::any_of(family.begin(), family.end(),
+                    [&r](const Relative& other) { return other.parent == r.campaign; });
+    if (has_children) AddBranch(family, r.campaign, shown, html);
+  }
+  html += "</ul>\n";
+}
+
+std::string Tree(const ReportData& data) {
+  if (data.story.family.size() < 2) return "";
+  std::string html =
+      "<h3>Models tried</h3>\n<p class=\"sub\">Each one is the one above with effects added; "
+      "evidence "
+      "of those that were only tried is of the fitted experiments alone.</p>\n";
+  AddBranch(data.story.family, data.story.family.front().parent, data.view.status.campaign(), html);
+  return html;
+}
+
+std::string ErrorChart(const std::vector<ErrorStep>& steps) {
+  if (steps.size() < 2) return "";
+  std::vector<double> x;
+  std::vector<double> fitted;
+  std::vector<double> held_x;
+  std::vector<double> held;
+  std::vector<double> all = {0, 1};
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    x.push_back(static_cast<double>(k));
+    fitted.push_back(steps[k].rms_error);
+    all.push_back(fitted.back());
+    if (steps[k].heldout_rms_error) {
+      held_x.push_back(x.back());
+      held.push_back(*steps[k].heldout_rms_error);
+      all.push_back(held.back());
+    }
+  }
+  Plot plot({}, Axis("effects added", 0, x.back(), static_cast<int>(steps.size())),
+            Axis::Covering("rms of residual / sd", all, 5));
+  plot.AddHorizontal(1);
+  plot.AddLine(x, fitted, "mean");
+  plot.AddPoints(x, fitted, 3.5);
+  plot.AddLine(held_x, held, "mean held");
+  plot.AddPoints(held_x, held, 3.5, "residual held");
+  std::string html =
+      "<h3>Error before and after</h3>\n<div class=\"grid\">\n<figure>\n" +
+      plot.Svg(
+          "Error against the number of effects added",
+          "rms of residual over standard deviation of the fitted data and of the held-out data") +
+      "<figcaption>Fitted data; held-out data for the first and the last model. At one the model "
+      "is as close as the errors let it be.</figcaption>\n</figure>\n</div>\n"
+      "<div class=\"scroll\"><table><tr><th>model</th><th class=\"l\">experiment</th><th "
+      "class=\"l\">observable</th><th>rms / sd</th></tr>\n";
+  for (const ErrorStep& step : steps) {
+    for (const ObservableMisfit& m : step.by_observable) {
+      if (m.heldout && !step.heldout_rms_error) continue;
+      html += fmt::format(
+          "<tr><td>{}</td><td class=\"l\">{}{}</td><td class=\"l\">{}</td><td>{}</td></tr>\n",
+          Escape(Joined(step.effects)), Escape(m.experiment), m.heldout ? " (held out)" : "",
+          Escape(NameForPeople(m.observable)), Number(m.rms_error, 3));
+    }
+  }
+  return html + "</table></div>\n";
+}
+
+}  // namespace
+
+std::string MissingPhysicsSection(const ReportData& data) {
+  const std::string body = Failures(data.comparison) + DriftTable(data.story.drift) + Tree(data) +
+                           ErrorChart(data.story.steps);
+  return body.empty() ? "" : "<h2>Where the model fails</h2>\n" + body;
+}
+
+}  // namespace calib::report
