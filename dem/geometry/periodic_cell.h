@@ -13,7 +13,9 @@ inline constexpr int ImageCode(int sx, int sy, int sz) {
 }
 
 struct PeriodicCell {
-  double length[3] = {0, 0, 0};  ///< [m]
+  double length[3] = {0, 0, 0};          ///< [m]
+  bool open[3] = {false, false, false};  ///< no images along this axis: grains may be anywhere, the
+                                         ///< length only says where they usually are, 0 .. length
   double stretch[3] = {0, 0,
                        0};  ///< velocity gradient of the last move, compression negative [1/s]
 

@@ -17,7 +17,8 @@ struct GridNeighbor {
 
 class CellGrid {
  public:
-  /// Sorts wrapped centres (0 <= x < L) into grid cells of at least `range` [m] > 0 per edge.
+  /// Sorts centres (0 <= x < L, anywhere along open axes) into grid cells of at least `range` [m] >
+  /// 0 per edge.
   CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, double range);
 
   /// Grains of one grid cell in ascending order: grains()[begin(c)] .. grains()[begin(c + 1) - 1].
@@ -31,6 +32,7 @@ class CellGrid {
 
  private:
   std::array<int, 3> count_ = {1, 1, 1};
+  std::array<bool, 3> open_ = {false, false, false};
   std::vector<int> cell_of_, begin_, grains_;
 };
 

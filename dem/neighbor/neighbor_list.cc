@@ -25,9 +25,9 @@ absl::Status WrapAll(const PeriodicCell& cell, ParticleArrays& p) {
       return absl::OutOfRangeError(
           absl::StrCat("grain ", p.id[i], " has no finite position (NaN or lost)"));
     }
-    p.x[i] = Wrap(p.x[i], cell.length[0]);
-    p.y[i] = Wrap(p.y[i], cell.length[1]);
-    p.z[i] = Wrap(p.z[i], cell.length[2]);
+    p.x[i] = cell.open[0] ? p.x[i] : Wrap(p.x[i], cell.length[0]);
+    p.y[i] = cell.open[1] ? p.y[i] : Wrap(p.y[i], cell.length[1]);
+    p.z[i] = cell.open[2] ? p.z[i] : Wrap(p.z[i], cell.length[2]);
   }
   return absl::OkStatus();
 }
@@ -62,7 +62,7 @@ absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleAr
   const double largest = *std::max_element(p.radius.begin(), p.radius.end());
   const double range = 2 * largest + skin;
   for (int a = 0; a < 3; ++a) {
-    if (!(cell.length[a] >= 2 * range)) {
+    if (!cell.open[a] && !(cell.length[a] >= 2 * range)) {
       return absl::OutOfRangeError(absl::StrCat("the cell has become too short along ", kAxis[a],
                                                 ": ", cell.length[a], " m, at least ", 2 * range,
                                                 " m are needed"));
