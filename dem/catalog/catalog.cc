@@ -61,7 +61,12 @@ std::span<const EffectInfo> Effects() {
 }
 
 std::span<const TestInfo> Tests() {
-  static const std::vector<TestInfo> infos = InfosOf<TestInfo>(ElementTestEntries());
+  static const std::vector<TestInfo> infos = [] {
+    auto all = InfosOf<TestInfo>(ElementTestEntries());
+    const auto poured = InfosOf<TestInfo>(GravityTestEntries());
+    all.insert(all.end(), poured.begin(), poured.end());
+    return all;
+  }();
   return infos;
 }
 
@@ -102,6 +107,39 @@ std::span<const ObservableInfo> Observables() {
       {.name = "coordination_number",
        .unit = "1",
        .description = "2 contacts / grains, all grains counted"},
+      {.name = "time", .unit = "s", .description = "since the motion began"},
+      {.name = "repetition", .unit = "1", .description = "number of a repeat, each poured anew"},
+      {.name = "opening", .unit = "m", .description = "diameter or width of an outlet"},
+      {.name = "rotation_speed", .unit = "rad/s", .description = "of a drum"},
+      {.name = "belt_speed", .unit = "m/s", .description = "of a conveyor"},
+      {.name = "angle_of_repose", .unit = "rad", .description = "slope of a free surface"},
+      {.name = "angle_fluctuation",
+       .unit = "rad",
+       .description = "standard deviation of that slope in time"},
+      {.name = "heap_height", .unit = "m", .description = "of a heap above its floor"},
+      {.name = "mass_flow_rate", .unit = "kg/s", .description = "through an outlet"},
+      {.name = "discharged_mass", .unit = "kg", .description = "that has left a container"},
+      {.name = "avalanche_size",
+       .unit = "1",
+       .description = "mean number of grains between two arches that stop the flow"},
+      {.name = "jams", .unit = "1", .description = "number of arches that stopped the flow"},
+      {.name = "slide_time",
+       .unit = "s",
+       .description = "from opening until the material has slid past a plane"},
+      {.name = "mass_flow_left", .unit = "kg/s", .description = "to the side of negative y"},
+      {.name = "mass_flow_right", .unit = "kg/s", .description = "to the side of positive y"},
+      {.name = "mass_flow_difference",
+       .unit = "kg/s",
+       .description = "absolute difference of the flows to both sides"},
+      {.name = "intruder_height",
+       .unit = "m",
+       .description = "of the large grain's centre above the floor of its box"},
+      {.name = "fraction_above",
+       .unit = "1",
+       .description = "share of the time that the large grain has been above a height"},
+      {.name = "exit_time",
+       .unit = "s",
+       .description = "when the large grain first reached a height; the present time before"},
   };
   return infos;
 }

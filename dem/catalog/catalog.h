@@ -101,6 +101,12 @@ struct ObservableInfo {
   std::string description;
 };
 
+/// Values that a control may take.
+struct ControlRange {
+  double min = 0;
+  double max = 0;
+};
+
 struct TestInfo {
   std::string name;
   std::string description;               ///< geometry, control, stages, what makes it fail
@@ -109,6 +115,10 @@ struct TestInfo {
   std::string control;      ///< the observable that drives the loading ("axial_strain")
   bool may_reverse = true;  ///< the control may go down again (unload-reload)
   std::string reference;
+  bool poured = false;  ///< takes only the sizes of the packing's grains, which it pours itself; no
+                        ///< consolidation, no staging
+  bool separate_points = false;  ///< every value of the control is a run of its own, in any order
+  std::optional<ControlRange> control_range = {};  ///< empty: strains below 1, stresses above 0
 };
 
 std::span<const ContactInfo> Contacts();

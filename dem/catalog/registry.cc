@@ -21,9 +21,16 @@
 #include "dem/effects/strain_offset.h"
 #include "dem/effects/twisting_resistance.h"
 #include "dem/effects/viscous_damping.h"
+#include "dem/effects/wall_friction.h"
+#include "dem/lab_tests/angle_of_repose.h"
+#include "dem/lab_tests/calibration_device.h"
 #include "dem/lab_tests/isotropic.h"
 #include "dem/lab_tests/oedometric.h"
+#include "dem/lab_tests/rotating_drum.h"
+#include "dem/lab_tests/shaken_box.h"
+#include "dem/lab_tests/silo_discharge.h"
 #include "dem/lab_tests/simple_shear.h"
+#include "dem/lab_tests/transfer_chute.h"
 #include "dem/lab_tests/triaxial_drained.h"
 #include "dem/lab_tests/triaxial_undrained.h"
 
@@ -49,16 +56,24 @@ std::span<const ContactEntry> ContactEntries() {
 
 std::span<const EffectEntry> EffectEntries() {
   static const std::vector<EffectEntry> entries = {
-      HertzNonlinearity(),   ContactPlasticity(),  LinearCohesion(),    AdhesionDmt(),
-      AdhesionJkr(),         CapillaryBridges(),   ViscousDamping(),    PressureDependentFriction(),
-      RollingResistance(),   TwistingResistance(), InitialDensity(),    InitialFabric(),
-      ApparatusCompliance(), StrainOffset(),       MembraneStiffness(), LoadCellError()};
+      HertzNonlinearity(), ContactPlasticity(),   LinearCohesion(), AdhesionDmt(),
+      AdhesionJkr(),       CapillaryBridges(),    ViscousDamping(), PressureDependentFriction(),
+      RollingResistance(), TwistingResistance(),  InitialDensity(), InitialFabric(),
+      WallFriction(),      ApparatusCompliance(), StrainOffset(),   MembraneStiffness(),
+      LoadCellError()};
   return entries;
 }
 
 std::span<const ElementTestEntry> ElementTestEntries() {
   static const std::vector<ElementTestEntry> entries = {
       Isotropic(), Oedometric(), TriaxialDrained(), TriaxialUndrained(), SimpleShear()};
+  return entries;
+}
+
+std::span<const GravityTestEntry> GravityTestEntries() {
+  static const std::vector<GravityTestEntry> entries = {AngleOfRepose(), SiloDischarge(),
+                                                        RotatingDrum(),  CalibrationDevice(),
+                                                        TransferChute(), ShakenBox()};
   return entries;
 }
 

@@ -2,6 +2,7 @@
 // Where contact laws, effects and lab tests are listed: one line each in registry.cc makes an entry
 // known to everything that reads the catalogue and to the engine.
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -31,13 +32,20 @@ struct Preparation {
   double stress_anisotropy = 0;  ///< q/p during consolidation [-]
 };
 
-/// An effect acts between grains, on the readings, or on the initial state: it sets what it needs.
-/// Effects of one stage act in the order of the registry.
+/// What distinguishes contacts with walls from those between grains.
+struct WallProperties {
+  double friction_ratio = 1;       ///< tan(phi_w)/tan(phi_mu) [-]
+  std::optional<double> friction;  ///< tan(phi_w) itself, in place of the ratio [-]
+};
+
+/// An effect acts between grains, at walls, on the readings, or on the initial state: it sets what
+/// it needs. Effects of one stage act in the order of the registry.
 struct EffectEntry {
   EffectInfo info;
   std::vector<EffectKernel> kernels = {};
   void (*alter)(const ParameterSet& parameters, Apparatus& apparatus) = nullptr;
   void (*prepare)(const ParameterSet& parameters, Preparation& preparation) = nullptr;
+  void (*bound)(const ParameterSet& parameters, WallProperties& walls) = nullptr;
 };
 
 /// A test of one specimen in its periodic cell.
@@ -47,6 +55,11 @@ struct ElementTestEntry {
   RigLoad rig_load = RigLoad::kNone;
 };
 
+/// A test of grains under gravity between walls; its procedure is in simulation/.
+struct GravityTestEntry {
+  TestInfo info;
+};
+
 /// Given values of one law or effect without their prefix, and the defaults of what was not given.
 ParameterSet ResolveParameters(const std::vector<ParameterInfo>& infos, const std::string& prefix,
                                const std::map<std::string, double>& given);
@@ -54,5 +67,6 @@ ParameterSet ResolveParameters(const std::vector<ParameterInfo>& infos, const st
 std::span<const ContactEntry> ContactEntries();
 std::span<const EffectEntry> EffectEntries();
 std::span<const ElementTestEntry> ElementTestEntries();
+std::span<const GravityTestEntry> GravityTestEntries();
 
 }  // namespace calib::dem

@@ -35,6 +35,7 @@ ContactModel::ContactModel(const Model& model)
                                                         .parameters = law_parameters}));
   kernels.emplace_back(ContactStage::kSlidingLimit, MakeCoulombLimit());
   kernels.emplace_back(ContactStage::kTangential, MakeTangentialSpring());
+  WallProperties walls;
   for (const EffectEntry& effect :
        EffectEntries()) {  // in catalogue order, however the user lists them
     const std::string& name = effect.info.name;
@@ -44,11 +45,15 @@ ContactModel::ContactModel(const Model& model)
           .density = model.density,
           .law = law_parameters,
           .parameters = ResolveParameters(effect.info.parameters, name + ".", model.parameters)};
+      if (effect.bound != nullptr) {
+        effect.bound(context.parameters, walls);
+      }
       for (const EffectKernel& kernel : effect.kernels) {
         kernels.emplace_back(kernel.stage, kernel.make(context));
       }
     }
   }
+  wall_friction_ = walls.friction.value_or(walls.friction_ratio * sliding_friction_);
   std::stable_sort(kernels.begin(), kernels.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   for (auto& [stage, kernel] : kernels) {
@@ -68,7 +73,11 @@ double ContactModel::Reach(double largest_radius) const {
 }
 
 void ContactModel::Evaluate(ContactBlock& block) const {
-  ComputeKinematics(block);
+  if (block.wall) {
+    ComputeWallKinematics(block);
+  } else {
+    ComputeKinematics(block);
+  }
   for (ContactBlock::Lane* lane :
        {&block.attraction, &block.holds, &block.normal_damping, &block.tangential_damping,
         &block.mx, &block.my, &block.mz, &block.rolling_stiffness, &block.twisting_stiffness}) {

@@ -24,6 +24,9 @@ class ContactModel {
   /// tan(phi_mu) of the model itself; consolidation may put another one into the block.
   [[nodiscard]] double sliding_friction() const { return sliding_friction_; }
 
+  /// tan(phi_w) of contacts with walls.
+  [[nodiscard]] double wall_friction() const { return wall_friction_; }
+
   /// Kinematics, every kernel in the order of ContactStage, totals. All inputs of the block are
   /// set; its history is read and updated.
   void Evaluate(ContactBlock& block) const;
@@ -36,6 +39,7 @@ class ContactModel {
   std::vector<Link> chain_;
   int history_size_ = 0;
   double sliding_friction_ = 0;
+  double wall_friction_ = 0;
 };
 
 }  // namespace calib::dem

@@ -1,4 +1,4 @@
-// What an assembly is made of: grains, model and the figures that follow from them.
+// What an assembly is made of: grains, model, walls, and the figures that follow from them.
 #include "dem/dynamics/assembly.h"
 
 #include <algorithm>
@@ -13,15 +13,27 @@ namespace {
 /// narrower one searches more often. Measured best on dense packings of 1000 to 10 000 grains.
 constexpr double kSkin = 0.03;
 
+Surroundings NoSurroundings() { return {.open = {false, false, false}, .skin = kSkin}; }
+
 }  // namespace
 
 Assembly::Assembly(const Packing& packing, double density, ContactModel model, int threads)
+    : Assembly(packing, density, std::move(model), NoSurroundings(), threads) {}
+
+Assembly::Assembly(const Packing& packing, double density, ContactModel model,
+                   Surroundings surroundings, int threads)
     : particles_(MakeParticles(packing, density)),
       model_(std::move(model)),
       threads_(threads),
-      sliding_friction_(model_.sliding_friction()) {
+      sliding_friction_(model_.sliding_friction()),
+      gravity_(surroundings.gravity),
+      density_(density),
+      next_id_(particles_.size()),
+      planar_(surroundings.planar),
+      walls_(std::move(surroundings.walls)) {
   assert(particles_.size() > 0 && density > 0 && threads >= 1);
   std::copy(std::begin(packing.length), std::end(packing.length), std::begin(cell_.length));
+  std::copy(std::begin(surroundings.open), std::end(surroundings.open), std::begin(cell_.open));
   double radii = 0;
   for (const double r : particles_.radius) {
     solid_volume_ += 4.0 / 3.0 * std::numbers::pi * r * r * r;
@@ -30,7 +42,7 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model, i
   mean_diameter_ = 2 * radii / particles_.size();
   largest_radius_ = *std::max_element(particles_.radius.begin(), particles_.radius.end());
   reach_ = model_.Reach(largest_radius_);
-  skin_ = kSkin * mean_diameter_ + reach_;
+  skin_ = surroundings.skin * mean_diameter_ + reach_;
   nominal_critical_step_ = CriticalStepAt(1e-4);
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// All grains of one specimen with their contacts in the periodic cell, and one explicit time step
-// of them.
+// All grains of one specimen with their contacts, in the periodic cell or between walls, and one
+// explicit time step of them.
 
 #include <array>
 #include <cstdint>
@@ -9,19 +9,15 @@
 
 #include "absl/status/status.h"
 #include "dem/contact/contact_model.h"
+#include "dem/dynamics/grain_load.h"
 #include "dem/dynamics/leapfrog.h"
+#include "dem/dynamics/wall_contacts.h"
 #include "dem/geometry/periodic_cell.h"
 #include "dem/neighbor/neighbor_list.h"
 #include "dem/particles/packing.h"
 #include "dem/particles/particle_arrays.h"
 
 namespace calib::dem {
-
-/// What one contact does to one of its grains.
-struct GrainLoad {
-  double force[3];   ///< [N]
-  double torque[3];  ///< about the centre [N m]
-};
 
 /// Stiffness seen by the slowest-allowed time step and by the servo.
 struct StiffnessEstimate {
@@ -31,12 +27,49 @@ struct StiffnessEstimate {
   std::array<double, 3> viscosity = {0, 0, 0};  ///< the same of the dashpots [Pa s]
 };
 
+/// What surrounds the grains where it is not a periodic cell.
+struct Surroundings {
+  bool open[3] = {true, true, true};  ///< axes without images (PeriodicCell::open)
+  Vec3 gravity{};                     ///< [m/s^2]
+  std::vector<Wall> walls{};          ///< in a periodic axis they reach a diameter beyond the cell
+  bool planar = false;                ///< grains move in the plane of x and z only, as disks do
+  double skin = 0.15;  ///< gap up to which pairs are listed, over the mean diameter; flows search
+                       ///< less often with a wide one
+};
+
+/// A grain that joins others.
+struct NewGrain {
+  Vec3 centre{}, velocity{};  ///< [m, m/s]
+  double radius = 0;          ///< [m] > 0
+};
+
 /// Copyable: a copy is a snapshot that goes on to the same bits. Not thread-safe; uses `threads`
 /// threads inside.
 class Assembly {
  public:
   /// Preconditions: the packing has grains, all single spheres; density > 0; threads >= 1.
   Assembly(const Packing& packing, double density, ContactModel model, int threads);
+
+  /// The same with gravity and walls around the grains; `packing.length` only says where they
+  /// usually are along open axes, 0 .. length. Grains like these may join later.
+  Assembly(const Packing& packing, double density, ContactModel model, Surroundings surroundings,
+           int threads);
+
+  /// Takes out the grains at these indices of particles(), ascending. To be followed by
+  /// EvaluateForces.
+  void Remove(const std::vector<int>& grains);
+
+  /// Lets grains join, with the next free ids. To be followed by EvaluateForces. Precondition: the
+  /// skin and the step were chosen for grains like these.
+  void Insert(const std::vector<NewGrain>& grains);
+
+  /// Velocities, activity and friction of walls may be set between steps.
+  [[nodiscard]] const WallContacts& walls() const { return walls_; }
+  std::vector<Wall>& mutable_walls() { return walls_.mutable_walls(); }
+
+  /// Forgets the list, so that the next EvaluateForces searches: after a wall was opened or placed
+  /// by hand.
+  void SearchAgain() { stale_ = true; }
 
   /// Contact forces, torques and stress of the present configuration; searches neighbours first
   /// when the list may miss a pair. To be called once after every Move. Errors: OUT_OF_RANGE naming
@@ -67,6 +100,8 @@ class Assembly {
   /// when not finite.
   [[nodiscard]] double UnbalancedForce() const;
 
+  [[nodiscard]] Vec3 gravity() const { return gravity_; }  ///< [m/s^2]
+
   /// Grains whose net force is not a number, in words; empty: none.
   [[nodiscard]] std::string FirstNotFinite() const;
 
@@ -96,6 +131,7 @@ class Assembly {
   /// Its component xz (mean of xz and zx), positive where the top is pushed along +x by what is
   /// below: shearing the top along +x against friction makes it positive [Pa].
   [[nodiscard]] double shear_stress() const { return shear_stress_; }
+  /// Contacts between grains; those with walls are counted by walls().
   [[nodiscard]] std::int64_t contacts() const { return contacts_; }
   [[nodiscard]] double solid_volume() const { return solid_volume_; }
   [[nodiscard]] double mean_diameter() const { return mean_diameter_; }
@@ -119,6 +155,8 @@ class Assembly {
   void OpenContact(std::size_t slot);
   int CollectActive(std::size_t begin, std::size_t end, int* active);
   void GatherLoads(std::size_t begin, std::size_t end);
+  void AddSurroundings(int begin, int end);
+  void Renumber(const std::vector<int>& to);
   double MoveChunk(int chunk, const Motion& motion);
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
@@ -129,7 +167,13 @@ class Assembly {
   int threads_ = 1;
   double sliding_friction_ = 0;
   bool viscous_ = true;
-  double reach_ = 0;  ///< gap up to which formed contacts may act [m]
+  Vec3 gravity_;
+  double density_ = 0;
+  int next_id_ = 0;
+  bool planar_ = false;
+  WallContacts walls_;
+  bool stale_ = false;  ///< the list must be made anew
+  double reach_ = 0;    ///< gap up to which formed contacts may act [m]
   double last_dt_ = 0;
 
   NeighborList list_;

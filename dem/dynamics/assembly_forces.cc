@@ -38,7 +38,7 @@ void MeasureDistances(const PairInput& in, std::size_t begin, std::size_t end, d
 }  // namespace
 
 absl::Status Assembly::EvaluateForces() {
-  if (list_.row.empty() || ListMayMissPairs()) {
+  if (stale_ || list_.row.empty() || ListMayMissPairs()) {
     if (auto s = SearchNeighbors(); !s.ok()) {
       return s;
     }
@@ -68,6 +68,15 @@ absl::Status Assembly::EvaluateForces() {
   }
   shear_stress_ /= volume;
   contact_updates_ += contacts_;
+  if (!walls_.empty()) {
+    if (auto s = walls_.Evaluate(
+            particles_, model_,
+            {.dt = last_dt_, .viscous = viscous_, .reach = reach_, .threads = threads_});
+        !s.ok()) {
+      return s;
+    }
+    contact_updates_ += walls_.contacts();
+  }
   return absl::OkStatus();
 }
 

@@ -113,6 +113,31 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
   if (b.count > 0) {
     add();
   }
+  walls_.VisitBlocks(p, model_, viscous_, [&](const ContactBlock& w, const int* grains) {
+    for (int k = 0; k < w.count; ++k) {
+      const auto i = static_cast<std::size_t>(grains[k]);
+      if (!(w.overlap[k] <= 0.5 * w.radius_i[k]) && status.ok()) {
+        status = absl::OutOfRangeError(absl::StrCat("grain ", p.id[i], " overlaps a wall by ",
+                                                    w.overlap[k], " m, more than half its radius"));
+      }
+      const double n2[3] = {w.nx[k] * w.nx[k], w.ny[k] * w.ny[k], w.nz[k] * w.nz[k]};
+      const double r2 = w.radius_i[k] * w.radius_i[k];
+      const bool damped = w.normal_damping[k] + w.tangential_damping[k] > 0;
+      if (damped) {
+        damping.resize(n, {0, 0, 0, 0, 0, 0});
+      }
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double across = 1.0 - n2[a];
+        stiffness[i][a] += w.normal_stiffness[k] * n2[a] + w.tangential_stiffness[k] * across;
+        stiffness[i][a + 3] += w.tangential_stiffness[k] * across * r2 +
+                               w.rolling_stiffness[k] * across + w.twisting_stiffness[k] * n2[a];
+        if (damped) {
+          damping[i][a] += w.normal_damping[k] * n2[a] + w.tangential_damping[k] * across;
+          damping[i][a + 3] += w.tangential_damping[k] * across * r2;
+        }
+      }
+    }
+  });
   double rate2 = 0;  // largest K/m
   for (std::size_t g = 0; g < n; ++g) {
     for (std::size_t a = 0; a < 3; ++a) {

@@ -70,6 +70,28 @@ void Assembly::GatherLoads(std::size_t begin, std::size_t end) {
   }
 }
 
+void Assembly::AddSurroundings(int begin, int end) {
+  ParticleArrays& p = particles_;
+  if (!walls_.empty()) {
+    walls_.AddLoads(begin, end, p);
+  }
+  const double g[3] = {gravity_.x, gravity_.y, gravity_.z};
+  std::vector<double>* const force[3] = {&p.fx, &p.fy, &p.fz};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (g[a] != 0) {
+      for (int k = begin; k < end; ++k) {
+        const auto q = static_cast<std::size_t>(k);
+        (*force[a])[q] += g[a] / p.inverse_mass[q];
+      }
+    }
+  }
+  if (planar_) {
+    for (auto* load : {&p.fy, &p.tx, &p.tz}) {
+      std::fill(load->begin() + begin, load->begin() + end, 0.0);
+    }
+  }
+}
+
 double Assembly::MoveChunk(int chunk, const Motion& motion) {
   const auto begin = static_cast<std::size_t>(chunk) * kGrainChunk;
   const auto end = std::min(begin + kGrainChunk, particles_.x.size());
@@ -78,6 +100,7 @@ double Assembly::MoveChunk(int chunk, const Motion& motion) {
     scale[a] = cell_.length[a] / searched_length_[a];
   }
   GatherLoads(begin, end);
+  AddSurroundings(static_cast<int>(begin), static_cast<int>(end));
   AdvanceGrains(motion, static_cast<int>(begin), static_cast<int>(end), particles_);
   return LargestShift2(particles_, searched_, scale, ShearSinceSearch(), begin, end);
 }
@@ -101,6 +124,7 @@ void Assembly::Move(const Motion& motion) {
     largest = m <= largest ? largest : m;
   }
   moved_ = std::sqrt(largest);
+  walls_.Move(motion.dt);
   ++steps_;
 }
 

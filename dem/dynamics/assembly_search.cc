@@ -15,7 +15,8 @@ bool Assembly::ListMayMissPairs() const {
   }
   shrink += std::abs(ShearSinceSearch());
   // Two surfaces approach by at most both displacements and the affine shortening of their branch.
-  return !(2 * moved_ + shrink * (2 * largest_radius_ + skin_) < skin_);
+  const double approach = moved_ + std::max(moved_, walls_.moved());
+  return !(approach + shrink * (2 * largest_radius_ + skin_) < skin_);
 }
 
 double Assembly::ShearSinceSearch() const {
@@ -36,6 +37,10 @@ absl::Status Assembly::SearchNeighbors() {
   std::copy(std::begin(cell_.length), std::end(cell_.length), std::begin(searched_length_));
   searched_tilt_ = cell_.Tilt();
   moved_ = 0;
+  stale_ = false;
+  if (!walls_.empty()) {
+    walls_.Search(particles_, skin_);
+  }
 
   const auto slots = static_cast<std::size_t>(list_.size());
   const auto width = static_cast<std::size_t>(model_.history_size());

@@ -58,6 +58,14 @@ void AdvanceGrains(const Motion& motion, int begin, int end, ParticleArrays& p) 
   for (const Kick& kick : kicks) {
     ApplyKick(kick, motion.dt, motion.damping, begin, end);
   }
+  if (motion.drag > 0) {
+    const double keep = 1.0 - motion.drag * motion.dt;
+    for (auto* velocity : {&p.vx, &p.vy, &p.vz, &p.wx, &p.wy, &p.wz}) {
+      for (int g = begin; g < end; ++g) {
+        (*velocity)[static_cast<std::size_t>(g)] *= keep;
+      }
+    }
+  }
   Drift(p.vx.data(), motion.stretch[0], motion.dt, begin, end, p.x.data());
   Drift(p.vy.data(), motion.stretch[1], motion.dt, begin, end, p.y.data());
   if (motion.shear != 0) {  // z is still that of the beginning of the step

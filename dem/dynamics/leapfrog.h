@@ -11,6 +11,7 @@ struct Motion {
   double shear = 0;               ///< velocity gradient dvx/dz [1/s]
   double dt = 0;                  ///< [s] > 0
   double damping = 0;             ///< local damping, 0 .. 1 [-]
+  double drag = 0;                ///< global viscous damping: a -= drag v, also of spin [1/s] >= 0
 };
 
 /// Moves grains [begin, end) by their loads fx .. tz:

@@ -17,7 +17,9 @@ inline constexpr int ImageCode(int sx, int sy, int sz) {
 /// Lattice vectors (Lx, 0, 0), (0, Ly, 0), (tilt, 0, Lz). Adding whole lengths Lx to the tilt gives
 /// the same lattice: images are found in the least tilted description, Tilt().
 struct PeriodicCell {
-  double length[3] = {0, 0, 0};   ///< [m]
+  double length[3] = {0, 0, 0};          ///< [m]
+  bool open[3] = {false, false, false};  ///< no images along this axis: grains may be anywhere, the
+                                         ///< length only says where they usually are, 0 .. length
   double stretch[3] = {0, 0, 0};  ///< diagonal velocity gradient of the last move, compression
                                   ///< negative [1/s]
   double displacement = 0;        ///< of the top against the bottom along x, all of it [m]

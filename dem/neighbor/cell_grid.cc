@@ -13,10 +13,12 @@ CellGrid::CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, do
   const double ranges[3] = {range * std::sqrt(1.0 + slope * slope), range, range};
   for (std::size_t a = 0; a < 3; ++a) {
     count_[a] = std::clamp(static_cast<int>(cell.length[a] / ranges[a]), 1, 1024);
+    open_[a] = cell.open[a];
   }
   const auto n = static_cast<std::size_t>(particles.size());
   const auto index = [this, &cell](double s, std::size_t a) {
-    return std::clamp(static_cast<int>(s / cell.length[a] * count_[a]), 0, count_[a] - 1);
+    // Beyond the ends of an open axis the last cells go on for ever; neighbours stay neighbours.
+    return static_cast<int>(std::clamp(s / cell.length[a] * count_[a], 0.0, count_[a] - 1.0));
   };
   cell_of_.resize(n);
   begin_.assign(static_cast<std::size_t>(count_[0]) * count_[1] * count_[2] + 1, 0);
@@ -49,13 +51,17 @@ std::vector<GridNeighbor> CellGrid::Around(int cell) const {
         const int raw[3] = {cx + dx, cy + dy, cz + dz};
         GridNeighbor neighbor;
         int wrapped[3];
+        bool outside = false;
         for (int a = 0; a < 3; ++a) {
           const int count = count_[static_cast<std::size_t>(a)];
           neighbor.shift[a] = raw[a] < 0 ? -1 : (raw[a] >= count ? 1 : 0);
+          outside = outside || (neighbor.shift[a] != 0 && open_[static_cast<std::size_t>(a)]);
           wrapped[a] = raw[a] - neighbor.shift[a] * count;
         }
         neighbor.cell = wrapped[0] + count_[0] * (wrapped[1] + count_[1] * wrapped[2]);
-        around.push_back(neighbor);
+        if (!outside) {
+          around.push_back(neighbor);
+        }
       }
     }
   }

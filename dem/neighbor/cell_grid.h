@@ -17,8 +17,9 @@ struct GridNeighbor {
 
 class CellGrid {
  public:
-  /// Sorts wrapped centres (0 <= z < Lz, 0 <= x - z tilt/Lz < Lx) into grid cells of at least
-  /// `range` [m] > 0 per edge; in a sheared cell the edges along x follow its tilt and are longer.
+  /// Sorts wrapped centres (0 <= z < Lz, 0 <= x - z tilt/Lz < Lx; anywhere along open axes) into
+  /// grid cells of at least `range` [m] > 0 per edge; in a sheared cell the edges along x follow
+  /// its tilt and are longer.
   CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, double range);
 
   /// Grains of one grid cell in ascending order: grains()[begin(c)] .. grains()[begin(c + 1) - 1].
@@ -32,6 +33,7 @@ class CellGrid {
 
  private:
   std::array<int, 3> count_ = {1, 1, 1};
+  std::array<bool, 3> open_ = {false, false, false};
   std::vector<int> cell_of_, begin_, grains_;
 };
 

@@ -25,14 +25,14 @@ absl::Status WrapAll(const PeriodicCell& cell, ParticleArrays& p) {
       return absl::OutOfRangeError(
           absl::StrCat("grain ", p.id[i], " has no finite position (NaN or lost)"));
     }
-    p.y[i] = Wrap(p.y[i], cell.length[1]);
-    const double z = Wrap(p.z[i], cell.length[2]);
-    if (cell.Tilt() != 0) {
+    p.y[i] = cell.open[1] ? p.y[i] : Wrap(p.y[i], cell.length[1]);
+    const double z = cell.open[2] ? p.z[i] : Wrap(p.z[i], cell.length[2]);
+    if (cell.Tilt() != 0) {  // sheared cells have no open axes
       const double across = std::round((z - p.z[i]) / cell.length[2]);
       const double skew = z / cell.length[2] * cell.Tilt();
       p.x[i] = Wrap(p.x[i] + across * cell.Tilt() - skew, cell.length[0]) + skew;
     } else {
-      p.x[i] = Wrap(p.x[i], cell.length[0]);
+      p.x[i] = cell.open[0] ? p.x[i] : Wrap(p.x[i], cell.length[0]);
     }
     p.z[i] = z;
   }
@@ -69,7 +69,7 @@ absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleAr
   const double largest = *std::max_element(p.radius.begin(), p.radius.end());
   const double range = 2 * largest + skin;
   for (int a = 0; a < 3; ++a) {
-    if (!(cell.length[a] >= 2 * range)) {
+    if (!cell.open[a] && !(cell.length[a] >= 2 * range)) {
       return absl::OutOfRangeError(absl::StrCat("the cell has become too short along ", kAxis[a],
                                                 ": ", cell.length[a], " m, at least ", 2 * range,
                                                 " m are needed"));

@@ -26,10 +26,10 @@ struct NeighborList {
   [[nodiscard]] int size() const { return static_cast<int>(second.size()); }
 };
 
-/// Wraps all centres into the cell (its tilt at most half of Lx) and lists every pair with |x_j -
-/// x_i| < r_i + r_j + skin. Errors: OUT_OF_RANGE when a centre is not finite or the cell has become
-/// shorter than two interaction ranges (pairs would have several images); list and positions are
-/// then unusable.
+/// Wraps all centres into the cell along its periodic axes (its tilt at most half of Lx) and lists
+/// every pair with |x_j - x_i| < r_i + r_j + skin. Errors: OUT_OF_RANGE when a centre is not finite
+/// or the cell has become shorter than two interaction ranges (pairs would have several images);
+/// list and positions are then unusable.
 absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleArrays& particles,
                                NeighborList& list);
 

@@ -44,6 +44,10 @@ struct PackingRecipe {
   std::uint64_t seed = 1;
 };
 
+/// Grains of the recipe's sizes, thrown loosely into a cell, for tests that pour them themselves; its
+/// porosity and pressure are not used. Errors as GeneratePacking.
+absl::StatusOr<Packing> GenerateSizes(const PackingRecipe& recipe);
+
 /// Generates a packing; the same recipe gives the same bits on every thread count. Independent of
 /// the model's parameters, so that all samples of a campaign start from the same specimen. Errors:
 /// OUT_OF_RANGE with the attainable porosity range when the target cannot be reached by lowering

@@ -1,7 +1,5 @@
 #include "dem/particles/random_cloud.h"
 
-#include <Random123/philox.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,22 +7,10 @@
 #include <numbers>
 
 #include "absl/strings/str_cat.h"
+#include "dem/particles/random_numbers.h"
 
 namespace calib::dem {
 namespace {
-
-enum class Purpose : std::uint32_t { kRadius = 1, kPosition = 2 };
-
-/// Three numbers in [0, 1): draw `attempt` of grain `grain`.
-std::array<double, 3> Uniform(std::uint64_t seed, Purpose purpose, int grain, int attempt) {
-  const r123::Philox4x32::key_type key = {
-      {static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)}};
-  const r123::Philox4x32::ctr_type counter = {{static_cast<std::uint32_t>(purpose),
-                                               static_cast<std::uint32_t>(grain),
-                                               static_cast<std::uint32_t>(attempt), 0}};
-  const auto bits = r123::Philox4x32()(counter, key);
-  return {bits[0] / 4294967296.0, bits[1] / 4294967296.0, bits[2] / 4294967296.0};
-}
 
 /// Placed grains by grid cells of at least the largest diameter.
 class PlacedGrains {
@@ -101,7 +87,7 @@ absl::StatusOr<Packing> RandomCloud(const PackingRecipe& recipe, double solid_fr
   const int n = recipe.particles;
   double solid = 0;
   for (int i = 0; i < n; ++i) {
-    const double u = Uniform(recipe.seed, Purpose::kRadius, i, 0)[0];
+    const double u = Uniform(recipe.seed, kRadiusDraw, i, 0)[0];
     const double r = recipe.mean_radius * (1 + recipe.radius_spread * (2 * u - 1));
     packing.radius.push_back(r);
     solid += 4.0 / 3.0 * std::numbers::pi * r * r * r;
@@ -117,7 +103,7 @@ absl::StatusOr<Packing> RandomCloud(const PackingRecipe& recipe, double solid_fr
   for (int i = 0; i < n; ++i) {
     bool found = false;
     for (int attempt = 0; attempt < kAttempts && !found; ++attempt) {
-      std::array<double, 3> centre = Uniform(recipe.seed, Purpose::kPosition, i, attempt);
+      std::array<double, 3> centre = Uniform(recipe.seed, kPositionDraw, i, attempt);
       for (std::size_t a = 0; a < 3; ++a) {
         centre[a] *= packing.length[a];
       }

@@ -66,6 +66,13 @@ Packing PackingOf(const Assembly& assembly) {
 
 }  // namespace
 
+absl::StatusOr<Packing> GenerateSizes(const PackingRecipe& recipe) {
+  if (const auto problems = RecipeProblems(recipe); !problems.empty()) {
+    return absl::InvalidArgumentError(absl::StrJoin(problems, "; "));
+  }
+  return RandomCloud(recipe, kCloudFraction);
+}
+
 absl::StatusOr<Packing> GeneratePacking(const PackingRecipe& recipe, int threads,
                                         std::stop_token stop) {
   if (const auto problems = RecipeProblems(recipe); !problems.empty()) {

@@ -113,7 +113,7 @@ void CheckModel(const Model& model, Problems& problems) {
   }
 }
 
-void CheckPacking(const Packing& packing, Problems& problems) {
+void CheckPacking(const Packing& packing, bool poured, Problems& problems) {
   const std::size_t n = packing.x.size();
   if (n < 2 || packing.y.size() != n || packing.z.size() != n || packing.radius.size() != n ||
       packing.clump.size() != n) {
@@ -137,7 +137,7 @@ void CheckPacking(const Packing& packing, Problems& problems) {
     problems.push_back(absl::StrCat("grain ", clump - packing.clump.begin(), " belongs to clump ",
                                     *clump, "; only single spheres (clump -1) are simulated"));
   }
-  for (int a = 0; a < 3; ++a) {
+  for (int a = 0; a < 3 && !poured; ++a) {
     if (!(packing.length[a] > 4 * largest && std::isfinite(packing.length[a]))) {
       problems.push_back(absl::StrCat("the cell is ", packing.length[a], " m long along axis ", a,
                                       ", it must be longer than two of its largest grains (",
@@ -169,12 +169,17 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
     }
   }
   const bool stress_driven = test->control == "mean_stress";
+  const auto& range = test->control_range;
   std::set<int> steps;
   for (std::size_t k = 0; k < scenario.path.size(); ++k) {
     const ControlPoint& point = scenario.path[k];
-    const bool sensible = stress_driven ? point.target > 0 && std::isfinite(point.target)
-                                        : std::abs(point.target) < kLargestStrain;
-    if (!sensible) {
+    const bool sensible = range           ? point.target >= range->min && point.target <= range->max
+                          : stress_driven ? point.target > 0 && std::isfinite(point.target)
+                                          : std::abs(point.target) < kLargestStrain;
+    if (!sensible && range) {
+      problems.push_back(absl::StrCat("path point ", k, ": ", test->control, " is ", point.target,
+                                      ", allowed is [", range->min, ", ", range->max, "]"));
+    } else if (!sensible) {
       problems.push_back(
           absl::StrCat("path point ", k, ": ", test->control, " is ", point.target,
                        stress_driven ? ", it must be positive" : ", allowed is (-1, 1)"));
@@ -226,7 +231,8 @@ void CheckPreparation(const Scenario& scenario, Problems& problems) {
 std::vector<std::string> ScenarioProblems(const Scenario& scenario) {
   Problems problems;
   CheckModel(scenario.model, problems);
-  CheckPacking(scenario.packing, problems);
+  const TestInfo* test = FindTest(scenario.test);
+  CheckPacking(scenario.packing, test != nullptr && test->poured, problems);
   CheckTest(scenario, problems);
   CheckPreparation(scenario, problems);
   return problems;

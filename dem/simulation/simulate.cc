@@ -2,7 +2,9 @@
 #include <utility>
 
 #include "absl/strings/str_join.h"
+#include "dem/catalog/catalog.h"
 #include "dem/simulation/element_test_run.h"
+#include "dem/simulation/gravity_run.h"
 #include "dem/simulation/scenario.h"
 #include "dem/simulation/vtk_writer.h"
 
@@ -13,6 +15,9 @@ absl::StatusOr<Summary> Run(const Scenario& scenario, const LoadStepSink& sink,
                             std::stop_token stop) {
   if (const auto problems = ScenarioProblems(scenario); !problems.empty()) {
     return absl::InvalidArgumentError(absl::StrJoin(problems, "; "));
+  }
+  if (FindTest(scenario.test)->poured) {
+    return RunGravityTest(scenario, sink, std::move(stop));
   }
   return RunElementTest(scenario, sink, std::move(stop));
 }

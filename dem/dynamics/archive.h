@@ -1,0 +1,105 @@
+#pragma once
+// Writing state to bytes and reading it back: one list of members serves both ways.
+
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace calib::dem {
+
+/// Appends members to `bytes`. Plain numbers and structs as they lie in memory (little-endian IEEE
+/// machines only), vectors and strings with their length in front, other types by their Visit().
+class SaveArchive {
+ public:
+  template <class... T>
+  void operator()(T&... members) {
+    (Put(members), ...);
+  }
+  [[nodiscard]] std::string& bytes() { return bytes_; }
+
+ private:
+  template <class T>
+  void Put(T& value) {
+    if constexpr (requires { value.Visit(*this); }) {
+      value.Visit(*this);
+    } else {
+      static_assert(std::is_trivially_copyable_v<T>);
+      bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+    }
+  }
+  template <class T>
+  void Put(std::vector<T>& values) {
+    std::uint64_t size = values.size();
+    Put(size);
+    for (T& value : values) {
+      Put(value);
+    }
+  }
+  void Put(std::string& text) {
+    std::uint64_t size = text.size();
+    Put(size);
+    bytes_ += text;
+  }
+
+  std::string bytes_;
+};
+
+/// Reads what SaveArchive wrote. ok() is false once the bytes have not sufficed; members are then
+/// undefined.
+class LoadArchive {
+ public:
+  explicit LoadArchive(const std::string& bytes) : bytes_(bytes) {}
+
+  template <class... T>
+  void operator()(T&... members) {
+    (Get(members), ...);
+  }
+  /// Everything was there, and nothing more.
+  [[nodiscard]] bool complete() const { return ok_ && at_ == bytes_.size(); }
+  [[nodiscard]] bool ok() const { return ok_; }
+
+ private:
+  template <class T>
+  void Get(T& value) {
+    if constexpr (requires { value.Visit(*this); }) {
+      value.Visit(*this);
+    } else {
+      static_assert(std::is_trivially_copyable_v<T>);
+      Take(&value, sizeof value);
+    }
+  }
+  template <class T>
+  void Get(std::vector<T>& values) {
+    const std::uint64_t size = Size();
+    values.assign(size, T{});
+    for (T& value : values) {
+      Get(value);
+    }
+  }
+  void Get(std::string& text) {
+    text.assign(Size(), '\0');
+    Take(text.data(), text.size());
+  }
+  /// A length that the remaining bytes could hold.
+  std::uint64_t Size() {
+    std::uint64_t size = 0;
+    Get(size);
+    ok_ = ok_ && size <= bytes_.size() - at_;
+    return ok_ ? size : 0;
+  }
+  void Take(void* to, std::size_t size) {
+    ok_ = ok_ && size <= bytes_.size() - at_;
+    if (ok_) {
+      std::memcpy(to, bytes_.data() + at_, size);
+      at_ += size;
+    }
+  }
+
+  const std::string& bytes_;
+  std::size_t at_ = 0;
+  bool ok_ = true;
+};
+
+}  // namespace calib::dem

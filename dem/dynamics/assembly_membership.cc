@@ -1,0 +1,103 @@
+// Grains that join and leave.
+#include <algorithm>
+#include <cassert>
+#include <numbers>
+
+#include "dem/dynamics/assembly.h"
+
+namespace calib::dem {
+namespace {
+
+constexpr int kGone = -1;
+
+/// Keeps what is not gone, in order.
+void Keep(const std::vector<int>& to, ParticleArrays& p) {
+  for (auto* a : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.wx, &p.wy, &p.wz, &p.fx, &p.fy, &p.fz,
+                  &p.tx, &p.ty, &p.tz, &p.radius, &p.inverse_mass, &p.inverse_inertia}) {
+    std::size_t kept = 0;
+    for (std::size_t g = 0; g < to.size(); ++g) {
+      if (to[g] != kGone) {
+        (*a)[kept++] = (*a)[g];
+      }
+    }
+    a->resize(kept);
+  }
+  std::size_t kept = 0;
+  for (std::size_t g = 0; g < to.size(); ++g) {
+    if (to[g] != kGone) {
+      p.id[kept++] = p.id[g];
+    }
+  }
+  p.id.resize(kept);
+}
+
+}  // namespace
+
+void Assembly::Renumber(const std::vector<int>& to) {
+  const auto width = static_cast<std::size_t>(model_.history_size());
+  std::size_t kept = 0;  // only what the next search reads of the list: pairs and their memory
+  for (std::size_t s = 0; s < list_.second.size(); ++s) {
+    const int i = to[static_cast<std::size_t>(list_.first[s])];
+    const int j = to[static_cast<std::size_t>(list_.second[s])];
+    if (i == kGone || j == kGone) {
+      continue;
+    }
+    list_.first[kept] = i;
+    list_.second[kept] = j;
+    touching_[kept] = touching_[s];
+    std::copy_n(history_.begin() + static_cast<std::ptrdiff_t>(s * width), width,
+                history_.begin() + static_cast<std::ptrdiff_t>(kept * width));
+    ++kept;
+  }
+  list_.first.resize(kept);
+  list_.second.resize(kept);
+  touching_.resize(kept);
+  history_.resize(kept * width);
+  walls_.Renumber(to);
+  stale_ = true;
+}
+
+void Assembly::Remove(const std::vector<int>& grains) {
+  if (grains.empty()) {
+    return;
+  }
+  std::vector<int> to(particles_.x.size(), 0);
+  for (const int g : grains) {
+    const auto q = static_cast<std::size_t>(g);
+    to[q] = kGone;
+    const double r = particles_.radius[q];
+    solid_volume_ -= 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  }
+  int next = 0;
+  for (int& index : to) {
+    index = index == kGone ? kGone : next++;
+  }
+  Renumber(to);
+  Keep(to, particles_);
+}
+
+void Assembly::Insert(const std::vector<NewGrain>& grains) {
+  ParticleArrays& p = particles_;
+  for (const NewGrain& grain : grains) {
+    assert(grain.radius > 0 && grain.radius <= largest_radius_ * (1 + 1e-12));
+    const double volume = 4.0 / 3.0 * std::numbers::pi * grain.radius * grain.radius * grain.radius;
+    const double mass = density_ * volume;
+    for (auto* a : {&p.wx, &p.wy, &p.wz, &p.fx, &p.fy, &p.fz, &p.tx, &p.ty, &p.tz}) {
+      a->push_back(0);
+    }
+    p.x.push_back(grain.centre.x);
+    p.y.push_back(grain.centre.y);
+    p.z.push_back(grain.centre.z);
+    p.vx.push_back(grain.velocity.x);
+    p.vy.push_back(grain.velocity.y);
+    p.vz.push_back(grain.velocity.z);
+    p.radius.push_back(grain.radius);
+    p.inverse_mass.push_back(1.0 / mass);
+    p.inverse_inertia.push_back(1.0 / (0.4 * mass * grain.radius * grain.radius));
+    p.id.push_back(next_id_++);
+    solid_volume_ += volume;
+  }
+  stale_ = true;
+}
+
+}  // namespace calib::dem

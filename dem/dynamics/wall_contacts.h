@@ -1,0 +1,145 @@
+#pragma once
+// Contacts of grains with walls: which touch, what they remember, what they do.
+
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "dem/contact/contact_block.h"
+#include "dem/contact/contact_model.h"
+#include "dem/dynamics/grain_load.h"
+#include "dem/geometry/wall.h"
+#include "dem/particles/particle_arrays.h"
+
+namespace calib::dem {
+
+/// Walls and their contacts. A grain has one contact with a plane that it overlaps and one for each
+/// local minimum of the distance from its centre to a mesh: a face counts once, an edge or corner
+/// that triangles share counts once, and not where one of them is nearer elsewhere. A contact that
+/// rolls from one triangle to the next keeps what it remembers. Copyable, as Assembly.
+class WallContacts {
+ public:
+  static constexpr int kMost = 8;  ///< contacts that one grain may have with walls
+
+  explicit WallContacts(std::vector<Wall> walls = {}) : walls_(std::move(walls)) {}
+
+  [[nodiscard]] bool empty() const { return walls_.empty(); }
+  [[nodiscard]] const std::vector<Wall>& walls() const { return walls_; }
+  /// Velocities, activity and friction may be set between steps; places change by Move() only.
+  std::vector<Wall>& mutable_walls() { return walls_; }
+
+  /// Lists what each grain may touch until grains and walls have moved by `skin` together; what
+  /// contacts remember goes along.
+  void Search(const ParticleArrays& particles, double skin);
+
+  /// Moves the walls on.
+  void Move(double dt);
+
+  /// Largest displacement of any wall since the search [m].
+  [[nodiscard]] double moved() const { return moved_; }
+
+  /// What all contacts of a step have in common.
+  struct Step {
+    double dt = 0;
+    bool viscous = true;
+    double reach = 0;  ///< gap up to which formed contacts may act [m]
+    int threads = 1;
+  };
+
+  /// Forces of the present configuration. Errors: OUT_OF_RANGE naming the grain that touches more
+  /// than kMost places of walls at once.
+  absl::Status Evaluate(const ParticleArrays& particles, const ContactModel& model,
+                        const Step& step);
+
+  /// Adds the loads of the last Evaluate to the grains' forces and torques, for grains of [begin,
+  /// end).
+  void AddLoads(int begin, int end, ParticleArrays& particles) const;
+
+  /// Force of the grains on a wall in the last Evaluate [N].
+  [[nodiscard]] Vec3 ForceOn(int wall) const { return force_[static_cast<std::size_t>(wall)]; }
+
+  /// Contacts of the last Evaluate.
+  [[nodiscard]] std::int64_t contacts() const { return contacts_; }
+
+  /// Calls visit(block, grains) for blocks of the present contacts without moving them on: lane k
+  /// is of grain grains[k].
+  template <class Visit>
+  void VisitBlocks(const ParticleArrays& particles, const ContactModel& model, bool viscous,
+                   const Visit& visit) const;
+
+  /// Grain q leaves: to[q] is the new index of a grain, -1 of one that is taken out. The search has
+  /// to follow.
+  void Renumber(const std::vector<int>& to);
+
+ private:
+  struct Contact {
+    int wall = 0;
+    Vec3 point{};  ///< nearest point of the wall
+    double history[kMaxHistory] = {};
+  };
+  struct Candidate {
+    int wall = 0;
+    int triangle = -1;  ///< -1: a plane
+  };
+  /// A grain that may touch walls.
+  struct Row {
+    int grain = 0;
+    int first_candidate = 0;
+    int contacts = 0;
+    std::array<Contact, kMost> contact;
+    GrainLoad load{};
+  };
+  struct ChunkResult {
+    std::vector<Vec3> force;  ///< per wall
+    std::int64_t contacts = 0;
+    int crowded = -1;  ///< grain with too many contacts
+  };
+
+  void FindContacts(const ParticleArrays& p, double reach, std::size_t row, ChunkResult& result);
+  void EvaluateChunk(const ParticleArrays& p, const ContactModel& model, const Step& step,
+                     int chunk, ChunkResult& result);
+  void LoadLane(const ParticleArrays& p, const ContactModel& model, const Row& row,
+                const Contact& contact, ContactBlock& block) const;
+  [[nodiscard]] double FrictionOf(int wall, const ContactModel& model) const;
+  [[nodiscard]] Vec3 NearestOn(const Candidate& candidate, const Vec3& p) const;
+
+  std::vector<Wall> walls_;
+  std::vector<std::vector<Vec3>> searched_;  ///< vertices at the search; a plane's point
+  double moved_ = 0;
+  std::vector<Row> rows_;  ///< ascending by grain
+  std::vector<Candidate> candidates_;
+  std::vector<Vec3> force_;
+  std::int64_t contacts_ = 0;
+};
+
+template <class Visit>
+void WallContacts::VisitBlocks(const ParticleArrays& particles, const ContactModel& model,
+                               bool viscous, const Visit& visit) const {
+  ContactBlock block;
+  block.wall = true;
+  block.mass_factor = 2;
+  block.viscous = viscous ? 1.0 : 0.0;
+  int grains[kBlock];
+  const auto flush = [&] {
+    if (block.count > 0) {
+      PadLanes(model.history_size(), block);
+      model.Evaluate(block);
+      visit(block, grains);
+      block.count = 0;
+    }
+  };
+  for (const Row& row : rows_) {
+    for (int c = 0; c < row.contacts; ++c) {
+      grains[block.count] = row.grain;
+      LoadLane(particles, model, row, row.contact[static_cast<std::size_t>(c)], block);
+      if (block.count == kBlock) {
+        flush();
+      }
+    }
+  }
+  flush();
+}
+
+}  // namespace calib::dem

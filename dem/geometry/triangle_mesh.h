@@ -1,0 +1,47 @@
+#pragma once
+// Surfaces made of flat triangles: what walls are made of.
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "dem/geometry/vector3.h"
+
+namespace calib::dem {
+
+struct TriangleMesh {
+  std::vector<Vec3> vertex;                  ///< [m]
+  std::vector<std::array<int, 3>> triangle;  ///< indices of vertices
+
+  [[nodiscard]] int size() const { return static_cast<int>(triangle.size()); }
+};
+
+/// Nearest point of the triangle a b c to p. Pure; the triangle has an area.
+/// [Ericson 2005, Real-Time Collision Detection, sec. 5.1.5: regions of the Voronoi diagram]
+Vec3 NearestPoint(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
+
+/// Two triangles a b c, a c d. Preconditions: the corners lie in a plane, in order around it.
+void AddQuad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, TriangleMesh& mesh);
+
+/// Side of a cylinder or cone about a vertical axis: `sides` flat faces whose edges lie on the
+/// two circles. Radii [m] >= 0, not both zero; a cone's tip gives triangles.
+struct Frustum {
+  Vec3 centre{};            ///< of the lower circle [m]
+  double height = 0;        ///< [m]; 0: a flat ring
+  double lower_radius = 0;  ///< [m]
+  double upper_radius = 0;  ///< [m]
+  int sides = 24;           ///< >= 3
+};
+void AddFrustum(const Frustum& frustum, TriangleMesh& mesh);
+
+/// The same about a horizontal axis along y: `centre` is the end at the smaller y, height the
+/// length along y.
+void AddFrustumAlongY(const Frustum& frustum, TriangleMesh& mesh);
+
+/// What is wrong with a surface, one sentence each, at most ten; empty: nothing. Vertices count as
+/// the same where they agree within 1e-9 of the mesh's size. Wrong are: no triangle, a coordinate
+/// that is not finite, a triangle without area, an edge of more than two triangles and, where
+/// `closed`, an edge of one triangle only (a hole).
+std::vector<std::string> MeshProblems(const TriangleMesh& mesh, bool closed);
+
+}  // namespace calib::dem

@@ -1,0 +1,39 @@
+#include "dem/lab_tests/calibration_device.h"
+
+#include "dem/lab_tests/gravity_test.h"
+
+namespace calib::dem {
+
+GravityTestEntry CalibrationDevice() {
+  return {
+      .info = {
+          .name = "calibration_device",
+          .description = "A slice, periodic along y: a hopper with walls at 60 degrees is filled "
+                         "above a trapdoor; the trapdoor opens, the "
+                         "material slides down a plate and piles up in a corner. Control: the "
+                         "number of the repetition, each poured "
+                         "anew. mass_flow_rate is the slope of the mass in the hopper between 90 "
+                         "and 10 % of it; slide_time the last "
+                         "time at which the slide bears at least 0.3 % of the material, or, where "
+                         "that never leaves it, the time of the "
+                         "end + 10 s x the share that stays; angle_of_repose the slope at the "
+                         "inflexion of a sigmoid through the pile's "
+                         "surface. Fails when a grain escapes, or when nothing piles up",
+          .settings = WithCommonSettings(
+              {Chosen("opening", "m", "width of the outlet; 0: six mean grain diameters"),
+               Setting("slide_angle", "rad", {.value = 0.7853981633974483, .min = 0.1, .max = 1.4},
+                       "of the plate below the horizontal"),
+               Chosen("slide_length", "m", "0: 16 mean grain diameters"),
+               Chosen("depth", "m", "of the periodic slice; 0: six largest grain diameters"),
+               Chosen("duration", "s",
+                      "longest time after opening; 0: 200 sqrt(mean diameter / gravity)")}),
+          .observables = {"repetition", "mass_flow_rate", "slide_time", "angle_of_repose"},
+          .control = "repetition",
+          .may_reverse = true,
+          .reference = "Samuelsson 2023, sec. 4.1",
+          .poured = true,
+          .separate_points = true,
+          .control_range = ControlRange{.min = 0, .max = 1e6}}};
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,41 @@
+#include "dem/lab_tests/gravity_test.h"
+
+namespace calib::dem {
+
+std::vector<std::string> GravityTestNames() {
+  return {"angle_of_repose",    "silo_discharge", "rotating_drum",
+          "calibration_device", "transfer_chute", "shaken_box"};
+}
+
+ParameterInfo Setting(const std::string& name, const std::string& unit, const SettingRange& range,
+                      const std::string& description) {
+  ParameterInfo info;
+  info.name = name;
+  info.unit = unit;
+  info.min = range.min;
+  info.max = range.max;
+  info.default_value = range.value;
+  info.default_prior = {.kind = "uniform", .min = range.min, .max = range.max};
+  info.description = description;
+  return info;
+}
+
+ParameterInfo Chosen(const std::string& name, const std::string& unit,
+                     const std::string& description) {
+  return Setting(name, unit, {.value = 0, .min = 0, .max = 1000}, description);
+}
+
+std::vector<ParameterInfo> WithCommonSettings(std::vector<ParameterInfo> own) {
+  std::vector<ParameterInfo> all = {
+      Setting("gravity", "m/s^2", {.value = 9.80665, .min = 1e-3, .max = 1000},
+              "acceleration of free fall, downwards along z"),
+      Setting(
+          "local_damping", "1", {.value = 0, .min = 0, .max = 0.9},
+          "share of each grain's net force that opposes its motion (Cundall); also of its weight"),
+      Setting("drag", "1/s", {.value = 0, .min = 0, .max = 1000},
+              "global viscous damping: deceleration over velocity")};
+  all.insert(all.end(), own.begin(), own.end());
+  return all;
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,32 @@
+#pragma once
+// Tests of grains under gravity between walls, in real time: settings that they share.
+
+#include <string>
+#include <vector>
+
+#include "dem/catalog/catalog.h"
+
+namespace calib::dem {
+
+/// Names of the tests with walls, where effects of kind "boundary" show.
+std::vector<std::string> GravityTestNames();
+
+/// A length, time or speed of the test's geometry in `unit`, >= 0; 0, its default, lets the test
+/// choose it from the grains, as the description says.
+ParameterInfo Chosen(const std::string& name, const std::string& unit,
+                     const std::string& description);
+
+/// A setting with a default of its own, in [min, max].
+struct SettingRange {
+  double value = 0;
+  double min = 0;
+  double max = 0;
+};
+ParameterInfo Setting(const std::string& name, const std::string& unit, const SettingRange& range,
+                      const std::string& description);
+
+/// The settings given, after gravity [m/s^2], local_damping [-] and drag [1/s], which every test
+/// has.
+std::vector<ParameterInfo> WithCommonSettings(std::vector<ParameterInfo> own);
+
+}  // namespace calib::dem

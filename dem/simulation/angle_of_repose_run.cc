@@ -1,0 +1,90 @@
+// `angle_of_repose`: a cylinder is filled and lifted; the heap that stays.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "absl/strings/str_cat.h"
+#include "dem/measure/free_surface.h"
+#include "dem/simulation/gravity_run.h"
+
+namespace calib::dem {
+namespace {
+
+constexpr int kSides = 32;
+constexpr double kSolidFraction = 0.58;  ///< of the filling
+
+StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
+  const double d = run.largest_diameter();
+  double solid = 0;
+  for (const double r : run.radii()) {
+    solid += 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  }
+  const double radius =
+      0.5 *
+      run.SettingOr("cylinder_diameter",
+                    std::max(3 * d, std::cbrt(4 * solid / (kSolidFraction * std::numbers::pi))));
+  const double inner = radius * std::cos(std::numbers::pi / kSides);
+  const double speed =
+      run.SettingOr("lift_speed", 0.15 * std::sqrt(run.gravity() * run.mean_diameter()));
+  const Vec3 axis{4 * radius, 4 * radius, 0};
+  Packing grains = LooseFill(
+      run.radii(),
+      {.low = {axis.x - radius, axis.y - radius, 0},
+       .width = 2 * radius,
+       .depth = 2 * radius,
+       .holds = [&](const Vec3& c,
+                    double r) { return std::hypot(c.x - axis.x, c.y - axis.y) + r < inner; }},
+      run.seed() + static_cast<std::uint64_t>(std::llround(1e6 * point.target)) * 1'000'003U);
+  if (grains.x.size() < run.radii().size()) {
+    return run.Fail("cylinder_diameter is too small: no grain fits into the cylinder");
+  }
+  const double top = TopOf(grains);
+  grains.length[0] = grains.length[1] = 8 * radius;
+  grains.length[2] = top;
+  TriangleMesh side;
+  AddFrustum({.centre = axis,
+              .height = top + d,
+              .lower_radius = radius,
+              .upper_radius = radius,
+              .sides = kSides},
+             side);
+  Assembly assembly = run.Make(grains, {.walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
+                                                  MakeMeshWall("cylinder", side)}});
+  const double far = 100 * radius + 10 * top;
+  Flow flow = run.Drive(
+      assembly, {.drop_height = top, .low = {-far, -far, -d}, .high = {far, far, top + far}});
+  const double longest = 40 * std::sqrt(top / run.gravity());
+  StageEnd end = flow.Settle(longest, GravityRun::kSettling);
+  if (end == StageEnd::kDone) {
+    double heap = 0;
+    for (std::size_t g = 0; g < assembly.particles().z.size(); ++g) {
+      heap = std::max(heap, assembly.particles().z[g] + assembly.particles().radius[g]);
+    }
+    assembly.mutable_walls()[1].velocity = {0, 0, speed};
+    end = flow.Advance((heap + d) / speed);
+  }
+  if (end == StageEnd::kDone) {
+    assembly.mutable_walls()[1].active = false;
+    assembly.mutable_walls()[1].velocity = {};
+    assembly.SearchAgain();
+    end = flow.Settle(longest, run.Setting("local_damping"));
+  }
+  end = run.Close(end, flow, {}, absl::StrCat("repetition ", point.target));
+  if (end != StageEnd::kDone) {
+    return end;
+  }
+  const Heap heap = ConicalHeap(assembly.particles(), axis, run.mean_diameter());
+  return run.Report(point, {point.target, heap.angle, heap.height}, assembly);
+}
+
+}  // namespace
+
+StageEnd RunAngleOfRepose(GravityRun& run) {
+  StageEnd end = StageEnd::kDone;
+  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
+    end = Repeat(run, run.path()[k]);
+  }
+  return end;
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,209 @@
+// `calibration_device`: hopper, slide and pile, a slice of it, poured anew for each repetition.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dem/measure/free_surface.h"
+#include "dem/simulation/gravity_run.h"
+
+namespace calib::dem {
+namespace {
+
+constexpr double kHopperSlope = 1.0471975511965976;  ///< of its walls, 60 degrees [rad]
+constexpr double kOnSlide = 0.003;  ///< share of the material below which the slide counts as empty
+constexpr double kPenalty = 10;     ///< [s] per share of the material that never leaves the slide
+
+/// Places in the plane of x and z, x = 0 below the outlet, the pile's corner at the left.
+struct Device {
+  double opening = 0;
+  double depth = 0;                 ///< period along y
+  double outlet = 0;                ///< height of the outlet
+  double upper_x = 0, upper_z = 0;  ///< ends of the slide
+  double lower_x = 0, lower_z = 0;
+  double corner = 0;                  ///< x of the wall beside the pile
+  double hopper_x = 0, hopper_z = 0;  ///< where the hopper's slopes become vertical
+};
+
+Device Plan(const GravityRun& run) {
+  const double d = run.mean_diameter();
+  Device device;
+  device.opening = run.SettingOr("opening", 6 * d);
+  device.depth = run.SettingOr("depth", 6 * run.largest_diameter());
+  const double angle = run.Setting("slide_angle");
+  const double length = run.SettingOr("slide_length", 16 * d);
+  const double dx = length * std::cos(angle);
+  const double dz = length * std::sin(angle);
+  device.lower_z = 10 * d;
+  device.upper_x = device.opening;
+  device.upper_z = device.lower_z + dz;
+  device.lower_x = device.upper_x - dx;
+  device.corner = device.lower_x - 10 * d;
+  device.outlet = device.upper_z + 2 * d;
+  device.hopper_z = device.outlet + 12 * d;
+  device.hopper_x = 0.5 * device.opening + 12 * d / std::tan(kHopperSlope);
+  return device;
+}
+
+/// A plate along y from (x1, z1) to (x2, z2), longer than the slice by `overhang` at both ends.
+void AddPlate(double x1, double z1, double x2, double z2, double depth, double overhang,
+              TriangleMesh& mesh) {
+  AddQuad({x1, -overhang, z1}, {x2, -overhang, z2}, {x2, depth + overhang, z2},
+          {x1, depth + overhang, z1}, mesh);
+}
+
+/// Share of a moving total: least-squares slope of mass over time where mass is between 90 and 10 %
+/// of the first, with the sign of a loss [kg/s].
+double LossRate(const std::vector<double>& time, const std::vector<double>& mass) {
+  double n = 0;
+  double t = 0;
+  double m = 0;
+  double tt = 0;
+  double tm = 0;
+  for (std::size_t k = 0; k < time.size(); ++k) {
+    if (mass[k] > 0.9 * mass.front() || mass[k] < 0.1 * mass.front()) {
+      continue;
+    }
+    n += 1;
+    t += time[k];
+    m += mass[k];
+    tt += time[k] * time[k];
+    tm += time[k] * mass[k];
+  }
+  const double spread = n * tt - t * t;
+  return n >= 2 && spread > 0 ? -(n * tm - t * m) / spread
+                              : (mass.front() - mass.back()) / (time.back() - time.front());
+}
+
+struct Masses {
+  double hopper = 0, slide = 0, total = 0;
+};
+
+Masses Weigh(const ParticleArrays& p, const Device& device) {
+  Masses masses;
+  for (std::size_t g = 0; g < p.x.size(); ++g) {
+    const double mass = 1.0 / p.inverse_mass[g];
+    masses.total += mass;
+    if (p.z[g] > device.outlet) {
+      masses.hopper += mass;
+    } else if (p.x[g] > device.lower_x && p.z[g] > device.lower_z) {
+      masses.slide += mass;
+    }
+  }
+  return masses;
+}
+
+StageEnd Measure(GravityRun& run, const Device& device, const ControlPoint& point, Flow& flow) {
+  Assembly& assembly = flow.assembly();
+  const double opened = flow.time();
+  const double longest = run.SettingOr("duration", 200 * run.fall_time());
+  std::vector<double> time = {0};
+  std::vector<double> hopper = {Weigh(assembly.particles(), device).hopper};
+  double last_on_slide = 0;
+  StageEnd end = StageEnd::kDone;
+  int still = 0;
+  Masses masses;
+  while (end == StageEnd::kDone && time.back() < longest && still < 5) {
+    end = flow.Advance(run.fall_time());
+    masses = Weigh(assembly.particles(), device);
+    time.push_back(flow.time() - opened);
+    hopper.push_back(masses.hopper);
+    if (masses.slide >= kOnSlide * masses.total) {
+      last_on_slide = time.back();
+    }
+    const double quiet = 1e-4 * run.gravity() * run.mean_diameter();
+    still = flow.MeanSquareSpeed() < quiet ? still + 1 : 0;
+  }
+  if (end != StageEnd::kDone) {
+    return end;
+  }
+  const bool stays = masses.slide >= kOnSlide * masses.total;
+  const double slide_time =
+      stays ? time.back() + kPenalty * masses.slide / masses.total : last_on_slide;
+  const auto pile = SigmoidPile(assembly.particles(),
+                                {.wall = device.corner,
+                                 .end = device.corner + 4 * (device.upper_x - device.corner),
+                                 .highest = device.lower_z},
+                                run.mean_diameter());
+  if (!pile) {
+    return run.Fail("nothing has piled up: fewer than four columns hold grains below the slide");
+  }
+  return run.Report(point, {point.target, LossRate(time, hopper), slide_time, pile->angle},
+                    assembly);
+}
+
+StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point) {
+  const double d = run.largest_diameter();
+  const double half = device.hopper_x;
+  Packing grains = LooseFill(
+      run.radii(),
+      {.low = {-half, 0, device.outlet},
+       .width = 2 * half,
+       .depth = device.depth,
+       .holds =
+           [&](const Vec3& c, double r) {
+             const double up = c.z - device.outlet - 2 * r;
+             const double room =
+                 std::min(half, 0.5 * device.opening + up / std::tan(kHopperSlope)) - r;
+             return std::abs(c.x) < room;
+           }},
+      run.seed() + static_cast<std::uint64_t>(std::llround(1e6 * point.target)) * 1'000'003U);
+  if (grains.x.size() < run.radii().size()) {
+    return run.Fail("the hopper is too small for the grains");
+  }
+  const double top = TopOf(grains);
+  const double width = 4 * (device.upper_x - device.corner);
+  grains.length[0] = width;
+  grains.length[1] = device.depth;
+  grains.length[2] = top;
+  const double shift = -device.corner;  // the grid of cells begins at x = 0
+  for (double& x : grains.x) {
+    x += shift;
+  }
+  Device here = device;
+  for (double* x : {&here.upper_x, &here.lower_x, &here.corner}) {
+    *x += shift;
+  }
+  TriangleMesh hopper;
+  for (const double side : {-1.0, 1.0}) {
+    AddPlate(shift + side * 0.5 * device.opening, device.outlet, shift + side * half,
+             device.hopper_z, device.depth, d, hopper);
+    AddPlate(shift + side * half, device.hopper_z, shift + side * half, top + 10 * d, device.depth,
+             d, hopper);
+  }
+  TriangleMesh trapdoor;
+  AddPlate(shift - 0.5 * device.opening, device.outlet, shift + 0.5 * device.opening, device.outlet,
+           device.depth, d, trapdoor);
+  TriangleMesh slide;
+  AddPlate(here.upper_x, here.upper_z, here.lower_x, here.lower_z, device.depth, d, slide);
+  AddPlate(here.upper_x, here.upper_z, here.upper_x, device.outlet, device.depth, d, slide);
+  Assembly assembly = run.Make(
+      grains, {.open = {true, false, true},
+               .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
+                         MakePlane("corner", {0, 0, 0}, {1, 0, 0}), MakeMeshWall("hopper", hopper),
+                         MakeMeshWall("slide", slide), MakeMeshWall("trapdoor", trapdoor)}});
+  Flow flow = run.Drive(
+      assembly,
+      {.drop_height = top, .low = {-d, -1e300, -d}, .high = {100 * width, 1e300, 2 * top}});
+  StageEnd end = flow.Settle(40 * std::sqrt(top / run.gravity()), GravityRun::kSettling);
+  if (end == StageEnd::kDone) {
+    assembly.mutable_walls().back().active = false;
+    assembly.SearchAgain();
+    end = Measure(run, here, point, flow);
+  }
+  return run.Close(end, flow, {}, absl::StrCat("repetition ", point.target));
+}
+
+}  // namespace
+
+StageEnd RunCalibrationDevice(GravityRun& run) {
+  const Device device = Plan(run);
+  StageEnd end = StageEnd::kDone;
+  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
+    end = Repeat(run, device, run.path()[k]);
+  }
+  return end;
+}
+
+}  // namespace calib::dem

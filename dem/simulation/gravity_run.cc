@@ -1,0 +1,109 @@
+#include "dem/simulation/gravity_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
+
+namespace calib::dem {
+
+GravityRun::GravityRun(const Scenario& scenario, const LoadStepSink& sink, std::stop_token stop)
+    : scenario_(scenario),
+      sink_(sink),
+      stop_(std::move(stop)),
+      observables_(FindTest(scenario.test)->observables) {
+  double sum = 0;
+  for (const double r : radii()) {
+    sum += 2 * r;
+    largest_diameter_ = std::max(largest_diameter_, 2 * r);
+  }
+  mean_diameter_ = sum / static_cast<double>(radii().size());
+}
+
+double GravityRun::Setting(const std::string& name) const {
+  if (const auto it = scenario_.settings.find(name); it != scenario_.settings.end()) {
+    return it->second;
+  }
+  const auto& settings = FindTest(scenario_.test)->settings;
+  const auto info = std::find_if(settings.begin(), settings.end(),
+                                 [&](const ParameterInfo& s) { return s.name == name; });
+  return *info->default_value;
+}
+
+double GravityRun::SettingOr(const std::string& name, double chosen) const {
+  const double given = Setting(name);
+  return given > 0 ? given : chosen;
+}
+
+double GravityRun::fall_time() const { return std::sqrt(mean_diameter_ / gravity()); }
+
+Assembly GravityRun::Make(const Packing& grains, Surroundings surroundings) const {
+  surroundings.gravity = {0, 0, -gravity()};
+  return {grains, scenario_.model.density, ContactModel(scenario_.model), std::move(surroundings),
+          scenario_.threads};
+}
+
+Flow GravityRun::Drive(Assembly& assembly, FlowOptions options) const {
+  options.damping = Setting("local_damping");
+  options.drag = Setting("drag");
+  return {assembly, options, stop_};
+}
+
+StageEnd GravityRun::Fail(std::string reason) {
+  reason_ = std::move(reason);
+  return StageEnd::kDiverged;
+}
+
+StageEnd GravityRun::Report(const ControlPoint& point, const std::vector<double>& values,
+                            const Assembly& assembly) {
+  if (point.load_step < 0) {
+    return StageEnd::kDone;
+  }
+  for (std::size_t v = 0; v < values.size(); ++v) {
+    if (!std::isfinite(values[v])) {
+      return Fail(
+          absl::StrCat("load step ", point.load_step, ": ", observables_[v], " is not finite"));
+    }
+  }
+  sink_status_ = sink_({.load_step = point.load_step, .values = values}, assembly);
+  return sink_status_.ok() ? StageEnd::kDone : Fail("the state could not be given on");
+}
+
+StageEnd GravityRun::Close(StageEnd end, const Flow& flow, const Mark& first,
+                           const std::string& where) {
+  const Mark last = MarkOf(flow.assembly());
+  summary_.steps += last.steps - first.steps;
+  summary_.contact_updates += last.updates - first.updates;
+  summary_.time_step = flow.time_step();
+  if (end == StageEnd::kDiverged && reason_.empty()) {
+    reason_ = absl::StrCat(where, ": ", flow.reason());
+  }
+  return end;
+}
+
+absl::StatusOr<Summary> GravityRun::Finish(StageEnd end) const {
+  if (!sink_status_.ok()) {
+    return sink_status_;
+  }
+  Summary summary = summary_;
+  summary.outcome = end == StageEnd::kDone      ? Outcome::kCompleted
+                    : end == StageEnd::kStopped ? Outcome::kStopped
+                                                : Outcome::kDiverged;
+  summary.reason = end == StageEnd::kDiverged ? reason_ : "";
+  return summary;
+}
+
+absl::StatusOr<Summary> RunGravityTest(const Scenario& scenario, const LoadStepSink& sink,
+                                       std::stop_token stop) {
+  static const std::map<std::string, StageEnd (*)(GravityRun&)> procedures = {
+      {"angle_of_repose", &RunAngleOfRepose}, {"silo_discharge", &RunSiloDischarge},
+      {"rotating_drum", &RunRotatingDrum},    {"calibration_device", &RunCalibrationDevice},
+      {"transfer_chute", &RunTransferChute},  {"shaken_box", &RunShakenBox}};
+  GravityRun run(scenario, sink, std::move(stop));
+  return run.Finish(procedures.at(scenario.test)(run));
+}
+
+}  // namespace calib::dem

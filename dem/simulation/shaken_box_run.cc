@@ -1,0 +1,127 @@
+// `shaken_box`: a plane of grains and a large one in a box that is moved and tilted.
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "dem/simulation/gravity_run.h"
+#include "dem/simulation/sine.h"
+
+namespace calib::dem {
+namespace {
+
+/// Where the box is at a time, from its place at rest. [Hadjidoukas 2014, Eq. 16]
+struct Shaking {
+  double ax = 0, az = 0, w = 0, tilt = 0, tilt_w = 0;
+
+  [[nodiscard]] Vec3 Shift(double t) const {
+    return {ax * (Cosine(w * t) - 1.0), 0, az * Sine(w * t)};
+  }
+  [[nodiscard]] double Tilt(double t) const { return tilt * Sine(tilt_w * t); }
+};
+
+/// How long the intruder has been above a height, and when it came there first.
+struct Watch {
+  double height = 0;
+  double above = 0;
+  double first = -1;  ///< not yet
+};
+
+}  // namespace
+
+StageEnd RunShakenBox(GravityRun& run) {
+  const double d = run.largest_diameter();
+  const double width = run.SettingOr("box_width", 8.05 * d);
+  const double big = 0.5 * d * run.Setting("intruder_ratio");
+  const double start = std::max(big, run.Setting("intruder_start"));
+  const double rate = std::sqrt(run.gravity() / d);  // scales the published box of 20 mm disks
+  const Shaking shaking{.ax = run.SettingOr("amplitude_x", 2.5 * d),
+                        .az = run.SettingOr("amplitude_z", 4.15 * d),
+                        .w = run.SettingOr("frequency", 0.768 * rate),
+                        .tilt = run.Setting("tilt"),
+                        .tilt_w = run.SettingOr("tilt_frequency", 8.13 * rate)};
+  Watch watch{.height = run.SettingOr("height", 5 * d)};
+  const double side = 2 * shaking.ax + 2 * d;  // room for the motion in the grid of cells
+  const Vec3 intruder{side + 0.5 * width, 0, start};
+  if (!(2 * big < width)) {
+    return run.Fail("box_width is too small for the intruder");
+  }
+  Packing grains = LooseFill(run.radii(),
+                             {.low = {side, 0, 0},
+                              .width = width,
+                              .holds =
+                                  [&](const Vec3& c, double r) {
+                                    return c.x - r > side && c.x + r < side + width &&
+                                           std::hypot(c.x - intruder.x, c.z - start) > r + big;
+                                  }},
+                             run.seed());
+  if (grains.x.size() < run.radii().size()) {
+    return run.Fail("box_width is too small: no grain fits into the box");
+  }
+  grains.x.push_back(intruder.x);
+  grains.y.push_back(0);
+  grains.z.push_back(start);
+  grains.radius.push_back(big);
+  grains.clump.push_back(-1);
+  const int intruder_id = static_cast<int>(grains.x.size()) - 1;
+  const double top = std::max(2 * width, TopOf(grains) + 10 * d);
+  grains.length[0] = 2 * side + width;
+  grains.length[1] = 8 * big;
+  grains.length[2] = top;
+
+  TriangleMesh mesh;
+  const double far = 4 * big;  // along y, where nothing moves
+  const auto plate = [&](double x1, double z1, double x2, double z2) {
+    AddQuad({x1, -far, z1}, {x2, -far, z2}, {x2, far, z2}, {x1, far, z1}, mesh);
+  };
+  plate(side, 0, side + width, 0);
+  plate(side, 0, side, top);
+  plate(side + width, 0, side + width, top);
+  plate(side, top, side + width, top);
+  Wall box = MakeMeshWall("box", mesh);
+  box.centre = {side + 0.5 * width, 0, 0.5 * top};
+  const Vec3 rest = box.centre;
+  Assembly assembly = run.Make(grains, {.walls = {box}, .planar = true});
+  const double reach = 2 * top + shaking.az;
+  const double fastest =
+      shaking.w * (shaking.az + shaking.ax) + shaking.tilt * shaking.tilt_w * top;
+  Flow flow = run.Drive(assembly, {.drop_height = top + fastest * fastest / (2 * run.gravity()),
+                                   .low = {-reach, -reach, -reach},
+                                   .high = {side + width + reach, reach, 2 * reach}});
+  StageEnd end = flow.Settle(40 * std::sqrt(top / run.gravity()), GravityRun::kSettling);
+  const double begun = flow.time();
+
+  /// Height of the intruder above the floor, along the box.
+  const auto intruder_height = [&] {
+    const ParticleArrays& p = assembly.particles();
+    const auto g =
+        static_cast<std::size_t>(std::find(p.id.begin(), p.id.end(), intruder_id) - p.id.begin());
+    const Wall& now = assembly.walls().walls()[0];
+    const Vec3 floor = now.mesh.vertex[0];
+    const Vec3 up = now.mesh.vertex[5] - now.mesh.vertex[4];  // of the left plate
+    return Dot(Vec3{p.x[g], p.y[g], p.z[g]} - floor, up) / Length(up);
+  };
+  flow.SetBeforeStep([&](double time, double dt) {
+    const double t = time - begun;
+    const double h = intruder_height();
+    watch.above += h > watch.height ? dt : 0.0;
+    watch.first = watch.first < 0 && h >= watch.height ? t : watch.first;
+    // Velocities that bring the box to where it has to be after the step.
+    Wall& now = assembly.mutable_walls()[0];
+    now.velocity = (1.0 / dt) * (rest + shaking.Shift(t + dt) - now.centre);
+    now.angular_velocity = {0, (shaking.Tilt(t + dt) - shaking.Tilt(t)) / dt, 0};
+  });
+  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
+    const ControlPoint& point = run.path()[k];
+    end = flow.Advance(point.target - (flow.time() - begun));
+    if (end == StageEnd::kDone) {
+      const double t = flow.time() - begun;
+      end = run.Report(point,
+                       {point.target, intruder_height(), t > 0 ? watch.above / t : 0.0,
+                        watch.first < 0 ? point.target : watch.first},
+                       assembly);
+    }
+  }
+  return run.Close(end, flow, {}, "shaking");
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,223 @@
+// `silo_discharge`: one filling, an outlet for each value of the control; arches are broken.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dem/simulation/gravity_run.h"
+
+namespace calib::dem {
+namespace {
+
+constexpr int kSides = 32;
+
+/// A filled silo about the vertical through (middle, middle).
+struct Silo {
+  bool flat = false;
+  double width = 0;   ///< or diameter [m]
+  double middle = 0;  ///< [m]
+};
+
+Wall FloorWithOutlet(const Silo& silo, double opening, double overhang) {
+  TriangleMesh mesh;
+  const double m = silo.middle;
+  const double far = 0.5 * silo.width + overhang;
+  if (silo.flat) {
+    for (const double side : {-1.0, 1.0}) {
+      const double inner = m + side * 0.5 * opening;
+      const double outer = m + side * far;
+      AddQuad({inner, m - far, 0}, {outer, m - far, 0}, {outer, m + far, 0}, {inner, m + far, 0},
+              mesh);
+    }
+  } else {
+    AddFrustum({.centre = {m, m, 0},
+                .height = 0,
+                .lower_radius = 0.5 * opening,
+                .upper_radius = far,
+                .sides = kSides},
+               mesh);
+  }
+  return MakeMeshWall("floor", mesh);
+}
+
+/// Grains whose centre stands above the outlet; the lowest first.
+std::vector<int> AboveOutlet(const ParticleArrays& p, const Silo& silo, double opening) {
+  std::vector<int> above;
+  for (int g = 0; g < p.size(); ++g) {
+    const auto q = static_cast<std::size_t>(g);
+    const double y = silo.flat ? 0 : p.y[q] - silo.middle;
+    if (std::hypot(p.x[q] - silo.middle, y) < 0.5 * opening) {
+      above.push_back(g);
+    }
+  }
+  std::sort(above.begin(), above.end(), [&](int a, int b) {
+    const double za = p.z[static_cast<std::size_t>(a)];
+    const double zb = p.z[static_cast<std::size_t>(b)];
+    return za != zb ? za < zb : a < b;
+  });
+  return above;
+}
+
+/// Takes the lowest grain of an arch out and sets it on top of the others.
+void BreakArch(int lowest, Assembly& assembly) {
+  const ParticleArrays& p = assembly.particles();
+  const auto q = static_cast<std::size_t>(lowest);
+  double top = 0;
+  for (std::size_t g = 0; g < p.z.size(); ++g) {
+    top = std::max(top, p.z[g] + p.radius[g]);
+  }
+  const NewGrain grain{.centre = {p.x[q], p.y[q], top + 1.1 * p.radius[q]}, .radius = p.radius[q]};
+  assembly.Remove({lowest});
+  assembly.Insert({grain});
+}
+
+/// Slope of mass over the time of flow, waits left out, between 10 and 70 % of the mass [kg/s].
+double FlowRate(const std::vector<Drained>& drained, double jam_time) {
+  if (drained.size() < 2) {
+    return 0;
+  }
+  std::vector<double> time;
+  std::vector<double> mass;
+  double waited = 0;
+  double total = 0;
+  for (std::size_t k = 0; k < drained.size(); ++k) {
+    const double gap = k > 0 ? drained[k].time - drained[k - 1].time : 0;
+    waited += gap >= jam_time ? gap : 0;
+    total += drained[k].mass;
+    time.push_back(drained[k].time - waited);
+    mass.push_back(total);
+  }
+  double n = 0;
+  double t = 0;
+  double m = 0;
+  double tt = 0;
+  double tm = 0;
+  for (std::size_t k = 0; k < time.size(); ++k) {
+    if (mass[k] < 0.1 * total || mass[k] > 0.7 * total) {
+      continue;
+    }
+    n += 1;
+    t += time[k];
+    m += mass[k];
+    tt += time[k] * time[k];
+    tm += time[k] * mass[k];
+  }
+  const double spread = n * tt - t * t;
+  return n >= 3 && spread > 0 ? (n * tm - t * m) / spread
+                              : total / std::max(time.back() - time.front(), jam_time);
+}
+
+StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
+                   const FlowOptions& options, const ControlPoint& point) {
+  const double opening = point.target;
+  const double jam_time = run.SettingOr("jam_time", 20 * run.fall_time());
+  const double duration = run.SettingOr("duration", 400 * run.fall_time());
+  Assembly assembly = filled;
+  const auto first = GravityRun::MarkOf(assembly);
+  assembly.mutable_walls()[0] = FloorWithOutlet(silo, opening, run.largest_diameter());
+  assembly.SearchAgain();
+  Flow flow = run.Drive(assembly, options);
+  flow.SetDrain(-2 * run.largest_diameter());
+  StageEnd end = StageEnd::kDone;
+  int jams = 0;
+  std::size_t seen = 0;
+  double since = 0;  // time at which something last happened
+  const double slice = 0.25 * jam_time;
+  const auto most = static_cast<int>(run.Setting("avalanches"));
+  while (end == StageEnd::kDone && flow.time() < duration && assembly.particles().size() > 0) {
+    end = flow.Advance(slice);
+    if (flow.drained().size() > seen) {
+      seen = flow.drained().size();
+      since = flow.drained().back().time;
+    }
+    if (end != StageEnd::kDone || flow.time() - since < jam_time) {
+      continue;
+    }
+    const std::vector<int> arch = AboveOutlet(assembly.particles(), silo, opening);
+    if (arch.empty()) {
+      break;  // it has run empty
+    }
+    if (++jams >= most) {
+      break;
+    }
+    BreakArch(arch.front(), assembly);
+    since = flow.time();
+  }
+  end = run.Close(end, flow, first, absl::StrCat("opening ", opening, " m"));
+  if (end != StageEnd::kDone) {
+    return end;
+  }
+  double mass = 0;
+  for (const Drained& grain : flow.drained()) {
+    mass += grain.mass;
+  }
+  const double avalanches = std::max(1, jams);
+  return run.Report(
+      point,
+      {opening, FlowRate(flow.drained(), jam_time), mass,
+       static_cast<double>(flow.drained().size()) / avalanches, static_cast<double>(jams)},
+      assembly);
+}
+
+}  // namespace
+
+StageEnd RunSiloDischarge(GravityRun& run) {
+  const double d = run.largest_diameter();
+  Silo silo{.flat = run.Setting("flat") >= 0.5};
+  silo.width = run.SettingOr("silo_width", (silo.flat ? 40 : 12) * run.mean_diameter());
+  silo.middle = 0.5 * silo.width + d;
+  for (const ControlPoint& point : run.path()) {
+    if (!(point.target < silo.width)) {
+      return run.Fail(absl::StrCat("opening ", point.target, " m is not smaller than silo_width, ",
+                                   silo.width, " m"));
+    }
+  }
+  const double m = silo.middle;
+  const double inner = 0.5 * silo.width * std::cos(std::numbers::pi / kSides);
+  Packing grains =
+      LooseFill(run.radii(),
+                {.low = {m - 0.5 * silo.width, silo.flat ? m : m - 0.5 * silo.width, 0},
+                 .width = silo.width,
+                 .depth = silo.flat ? 0 : silo.width,
+                 .holds =
+                     [&](const Vec3& c, double r) {
+                       return silo.flat ? std::abs(c.x - m) + r < 0.5 * silo.width
+                                        : std::hypot(c.x - m, c.y - m) + r < inner;
+                     }},
+                run.seed());
+  if (grains.x.size() < run.radii().size()) {
+    return run.Fail("silo_width is too small: no grain fits into the silo");
+  }
+  const double top = TopOf(grains);
+  grains.length[0] = grains.length[1] = silo.width + 2 * d;
+  grains.length[2] = top;
+  Surroundings walls{.planar = silo.flat};
+  walls.walls.push_back(MakePlane("floor", {0, 0, 0}, {0, 0, 1}));
+  if (silo.flat) {
+    walls.walls.push_back(MakePlane("left", {m - 0.5 * silo.width, m, 0}, {1, 0, 0}));
+    walls.walls.push_back(MakePlane("right", {m + 0.5 * silo.width, m, 0}, {-1, 0, 0}));
+  } else {
+    TriangleMesh side;
+    AddFrustum({.centre = {m, m, -d},
+                .height = top + 20 * d,
+                .lower_radius = 0.5 * silo.width,
+                .upper_radius = 0.5 * silo.width,
+                .sides = kSides},
+               side);
+    walls.walls.push_back(MakeMeshWall("cylinder", side));
+  }
+  Assembly assembly = run.Make(grains, std::move(walls));
+  const double far = silo.width + top;
+  const FlowOptions options{
+      .drop_height = top, .low = {-far, -far, -far}, .high = {2 * far, 2 * far, 3 * far}};
+  Flow filling = run.Drive(assembly, options);
+  StageEnd end = filling.Settle(40 * std::sqrt(top / run.gravity()), GravityRun::kSettling);
+  end = run.Close(end, filling, {}, "filling");
+  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
+    end = Discharge(run, silo, assembly, options, run.path()[k]);
+  }
+  return end;
+}
+
+}  // namespace calib::dem

@@ -1,0 +1,234 @@
+// `transfer_chute`: a belt feeds a funnel above a ridge; what falls to either side.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "dem/particles/random_numbers.h"
+#include "dem/simulation/gravity_run.h"
+
+namespace calib::dem {
+namespace {
+
+// Lengths in largest grain diameters.
+constexpr double kBeltWidth = 10;
+constexpr double kBeltLength = 12;
+constexpr double kPlate = 6;         ///< from the belt's end to the plate
+constexpr double kFunnelTop = 7;     ///< radius
+constexpr double kFunnelBottom = 3;  ///< radius
+constexpr double kFunnelHeight = 7;
+constexpr double kRidge = 6;           ///< height of the ridge
+constexpr double kRidgeHalfWidth = 5;  ///< at its foot: 50 degrees steep
+constexpr double kGap = 2;             ///< between ridge and funnel
+constexpr double kWidth = 40;          ///< of the whole, along y
+
+/// Turns a mesh about the line through `pivot` along x.
+void TurnAboutX(double angle, const Vec3& pivot, TriangleMesh& mesh) {
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  for (Vec3& v : mesh.vertex) {
+    const double y = v.y - pivot.y;
+    const double z = v.z - pivot.z;
+    v.y = pivot.y + c * y - s * z;
+    v.z = pivot.z + s * y + c * z;
+  }
+}
+
+struct Chute {
+  double d = 0;
+  double belt_z = 0;    ///< height of the belt's surface
+  double belt_end = 0;  ///< x
+  double middle = 0;    ///< y of ridge and belt
+  std::vector<Wall> walls;
+};
+
+Chute Build(const GravityRun& run, double speed) {
+  const double d = run.largest_diameter();
+  Chute chute;
+  chute.d = d;
+  chute.middle = 0.5 * kWidth * d;
+  const double m = chute.middle;
+  const double shift_z = run.Setting("funnel_shift_z");
+  chute.belt_end = kBeltLength * d;
+  chute.belt_z = (kRidge + kGap + kFunnelHeight + 3) * d;
+  const double half = 0.5 * kBeltWidth * d;
+
+  TriangleMesh belt;
+  AddQuad({0, m - half, chute.belt_z}, {chute.belt_end, m - half, chute.belt_z},
+          {chute.belt_end, m + half, chute.belt_z}, {0, m + half, chute.belt_z}, belt);
+  Wall belt_wall = MakeMeshWall("belt", belt);
+  belt_wall.surface_velocity = {speed, 0, 0};
+  belt_wall.friction = run.Setting("belt_friction");
+  chute.walls.push_back(belt_wall);
+
+  TriangleMesh guards;
+  const double plate_x = chute.belt_end + kPlate * d;
+  const double high = chute.belt_z + 20 * d;
+  for (const double side : {-1.0, 1.0}) {
+    const double y = m + side * half;
+    AddQuad({0, y, chute.belt_z}, {plate_x, y, chute.belt_z}, {plate_x, y, high}, {0, y, high},
+            guards);
+  }
+  AddQuad({0, m - half, chute.belt_z}, {0, m + half, chute.belt_z}, {0, m + half, high},
+          {0, m - half, high}, guards);
+  AddQuad({plate_x, m - half, chute.belt_z - d}, {plate_x, m + half, chute.belt_z - d},
+          {plate_x, m + half, high}, {plate_x, m - half, high}, guards);
+  chute.walls.push_back(MakeMeshWall("guards", guards));
+
+  const Vec3 foot{plate_x - 0.5 * kPlate * d, m + run.Setting("funnel_shift_y"),
+                  (kRidge + kGap) * d + shift_z};
+  TriangleMesh funnel;
+  AddFrustum({.centre = foot,
+              .height = kFunnelHeight * d,
+              .lower_radius = kFunnelBottom * d,
+              .upper_radius = kFunnelTop * d,
+              .sides = 16},
+             funnel);
+  TurnAboutX(run.Setting("funnel_angle"), {foot.x, foot.y, foot.z + kFunnelHeight * d}, funnel);
+  chute.walls.push_back(MakeMeshWall("funnel", funnel));
+
+  TriangleMesh ridge;
+  for (const double side : {-1.0, 1.0}) {
+    const double foot_y = m + side * kRidgeHalfWidth * d;
+    AddQuad({-kWidth * d, m, kRidge * d}, {2 * kWidth * d, m, kRidge * d},
+            {2 * kWidth * d, foot_y, 0}, {-kWidth * d, foot_y, 0}, ridge);
+  }
+  chute.walls.push_back(MakeMeshWall("ridge", ridge));
+  return chute;
+}
+
+/// Sets grains onto the belt's beginning in rows, at the feed rate, with the belt's speed.
+class Feed {
+ public:
+  Feed(const GravityRun& run, const Chute& chute, double speed, double rate)
+      : radii_(run.radii()),
+        chute_(chute),
+        speed_(speed),
+        density_(run.density()),
+        rate_(rate),
+        seed_(run.seed()) {}
+
+  [[nodiscard]] bool done() const { return next_ >= radii_.size(); }
+
+  /// Lets the grains join that are due at a time.
+  void Act(double time, Assembly& assembly) {
+    std::vector<NewGrain> row;
+    const double d = chute_.d;
+    const double pitch = 1.1 * d;
+    const auto places = static_cast<std::size_t>((kBeltWidth - 1) * d / pitch);
+    if (done() || time < ready_ || rate_ * time < fed_) {
+      return;
+    }
+    for (std::size_t k = 0; k < places && !done(); ++k) {
+      const double r = radii_[next_];
+      const auto u = Uniform(seed_, kFeedDraw, static_cast<int>(next_), 0);
+      const double y = chute_.middle +
+                       (static_cast<double>(k) - 0.5 * static_cast<double>(places - 1)) * pitch +
+                       0.04 * d * (2 * u[0] - 1);
+      row.push_back({.centre = {1.0 * d + 0.02 * d * (2 * u[1] - 1), y, chute_.belt_z + r},
+                     .velocity = {speed_, 0, 0},
+                     .radius = r});
+      fed_ += density_ * 4.0 / 3.0 * std::numbers::pi * r * r * r;
+      ++next_;
+    }
+    ready_ = time + 1.2 * d / speed_;  // until the row has moved on by its own length
+    assembly.Insert(row);
+  }
+
+ private:
+  const std::vector<double>& radii_;
+  const Chute& chute_;
+  double speed_, density_, rate_;
+  std::uint64_t seed_;
+  std::size_t next_ = 0;
+  double fed_ = 0;
+  double ready_ = 0;
+};
+
+/// Flow through one side between 20 and 80 % of what came through [kg/s].
+std::array<double, 2> Sides(const std::vector<Drained>& drained, double middle) {
+  const std::size_t begin = drained.size() / 5;
+  const std::size_t end = drained.size() - begin;
+  std::array<double, 2> mass = {0, 0};
+  for (std::size_t k = begin; k < end; ++k) {
+    mass[drained[k].y < middle ? 0 : 1] += drained[k].mass;
+  }
+  const double time = drained[end - 1].time - drained[begin].time;
+  return {mass[0] / time, mass[1] / time};
+}
+
+StageEnd Convey(GravityRun& run, const ControlPoint& point) {
+  const double speed = point.target;
+  const double d = run.largest_diameter();
+  if (!(speed >= std::sqrt(run.gravity() * d))) {
+    return run.Fail(absl::StrCat("belt_speed is ", speed,
+                                 " m/s, grains are thrown off the belt from sqrt(g d) = ",
+                                 std::sqrt(run.gravity() * d), " m/s on"));
+  }
+  const Chute chute = Build(run, speed);
+  double mean_mass = 0;
+  for (const double r : run.radii()) {
+    mean_mass += run.density() * 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  }
+  mean_mass /= static_cast<double>(run.radii().size());
+  const double rate = run.SettingOr("feed_rate", kBeltWidth / 3 * mean_mass * speed / d);
+  // The smallest and the largest grain stand far below as patterns for skin and step; they drain.
+  const auto [smallest, largest] = std::minmax_element(run.radii().begin(), run.radii().end());
+  Packing patterns;
+  for (const double r : {*smallest, *largest}) {
+    patterns.x.push_back(0.0);
+    patterns.y.push_back(chute.middle + (patterns.x.size() > 1 ? 5 * d : -5 * d));
+    patterns.z.push_back(-100 * d);
+    patterns.radius.push_back(r);
+    patterns.clump.push_back(-1);
+  }
+  patterns.length[0] = (kBeltLength + 2 * kPlate) * d;
+  patterns.length[1] = kWidth * d;
+  patterns.length[2] = chute.belt_z + 5 * d;
+  Assembly assembly = run.Make(patterns, {.walls = chute.walls});
+  assembly.Remove({0, 1});
+  Feed feed(run, chute, speed, rate);
+  feed.Act(0, assembly);
+  const double fall = chute.belt_z + speed * speed / (2 * run.gravity());
+  Flow flow = run.Drive(assembly, {.drop_height = fall,
+                                   .low = {-kWidth * d, -kWidth * d, -10 * d},
+                                   .high = {2 * kWidth * d, 2 * kWidth * d, 10 * fall}});
+  flow.SetDrain(-d);
+  flow.SetBeforeStep([&](double time, double) { feed.Act(time, assembly); });
+  const double feeding = mean_mass * static_cast<double>(run.radii().size()) / rate;
+  const double longest = 3 * feeding + 60 * std::sqrt(fall / run.gravity());
+  StageEnd end = StageEnd::kDone;
+  while (end == StageEnd::kDone && flow.time() < longest &&
+         !(feed.done() && assembly.particles().size() == 0)) {
+    end = flow.Advance(2 * run.fall_time());
+    if (feed.done() && flow.drained().size() > 1 &&
+        flow.time() - flow.drained().back().time > 40 * run.fall_time()) {
+      break;  // what is left stays
+    }
+  }
+  end = run.Close(end, flow, {}, absl::StrCat("belt_speed ", speed, " m/s"));
+  if (end != StageEnd::kDone) {
+    return end;
+  }
+  const std::size_t through = flow.drained().size();
+  if (2 * through < run.radii().size() || through < 10) {
+    return run.Fail(absl::StrCat("belt_speed ", speed, " m/s: only ", through, " of ",
+                                 run.radii().size(), " grains came through, the funnel blocks"));
+  }
+  const auto [left, right] = Sides(flow.drained(), chute.middle);
+  return run.Report(point, {speed, left, right, std::abs(left - right)}, assembly);
+}
+
+}  // namespace
+
+StageEnd RunTransferChute(GravityRun& run) {
+  StageEnd end = StageEnd::kDone;
+  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
+    end = Convey(run, run.path()[k]);
+  }
+  return end;
+}
+
+}  // namespace calib::dem

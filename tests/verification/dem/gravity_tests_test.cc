@@ -1,0 +1,178 @@
+// The tests of grains under gravity: scaling laws, order of their answers, threads, bad settings.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "dem/catalog/catalog.h"
+#include "tests/support/dem/scenarios.h"
+
+namespace calib::dem {
+namespace {
+
+constexpr double kDiameter = 0.004;
+
+Model Beads(double friction, double rolling) {
+  Model model;
+  model.contact = "hertz_mindlin";
+  model.density = 2500;
+  model.effects = {"viscous_damping", "rolling_resistance"};
+  model.parameters = {{"young_modulus", 5e6},
+                      {"poisson_ratio", 0.25},
+                      {"friction_coefficient", friction},
+                      {"viscous_damping.ratio", 0.3},
+                      {"rolling_resistance.stiffness_ratio", 0.5},
+                      {"rolling_resistance.friction", rolling}};
+  return model;
+}
+
+Scenario Pour(const std::string& test, int grains, std::vector<double> controls) {
+  Scenario scenario;
+  scenario.model = Beads(0.5, 0.1);
+  scenario.test = test;
+  const auto packing = GenerateSizes(
+      {.particles = grains, .mean_radius = 0.5 * kDiameter, .radius_spread = 0.15, .seed = 3});
+  EXPECT_TRUE(packing.ok());
+  scenario.packing = *packing;
+  scenario.seed = 5;
+  for (std::size_t k = 0; k < controls.size(); ++k) {
+    scenario.path.push_back({.target = controls[k], .load_step = static_cast<int>(k)});
+  }
+  return scenario;
+}
+
+/// Value of an observable at a load step of a run that has to complete.
+double Value(const test::Run& run, const std::string& test, const std::string& name,
+             std::size_t step) {
+  EXPECT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  const auto& names = FindTest(test)->observables;
+  const auto at = std::find(names.begin(), names.end(), name) - names.begin();
+  return step < run.states.size() ? run.states[step].values[static_cast<std::size_t>(at)]
+                                  : std::nan("");
+}
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+TEST(AngleOfRepose, RoughGrainsStandSteeperThanSmoothOnes) {
+  Scenario rough = Pour("angle_of_repose", 300, {1});
+  rough.model = Beads(0.6, 0.3);
+  Scenario smooth = rough;
+  smooth.model = Beads(0.1, 0.0);
+  const double steep = Value(test::RunAll(rough), "angle_of_repose", "angle_of_repose", 0);
+  const double flat = Value(test::RunAll(smooth), "angle_of_repose", "angle_of_repose", 0);
+  std::printf("angle of repose %.1f deg rough, %.1f deg smooth\n", steep / kDegree, flat / kDegree);
+  EXPECT_GT(steep, 8 * kDegree);  // a heap of four layers is flatter than one of many
+  EXPECT_LT(steep, 45 * kDegree);
+  EXPECT_LT(flat, 0.6 * steep);
+}
+
+TEST(SiloDischarge, WiderOutletsGiveBeverloosExponentInThePlane) {
+  // In the plane W grows as (D - k d)^{3/2}; between two openings the exponent is found with k
+  // = 1.4.
+  Scenario silo = Pour("silo_discharge", 600, {4.5 * kDiameter, 7 * kDiameter});
+  silo.model = Beads(0.3, 0.0);
+  silo.settings = {{"flat", 1}, {"silo_width", 18 * kDiameter}};
+  const test::Run run = test::RunAll(silo);
+  const double narrow = Value(run, "silo_discharge", "mass_flow_rate", 0);
+  const double wide = Value(run, "silo_discharge", "mass_flow_rate", 1);
+  const double exponent = std::log(wide / narrow) / std::log((7 - 1.4) / (4.5 - 1.4));
+  std::printf("silo %.4f and %.4f kg/s, exponent %.2f\n", narrow, wide, exponent);
+  EXPECT_NEAR(exponent, 1.5, 0.35);
+}
+
+TEST(SiloDischarge, ArchesStopASmallOutletAndAreBroken) {
+  Scenario silo = Pour("silo_discharge", 150, {2.5 * kDiameter});
+  silo.settings = {{"flat", 1}, {"silo_width", 14 * kDiameter}, {"avalanches", 4}};
+  const test::Run run = test::RunAll(silo);
+  EXPECT_GE(Value(run, "silo_discharge", "jams", 0), 1);
+  EXPECT_GT(Value(run, "silo_discharge", "avalanche_size", 0), 0);
+}
+
+TEST(RotatingDrum, SlopeRisesWithFrictionAndLeansAgainstTheTurn) {
+  Scenario drum = Pour("rotating_drum", 250, {2});
+  drum.settings = {{"turns", 0.15}};
+  drum.model = Beads(0.6, 0.2);
+  Scenario smooth = drum;
+  smooth.model = Beads(0.1, 0.0);
+  const double steep = Value(test::RunAll(drum), "rotating_drum", "angle_of_repose", 0);
+  const double flat = Value(test::RunAll(smooth), "rotating_drum", "angle_of_repose", 0);
+  std::printf("drum %.1f deg rough, %.1f deg smooth\n", steep / kDegree, flat / kDegree);
+  EXPECT_GT(steep, 15 * kDegree);
+  EXPECT_LT(steep, 60 * kDegree);
+  EXPECT_LT(flat, steep);
+  EXPECT_GT(flat, 0);
+}
+
+TEST(CalibrationDevice, SlipperySlideIsLeftSooner) {
+  Scenario device = Pour("calibration_device", 300, {1});
+  device.model.effects.emplace_back("wall_friction");
+  device.model.parameters["wall_friction.coefficient"] = 0.1;
+  Scenario rough = device;
+  rough.model.parameters["wall_friction.coefficient"] = 0.8;
+  const test::Run fast = test::RunAll(device);
+  const test::Run slow = test::RunAll(rough);
+  const auto value = [](const test::Run& run, const char* name) {
+    return Value(run, "calibration_device", name, 0);
+  };
+  std::printf("device: rate %.4f %.4f kg/s, slide %.3f %.3f s, pile %.1f %.1f deg\n",
+              value(fast, "mass_flow_rate"), value(slow, "mass_flow_rate"),
+              value(fast, "slide_time"), value(slow, "slide_time"),
+              value(fast, "angle_of_repose") / kDegree, value(slow, "angle_of_repose") / kDegree);
+  EXPECT_GT(value(fast, "mass_flow_rate"), 0);
+  EXPECT_LT(value(fast, "slide_time"), value(slow, "slide_time"));
+  EXPECT_GT(value(fast, "angle_of_repose"), 0);
+}
+
+TEST(TransferChute, AFunnelShiftedToTheRightFeedsTheRight) {
+  Scenario chute = Pour("transfer_chute", 250, {1.0});
+  chute.settings = {{"funnel_shift_y", 2 * kDiameter}};
+  const test::Run run = test::RunAll(chute);
+  const double left = Value(run, "transfer_chute", "mass_flow_left", 0);
+  const double right = Value(run, "transfer_chute", "mass_flow_right", 0);
+  std::printf("chute: left %.4f, right %.4f kg/s\n", left, right);
+  EXPECT_GT(right, 2 * left);
+  EXPECT_DOUBLE_EQ(Value(run, "transfer_chute", "mass_flow_difference", 0), std::abs(left - right));
+}
+
+TEST(ShakenBox, TheIntruderRises) {
+  Scenario box = Pour("shaken_box", 72, {0.0, 1.0, 2.0});
+  box.settings = {{"height", 2.5 * kDiameter}};
+  const test::Run run = test::RunAll(box);
+  const auto height = [&](std::size_t k) { return Value(run, "shaken_box", "intruder_height", k); };
+  std::printf("intruder at %.4f, %.4f, %.4f m; above for %.2f of the time, first at %.2f s\n",
+              height(0), height(1), height(2), Value(run, "shaken_box", "fraction_above", 2),
+              Value(run, "shaken_box", "exit_time", 2));
+  EXPECT_NEAR(height(0), kDiameter, 0.2 * kDiameter);
+  EXPECT_GT(std::max(height(1), height(2)), 2 * kDiameter);
+  EXPECT_LT(Value(run, "shaken_box", "exit_time", 2), 2.0);
+}
+
+TEST(GravityTests, ThreadsChangeNoBit) {
+  Scenario silo = Pour("silo_discharge", 400, {6 * kDiameter});
+  silo.settings = {{"duration", 0.1}};
+  const test::Run one = test::RunAll(silo);
+  silo.threads = 2;
+  const test::Run two = test::RunAll(silo);
+  ASSERT_EQ(one.states.size(), 1U);
+  EXPECT_EQ(one.states[0].values, two.states[0].values);
+  EXPECT_EQ(one.summary.steps, two.summary.steps);
+}
+
+TEST(GravityTests, BadSettingsAndFailuresAreSentences) {
+  Scenario drum = Pour("rotating_drum", 100, {-1});
+  drum.settings = {{"turns", 0}, {"width", 1}};
+  const auto problems = ScenarioProblems(drum);
+  EXPECT_THAT(problems,
+              testing::Contains("path point 0: rotation_speed is -1, allowed is [0, 1000]"));
+  EXPECT_THAT(problems, testing::Contains("test rotating_drum has no setting \"width\""));
+  EXPECT_THAT(problems, testing::Contains(testing::HasSubstr("turns is 0")));
+  Scenario small = Pour("rotating_drum", 100, {1});
+  small.settings = {{"drum_diameter", 0.02}};
+  const test::Run run = test::RunAll(small);
+  EXPECT_EQ(run.summary.outcome, Outcome::kDiverged);
+  EXPECT_THAT(run.summary.reason, testing::HasSubstr("holds only"));
+}
+
+}  // namespace
+}  // namespace calib::dem
