@@ -21,6 +21,8 @@ struct alignas(64) ContactBlock {
   int count = 0;  ///< lanes in use
   double dt = 0;  ///< time since the last evaluation [s]; 0: evaluate without moving on
   double sliding_friction = 0;  ///< tan(phi_mu), or what replaces it during consolidation [-] >= 0
+  bool wall = false;            ///< j is a wall: see ComputeWallKinematics
+  double mass_factor = 1;       ///< m* over m_i m_j/(m_i + m_j): 2 where j mirrors i for a wall
   double viscous = 1;           ///< 1: viscous effects act; 0: not, as during consolidation
   double stretch[3] = {0, 0, 0};  ///< homogeneous velocity gradient of the cell, diagonal [1/s]
   double shear = 0;               ///< its component dvx/dz [1/s]

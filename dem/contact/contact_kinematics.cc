@@ -63,6 +63,44 @@ CALIB_DEM_CLONES void ComputeKinematics(ContactBlock& b) {
   }
 }
 
+CALIB_DEM_CLONES void ComputeWallKinematics(ContactBlock& b) {
+  const double dt = b.dt;
+  for (int k = 0; k < kBlock; ++k) {
+    const double r = b.radius_i[k];
+    const double distance = std::sqrt(b.dx[k] * b.dx[k] + b.dy[k] * b.dy[k] + b.dz[k] * b.dz[k]);
+    const double inverse = 1.0 / distance;
+    const double nx = b.dx[k] * inverse;
+    const double ny = b.dy[k] * inverse;
+    const double nz = b.dz[k] * inverse;
+    b.nx[k] = nx;
+    b.ny[k] = ny;
+    b.nz[k] = nz;
+    b.overlap[k] = r - distance;
+    b.effective_radius[k] = r;
+    const double vn = nx * b.vx[k] + ny * b.vy[k] + nz * b.vz[k];
+    b.normal_velocity[k] = vn;
+    const double cx = r * b.wix[k];
+    const double cy = r * b.wiy[k];
+    const double cz = r * b.wiz[k];
+    b.slip_x[k] = dt * (b.vx[k] - nx * vn - (cy * nz - cz * ny));
+    b.slip_y[k] = dt * (b.vy[k] - ny * vn - (cz * nx - cx * nz));
+    b.slip_z[k] = dt * (b.vz[k] - nz * vn - (cx * ny - cy * nx));
+    // The normal hardly turns in a step, and projecting what is remembered loses only the square.
+    b.tilt_x[k] = b.tilt_y[k] = b.tilt_z[k] = 0.0;
+    const double rx = dt * (b.wjx[k] - b.wix[k]);
+    const double ry = dt * (b.wjy[k] - b.wiy[k]);
+    const double rz = dt * (b.wjz[k] - b.wiz[k]);
+    const double twist = nx * rx + ny * ry + nz * rz;
+    b.twist[k] = twist;
+    b.roll_x[k] = rx - nx * twist;
+    b.roll_y[k] = ry - ny * twist;
+    b.roll_z[k] = rz - nz * twist;
+    b.spin[k] =
+        0.5 * dt *
+        (nx * (b.wix[k] + b.wjx[k]) + ny * (b.wiy[k] + b.wjy[k]) + nz * (b.wiz[k] + b.wjz[k]));
+  }
+}
+
 CALIB_DEM_CLONES void TransportTangential(ContactBlock& b, int first) {
   double* const sx = b.history[first];
   double* const sy = b.history[first + 1];

@@ -16,6 +16,14 @@ namespace calib::dem {
 /// Garcia-Rojo, Herrmann, Phys. Rev. E 77 (2008) 031304]. Precondition: |d| > 0 in every lane.
 void ComputeKinematics(ContactBlock& block);
 
+/// The same for grain i at a wall j: d points from the centre to the nearest point of the wall, v
+/// is the wall's velocity there minus that of the centre, w_j the wall's angular velocity. The wall
+/// is a partner of infinite radius,
+///   n = d/|d|, u = r_i - |d|, r* = r_i, slip = dt [ (v - n (n.v)) - r_i w_i x n ],
+/// except where laws use the radii themselves (moments): there it counts as a mirror image, r_j =
+/// r_i, and the effective mass is that of the grain (block.mass_factor = 2).
+void ComputeWallKinematics(ContactBlock& block);
+
 /// Carries a tangential vector (three history columns from `first` on) from the last tangent plane
 /// to the present one and turns it with the mean spin of the grains about n:
 ///   s' = s - (n.s)(n - dn/2),   s'' = s' + spin n x s' - spin^2/2 s'.

@@ -29,10 +29,11 @@ ContactModel::ContactModel(const Model& model)
   std::vector<std::pair<ContactStage, std::shared_ptr<const ContactKernel>>> kernels;
   const ContactEntry& law = LawNamed(model.contact);
   const ParameterSet law_parameters = ResolveParameters(law.info.parameters, "", model.parameters);
-  kernels.emplace_back(ContactStage::kNormal, law.make({.contact = model.contact,
-                                                        .density = model.density,
-                                                        .law = law_parameters,
-                                                        .parameters = law_parameters}));
+  const KernelContext law_context{.contact = model.contact,
+                                  .density = model.density,
+                                  .law = law_parameters,
+                                  .parameters = law_parameters};
+  kernels.emplace_back(ContactStage::kNormal, law.make(law_context));
   kernels.emplace_back(ContactStage::kSlidingLimit, MakeCoulombLimit());
   kernels.emplace_back(ContactStage::kTangential, MakeTangentialSpring());
   for (const EffectEntry& effect :
@@ -48,6 +49,9 @@ ContactModel::ContactModel(const Model& model)
         kernels.emplace_back(kernel.stage, kernel.make(context));
       }
     }
+  }
+  if (law.make_dashpot != nullptr) {
+    kernels.emplace_back(ContactStage::kNormalExtra, law.make_dashpot(law_context));
   }
   std::stable_sort(kernels.begin(), kernels.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -68,7 +72,11 @@ double ContactModel::Reach(double largest_radius) const {
 }
 
 void ContactModel::Evaluate(ContactBlock& block) const {
-  ComputeKinematics(block);
+  if (block.wall) {
+    ComputeWallKinematics(block);
+  } else {
+    ComputeKinematics(block);
+  }
   for (ContactBlock::Lane* lane :
        {&block.attraction, &block.holds, &block.normal_damping, &block.tangential_damping,
         &block.mx, &block.my, &block.mz, &block.rolling_stiffness, &block.twisting_stiffness}) {

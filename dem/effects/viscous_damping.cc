@@ -23,7 +23,7 @@ inline double EffectiveMass(double mass, double ri, double rj) {
 CALIB_DEM_CLONES void DampNormal(const Dashpot dashpot, ContactBlock& b) {
   const double scale = dashpot.twice_ratio * b.viscous;
   for (int k = 0; k < kBlock; ++k) {
-    const double mass = EffectiveMass(dashpot.mass, b.radius_i[k], b.radius_j[k]);
+    const double mass = EffectiveMass(b.mass_factor * dashpot.mass, b.radius_i[k], b.radius_j[k]);
     const double stiffness = b.normal_stiffness[k] > 0 ? b.normal_stiffness[k] : 0.0;
     const double c = scale * std::sqrt(mass * stiffness);
     const double elastic = b.normal_force[k];
@@ -38,7 +38,7 @@ CALIB_DEM_CLONES void DampShear(const Dashpot dashpot, ContactBlock& b) {
   const double scale = dashpot.twice_ratio * b.viscous;
   const double per_time = b.dt > 0 ? 1.0 / b.dt : 0.0;
   for (int k = 0; k < kBlock; ++k) {
-    const double mass = EffectiveMass(dashpot.mass, b.radius_i[k], b.radius_j[k]);
+    const double mass = EffectiveMass(b.mass_factor * dashpot.mass, b.radius_i[k], b.radius_j[k]);
     const double c = scale * std::sqrt(mass * b.tangential_stiffness[k]);
     const double limit = b.sliding_limit[k];
     const double spring = std::sqrt(b.fx[k] * b.fx[k] + b.fy[k] * b.fy[k] + b.fz[k] * b.fz[k]);
