@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/registry.h"
+#include "dem/lab_tests/collision.h"
 
 namespace calib::dem {
 namespace {
@@ -65,6 +66,7 @@ std::span<const TestInfo> Tests() {
     auto all = InfosOf<TestInfo>(ElementTestEntries());
     const auto poured = InfosOf<TestInfo>(GravityTestEntries());
     all.insert(all.end(), poured.begin(), poured.end());
+    all.push_back(Collision());
     return all;
   }();
   return infos;
@@ -104,6 +106,26 @@ std::span<const ObservableInfo> Observables() {
                       "of consolidation - effective lateral stress"},
       {.name = "porosity", .unit = "1", .description = "void volume over cell volume"},
       {.name = "void_ratio", .unit = "1", .description = "void volume over solid volume"},
+      {.name = "impact_angle",
+       .unit = "rad",
+       .description = "between the relative velocity before impact and the normal"},
+      {.name = "impact_speed", .unit = "m/s", .description = "relative speed before impact"},
+      {.name = "impact_spin",
+       .unit = "rad/s",
+       .description = "spin before impact, positive where it adds to the slip"},
+      {.name = "normal_restitution",
+       .unit = "1",
+       .description = "normal relative velocity after over before impact, turned round"},
+      {.name = "tangential_restitution",
+       .unit = "1",
+       .description = "tangential relative velocity of the centres after over before impact"},
+      {.name = "energy_restitution",
+       .unit = "1",
+       .description = "kinetic energy of the relative motion and of spin, after over before"},
+      {.name = "rebound_angle", .unit = "rad", .description = "to the normal, after impact"},
+      {.name = "rebound_spin", .unit = "rad/s", .description = "spin of the body after impact"},
+      {.name = "contact_duration", .unit = "s", .description = "of the collision"},
+      {.name = "peak_overlap", .unit = "m", .description = "largest overlap in the collision"},
       {.name = "coordination_number",
        .unit = "1",
        .description = "2 contacts / grains, all grains counted"},

@@ -112,8 +112,11 @@ struct TestInfo {
   std::string description;               ///< geometry, control, stages, what makes it fail
   std::vector<ParameterInfo> settings;   ///< e.g. confining_pressure
   std::vector<std::string> observables;  ///< names, in the order in which a state holds its values
-  std::string control;      ///< the observable that drives the loading ("axial_strain")
-  bool may_reverse = true;  ///< the control may go down again (unload-reload)
+  std::string control;  ///< the observable that drives the loading ("axial_strain")
+  std::vector<std::string> other_controls = {};  ///< settings that may drive it instead; the one
+                                                 ///< that does is not given as a setting
+  bool needs_packing = true;  ///< false: bodies come from the settings, nothing is consolidated
+  bool may_reverse = true;    ///< the control may go down again (unload-reload)
   std::string reference;
   bool poured = false;  ///< takes only the sizes of the packing's grains, which it pours itself; no
                         ///< consolidation, no staging

@@ -3,8 +3,11 @@
 #include <utility>
 #include <vector>
 
+#include "dem/contact/extended_viscoelastic.h"
 #include "dem/contact/hertz_mindlin.h"
+#include "dem/contact/kuwabara_kono.h"
 #include "dem/contact/linear.h"
+#include "dem/contact/tsuji.h"
 #include "dem/effects/adhesion_dmt.h"
 #include "dem/effects/adhesion_jkr.h"
 #include "dem/effects/apparatus_compliance.h"
@@ -16,6 +19,8 @@
 #include "dem/effects/linear_cohesion.h"
 #include "dem/effects/load_cell_error.h"
 #include "dem/effects/membrane_stiffness.h"
+#include "dem/effects/nonspherical_shape.h"
+#include "dem/effects/particle_crushing.h"
 #include "dem/effects/pressure_dependent_friction.h"
 #include "dem/effects/rolling_resistance.h"
 #include "dem/effects/strain_offset.h"
@@ -50,17 +55,22 @@ ParameterSet ResolveParameters(const std::vector<ParameterInfo>& infos, const st
 }
 
 std::span<const ContactEntry> ContactEntries() {
-  static const std::vector<ContactEntry> entries = {HertzMindlin(), Linear()};
+  static const std::vector<ContactEntry> entries = {HertzMindlin(), Linear(), Tsuji(),
+                                                    KuwabaraKono(), ExtendedViscoelastic()};
   return entries;
 }
 
 std::span<const EffectEntry> EffectEntries() {
-  static const std::vector<EffectEntry> entries = {
-      HertzNonlinearity(), ContactPlasticity(),   LinearCohesion(), AdhesionDmt(),
-      AdhesionJkr(),       CapillaryBridges(),    ViscousDamping(), PressureDependentFriction(),
-      RollingResistance(), TwistingResistance(),  InitialDensity(), InitialFabric(),
-      WallFriction(),      ApparatusCompliance(), StrainOffset(),   MembraneStiffness(),
-      LoadCellError()};
+  static const std::vector<EffectEntry> entries = {NonsphericalShape(), ParticleCrushing(),
+                                                   HertzNonlinearity(), ContactPlasticity(),
+                                                   LinearCohesion(),    AdhesionDmt(),
+                                                   AdhesionJkr(),       CapillaryBridges(),
+                                                   ViscousDamping(),    PressureDependentFriction(),
+                                                   RollingResistance(), TwistingResistance(),
+                                                   InitialDensity(),    InitialFabric(),
+                                                   WallFriction(),      ApparatusCompliance(),
+                                                   StrainOffset(),      MembraneStiffness(),
+                                                   LoadCellError()};
   return entries;
 }
 

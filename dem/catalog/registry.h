@@ -14,10 +14,11 @@
 namespace calib::dem {
 
 /// A contact law; its kernel runs at ContactStage::kNormal, friction and shear spring follow for
-/// every law.
+/// every law. A dashpot, where there is one, runs at the end of kNormalExtra.
 struct ContactEntry {
   ContactInfo info;
   MakeKernel make = nullptr;
+  MakeKernel make_dashpot = nullptr;
 };
 
 /// One kernel of an effect and where in the chain it acts.
@@ -26,10 +27,16 @@ struct EffectKernel {
   MakeKernel make = nullptr;
 };
 
-/// How the initial state differs from consolidation as asked for.
+/// How the specimen and its initial state differ from packing and consolidation as asked for.
 struct Preparation {
   double densification = 0;      ///< fall of porosity [-]
   double stress_anisotropy = 0;  ///< q/p during consolidation [-]
+  double aspect = 1;             ///< length over width of the grains; 1: as they are [-]
+  // Of grains that crush: CrushingLaw in dynamics/crushing.h.
+  double weakness = 0;               ///< [1/Pa]
+  double weibull_modulus = 3;        ///< [-]
+  double reference_diameter = 1e-3;  ///< [m]
+  double size_loss = 0;              ///< [-]
 };
 
 /// What distinguishes contacts with walls from those between grains.

@@ -16,6 +16,18 @@ ParameterInfo YoungModulus() {
   return info;
 }
 
+ParameterInfo PoissonRatio() {
+  ParameterInfo info;
+  info.name = "poisson_ratio";
+  info.unit = "1";
+  info.min = 0;
+  info.max = 0.5;
+  info.default_prior = {.kind = "uniform", .min = 0, .max = 0.5};
+  info.default_value = 0.2;
+  info.description = "Poisson's ratio of the grains";
+  return info;
+}
+
 ParameterInfo FrictionAngle() {
   ParameterInfo info;
   info.name = "friction_angle";

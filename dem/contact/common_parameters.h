@@ -10,6 +10,7 @@ namespace calib::dem {
 
 /// Young's modulus of the grains (a contact modulus for linear springs) [Pa].
 ParameterInfo YoungModulus();
+ParameterInfo PoissonRatio();
 
 /// Angle phi_mu of friction between grains [rad]; this or FrictionCoefficient() is given.
 ParameterInfo FrictionAngle();

@@ -29,10 +29,11 @@ ContactModel::ContactModel(const Model& model)
   std::vector<std::pair<ContactStage, std::shared_ptr<const ContactKernel>>> kernels;
   const ContactEntry& law = LawNamed(model.contact);
   const ParameterSet law_parameters = ResolveParameters(law.info.parameters, "", model.parameters);
-  kernels.emplace_back(ContactStage::kNormal, law.make({.contact = model.contact,
-                                                        .density = model.density,
-                                                        .law = law_parameters,
-                                                        .parameters = law_parameters}));
+  const KernelContext law_context{.contact = model.contact,
+                                  .density = model.density,
+                                  .law = law_parameters,
+                                  .parameters = law_parameters};
+  kernels.emplace_back(ContactStage::kNormal, law.make(law_context));
   kernels.emplace_back(ContactStage::kSlidingLimit, MakeCoulombLimit());
   kernels.emplace_back(ContactStage::kTangential, MakeTangentialSpring());
   WallProperties walls;
@@ -54,6 +55,9 @@ ContactModel::ContactModel(const Model& model)
     }
   }
   wall_friction_ = walls.friction.value_or(walls.friction_ratio * sliding_friction_);
+  if (law.make_dashpot != nullptr) {
+    kernels.emplace_back(ContactStage::kNormalExtra, law.make_dashpot(law_context));
+  }
   std::stable_sort(kernels.begin(), kernels.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   for (auto& [stage, kernel] : kernels) {

@@ -44,20 +44,13 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 }  // namespace
 
 ContactEntry HertzMindlin() {
-  ParameterInfo poisson;
-  poisson.name = "poisson_ratio";
-  poisson.unit = "1";
-  poisson.min = 0;
-  poisson.max = 0.5;
-  poisson.default_prior = {.kind = "uniform", .min = 0, .max = 0.5};
-  poisson.default_value = 0.2;
-  poisson.description = "Poisson's ratio of the grains";
   return {
       .info = {.name = "hertz_mindlin",
                .description =
                    "Elastic spheres: kn = 2E/(3(1-nu^2)) sqrt(r* u), Fn = kn u; "
                    "ks = 2E/((1+nu)(2-nu)) sqrt(r* u), dFs = ks dus; |Fs| <= tan(phi_mu) Fn",
-               .parameters = {YoungModulus(), poisson, FrictionAngle(), FrictionCoefficient()},
+               .parameters = {YoungModulus(), PoissonRatio(), FrictionAngle(),
+                              FrictionCoefficient()},
                .reference = "Cheng et al. 2018, Eqs. 1-2 and 5-6, Table 1; Johnson, Contact "
                             "Mechanics (1985), sec. 4.2; Mindlin, J. Appl. Mech. 16 (1949) 259"},
       .make = &Make};

@@ -34,15 +34,37 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model,
   assert(particles_.size() > 0 && density > 0 && threads >= 1);
   std::copy(std::begin(packing.length), std::end(packing.length), std::begin(cell_.length));
   std::copy(std::begin(surroundings.open), std::end(surroundings.open), std::begin(cell_.open));
+  clumps_ = RigidClumps(packing, density, particles_);
   double radii = 0;
-  for (const double r : particles_.radius) {
-    solid_volume_ += 4.0 / 3.0 * std::numbers::pi * r * r * r;
-    radii += r;
+  for (std::size_t g = 0; g < particles_.radius.size(); ++g) {
+    if (particles_.body.empty() || particles_.body[g] < 0) {
+      const double r = particles_.radius[g];
+      solid_volume_ += 4.0 / 3.0 * std::numbers::pi * r * r * r;
+      radii += r;
+      ++bodies_;
+    }
   }
-  mean_diameter_ = 2 * radii / particles_.size();
+  for (const Clump& clump : clumps_.all()) {
+    solid_volume_ += clump.volume;
+    radii += std::cbrt(0.75 / std::numbers::pi * clump.volume);
+    ++bodies_;
+  }
+  mean_diameter_ = 2 * radii / bodies_;
   largest_radius_ = *std::max_element(particles_.radius.begin(), particles_.radius.end());
   reach_ = model_.Reach(largest_radius_);
   skin_ = surroundings.skin * mean_diameter_ + reach_;
+  nominal_critical_step_ = CriticalStepAt(1e-4);
+}
+
+void Assembly::Shrink(const std::vector<std::pair<int, double>>& radii) {
+  for (const auto& [grain, radius] : radii) {
+    const auto g = static_cast<std::size_t>(grain);
+    assert(radius <= particles_.radius[g]);
+    const double ratio = particles_.radius[g] / radius;
+    particles_.radius[g] = radius;
+    particles_.inverse_mass[g] *= ratio * ratio * ratio;
+    particles_.inverse_inertia[g] *= ratio * ratio * ratio * ratio * ratio;
+  }
   nominal_critical_step_ = CriticalStepAt(1e-4);
 }
 

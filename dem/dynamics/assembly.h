@@ -5,12 +5,14 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "dem/contact/contact_model.h"
 #include "dem/dynamics/grain_load.h"
 #include "dem/dynamics/leapfrog.h"
+#include "dem/dynamics/rigid_clumps.h"
 #include "dem/dynamics/wall_contacts.h"
 #include "dem/geometry/periodic_cell.h"
 #include "dem/neighbor/neighbor_list.h"
@@ -47,7 +49,8 @@ struct NewGrain {
 /// threads inside.
 class Assembly {
  public:
-  /// Preconditions: the packing has grains, all single spheres; density > 0; threads >= 1.
+  /// Spheres of one clump id move as one rigid body. Preconditions: the packing has grains; density
+  /// > 0; threads >= 1.
   Assembly(const Packing& packing, double density, ContactModel model, int threads);
 
   /// The same with gravity and walls around the grains; `packing.length` only says where they
@@ -133,7 +136,18 @@ class Assembly {
   [[nodiscard]] double shear_stress() const { return shear_stress_; }
   /// Contacts between grains; those with walls are counted by walls().
   [[nodiscard]] std::int64_t contacts() const { return contacts_; }
+  /// Single spheres and clumps.
+  [[nodiscard]] int bodies() const { return bodies_; }
+  [[nodiscard]] const RigidClumps& clumps() const { return clumps_; }
+  RigidClumps& mutable_clumps() { return clumps_; }
+
+  /// Makes grains (index, new radius [m]) smaller; the solid volume stays what it was. Forces
+  /// follow at the next evaluation. Precondition: single spheres, no radius grows.
+  void Shrink(const std::vector<std::pair<int, double>>& radii);
+
+  /// Sum of sphere volumes, unions for clumps, of the packing as it was given.
   [[nodiscard]] double solid_volume() const { return solid_volume_; }
+  /// Of the spheres that have the volumes of the bodies.
   [[nodiscard]] double mean_diameter() const { return mean_diameter_; }
   [[nodiscard]] std::int64_t steps() const { return steps_; }
   [[nodiscard]] std::int64_t contact_updates() const { return contact_updates_; }
@@ -158,8 +172,10 @@ class Assembly {
   void AddSurroundings(int begin, int end);
   void Renumber(const std::vector<int>& to);
   double MoveChunk(int chunk, const Motion& motion);
+  [[nodiscard]] double LargestShift2OfChunk(int chunk) const;
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
+  void TakeBranchesBetweenBodies();
 
   PeriodicCell cell_;
   ParticleArrays particles_;
@@ -193,6 +209,8 @@ class Assembly {
   double shear_stress_ = 0;
   std::int64_t contacts_ = 0;
 
+  RigidClumps clumps_;
+  int bodies_ = 0;
   double solid_volume_ = 0;
   double mean_diameter_ = 0;
   double nominal_critical_step_ = 0;

@@ -67,6 +67,9 @@ absl::Status Assembly::EvaluateForces() {
     s /= volume;
   }
   shear_stress_ /= volume;
+  if (!clumps_.empty()) {
+    TakeBranchesBetweenBodies();
+  }
   contact_updates_ += contacts_;
   if (!walls_.empty()) {
     if (auto s = walls_.Evaluate(
@@ -78,6 +81,28 @@ absl::Status Assembly::EvaluateForces() {
     contact_updates_ += walls_.contacts();
   }
   return absl::OkStatus();
+}
+
+/// The stress of a rigid body is carried between centres of bodies: sum f d over contacts of
+/// spheres less what the loads of the members do on their arms.
+void Assembly::TakeBranchesBetweenBodies() {
+  const double volume = cell_.Volume();
+  for (const Clump& clump : clumps_.all()) {
+    for (std::size_t s = 0; s < clump.members.size(); ++s) {
+      const auto member = static_cast<std::size_t>(clump.members[s]);
+      double force[3] = {0, 0, 0};
+      for (int k = list_.place_row[member]; k < list_.place_row[member + 1]; ++k) {
+        for (int a = 0; a < 3; ++a) {
+          force[a] += loads_[static_cast<std::size_t>(k)].force[a];
+        }
+      }
+      const std::array<double, 3>& arm = clump.arm[s];
+      for (std::size_t a = 0; a < 3; ++a) {
+        stress_[a] -= force[a] * arm[a] / volume;
+      }
+      shear_stress_ += 0.5 * (force[0] * arm[2] + force[2] * arm[0]) / volume;
+    }
+  }
 }
 
 void Assembly::LoadLane(int slot, ContactBlock& b) const {

@@ -138,6 +138,10 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
       }
     }
   });
+  clumps_.Fold(stiffness);
+  if (!damping.empty()) {
+    clumps_.Fold(damping);
+  }
   double rate2 = 0;  // largest K/m
   for (std::size_t g = 0; g < n; ++g) {
     for (std::size_t a = 0; a < 3; ++a) {

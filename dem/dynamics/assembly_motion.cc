@@ -95,13 +95,19 @@ void Assembly::AddSurroundings(int begin, int end) {
 double Assembly::MoveChunk(int chunk, const Motion& motion) {
   const auto begin = static_cast<std::size_t>(chunk) * kGrainChunk;
   const auto end = std::min(begin + kGrainChunk, particles_.x.size());
+  GatherLoads(begin, end);
+  AddSurroundings(static_cast<int>(begin), static_cast<int>(end));
+  AdvanceGrains(motion, static_cast<int>(begin), static_cast<int>(end), particles_);
+  return LargestShift2OfChunk(chunk);
+}
+
+double Assembly::LargestShift2OfChunk(int chunk) const {
+  const auto begin = static_cast<std::size_t>(chunk) * kGrainChunk;
+  const auto end = std::min(begin + kGrainChunk, particles_.x.size());
   double scale[3];
   for (int a = 0; a < 3; ++a) {
     scale[a] = cell_.length[a] / searched_length_[a];
   }
-  GatherLoads(begin, end);
-  AddSurroundings(static_cast<int>(begin), static_cast<int>(end));
-  AdvanceGrains(motion, static_cast<int>(begin), static_cast<int>(end), particles_);
   return LargestShift2(particles_, searched_, scale, ShearSinceSearch(), begin, end);
 }
 
@@ -119,6 +125,12 @@ void Assembly::Move(const Motion& motion) {
   ForEachChunk(chunks, threads_, [&](int chunk) {
     moved2[static_cast<std::size_t>(chunk)] = MoveChunk(chunk, motion);
   });
+  if (!clumps_.empty()) {  // takes its members back from where they went alone
+    clumps_.Advance(motion, cell_, threads_, particles_);
+    ForEachChunk(chunks, threads_, [&](int chunk) {
+      moved2[static_cast<std::size_t>(chunk)] = LargestShift2OfChunk(chunk);
+    });
+  }
   double largest = 0;
   for (const double m : moved2) {
     largest = m <= largest ? largest : m;

@@ -31,6 +31,7 @@ absl::Status Assembly::SearchNeighbors() {
   if (auto s = BuildNeighborList(cell_, skin_, particles_, list_); !s.ok()) {
     return s;
   }
+  clumps_.Rewrap(cell_, particles_);
   searched_[0] = particles_.x;
   searched_[1] = particles_.y;
   searched_[2] = particles_.z;

@@ -67,6 +67,9 @@ StageEnd QuasiStatic::Inspect() {
   if (std::string bad = assembly_->FirstNotFinite(); !bad.empty()) {
     return Diverge(std::move(bad));
   }
+  if (intervention_) {
+    intervention_(*assembly_);
+  }
   StiffnessEstimate estimate;
   if (auto s = assembly_->EstimateStiffness(estimate); !s.ok()) {
     return Diverge(std::string(s.message()));

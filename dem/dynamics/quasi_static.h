@@ -74,6 +74,11 @@ class QuasiStatic {
   /// Lets every target from now on be followed; empty: targets are what they are.
   void SetFollow(Follow follow) { follow_ = std::move(follow); }
 
+  /// Called at every inspection (20 steps); may change grains, as those that crush.
+  void SetIntervention(std::function<void(Assembly&)> intervention) {
+    intervention_ = std::move(intervention);
+  }
+
   [[nodiscard]] StageOptions& options() { return options_; }
   [[nodiscard]] Assembly& assembly() { return *assembly_; }
   [[nodiscard]] double time_step() const { return dt_; }
@@ -100,6 +105,7 @@ class QuasiStatic {
   std::int64_t since_inspection_ = 0;
   bool begun_ = false;
   Follow follow_;
+  std::function<void(Assembly&)> intervention_;
   std::string reason_;
 };
 

@@ -60,8 +60,7 @@ Measurement Measure(const Assembly& assembly, const double reference[3]) {
   m.shear_stress = assembly.shear_stress();
   m.porosity = Porosity(assembly);
   Derive(m);
-  m.coordination_number =
-      2.0 * static_cast<double>(assembly.contacts()) / assembly.particles().size();
+  m.coordination_number = 2.0 * static_cast<double>(assembly.contacts()) / assembly.bodies();
   return m;
 }
 

@@ -39,6 +39,10 @@ absl::Status WrapAll(const PeriodicCell& cell, ParticleArrays& p) {
   return absl::OkStatus();
 }
 
+bool OfOneBody(const ParticleArrays& p, std::size_t i, std::size_t j) {
+  return !p.body.empty() && p.body[i] >= 0 && p.body[i] == p.body[j];
+}
+
 /// Slots come sorted by (i, j), so that one pass in slot order meets, for a grain q, first the
 /// pairs (i, q) with i < q, then (q, j): its row of places fills in ascending order of neighbours.
 void AssignPlaces(int grains, NeighborList& list) {
@@ -103,7 +107,8 @@ absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleAr
         const double dy = p.y[j] + sy;
         const double dz = p.z[j] + sz;
         const double limit = reach + p.radius[j];
-        if (j > i && dx * dx + dy * dy + dz * dz < limit * limit) {
+        if (j > i && dx * dx + dy * dy + dz * dz < limit * limit &&
+            !OfOneBody(p, static_cast<std::size_t>(i), static_cast<std::size_t>(j))) {
           found.emplace_back(j, static_cast<std::uint8_t>(ImageCode(
                                     neighbor.shift[0], neighbor.shift[1], neighbor.shift[2])));
         }

@@ -27,9 +27,9 @@ struct NeighborList {
 };
 
 /// Wraps all centres into the cell along its periodic axes (its tilt at most half of Lx) and lists
-/// every pair with |x_j - x_i| < r_i + r_j + skin. Errors: OUT_OF_RANGE when a centre is not finite
-/// or the cell has become shorter than two interaction ranges (pairs would have several images);
-/// list and positions are then unusable.
+/// every pair with |x_j - x_i| < r_i + r_j + skin that is not of one clump. Errors: OUT_OF_RANGE
+/// when a centre is not finite or the cell has become shorter than two interaction ranges (pairs
+/// would have several images); list and positions are then unusable.
 absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleArrays& particles,
                                NeighborList& list);
 

@@ -17,6 +17,7 @@ struct ParticleArrays {
   std::vector<double> inverse_mass;     ///< [1/kg]
   std::vector<double> inverse_inertia;  ///< of the solid sphere, 5/(2 m r^2) [1/(kg m^2)]
   std::vector<int> id;                  ///< index in the packing
+  std::vector<int> body;                ///< clump of each sphere, -1: none; empty: no clumps at all
 
   [[nodiscard]] int size() const { return static_cast<int>(x.size()); }
 };

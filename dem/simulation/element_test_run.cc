@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/registry.h"
 #include "dem/contact/contact_model.h"
+#include "dem/dynamics/crushing.h"
 #include "dem/dynamics/quasi_static.h"
 #include "dem/measure/observables.h"
 #include "dem/simulation/consolidation.h"
+#include "dem/simulation/shape_change.h"
 
 namespace calib::dem {
 namespace {
@@ -51,15 +54,44 @@ Staging ResolveStaging(const Scenario& scenario, const Assembly& assembly) {
           .unbalanced = given.unbalanced.value_or(kUnbalanced)};
 }
 
+/// What the effects of the model ask of readings and initial state.
+struct Alterations {
+  Apparatus apparatus;
+  Preparation preparation;
+};
+
+Alterations AlterationsOf(const Scenario& scenario) {
+  Alterations result;
+  const bool rig = EntryOf(scenario.test).rig_load != RigLoad::kNone;
+  const auto& chosen = scenario.model.effects;
+  for (const EffectEntry& effect : EffectEntries()) {
+    const std::string& name = effect.info.name;
+    if (std::find(chosen.begin(), chosen.end(), name) == chosen.end()) {
+      continue;
+    }
+    const ParameterSet parameters =
+        ResolveParameters(effect.info.parameters, name + ".", scenario.model.parameters);
+    if (effect.alter != nullptr && rig) {
+      effect.alter(parameters, result.apparatus);
+    }
+    if (effect.prepare != nullptr) {
+      effect.prepare(parameters, result.preparation);
+    }
+  }
+  return result;
+}
+
 class ElementTestRun {
  public:
-  ElementTestRun(const Scenario& scenario, std::stop_token stop)
+  ElementTestRun(const Scenario& scenario, const Packing& packing, const Alterations& alterations,
+                 std::stop_token stop)
       : scenario_(scenario),
         entry_(EntryOf(scenario.test)),
-        assembly_(scenario.packing, scenario.model.density, ContactModel(scenario.model),
-                  scenario.threads),
+        assembly_(packing, scenario.model.density, ContactModel(scenario.model), scenario.threads),
         staging_(ResolveStaging(scenario, assembly_)),
-        stages_(assembly_, OptionsFrom(staging_), std::move(stop)) {
+        stages_(assembly_, OptionsFrom(staging_), std::move(stop)),
+        apparatus_(alterations.apparatus),
+        preparation_(alterations.preparation) {
     context_.settings = scenario.settings;
     for (const ParameterInfo& setting : entry_.info.settings) {
       if (setting.default_value) {
@@ -67,23 +99,16 @@ class ElementTestRun {
       }
     }
     const double pressure = scenario.settings.at("confining_pressure");
-    for (const EffectEntry& effect : EffectEntries()) {
-      const std::string& name = effect.info.name;
-      const auto& chosen = scenario.model.effects;
-      if (std::find(chosen.begin(), chosen.end(), name) == chosen.end()) {
-        continue;
-      }
-      const ParameterSet parameters =
-          ResolveParameters(effect.info.parameters, name + ".", scenario.model.parameters);
-      if (effect.alter != nullptr && entry_.rig_load != RigLoad::kNone) {
-        effect.alter(parameters, apparatus_);
-      }
-      if (effect.prepare != nullptr) {
-        effect.prepare(parameters, preparation_);
-      }
-    }
     context_.lateral_stress = scenario.initial_stress ? scenario.initial_stress->lateral : pressure;
     context_.axial_stress = scenario.initial_stress ? scenario.initial_stress->axial : pressure;
+    const CrushingLaw law{.weakness = preparation_.weakness,
+                          .weibull_modulus = preparation_.weibull_modulus,
+                          .reference_diameter = preparation_.reference_diameter,
+                          .size_loss = preparation_.size_loss};
+    if (law.Acts()) {
+      crushing_.emplace(law, scenario.seed, assembly_);
+      stages_.SetIntervention([this](Assembly& assembly) { crushing_->Crush(assembly); });
+    }
   }
 
   absl::StatusOr<Summary> Run(const LoadStepSink& sink) {
@@ -257,6 +282,7 @@ class ElementTestRun {
   ElementTestContext context_;
   Apparatus apparatus_;
   Preparation preparation_;
+  std::optional<Crushing> crushing_;
   double rig_start_ = 0;  ///< RigStress() at the start of loading [Pa]
   double reference_[3] = {0, 0, 0};
   double control_ = 0;
@@ -266,7 +292,19 @@ class ElementTestRun {
 
 absl::StatusOr<Summary> RunElementTest(const Scenario& scenario, const LoadStepSink& sink,
                                        std::stop_token stop) {
-  return ElementTestRun(scenario, std::move(stop)).Run(sink);
+  const Alterations alterations = AlterationsOf(scenario);
+  if (alterations.preparation.aspect == 1) {
+    return ElementTestRun(scenario, scenario.packing, alterations, std::move(stop)).Run(sink);
+  }
+  const auto packing =
+      Elongate(scenario.packing, alterations.preparation.aspect, scenario.threads, stop);
+  if (!packing.ok()) {  // of a calibrated parameter: a result
+    Summary summary;
+    summary.outcome = absl::IsCancelled(packing.status()) ? Outcome::kStopped : Outcome::kDiverged;
+    summary.reason = std::string(packing.status().message());
+    return summary;
+  }
+  return ElementTestRun(scenario, *packing, alterations, std::move(stop)).Run(sink);
 }
 
 }  // namespace calib::dem

@@ -1,11 +1,14 @@
 // ScenarioProblems(): everything that can be known to be wrong with a scenario without running it.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
+#include "dem/lab_tests/collision.h"
+#include "dem/simulation/collision_run.h"
 #include "dem/simulation/scenario.h"
 
 namespace calib::dem {
@@ -113,6 +116,31 @@ void CheckModel(const Model& model, Problems& problems) {
   }
 }
 
+/// Spheres of one id must lie together, within half the cell, for nearest images to be theirs.
+void CheckClumps(const Packing& packing, Problems& problems) {
+  std::map<int, std::size_t> first;
+  for (std::size_t i = 0; i < packing.clump.size(); ++i) {
+    const int id = packing.clump[i];
+    if (id < 0) {
+      continue;
+    }
+    const std::size_t j = first.emplace(id, i).first->second;
+    const std::vector<double>* axes[3] = {&packing.x, &packing.y, &packing.z};
+    for (std::size_t a = 0; a < 3; ++a) {
+      double apart = std::abs((*axes[a])[i] - (*axes[a])[j]);
+      apart -= std::round(apart / packing.length[a]) * packing.length[a];
+      if (i != j &&
+          std::abs(apart) + packing.radius[i] + packing.radius[j] > 0.5 * packing.length[a]) {
+        problems.push_back(absl::StrCat("grains ", j, " and ", i, " of clump ", id, " lie ",
+                                        std::abs(apart), " m apart along axis ", a,
+                                        ": a clump must be smaller than half the cell (",
+                                        0.5 * packing.length[a], " m)"));
+        return;
+      }
+    }
+  }
+}
+
 void CheckPacking(const Packing& packing, bool poured, Problems& problems) {
   const std::size_t n = packing.x.size();
   if (n < 2 || packing.y.size() != n || packing.z.size() != n || packing.radius.size() != n ||
@@ -131,12 +159,6 @@ void CheckPacking(const Packing& packing, bool poured, Problems& problems) {
     }
     largest = std::max(largest, packing.radius[i]);
   }
-  const auto clump =
-      std::find_if(packing.clump.begin(), packing.clump.end(), [](int id) { return id >= 0; });
-  if (clump != packing.clump.end()) {
-    problems.push_back(absl::StrCat("grain ", clump - packing.clump.begin(), " belongs to clump ",
-                                    *clump, "; only single spheres (clump -1) are simulated"));
-  }
   for (int a = 0; a < 3 && !poured; ++a) {
     if (!(packing.length[a] > 4 * largest && std::isfinite(packing.length[a]))) {
       problems.push_back(absl::StrCat("the cell is ", packing.length[a], " m long along axis ", a,
@@ -144,6 +166,42 @@ void CheckPacking(const Packing& packing, bool poured, Problems& problems) {
                                       4 * largest, " m)"));
     }
   }
+  if (problems.empty() && !poured) {
+    CheckClumps(packing, problems);
+  }
+}
+
+/// Effects that know single spheres only.
+void CheckShapes(const Scenario& scenario, bool poured, Problems& problems) {
+  const auto& effects = scenario.model.effects;
+  const auto chosen = [&effects](const char* name) {
+    return std::find(effects.begin(), effects.end(), name) != effects.end();
+  };
+  const bool clumps = std::any_of(scenario.packing.clump.begin(), scenario.packing.clump.end(),
+                                  [](int id) { return id >= 0; });
+  if (clumps && poured) {
+    problems.push_back(absl::StrCat("test ", scenario.test,
+                                    " pours single spheres (clump -1), this packing has clumps"));
+  }
+  for (const char* name : {"nonspherical_shape", "particle_crushing"}) {
+    if (poured && chosen(name)) {
+      problems.push_back(absl::StrCat("effect ", name, " is not there in test ", scenario.test,
+                                      ", which pours single spheres"));
+    }
+    if (clumps && chosen(name)) {
+      problems.push_back(absl::StrCat("effect ", name,
+                                      " needs a packing of single spheres (clump -1), this one has "
+                                      "clumps"));
+    }
+  }
+  if (chosen("nonspherical_shape") && chosen("particle_crushing")) {
+    problems.emplace_back(
+        "effects nonspherical_shape and particle_crushing cannot act together: only spheres crush");
+  }
+}
+
+std::string ControlOf(const TestInfo& test, const std::map<std::string, double>& settings) {
+  return test.name == "collision" ? CollisionControl(settings) : test.control;
 }
 
 void CheckTest(const Scenario& scenario, Problems& problems) {
@@ -157,7 +215,7 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
     const auto it = scenario.settings.find(info.name);
     if (it != scenario.settings.end()) {
       CheckRange(info.name, it->second, info, info.unit, problems);
-    } else if (!info.default_value) {
+    } else if (!info.default_value && info.name != ControlOf(*test, scenario.settings)) {
       problems.push_back(absl::StrCat("test ", scenario.test, " needs the setting ", info.name));
     }
   }
@@ -170,16 +228,24 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
   }
   const bool stress_driven = test->control == "mean_stress";
   const auto& range = test->control_range;
+  const bool collision = test->name == "collision";
+  const std::string control = ControlOf(*test, scenario.settings);
+  const auto driven = std::find_if(test->settings.begin(), test->settings.end(),
+                                   [&](const ParameterInfo& info) { return info.name == control; });
   std::set<int> steps;
   for (std::size_t k = 0; k < scenario.path.size(); ++k) {
     const ControlPoint& point = scenario.path[k];
+    if (driven != test->settings.end()) {
+      CheckRange(absl::StrCat("path point ", k, ": ", control), point.target, *driven, driven->unit,
+                 problems);
+    }
     const bool sensible = range           ? point.target >= range->min && point.target <= range->max
                           : stress_driven ? point.target > 0 && std::isfinite(point.target)
                                           : std::abs(point.target) < kLargestStrain;
     if (!sensible && range) {
       problems.push_back(absl::StrCat("path point ", k, ": ", test->control, " is ", point.target,
                                       ", allowed is [", range->min, ", ", range->max, "]"));
-    } else if (!sensible) {
+    } else if (!sensible && driven == test->settings.end()) {
       problems.push_back(
           absl::StrCat("path point ", k, ": ", test->control, " is ", point.target,
                        stress_driven ? ", it must be positive" : ", allowed is (-1, 1)"));
@@ -191,6 +257,10 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
   }
   if (scenario.path.empty()) {
     problems.emplace_back("the control path is empty");
+  }
+  if (collision && problems.empty()) {
+    const auto more = CollisionProblems(scenario);
+    problems.insert(problems.end(), more.begin(), more.end());
   }
   if (stress_driven && scenario.loading_rate) {
     problems.push_back(
@@ -232,7 +302,11 @@ std::vector<std::string> ScenarioProblems(const Scenario& scenario) {
   Problems problems;
   CheckModel(scenario.model, problems);
   const TestInfo* test = FindTest(scenario.test);
-  CheckPacking(scenario.packing, test != nullptr && test->poured, problems);
+  if (test == nullptr || test->needs_packing) {
+    const bool poured = test != nullptr && test->poured;
+    CheckPacking(scenario.packing, poured, problems);
+    CheckShapes(scenario, poured, problems);
+  }
   CheckTest(scenario, problems);
   CheckPreparation(scenario, problems);
   return problems;

@@ -3,6 +3,7 @@
 
 #include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
+#include "dem/simulation/collision_run.h"
 #include "dem/simulation/element_test_run.h"
 #include "dem/simulation/gravity_run.h"
 #include "dem/simulation/scenario.h"
@@ -26,6 +27,12 @@ absl::StatusOr<Summary> Run(const Scenario& scenario, const LoadStepSink& sink,
 
 absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink,
                                  std::stop_token stop) {
+  if (scenario.test == "collision") {
+    if (const auto problems = ScenarioProblems(scenario); !problems.empty()) {
+      return absl::InvalidArgumentError(absl::StrJoin(problems, "; "));
+    }
+    return RunCollision(scenario, sink, std::move(stop));
+  }
   return Run(
       scenario,
       [&](const State& state, const Assembly&) {
@@ -37,6 +44,9 @@ absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink
 
 absl::StatusOr<Summary> SimulateWithVtk(const Scenario& scenario, const StateSink& sink,
                                         std::stop_token stop, const VtkOutput& vtk) {
+  if (scenario.test == "collision") {
+    return absl::InvalidArgumentError("collision: one contact has no pictures of grains");
+  }
   return Run(
       scenario,
       [&](const State& state, const Assembly& assembly) {

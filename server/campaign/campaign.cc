@@ -118,9 +118,8 @@ inference::Proposal FirstProposalOf(const Campaign& campaign) {
   if (!campaign.first_proposal) return proposal;
   const auto d = static_cast<Eigen::Index>(campaign.parameters.size());
   const std::vector<inference::Prior> priors = Priors(campaign);
-  inference::MixtureComponent component{.weight = 1,
-                                        .mean = Eigen::VectorXd::Zero(d),
-                                        .covariance = Eigen::MatrixXd::Identity(d, d)};
+  inference::MixtureComponent component{
+      .weight = 1, .mean = Eigen::VectorXd::Zero(d), .covariance = Eigen::MatrixXd::Identity(d, d)};
   for (Eigen::Index j = 0; j < d; ++j) {
     const auto index = static_cast<std::size_t>(j);
     const auto place = campaign.first_proposal->places.find(campaign.parameters[index].name);

@@ -49,7 +49,10 @@ struct PackingFile {
   std::string digest;  ///< SHA-256 of the text
   dem::Packing packing;
 };
-using Specimen = std::variant<PackingFile, dem::PackingRecipe>;
+/// Of tests that make their bodies from their settings.
+struct NoPacking {};
+
+using Specimen = std::variant<PackingFile, dem::PackingRecipe, NoPacking>;
 
 struct Experiment {
   std::string name;

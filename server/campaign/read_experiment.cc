@@ -1,6 +1,7 @@
 #include "server/campaign/read_experiment.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 
@@ -42,9 +43,29 @@ std::string ReadName(MapReader& map, const Campaign& campaign) {
   return name;
 }
 
-// Runs made elsewhere need no settings; what is given is read.
+// Our name of the control, as far as it can be told before the measurements are read.
+std::string ControlNameOf(MapReader& map) {
+  const YamlNode* node = map.Find("control");
+  if (node == nullptr) return "";
+  if (node->kind == YamlNode::Kind::kScalar) return node->scalar;
+  for (const YamlEntry& entry : node->entries) {
+    if (entry.key == "column") return entry.value.scalar;
+  }
+  return "";
+}
+
+// Runs made elsewhere need no settings; what is given is read. What the test is driven along is
+// none.
 void ReadSettings(MapReader& map, const dem::TestInfo& test, bool needed, Experiment& experiment) {
+  const std::string control = ControlNameOf(map);
   for (const dem::ParameterInfo& setting : test.settings) {
+    if (setting.name == control) {
+      if (map.Has(setting.name)) {
+        map.Problem(setting.name, "is the control of this experiment; remove it here");
+      }
+      map.Ignore({setting.name});
+      continue;
+    }
     const Range range{.min = setting.min, .max = setting.max, .min_open = setting.min_open};
     if (const auto value = map.Quantity(setting.name, setting.unit, range)) {
       if (setting.whole && *value != std::round(*value)) {
@@ -130,11 +151,14 @@ const dem::TestInfo* ReadTest(MapReader& map, const Campaign& campaign, Experime
   return dem::FindTest(experiment.test);
 }
 
-// Keys that only a simulation needs: all problems with them at once.
-void RefuseSimulationKeys(const MapReader& map) {
-  for (const char* key :
-       {"packing", "realizations", "consolidation", "initial_stress", "loading_rate", "staging"}) {
-    if (map.Has(key)) map.Problem(key, "has no meaning with precomputed runs; remove it");
+constexpr std::array<const char*, 6> kSpecimenKeys = {
+    "packing", "realizations", "consolidation", "initial_stress", "loading_rate", "staging"};
+
+// Keys that only a specimen of grains needs: all problems with them at once.
+void RefuseKeys(MapReader& map, const std::string& why) {
+  for (const char* key : kSpecimenKeys) {
+    map.Ignore({key});
+    if (map.Has(key)) map.Problem(key, why);
   }
 }
 
@@ -148,15 +172,19 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
           ? Role::kValidate
           : Role::kCalibrate;
   if (campaign.precomputed) {
-    map.Ignore(
-        {"packing", "realizations", "consolidation", "initial_stress", "loading_rate", "staging"});
     if (test == nullptr) map.Ignore({"confining_pressure"});
-    RefuseSimulationKeys(map);
+    RefuseKeys(map, "has no meaning with precomputed runs; remove it");
   } else {
-    experiment.specimens = ReadSpecimens(map, context);
-    ReadConsolidation(map, experiment);
-    ReadInitialStress(map, experiment);
-    ReadStaging(map, experiment);
+    if (test != nullptr && !test->needs_packing) {
+      experiment.specimens = {NoPacking{}};
+      RefuseKeys(map, absl::StrCat("has no meaning in ", test->name,
+                                   ", which makes its bodies from its settings; remove it"));
+    } else {
+      experiment.specimens = ReadSpecimens(map, context);
+      ReadConsolidation(map, experiment);
+      ReadInitialStress(map, experiment);
+      ReadStaging(map, experiment);
+    }
   }
   const MeasurementRules rules{
       .precomputed = campaign.precomputed.has_value(),

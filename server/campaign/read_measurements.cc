@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
 #include "server/campaign/control_path.h"
 #include "server/campaign/laboratory_table.h"
@@ -41,9 +42,13 @@ ControlSpec ReadControl(MapReader& map, const MeasurementRules& rules, const dem
     control.name = map.Text("control").value_or("");
   }
   if (!rules.precomputed && test != nullptr && !control.name.empty() &&
-      control.name != test->control) {
+      control.name != test->control &&
+      std::find(test->other_controls.begin(), test->other_controls.end(), control.name) ==
+          test->other_controls.end()) {
     map.Problem("control", absl::StrCat(Quoted(control.name), " cannot drive ", test->name,
-                                        "; it is driven by ", test->control));
+                                        "; it is driven by ", test->control,
+                                        test->other_controls.empty() ? "" : " or ",
+                                        absl::StrJoin(test->other_controls, " or ")));
     control.name.clear();
   }
   return control;

@@ -11,9 +11,8 @@ using Kind = YamlNode::Kind;
 
 bool IsPlain(const std::string& text) {
   const auto safe = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           c == '_' || c == '.' || c == '/' || c == '+' || c == '-' || c == '^' || c == '$' ||
-           c == ' ';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '.' || c == '/' || c == '+' || c == '-' || c == '^' || c == '$' || c == ' ';
   };
   return !text.empty() && std::all_of(text.begin(), text.end(), safe) && text.front() != ' ' &&
          text.back() != ' ' && text.front() != '-' && text != "null" && text != "Null" &&

@@ -20,10 +20,11 @@ double DiameterOf(const campaign::Experiment& experiment) {
     if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
       return 2 * recipe->mean_radius;
     }
-    const auto& radius = std::get<campaign::PackingFile>(specimen).packing.radius;
+    const auto* file = std::get_if<campaign::PackingFile>(&specimen);
+    if (file == nullptr || file->packing.radius.empty()) continue;
     double sum = 0;
-    for (const double r : radius) sum += r;
-    if (!radius.empty()) return 2 * sum / static_cast<double>(radius.size());
+    for (const double r : file->packing.radius) sum += r;
+    return 2 * sum / static_cast<double>(file->packing.radius.size());
   }
   return 1e-3;
 }
@@ -43,13 +44,12 @@ std::map<std::string, dem::DefaultPrior> ParametersOf(const dem::EffectInfo& eff
       if (on_ray(parameter.name) != strengths) continue;
       if (!strengths && parameter.default_value) continue;
       const std::string& other = parameter.alternative_to;
-      const bool said =
-          std::any_of(covered.begin(), covered.end(), [&](const std::string& name) {
-            const auto same = std::find_if(
-                effect.parameters.begin(), effect.parameters.end(),
-                [&name](const dem::ParameterInfo& p) { return p.name == name; });
-            return name == other || same->alternative_to == parameter.name;
-          });
+      const bool said = std::any_of(covered.begin(), covered.end(), [&](const std::string& name) {
+        const auto same =
+            std::find_if(effect.parameters.begin(), effect.parameters.end(),
+                         [&name](const dem::ParameterInfo& p) { return p.name == name; });
+        return name == other || same->alternative_to == parameter.name;
+      });
       if (said) continue;
       covered.push_back(parameter.name);
       chosen[absl::StrCat(effect.name, ".", parameter.name)] =
@@ -90,18 +90,18 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
   if (effect == nullptr) {
     std::vector<std::string> names;
     for (const dem::EffectInfo& info : dem::Effects()) names.push_back(info.name);
-    return absl::StrCat("there is no effect ", name, "; this build has ", absl::StrJoin(names, ", "));
+    return absl::StrCat("there is no effect ", name, "; this build has ",
+                        absl::StrJoin(names, ", "));
   }
   if (campaign.precomputed) return "runs that were made elsewhere cannot be joined by an effect";
   const auto& has = campaign.model.effects;
   if (std::find(has.begin(), has.end(), name) != has.end()) {
     return absl::StrCat(name, " is part of the model already");
   }
-  if (!effect->contacts.empty() &&
-      std::find(effect->contacts.begin(), effect->contacts.end(), campaign.model.contact) ==
-          effect->contacts.end()) {
-    return absl::StrCat(name, " cannot join the contact ", campaign.model.contact, "; it works with ",
-                        absl::StrJoin(effect->contacts, ", "));
+  if (!effect->contacts.empty() && std::find(effect->contacts.begin(), effect->contacts.end(),
+                                             campaign.model.contact) == effect->contacts.end()) {
+    return absl::StrCat(name, " cannot join the contact ", campaign.model.contact,
+                        "; it works with ", absl::StrJoin(effect->contacts, ", "));
   }
   return "";
 }
@@ -135,8 +135,7 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
   }
   for (int j = 0; j < parent.posterior.parameters_size(); ++j) {
     const v1::Posterior::Parameter& parameter = parent.posterior.parameters(j);
-    const inference::Prior& prior =
-        parent.campaign.parameters[static_cast<std::size_t>(j)].prior;
+    const inference::Prior& prior = parent.campaign.parameters[static_cast<std::size_t>(j)].prior;
     if (!(parameter.sd() > 0) || !prior.InSupport(parameter.mean())) continue;
     derivation.first_proposal->places[parameter.name()] = {.center = parameter.mean(),
                                                            .sd = kTempered * parameter.sd()};

@@ -45,9 +45,11 @@ std::string SpecimenSentence(const campaign::Experiment& experiment) {
   if (const auto* file = std::get_if<campaign::PackingFile>(&experiment.specimens.front())) {
     return fmt::format("packing {} ({} grains)", file->path, file->packing.x.size());
   }
-  const auto& recipe = std::get<dem::PackingRecipe>(experiment.specimens.front());
-  return fmt::format("{} generated packing(s) of {} grains, porosity {}",
-                     experiment.specimens.size(), recipe.particles, Number(recipe.porosity, 3));
+  if (const auto* recipe = std::get_if<dem::PackingRecipe>(&experiment.specimens.front())) {
+    return fmt::format("{} generated packing(s) of {} grains, porosity {}",
+                       experiment.specimens.size(), recipe->particles, Number(recipe->porosity, 3));
+  }
+  return "bodies by the test's settings";
 }
 
 }  // namespace

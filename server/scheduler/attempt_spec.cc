@@ -27,6 +27,8 @@ void SetSpecimen(const dem::PackingRecipe& recipe, v1::AttemptSpec& spec) {
   message.set_seed(recipe.seed);
 }
 
+void SetSpecimen(const campaign::NoPacking& /*none*/, v1::AttemptSpec& /*spec*/) {}
+
 v1::Staging ToMessage(const dem::Staging& staging) {
   v1::Staging message;
   if (staging.rate.has_value()) {

@@ -71,10 +71,18 @@ TEST(ScenarioProblems, RollingStiffnessAndRatioExcludeEachOther) {
               ElementsAre(HasSubstr("rolling_resistance.stiffness is missing")));
 }
 
-TEST(ScenarioProblems, ClumpsAreRefusedAsSuch) {
+TEST(ScenarioProblems, ClumpsMustLieTogetherAndDoNotCrush) {
   Scenario s = Good();
-  s.packing.clump[1] = 3;
-  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("clump 3")));
+  s.packing.clump[0] = s.packing.clump[1] = 3;
+  s.packing.x[1] = s.packing.x[0] + 0.5 * s.packing.length[0];
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("of clump 3 lie")));
+  s.packing.x[1] = s.packing.x[0] + 0.5 * s.packing.radius[0];
+  s.packing.y[1] = s.packing.y[0];
+  s.packing.z[1] = s.packing.z[0];
+  EXPECT_THAT(ScenarioProblems(s), IsEmpty());
+  s.model.effects = {"particle_crushing"};
+  s.model.parameters["particle_crushing.weakness"] = 1e-7;
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("needs a packing of single spheres")));
 }
 
 TEST(ScenarioProblems, CollectsEverythingAtOnce) {

@@ -1,0 +1,90 @@
+#include "dem/dynamics/crushing.h"
+
+#include <Random123/philox.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace calib::dem {
+namespace {
+
+constexpr std::uint32_t kPurpose = 4;      // 1 to 3: random_cloud.cc, elongation.cc
+constexpr double kComminutionLimit = 0.1;  ///< of the first diameter
+
+double Volume(double radius) { return 4.0 / 3.0 * std::numbers::pi * radius * radius * radius; }
+
+}  // namespace
+
+Crushing::Crushing(const CrushingLaw& law, std::uint64_t seed, const Assembly& assembly)
+    : law_(law),
+      seed_(seed),
+      first_radius_(assembly.particles().radius),
+      radius_(first_radius_.size(), 0.0),
+      strength_(first_radius_.size(), 0.0) {}
+
+void Crushing::Refresh(std::size_t grain, const ParticleArrays& p) {
+  if (radius_[grain] == p.radius[grain]) {
+    return;
+  }
+  radius_[grain] = p.radius[grain];
+  const double shrunk = std::log(radius_[grain] / first_radius_[grain]);
+  const auto times = static_cast<int>(std::lround(shrunk / std::log1p(-law_.size_loss)));
+  strength_[grain] = Strength(p.id[grain], times, 2 * radius_[grain]);
+}
+
+double Crushing::FinesVolume(const Assembly& assembly) const {
+  double fines = 0;
+  for (std::size_t g = 0; g < first_radius_.size(); ++g) {
+    fines += Volume(first_radius_[g]) - Volume(assembly.particles().radius[g]);
+  }
+  return fines;
+}
+
+double Crushing::Strength(int id, int times, double diameter) const {
+  const r123::Philox4x32::key_type key = {
+      {static_cast<std::uint32_t>(seed_), static_cast<std::uint32_t>(seed_ >> 32)}};
+  const auto bits = r123::Philox4x32()(
+      {{kPurpose, static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(times), 0}}, key);
+  const double u = (bits[0] + 0.5) / 4294967296.0;
+  const double size = law_.reference_diameter / diameter;
+  return std::pow(size * size * size * -std::log1p(-u), 1.0 / law_.weibull_modulus) / law_.weakness;
+}
+
+int Crushing::Crush(Assembly& assembly) {
+  const ParticleArrays& p = assembly.particles();
+  const NeighborList& list = assembly.neighbors();
+  std::vector<double> largest2(p.x.size(), 0.0);  // square of the largest contact force
+  for (int s = 0; s < list.size(); ++s) {
+    if (!assembly.touching(s)) {
+      continue;
+    }
+    const double* f = assembly.load_on_j(s).force;
+    const double force2 = f[0] * f[0] + f[1] * f[1] + f[2] * f[2];
+    const auto slot = static_cast<std::size_t>(s);
+    for (const int g : {list.first[slot], list.second[slot]}) {
+      double& largest = largest2[static_cast<std::size_t>(g)];
+      largest = std::max(largest, force2);
+    }
+  }
+  std::vector<std::pair<int, double>> shrunk;
+  for (std::size_t g = 0; g < largest2.size(); ++g) {
+    if (largest2[g] == 0) {
+      continue;
+    }
+    Refresh(g, p);
+    const double diameter = 2 * p.radius[g];
+    const double smaller = (1.0 - law_.size_loss) * p.radius[g];
+    if (std::sqrt(largest2[g]) >= strength_[g] * diameter * diameter &&
+        smaller >= kComminutionLimit * first_radius_[g]) {
+      shrunk.emplace_back(static_cast<int>(g), smaller);
+    }
+  }
+  if (!shrunk.empty()) {
+    assembly.Shrink(shrunk);
+  }
+  return static_cast<int>(shrunk.size());
+}
+
+}  // namespace calib::dem

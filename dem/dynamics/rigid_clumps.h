@@ -1,0 +1,65 @@
+#pragma once
+// Spheres of one clump move as one rigid body: translation of its centre of mass, rotation by
+// quaternions.
+
+#include <array>
+#include <vector>
+
+#include "dem/dynamics/leapfrog.h"
+#include "dem/geometry/periodic_cell.h"
+#include "dem/particles/packing.h"
+#include "dem/particles/particle_arrays.h"
+
+namespace calib::dem {
+
+/// One rigid body. Vectors in the axes of the cell.
+struct Clump {
+  std::vector<int> members;                ///< indices in the arrays, ascending
+  double mass = 0;                         ///< of the union of its spheres [kg]
+  double volume = 0;                       ///< of the union [m^3]
+  std::array<double, 3> inertia{};         ///< principal moments [kg m^2], > 0
+  std::array<double, 3> centre{};          ///< of mass, not wrapped [m]
+  std::array<double, 3> velocity{};        ///< peculiar, at half steps [m/s]
+  std::array<double, 3> momentum{};        ///< angular, at half steps [kg m^2/s]
+  std::array<double, 4> orientation{};     ///< unit quaternion (w, x, y, z): principal to cell axes
+  std::vector<std::array<double, 3>> at;   ///< centres of the members, principal axes [m]
+  std::vector<std::array<double, 3>> arm;  ///< the same in cell axes now [m]
+  std::vector<std::array<int, 3>> image;   ///< whole lattice vectors between member and body
+};
+
+/// Bodies of an assembly; none where every grain is a sphere of its own. Mass and inertia are those
+/// of the union, so that overlapping members count once. Leapfrog: forces and momenta at half
+/// steps, orientation by the angular velocity at mid-step [Fincham 1992, Mol. Simul. 8, 165], with
+/// rational rotations (Cayley), so that the same bits come out on every processor.
+class RigidClumps {
+ public:
+  RigidClumps() = default;
+
+  /// Takes the clumps of the packing (two and more spheres of one id) and gives their members the
+  /// mass and the smallest moment of the body. particles: MakeParticles of the packing. Members lie
+  /// at the images nearest to their first. density [kg/m^3] > 0.
+  RigidClumps(const Packing& packing, double density, ParticleArrays& particles);
+
+  [[nodiscard]] bool empty() const { return clumps_.empty(); }
+  [[nodiscard]] const std::vector<Clump>& all() const { return clumps_; }
+  std::vector<Clump>& mutable_all() { return clumps_; }
+
+  /// One step under the members' loads (fx .. tz of the particles), with local damping; places
+  /// members and gives them velocities such that their displacement is exactly that of the body.
+  /// Afterwards the body's loads stand at its first member and zero at the others. cell: after its
+  /// own step.
+  void Advance(const Motion& motion, const PeriodicCell& cell, int threads,
+               ParticleArrays& particles);
+
+  /// Remembers where wrapping has put the members. To be called after each search.
+  void Rewrap(const PeriodicCell& cell, const ParticleArrays& particles);
+
+  /// Collects stiffness (or damping) of members, three translations and three rotations each, at
+  /// the first member: translations add up, rotations gain what translation does on the arms.
+  void Fold(std::vector<std::array<double, 6>>& stiffness) const;
+
+ private:
+  std::vector<Clump> clumps_;
+};
+
+}  // namespace calib::dem

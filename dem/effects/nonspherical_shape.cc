@@ -1,0 +1,36 @@
+#include "dem/effects/nonspherical_shape.h"
+
+namespace calib::dem {
+namespace {
+
+void Prepare(const ParameterSet& parameters, Preparation& preparation) {
+  preparation.aspect = parameters.Get("aspect");
+}
+
+}  // namespace
+
+EffectEntry NonsphericalShape() {
+  ParameterInfo aspect;
+  aspect.name = "aspect";
+  aspect.unit = std::string("1");
+  aspect.min = 1;
+  aspect.max = 2;
+  aspect.default_prior = {.kind = "uniform", .min = 1, .max = 2};
+  aspect.null_value = 1;
+  aspect.description = "length over width of the grains; 2: two spheres that just touch";
+  return {.info = {.name = "nonspherical_shape",
+                   .kind = "particle",
+                   .description =
+                       "Rigid clumps of two equal spheres of the volume of the sphere that they "
+                       "replace, at random directions and the packing's porosity; one-sided, "
+                       "vanishes at aspect 1",
+                   .contacts = {},
+                   .parameters = {aspect},
+                   .reference = "Favier et al., Eng. Comput. 16 (1999) 467; Ng, J. Eng. Mech. 130 "
+                                "(2004) 193",
+                   .two_sided = false,
+                   .rays = {{.parameter = "aspect", .steps = {0.1, 0.3}}}},
+          .prepare = &Prepare};
+}
+
+}  // namespace calib::dem

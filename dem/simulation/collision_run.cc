@@ -1,0 +1,332 @@
+#include "dem/simulation/collision_run.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
+#include "dem/contact/contact_model.h"
+#include "dem/lab_tests/collision.h"
+
+namespace calib::dem {
+namespace {
+
+constexpr double kStepsPerHalfPeriod = 5000;
+constexpr int kLongestInHalfPeriods = 200;  ///< bodies that touch for longer stick together
+
+struct Body {
+  double radius = 0;
+  double inverse_mass = 0;     ///< 0: a wall
+  double inverse_inertia = 0;  ///< about the axis normal to the plane of motion
+};
+
+Body MakeBody(double radius, double thickness, double density) {
+  if (!std::isfinite(radius)) {
+    return {};
+  }
+  const double r2 = radius * radius;
+  const double volume = thickness > 0 ? std::numbers::pi * r2 * thickness
+                                      : 4.0 / 3.0 * std::numbers::pi * r2 * radius;
+  const double mass = density * volume;
+  return {.radius = radius,
+          .inverse_mass = 1.0 / mass,
+          .inverse_inertia = 1.0 / ((thickness > 0 ? 0.5 : 0.4) * mass * r2)};
+}
+
+struct Impact {
+  double angle = 0, speed = 0, spin = 0;
+  int load_step = -1;
+};
+
+/// One collision in the plane x, y: the body (i) flies along +x and +y into its partner (j).
+struct Flight {
+  double dx = 0, dy = 0;            ///< centre of j, or foot on the wall, minus centre of i [m]
+  double vix = 0, viy = 0, wi = 0;  ///< of the body
+  double vjx = 0, vjy = 0, wj = 0;  ///< of the partner
+  double peak = 0, begun = 0, ended = 0;
+  bool touched = false, done = false;
+};
+
+double SettingOf(const Scenario& scenario, const std::string& name) {
+  const auto it = scenario.settings.find(name);
+  if (it != scenario.settings.end()) {
+    return it->second;
+  }
+  for (const ParameterInfo& info : FindTest("collision")->settings) {
+    if (info.name == name && info.default_value) {
+      return *info.default_value;
+    }
+  }
+  return 0;
+}
+
+std::vector<Impact> ImpactsOf(const Scenario& scenario) {
+  const std::string control = CollisionControl(scenario.settings);
+  std::vector<Impact> impacts;
+  for (const ControlPoint& point : scenario.path) {
+    if (point.load_step < 0) {
+      continue;
+    }
+    const auto value = [&](const std::string& name) {
+      return name == control ? point.target : SettingOf(scenario, name);
+    };
+    impacts.push_back({.angle = std::max(value("impact_angle"), kSmallestImpactAngle),
+                       .speed = value("impact_speed"),
+                       .spin = value("impact_spin"),
+                       .load_step = point.load_step});
+  }
+  return impacts;
+}
+
+class CollisionRun {
+ public:
+  CollisionRun(const Scenario& scenario, std::stop_token stop)
+      : model_(scenario.model), stop_(std::move(stop)) {
+    const double thickness = SettingOf(scenario, "thickness");
+    body_ = MakeBody(SettingOf(scenario, "radius"), thickness, scenario.model.density);
+    partner_ = MakeBody(SettingOf(scenario, "partner_radius"), thickness, scenario.model.density);
+    block_.sliding_friction = model_.sliding_friction();
+    block_.wall = IsWall();
+    block_.mass_factor = IsWall() ? 2.0 : 1.0;
+  }
+
+  /// Runs up to kBlock impacts to their ends; false: stopped.
+  bool Run(const Impact* impacts, int count) {
+    for (int k = 0; k < kBlock; ++k) {
+      const Impact& impact = impacts[std::min(k, count - 1)];
+      flights_[k] = {};
+      flights_[k].dx = body_.radius + partner_.radius;
+      flights_[k].vix = impact.speed * std::cos(impact.angle);
+      flights_[k].viy = impact.speed * std::sin(impact.angle);
+      flights_[k].wi = impact.spin;
+    }
+    for (auto& column : block_.history) {
+      std::fill(std::begin(column), std::end(column), 0.0);
+    }
+    const double half_period = ShortestHalfPeriod();
+    dt_ = half_period / kStepsPerHalfPeriod;
+    const auto longest = static_cast<std::int64_t>(kStepsPerHalfPeriod) * kLongestInHalfPeriods;
+    block_.dt = dt_;
+    for (std::int64_t step = 0; step < longest; ++step) {
+      if (step % 1024 == 0 && stop_.stop_requested()) {
+        return false;
+      }
+      Drift();
+      LoadBlock();
+      model_.Evaluate(block_);
+      ++steps_;
+      if (!Kick(static_cast<double>(step) * dt_)) {
+        break;
+      }
+    }
+    return true;
+  }
+
+  [[nodiscard]] State Observe(const Impact& impact, int lane) const {
+    const Flight& f = flights_[static_cast<std::size_t>(lane)];
+    const double vx = f.vix - f.vjx;
+    const double vy = f.viy - f.vjy;
+    double nx = 1;
+    double ny = 0;
+    if (!IsWall()) {  // each velocity is taken along the line of centres of its own moment
+      const double distance = std::sqrt(f.dx * f.dx + f.dy * f.dy);
+      nx = f.dx / distance;
+      ny = f.dy / distance;
+    }
+    const double normal = -(vx * nx + vy * ny);
+    const double tangential = vy * nx - vx * ny;
+    const double mass = 1.0 / (body_.inverse_mass + partner_.inverse_mass);
+    const auto spin_energy = [&](double wi, double wj) {
+      return wi * wi / body_.inverse_inertia +
+             (IsWall() ? 0.0 : wj * wj / partner_.inverse_inertia);
+    };
+    const double before = mass * impact.speed * impact.speed + spin_energy(impact.spin, 0);
+    const double after = mass * (vx * vx + vy * vy) + spin_energy(f.wi, f.wj);
+    return {.load_step = impact.load_step,
+            .values = {impact.angle, impact.speed, impact.spin,
+                       normal / (impact.speed * std::cos(impact.angle)),
+                       tangential / (impact.speed * std::sin(impact.angle)), after / before,
+                       std::atan2(tangential, normal), f.wi, f.ended - f.begun, f.peak}};
+  }
+
+  [[nodiscard]] bool separated(int lane) const {
+    return flights_[static_cast<std::size_t>(lane)].done;
+  }
+  [[nodiscard]] double time_step() const { return dt_; }
+  [[nodiscard]] std::int64_t steps() const { return steps_; }
+
+ private:
+  [[nodiscard]] bool IsWall() const { return partner_.inverse_mass == 0; }
+
+  void Drift() {
+    for (Flight& f : flights_) {
+      f.dx += dt_ * (f.vjx - f.vix);
+      // A flat wall has its nearest point always straight ahead.
+      f.dy += IsWall() ? 0.0 : dt_ * (f.vjy - f.viy);
+    }
+  }
+
+  void LoadBlock() {
+    block_.count = kBlock;
+    for (int k = 0; k < kBlock; ++k) {
+      const Flight& f = flights_[k];
+      block_.dx[k] = f.dx;
+      block_.dy[k] = f.dy;
+      block_.dz[k] = 0;
+      block_.radius_i[k] = body_.radius;
+      block_.radius_j[k] = IsWall() ? body_.radius : partner_.radius;
+      block_.vx[k] = f.vjx - f.vix;
+      block_.vy[k] = f.vjy - f.viy;
+      block_.vz[k] = 0;
+      block_.wix[k] = block_.wiy[k] = block_.wjx[k] = block_.wjy[k] = 0;
+      block_.wiz[k] = f.wi;
+      block_.wjz[k] = f.wj;
+    }
+  }
+
+  /// Velocities by the contact's loads; false: all bodies have separated. A touching contact that
+  /// has come apart is over, as in Assembly.
+  bool Kick(double time) {
+    bool any = false;
+    for (int k = 0; k < kBlock; ++k) {
+      Flight& f = flights_[k];
+      if (f.done) {
+        continue;
+      }
+      const double overlap = block_.overlap[k];
+      f.peak = std::max(f.peak, overlap);
+      if (!(overlap > 0) && !(f.touched && block_.holds[k] > 0)) {
+        if (f.touched) {
+          f.ended = time;
+          f.done = true;
+          continue;
+        }
+        any = true;
+        continue;
+      }
+      if (!f.touched) {
+        f.touched = true;
+        f.begun = time - dt_;
+      }
+      any = true;
+      f.vix -= dt_ * body_.inverse_mass * block_.force_x[k];
+      f.viy -= dt_ * body_.inverse_mass * block_.force_y[k];
+      f.vjx += dt_ * partner_.inverse_mass * block_.force_x[k];
+      f.vjy += dt_ * partner_.inverse_mass * block_.force_y[k];
+      f.wi += dt_ * body_.inverse_inertia * TorqueOnBody(k);
+      f.wj += dt_ * partner_.inverse_inertia * block_.torque_jz[k];
+    }
+    return any;
+  }
+
+  /// At a wall the arm is the radius, as in the slip: what friction takes from spin is then what
+  /// the slip has done, and the reference solutions agree [Hadjidoukas 2014].
+  [[nodiscard]] double TorqueOnBody(int k) const {
+    if (!IsWall()) {
+      return block_.torque_iz[k];
+    }
+    return -body_.radius * (block_.nx[k] * block_.fy[k] - block_.ny[k] * block_.fx[k]) -
+           block_.mz[k];
+  }
+
+  /// pi sqrt(m/k) of the stiffest oscillation of any lane, at the overlap where the elastic force
+  /// has taken up the energy of the normal motion. Memories stay empty: block.dt is zero.
+  double ShortestHalfPeriod() {
+    const double mass = 1.0 / (body_.inverse_mass + partner_.inverse_mass);
+    double energy = 0;
+    for (const Flight& f : flights_) {
+      energy = std::max(energy, 0.5 * mass * f.vix * f.vix);
+    }
+    const double sum = body_.radius + (IsWall() ? 0.0 : partner_.radius);
+    block_.dt = 0;
+    double span = 1e-9 * body_.radius;  // 32 overlaps up to the span, doubled until they hold it
+    for (;; span *= 2) {
+      LoadBlock();
+      for (int k = 0; k < kBlock; ++k) {
+        block_.dx[k] = sum - span * (k + 1) / kBlock;
+        block_.dy[k] = 0;
+        block_.vx[k] = block_.vy[k] = block_.wiz[k] = 0;
+      }
+      model_.Evaluate(block_);
+      double work = 0;
+      for (int k = 0; k < kBlock; ++k) {
+        work += block_.normal_force[k] * span / kBlock;
+      }
+      if (!(work < energy) || span > 0.25 * body_.radius) {
+        break;
+      }
+    }
+    double rate2 = 0;
+    for (int k = 0; k < kBlock; ++k) {
+      const double inertia = body_.radius * body_.radius * body_.inverse_inertia;
+      const double turning = block_.rolling_stiffness[k] * body_.inverse_inertia;
+      rate2 = std::max({rate2, block_.normal_stiffness[k] / mass, turning,
+                        block_.tangential_stiffness[k] * (1.0 / mass + 2 * inertia)});
+    }
+    for (auto& column : block_.history) {
+      std::fill(std::begin(column), std::end(column), 0.0);
+    }
+    return std::numbers::pi / std::sqrt(rate2);
+  }
+
+  ContactModel model_;
+  std::stop_token stop_;
+  Body body_, partner_;
+  ContactBlock block_{};
+  std::array<Flight, kBlock> flights_{};
+  double dt_ = 0;
+  std::int64_t steps_ = 0;
+};
+
+}  // namespace
+
+Summary RunCollision(const Scenario& scenario, const StateSink& sink, std::stop_token stop) {
+  const std::vector<Impact> impacts = ImpactsOf(scenario);
+  CollisionRun run(scenario, std::move(stop));
+  Summary summary;
+  for (std::size_t first = 0; first < impacts.size(); first += kBlock) {
+    const int count = static_cast<int>(std::min<std::size_t>(kBlock, impacts.size() - first));
+    const bool finished = run.Run(&impacts[first], count);
+    summary.steps = summary.contact_updates = run.steps();
+    summary.time_step = run.time_step();
+    if (!finished) {
+      summary.outcome = Outcome::kStopped;
+      return summary;
+    }
+    for (int k = 0; k < count; ++k) {
+      const Impact& impact = impacts[first + static_cast<std::size_t>(k)];
+      const State state = run.Observe(impact, k);
+      const bool finite = std::all_of(state.values.begin(), state.values.end(),
+                                      [](double v) { return std::isfinite(v); });
+      if (!run.separated(k) || !finite) {
+        summary.outcome = Outcome::kDiverged;
+        summary.reason =
+            absl::StrCat("load step ", impact.load_step, " (angle ", impact.angle, ", speed ",
+                         impact.speed, ", spin ", impact.spin,
+                         "): ", finite ? "the bodies stick together" : "a velocity is not finite");
+        return summary;
+      }
+      sink(state);
+    }
+  }
+  return summary;
+}
+
+std::vector<std::string> CollisionProblems(const Scenario& scenario) {
+  std::vector<std::string> problems;
+  for (const Impact& impact : ImpactsOf(scenario)) {
+    if (impact.spin != 0 && impact.angle <= kSmallestImpactAngle) {
+      problems.push_back(absl::StrCat(
+          "load step ", impact.load_step, ": with impact_spin the impact_angle must be above ",
+          kSmallestImpactAngle,
+          " rad, for tangential_restitution compares with the tangential velocity before"));
+    }
+  }
+  return problems;
+}
+
+}  // namespace calib::dem

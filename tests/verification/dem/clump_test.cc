@@ -1,0 +1,262 @@
+// Rigid clumps: pendulum, free top, balances of a collision, and clumps in lab tests.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "dem/catalog/catalog.h"
+#include "dem/dynamics/assembly.h"
+#include "dem/particles/elongation.h"
+#include "dem/simulation/shape_change.h"
+#include "tests/support/dem/scenarios.h"
+
+namespace calib::dem {
+namespace {
+
+constexpr double kRadius = 0.01;
+constexpr double kDensity = 2500;
+const double kSphere = kDensity * 4.0 / 3.0 * std::numbers::pi * std::pow(kRadius, 3);
+
+Packing Spheres(const std::vector<std::array<double, 3>>& centres, const std::vector<int>& clump) {
+  Packing p;
+  for (double& length : p.length) {
+    length = 1;
+  }
+  for (const auto& c : centres) {
+    p.x.push_back(c[0]);
+    p.y.push_back(c[1]);
+    p.z.push_back(c[2]);
+    p.radius.push_back(kRadius);
+  }
+  p.clump = clump;
+  return p;
+}
+
+// Two spheres that touch, hung up at the centre of one: T = 2 pi sqrt((I + M r^2)/(M g r)), I = 2
+// (2/5 + 1) m r^2, times 1 + a^2/16 for the amplitude a. The pivot is a stiff spring.
+TEST(Clump, PendulumSwingsWithItsPeriod) {
+  constexpr double kGravity = 9.81;
+  constexpr double kAmplitude = 0.05;
+  const double s = 2 * kRadius * std::sin(kAmplitude);
+  const double c = 2 * kRadius * std::cos(kAmplitude);
+  const Packing packing = Spheres({{0.5, 0.5, 0.5}, {0.5 + s, 0.5, 0.5 - c}}, {7, 7});
+  ParticleArrays p = MakeParticles(packing, kDensity);
+  RigidClumps clumps(packing, kDensity, p);
+  ASSERT_EQ(clumps.all().size(), 1U);
+  EXPECT_NEAR(clumps.all()[0].mass, 2 * kSphere, 1e-12 * kSphere);
+  const PeriodicCell cell{.length = {1, 1, 1}};
+  const double weight = 2 * kSphere * kGravity;
+  const double stiffness = 1e4 * weight / kRadius;
+  const double period = 2 * std::numbers::pi * std::sqrt(2.4 * kRadius / kGravity) *
+                        (1 + kAmplitude * kAmplitude / 16);
+  const double dt = period / 100000;
+  const std::size_t held = p.id[0] == 0 ? 0 : 1;
+  double last = s;
+  std::vector<double> crossings;
+  for (int step = 0; step < 350000; ++step) {
+    p.fx = {0, 0};
+    p.fy = {0, 0};
+    p.fz = {-0.5 * weight, -0.5 * weight};
+    p.tx = p.ty = p.tz = {0, 0};
+    p.fx[held] -= stiffness * (p.x[held] - 0.5);
+    p.fy[held] -= stiffness * (p.y[held] - 0.5);
+    p.fz[held] -= stiffness * (p.z[held] - 0.5);
+    clumps.Advance({.dt = dt}, cell, 1, p);
+    const double now = p.x[1 - held] - p.x[held];
+    if (last > 0 && now <= 0) {
+      crossings.push_back((step + now / (last - now)) * dt);
+    }
+    last = now;
+  }
+  ASSERT_GE(crossings.size(), 3U);
+  const double found = (crossings.back() - crossings.front()) / (crossings.size() - 1);
+  std::printf("period over closed form %.6f\n", found / period);
+  EXPECT_NEAR(found, period, 5e-4 * period);
+}
+
+// A dumbbell spun off its axis precesses about its angular momentum with L/I_t; both its energy and
+// the momentum stay.
+TEST(Clump, FreeTopPrecesses) {
+  const Packing packing = Spheres({{0.5, 0.5, 0.5}, {0.5, 0.5, 0.5 + 2 * kRadius}}, {0, 0});
+  ParticleArrays p = MakeParticles(packing, kDensity);
+  RigidClumps clumps(packing, kDensity, p);
+  Clump& body = clumps.mutable_all()[0];
+  const double axial = 0.8 * kSphere * kRadius * kRadius;
+  const double transverse = 2.8 * kSphere * kRadius * kRadius;
+  EXPECT_NEAR(body.inertia[0], axial, 1e-12 * axial);
+  EXPECT_NEAR(body.inertia[2], transverse, 1e-12 * transverse);
+  const double l[3] = {axial * 30, 0, axial * 40};  // 40 rad/s about the axis
+  body.momentum = {l[0], l[1], l[2]};
+  const double size = axial * 50;
+  const double precession = size / transverse;
+  const PeriodicCell cell{.length = {1, 1, 1}};
+  p.fx = p.fy = p.fz = p.tx = p.ty = p.tz = {0, 0};
+  const int steps = 20000;
+  const double dt = 0.75 * std::numbers::pi / precession / steps;  // 3/8 of a turn
+  for (int k = 0; k < steps; ++k) {
+    clumps.Advance({.dt = dt}, cell, 1, p);
+  }
+  EXPECT_EQ(body.momentum[0], l[0]);
+  EXPECT_EQ(body.momentum[2], l[2]);
+  // Axis z turned about L by 135 degrees.
+  const double u[3] = {0.6, 0, 0.8};
+  const double angle = 0.75 * std::numbers::pi;
+  const double along = u[2];
+  const double expected[3] = {u[0] * along * (1 - std::cos(angle)), -u[0] * std::sin(angle),
+                              std::cos(angle) + u[2] * along * (1 - std::cos(angle))};
+  const std::size_t top = p.id[0] == 1 ? 0 : 1;
+  EXPECT_NEAR((p.x[top] - body.centre[0]) / kRadius, expected[0], 1e-6);
+  EXPECT_NEAR((p.y[top] - body.centre[1]) / kRadius, expected[1], 1e-6);
+  EXPECT_NEAR((p.z[top] - body.centre[2]) / kRadius, expected[2], 1e-6);
+}
+
+// An L of three overlapping spheres hits a dumbbell, elastic and frictionless: momentum, angular
+// momentum and energy after are those before.
+TEST(Clump, CollisionKeepsMomentumAngularMomentumAndEnergy) {
+  const Packing packing = Spheres({{0.47, 0.5, 0.5},
+                                   {0.47, 0.515, 0.5},
+                                   {0.458, 0.5, 0.503},
+                                   {0.4975, 0.508, 0.498},
+                                   {0.4975, 0.488, 0.498}},
+                                  {3, 3, 3, 1, 1});
+  Model model = test::HertzModel();
+  model.parameters["friction_coefficient"] = 0;
+  Assembly assembly(packing, kDensity, ContactModel(model), 1);
+  ASSERT_EQ(assembly.clumps().all().size(), 2U);
+  ASSERT_EQ(assembly.bodies(), 2);
+  for (Clump& c : assembly.mutable_clumps().mutable_all()) {
+    const bool thrown = c.members.size() == 3;
+    c.velocity = {thrown ? 1.0 : 0.0, 0, 0};
+    if (thrown) {
+      c.momentum = {0, 0, 3 * c.inertia[2]};
+    }
+  }
+  struct Sums {
+    std::array<double, 3> linear{}, angular{};
+    double energy = 0;
+  };
+  const auto sums = [&assembly] {
+    Sums s;
+    for (const Clump& c : assembly.clumps().all()) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        const std::size_t b = (a + 1) % 3;
+        const std::size_t d = (a + 2) % 3;
+        s.linear[a] += c.mass * c.velocity[a];
+        s.angular[a] += c.momentum[a] + c.mass * ((c.centre[b] - 0.5) * c.velocity[d] -
+                                                  (c.centre[d] - 0.5) * c.velocity[b]);
+        s.energy += 0.5 * c.mass * c.velocity[a] * c.velocity[a];
+      }
+      const std::size_t m = static_cast<std::size_t>(c.members.front());
+      const ParticleArrays& p = assembly.particles();
+      s.energy +=
+          0.5 * (c.momentum[0] * p.wx[m] + c.momentum[1] * p.wy[m] + c.momentum[2] * p.wz[m]);
+    }
+    return s;
+  };
+  ASSERT_TRUE(assembly.EvaluateForces().ok());
+  EXPECT_EQ(assembly.contacts(), 0);
+  assembly.Move({.dt = 1e-7});  // gives the members the bodies' spins
+  ASSERT_TRUE(assembly.EvaluateForces().ok());
+  const Sums before = sums();
+  std::int64_t touched = 0;
+  for (int step = 0; step < 200000; ++step) {
+    assembly.Move({.dt = 1e-7});
+    ASSERT_TRUE(assembly.EvaluateForces().ok());
+    touched += assembly.contacts();
+  }
+  EXPECT_GT(touched, 100);
+  EXPECT_EQ(assembly.contacts(), 0);
+  const Sums after = sums();
+  const double scale = std::abs(before.linear[0]);
+  for (std::size_t a = 0; a < 3; ++a) {
+    EXPECT_NEAR(after.linear[a], before.linear[a], 1e-12 * scale);
+    EXPECT_NEAR(after.angular[a], before.angular[a], 1e-7 * scale * kRadius);
+  }
+  EXPECT_NE(after.linear[0], 0);
+  EXPECT_GT(
+      std::abs(assembly.clumps().all()[1].velocity[0] - assembly.clumps().all()[0].velocity[0]),
+      0.1);
+  std::printf("energy after over before %.7f\n", after.energy / before.energy);
+  EXPECT_NEAR(after.energy / before.energy, 1, 1e-4);
+}
+
+Scenario Elongated13(double aspect) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.packing = test::SmallPacking(200);
+  s.model.effects = {"nonspherical_shape"};
+  s.model.parameters["nonspherical_shape.aspect"] = aspect;
+  s.path = {{.target = 0, .load_step = 0}, {.target = 0.02, .load_step = 1}};
+  return s;
+}
+
+double At(const State& state, const std::string& name) {
+  const auto& names = FindTest("triaxial_drained")->observables;
+  return state.values[static_cast<std::size_t>(std::find(names.begin(), names.end(), name) -
+                                               names.begin())];
+}
+
+TEST(NonsphericalShape, KeepsVolumesAndLetsTheGrainsGiveWay) {
+  const Packing& spheres = test::SmallPacking(200);
+  const auto packing = Elongate(spheres, 1.3, 1, {});
+  ASSERT_TRUE(packing.ok()) << packing.status();
+  Model model = test::LinearModel();
+  Assembly before(spheres, 2650, ContactModel(model), 1);
+  Assembly after(*packing, 2650, ContactModel(model), 1);
+  EXPECT_EQ(after.bodies(), 200);
+  EXPECT_NEAR(after.solid_volume(), before.solid_volume(), 1e-4 * before.solid_volume());
+  EXPECT_NEAR(after.mean_diameter(), before.mean_diameter(), 1e-4 * before.mean_diameter());
+  ASSERT_TRUE(after.EvaluateForces().ok());
+  double largest = 0;
+  const auto& list = after.neighbors();
+  for (int s = 0; s < list.size(); ++s) {
+    if (after.touching(s)) {
+      const double* f = after.load_on_j(s).force;
+      largest = std::max(largest, std::hypot(f[0], f[1], f[2]));
+    }
+  }
+  // kn = 2 E r*: overlap over radius; jammed grains would keep percents.
+  std::printf("largest overlap %.2g of a radius\n", largest / (1.2e8 * 1e-3 * 1e-3));
+  EXPECT_LT(largest / (1.2e8 * 1e-3 * 1e-3), 2e-2);
+}
+
+TEST(NonsphericalShape, RunsOnAnyNumberOfThreadsToTheSameBits) {
+  Scenario s = Elongated13(1.3);
+  const test::Run one = test::RunAll(s);
+  ASSERT_EQ(one.summary.outcome, Outcome::kCompleted) << one.summary.reason;
+  s.threads = 2;
+  const test::Run two = test::RunAll(s);
+  for (std::size_t k = 0; k < one.states.size(); ++k) {
+    EXPECT_EQ(one.states[k].values, two.states[k].values);
+  }
+  const test::Run spheres = test::RunAll(Elongated13(1));
+  std::printf(
+      "porosity %.4f (spheres %.4f), stress ratio at 2 %% %.2f (%.2f), contacts %.2f (%.2f)\n",
+      At(one.states[0], "porosity"), At(spheres.states[0], "porosity"),
+      At(one.states[1], "stress_ratio"), At(spheres.states[1], "stress_ratio"),
+      At(one.states[0], "coordination_number"), At(spheres.states[0], "coordination_number"));
+  EXPECT_NEAR(At(one.states[1], "lateral_stress"), 2e5, 2e2);
+  EXPECT_GT(At(one.states[1], "stress_ratio"), 1.3);
+  EXPECT_GT(At(one.states[0], "coordination_number"), At(spheres.states[0], "coordination_number"));
+}
+
+// Clumps come from packing files too: the text of an elongated packing gives the bits of the
+// effect.
+TEST(Clump, PackingFilesWithClumpsRun) {
+  const auto packing = Elongate(test::SmallPacking(200), 1.3, 1, {});
+  ASSERT_TRUE(packing.ok());
+  std::vector<PackingProblem> problems;
+  Scenario s = Elongated13(1.3);
+  s.path = {{.target = 0, .load_step = 0}};
+  const test::Run by_effect = test::RunAll(s);
+  s.packing = ParsePacking(FormatPacking(*packing), problems);
+  ASSERT_TRUE(problems.empty());
+  s.model.effects = {};
+  s.model.parameters.erase("nonspherical_shape.aspect");
+  const test::Run by_file = test::RunAll(s);
+  ASSERT_EQ(by_file.states.size(), 1U);
+  EXPECT_EQ(by_file.states[0].values, by_effect.states[0].values);
+}
+
+}  // namespace
+}  // namespace calib::dem

@@ -1,0 +1,220 @@
+// The test `collision` against closed forms: Hertz, Tsuji, Kuwabara-Kono, gross sliding, balances.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "dem/catalog/catalog.h"
+#include "tests/support/dem/scenarios.h"
+
+namespace calib::dem {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr double kRadius = 0.02225;
+constexpr double kMass = 0.3538;
+constexpr double kModulus = 2.1e11;
+constexpr double kPoisson = 0.3;
+const double kDensity = kMass / (4.0 / 3.0 * std::numbers::pi * std::pow(kRadius, 3));
+const double kStiffness = 2 * kModulus / (3 * (1 - kPoisson * kPoisson)) * std::sqrt(kRadius);
+
+double Value(const State& state, const std::string& observable) {
+  const auto& names = FindTest("collision")->observables;
+  return state.values[static_cast<std::size_t>(std::find(names.begin(), names.end(), observable) -
+                                               names.begin())];
+}
+
+Scenario Steel(const std::string& contact, std::map<std::string, double> parameters) {
+  Scenario s;
+  s.model.contact = contact;
+  s.model.density = kDensity;
+  s.model.parameters = std::move(parameters);
+  s.model.parameters["young_modulus"] = kModulus;
+  s.model.parameters["poisson_ratio"] = kPoisson;
+  s.test = "collision";
+  s.settings = {{"radius", kRadius}, {"impact_angle", 0}};  // driven by speed
+  s.path = {{.target = 0.1, .load_step = 0},
+            {.target = 1, .load_step = 1},
+            {.target = 10, .load_step = 2}};
+  return s;
+}
+
+TEST(Collision, ElasticImpactOnAWallFollowsHertz) {
+  const test::Run run = test::RunAll(Steel("hertz_mindlin", {{"friction_coefficient", 0}}));
+  ASSERT_EQ(run.states.size(), 3U);
+  for (const State& state : run.states) {
+    const double v = Value(state, "impact_speed");
+    const double peak = std::pow(1.25 * kMass * v * v / kStiffness, 0.4);
+    EXPECT_NEAR(Value(state, "peak_overlap"), peak, 1e-6 * peak);
+    // T = 4/5 B(2/5, 1/2) u/v
+    const double duration = 0.8 * std::beta(0.4, 0.5) * peak / v;
+    EXPECT_NEAR(Value(state, "contact_duration"), duration, 4e-4 * duration);
+    EXPECT_NEAR(Value(state, "normal_restitution"), 1, 1e-6);
+    EXPECT_NEAR(Value(state, "energy_restitution"), 1, 2e-6);
+  }
+}
+
+// gamma = -sqrt(5) ln e/sqrt(ln^2 e + pi^2) sqrt(m k) [Antypov & Elliott 2011], any speed.
+TEST(Collision, TsujiRestitutionIsItsClosedFormAtAnySpeed) {
+  for (const double e : {0.95, 0.8, 0.5}) {
+    const double l = std::log(e);
+    const double damping =
+        -std::sqrt(5.0) * l / std::hypot(l, std::numbers::pi) * std::sqrt(kMass * kStiffness);
+    const test::Run run = test::RunAll(
+        Steel("tsuji",
+              {{"friction_coefficient", 0}, {"tangential_stiffness", 1e8}, {"damping", damping}}));
+    ASSERT_EQ(run.states.size(), 3U);
+    for (const State& state : run.states) {
+      EXPECT_NEAR(Value(state, "normal_restitution"), e, 1e-4);
+    }
+  }
+}
+
+/// Energy lost over m v^2 along the elastic path with a dashpot gamma u^alpha: the first order x of
+/// 1 - e = x - ... .
+double FirstOrderLoss(double damping, double alpha, double speed) {
+  const double peak = std::pow(1.25 * kMass * speed * speed / kStiffness, 0.4);
+  const double integral = 0.4 * std::beta(0.4 * (alpha + 1), 1.5);
+  return 2 * damping * speed * std::pow(peak, alpha + 1) * integral / (kMass * speed * speed);
+}
+
+// e = 1 - x + 3/5 x^2 - ..., x ~ v^{1/5} [Schwager & Poeschel 1998; Ramirez et al. 1999].
+TEST(Collision, KuwabaraKonoRestitutionFallsWithTheFifthRootOfSpeed) {
+  constexpr double kDamping = 3e4;
+  const test::Run run = test::RunAll(
+      Steel("kuwabara_kono",
+            {{"friction_coefficient", 0}, {"tangential_stiffness", 1e8}, {"damping", kDamping}}));
+  ASSERT_EQ(run.states.size(), 3U);
+  for (const State& state : run.states) {
+    const double x = FirstOrderLoss(kDamping, 0.5, Value(state, "impact_speed"));
+    EXPECT_GT(x, 0.01);
+    EXPECT_NEAR(Value(state, "normal_restitution"), 1 - x + 0.6 * x * x, 0.5 * x * x * x + 2e-5);
+  }
+  const double ratio = (1 - Value(run.states[2], "normal_restitution")) /
+                       (1 - Value(run.states[0], "normal_restitution"));
+  EXPECT_NEAR(ratio, std::pow(100, 0.2), 0.05 * ratio);
+}
+
+TEST(Collision, ExtendedLawContainsBothAndFollowsItsFirstOrder) {
+  const auto restitution = [](const std::string& contact, std::map<std::string, double> more) {
+    more["friction_coefficient"] = 0.1;
+    more["tangential_stiffness"] = 1.3e8;
+    Scenario s = Steel(contact, std::move(more));
+    s.settings["impact_angle"] = 0.5;
+    const test::Run run = test::RunAll(s);
+    EXPECT_EQ(run.states.size(), 3U);
+    std::vector<double> values;
+    for (const State& state : run.states) {
+      values.push_back(Value(state, "normal_restitution"));
+      values.push_back(Value(state, "tangential_restitution"));
+    }
+    return values;
+  };
+  const auto compare = [](const std::vector<double>& a, const std::vector<double>& b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (std::size_t k = 0; k < a.size(); ++k) {
+      EXPECT_NEAR(a[k], b[k], 1e-10);
+    }
+  };
+  compare(restitution("extended_viscoelastic", {{"damping", 8e3}, {"damping_exponent", 0.25}}),
+          restitution("tsuji", {{"damping", 8e3}}));
+  compare(restitution("extended_viscoelastic", {{"damping", 8e4}, {"damping_exponent", 0.5}}),
+          restitution("kuwabara_kono", {{"damping", 8e4}}));
+  const auto weak =
+      restitution("extended_viscoelastic", {{"damping", 1e5}, {"damping_exponent", 0.9}});
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double speed = std::pow(10, static_cast<double>(k) - 1) * std::cos(0.5);
+    const double x = FirstOrderLoss(1e5, 0.9, speed);
+    EXPECT_NEAR(weak[2 * k], 1 - x, x * x + 2e-6);
+  }
+}
+
+// Sliding throughout: impulses mu times the normal one, (1 + e) v_n; spin by the same impulse.
+TEST(Collision, GrossSlidingOnAWall) {
+  constexpr double kFriction = 0.2;
+  Scenario s = Steel("hertz_mindlin", {{"friction_coefficient", kFriction}});
+  s.settings.erase("impact_angle");
+  s.settings["impact_speed"] = 2;
+  s.path = {{.target = 1.2, .load_step = 0}, {.target = 1.4, .load_step = 1}};
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.states.size(), 2U);
+  for (const State& state : run.states) {
+    const double angle = Value(state, "impact_angle");
+    const double impulse = 2 * kFriction * 2 * std::cos(angle);  // over the mass
+    // The contact sticks until the spring holds the limit: a moment of less friction.
+    EXPECT_NEAR(Value(state, "tangential_restitution"), 1 - impulse / (2 * std::sin(angle)), 1e-3);
+    EXPECT_NEAR(Value(state, "rebound_spin"), -2.5 * impulse / kRadius, 3e-3 * impulse / kRadius);
+    EXPECT_NEAR(std::tan(Value(state, "rebound_angle")),
+                (2 * std::sin(angle) - impulse) / (2 * std::cos(angle)), 3e-3);
+  }
+}
+
+TEST(Collision, SpinThatMeetsTheSlipLeavesTheTangentialVelocity) {
+  Scenario s = Steel("hertz_mindlin", {{"friction_coefficient", 0.3}});
+  s.settings = {{"radius", kRadius}, {"impact_angle", 0.6}, {"impact_speed", 2}};
+  const double rolling = -2 * std::sin(0.6) / kRadius;  // no slip at the contact
+  s.path = {{.target = rolling, .load_step = 0}, {.target = 0, .load_step = 1}};
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.states.size(), 2U);
+  EXPECT_NEAR(Value(run.states[0], "tangential_restitution"), 1, 1e-9);
+  EXPECT_NEAR(Value(run.states[0], "rebound_spin"), rolling, 1e-9 * std::abs(rolling));
+  EXPECT_LT(Value(run.states[1], "tangential_restitution"), 0.9);
+}
+
+// Two spheres: the reduced mass and radius decide; a disk has its own mass and inertia.
+TEST(Collision, TwoSpheresAndDisks) {
+  Scenario s = Steel("hertz_mindlin", {{"friction_coefficient", 0}});
+  s.settings["partner_radius"] = kRadius;
+  const test::Run run = test::RunAll(s);
+  const double stiffness = kStiffness / std::sqrt(2.0);
+  const double peak = std::pow(1.25 * 0.5 * kMass / stiffness, 0.4);
+  EXPECT_NEAR(Value(run.states[1], "peak_overlap"), peak, 1e-6 * peak);
+  EXPECT_NEAR(Value(run.states[1], "normal_restitution"), 1, 1e-6);
+
+  Scenario disk = Steel("hertz_mindlin", {{"friction_coefficient", 0.2}});
+  disk.settings["thickness"] = 0.01;
+  disk.settings["impact_angle"] = 1.3;
+  disk.path = {{.target = 2, .load_step = 0}};
+  const test::Run flat = test::RunAll(disk);
+  const double mass = kDensity * std::numbers::pi * kRadius * kRadius * 0.01;
+  const double v = 2 * std::cos(1.3);
+  const double expected = std::pow(1.25 * mass * v * v / kStiffness, 0.4);
+  EXPECT_NEAR(Value(flat.states[0], "peak_overlap"), expected, 1e-6 * expected);
+  EXPECT_NEAR(Value(flat.states[0], "rebound_spin"), -2 * 2 * 0.2 * v / kRadius,
+              5e-3 * v / kRadius);  // I = m r^2/2
+}
+
+TEST(Collision, NeverGainsEnergy) {
+  for (const char* contact : {"tsuji", "kuwabara_kono"}) {
+    Scenario s = Steel(contact, {{"friction_coefficient", 0.15},
+                                 {"tangential_stiffness", 2e8},
+                                 {"damping", contact[0] == 't' ? 8e3 : 8e4}});
+    s.settings["partner_radius"] = 0.6 * kRadius;
+    for (const double angle : {0.2, 0.7, 1.2}) {
+      s.settings["impact_angle"] = angle;
+      for (const State& state : test::RunAll(s).states) {
+        EXPECT_LT(Value(state, "energy_restitution"), 1);
+        EXPECT_GT(Value(state, "energy_restitution"), 0.1);
+      }
+    }
+  }
+}
+
+TEST(Collision, RefusesWhatCannotBe) {
+  Scenario s = Steel("tsuji", {{"friction_coefficient", 0}, {"damping", 0}});
+  s.settings["radius"] = -1;
+  s.path[1].target = -2;
+  EXPECT_THAT(ScenarioProblems(s),
+              ElementsAre("parameter tangential_stiffness is missing", HasSubstr("radius is -1"),
+                          HasSubstr("path point 1: impact_speed is -2, allowed is (0, ")));
+  Scenario spinning = Steel("hertz_mindlin", {{"friction_coefficient", 0}});
+  spinning.settings["impact_spin"] = 3;
+  EXPECT_THAT(ScenarioProblems(spinning), testing::Each(HasSubstr("impact_angle must be above")));
+  EXPECT_THAT(ScenarioProblems(spinning), testing::SizeIs(3));
+}
+
+}  // namespace
+}  // namespace calib::dem
