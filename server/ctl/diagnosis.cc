@@ -17,14 +17,19 @@ namespace calib::ctl {
 namespace {
 
 using Eigen::Index;
-using report::RunTable;
 using report::RunsOf;
+using report::RunTable;
 
 constexpr int kMostRuns = 4;           // of one effect in the screen, or
 constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all effects
 constexpr std::size_t kWarmFits = 3;
 constexpr int kWarmIterations = 3;
-constexpr int kLeastWarmSamples = 12;
+constexpr int kWarmMore = 2;  // iterations at a time, where the fit cannot be judged yet
+constexpr int kMostWarmIterations = 11;
+constexpr int kWarmShare = 2;  // times the campaign's evaluations, for all of these
+constexpr int kLeastWarmSamples = 16;
+constexpr double kNotExcluded = 3;      // times the rms of the best: a fit not judged yet
+constexpr double kClearlyCloser = 0.8;  // of the base model's rms
 constexpr std::size_t kMostNames = 3;
 
 // One step away from the model without the effect.
@@ -45,8 +50,7 @@ std::vector<Step> StepsOf(const dem::EffectInfo& effect, std::size_t rows) {
 
 class Inquiry {
  public:
-  Inquiry(Laboratory& laboratory, const report::CampaignView& view,
-          const DiagnosisOptions& options)
+  Inquiry(Laboratory& laboratory, const report::CampaignView& view, const DiagnosisOptions& options)
       : laboratory_(laboratory),
         view_(view),
         options_(options),
@@ -81,8 +85,7 @@ class Inquiry {
       return diagnosis_;
     }
     if (auto status = ScreenEffects(); !status.ok()) return status;
-    const bool hinted =
-        !scores_.empty() && scores_.front().adjusted < options_.level;
+    const bool hinted = !scores_.empty() && scores_.front().adjusted < options_.level;
     if (fits && !hinted) {
       diagnosis_.verdict = "adequate";
       return diagnosis_;
@@ -99,13 +102,16 @@ class Inquiry {
   absl::Status CheckPossible() const {
     const std::string& id = view_.status.campaign();
     if (view_.posterior.posterior_from().empty() || view_.posterior.posterior_from() == "none") {
-      return absl::FailedPreconditionError(absl::StrCat(
-          "campaign ", id, " has no posterior, so nothing can be said about its model: see "
-          "`calibctl posterior ", id, "`"));
+      return absl::FailedPreconditionError(
+          absl::StrCat("campaign ", id,
+                       " has no posterior, so nothing can be said about its model: see "
+                       "`calibctl posterior ",
+                       id, "`"));
     }
     if (view_.campaign.filter.noise != inference::NoiseMode::kGiven) {
       return absl::FailedPreconditionError(
-          absl::StrCat("campaign ", id, " states no size of the errors (noise is inferred or "
+          absl::StrCat("campaign ", id,
+                       " states no size of the errors (noise is inferred or "
                        "tempered), so its model cannot be judged; give the noise"));
     }
     if (view_.campaign.precomputed && !options_.only_adequacy) {
@@ -139,8 +145,7 @@ class Inquiry {
     campaign::Derivation::Row row{.like = table_.sample[static_cast<std::size_t>(run)],
                                   .values = {}};
     for (std::size_t j = 0; j < view_.campaign.parameters.size(); ++j) {
-      row.values[view_.campaign.parameters[j].name] =
-          table_.parameters(run, static_cast<Index>(j));
+      row.values[view_.campaign.parameters[j].name] = table_.parameters(run, static_cast<Index>(j));
     }
     return row;
   }
@@ -222,8 +227,7 @@ class Inquiry {
     }
     if (effects.empty()) return absl::OkStatus();
     const int experiments = std::max(1, FittedExperiments());
-    const double share = kScreenShare *
-                         static_cast<double>(table_.sample.size()) * experiments /
+    const double share = kScreenShare * static_cast<double>(table_.sample.size()) * experiments /
                          static_cast<double>(effects.size());
     const auto rows = static_cast<std::size_t>(
         std::clamp(static_cast<int>(std::max<double>(kMostRuns, share)) / experiments, 1, 2));
@@ -238,9 +242,8 @@ class Inquiry {
         signatures.push_back(*std::move(signature));
       }
     }
-    auto scores =
-        inference::Screen(base_.model, signatures,
-                          {.level = options_.level, .seed = view_.campaign.filter.seed});
+    auto scores = inference::Screen(base_.model, signatures,
+                                    {.level = options_.level, .seed = view_.campaign.filter.seed});
     if (!scores.ok()) return scores.status();
     scores_ = *std::move(scores);
     for (const inference::Score& score : scores_) AddCandidate(score);
@@ -310,53 +313,114 @@ class Inquiry {
     const std::size_t count = std::min(kWarmFits, diagnosis_.candidates.size());
     if (count == 0) return absl::OkStatus();
     const auto runs = static_cast<int>(table_.sample.size());
-    const int samples = std::max(
-        kLeastWarmSamples, runs / (static_cast<int>(count) * kWarmIterations));
+    const int samples =
+        std::max(kLeastWarmSamples, runs / (static_cast<int>(count) * kWarmIterations));
     for (std::size_t c = 0; c < count; ++c) {
-      CandidateEffect& candidate = diagnosis_.candidates[c];
-      const auto text = ExtensionText(view_, {.effects = {candidate.effect},
-                                              .purpose = "warm_fit",
-                                              .held_out = false,
-                                              .samples = samples,
-                                              .iterations = kWarmIterations});
-      if (!text.ok()) return text.status();
-      const auto view =
-          laboratory_.Run(view_, *text, absl::StrCat("warm fit with ", candidate.effect));
-      if (!view.ok()) return view.status();
-      candidate.campaign = view->status.campaign();
-      diagnosis_.warm_evaluations += view->status.model_evaluations();
-      const auto response = RespondTo(
-          *view, nuisance_, RunsWithoutEffect(table_, view_.campaign, view->campaign));
-      if (!response.ok() || !response->trustworthy) continue;  // no emulator: the effect is not judged by a fit
-      const auto adequacy = inference::TestAdequacy(response->model);
-      const auto advantage = inference::Compare(response->model, base_.model);
-      if (!adequacy.ok() || !advantage.ok()) continue;
-      candidate.refit_p_value = adequacy->p_value;
-      candidate.refit_chi2 = adequacy->chi2;
-      candidate.over_base = *advantage;
-      candidate.predicted_rms_error = response->model.histories.row(adequacy->best).norm() /
-                                      std::sqrt(static_cast<double>(table_.histories.cols()));
-      candidate.explained_fraction =
-          std::clamp((diagnosis_.adequacy.chi2 - adequacy->chi2) /
-                         std::max(1.0, diagnosis_.adequacy.chi2 - diagnosis_.adequacy.degrees),
-                     0.0, 1.0);
-      for (Index j = 0; j < response->points.cols(); ++j) {
-        const std::string& name = view->campaign.parameters[static_cast<std::size_t>(j)].name;
-        if (name.starts_with(candidate.effect + ".")) {
-          candidate.amplitude[name] = response->points(adequacy->best, j);
+      if (auto s = FitOne(diagnosis_.candidates[c], samples, kWarmIterations); !s.ok()) return s;
+    }
+    // Where the emulator is not good enough to judge by, more iterations for the closest of them.
+    const std::int64_t limit = diagnosis_.warm_evaluations +
+                               static_cast<std::int64_t>(kWarmShare) * runs * FittedExperiments();
+    const std::int64_t cost = static_cast<std::int64_t>(samples) * kWarmMore * FittedExperiments();
+    std::map<std::string, int> iterations;
+    const bool misses = diagnosis_.adequacy.p_value < options_.level;
+    while (misses && diagnosis_.warm_evaluations + cost <= limit) {
+      CandidateEffect* closest = nullptr;
+      for (std::size_t c = 0; c < count; ++c) {
+        CandidateEffect& candidate = diagnosis_.candidates[c];
+        if (candidate.refit_p_value >= 0 ||
+            kWarmIterations + iterations[candidate.effect] + kWarmMore > kMostWarmIterations) {
+          continue;
+        }
+        if (closest == nullptr || candidate.predicted_rms_error < closest->predicted_rms_error) {
+          closest = &candidate;
         }
       }
-      warm_.emplace(candidate.effect,
-                    WarmFit{.view = *view, .best = PointOf(*view, *response, adequacy->best)});
-      fitted_.emplace(candidate.effect, response->model);
+      // With an adequate one at hand the others need not be pursued.
+      if (closest == nullptr || AnyAdequate()) break;
+      iterations[closest->effect] += kWarmMore;
+      if (auto s = FitOne(*closest, samples, kWarmIterations + iterations[closest->effect]);
+          !s.ok()) {
+        return s;
+      }
     }
-    // Refitted ones first, by how well they describe the readings.
+    // Those that explain the readings, by how well; then the other fits, by how close they come.
+    const auto rank = [this](const CandidateEffect& c) {
+      return Explains(c) ? 0 : (c.campaign.empty() ? 2 : 1);
+    };
     std::stable_sort(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
-                     [this](const CandidateEffect& a, const CandidateEffect& b) {
-                       const bool fa = fitted_.contains(a.effect);
-                       const bool fb = fitted_.contains(b.effect);
-                       return fa != fb ? fa : fa && a.over_base.nats > b.over_base.nats;
+                     [&rank](const CandidateEffect& a, const CandidateEffect& b) {
+                       if (rank(a) != rank(b)) return rank(a) < rank(b);
+                       if (rank(a) == 0) return a.over_base.nats > b.over_base.nats;
+                       return rank(a) == 1 && a.predicted_rms_error < b.predicted_rms_error;
                      });
+    return absl::OkStatus();
+  }
+
+  bool Explains(const CandidateEffect& candidate) const {
+    return candidate.refit_p_value >= options_.level &&
+           candidate.over_base.nats > 2 * candidate.over_base.sd;
+  }
+  bool AnyAdequate() const {
+    return std::any_of(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
+                       [this](const CandidateEffect& c) { return Explains(c); });
+  }
+
+  // The model with the effect, refitted; refit_p_value stays below zero where the emulator of its
+  // runs is not good enough to judge by, predicted_rms_error is then that of the best run.
+  absl::Status FitOne(CandidateEffect& candidate, int samples, int iterations) {
+    const auto text = ExtensionText(view_, {.effects = {candidate.effect},
+                                            .purpose = "warm_fit",
+                                            .held_out = false,
+                                            .samples = samples,
+                                            .iterations = iterations});
+    if (!text.ok()) return text.status();
+    const auto view =
+        laboratory_.Run(view_, *text, absl::StrCat("warm fit with ", candidate.effect));
+    if (!view.ok()) return view.status();
+    candidate.campaign = view->status.campaign();
+    diagnosis_.warm_evaluations += view->status.model_evaluations();
+    const RunTable own = RunsOf(*view);
+    const auto readings = static_cast<double>(table_.histories.cols());
+    if (own.histories.rows() > 0) {
+      Index best = 0;
+      candidate.predicted_rms_error =
+          std::sqrt(own.histories.rowwise().squaredNorm().minCoeff(&best) / readings);
+      std::map<std::string, double> values;
+      for (Index j = 0; j < own.parameters.cols(); ++j) {
+        values[view->campaign.parameters[static_cast<std::size_t>(j)].name] =
+            own.parameters(best, j);
+      }
+      warm_.insert_or_assign(candidate.effect, WarmFit{.view = *view, .best = values});
+      for (const auto& [name, value] : values) {
+        if (name.starts_with(candidate.effect + ".")) candidate.amplitude[name] = value;
+      }
+    }
+    const auto response =
+        RespondTo(*view, nuisance_, RunsWithoutEffect(table_, view_.campaign, view->campaign));
+    if (!response.ok() || !response->trustworthy) return absl::OkStatus();
+    const auto adequacy = inference::TestAdequacy(response->model);
+    const auto advantage = inference::Compare(response->model, base_.model);
+    if (!adequacy.ok() || !advantage.ok()) return absl::OkStatus();
+    candidate.refit_p_value = adequacy->p_value;
+    candidate.refit_chi2 = adequacy->chi2;
+    candidate.over_base = *advantage;
+    candidate.predicted_rms_error =
+        response->model.histories.row(adequacy->best).norm() / std::sqrt(readings);
+    candidate.explained_fraction =
+        std::clamp((diagnosis_.adequacy.chi2 - adequacy->chi2) /
+                       std::max(1.0, diagnosis_.adequacy.chi2 - diagnosis_.adequacy.degrees),
+                   0.0, 1.0);
+    for (Index j = 0; j < response->points.cols(); ++j) {
+      const std::string& name = view->campaign.parameters[static_cast<std::size_t>(j)].name;
+      if (name.starts_with(candidate.effect + ".")) {
+        candidate.amplitude[name] = response->points(adequacy->best, j);
+      }
+    }
+    warm_.insert_or_assign(
+        candidate.effect,
+        WarmFit{.view = *view, .best = PointOf(*view, *response, adequacy->best)});
+    fitted_.insert_or_assign(candidate.effect, response->model);
     return absl::OkStatus();
   }
 
@@ -369,21 +433,21 @@ class Inquiry {
     return values;
   }
 
-  // The named effect, or the best, against what comes next; the base model where there is no second.
+  // The named effect, or the best, against what comes next; the base model where there is no
+  // second.
   absl::Status PlanNext() {
     std::vector<Rival> rivals;
     for (const CandidateEffect& candidate : diagnosis_.candidates) {
       const auto found = warm_.find(candidate.effect);
       if (found == warm_.end() || rivals.size() >= kMostNames) continue;
-      const bool named = diagnosis_.verdict != "ambiguous" || rivals.empty() ||
-                         std::find(diagnosis_.candidates.front().confusable_with.begin(),
-                                   diagnosis_.candidates.front().confusable_with.end(),
-                                   candidate.effect) !=
-                             diagnosis_.candidates.front().confusable_with.end();
+      const bool named =
+          diagnosis_.verdict != "ambiguous" || rivals.empty() ||
+          std::find(diagnosis_.candidates.front().confusable_with.begin(),
+                    diagnosis_.candidates.front().confusable_with.end(),
+                    candidate.effect) != diagnosis_.candidates.front().confusable_with.end();
       if (!named) continue;
-      rivals.push_back({.name = candidate.effect,
-                        .view = &found->second.view,
-                        .values = found->second.best});
+      rivals.push_back(
+          {.name = candidate.effect, .view = &found->second.view, .values = found->second.best});
       if (diagnosis_.verdict != "ambiguous" && rivals.size() == 2) break;
     }
     if (rivals.size() == 1) {
@@ -407,29 +471,32 @@ class Inquiry {
   void Conclude(bool base_fits) {
     std::vector<std::string> adequate;
     for (const CandidateEffect& candidate : diagnosis_.candidates) {
-      if (candidate.refit_p_value >= options_.level &&
-          candidate.over_base.nats > 2 * candidate.over_base.sd) {
+      if (Explains(candidate)) {
         adequate.push_back(candidate.effect);
       }
     }
     if (adequate.empty()) {
       diagnosis_.verdict = base_fits ? "adequate" : "unexplained";
+      // Judged or not: the one that comes closest, if it comes clearly closer than the base model.
+      const CandidateEffect* closest = nullptr;
       for (const CandidateEffect& candidate : diagnosis_.candidates) {
-        if (!base_fits && candidate.refit_p_value >= 0 &&
-            candidate.over_base.nats > 2 * candidate.over_base.sd) {
-          diagnosis_.best_partial = candidate.effect;
-          break;
+        if (candidate.campaign.empty()) continue;
+        const bool worse =
+            closest != nullptr && candidate.predicted_rms_error >= closest->predicted_rms_error;
+        if (!worse && candidate.predicted_rms_error < kClearlyCloser * diagnosis_.rms) {
+          closest = &candidate;
         }
       }
+      if (!base_fits && closest != nullptr) diagnosis_.best_partial = closest->effect;
       return;
     }
     std::vector<std::string> rivals;
     for (std::size_t k = 1; k < adequate.size(); ++k) {
       if (!ClearlyBetter(adequate.front(), adequate[k])) rivals.push_back(adequate[k]);
     }
-    CandidateEffect& first = *std::find_if(
-        diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
-        [&](const CandidateEffect& c) { return c.effect == adequate.front(); });
+    CandidateEffect& first =
+        *std::find_if(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
+                      [&](const CandidateEffect& c) { return c.effect == adequate.front(); });
     if (rivals.empty()) {
       diagnosis_.verdict = "missing_effect";
       diagnosis_.effect = first.effect;

@@ -45,8 +45,8 @@ Json ToJson(const std::vector<ImproveStep>& steps, const std::string& digest) {
     list.push_back({{"campaign", step.campaign},
                     {"effects", step.effects},
                     {"rms_error", step.rms_error},
-                    {"heldout_rms_error", step.heldout_rms_error ? Json(*step.heldout_rms_error)
-                                                                 : Json(nullptr)},
+                    {"heldout_rms_error",
+                     step.heldout_rms_error ? Json(*step.heldout_rms_error) : Json(nullptr)},
                     {"log_evidence", step.log_evidence},
                     {"verdict", step.verdict}});
   }
@@ -90,8 +90,8 @@ class Improvement {
     for (int added = 0;; ++added) {
       const bool last = added >= max_effects_;
       const auto diagnosis =
-          Diagnose(laboratory_, view, {.only_adequacy = last || (added > 0 && Fits(view)),
-                                        .next_experiment = false});
+          Diagnose(laboratory_, view,
+                   {.only_adequacy = last || (added > 0 && Fits(view)), .next_experiment = false});
       if (!diagnosis.ok()) return diagnosis.status();
       const auto comparison = report::Compare(view, report::PredictReadings(view));
       steps_.push_back({.campaign = view.status.campaign(),
@@ -102,14 +102,13 @@ class Improvement {
                         .verdict = diagnosis->verdict});
       const std::string next = NextEffect(*diagnosis);
       if (diagnosis->verdict == "adequate" || last || next.empty()) break;
-      const auto text = ExtensionText(view, {.effects = {next},
-                                             .purpose = "extension",
-                                             .samples = std::nullopt,
-                                             .iterations = std::nullopt});
-      if (!text.ok()) return text.status();
-      auto extended = laboratory_.Run(view, *text, "calibration with " + next);
+      auto extended = Extended(view, next);
       if (!extended.ok()) return extended.status();
-      if (extended->posterior.posterior_from() == "none") break;
+      if (extended->posterior.posterior_from() == "none") {
+        std::cerr << "the calibration with " << next << " (" << extended->status.campaign()
+                  << ") has no posterior, so it is no step: run more samples\n";
+        break;
+      }
       view = *std::move(extended);
     }
     last_ = std::move(view);
@@ -120,6 +119,25 @@ class Improvement {
   const std::string& digest() const { return digest_; }
 
  private:
+  // With one parameter more the parent's iterations may not do: then as many again.
+  absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
+                                                const std::string& effect) {
+    absl::StatusOr<report::CampaignView> extended = absl::UnknownError("not run");
+    for (const int times : {1, 2}) {
+      const auto text = ExtensionText(
+          view,
+          {.effects = {effect},
+           .purpose = "extension",
+           .samples = std::nullopt,
+           .iterations = times == 1 ? std::nullopt
+                                    : std::optional<int>(times * view.campaign.max_iterations)});
+      if (!text.ok()) return text.status();
+      extended = laboratory_.Run(view, *text, "calibration with " + effect);
+      if (!extended.ok() || extended->posterior.posterior_from() != "none") break;
+    }
+    return extended;
+  }
+
   bool Fits(const report::CampaignView& view) {
     const auto quick = Diagnose(laboratory_, view, {.only_adequacy = true});
     return quick.ok() && quick->verdict == "adequate";
@@ -156,9 +174,8 @@ int Improve(const Arguments& arguments) {
   if (!view.ok()) return Fail(view.status());
   Improvement improvement(laboratory, (*session)->client(), arguments.max_effects);
   if (auto status = improvement.From(*std::move(view)); !status.ok()) return Fail(status);
-  std::cout << (arguments.json
-                    ? ToJson(improvement.steps(), improvement.digest()).dump(2) + "\n"
-                    : ToText(improvement.steps()));
+  std::cout << (arguments.json ? ToJson(improvement.steps(), improvement.digest()).dump(2) + "\n"
+                               : ToText(improvement.steps()));
   return kDone;
 }
 
