@@ -28,6 +28,10 @@ struct ControlPath {
 ControlPath CleanControl(const std::vector<double>& readings, double start,
                          std::optional<double> noise);
 
+/// The readings as they are, each a run of its own: for controls that are no path. Readings count as
+/// equally far apart.
+ControlPath AsRead(const std::vector<double>& readings);
+
 /// Loading stage of each reading: initial_loading, then unload_1, reload_1, unload_2, ... at the
 /// turning points. Where `strength` (a deviatoric observable at each reading; empty: none) has a
 /// clear peak within the first stage, the part beyond half of the peak is pre_peak and the part

@@ -133,6 +133,16 @@ void RefuseSimulationKeys(const MapReader& map) {
   }
 }
 
+// Grains that are poured are neither consolidated nor strained in stages.
+void RefusePreparationKeys(MapReader& map, const dem::TestInfo& test) {
+  map.Ignore({"consolidation", "initial_stress", "loading_rate", "staging"});
+  for (const char* key : {"consolidation", "initial_stress", "loading_rate", "staging"}) {
+    if (map.Has(key)) {
+      map.Problem(key, absl::StrCat("has no meaning in ", test.name, "; remove it"));
+    }
+  }
+}
+
 void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   Experiment experiment;
   experiment.name = ReadName(map, campaign);
@@ -148,10 +158,15 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
     if (test == nullptr) map.Ignore({"confining_pressure"});
     RefuseSimulationKeys(map);
   } else {
-    experiment.specimens = ReadSpecimens(map, context);
-    ReadConsolidation(map, experiment);
-    ReadInitialStress(map, experiment);
-    ReadStaging(map, experiment);
+    const bool poured = test != nullptr && test->poured;
+    experiment.specimens = ReadSpecimens(map, poured, context);
+    if (poured) {
+      RefusePreparationKeys(map, *test);
+    } else {
+      ReadConsolidation(map, experiment);
+      ReadInitialStress(map, experiment);
+      ReadStaging(map, experiment);
+    }
   }
   const MeasurementRules rules{
       .precomputed = campaign.precomputed.has_value(),
