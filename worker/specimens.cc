@@ -4,13 +4,16 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
 #include "worker/scenario_from_spec.h"
 
 namespace calib::worker {
 namespace {
 
 std::string KeyOf(const v1::AttemptSpec& spec) {
-  return spec.has_recipe() ? absl::StrCat("recipe ", spec.recipe().SerializeAsString())
+  const dem::TestInfo* test = dem::FindTest(spec.test());
+  const char* kind = test != nullptr && test->poured ? "sizes " : "recipe ";
+  return spec.has_recipe() ? absl::StrCat(kind, spec.recipe().SerializeAsString())
                            : spec.packing_digest();
 }
 
@@ -58,7 +61,10 @@ absl::StatusOr<std::shared_ptr<const dem::Packing>> Specimens::Get(const v1::Att
 Specimens::Result Specimens::Make(const v1::AttemptSpec& spec, std::stop_token stop) const {
   absl::StatusOr<dem::Packing> packing;
   if (spec.has_recipe()) {
-    packing = dem::GeneratePacking(RecipeFromMessage(spec.recipe()), 1, stop);
+    const dem::TestInfo* test = dem::FindTest(spec.test());
+    packing = test != nullptr && test->poured
+                  ? dem::GenerateSizes(RecipeFromMessage(spec.recipe()))
+                  : dem::GeneratePacking(RecipeFromMessage(spec.recipe()), 1, stop);
   } else if (spec.packing_digest().empty()) {
     packing = dem::Packing{};  // the test makes its bodies from its settings
   } else {

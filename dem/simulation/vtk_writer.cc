@@ -1,9 +1,11 @@
 #include "dem/simulation/vtk_writer.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <numeric>
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
@@ -15,11 +17,13 @@ absl::Status WriteVtk(const Assembly& assembly, const std::string& directory, in
   const ParticleArrays& p = assembly.particles();
   const PeriodicCell& cell = assembly.cell();
   const std::size_t n = p.x.size();
-  std::vector<std::size_t> at(n);  // position in the arrays of each grain of the packing
-  for (std::size_t k = 0; k < n; ++k) {
-    at[static_cast<std::size_t>(p.id[k])] = k;
-  }
-  const auto wrapped = [](double s, double length) { return s - std::floor(s / length) * length; };
+  std::vector<std::size_t> at(n);  // places in the arrays, by id: grains may have left
+  std::iota(at.begin(), at.end(), std::size_t{0});
+  std::sort(at.begin(), at.end(), [&](std::size_t a, std::size_t b) { return p.id[a] < p.id[b]; });
+  const auto wrapped = [&cell](double s, int a) {
+    const double length = cell.length[a];
+    return cell.open[a] ? s : s - std::floor(s / length) * length;
+  };
 
   std::string text = absl::StrFormat(
       "# vtk DataFile Version 3.0\ngrains, load step %d, periodic cell %.9g %.9g %.9g "
@@ -27,11 +31,11 @@ absl::Status WriteVtk(const Assembly& assembly, const std::string& directory, in
       "POINTS %d double\n",
       load_step, cell.length[0], cell.length[1], cell.length[2], n);
   for (const std::size_t k : at) {
-    const double layers = std::floor(p.z[k] / cell.length[2]);  // wraps along (tilt, 0, Lz)
-    const double z = p.z[k] - layers * cell.length[2];
-    const double skew = z / cell.length[2] * cell.Tilt();
-    const double x = wrapped(p.x[k] - layers * cell.Tilt() - skew, cell.length[0]) + skew;
-    absl::StrAppendFormat(&text, "%.12g %.12g %.12g\n", x, wrapped(p.y[k], cell.length[1]), z);
+    // A sheared cell, which has no open axes, wraps along (tilt, 0, Lz).
+    const double layers = cell.Tilt() != 0 ? std::floor(p.z[k] / cell.length[2]) : 0;
+    const double skew = (p.z[k] / cell.length[2] - layers) * cell.Tilt();
+    const double x = wrapped(p.x[k] - layers * cell.Tilt() - skew, 0) + skew;
+    absl::StrAppendFormat(&text, "%.12g %.12g %.12g\n", x, wrapped(p.y[k], 1), wrapped(p.z[k], 2));
   }
   absl::StrAppendFormat(&text, "VERTICES %d %d\n", n, 2 * n);
   for (std::size_t i = 0; i < n; ++i) {

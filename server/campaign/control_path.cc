@@ -185,6 +185,15 @@ ControlPath CleanControl(const std::vector<double>& readings, double start,
   return path;
 }
 
+ControlPath AsRead(const std::vector<double>& readings) {
+  ControlPath path;
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    path.points.push_back({.target = readings[i], .load_step = static_cast<int>(i)});
+    path.travelled.push_back(static_cast<double>(i + 1));
+  }
+  return path;
+}
+
 std::vector<std::string> NameSegments(const ControlPath& path, const StageCurves& curves) {
   std::vector<std::string> names(path.points.size(), "initial_loading");
   if (names.empty()) return names;

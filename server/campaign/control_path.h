@@ -28,6 +28,10 @@ struct ControlPath {
 ControlPath CleanControl(const std::vector<double>& readings, double start,
                          std::optional<double> noise);
 
+/// The readings as they are, each a run of its own: for controls that are no path. Readings count
+/// as equally far apart.
+ControlPath AsRead(const std::vector<double>& readings);
+
 /// What the stages are found from, one value per reading; empty: not measured.
 struct StageCurves {
   std::vector<double> strength = {};  ///< a deviatoric observable

@@ -162,6 +162,16 @@ void RefuseKeys(MapReader& map, const std::string& why) {
   }
 }
 
+// Grains that are poured are neither consolidated nor strained in stages.
+void RefusePreparationKeys(MapReader& map, const dem::TestInfo& test) {
+  map.Ignore({"consolidation", "initial_stress", "loading_rate", "staging"});
+  for (const char* key : {"consolidation", "initial_stress", "loading_rate", "staging"}) {
+    if (map.Has(key)) {
+      map.Problem(key, absl::StrCat("has no meaning in ", test.name, "; remove it"));
+    }
+  }
+}
+
 void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   Experiment experiment;
   experiment.name = ReadName(map, campaign);
@@ -175,12 +185,18 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
     if (test == nullptr) map.Ignore({"confining_pressure"});
     RefuseKeys(map, "has no meaning with precomputed runs; remove it");
   } else {
-    if (test != nullptr && !test->needs_packing) {
+    const bool poured = test != nullptr && test->poured;
+    const bool bodiless = test != nullptr && !test->needs_packing;
+    if (bodiless) {
       experiment.specimens = {NoPacking{}};
       RefuseKeys(map, absl::StrCat("has no meaning in ", test->name,
                                    ", which makes its bodies from its settings; remove it"));
     } else {
-      experiment.specimens = ReadSpecimens(map, context);
+      experiment.specimens = ReadSpecimens(map, poured, context);
+    }
+    if (poured) {
+      RefusePreparationKeys(map, *test);
+    } else if (!bodiless) {
       ReadConsolidation(map, experiment);
       ReadInitialStress(map, experiment);
       ReadStaging(map, experiment);

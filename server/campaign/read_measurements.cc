@@ -115,6 +115,19 @@ void CheckPath(const MapReader& map, const LaboratoryTable& table, const dem::Te
   }
 }
 
+void CheckRange(const LaboratoryTable& table, const dem::TestInfo& test, const ControlSpec& control,
+                const std::vector<double>& readings, ReadContext& context) {
+  if (!test.control_range) return;
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    if (readings[i] >= test.control_range->min && readings[i] <= test.control_range->max) continue;
+    context.problems().AddIn(
+        table.path(), table.LineOf(i), table.ColumnOf(control.name),
+        absl::StrCat("is ", readings[i], "; ", test.name, " allows ", test.control_range->min,
+                     " .. ", test.control_range->max));
+    return;
+  }
+}
+
 // Loading starts where consolidation ends: strains count from there, stresses from the start
 // pressure.
 double StartOf(const std::string& control, const Experiment& experiment) {
@@ -176,11 +189,17 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
   if (context.problems().size() > before) return;
   experiment.control_name = control.name;
   experiment.control_start = StartOf(control.name, experiment);
+  if (test != nullptr && !rules.precomputed) {
+    CheckRange(*table, *test, control, experiment.control, context);
+  }
   const ControlPath path =
-      CleanControl(experiment.control, experiment.control_start, control.noise);
+      test != nullptr && test->separate_points
+          ? AsRead(experiment.control)
+          : CleanControl(experiment.control, experiment.control_start, control.noise);
   if (!control.name.empty()) CheckPath(experiment_map, *table, test, control, path);
   experiment.path = path.points;
-  experiment.segment = NameSegments(path, {.strength = Strength(experiment), .volume = Volume(experiment)});
+  experiment.segment =
+      NameSegments(path, {.strength = Strength(experiment), .volume = Volume(experiment)});
 }
 
 }  // namespace calib::campaign

@@ -32,7 +32,7 @@ std::optional<Specimen> ReadFile(const MapReader& packing, const std::string& ke
   return file;
 }
 
-std::optional<dem::PackingRecipe> ReadRecipe(MapReader& map) {
+std::optional<dem::PackingRecipe> ReadRecipe(MapReader& map, bool poured) {
   const std::size_t before = map.problems().size();
   dem::PackingRecipe recipe;
   recipe.particles =
@@ -40,7 +40,11 @@ std::optional<dem::PackingRecipe> ReadRecipe(MapReader& map) {
   const auto porosity = map.Quantity("porosity", "1", kPorosity);
   const auto void_ratio = map.Quantity(
       "void_ratio", "1", {.min = 0.25, .max = 1.5, .min_open = true, .max_open = true});
-  if (map.Has("porosity") == map.Has("void_ratio")) {
+  if (poured) {
+    for (const char* key : {"porosity", "void_ratio", "aspect", "pressure"}) {
+      if (map.Has(key)) map.Problem(key, "has no meaning here: the test pours the grains itself");
+    }
+  } else if (map.Has("porosity") == map.Has("void_ratio")) {
     map.Problem("porosity", map.Has("porosity")
                                 ? "and void_ratio say the same thing; give one of them"
                                 : "is missing; give porosity or void_ratio");
@@ -94,7 +98,7 @@ std::vector<Specimen> ReadFiles(MapReader& experiment, MapReader& packing, const
 
 }  // namespace
 
-std::vector<Specimen> ReadSpecimens(MapReader& experiment, ReadContext& context) {
+std::vector<Specimen> ReadSpecimens(MapReader& experiment, bool poured, ReadContext& context) {
   const auto realizations = experiment.Integer("realizations", 1, kMostRealizations);
   if (experiment.Require("packing", "{file: ...}, {files: [...]} or {generate: {...}}") ==
       nullptr) {
@@ -115,7 +119,7 @@ std::vector<Specimen> ReadSpecimens(MapReader& experiment, ReadContext& context)
   if (packing->Has("files")) return ReadFiles(experiment, *packing, "files", realizations, context);
   auto generate = packing->Map("generate");
   if (!generate) return {};
-  auto recipe = ReadRecipe(*generate);
+  auto recipe = ReadRecipe(*generate, poured);
   if (!recipe) return {};
   std::vector<Specimen> specimens;
   for (std::int64_t i = 0; i < realizations.value_or(1); ++i) {

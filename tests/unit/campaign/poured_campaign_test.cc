@@ -1,0 +1,70 @@
+// Campaigns of tests that pour their grains: what they need, and what has no meaning there.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "absl/strings/str_replace.h"
+#include "tests/unit/campaign/good_campaign.h"
+
+namespace calib::campaign {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::ProblemsOf;
+using testing::ReaderOf;
+
+std::map<std::string, std::string> Files() {
+  return {{"silo.csv", "opening,mass_flow_rate\n40,0.9\n20,0.2\n30.5,0.5\n20,0.21\n"}};
+}
+
+std::string Yaml() {
+  return R"(name: silo
+model:
+  contact: hertz_mindlin
+  effects: [wall_friction]
+  density: 2500
+  fixed: {young_modulus: 1e7, poisson_ratio: 0.25}
+parameters:
+  friction_coefficient: {prior: uniform, min: 0.2, max: 0.9}
+  wall_friction.coefficient: {prior: uniform, min: 0.2, max: 0.9}
+experiments:
+  - name: outlet
+    test: silo_discharge
+    silo_width: 10 cm
+    packing: {generate: {particles: 200, radii: {mean: 2 mm, spread: 0.1}, seed: 4}}
+    data: {file: silo.csv, units: {opening: mm}}
+    control: opening
+    observables: {mass_flow_rate: {noise: {relative: 0.05}}}
+inference: {samples: 10}
+)";
+}
+
+TEST(PouredCampaign, TakesSizesOnlyAndReadingsInAnyOrder) {
+  const ReadOutcome outcome = ReadCampaign(Yaml(), "c.yaml", ReaderOf(Files()));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
+  const Experiment& experiment = outcome.campaign.experiments[0];
+  EXPECT_DOUBLE_EQ(experiment.settings.at("silo_width"), 0.1);
+  ASSERT_EQ(experiment.path.size(), 4U);
+  const double openings[] = {0.04, 0.02, 0.0305, 0.02};
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_DOUBLE_EQ(experiment.path[k].target, openings[k]);
+    EXPECT_EQ(experiment.path[k].load_step, static_cast<int>(k));
+    EXPECT_EQ(experiment.segment[k], "initial_loading");
+  }
+}
+
+TEST(PouredCampaign, RefusesWhatHasNoMeaningThere) {
+  const std::string packed = absl::StrReplaceAll(
+      Yaml(), {{"particles: 200", "particles: 200, porosity: 0.4"},
+               {"    control: opening", "    staging: {rate: 0.1}\n    control: opening"}});
+  EXPECT_EQ(ProblemsOf(packed, Files()),
+            "c.yaml:14: experiments[1].packing.generate.porosity: has no meaning here: the test "
+            "pours the grains itself\n"
+            "c.yaml:16: experiments[1].staging: has no meaning in silo_discharge; remove it\n");
+  auto files = Files();
+  files["silo.csv"] = "opening,mass_flow_rate\n40,0.9\n-20,0.2\n";
+  EXPECT_THAT(ProblemsOf(Yaml(), files), HasSubstr("silo.csv:3: opening: is -0.02"));
+}
+
+}  // namespace
+}  // namespace calib::campaign
