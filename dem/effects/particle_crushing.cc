@@ -60,7 +60,7 @@ EffectEntry ParticleCrushing() {
                                 "J. Mech. Phys. Solids 57 (2009) 1813",
                    .two_sided = false,
                    .rays = {{.parameter = "weakness",
-                             .steps = {0.05, 0.2},
+                             .steps = {0.2, 0.3},
                              .held = {{"reference_diameter", 1}}}}},
           .prepare = &Prepare};
 }
