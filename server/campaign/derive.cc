@@ -89,6 +89,15 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
   YamlAt(inference, "first_proposal") = std::move(proposal);
 }
 
+absl::Status ReplaceExperiments(const std::string& text, YamlNode& root) {
+  YamlParse parse = ParseYaml(text);
+  if (parse.error || parse.root->kind != Kind::kSequence) {
+    return absl::InvalidArgumentError("the experiments are not a YAML list");
+  }
+  YamlAt(root, "experiments") = std::move(*parse.root);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> Derive(const std::string& parent_yaml, const Derivation& derivation) {
@@ -101,6 +110,11 @@ absl::StatusOr<std::string> Derive(const std::string& parent_yaml, const Derivat
   YamlAt(root, "lineage") = YamlMap({{"parent", YamlScalar(derivation.lineage.parent)},
                                      {"purpose", YamlScalar(derivation.lineage.purpose)}});
   ChangeModel(derivation, root);
+  if (!derivation.experiments.empty()) {
+    if (auto replaced = ReplaceExperiments(derivation.experiments, root); !replaced.ok()) {
+      return replaced;
+    }
+  }
   ChangeExperiments(derivation, root);
   ChangeInference(derivation, root);
   return ToYaml(root);

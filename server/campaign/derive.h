@@ -23,6 +23,8 @@ struct Derivation {
   /// Held constant; replaces what the parent calibrates or fixes under the name.
   std::map<std::string, double> fixed{};
   bool held_out = true;  ///< false: experiments with role validate are left out
+  std::string
+      experiments{};  ///< YAML list that takes the place of the parent's; empty: the parent's
   std::optional<int> samples{}, max_iterations{};
   std::optional<FirstProposal> first_proposal{};
   /// Makes it a table: parameter values by name, and whose specimen and seed they take.

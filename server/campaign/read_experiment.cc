@@ -128,7 +128,8 @@ const dem::TestInfo* ReadTest(MapReader& map, const Campaign& campaign, Experime
 // Keys that only a simulation needs: all problems with them at once.
 void RefuseSimulationKeys(const MapReader& map) {
   for (const char* key :
-       {"packing", "realizations", "consolidation", "initial_stress", "loading_rate", "staging"}) {
+       {"packing", "realizations", "specimen_grains", "consolidation", "initial_stress",
+        "loading_rate", "staging"}) {
     if (map.Has(key)) map.Problem(key, "has no meaning with precomputed runs; remove it");
   }
 }
@@ -144,18 +145,21 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
           : Role::kCalibrate;
   if (campaign.precomputed) {
     map.Ignore(
-        {"packing", "realizations", "consolidation", "initial_stress", "loading_rate", "staging"});
+        {"packing", "realizations", "specimen_grains", "consolidation", "initial_stress",
+         "loading_rate", "staging"});
     if (test == nullptr) map.Ignore({"confining_pressure"});
     RefuseSimulationKeys(map);
   } else {
     experiment.specimens = ReadSpecimens(map, context);
+    experiment.specimen_grains = map.Quantity("specimen_grains", "1", {.min = 1});
     ReadConsolidation(map, experiment);
     ReadInitialStress(map, experiment);
     ReadStaging(map, experiment);
   }
   const MeasurementRules rules{
       .precomputed = campaign.precomputed.has_value(),
-      .noise_needed = campaign.filter.noise != inference::NoiseMode::kEssTarget};
+      .noise_needed = campaign.filter.noise != inference::NoiseMode::kEssTarget,
+      .measured = campaign.method != Method::kTable};
   if (campaign.precomputed || test != nullptr) {
     ReadMeasurements(map, rules, context, experiment);
     map.Finish();

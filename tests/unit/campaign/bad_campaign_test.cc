@@ -142,7 +142,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"NoiseTwice", "{relative: 0.02, floor: 0.01}", "{relative: 0.02, absolute: 0.01}",
                 "c.yaml:23: experiments[1].observables.stress_ratio.noise: needs exactly one of "
                 "relative (with floor), "
-                "absolute and column"},
+                "absolute, column and "
+                "covariance"},
         Mistake{"NegativeNoise", "{relative: 0.02, floor", "{relative: -0.02, floor",
                 "c.yaml:23: experiments[1].observables.stress_ratio.noise.relative: '-0.02' is "
                 "outside what is allowed: "
@@ -183,7 +184,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "latin_hypercube, symmetric_latin_hypercube"},
         Mistake{"NoSuchMethod", "method: iterative_bayesian_filter", "method: iterative_filter",
                 "c.yaml:36: inference.method: 'iterative_filter' is unknown; allowed: sqmc, "
-                "iterative_bayesian_filter, tmcmc, surrogate_msrs"},
+                "iterative_bayesian_filter, tmcmc, surrogate_msrs, table"},
         Mistake{"HalfASample", "samples: 20", "samples: 20.5",
                 "c.yaml:36: inference.samples: '20.5' is not a whole number from 2 to 1000000"},
         Mistake{"DiscardTooMuch", "discard_at_most: 1e-3", "discard_at_most: 2",
