@@ -66,7 +66,18 @@ std::vector<double> TravelledControl(const Experiment& experiment, double correl
   return travelled;
 }
 
-inference::DataSet MakeDataSet(const Campaign& campaign) {
+double ScatterShare(const Experiment& experiment) {
+  if (!experiment.specimen_grains || experiment.specimens.empty()) return 1;
+  double grains = 0;
+  if (const auto* file = std::get_if<PackingFile>(&experiment.specimens.front())) {
+    grains = static_cast<double>(file->packing.x.size());
+  } else {
+    grains = std::get<dem::PackingRecipe>(experiment.specimens.front()).particles;
+  }
+  return std::min(1.0, grains / *experiment.specimen_grains);
+}
+
+inference::DataSet MakeDataSet(const Campaign& campaign, Role role) {
   inference::DataSet data;
   for (std::size_t e = 0; e < campaign.experiments.size(); ++e) {
     const Experiment& experiment = campaign.experiments[e];
@@ -74,7 +85,7 @@ inference::DataSet MakeDataSet(const Campaign& campaign) {
     for (const MeasuredObservable& observable : experiment.observables) {
       data.ess_weights.back().push_back(observable.ess_weight);
     }
-    if (experiment.role != Role::kCalibrate) continue;
+    if (experiment.role != role) continue;
     std::vector<std::vector<double>> travelled;
     for (const MeasuredObservable& observable : experiment.observables) {
       travelled.push_back(TravelledControl(experiment, observable.correlation_length));
@@ -82,6 +93,7 @@ inference::DataSet MakeDataSet(const Campaign& campaign) {
     for (std::size_t i = 0; i < experiment.control.size(); ++i) {
       for (std::size_t j = 0; j < experiment.observables.size(); ++j) {
         const MeasuredObservable& observable = experiment.observables[j];
+        if (observable.values.empty()) continue;  // to be predicted
         data.readings.push_back({.experiment = static_cast<int>(e),
                                  .observable = static_cast<int>(j),
                                  .load_step = static_cast<int>(i),
@@ -94,6 +106,10 @@ inference::DataSet MakeDataSet(const Campaign& campaign) {
       const double length = experiment.observables[j].correlation_length;
       if (length > 0) {
         data.correlations.push_back({static_cast<int>(e), static_cast<int>(j), length});
+      }
+      const Eigen::MatrixXd& covariance = experiment.observables[j].covariance;
+      if (covariance.size() > 0) {
+        data.covariances.push_back({static_cast<int>(e), static_cast<int>(j), covariance});
       }
     }
   }

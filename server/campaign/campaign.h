@@ -35,10 +35,15 @@ struct CalibratedParameter {
 
 struct MeasuredObservable {
   std::string name;
-  std::vector<double> values;  ///< one per reading, SI, compression positive, strains logarithmic
-  std::vector<double> sd;      ///< one per reading, > 0 (may be empty with ess_target)
+  /// One per reading, SI, compression positive, strains logarithmic; none where the observable is
+  /// only predicted (method table).
+  std::vector<double> values;
+  std::vector<double> sd;         ///< one per reading, > 0 (may be empty with ess_target)
   double correlation_length = 0;  ///< in the control; 0: independent
-  double ess_weight = 1;          ///< w_j of ess_target
+  /// Of the errors of all readings, in the square of their SI unit, sd^2 its diagonal; empty: sd
+  /// and correlation_length say it all.
+  Eigen::MatrixXd covariance = {};
+  double ess_weight = 1;  ///< w_j of ess_target
 };
 
 enum class Role { kCalibrate, kValidate };
@@ -61,6 +66,8 @@ struct Experiment {
   Role role = Role::kCalibrate;
   /// Realizations: sample i uses specimen i mod size. Empty when precomputed.
   std::vector<Specimen> specimens;
+  /// Of the specimen that was measured; empty: unknown, taken for as few as the model's.
+  std::optional<double> specimen_grains;
   dem::Consolidation consolidation;
   std::optional<dem::InitialStress> initial_stress;
   std::optional<double> loading_rate;
@@ -165,9 +172,13 @@ int MostBatches(const Campaign& campaign);
 /// readings are never quite the same.
 std::vector<double> TravelledControl(const Experiment& experiment, double correlation_length);
 
-/// Readings of the calibrated experiments, flat, in processing order; experiment = index in
+/// Part of the variance between packings that the measurement has as well: grains of the model over
+/// grains of the measured specimen, at most 1; 1 where that is unknown.
+double ScatterShare(const Experiment& experiment);
+
+/// Readings of the experiments of a role, flat, in processing order; experiment = index in
 /// campaign.experiments.
-inference::DataSet MakeDataSet(const Campaign& campaign);
+inference::DataSet MakeDataSet(const Campaign& campaign, Role role = Role::kCalibrate);
 
 /// The priors of the calibrated parameters in order.
 std::vector<inference::Prior> Priors(const Campaign& campaign);

@@ -136,6 +136,11 @@ std::vector<double> LaboratoryTable::RawColumn(const std::string& column, const 
   return values;
 }
 
+double LaboratoryTable::Factor(const std::string& name) const {
+  const double* factor = FindIn(factors_, name);
+  return factor != nullptr ? *factor : 1;
+}
+
 bool LaboratoryTable::IsEngineering(const std::string& name) const {
   return engineering_ && IsStrain(name);
 }

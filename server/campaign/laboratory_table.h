@@ -22,6 +22,8 @@ class LaboratoryTable {
 
   const std::string& path() const { return path_; }
   std::size_t rows() const { return table_->rows(); }
+  /// True when the file has a column for one of our names.
+  bool Has(const std::string& name) const { return table_->Has(ColumnOf(name)); }
   int LineOf(std::size_t row) const { return table_->LineOf(row); }
   /// The file's column behind one of our names.
   std::string ColumnOf(const std::string& name) const;
@@ -32,6 +34,8 @@ class LaboratoryTable {
   /// A column by its name in the file, in the unit of our name `like`.
   std::vector<double> RawColumn(const std::string& column, const std::string& like,
                                 ReadContext& context) const;
+  /// What turns a number of the file's column behind one of our names into SI.
+  double Factor(const std::string& name) const;
   /// Engineering strains to logarithmic, ln being that of the deformed over the initial length or
   /// volume and compression positive: e_log = -ln(1 - e). Other observables pass unchanged.
   std::vector<double> ToModel(const std::string& name, const std::vector<double>& raw,

@@ -151,8 +151,9 @@ const dem::TestInfo* ReadTest(MapReader& map, const Campaign& campaign, Experime
   return dem::FindTest(experiment.test);
 }
 
-constexpr std::array<const char*, 6> kSpecimenKeys = {
-    "packing", "realizations", "consolidation", "initial_stress", "loading_rate", "staging"};
+constexpr std::array<const char*, 7> kSpecimenKeys = {
+    "packing",        "realizations", "specimen_grains", "consolidation",
+    "initial_stress", "loading_rate", "staging"};
 
 // Keys that only a specimen of grains needs: all problems with them at once.
 void RefuseKeys(MapReader& map, const std::string& why) {
@@ -193,6 +194,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
                                    ", which makes its bodies from its settings; remove it"));
     } else {
       experiment.specimens = ReadSpecimens(map, poured, context);
+      experiment.specimen_grains = map.Quantity("specimen_grains", "1", {.min = 1});
     }
     if (poured) {
       RefusePreparationKeys(map, *test);
@@ -204,7 +206,8 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   }
   const MeasurementRules rules{
       .precomputed = campaign.precomputed.has_value(),
-      .noise_needed = campaign.filter.noise != inference::NoiseMode::kEssTarget};
+      .noise_needed = campaign.filter.noise != inference::NoiseMode::kEssTarget,
+      .measured = campaign.method != Method::kTable};
   if (campaign.precomputed || test != nullptr) {
     ReadMeasurements(map, rules, context, experiment);
     map.Finish();

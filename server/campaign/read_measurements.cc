@@ -143,7 +143,7 @@ std::vector<double> Strength(const Experiment& experiment) {
   for (const char* name :
        {"q_over_p", "stress_ratio", "deviatoric_stress", "shear_stress_ratio", "shear_stress"}) {
     for (const MeasuredObservable& observable : experiment.observables) {
-      if (observable.name == name) return observable.values;
+      if (observable.name == name && !observable.values.empty()) return observable.values;
     }
   }
   return {};
@@ -165,16 +165,20 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
   const std::vector<ObservableSpec> specs = ReadObservableNames(experiment_map);
   std::vector<std::string> wanted;
   if (!control.name.empty()) wanted.push_back(control.name);
-  for (const ObservableSpec& spec : specs) wanted.push_back(spec.name);
+  for (const ObservableSpec& spec : specs) {
+    if (rules.measured) wanted.push_back(spec.name);
+  }
   const auto table = LaboratoryTable::Read(experiment_map, wanted, rules.precomputed, context);
 
   for (const ObservableSpec& spec : specs) {
     if (!Comparable(experiment_map, spec.name, control, rules, test)) continue;
     MeasuredObservable observable{.name = spec.name, .values = {}, .sd = {}};
-    const std::vector<double> raw = table ? table->Raw(spec.name, context) : std::vector<double>();
-    if (table) observable.values = table->ToModel(spec.name, raw, context);
-    ReadNoise(experiment_map, spec.name, spec.node, {control.name, rules.noise_needed},
-              table ? &*table : nullptr, raw, context, observable);
+    const bool given = table && (rules.measured || table->Has(spec.name));
+    const std::vector<double> raw = given ? table->Raw(spec.name, context) : std::vector<double>();
+    if (given) observable.values = table->ToModel(spec.name, raw, context);
+    ReadNoise(experiment_map, spec.name, spec.node,
+              {control.name, rules.noise_needed && rules.measured, rules.measured},
+              given ? &*table : nullptr, raw, context, observable);
     experiment.observables.push_back(std::move(observable));
   }
   if (!table) return;

@@ -11,6 +11,8 @@ struct MeasurementRules {
   bool precomputed = false;  ///< no model is driven: the control is optional
   bool noise_needed =
       true;  ///< false with ess_target, where the readings themselves scale the errors
+  /// False with the method table, which infers nothing: an observable need not have been measured.
+  bool measured = true;
 };
 
 /// Fills path, control, segment and observables of the experiment (whose name and test are known).

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "dem/catalog/catalog.h"
 #include "server/campaign/suggestion.h"
 
@@ -17,6 +19,7 @@ constexpr double kNextToNothing = 1e-9;  // of the largest reading
 struct NoiseSpec {
   std::optional<double> relative, floor, absolute;
   std::string column;
+  std::string covariance;  // file
 };
 
 std::string UnitOf(const std::string& name) {
@@ -42,11 +45,14 @@ std::optional<NoiseSpec> ReadSpec(MapReader& noise, const std::string& name) {
   spec.floor = noise.Quantity("floor", UnitOf(name), kNotNegative);
   spec.absolute = noise.Quantity("absolute", UnitOf(name), kPositive);
   spec.column = noise.Text("column").value_or("");
-  const int kinds = static_cast<int>(noise.Has("relative")) +
-                    static_cast<int>(noise.Has("absolute")) + static_cast<int>(noise.Has("column"));
+  spec.covariance = noise.Text("covariance").value_or("");
+  const int kinds =
+      static_cast<int>(noise.Has("relative")) + static_cast<int>(noise.Has("absolute")) +
+      static_cast<int>(noise.Has("column")) + static_cast<int>(noise.Has("covariance"));
   if (kinds != 1) {
     noise.problems().Add(noise.line(), noise.path(),
-                         "needs exactly one of relative (with floor), absolute and column");
+                         "needs exactly one of relative (with floor), absolute, column and "
+                         "covariance");
   } else if (noise.Has("floor") && !noise.Has("relative")) {
     noise.Problem("floor", "belongs to relative noise: sd = sqrt((relative y)^2 + floor^2)");
   }
@@ -64,6 +70,58 @@ std::vector<double> FromColumn(const NoiseSpec& spec, const std::string& name,
     }
   }
   return sd;
+}
+
+// Numbers of a square table without a header, row by row; one problem for what is wrong first.
+Eigen::MatrixXd ReadCovariance(const MapReader& noise, const std::string& path,
+                               std::size_t readings, double factor, ReadContext& context) {
+  const std::string* text = context.ReadNamedFile(noise, "covariance", path);
+  if (text == nullptr) return {};
+  const auto n = static_cast<Eigen::Index>(readings);
+  const std::string wanted =
+      absl::StrCat(readings, " numbers, one per reading, in the square of the observable's unit");
+  Eigen::MatrixXd matrix(n, n);
+  Eigen::Index row = 0;
+  int line = 0;
+  for (const absl::string_view raw : absl::StrSplit(*text, '\n')) {
+    ++line;
+    const absl::string_view content = raw.substr(0, raw.find('#'));
+    const std::vector<std::string> fields =
+        absl::StrSplit(content, absl::ByAnyChar(" ,\t\r"), absl::SkipEmpty());
+    if (fields.empty()) continue;
+    if (row == n || static_cast<Eigen::Index>(fields.size()) != n) {
+      context.problems().AddIn(
+          path, line, "",
+          row == n
+              ? absl::StrCat("has more than ", readings, " rows, but there are as many readings")
+              : absl::StrCat("has ", fields.size(), " numbers; a row has ", wanted));
+      return {};
+    }
+    for (Eigen::Index j = 0; j < n; ++j) {
+      double value = 0;
+      if (!absl::SimpleAtod(fields[static_cast<std::size_t>(j)], &value) || !std::isfinite(value)) {
+        context.problems().AddIn(
+            path, line, "",
+            absl::StrCat(Quoted(fields[static_cast<std::size_t>(j)]), " is not a finite number"));
+        return {};
+      }
+      matrix(row, j) = value * factor * factor;
+    }
+    ++row;
+  }
+  std::string problem;
+  if (row < n) {
+    problem = absl::StrCat("has ", row, " rows, but there are ", readings, " readings");
+  } else if (((matrix - matrix.transpose()).cwiseAbs().array() >
+              1e-9 * matrix.cwiseAbs().maxCoeff())
+                 .any()) {
+    problem = "is not symmetric, as a covariance is";
+  } else if (Eigen::LLT<Eigen::MatrixXd>(matrix).info() != Eigen::Success) {
+    problem = "is not positive definite, as a covariance is";
+  }
+  if (problem.empty()) return 0.5 * (matrix + matrix.transpose());
+  context.problems().AddIn(path, 0, "", problem);
+  return {};
 }
 
 std::vector<double> StandardDeviations(const NoiseSpec& spec, const MapReader& noise,
@@ -109,7 +167,8 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
                MeasuredObservable& observable) {
   const bool readable = table != nullptr && std::none_of(raw.begin(), raw.end(),
                                                          [](double v) { return std::isnan(v); });
-  if (!rules.noise_needed && readable) RefuseZeroReadings(experiment, name, *table, raw);
+  if (!rules.noise_needed && rules.measured && readable)
+    RefuseZeroReadings(experiment, name, *table, raw);
   const std::string path = experiment.PathOf("observables." + name);
   const bool given = node != nullptr && node->kind != YamlNode::Kind::kNull;
   bool noise_given = false;
@@ -122,7 +181,22 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
       observable.correlation_length =
           noise->Quantity("correlation_length", UnitOf(rules.control), kNotNegative).value_or(0);
       noise->Finish();
-      if (spec && readable) {
+      if (spec && noise->Has("correlation_length") && !spec->covariance.empty()) {
+        noise->Problem("correlation_length", "is part of the covariance already; remove it");
+      }
+      if (spec && readable && !spec->covariance.empty()) {
+        observable.covariance =
+            ReadCovariance(*noise, spec->covariance, raw.size(), table->Factor(name), context);
+        const auto n = observable.covariance.rows();
+        for (Eigen::Index i = 0; i < n; ++i) {
+          const double slope = table->Slope(name, raw[static_cast<std::size_t>(i)]);
+          observable.covariance.row(i) *= slope;
+          observable.covariance.col(i) *= slope;
+        }
+        for (Eigen::Index i = 0; i < n; ++i) {
+          observable.sd.push_back(std::sqrt(observable.covariance(i, i)));
+        }
+      } else if (spec && readable) {
         observable.sd = StandardDeviations(*spec, *noise, name, *table, raw, context);
         for (std::size_t i = 0; i < observable.sd.size(); ++i) {
           observable.sd[i] *= table->Slope(name, raw[i]);

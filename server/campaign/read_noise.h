@@ -8,7 +8,8 @@ namespace calib::campaign {
 struct NoiseRules {
   std::string control;  ///< name of the control, which correlation lengths are measured in; empty:
                         ///< the reading's index
-  bool noise_needed = true;  ///< false with ess_target
+  bool noise_needed = true;  ///< false with ess_target and where nothing is inferred
+  bool measured = true;      ///< false: readings are only predicted
 };
 
 /// Reads noise {relative, floor} | {absolute} | {column}, each with an optional correlation_length,

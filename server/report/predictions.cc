@@ -46,7 +46,8 @@ Counted WeightedSamples(const CampaignView& view) {
 Counted PosteriorDraws(const CampaignView& view) {
   Counted counted;
   for (const v1::Sample& sample : view.samples) {
-    if (sample.iteration() < view.posterior.iterations()) continue;
+    const bool ensemble = sample.iteration() < view.posterior.iterations();
+    if (ensemble || sample.purpose() == "replicate") continue;
     counted.samples.push_back(&sample);
     counted.weights.push_back(1);
   }
@@ -55,10 +56,10 @@ Counted PosteriorDraws(const CampaignView& view) {
 
 ExperimentPrediction FromRuns(const CampaignView& view, const campaign::Experiment& experiment,
                               const Counted& counted, bool band) {
-  Ensemble ensemble(experiment.observables.size(),
-                    std::vector<std::vector<double>>(
-                        experiment.control.size(),
-                        std::vector<double>(counted.samples.size(), std::nan(""))));
+  Ensemble ensemble(
+      experiment.observables.size(),
+      std::vector<std::vector<double>>(experiment.control.size(),
+                                       std::vector<double>(counted.samples.size(), std::nan(""))));
   ExperimentPrediction prediction;
   for (std::size_t s = 0; s < counted.samples.size(); ++s) {
     const auto history = view.states.find({experiment.name, counted.samples[s]->index()});

@@ -48,9 +48,15 @@ std::vector<inference::ParameterSummary> Answer::Parameters() const {
 void AskEmulator(const Definition& definition, std::span<const inference::Iteration> iterations,
                  Answer& answer) {
   const inference::FilterOptions& filter = definition.campaign.filter;
+  inference::EmulatorOptions options{.noise = filter.noise, .training = {}, .seed = filter.seed};
+  options.training.scatter_share =
+      definition.mean_data ? 0 : LargestScatterShare(definition.campaign);
   auto emulated = inference::EmulatedPosterior(
-      definition.priors, definition.data, {.noise = filter.noise, .seed = filter.seed}, iterations);
+      definition.priors, definition.mean_data.value_or(definition.data), options, iterations);
   if (emulated.ok()) {
+    if (emulated->adequate) {
+      answer.scatter = ScatterOfEmulator(definition, *emulated);
+    }
     answer.emulated = *std::move(emulated);
     ExplainEmulator(answer, answer.warnings);
   } else {

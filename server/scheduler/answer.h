@@ -11,6 +11,7 @@
 #include "inference/emulator/emulated_posterior.h"
 #include "inference/filter/iterative_filter.h"
 #include "server/scheduler/definition.h"
+#include "server/scheduler/scatter.h"
 
 namespace calib::scheduler {
 
@@ -20,7 +21,8 @@ struct Answer {
   Eigen::MatrixXd draws;                   ///< equally weighted, of tmcmc; else empty
   /// Where the weights do not suffice and the states could be emulated, adequately or not.
   std::optional<inference::EmulatedResult> emulated;
-  std::vector<std::string> warnings;  ///< whole sentences
+  std::vector<ObservableScatter> scatter;  ///< what runs on other packings differ by, where known
+  std::vector<std::string> warnings;       ///< whole sentences
 
   bool FromWeights() const { return weighted.degeneracy.empty(); }
   bool FromEmulator() const { return emulated.has_value() && emulated->adequate; }

@@ -99,6 +99,7 @@ std::shared_ptr<const Definition> MakeDefinition(campaign::Campaign campaign) {
   ReadingIndex readings(campaign, data);
   return std::make_shared<const Definition>(Definition{.campaign = std::move(campaign),
                                                        .data = std::move(data),
+                                                       .mean_data = std::nullopt,
                                                        .priors = std::move(priors),
                                                        .readings = std::move(readings)});
 }

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -36,7 +37,9 @@ class ReadingIndex {
 
 struct Definition {
   campaign::Campaign campaign;
-  inference::DataSet data;
+  inference::DataSet data;  ///< errors of a reading about a run
+  /// Errors of a reading about the mean history, where the scatter of runs is part of `data`.
+  std::optional<inference::DataSet> mean_data{};
   std::vector<inference::Prior> priors;
   ReadingIndex readings;
 

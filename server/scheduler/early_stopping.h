@@ -26,8 +26,8 @@ bool StopsEarly(const Definition& definition);
 
 /// Per new sample, the largest LogLikelihoodBound with which it is stopped:
 ///   [ln(finished weight) + ln(discard_at_most / N) - ln(prior / proposals)_i] / exponent
-/// where exponent is the guiding one and the proposals are those of all iterations and the new one. NaN (never stopped) for all
-/// while no sample has finished.
+/// where exponent is the guiding one and the proposals are those of all iterations and the new one.
+/// NaN (never stopped) for all while no sample has finished.
 absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
                                                    const History& history,
                                                    const inference::Iteration& next);

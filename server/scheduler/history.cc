@@ -66,8 +66,8 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     }
   }
   for (store::IterationRecord& record : *iterations) {
-    if (record.proposal == kHeldOutDraws) {
-      break;  // the last
+    if (record.proposal == kHeldOutDraws || record.proposal == kReplicates) {
+      break;  // nothing of the ensemble comes after them
     }
     inference::Iteration& iteration = history.iterations.emplace_back();
     if (campaign::IsFilter(definition.campaign.method)) {
@@ -82,6 +82,7 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
       iteration.log_proposal = definition.campaign.precomputed->log_proposal;
     }
     if (record.posterior.has_value()) {
+      history.previous_posterior = std::move(history.last_posterior);
       history.last_posterior = std::move(record.posterior);
     }
   }

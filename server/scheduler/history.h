@@ -22,7 +22,8 @@ struct History {
   std::vector<store::EvaluationKey> stopped_keys;  ///< evaluations stopped early
   std::vector<std::vector<char>> diverged;   ///< [iteration][position]: it has no finite prediction
   std::vector<store::SampleRecord> samples;  ///< of all iterations
-  std::optional<std::string> last_posterior;  ///< JSON, of the last iteration that has one
+  std::optional<std::string> last_posterior;      ///< JSON, of the last iteration that has one
+  std::optional<std::string> previous_posterior;  ///< of the iteration before that
   int stopped_early = 0;  ///< samples; those rejected without a run are not among them
   store::Effort effort;
 };
@@ -30,6 +31,8 @@ struct History {
 /// Stands in the place of an iteration's proposal when its samples are draws from the posterior,
 /// made for held-out experiments alone.
 inline constexpr const char* kHeldOutDraws = "\"draws from the posterior\"";
+/// Likewise when they are the best estimate on every packing, one sample each.
+inline constexpr const char* kReplicates = "\"best estimate on every packing\"";
 
 /// Reads every record in the order of its natural key.
 absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t campaign,

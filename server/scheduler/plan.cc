@@ -14,6 +14,7 @@
 #include "server/scheduler/history.h"
 #include "server/scheduler/method.h"
 #include "server/scheduler/posterior_record.h"
+#include "server/scheduler/scatter.h"
 
 namespace calib::scheduler {
 namespace {
@@ -28,8 +29,15 @@ constexpr double kValidatedMass = 0.99;
 
 class Planner {
  public:
-  Planner(const Definition& definition, const store::CampaignRecord& record, store::Reader& reader)
-      : definition_(definition), campaign_(definition.campaign), record_(record), reader_(reader) {}
+  /// scatter: measured on replicates, and part of the definition's errors where it belongs there.
+  Planner(const Definition& definition, const store::CampaignRecord& record, store::Reader& reader,
+          bool replicating, std::vector<ObservableScatter> scatter)
+      : definition_(definition),
+        campaign_(definition.campaign),
+        record_(record),
+        reader_(reader),
+        scatter_(std::move(scatter)),
+        replicating_(replicating) {}
 
   absl::StatusOr<Plan> Next() {
     absl::StatusOr<History> history = LoadHistory(definition_, record_.submitted.id, reader_);
@@ -88,17 +96,30 @@ class Planner {
       }
       stated_loss_ = loss->stated;
     }
-    auto outcome = MakeMethod(definition_)->Conclude(history_, !BudgetSpent());
+    if (replicating_) {
+      history_.last_posterior = history_.previous_posterior;  // the same iteration once more
+    }
+    auto outcome = MakeMethod(definition_)->Conclude(history_, !BudgetSpent() && !replicating_);
     if (!outcome.ok()) {
       return Fail(outcome.status());
     }
+    if (replicating_) {
+      outcome->converged |= plan_.converged && outcome->answer.HasIntervals();
+    }
+    if (!scatter_.empty()) {
+      outcome->answer.scatter = scatter_;
+    }
     plan_.converged = outcome->converged;
     AddConclusion(*outcome);
+    if (replicating_) {
+      return Validate(outcome->answer);
+    }
     if (!outcome->next.has_value()) {
       if (!outcome->converged && BudgetSpent()) {
         plan_.log.emplace_back("no further iteration: it would exceed the budget");
       }
-      return Validate(outcome->answer);
+      const int count = Replicates();
+      return count > 0 ? Replicate(outcome->answer, count) : Validate(outcome->answer);
     }
     return Begin(*std::move(outcome->next));
   }
@@ -147,11 +168,54 @@ class Planner {
     return values;
   }
 
+  /// How often the best estimate is to be run; 0: its scatter is not asked for or cannot be had.
+  int Replicates() {
+    const int wanted = std::min(ReplicatesOf(campaign_), campaign_.samples);
+    if (wanted < 2) {
+      return 0;
+    }
+    if (Exceeds(static_cast<std::int64_t>(wanted) *
+                static_cast<std::int64_t>(campaign_.experiments.size()))) {
+      plan_.log.emplace_back("the scatter of packings is not measured: it would exceed the budget");
+      return 0;
+    }
+    return wanted;
+  }
+
+  /// The best estimate on every packing, all experiments, as samples of an iteration of their own:
+  /// consecutive numbers meet every packing once.
+  absl::Status Replicate(const Answer& answer, int count) {
+    Start start{.iteration = static_cast<int>(history_.iterations.size()),
+                .proposal = kReplicates,
+                .samples = {}};
+    std::vector<double> best;
+    for (const inference::ParameterSummary& parameter : answer.Parameters()) {
+      best.push_back(parameter.mean);
+    }
+    std::vector<int> experiments(campaign_.experiments.size());
+    std::iota(experiments.begin(), experiments.end(), 0);
+    for (int i = 0; i < count; ++i) {
+      start.samples.push_back({.sample = start.iteration * record_.submitted.samples + i,
+                               .iteration = start.iteration,
+                               .parameters = best,
+                               .log_weight = -std::numeric_limits<double>::infinity()});
+      if (absl::Status status = Ask(start.samples.back(), experiments); !status.ok()) {
+        return status;
+      }
+    }
+    plan_.draws = std::move(start);
+    return absl::OkStatus();
+  }
+
   /// True when the next iteration would exceed what the user allowed.
   bool BudgetSpent() const {
+    return Exceeds(static_cast<std::int64_t>(campaign::LaterBatch(campaign_)) *
+                   static_cast<std::int64_t>(definition_.ExperimentsOf(Role::kCalibrate).size()));
+  }
+
+  /// True when so many evaluations more would.
+  bool Exceeds(std::int64_t next) const {
     const campaign::Budget& budget = campaign_.budget;
-    const auto next = static_cast<std::int64_t>(campaign::LaterBatch(campaign_)) *
-                      static_cast<std::int64_t>(definition_.ExperimentsOf(Role::kCalibrate).size());
     return (budget.model_evaluations.has_value() &&
             history_.effort.model_evaluations + next > *budget.model_evaluations) ||
            (budget.core_hours.has_value() &&
@@ -282,7 +346,7 @@ class Planner {
 
   /// Draws evenly spaced in the population, as samples of an iteration of their own.
   absl::Status ValidateDraws(const Eigen::MatrixXd& draws, const std::vector<int>& experiments) {
-    Start start{.iteration = static_cast<int>(history_.iterations.size()),
+    Start start{.iteration = static_cast<int>(history_.iterations.size()) + (replicating_ ? 1 : 0),
                 .proposal = kHeldOutDraws,
                 .samples = {}};
     const auto count = static_cast<Eigen::Index>(
@@ -325,6 +389,8 @@ class Planner {
   const campaign::Campaign& campaign_;
   const store::CampaignRecord& record_;
   store::Reader& reader_;
+  const std::vector<ObservableScatter> scatter_;
+  const bool replicating_;  // their runs have ended
   History history_;
   double stated_loss_ = 0;
   Plan plan_;
@@ -334,7 +400,24 @@ class Planner {
 
 absl::StatusOr<Plan> PlanNext(const Definition& definition, const store::CampaignRecord& campaign,
                               store::Reader& reader) {
-  return Planner(definition, campaign, reader).Next();
+  const auto iterations = reader.Iterations(campaign.submitted.id);
+  if (!iterations.ok()) {
+    return iterations.status();
+  }
+  // Replicates are the last runs of the calibration; what follows them is the end of its phase.
+  const bool replicating =
+      campaign.progress.phase == "calibrating" &&
+      std::any_of(iterations->begin(), iterations->end(),
+                  [](const store::IterationRecord& i) { return i.proposal == kReplicates; });
+  if (!replicating) {
+    return Planner(definition, campaign, reader, false, {}).Next();
+  }
+  auto scatter = MeasureScatter(definition, campaign.submitted.id, reader);
+  if (!scatter.ok()) {
+    return scatter.status();
+  }
+  const Definition with = DefinitionWith(definition, *scatter);
+  return Planner(with, campaign, reader, true, *std::move(scatter)).Next();
 }
 
 void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgress& progress,

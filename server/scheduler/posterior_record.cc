@@ -114,6 +114,25 @@ void AddEmulator(const Definition& definition, const inference::EmulatedResult& 
   }
 }
 
+void AddScatter(const Definition& definition, const Answer& answer, v1::Posterior& message) {
+  for (const ObservableScatter& scatter : answer.scatter) {
+    const campaign::Experiment& experiment =
+        definition.campaign.experiments[static_cast<std::size_t>(scatter.group.experiment)];
+    v1::Posterior::Scatter& out = *message.add_scatter();
+    out.set_experiment(experiment.name);
+    out.set_observable(
+        experiment.observables[static_cast<std::size_t>(scatter.group.observable)].name);
+    for (Eigen::Index i = 0; i < scatter.group.sd.size(); ++i) {
+      out.add_load_step(static_cast<int>(i));
+      out.add_sd(scatter.group.sd[i]);
+    }
+    out.set_correlation_length(scatter.group.length);
+    out.set_share(scatter.group.share);
+    out.set_from(scatter.from);
+    out.set_runs(scatter.runs);
+  }
+}
+
 using Json = nlohmann::json;
 
 Json ToJson(const Eigen::VectorXd& values) {
@@ -159,6 +178,7 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
   if (answer.emulated.has_value()) {
     AddEmulator(definition, *answer.emulated, message);
   }
+  AddScatter(definition, answer, message);
   AddPath(definition, posterior.path, message);
   message.mutable_warnings()->Add(answer.warnings.begin(), answer.warnings.end());
   message.set_noise(ToString(definition.campaign.filter.noise));

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
 #include "server/scheduler/definition.h"
+#include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
 
 namespace calib::service {
@@ -197,11 +198,17 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
   const auto samples = reader.Samples(campaign);
   const auto evaluations = reader.Evaluations(campaign);
   const auto attempts = reader.AttemptsBySample(campaign);
-  for (const absl::Status& status :
-       {record.status(), samples.status(), evaluations.status(), attempts.status()}) {
+  const auto iterations = reader.Iterations(campaign);
+  for (const absl::Status& status : {record.status(), samples.status(), evaluations.status(),
+                                     attempts.status(), iterations.status()}) {
     if (!status.ok()) {
       return status;
     }
+  }
+  std::map<int, std::string> purposes;  // by iteration
+  for (const store::IterationRecord& iteration : *iterations) {
+    if (iteration.proposal == scheduler::kReplicates) purposes[iteration.number] = "replicate";
+    if (iteration.proposal == scheduler::kHeldOutDraws) purposes[iteration.number] = "draw";
   }
   auto statuses = StatusBySample(*evaluations);
   std::vector<v1::Sample> messages;
@@ -215,6 +222,7 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
     message.set_weight(std::exp(sample.log_weight));
     message.set_log_likelihood(sample.log_likelihood);
     const auto made = attempts->find(sample.sample);
+    message.set_purpose(purposes[sample.iteration]);
     message.set_attempts(made == attempts->end() ? 0 : made->second);
   }
   return messages;

@@ -7,11 +7,11 @@ namespace {
 
 /// A cubic lattice of grains of several sizes, a little apart and a little out of place: loading
 /// shears it, so that friction matters.
-std::string Packing() {
+std::string Packing(unsigned seed) {
   constexpr int kEdge = 4;
   constexpr double kSpacing = 2.3e-3;
   std::string text = fmt::format("##PERIODIC:: {0} {0} {0}\n", kEdge * kSpacing);
-  unsigned random = 12345;
+  unsigned random = 12345 + 1000 * seed;
   const auto share = [&random] {  // any fixed sequence will do
     random = random * 1664525U + 1013904223U;
     return static_cast<double>(random >> 8) / static_cast<double>(1U << 24);
@@ -36,11 +36,18 @@ std::string Data(int load_steps) {
 }
 
 std::string Experiment(const std::string& name, const std::string& pressure, double noise,
-                       bool validate) {
+                       bool validate, int packings) {
+  std::string files = "file: packing.txt";
+  for (int i = 1; i < packings; ++i) {
+    files += i == 1 ? "" : ", ";
+    if (i == 1) files = "files: [packing.txt, ";
+    files += fmt::format("packing{}.txt", i);
+  }
+  if (packings > 1) files += "]";
   return fmt::format(R"(  - name: {0}
     test: triaxial_drained
     confining_pressure: {1}
-    packing: {{file: packing.txt}}
+    packing: {{{4}}}
     data:
       file: data.txt
       columns: {{axial_strain: axial, stress_ratio: ratio}}
@@ -51,14 +58,17 @@ std::string Experiment(const std::string& name, const std::string& pressure, dou
       stress_ratio: {{noise: {{relative: {2}, floor: {2}}}}}
     role: {3}
 )",
-                     name, pressure, noise, validate ? "validate" : "calibrate");
+                     name, pressure, noise, validate ? "validate" : "calibrate", files);
 }
 
 }  // namespace
 
 SmallCampaign MakeSmallCampaign(const SmallCampaignOptions& options) {
   SmallCampaign campaign;
-  campaign.files = {{"packing.txt", Packing()}, {"data.txt", Data(options.load_steps)}};
+  campaign.files = {{"packing.txt", Packing(0)}, {"data.txt", Data(options.load_steps)}};
+  for (int i = 1; i < options.packings; ++i) {
+    campaign.files[fmt::format("packing{}.txt", i)] = Packing(static_cast<unsigned>(i));
+  }
   campaign.yaml = fmt::format(
       R"(name: small
 model:
@@ -77,8 +87,10 @@ inference:
 {}failure: {{attempts: {}, pause_above: 0.5}}
 seed: 7
 {})",
-      Experiment("tx", "0.1 MPa", options.relative_noise, false),
-      options.with_validation ? Experiment("tx2", "0.2 MPa", options.relative_noise, true) : "",
+      Experiment("tx", "0.1 MPa", options.relative_noise, false, options.packings),
+      options.with_validation
+          ? Experiment("tx2", "0.2 MPa", options.relative_noise, true, options.packings)
+          : "",
       options.method, options.samples, options.max_iterations, options.inference,
       options.failure_attempts, options.extra);
   return campaign;

@@ -18,10 +18,11 @@ struct SmallCampaignOptions {
   int load_steps = 4;
   int failure_attempts = 5;
   double relative_noise = 0.1;
+  int packings = 1;              ///< realizations, each a packing file of its own
   bool with_validation = false;  ///< a second experiment at another pressure, held out
   std::string method = "iterative_bayesian_filter";
   std::string inference{};  ///< further lines under inference, each "  key: value\n"
-  std::string extra{};           ///< further top-level YAML
+  std::string extra{};      ///< further top-level YAML
 };
 
 SmallCampaign MakeSmallCampaign(const SmallCampaignOptions& options);

@@ -142,7 +142,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"NoiseTwice", "{relative: 0.02, floor: 0.01}", "{relative: 0.02, absolute: 0.01}",
                 "c.yaml:23: experiments[1].observables.stress_ratio.noise: needs exactly one of "
                 "relative (with floor), "
-                "absolute and column"},
+                "absolute, column and "
+                "covariance"},
         Mistake{"NegativeNoise", "{relative: 0.02, floor", "{relative: -0.02, floor",
                 "c.yaml:23: experiments[1].observables.stress_ratio.noise.relative: '-0.02' is "
                 "outside what is allowed: "

@@ -152,6 +152,59 @@ TEST(CampaignFile, PriorsOfEveryKind) {
   EXPECT_DOUBLE_EQ(c.parameters[0].prior.min, 1e4);  // cut off at what is admissible
 }
 
+TEST(CampaignFile, FullCovarianceOfTheErrors) {
+  auto files = GoodFiles();
+  files["covariance.txt"] =
+      "# percent^2\n0.04 0.01 0 0 0 0\n0.01 0.04 0 0 0 0\n0 0 0.04 0 0 0\n"
+      "0 0 0 0.04 0 0\n0 0 0 0 0.09 0\n0,0,0,0,0,0.09\n";
+  const std::string yaml = Spoiled("{absolute: 0.1 percent, correlation_length: 0.5 percent}",
+                                   "{covariance: covariance.txt}");
+  const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(files));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  const MeasuredObservable& volume = outcome.campaign.experiments[0].observables[1];
+  ASSERT_THAT(volume.sd, SizeIs(6));
+  const double slope0 = 1;                 // of ln at the first reading, 0
+  const double slope1 = 1 / (1 - 0.0012);  // and the second, 0.12 percent
+  EXPECT_DOUBLE_EQ(volume.covariance(0, 1), 1e-6 * slope0 * slope1);
+  EXPECT_DOUBLE_EQ(volume.sd[1], 2e-3 * slope1);
+  const inference::DataSet data = MakeDataSet(outcome.campaign);
+  ASSERT_THAT(data.covariances, SizeIs(1));
+  EXPECT_EQ(data.covariances[0].observable, 1);
+  EXPECT_TRUE(inference::ValidateData(data, inference::NoiseMode::kGiven).ok());
+  EXPECT_THAT(outcome.files, ::testing::Contains("covariance.txt"));
+
+  files["covariance.txt"] = "1 0\n0 1\n";
+  EXPECT_THAT(ProblemsOf(yaml, files),
+              ::testing::HasSubstr("covariance.txt:1: has 2 numbers; a row has 6 numbers"));
+  files["covariance.txt"] =
+      "1 2 0 0 0 0\n2 1 0 0 0 0\n0 0 1 0 0 0\n0 0 0 1 0 0\n0 0 0 0 1 0\n0 0 0 0 0 1\n";
+  EXPECT_THAT(ProblemsOf(yaml, files), ::testing::HasSubstr("is not positive definite"));
+}
+
+TEST(CampaignFile, GrainsOfTheSpecimenShareTheScatter) {
+  const Campaign plain = Read(GoodYaml()).campaign;
+  EXPECT_DOUBLE_EQ(ScatterShare(plain.experiments[1]), 1);
+  const Campaign c =
+      Read(Spoiled("    realizations: 3\n", "    realizations: 3\n    specimen_grains: 2e6\n"))
+          .campaign;
+  EXPECT_DOUBLE_EQ(ScatterShare(c.experiments[1]), 100 / 2e6);
+}
+
+TEST(CampaignFile, AnObservableThatIsOnlyPredictedNeedNoColumn) {
+  const std::string table =
+      "inference: {method: table, rows: [{young_modulus: 1 GPa, friction_angle: 30 deg, "
+      "rolling_resistance.stiffness: 0.1, rolling_resistance.friction: 0.1}]}";
+  std::string yaml = Spoiled(
+      "inference: {method: iterative_bayesian_filter, samples: 20, max_iterations: 3}", table);
+  const std::string noise = "    observables: {q_over_p: {noise: {relative: 0.05}}}\n";
+  yaml.replace(yaml.find(noise), noise.size(), "    observables: [q_over_p, volumetric_strain]\n");
+  const Campaign c = Read(yaml).campaign;
+  ASSERT_THAT(c.experiments[1].observables, SizeIs(2));
+  EXPECT_THAT(c.experiments[1].observables[0].values, SizeIs(3));
+  EXPECT_THAT(c.experiments[1].observables[0].sd, IsEmpty());
+  EXPECT_THAT(c.experiments[1].observables[1].values, IsEmpty());
+}
+
 TEST(Identity, ChangesWithEverythingSubmitted) {
   Submission a{
       .campaign_file = "x", .file_name = "c.yaml", .files = {{"p", "d"}}, .seed = std::nullopt};

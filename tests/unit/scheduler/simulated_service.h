@@ -74,6 +74,9 @@ class SimulatedService {
   /// What the store holds about the campaign's result, with every bit.
   std::string Fingerprint();
 
+  /// Relative change of a curve from one packing to another, a number of order one times this.
+  double packing_scatter = 0;
+
   SimulatedPorts& ports() { return *ports_; }
   Scheduler& scheduler() { return *scheduler_; }
   store::Reader Read() { return *store_->Read(); }

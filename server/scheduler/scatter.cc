@@ -1,0 +1,197 @@
+#include "server/scheduler/scatter.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "server/scheduler/history.h"
+
+namespace calib::scheduler {
+namespace {
+
+using campaign::Role;
+using Eigen::Index;
+
+constexpr std::size_t kMostReplicates = 16;
+
+// Loading stages and path lengths of a group's readings.
+struct Place {
+  std::vector<int> stage;
+  Eigen::VectorXd control;
+};
+
+Place PlaceOf(const campaign::Experiment& experiment, const inference::DataSet& data,
+              const std::vector<int>& readings) {
+  Place place{.stage = {}, .control = Eigen::VectorXd(static_cast<Index>(readings.size()))};
+  std::map<std::string, int> stages;
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const inference::Reading& reading = data.readings[static_cast<std::size_t>(readings[i])];
+    const auto step = static_cast<std::size_t>(reading.load_step);
+    const std::string name = step < experiment.segment.size() ? experiment.segment[step] : "";
+    place.stage.push_back(stages.try_emplace(name, static_cast<int>(stages.size())).first->second);
+    place.control[static_cast<Index>(i)] = reading.control;
+  }
+  return place;
+}
+
+ObservableScatter Fit(const campaign::Campaign& campaign, const inference::DataSet& data,
+                      const std::pair<const std::pair<int, int>, std::vector<int>>& group,
+                      const inference::ScatterMoments& moments) {
+  const campaign::Experiment& experiment =
+      campaign.experiments[static_cast<std::size_t>(group.first.first)];
+  const Place place = PlaceOf(experiment, data, group.second);
+  ObservableScatter scatter;
+  scatter.group = inference::FitScatter(moments, place.stage, place.control);
+  scatter.group.experiment = group.first.first;
+  scatter.group.observable = group.first.second;
+  scatter.group.share = campaign::ScatterShare(experiment);
+  return scatter;
+}
+
+// Replicates x readings of one role, NaN where a run did not come.
+absl::StatusOr<Eigen::MatrixXd> ReplicateRuns(const campaign::Campaign& campaign,
+                                              const inference::DataSet& data, std::int64_t id,
+                                              const std::vector<int>& samples,
+                                              store::Reader& reader) {
+  const ReadingIndex index(campaign, data);
+  Eigen::MatrixXd runs = Eigen::MatrixXd::Constant(static_cast<Index>(samples.size()),
+                                                   static_cast<Index>(data.readings.size()),
+                                                   std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto states = reader.States(id, samples[i]);
+    if (!states.ok()) {
+      return states.status();
+    }
+    Eigen::RowVectorXd row = runs.row(static_cast<Index>(i));
+    for (const store::StateRecord& state : *states) {
+      index.Place(state.key.experiment, state.load_step, state.observables, row);
+    }
+    runs.row(static_cast<Index>(i)) = row;
+  }
+  return runs;
+}
+
+}  // namespace
+
+int ReplicatesOf(const campaign::Campaign& campaign) {
+  if (campaign.precomputed || campaign.filter.noise == inference::NoiseMode::kEssTarget) {
+    return 0;
+  }
+  std::size_t most = 0;
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    most = std::max(most, experiment.specimens.size());
+  }
+  return most < 2 ? 0 : static_cast<int>(std::min(most, kMostReplicates));
+}
+
+double LargestScatterShare(const campaign::Campaign& campaign) {
+  double largest = 0;
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    if (experiment.role == Role::kCalibrate) {
+      largest = std::max(largest, campaign::ScatterShare(experiment));
+    }
+  }
+  return largest;
+}
+
+absl::StatusOr<std::vector<ObservableScatter>> MeasureScatter(const Definition& definition,
+                                                              std::int64_t campaign,
+                                                              store::Reader& reader) {
+  const auto iterations = reader.Iterations(campaign);
+  const auto all = reader.Samples(campaign);
+  for (const absl::Status& status : {iterations.status(), all.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  std::vector<int> samples;
+  for (const store::IterationRecord& iteration : *iterations) {
+    for (const store::SampleRecord& sample : *all) {
+      if (iteration.proposal == kReplicates && sample.iteration == iteration.number) {
+        samples.push_back(sample.sample);
+      }
+    }
+  }
+  std::vector<ObservableScatter> result;
+  for (const Role role : {Role::kCalibrate, Role::kValidate}) {
+    const inference::DataSet data = campaign::MakeDataSet(definition.campaign, role);
+    const auto runs = ReplicateRuns(definition.campaign, data, campaign, samples, reader);
+    if (!runs.ok()) {
+      return runs.status();
+    }
+    for (const auto& group : inference::GroupsOf(data)) {
+      // Beyond its own packings an experiment's replicates are repetitions.
+      const auto& specimens =
+          definition.campaign.experiments[static_cast<std::size_t>(group.first.first)].specimens;
+      const Index packings = std::min(runs->rows(), static_cast<Index>(specimens.size()));
+      Eigen::MatrixXd finished(packings, static_cast<Index>(group.second.size()));
+      Index count = 0;
+      for (Index r = 0; r < packings; ++r) {
+        for (Index i = 0; i < finished.cols(); ++i) {
+          finished(count, i) = (*runs)(r, group.second[static_cast<std::size_t>(i)]);
+        }
+        count += finished.row(count).allFinite() ? 1 : 0;
+      }
+      if (count < 2) {
+        continue;
+      }
+      result.push_back(Fit(definition.campaign, data, group,
+                           inference::MomentsOfReplicates(finished.topRows(count))));
+      result.back().from = "realizations";
+      result.back().runs = static_cast<int>(count);
+    }
+  }
+  return result;
+}
+
+std::vector<ObservableScatter> ScatterOfEmulator(const Definition& definition,
+                                                 const inference::EmulatedResult& emulated) {
+  std::vector<ObservableScatter> result;
+  const Eigen::MatrixXd& factor = emulated.scatter_factor;
+  for (const auto& group : inference::GroupsOf(definition.data)) {
+    const auto n = static_cast<Index>(group.second.size());
+    inference::ScatterMoments moments{.variance = Eigen::VectorXd(n),
+                                      .neighbour = Eigen::VectorXd(std::max<Index>(0, n - 1))};
+    for (Index i = 0; i < n; ++i) {
+      const int t = group.second[static_cast<std::size_t>(i)];
+      moments.variance[i] = factor.row(t).squaredNorm() + emulated.scatter_white[t];
+      if (i + 1 < n) {
+        moments.neighbour[i] =
+            factor.row(t).dot(factor.row(group.second[static_cast<std::size_t>(i) + 1]));
+      }
+    }
+    result.push_back(Fit(definition.campaign, definition.data, group, moments));
+    result.back().from = "emulator";
+    result.back().runs = emulated.runs;
+  }
+  return result;
+}
+
+Definition DefinitionWith(const Definition& definition,
+                          const std::vector<ObservableScatter>& scatter) {
+  Definition with = definition;
+  if (!campaign::IsFilter(definition.campaign.method) ||
+      definition.campaign.filter.noise != inference::NoiseMode::kGiven) {
+    return with;
+  }
+  std::vector<inference::GroupScatter> groups;
+  std::vector<inference::GroupScatter> of_mean;
+  for (const ObservableScatter& one : scatter) {
+    const auto& experiment =
+        definition.campaign.experiments[static_cast<std::size_t>(one.group.experiment)];
+    if (experiment.role == Role::kCalibrate) {
+      groups.push_back(one.group);
+      // The mean over R packings is off by 1/R of the scatter, however many samples share them.
+      of_mean.push_back(one.group);
+      of_mean.back().share += 1.0 / one.runs;
+    }
+  }
+  if (!groups.empty()) {
+    with.data = inference::WithScatter(definition.data, groups, 1);
+    with.mean_data = inference::WithScatter(definition.data, of_mean, 0);
+  }
+  return with;
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,46 @@
+#pragma once
+// What runs on different packings differ by, measured after the calibration on the best estimate or
+// taken from the emulator of the runs.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/emulator/emulated_posterior.h"
+#include "inference/scatter/scatter.h"
+#include "server/scheduler/definition.h"
+#include "server/store/reader.h"
+
+namespace calib::scheduler {
+
+struct ObservableScatter {
+  inference::GroupScatter group;  ///< indices of campaign.experiments and its observables
+  const char* from = "";          ///< realizations | emulator
+  int runs = 0;                   ///< it was found from
+};
+
+/// How many packings the best estimate is to be run on: the most realizations of an experiment, up
+/// to 16; 0 where no experiment has two, where runs are given and where errors are not
+/// (ess_target).
+int ReplicatesOf(const campaign::Campaign& campaign);
+
+/// campaign::ScatterShare, the largest of the calibrated experiments.
+double LargestScatterShare(const campaign::Campaign& campaign);
+
+/// Scatter of every observable of every experiment (held-out ones too) that has two or more
+/// finished replicates on different packings. Errors: those of the store.
+absl::StatusOr<std::vector<ObservableScatter>> MeasureScatter(const Definition& definition,
+                                                              std::int64_t campaign,
+                                                              store::Reader& reader);
+
+/// Of every calibrated observable, from what the emulator does not explain of single runs.
+std::vector<ObservableScatter> ScatterOfEmulator(const Definition& definition,
+                                                 const inference::EmulatedResult& emulated);
+
+/// The definition with scatter in the errors of its readings, where that changes the posterior:
+/// filters with given noise. tmcmc and surrogate_msrs have decided by other errors.
+Definition DefinitionWith(const Definition& definition,
+                          const std::vector<ObservableScatter>& scatter);
+
+}  // namespace calib::scheduler
