@@ -152,6 +152,24 @@ class Assembly {
   [[nodiscard]] std::int64_t steps() const { return steps_; }
   [[nodiscard]] std::int64_t contact_updates() const { return contact_updates_; }
 
+  /// Everything that determines what follows, but the model and the number of threads, for archives
+  /// (dynamics/archive.h). Precondition: no clumps, which poured tests do not have.
+  template <class Archive>
+  void Visit(Archive& archive) {
+    ParticleArrays& p = particles_;
+    archive(cell_, p.x, p.y, p.z, p.vx, p.vy, p.vz, p.wx, p.wy, p.wz, p.fx, p.fy, p.fz, p.tx, p.ty,
+            p.tz, p.radius, p.inverse_mass, p.inverse_inertia, p.id, p.body);
+    archive(sliding_friction_, viscous_, gravity_, density_, next_id_, planar_, walls_, stale_,
+            reach_, last_dt_);
+    archive(list_.skin, list_.row, list_.first, list_.second, list_.image, list_.place_row,
+            list_.place_i, list_.place_j);
+    archive(searched_[0], searched_[1], searched_[2], searched_length_, searched_tilt_, moved_,
+            skin_, largest_radius_, touching_, history_, loads_, shift_, sums_, stress_,
+            shear_stress_, contacts_);
+    archive(bodies_, solid_volume_, mean_diameter_, nominal_critical_step_, steps_,
+            contact_updates_);
+  }
+
   /// Places and drives single grains by hand; for tests and for preparing states.
   ParticleArrays& mutable_particles() { return particles_; }
 

@@ -54,6 +54,15 @@ class Flow {
   void SetDrain(double z) { drain_ = z; }
   [[nodiscard]] const std::vector<Drained>& drained() const { return drained_; }
 
+  /// Everything that determines what follows, as bytes. Hooks, options and the model are the
+  /// caller's to make again.
+  [[nodiscard]] std::string Checkpoint() const;
+
+  /// Goes back to a checkpoint of a flow of the same model: from there on the same bits follow, on
+  /// any number of threads. Errors: INVALID_ARGUMENT saying why the bytes are none, of another
+  /// engine or of another model; the flow is then unchanged.
+  absl::Status Restore(const std::string& bytes);
+
   [[nodiscard]] double time() const { return time_; }
   [[nodiscard]] double time_step() const { return dt_; }
   [[nodiscard]] const std::string& reason() const { return reason_; }

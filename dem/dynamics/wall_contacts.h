@@ -65,9 +65,15 @@ class WallContacts {
 
   /// Calls visit(block, grains) for blocks of the present contacts without moving them on: lane k
   /// is of grain grains[k].
-  template <class Visit>
+  template <class Visitor>
   void VisitBlocks(const ParticleArrays& particles, const ContactModel& model, bool viscous,
-                   const Visit& visit) const;
+                   const Visitor& visit) const;
+
+  /// For archives: all state.
+  template <class Archive>
+  void Visit(Archive& archive) {
+    archive(walls_, searched_, moved_, rows_, candidates_, force_, contacts_);
+  }
 
   /// Grain q leaves: to[q] is the new index of a grain, -1 of one that is taken out. The search has
   /// to follow.
@@ -114,9 +120,9 @@ class WallContacts {
   std::int64_t contacts_ = 0;
 };
 
-template <class Visit>
+template <class Visitor>
 void WallContacts::VisitBlocks(const ParticleArrays& particles, const ContactModel& model,
-                               bool viscous, const Visit& visit) const {
+                               bool viscous, const Visitor& visit) const {
   ContactBlock block;
   block.wall = true;
   block.mass_factor = 2;

@@ -33,6 +33,13 @@ struct Wall {
     return velocity + Cross(angular_velocity, place - centre) + surface_velocity;
   }
 
+  /// For archives: all state.
+  template <class Archive>
+  void Visit(Archive& archive) {
+    archive(name, mesh.vertex, mesh.triangle, point, normal, active, velocity, angular_velocity,
+            centre, surface_velocity, friction);
+  }
+
   /// Moves it on by dt [s]. Turning is by the rational rotation of angle 2 atan(w dt/2), so that it
   /// needs no sine and a mesh keeps its shape to rounding.
   void Move(double dt);

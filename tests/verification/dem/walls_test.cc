@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "dem/dynamics/assembly.h"
+#include "dem/dynamics/flow.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -294,6 +295,79 @@ TEST(Membership, RemovedGrainsLeaveTheMemoryOfOthersAlone) {
     EXPECT_EQ(without.particles().id[k], same.particles().id[g]);
     ++k;
   }
+}
+
+/// Grains that pour through a turning funnel onto a floor.
+class Pouring {
+ public:
+  Pouring()
+      : assembly_(Make()),
+        flow_(assembly_, {.drop_height = 0.3, .low = {-1, -1, -1}, .high = {2, 2, 2}}, {}) {
+    flow_.SetDrain(0.004);
+  }
+  Flow& flow() { return flow_; }
+
+ private:
+  static Assembly Make() {
+    Packing grains;
+    for (int k = 0; k < 60; ++k) {
+      grains.x.push_back(0.25 + 0.011 * (k % 4 - 1.5));
+      grains.y.push_back(0.25 + 0.011 * (k / 4 % 4 - 1.5));
+      grains.z.push_back(0.15 + 0.011 * (k / 16));
+      grains.radius.push_back(kRadius);
+      grains.clump.push_back(-1);
+    }
+    grains.length[0] = grains.length[1] = grains.length[2] = 0.5;
+    TriangleMesh mesh;
+    AddFrustum(
+        {.centre = {0.25, 0.25, 0.08}, .height = 0.2, .lower_radius = 0.012, .upper_radius = 0.08},
+        mesh);
+    Wall funnel = MakeMeshWall("funnel", mesh);
+    funnel.centre = {0.25, 0.25, 0};
+    funnel.angular_velocity = {0, 0, 3};
+    Model model = With(Hard(0.3), "viscous_damping", {{"ratio", 0.3}});
+    model.parameters["young_modulus"] = 5e6;
+    return {grains,
+            kDensity,
+            ContactModel(model),
+            {.gravity = {0, 0, -kGravity}, .walls = {Floor(), funnel}},
+            1};
+  }
+
+  Assembly assembly_;
+  Flow flow_;
+};
+
+TEST(Checkpoint, AFlowGoesOnFromItBitForBit) {
+  Pouring whole;
+  ASSERT_EQ(whole.flow().Advance(0.1), StageEnd::kDone) << whole.flow().reason();
+  const std::string bytes = whole.flow().Checkpoint();
+  ASSERT_EQ(whole.flow().Advance(0.1), StageEnd::kDone) << whole.flow().reason();
+  Pouring resumed;
+  ASSERT_TRUE(resumed.flow().Restore(bytes).ok());
+  ASSERT_EQ(resumed.flow().Advance(0.1), StageEnd::kDone);
+  const ParticleArrays& a = whole.flow().assembly().particles();
+  const ParticleArrays& b = resumed.flow().assembly().particles();
+  EXPECT_GT(whole.flow().assembly().walls().contacts(), 0);
+  EXPECT_EQ(whole.flow().time(), resumed.flow().time());
+  EXPECT_EQ(whole.flow().drained().size(), resumed.flow().drained().size());
+  EXPECT_EQ(a.id, b.id);
+  EXPECT_EQ(a.x, b.x);
+  EXPECT_EQ(a.z, b.z);
+  EXPECT_EQ(a.wy, b.wy);
+}
+
+TEST(Checkpoint, BytesThatAreNoneAreRefusedAndChangeNothing) {
+  Pouring pouring;
+  ASSERT_EQ(pouring.flow().Advance(0.01), StageEnd::kDone);
+  const std::string bytes = pouring.flow().Checkpoint();
+  const double time = pouring.flow().time();
+  EXPECT_FALSE(pouring.flow().Restore("").ok());
+  EXPECT_FALSE(pouring.flow().Restore(std::string(1000, 'x')).ok());
+  EXPECT_FALSE(pouring.flow().Restore(bytes.substr(0, bytes.size() / 2)).ok());
+  EXPECT_FALSE(pouring.flow().Restore(bytes + "x").ok());
+  EXPECT_EQ(pouring.flow().time(), time);
+  EXPECT_EQ(pouring.flow().Checkpoint().size(), bytes.size());
 }
 
 TEST(Energy, OfAGrainThatRollsAndBouncesInABoxIsKept) {
