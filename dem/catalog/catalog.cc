@@ -288,6 +288,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "3"; }
+std::string EngineVersion() { return "4"; }
 
 }  // namespace calib::dem

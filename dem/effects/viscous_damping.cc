@@ -42,7 +42,8 @@ CALIB_DEM_CLONES void DampShear(const Dashpot dashpot, ContactBlock& b) {
     const double c = scale * std::sqrt(mass * b.tangential_stiffness[k]);
     const double limit = b.sliding_limit[k];
     const double spring = std::sqrt(b.fx[k] * b.fx[k] + b.fy[k] * b.fy[k] + b.fz[k] * b.fz[k]);
-    const double rate = spring < limit ? c * per_time : 0.0;
+    // Rounding must not decide: a spring that slides is cut to the limit, up to its last bit.
+    const double rate = spring < (1.0 - 1e-9) * limit ? c * per_time : 0.0;
     const double x = b.fx[k] - rate * b.slip_x[k];
     const double y = b.fy[k] - rate * b.slip_y[k];
     const double z = b.fz[k] - rate * b.slip_z[k];
