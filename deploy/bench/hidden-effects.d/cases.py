@@ -1,0 +1,50 @@
+"""The matrix: what is hidden in each measurement, how strongly, and how the measurement was made.
+
+Strengths are set by detectability: lambda is the squared distance, in standard deviations of a measurement, between the
+model with the effect and what the model without it can imitate. Its scale comes from a diagnosis of a campaign without a
+hidden effect, which says from which strength on an effect would have been found with 90 % power (see laboratory.py).
+"""
+import dataclasses, random
+
+MEASUREMENT_SIDE = {'apparatus_compliance', 'strain_offset', 'membrane_stiffness', 'load_cell_error'}
+LAMBDAS = (10, 60, 400)
+# Pairs of the row "two effects at once": one between the grains, one that acts elsewhere or otherwise.
+PAIRS = [('rolling_resistance', 'apparatus_compliance'), ('rolling_resistance', 'pressure_dependent_friction'),
+         ('contact_plasticity', 'membrane_stiffness')]
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    name: str
+    row: str                    # of the table
+    seed: int                   # of packing, parameters and noise
+    effects: tuple = ()         # hidden
+    parameters: tuple = ()      # (dotted name, SI value) of the hidden effects
+    staging: str = 'base'       # how the measurement was made: base | rate | step | grains
+    verb: str = 'diagnose'      # or improve
+    removed: str = ''           # effect that the diagnosis may not know
+
+
+def matrix(strengths, repeats, controls):
+    """strengths: {effect: {lambda: {dotted parameter: value}}}, as the laboratory measured them."""
+    cases = [Case(f'control-r{r + 1}', 'no hidden effect', 1000 + r) for r in range(controls)]
+    for staging in ('rate', 'step', 'grains'):
+        cases += [Case(f'control-{staging}-r{r + 1}', 'no hidden effect, other staging', 2000 + 100 * len(staging) + r,
+                       staging=staging) for r in range(max(1, repeats))]
+    for number, (effect, by_lambda) in enumerate(sorted(strengths.items())):
+        for strength in LAMBDAS:
+            row = 'measurement-side effect' if effect in MEASUREMENT_SIDE and strength > 10 else f'lambda = {strength}'
+            cases += [Case(f'{effect}-l{strength}-r{r + 1}', row, 10000 + 1000 * number + strength + r, (effect,),
+                           tuple(sorted(by_lambda[strength].items())),
+                           verb='improve' if strength == 60 else 'diagnose') for r in range(repeats)]
+        cases.append(Case(f'removed-{effect}-r1', 'true effect removed', 10000 + 1000 * number + 500, (effect,),
+                          tuple(sorted(by_lambda[60].items())), removed=effect))
+    for number, pair in enumerate(PAIRS):
+        if not set(pair) <= set(strengths):
+            continue
+        values = {k: v for effect in pair for k, v in strengths[effect][400].items()}
+        cases += [Case(f'{pair[0]}+{pair[1]}-r{r + 1}', 'two effects at once', 40000 + 100 * number + r, pair,
+                       tuple(sorted(values.items())), verb='improve') for r in range(repeats)]
+    # Interrupted runs are then a fair sample of the rows rather than the first few of them.
+    random.Random(1).shuffle(cases)
+    return cases

@@ -1,0 +1,181 @@
+"""Makes the measurements, runs the campaigns and keeps what came out; knows calibctl and files only."""
+import csv, hashlib, json, math, os, random, statistics, subprocess, threading
+
+YOUNG, FRICTION = (0.6e9, 1.2e9), (0.3, 0.6)     # where the truth is drawn from, well inside the priors
+NOISE = {'q_over_p': (0.015, 0.01), 'volumetric_strain': (0.0, 3e-4)}   # relative, absolute
+READINGS, STRAIN = 24, 0.08
+PRESSURES = {'low': ('0.1 MPa', 'calibrate'), 'high': ('0.4 MPa', 'calibrate'), 'held': ('0.2 MPa', 'validate')}
+STAGING = {'rate': 0.1, 'step': 0.004, 'grains': 300}
+LEVEL, POWER = 0.01, 0.9                          # of calibctl diagnose: `detectable`
+
+
+class Failed(Exception):
+    pass
+
+
+def axial_strains():
+    """Loading with one unloading and reloading half-way."""
+    up = [STRAIN * i / READINGS for i in range(READINGS + 1)]
+    half = len(up) // 2
+    return up[:half + 1] + [up[half] - 0.004, up[half] - 0.008, up[half] - 0.004] + up[half + 1:]
+
+
+class Laboratory:
+    def __init__(self, calibctl, folder):
+        self.calibctl, self.folder = calibctl, folder
+        os.makedirs(os.path.join(folder, 'sealed'), exist_ok=True)
+
+    # ---- one case -----------------------------------------------------------------------------------------------------
+    def path(self, case, *names):
+        return os.path.join(self.folder, case.name, *names)
+
+    def finished(self, case):
+        return os.path.exists(self.path(case, 'verdict.json'))
+
+    def run(self, case):
+        if self.finished(case):
+            return
+        os.makedirs(self.path(case), exist_ok=True)
+        if not os.path.exists(self.path(case, 'campaign.yaml')):
+            self.measure(case)
+        campaign = self.call(case, 'run', self.path(case, 'campaign.yaml'), '--workers', '1')
+        options = ['--without', case.removed] if case.removed else []
+        verdict = self.call(case, 'diagnose', campaign['campaign'], '--workers', '1', *options)
+        document = {'run': campaign, 'diagnose': verdict}
+        if case.verb == 'improve':
+            document['improve'] = self.call(case, 'improve', campaign['campaign'], '--workers', '1', '--max-effects', '2')
+            final = document['improve']['final_campaign']
+            document['final'] = self.call(case, 'posterior', final)
+        self.write(self.path(case, 'verdict.json'), json.dumps(document, indent=1))
+
+    def call(self, case, *arguments):
+        state = [] if arguments[0] in ('simulate', 'effects') else ['--state', self.path(case, 'state')]
+        r = subprocess.run([self.calibctl, *arguments, *state, '--json'], capture_output=True, text=True,
+                           stdin=subprocess.DEVNULL)
+        if r.returncode != 0:
+            raise Failed(f'{arguments[0]} ended with {r.returncode}: {r.stderr.strip()[-200:]}')
+        return json.loads(r.stdout)
+
+    def write(self, path, text):
+        with open(path + '.new', 'w') as out:
+            out.write(text)
+        os.replace(path + '.new', path)
+
+    # ---- measurements -------------------------------------------------------------------------------------------------
+    def campaign(self, seed, particles, staging, effects, parameters, realizations):
+        fixed = ''.join(f', {name}: {value!r}' for name, value in parameters)
+        text = f"""name: hidden
+model: {{contact: hertz_mindlin, effects: [{', '.join(effects)}], density: 2650000 kg/m^3, fixed: {{poisson_ratio: 0.2{fixed}}}}}
+parameters:
+  young_modulus: {{prior: log_uniform, min: 0.2 GPa, max: 4 GPa}}
+  friction_coefficient: {{prior: uniform, min: 0.1, max: 1.0}}
+"""
+        text += 'experiments:\n'
+        for name, (pressure, role) in PRESSURES.items():
+            text += f"""  - name: {name}
+    test: triaxial_drained
+    confining_pressure: {pressure}
+    packing: {{generate: {{particles: {particles}, porosity: 0.40, radii: {{mean: 1.5 mm, spread: 0.3}}, seed: {seed}}}}}
+    realizations: {realizations}
+    data: {{file: {name}.csv, strain: logarithmic}}
+    control: {{column: axial_strain, noise: 1e-5}}
+    staging: {{rate: {staging['rate']} 1/s, step: {staging['step']}, damping: [0.3, 0.9], unbalanced: 1e-3}}
+    observables:
+      q_over_p: {{noise: {{relative: {NOISE['q_over_p'][0]}, floor: {NOISE['q_over_p'][1]}}}}}
+      volumetric_strain: {{noise: {{absolute: {NOISE['volumetric_strain'][1]}}}}}
+    role: {role}
+"""
+        return text + 'inference: {method: iterative_bayesian_filter, samples: 24, max_iterations: 3}\nseed: 7\n'
+
+    def measure(self, case):
+        """Another packing (seed), 340 grains instead of 300, another rate, step or number of grains where the case says so."""
+        rnd = random.Random(case.seed)
+        truth = {'young_modulus': math.exp(rnd.uniform(*map(math.log, YOUNG))), 'friction_coefficient': rnd.uniform(*FRICTION)}
+        staging = {**STAGING, 'grains': 340}
+        staging.update({'rate': {'rate': 0.2}, 'step': {'step': 0.002}, 'grains': {'grains': 600}}.get(case.staging, {}))
+        work = self.path(case, 'making')
+        os.makedirs(work, exist_ok=True)
+        path = axial_strains()
+        for name in PRESSURES:
+            rows = ''.join(f'{strain!r},1,1\n' for strain in path)
+            self.write(os.path.join(work, name + '.csv'), 'axial_strain,q_over_p,volumetric_strain\n' + rows)
+        self.write(os.path.join(work, 'campaign.yaml'),
+                   self.campaign(case.seed + 50000, staging['grains'], staging, case.effects, case.parameters, 1))
+        states = os.path.join(work, 'states.csv')
+        given = [a for k, v in truth.items() for a in ('--set', f'{k}={v!r}')]
+        r = subprocess.run([self.calibctl, 'simulate', os.path.join(work, 'campaign.yaml'), *given, '-o', states],
+                           capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        if r.returncode != 0:
+            raise Failed(f'simulate ended with {r.returncode}: {r.stderr.strip()[-200:]}')
+        by_test = {name: [] for name in PRESSURES}
+        for row in csv.DictReader(open(states)):
+            by_test[row['experiment']].append(row)
+        for name, rows in by_test.items():
+            text = '# made by deploy/bench/hidden-effects\naxial_strain,q_over_p,volumetric_strain\n'
+            for strain, row in zip(path, rows):
+                values_ = []
+                for observable, (relative, absolute) in NOISE.items():
+                    y = float(row[observable])
+                    values_.append(y + rnd.gauss(0, 1) * math.hypot(relative * y, absolute))
+                text += f'{strain!r},{values_[0]:.6g},{values_[1]:.6g}\n'
+            self.write(self.path(case, name + '.csv'), text)
+        sealed = json.dumps({'effects': case.effects, 'parameters': {**truth, **dict(case.parameters)}, 'staging': case.staging}, indent=1)
+        self.write(os.path.join(self.folder, 'sealed', case.name + '.json'), sealed)
+        self.write(self.path(case, 'truth.sha256'), hashlib.sha256(sealed.encode()).hexdigest() + '\n')
+        for entry in os.listdir(work):
+            os.remove(os.path.join(work, entry))
+        os.rmdir(work)
+        # Last: a folder with a campaign is a complete measurement.
+        self.write(self.path(case, 'campaign.yaml'), self.campaign(1, STAGING['grains'], STAGING, (), (), 4))
+
+    def outcome(self, case):
+        """Verdict first, then the truth: its digest must be the one written down when the measurement was made."""
+        verdict = json.load(open(self.path(case, 'verdict.json')))
+        sealed = open(os.path.join(self.folder, 'sealed', case.name + '.json')).read()
+        if hashlib.sha256(sealed.encode()).hexdigest() != open(self.path(case, 'truth.sha256')).read().strip():
+            raise Failed(f'{case.name}: the sealed truth has been changed')
+        return {'case': case, 'verdict': verdict, 'truth': json.loads(sealed)}
+
+    # ---- strengths ----------------------------------------------------------------------------------------------------
+    def catalogue(self):
+        if not hasattr(self, '_catalogue'):
+            r = subprocess.run([self.calibctl, 'effects', '--json'], capture_output=True, text=True, check=True)
+            self._catalogue = {e['name']: e for e in json.loads(r.stdout)}
+        return self._catalogue
+
+    def measure_detectability(self):
+        import cases
+        path = os.path.join(self.folder, 'detectable.json')
+        if os.path.exists(path):
+            return
+        for seed in range(1, 6):  # a control that is judged adequate says what could have been seen
+            case = cases.Case(f'scale-{seed}', 'scale', seed)
+            self.run(case)
+            verdict = json.load(open(self.path(case, 'verdict.json')))['diagnose']
+            if verdict['verdict'] == 'adequate':
+                self.write(path, json.dumps({'detectable': verdict['detectable'],
+                                             'candidates': len(verdict['candidates'])}, indent=1))
+                return
+        raise Failed('none of five measurements without a hidden effect was judged adequate')
+
+    def strengths(self):
+        """{effect: {lambda: {dotted parameter: value}}}: the detectable distance scaled from the null value."""
+        path = os.path.join(self.folder, 'detectable.json')
+        if not os.path.exists(path):
+            return {}
+        found = json.load(open(path))
+        normal = statistics.NormalDist()
+        reach = normal.inv_cdf(1 - LEVEL / found['candidates']) + normal.inv_cdf(POWER)
+        strengths = {}
+        for effect, values in found['detectable'].items():
+            infos = {f"{effect}.{p['name']}": p for p in self.catalogue()[effect]['parameters']}
+            for strength in (10, 60, 400):
+                own = {}
+                for name, value in values.items():
+                    null = infos[name]['null_value']
+                    null = infos[name].get('null_by_contact', {}).get('hertz_mindlin', null)
+                    # Parameters without a null shape the effect, they are held.
+                    moved = value if null is None else null + (value - null) * math.sqrt(strength) / reach
+                    own[name] = min(max(moved, infos[name]['min'] or -math.inf), infos[name]['max'] or math.inf)
+                strengths.setdefault(effect, {})[strength] = own
+        return strengths

@@ -1,0 +1,50 @@
+"""Runs the matrix of hidden effects: see ../hidden-effects and README.md."""
+import argparse, concurrent.futures, fnmatch, json, os, sys, threading, time
+
+import cases, judge, laboratory
+
+parser = argparse.ArgumentParser(description=__doc__)
+parser.add_argument('--calibctl', required=True)
+parser.add_argument('--state', default='build/hidden-effects', help='folder of the cases; finished ones are kept')
+parser.add_argument('--only', default='*', help="pattern of case names, e.g. 'control*' or '*-l60-*'; several with commas")
+parser.add_argument('--repeats', type=int, default=3, help='of each effect and strength')
+parser.add_argument('--controls', type=int, default=100, help='measurements without a hidden effect')
+parser.add_argument('--jobs', type=int, default=os.cpu_count(), help='cases at a time, one worker each')
+parser.add_argument('--minutes', type=float, default=720, help='no case is begun after this time')
+parser.add_argument('--list', action='store_true', help='names of the cases, nothing is run')
+parser.add_argument('--table', action='store_true', help='table of what has been finished, nothing is run')
+arguments = parser.parse_args()
+
+state = os.path.abspath(arguments.state)
+lab = laboratory.Laboratory(os.path.abspath(arguments.calibctl), state)
+end = time.time() + 60 * arguments.minutes
+
+
+def wanted(name):
+    return any(fnmatch.fnmatch(name, pattern) for pattern in arguments.only.split(','))
+
+
+def run(case):
+    """True when the case is finished, now or earlier."""
+    if time.time() > end:
+        return False
+    began = time.time()
+    try:
+        lab.run(case)
+    except laboratory.Failed as failure:
+        print(f'{case.name}: {failure}', file=sys.stderr, flush=True)
+        return False
+    print(f'{case.name}: done in {time.time() - began:.0f} s', file=sys.stderr, flush=True)
+    return True
+
+
+if not arguments.table and not arguments.list:
+    lab.measure_detectability()
+matrix = [c for c in cases.matrix(lab.strengths(), arguments.repeats, arguments.controls) if wanted(c.name)]
+if arguments.list:
+    print('\n'.join(c.name for c in matrix))
+    sys.exit(0)
+if not arguments.table:
+    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+        list(pool.map(run, matrix))
+print(judge.table([lab.outcome(c) for c in matrix if lab.finished(c)], len(matrix)))
