@@ -45,15 +45,12 @@ Eigen::MatrixXd Standard(const std::vector<inference::Prior>& priors,
 Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
   const auto t = static_cast<Index>(data.readings.size());
   Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(t, t);
-  for (const inference::Correlation& c : data.correlations) {
-    for (Index i = 0; i < t; ++i) {
-      const inference::Reading& a = data.readings[static_cast<std::size_t>(i)];
-      if (a.experiment != c.experiment || a.observable != c.observable) continue;
-      for (Index j = 0; j < i; ++j) {
-        const inference::Reading& b = data.readings[static_cast<std::size_t>(j)];
-        if (b.experiment != c.experiment || b.observable != c.observable) continue;
-        correlation(i, j) = correlation(j, i) =
-            std::exp(-std::abs(a.control - b.control) / c.length);
+  for (const auto& [key, readings] : inference::GroupsOf(data)) {
+    const Eigen::MatrixXd of_group = inference::ErrorCorrelation(data, key, readings);
+    for (Index i = 0; i < of_group.rows(); ++i) {
+      for (Index j = 0; j < of_group.cols(); ++j) {
+        correlation(readings[static_cast<std::size_t>(i)], readings[static_cast<std::size_t>(j)]) =
+            of_group(i, j);
       }
     }
   }

@@ -52,9 +52,12 @@ Json Status(const v1::CampaignStatus& s) {
 Json Emulator(const v1::Posterior& p) {
   if (!p.has_emulator()) return nullptr;
   const v1::Posterior::Emulator& e = p.emulator();
-  return {{"adequate", e.adequate()},     {"reason", e.reason()},
-          {"runs", e.runs()},             {"components", e.components()},
-          {"cross_validated_error", e.error()}, {"scatter", e.scatter()},
+  return {{"adequate", e.adequate()},
+          {"reason", e.reason()},
+          {"runs", e.runs()},
+          {"components", e.components()},
+          {"cross_validated_error", e.error()},
+          {"scatter", e.scatter()},
           {"calibration", e.calibration()}};
 }
 
@@ -112,6 +115,8 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                              {"z", OrNull(m.z)},
                              {"p_value", OrNull(m.p_value)},
                              {"rms_residual", m.rms_residual},
+                             {"scatter_over_noise", m.scatter},
+                             {"scatter_from", m.scatter_from},
                              {"readings", m.readings},
                              {"role", m.heldout ? "validate" : "calibrate"}});
   }
@@ -185,7 +190,8 @@ std::string SamplesJson(const std::string& campaign, const std::vector<std::stri
                     {"reason", s.reason()},
                     {"weight", s.weight()},
                     {"log_likelihood", s.log_likelihood()},
-                    {"attempts", s.attempts()}});
+                    {"attempts", s.attempts()},
+                    {"purpose", s.purpose()}});
   }
   return Dump({{"campaign", campaign}, {"samples", list}});
 }
