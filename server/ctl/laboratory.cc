@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/campaign/campaign_file.h"
 #include "server/campaign/identity.h"
+#include "server/campaign/sha256.h"
 #include "server/ctl/interrupt.h"
 #include "server/ctl/load_view.h"
 #include "server/ctl/progress.h"
@@ -48,13 +49,11 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
     if (status->state() == "finished") return absl::OkStatus();
     if (IsOver(status->state()) || status->state() == "paused") {
       return absl::AbortedError(absl::StrCat("campaign ", campaign, " (", what, ") is ",
-                                             status->state(),
-                                             status->reason().empty() ? "" : ": ",
+                                             status->state(), status->reason().empty() ? "" : ": ",
                                              status->reason()));
     }
     if (Interrupted()) {
-      return absl::CancelledError(
-          "stopped; nothing is lost, the same command goes on from here");
+      return absl::CancelledError("stopped; nothing is lost, the same command goes on from here");
     }
     if (auto alive = session_.CheckWorkers(); !alive.ok()) return alive;
     std::this_thread::sleep_for(kPoll);
@@ -64,17 +63,27 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
 absl::StatusOr<report::CampaignView> Laboratory::Run(const report::CampaignView& parent,
                                                      const std::string& yaml,
                                                      const std::string& what) {
+  return Run(parent, yaml, what, {});
+}
+
+absl::StatusOr<report::CampaignView> Laboratory::Run(
+    const report::CampaignView& parent, const std::string& yaml, const std::string& what,
+    const std::map<std::string, std::string>& files) {
   v1::SubmitRequest request;
   request.set_campaign_file(yaml);
   request.set_file_name(parent.source.file_name());
   if (parent.source.has_seed()) request.set_seed(parent.source.seed());
   *request.mutable_files() = parent.source.files();
+  for (const auto& [path, content] : files) {
+    if (auto put = session_.client().PutBlob(content); !put.ok()) return put;
+    (*request.mutable_files())[path] = campaign::Sha256Hex(content);
+  }
   campaign::Submission submission{.campaign_file = yaml,
                                   .file_name = parent.source.file_name(),
                                   .files = {},
                                   .seed = std::nullopt};
   if (parent.source.has_seed()) submission.seed = parent.source.seed();
-  submission.files.insert(parent.source.files().begin(), parent.source.files().end());
+  submission.files.insert(request.files().begin(), request.files().end());
   request.set_request_id(campaign::IdentityDigest(submission));
   const auto reply = session_.client().Submit(request);
   if (!reply.ok()) return reply.status();
@@ -82,8 +91,7 @@ absl::StatusOr<report::CampaignView> Laboratory::Run(const report::CampaignView&
     const v1::Problem& problem = reply->problems(0);
     return absl::InvalidArgumentError(absl::StrCat(
         what, " cannot be run: ",
-        campaign::ToString(
-            {problem.file(), problem.line(), problem.key(), problem.message()})));
+        campaign::ToString({problem.file(), problem.line(), problem.key(), problem.message()})));
   }
   const std::string& campaign = reply->campaign();
   auto status = session_.client().Show(campaign);

@@ -2,6 +2,7 @@
 // Where a verb has further campaigns run: it hands over their text and waits. A campaign is
 // recognised by its text, so that a verb that is issued again finds what it has run already.
 
+#include <map>
 #include <set>
 #include <string>
 
@@ -26,6 +27,10 @@ class Laboratory {
   /// ABORTED when the campaign failed or was cancelled, CANCELLED on Ctrl-C (nothing is lost).
   absl::StatusOr<report::CampaignView> Run(const report::CampaignView& parent,
                                            const std::string& yaml, const std::string& what);
+  /// The same with further files, path as written -> content; they go before the parent's.
+  absl::StatusOr<report::CampaignView> Run(const report::CampaignView& parent,
+                                           const std::string& yaml, const std::string& what,
+                                           const std::map<std::string, std::string>& files);
 
  private:
   absl::Status Wait(const std::string& campaign, const std::string& what);
