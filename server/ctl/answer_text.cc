@@ -95,11 +95,12 @@ std::string ComparisonText(const report::Comparison& comparison) {
                         Number(*comparison.heldout_rms_error, 3));
   }
   if (!comparison.note.empty()) text += Wrapped(comparison.note, "", "");
-  TextTable observables({"<experiment", "<observable", "readings", "rms/sd", "rms", "z", "p", "<"});
+  TextTable observables(
+      {"<experiment", "<observable", "readings", "rms/sd", "scatter/noise", "rms", "z", "p", "<"});
   for (const report::ObservableMisfit& m : comparison.by_observable) {
     observables.AddRow(
         {m.experiment + (m.heldout ? " (held out)" : ""), m.observable, std::to_string(m.readings),
-         Number(m.rms_error, 3),
+         Number(m.rms_error, 3), m.scatter_from.empty() ? "–" : Number(m.scatter, 2),
          report::NumberWithUnit(m.rms_residual, m.observable, UnitOf(m.observable), 3),
          m.z ? Number(*m.z, 2) : "–", m.p_value ? Number(*m.p_value, 2) : "–",
          m.z ? Verdict(m.rms_error, m.p_value) : ""});

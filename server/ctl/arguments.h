@@ -17,18 +17,21 @@ struct Arguments {
   bool json = false;
 
   // Of some.
-  std::string file;      ///< campaign file
-  std::string campaign;  ///< id
+  std::string file;                      ///< campaign file
+  std::string campaign;                  ///< id
   std::vector<std::string> campaigns{};  ///< ids
-  std::string worker;    ///< name
+  std::string worker;                    ///< name
   int sample = 0;
   std::optional<int> iteration;
   std::optional<std::uint64_t> seed;
-  std::vector<std::string> set;  ///< NAME=VALUE
+  std::vector<std::string> set;      ///< NAME=VALUE
   std::vector<std::string> effects;  ///< to join the model
   int max_effects = 3;
-  std::string output;            ///< file or folder; empty: standard output
-  std::string vtk;               ///< folder
+  std::string test;                 ///< file with the tests to predict
+  int draws = 20;                   ///< of the posterior, to predict from
+  std::vector<std::string> exceed;  ///< OBSERVABLE=LEVEL
+  std::string output;               ///< file or folder; empty: standard output
+  std::string vtk;                  ///< folder
 };
 
 }  // namespace calib::ctl

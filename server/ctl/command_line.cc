@@ -132,6 +132,18 @@ void AddVerbsOnCampaigns(Builder& b) {
                   "Compare, diagnose, extend until the misfit is explained or nothing helps")
       ->add_option("--max-effects", b.arguments().max_effects, "at most so many are added [3]")
       ->check(CLI::Range(1, 10));
+  auto* predict = b.AddOnCampaign(
+      "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance");
+  predict
+      ->add_option("--test", b.arguments().test,
+                   "YAML: one experiment, or a file with experiments, as in a campaign file")
+      ->required();
+  predict
+      ->add_option("--exceed", b.arguments().exceed,
+                   "OBSERVABLE=LEVEL with an optional unit: probability to exceed it")
+      ->allow_extra_args(false);
+  predict->add_option("--draws", b.arguments().draws, "runs from the posterior [20]")
+      ->check(CLI::Range(2, 400));
   b.AddOnCampaign("report", &Report, "One self-contained HTML file with plots")
       ->add_option("-o,--output", b.arguments().output, "HTML file")
       ->required();

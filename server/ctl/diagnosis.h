@@ -20,21 +20,21 @@ struct CandidateEffect {
   double p_value = 1;             ///< of the screen, adjusted for the number of candidates
   double explained_fraction = 0;  ///< of the misfit beyond noise and scatter
   std::map<std::string, double> amplitude{};  ///< parameter -> strength that explains it best [SI]
-  double predicted_rms_error = 0;           ///< residual over noise sd with the effect
+  double predicted_rms_error = 0;             ///< residual over noise sd with the effect
   std::vector<std::string> confusable_with{};
   // Of the warm fit, where there was one.
-  std::string campaign{};         ///< id
-  double refit_p_value = -1;    ///< adequacy of the extended model
+  std::string campaign{};     ///< id
+  double refit_p_value = -1;  ///< adequacy of the extended model
   double refit_chi2 = 0;
   inference::Advantage over_base{};
 };
 
 struct Diagnosis {
   std::string campaign{};
-  std::string verdict;  ///< adequate | missing_effect | ambiguous | unexplained
-  std::string effect;   ///< named, with missing_effect
+  std::string verdict;                      ///< adequate | missing_effect | ambiguous | unexplained
+  std::string effect;                       ///< named, with missing_effect
   std::vector<CandidateEffect> candidates;  ///< best first
-  std::vector<std::pair<std::string, std::string>> not_excitable;  ///< effect, why
+  std::vector<std::pair<std::string, std::string>> not_excitable;   ///< effect, why
   std::map<std::string, std::map<std::string, double>> detectable;  ///< effect -> parameter -> SI
   std::string best_partial;  ///< with unexplained: the effect that helps most, if any does
   inference::Adequacy adequacy;
@@ -45,8 +45,8 @@ struct Diagnosis {
 };
 
 struct DiagnosisOptions {
-  double level = 0.01;         ///< of the adequacy test and of the screen
-  bool only_adequacy = false;  ///< no runs: says adequate or unexplained
+  double level = 0.01;                    ///< of the adequacy test and of the screen
+  bool only_adequacy = false;             ///< no runs: says adequate or unexplained
   std::vector<std::string> without = {};  ///< effects that do not take part
   bool next_experiment = true;  ///< where the model is not adequate: the test that separates rivals
 };

@@ -20,7 +20,7 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& ef
 struct ExtensionPlan {
   std::vector<std::string> effects{};
   std::string purpose{};            ///< extension | warm_fit
-  bool held_out = true;           ///< false: held-out experiments stay closed
+  bool held_out = true;             ///< false: held-out experiments stay closed
   std::optional<int> samples{};     ///< as the parent
   std::optional<int> iterations{};  ///< as the parent
 };

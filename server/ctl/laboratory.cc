@@ -68,15 +68,15 @@ absl::StatusOr<report::CampaignView> Laboratory::Run(
   request.set_file_name(parent.source.file_name());
   if (parent.source.has_seed()) request.set_seed(parent.source.seed());
   *request.mutable_files() = parent.source.files();
+  for (const auto& [path, content] : further) {
+    if (auto put = session_.client().PutBlob(content); !put.ok()) return put;
+    (*request.mutable_files())[path] = campaign::Sha256Hex(content);
+  }
   campaign::Submission submission{.campaign_file = yaml,
                                   .file_name = parent.source.file_name(),
                                   .files = {},
                                   .seed = std::nullopt};
   if (parent.source.has_seed()) submission.seed = parent.source.seed();
-  for (const auto& [path, content] : further) {
-    if (auto put = session_.client().PutBlob(content); !put.ok()) return put;
-    (*request.mutable_files())[path] = campaign::Sha256Hex(content);
-  }
   submission.files.insert(request.files().begin(), request.files().end());
   request.set_request_id(campaign::IdentityDigest(submission));
   const auto reply = session_.client().Submit(request);

@@ -15,8 +15,8 @@ namespace calib::ctl {
 namespace {
 
 using Eigen::Index;
-using report::RunTable;
 using report::RunsOf;
+using report::RunTable;
 
 constexpr int kSpread = 3000;   // points over the prior
 constexpr int kRefined = 1000;  // about the best of them, in each round
@@ -40,15 +40,12 @@ Eigen::MatrixXd Standard(const std::vector<inference::Prior>& priors,
 Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
   const auto t = static_cast<Index>(data.readings.size());
   Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(t, t);
-  for (const inference::Correlation& c : data.correlations) {
-    for (Index i = 0; i < t; ++i) {
-      const inference::Reading& a = data.readings[static_cast<std::size_t>(i)];
-      if (a.experiment != c.experiment || a.observable != c.observable) continue;
-      for (Index j = 0; j < i; ++j) {
-        const inference::Reading& b = data.readings[static_cast<std::size_t>(j)];
-        if (b.experiment != c.experiment || b.observable != c.observable) continue;
-        correlation(i, j) = correlation(j, i) =
-            std::exp(-std::abs(a.control - b.control) / c.length);
+  for (const auto& [key, readings] : inference::GroupsOf(data)) {
+    const Eigen::MatrixXd of_group = inference::ErrorCorrelation(data, key, readings);
+    for (Index i = 0; i < of_group.rows(); ++i) {
+      for (Index j = 0; j < of_group.cols(); ++j) {
+        correlation(readings[static_cast<std::size_t>(i)], readings[static_cast<std::size_t>(j)]) =
+            of_group(i, j);
       }
     }
   }
@@ -72,17 +69,16 @@ RunTable RunsWithoutEffect(const RunTable& without, const campaign::Campaign& pa
     if (from[static_cast<std::size_t>(j)] >= 0) continue;
     const dem::ParameterInfo* info =
         dem::FindParameter(extended.model.contact, extended.model.effects, own.name);
-    const auto null = info == nullptr
-                          ? std::nullopt
-                          : dem::NullValueOf(*info, extended.model.contact);
+    const auto null =
+        info == nullptr ? std::nullopt : dem::NullValueOf(*info, extended.model.contact);
     // A prior over orders of magnitude ends where the effect no longer matters.
     if (null) nulls.emplace_back(j, std::clamp(*null, own.prior.min, own.prior.max));
   }
   RunTable table;
   if (nulls.empty()) return table;
-  const auto spread = inference::DrawSamples(inference::Proposal{}, campaign::Priors(extended),
-                                             extended.filter, 0,
-                                             static_cast<int>(without.parameters.rows()));
+  const auto spread =
+      inference::DrawSamples(inference::Proposal{}, campaign::Priors(extended), extended.filter, 0,
+                             static_cast<int>(without.parameters.rows()));
   if (!spread.ok()) return table;
   table.parameters = *spread;
   table.histories = without.histories;
@@ -115,8 +111,9 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
   const auto trained = inference::TrainEmulator(
       {.inputs = Standard(priors, table.parameters), .histories = table.histories}, data, {});
   if (!trained.ok()) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "the runs of ", view.status.campaign(), " cannot be emulated: ", trained.status().message()));
+    return absl::FailedPreconditionError(
+        absl::StrCat("the runs of ", view.status.campaign(),
+                     " cannot be emulated: ", trained.status().message()));
   }
   const inference::StateEmulator& emulator = trained->emulator;
   const inference::PrincipalComponents& components = emulator.components();
@@ -137,7 +134,8 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
     const inference::ScorePrediction prediction = emulator.Predict(Standard(priors, values));
     std::vector<Index> known;
     for (Index i = 0; i < values.rows(); ++i) {
-      if (prediction.sd.row(i).squaredNorm() <= kMostUnknown * kMostUnknown * static_cast<double>(t)) {
+      if (prediction.sd.row(i).squaredNorm() <=
+          kMostUnknown * kMostUnknown * static_cast<double>(t)) {
         known.push_back(i);
       }
     }
@@ -194,8 +192,7 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
   const Eigen::MatrixXd spread_basis = components.basis * sd.asDiagonal();
   response.model.covariance = NoiseCorrelation(data);
   response.model.covariance.diagonal() += components.remainder;
-  response.model.covariance +=
-      spread_basis * emulator.correlation() * spread_basis.transpose();
+  response.model.covariance += spread_basis * emulator.correlation() * spread_basis.transpose();
   for (const Eigen::VectorXd& direction : nuisance) {
     response.model.covariance += direction * direction.transpose();
   }

@@ -16,9 +16,9 @@ namespace calib::ctl {
 
 struct Response {
   inference::FittedModel model;
-  Eigen::MatrixXd points;       ///< G x d, SI: where model.histories were predicted
-  double emulator_error = 0;    ///< of a run predicted from the others, noise sd
-  double scatter = 0;           ///< noise sd
+  Eigen::MatrixXd points;     ///< G x d, SI: where model.histories were predicted
+  double emulator_error = 0;  ///< of a run predicted from the others, noise sd
+  double scatter = 0;         ///< noise sd
   /// The emulator predicts runs well enough to judge by: what it does not know of them beyond their
   /// scatter would otherwise excuse any misfit.
   bool trustworthy = false;
@@ -34,7 +34,8 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
 /// Runs of the model without the effects that `extended` has on top, as runs of `extended`: where a
 /// parameter of an effect has its null value the others do not matter, so that they are spread over
 /// their priors. Runs that cannot be expressed so are left out.
-report::RunTable RunsWithoutEffect(const report::RunTable& without, const campaign::Campaign& parent,
-                           const campaign::Campaign& extended);
+report::RunTable RunsWithoutEffect(const report::RunTable& without,
+                                   const campaign::Campaign& parent,
+                                   const campaign::Campaign& extended);
 
 }  // namespace calib::ctl

@@ -20,6 +20,7 @@ int Compare(const Arguments& arguments);
 int Diagnose(const Arguments& arguments);
 int Extend(const Arguments& arguments);
 int Improve(const Arguments& arguments);
+int Predict(const Arguments& arguments);
 int Report(const Arguments& arguments);
 int Export(const Arguments& arguments);
 int Workers(const Arguments& arguments);

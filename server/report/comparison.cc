@@ -5,6 +5,8 @@
 #include <map>
 #include <set>
 
+#include "inference/scatter/scatter.h"
+
 namespace calib::report {
 namespace {
 
@@ -13,11 +15,54 @@ struct Group {
   const campaign::Experiment* experiment = nullptr;
   const campaign::MeasuredObservable* observable = nullptr;
   std::vector<std::size_t> readings;
-  Eigen::VectorXd residual;  // model - measurement
-  Eigen::VectorXd sd;
-  Eigen::VectorXd travelled;  // path length of the control
+  Eigen::VectorXd residual;    // model - measurement
+  Eigen::MatrixXd covariance;  // of noise and packing scatter together
+  double scatter = 0;          // rms of its sd over that of the noise
+  std::string scatter_from{};
   Eigen::VectorXd model;
 };
+
+// Noise, correlated along the path of the control where a length is given.
+Eigen::MatrixXd NoiseCovariance(const Eigen::VectorXd& sd, const Eigen::VectorXd& travelled,
+                                double length) {
+  Eigen::MatrixXd covariance = sd.cwiseAbs2().asDiagonal();
+  for (Eigen::Index i = 0; length > 0 && i < sd.size(); ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) {
+      covariance(i, j) = covariance(j, i) =
+          sd[i] * sd[j] * std::exp(-(travelled[i] - travelled[j]) / length);
+    }
+  }
+  return covariance;
+}
+
+const v1::Posterior::Scatter* FindScatter(const v1::Posterior& posterior,
+                                          const std::string& experiment,
+                                          const std::string& observable) {
+  for (const v1::Posterior::Scatter& scatter : posterior.scatter()) {
+    if (scatter.experiment() == experiment && scatter.observable() == observable) return &scatter;
+  }
+  return nullptr;
+}
+
+// The measured specimen is one packing of many; so is the model's where no mean over several runs
+// can be given.
+void AddScatter(const CampaignView& view, const Eigen::VectorXd& travelled, Group& group) {
+  const v1::Posterior::Scatter* scatter =
+      FindScatter(view.posterior, group.experiment->name, group.observable->name);
+  if (scatter == nullptr) return;
+  inference::GroupScatter found{.sd = Eigen::VectorXd(travelled.size()),
+                                .length = scatter->correlation_length()};
+  for (Eigen::Index i = 0; i < travelled.size(); ++i) {
+    const auto reading = static_cast<int>(group.readings[static_cast<std::size_t>(i)]);
+    found.sd[i] = reading < scatter->sd_size() ? scatter->sd(reading) : 0;
+  }
+  const double times = scatter->share() + (view.posterior.posterior_from() == "none" ? 1 : 0);
+  const Eigen::MatrixXd covariance = times * inference::ScatterCovariance(found, travelled);
+  const Eigen::VectorXd ratio = covariance.diagonal().cwiseQuotient(group.covariance.diagonal());
+  group.scatter = std::sqrt(ratio.mean());
+  group.scatter_from = scatter->from();
+  group.covariance += covariance;
+}
 
 Group MakeGroup(const CampaignView& view, const campaign::Experiment& experiment, std::size_t j,
                 const ObservablePrediction& prediction) {
@@ -25,8 +70,7 @@ Group MakeGroup(const CampaignView& view, const campaign::Experiment& experiment
               .observable = &experiment.observables[j],
               .readings = {},
               .residual = {},
-              .sd = {},
-              .travelled = {},
+              .covariance = {},
               .model = {}};
   std::vector<double> residual;
   std::vector<double> sd;
@@ -44,60 +88,53 @@ Group MakeGroup(const CampaignView& view, const campaign::Experiment& experiment
   }
   const auto size = static_cast<Eigen::Index>(residual.size());
   group.residual = Eigen::Map<const Eigen::VectorXd>(residual.data(), size);
-  group.sd = Eigen::Map<const Eigen::VectorXd>(sd.data(), size);
-  group.travelled = Eigen::Map<const Eigen::VectorXd>(travelled.data(), size);
+  const Eigen::Map<const Eigen::VectorXd> path(travelled.data(), size);
+  if (group.observable->covariance.size() > 0) {
+    std::vector<Eigen::Index> kept;
+    for (const std::size_t i : group.readings) kept.push_back(static_cast<Eigen::Index>(i));
+    group.covariance = Eigen::MatrixXd(group.observable->covariance(kept, kept));
+  } else {
+    group.covariance = NoiseCovariance(Eigen::Map<const Eigen::VectorXd>(sd.data(), size), path,
+                                       group.observable->correlation_length);
+  }
+  if (size > 0) AddScatter(view, path, group);
   group.model = Eigen::Map<const Eigen::VectorXd>(model.data(), size);
   return group;
 }
 
-// Correlation of the errors of readings i - 1 and i. exp(-distance / length) along one path is a
-// Markov chain, so that neighbours are all that chi-squared and the variance of a mean need.
-double NeighbourCorrelation(const Group& group, Eigen::Index i) {
-  const double length = group.observable->correlation_length;
-  return length > 0 ? std::exp(-(group.travelled[i] - group.travelled[i - 1]) / length) : 0;
-}
-
 ResidualCurve CurveOf(const Group& group, Eigen::Index first, Eigen::Index count) {
+  const Eigen::VectorXd sd = group.covariance.diagonal().cwiseSqrt();
   ResidualCurve curve{.residual = group.residual.segment(first, count),
-                      .sd = group.sd.segment(first, count),
+                      .sd = sd.segment(first, count),
                       .correlation = Eigen::VectorXd::Zero(count),
                       .control = Eigen::VectorXd(count),
                       .model = group.model.segment(first, count)};
   for (Eigen::Index i = 0; i < count; ++i) {
-    if (i > 0) curve.correlation[i] = NeighbourCorrelation(group, first + i);
-    curve.control[i] =
-        group.experiment->control[group.readings[static_cast<std::size_t>(first + i)]];
+    const Eigen::Index at = first + i;
+    if (i > 0) curve.correlation[i] = group.covariance(at, at - 1) / (sd[at] * sd[at - 1]);
+    curve.control[i] = group.experiment->control[group.readings[static_cast<std::size_t>(at)]];
   }
   return curve;
 }
 
-// r^T Sigma^-1 r with Sigma_ij = sd_i sd_j exp(-|c_i - c_j| / length), of readings first ...
+// r^T Sigma^-1 r of readings first .. first + count - 1.
 double ChiSquared(const Group& group, Eigen::Index first, Eigen::Index count) {
-  const ResidualCurve curve = CurveOf(group, first, count);
-  return Whitened(curve, curve.residual).squaredNorm();
+  const Eigen::LLT<Eigen::MatrixXd> factor(group.covariance.block(first, first, count, count));
+  return factor.matrixL().solve(group.residual.segment(first, count)).squaredNorm();
 }
 
 // Variance of the mean error of readings first .. first + count - 1: the sum of Sigma over count^2.
 double VarianceOfMean(const Group& group, Eigen::Index first, Eigen::Index count) {
-  double sum = 0;
-  double earlier = 0;  // sum over k < i of sd_k correlation(k, i)
-  for (Eigen::Index i = first; i < first + count; ++i) {
-    if (i > first) earlier = (earlier + group.sd[i - 1]) * NeighbourCorrelation(group, i);
-    sum += group.sd[i] * (group.sd[i] + 2 * earlier);
-  }
-  return sum / static_cast<double>(count * count);
+  return group.covariance.block(first, first, count, count).sum() /
+         static_cast<double>(count * count);
 }
 
 // n^2 / sum of the correlations of the errors.
 double EffectiveReadings(const Group& group) {
-  double sum = 0;
-  double earlier = 0;  // sum over k < i of correlation(k, i)
-  const Eigen::Index n = group.residual.size();
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (i > 0) earlier = (earlier + 1) * NeighbourCorrelation(group, i);
-    sum += 1 + 2 * earlier;
-  }
-  return static_cast<double>(n * n) / sum;
+  const Eigen::VectorXd inverse = group.covariance.diagonal().cwiseSqrt().cwiseInverse();
+  const double sum = inverse.dot(group.covariance * inverse);
+  const auto n = static_cast<double>(inverse.size());
+  return n * n / sum;
 }
 
 double UpperTail(double chi2, double degrees) {
@@ -129,10 +166,11 @@ void AddSegments(const Group& group, bool heldout, bool judged, std::vector<Segm
         .bias = group.residual.segment(first, count).mean(),
         .z = std::nullopt,
         .readings = static_cast<int>(count),
-        .rms_error = std::sqrt(group.residual.segment(first, count)
-                                   .cwiseQuotient(group.sd.segment(first, count))
-                                   .squaredNorm() /
-                               static_cast<double>(count)),
+        .rms_error = std::sqrt(
+            group.residual.segment(first, count)
+                .cwiseQuotient(group.covariance.diagonal().segment(first, count).cwiseSqrt())
+                .squaredNorm() /
+            static_cast<double>(count)),
         .chi2_share = std::nullopt};
     if (judged) {
       misfit.z = misfit.bias / std::sqrt(VarianceOfMean(group, first, count));
@@ -235,13 +273,16 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
       const Group group = MakeGroup(view, experiment, j, predictions[e].observables[j]);
       const auto n = static_cast<double>(group.readings.size());
       if (group.readings.empty()) continue;
-      const double squared = group.residual.cwiseQuotient(group.sd).squaredNorm();
+      const double squared =
+          group.residual.cwiseAbs2().cwiseQuotient(group.covariance.diagonal()).sum();
       ObservableMisfit misfit{.experiment = experiment.name,
                               .observable = group.observable->name,
                               .heldout = validation,
                               .readings = static_cast<int>(group.readings.size()),
                               .rms_error = std::sqrt(squared / n),
                               .rms_residual = std::sqrt(group.residual.squaredNorm() / n),
+                              .scatter = group.scatter,
+                              .scatter_from = group.scatter_from,
                               .z = std::nullopt,
                               .p_value = std::nullopt,
                               .effective_readings = EffectiveReadings(group)};

@@ -1,6 +1,6 @@
 #pragma once
 // Model against measurements: where the posterior mean fits and where it does not, in units of the
-// stated errors.
+// stated errors and of the scatter of packings.
 
 #include <optional>
 #include <string>
@@ -17,8 +17,10 @@ struct ObservableMisfit {
   std::string experiment, observable;
   bool heldout = false;  ///< of a validation experiment: never used for fitting
   int readings = 0;
-  double rms_error = 0;     ///< rms of residual / standard deviation
-  double rms_residual = 0;  ///< rms of residual [SI]
+  double rms_error = 0;        ///< rms of residual / sd of noise and packing scatter together
+  double rms_residual = 0;     ///< rms of residual [SI]
+  double scatter = 0;          ///< rms of the scatter's sd over that of the noise; 0: none is known
+  std::string scatter_from{};  ///< realizations | emulator; empty: none is known
   std::optional<double>
       z;  ///< chi-squared of the group as a standard normal deviate [Wilson & Hilferty 1931]
   std::optional<double>
@@ -64,7 +66,9 @@ struct Comparison {
   std::string note;                             ///< why something is not given; may be empty
 };
 
-/// Errors are those stated in the campaign, correlated where a correlation length is given. Without
+/// Errors are those stated in the campaign, correlated where a correlation length is given, and the
+/// scatter of packings that the posterior states, once for the measured specimen and, where no
+/// posterior could be given, once for the model's run. Without
 /// an independent scale of the errors (noise inferred or ess_target) nothing can be said about
 /// adequacy: z, p_value and reduced_chi2 stay empty.
 Comparison Compare(const CampaignView& view, const std::vector<ExperimentPrediction>& predictions);

@@ -140,6 +140,8 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                              {"z", OrNull(m.z)},
                              {"p_value", OrNull(m.p_value)},
                              {"rms_residual", m.rms_residual},
+                             {"scatter_over_noise", m.scatter},
+                             {"scatter_from", m.scatter_from},
                              {"readings", m.readings},
                              {"effective_readings", m.effective_readings},
                              {"pattern", Pattern(m.pattern)},
@@ -224,7 +226,8 @@ std::string SamplesJson(const std::string& campaign, const std::vector<std::stri
                     {"reason", s.reason()},
                     {"weight", s.weight()},
                     {"log_likelihood", s.log_likelihood()},
-                    {"attempts", s.attempts()}});
+                    {"attempts", s.attempts()},
+                    {"purpose", s.purpose()}});
   }
   return Dump({{"campaign", campaign}, {"samples", list}});
 }

@@ -1,0 +1,63 @@
+#pragma once
+// The posterior of a campaign propagated to another test: a table of runs at its draws, run by the
+// workers like any others, and what follows from them.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/prediction/prediction.h"
+#include "server/campaign/yaml_tree.h"
+#include "server/ctl/laboratory.h"
+
+namespace calib::ctl {
+
+/// The tests to predict as a list of experiments, with the files they name.
+struct PredictedTests {
+  std::vector<campaign::YamlNode> experiments;
+  std::map<std::string, std::string> files;  ///< path as written -> content
+};
+
+/// Reads a file that holds `experiments:` (the rest of it is passed over) or is one experiment. A
+/// test without data is given by `control: {column: NAME, to: VALUE, readings: N}`: that many
+/// readings, evenly spaced. Without `packing` a test takes that of the parent's first experiment.
+/// Errors: INVALID_ARGUMENT, a line per problem.
+absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path,
+                                         const report::CampaignView& parent);
+
+struct PredictionOptions {
+  int draws = 20;                   ///< runs, of each test
+  std::vector<std::string> exceed;  ///< OBSERVABLE=LEVEL with an optional unit
+};
+
+struct PredictedObservable {
+  std::string experiment, observable, control_name;
+  std::vector<double> control;             ///< at each reading, SI
+  inference::QuantityPrediction quantity;  ///< at each reading, SI
+  std::vector<double> measured;            ///< SI; empty: not measured
+  struct Exceedance {
+    double level = 0;             ///< SI
+    Eigen::VectorXd probability;  ///< at each reading
+    double anywhere = 0;          ///< share of the runs that reach the level somewhere
+  };
+  std::vector<Exceedance> exceedance;
+};
+
+struct Prediction {
+  std::string parent, campaign;  ///< ids
+  int runs = 0;                  ///< finished, of each test
+  int failed = 0;
+  std::vector<PredictedObservable> observables;
+  std::vector<std::string> notes;  ///< whole sentences
+};
+
+/// Errors: INVALID_ARGUMENT for levels that name no observable; FAILED_PRECONDITION without a
+/// posterior, with runs made elsewhere or when fewer than two runs finish; those of the runs.
+absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::CampaignView& parent,
+                                   const PredictedTests& tests, const PredictionOptions& options);
+
+std::string PredictionJson(const Prediction& prediction);
+std::string PredictionText(const Prediction& prediction);
+
+}  // namespace calib::ctl

@@ -1,0 +1,26 @@
+#include <iostream>
+
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/interrupt.h"
+#include "server/ctl/prediction.h"
+#include "server/ctl/verbs.h"
+
+namespace calib::ctl {
+
+int Predict(const Arguments& arguments) {
+  CatchInterrupts();
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  Laboratory laboratory(**session, arguments);
+  const auto view = laboratory.Finished(arguments.campaign);
+  if (!view.ok()) return Fail(view.status());
+  const auto tests = ReadTests((*session)->client(), arguments.test, *view);
+  if (!tests.ok()) return Fail(tests.status());
+  const auto prediction =
+      Predict(laboratory, *view, *tests, {.draws = arguments.draws, .exceed = arguments.exceed});
+  if (!prediction.ok()) return Fail(prediction.status());
+  std::cout << (arguments.json ? PredictionJson(*prediction) : PredictionText(*prediction));
+  return kDone;
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,138 @@
+// predict as a user meets it, on a calibration of 64 grains.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace calib::ctl {
+namespace {
+
+using Json = nlohmann::json;
+
+struct Answer {
+  int code = -1;
+  std::string out, err;
+  Json json() const { return Json::parse(out, nullptr, false); }
+};
+
+class Predicting : public ::testing::Test {
+ protected:
+  Predicting() {
+    std::string pattern =
+        (std::filesystem::temp_directory_path() / "calib-predict-XXXXXX").string();
+    work_ = mkdtemp(pattern.data());
+    Write("data.csv",
+          "axial_strain,q_over_p,volumetric_strain\n0.002,0.5,0.0008\n0.005,0.8,0.0012\n"
+          "0.01,1.0,0.001\n");
+    Write("small.yaml", R"(name: small
+model: {contact: linear, density: 2650000 kg/m^3, fixed: {poisson_ratio: 0.3}}
+parameters:
+  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e9 Pa}
+  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
+experiments:
+  - name: tx
+    test: triaxial_drained
+    confining_pressure: 100 kPa
+    packing: {generate: {particles: 64, porosity: 0.42, radii: {mean: 1 mm, spread: 0.2}, seed: 3}}
+    data: {file: data.csv, strain: logarithmic}
+    control: axial_strain
+    staging: {rate: 1 1/s, step: 0.005, damping: [0.3, 0.9], unbalanced: 5e-3}
+    observables: {q_over_p: {noise: {absolute: 0.3}}, volumetric_strain: {noise: {absolute: 0.002}}}
+inference: {method: iterative_bayesian_filter, samples: 12, max_iterations: 1}
+seed: 7
+)");
+    Write("other.yaml", R"(name: tx200
+test: triaxial_drained
+confining_pressure: 200 kPa
+control: {column: axial_strain, to: 1 percent, readings: 4}
+staging: {rate: 1 1/s, step: 0.005, damping: [0.3, 0.9], unbalanced: 5e-3}
+observables: [q_over_p, volumetric_strain]
+)");
+  }
+  ~Predicting() override { std::filesystem::remove_all(work_); }
+
+  void Write(const char* name, const std::string& text) const {
+    std::ofstream(work_ / name) << text;
+  }
+  Answer Call(const std::string& arguments) const {
+    const std::string command =
+        "cd '" + work_.string() + "' && '" + CALIBCTL + "' " + arguments + " >out 2>err </dev/null";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, Read("out"), Read("err")};
+  }
+  std::string Read(const char* name) const {
+    std::ifstream file(work_ / name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  std::filesystem::path work_;
+};
+
+TEST_F(Predicting, PosteriorAtAnotherPressure) {
+  ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  const std::string verb =
+      "predict c1 --test other.yaml --draws 10 --exceed q_over_p=0.2 --exceed q_over_p=5 "
+      "--state s --workers 2";
+  const Answer first = Call(verb + " --json");
+  ASSERT_EQ(first.code, 0) << first.err;
+  const Json json = first.json();
+  EXPECT_EQ(json["campaign"], "c1");
+  EXPECT_EQ(json["prediction"], "c2");
+  EXPECT_EQ(json["runs"], 10);
+  ASSERT_EQ(json["predictions"].size(), 2U);
+  const Json& q = json["predictions"][0];
+  EXPECT_EQ(q["experiment"], "tx200");
+  EXPECT_EQ(q["observable"], "q_over_p");
+  ASSERT_EQ(q["points"].size(), 4U);
+  for (const Json& point : q["points"]) {
+    EXPECT_LT(point["q05"], point["q95"]);
+    EXPECT_GT(point["mean"], 0);
+    EXPECT_TRUE(point["measured"].is_null());
+    const double parts =
+        std::hypot(point["sd_parameters"].get<double>(), point["sd_model_error"].get<double>());
+    EXPECT_NEAR(point["sd"].get<double>(), parts, 1e-9 * parts);
+  }
+  EXPECT_NEAR(q["points"][3]["control"].get<double>(), 0.01, 1e-15);
+  ASSERT_EQ(q["exceedance"].size(), 2U);
+  EXPECT_GT(q["exceedance"][0]["probability"][3], 0.9);
+  EXPECT_LT(q["exceedance"][1]["probability"][3], 0.01);
+  EXPECT_EQ(q["exceedance"][1]["anywhere"], 0);
+  // Again: nothing is run, nothing changes; in words too.
+  const auto evaluations = [this] {
+    std::int64_t sum = 0;
+    for (const Json& c : Call("list --state s --json").json()) {
+      sum += c["model_evaluations"].get<std::int64_t>();
+    }
+    return sum;
+  };
+  const auto before = evaluations();
+  EXPECT_EQ(Call(verb + " --json").out, first.out);
+  EXPECT_NE(Call(verb).out.find("Probability to exceed"), std::string::npos);
+  EXPECT_EQ(evaluations(), before);
+}
+
+TEST_F(Predicting, RefusesInASentence) {
+  ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  EXPECT_EQ(Call("predict c1 --test none.yaml --state s").code, 2);
+  Write("nothing.yaml", "name: nothing\n");
+  const Answer nothing = Call("predict c1 --test nothing.yaml --state s");
+  EXPECT_EQ(nothing.code, 2);
+  EXPECT_NE(nothing.err.find("neither the key test"), std::string::npos) << nothing.err;
+  Write("wrong.yaml",
+        "name: a\ntest: triaxial_drained\ncontrol: {column: axial_strain, to: 1 percent}\n"
+        "observables: [q_over_q]\n");
+  const Answer wrong = Call("predict c1 --test wrong.yaml --state s");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_NE(wrong.err.find("q_over_q"), std::string::npos) << wrong.err;
+  EXPECT_NE(wrong.err.find("confining_pressure"), std::string::npos) << wrong.err;
+  EXPECT_EQ(Call("list --state s --json").json().size(), 1U) << "nothing was submitted";
+}
+
+}  // namespace
+}  // namespace calib::ctl
