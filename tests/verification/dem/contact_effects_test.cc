@@ -341,6 +341,9 @@ TEST(Effects, AModerateStrengthRunsAndShows) {
   base.density = 2650;
   const test::Run plain = test::RunAll(test::SmallTriaxial(base));
   for (const EffectInfo& effect : Effects()) {
+    if (!effect.excited_by.empty() && FindTest(effect.excited_by.front())->poured) {
+      continue;  // walls_test.cc and gravity_tests_test.cc
+    }
     for (const StrengthRay& ray : effect.rays) {
       for (const double step : {ray.steps[0], ray.steps[1], -ray.steps[1]}) {
         if (!RayAdmits(effect, ray, step, base.contact, state)) {
