@@ -24,7 +24,9 @@ target_compile_options(calib_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -
                                              # g++ 12 at -O3 sees overlaps in std::string that are not there (GCC bug 105651)
                                              $<$<CONFIG:Release>:-Wno-restrict>)
 if(CALIB_PRECOMPILE)  # g++ 12 forgets there that standard headers are system headers, and warns of their insides
-  target_compile_options(calib_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overread -Wno-stringop-overflow -Wno-array-bounds>)
+  target_compile_options(calib_flags INTERFACE
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overread> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>)
 else()
   target_compile_options(calib_flags INTERFACE -Werror)
 endif()
