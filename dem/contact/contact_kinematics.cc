@@ -5,6 +5,28 @@
 #include "dem/contact/simd.h"
 
 namespace calib::dem {
+namespace {
+
+/// Relative and mean rotation of lane k during dt; the normal is there.
+inline void SetRotation(ContactBlock& b, int k) {
+  const double dt = b.dt;
+  const double nx = b.nx[k];
+  const double ny = b.ny[k];
+  const double nz = b.nz[k];
+  const double rx = dt * (b.wjx[k] - b.wix[k]);
+  const double ry = dt * (b.wjy[k] - b.wiy[k]);
+  const double rz = dt * (b.wjz[k] - b.wiz[k]);
+  const double twist = nx * rx + ny * ry + nz * rz;
+  b.twist[k] = twist;
+  b.roll_x[k] = rx - nx * twist;
+  b.roll_y[k] = ry - ny * twist;
+  b.roll_z[k] = rz - nz * twist;
+  b.spin[k] =
+      0.5 * dt *
+      (nx * (b.wix[k] + b.wjx[k]) + ny * (b.wiy[k] + b.wjy[k]) + nz * (b.wiz[k] + b.wjz[k]));
+}
+
+}  // namespace
 
 CALIB_DEM_CLONES void ComputeKinematics(ContactBlock& b) {
   const double dt = b.dt;
@@ -49,17 +71,7 @@ CALIB_DEM_CLONES void ComputeKinematics(ContactBlock& b) {
     b.slip_y[k] = dt * (rigid * ty - (cz * nx - cx * nz));
     b.slip_z[k] = dt * (rigid * tz - (cx * ny - cy * nx));
 
-    const double rx = dt * (b.wjx[k] - b.wix[k]);
-    const double ry = dt * (b.wjy[k] - b.wiy[k]);
-    const double rz = dt * (b.wjz[k] - b.wiz[k]);
-    const double twist = nx * rx + ny * ry + nz * rz;
-    b.twist[k] = twist;
-    b.roll_x[k] = rx - nx * twist;
-    b.roll_y[k] = ry - ny * twist;
-    b.roll_z[k] = rz - nz * twist;
-    b.spin[k] =
-        0.5 * dt *
-        (nx * (b.wix[k] + b.wjx[k]) + ny * (b.wiy[k] + b.wjy[k]) + nz * (b.wiz[k] + b.wjz[k]));
+    SetRotation(b, k);
   }
 }
 
@@ -87,17 +99,7 @@ CALIB_DEM_CLONES void ComputeWallKinematics(ContactBlock& b) {
     b.slip_z[k] = dt * (b.vz[k] - nz * vn - (cx * ny - cy * nx));
     // The normal hardly turns in a step, and projecting what is remembered loses only the square.
     b.tilt_x[k] = b.tilt_y[k] = b.tilt_z[k] = 0.0;
-    const double rx = dt * (b.wjx[k] - b.wix[k]);
-    const double ry = dt * (b.wjy[k] - b.wiy[k]);
-    const double rz = dt * (b.wjz[k] - b.wiz[k]);
-    const double twist = nx * rx + ny * ry + nz * rz;
-    b.twist[k] = twist;
-    b.roll_x[k] = rx - nx * twist;
-    b.roll_y[k] = ry - ny * twist;
-    b.roll_z[k] = rz - nz * twist;
-    b.spin[k] =
-        0.5 * dt *
-        (nx * (b.wix[k] + b.wjx[k]) + ny * (b.wiy[k] + b.wjy[k]) + nz * (b.wiz[k] + b.wjz[k]));
+    SetRotation(b, k);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "dem/contact/simd.h"
+#include "dem/effects/shared_parameters.h"
 
 namespace calib::dem {
 namespace {
@@ -32,23 +33,13 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 }  // namespace
 
 EffectEntry AdhesionDmt() {
-  ParameterInfo work;
-  work.name = "work_of_adhesion";
-  work.unit = "J/m^2";
-  work.max = 1e6;
-  work.default_prior = {.kind = "log_uniform", .min = 1e-3, .max = 10};
-  work.null_value = 0;
-  work.scale = {.pressure = 1, .diameter = 1};  // pull-off over p d^2 is then about one
-  work.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 10};
-  work.description =
-      "W, energy to part two surfaces, per area (twice the surface energy of one material)";
   return {
       .info = {.name = "adhesion_dmt",
                .kind = "contact",
                .description = "Attraction 2 pi W R* while grains touch, sliding limit mu (F + 2 "
                               "pi W R*); one-sided, vanishes at work_of_adhesion 0",
                .contacts = {},
-               .parameters = {work},
+               .parameters = {WorkOfAdhesion()},
                .reference = "Derjaguin, Muller & Toporov, J. Colloid Interface Sci. 53 (1975) "
                             "314",
                .two_sided = false,

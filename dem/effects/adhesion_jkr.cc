@@ -5,6 +5,7 @@
 
 #include "dem/contact/power.h"
 #include "dem/contact/simd.h"
+#include "dem/effects/shared_parameters.h"
 
 namespace calib::dem {
 namespace {
@@ -89,16 +90,6 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 }  // namespace
 
 EffectEntry AdhesionJkr() {
-  ParameterInfo work;
-  work.name = "work_of_adhesion";
-  work.unit = "J/m^2";
-  work.max = 1e6;
-  work.default_prior = {.kind = "log_uniform", .min = 1e-3, .max = 10};
-  work.null_value = 0;
-  work.scale = {.pressure = 1, .diameter = 1};  // pull-off over p d^2 is then about one
-  work.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 10};
-  work.description =
-      "W, energy to part two surfaces, per area (twice the surface energy of one material)";
   return {.info = {.name = "adhesion_jkr",
                    .kind = "contact",
                    .description =
@@ -106,7 +97,7 @@ EffectEntry AdhesionJkr() {
                        "gap of 3 a_c^2/R*, sliding limit mu (F + 3/2 pi W R*); one-sided, vanishes "
                        "at work_of_adhesion 0",
                    .contacts = {"hertz_mindlin"},
-                   .parameters = {work},
+                   .parameters = {WorkOfAdhesion()},
                    .reference = "Johnson, Kendall & Roberts, Proc. R. Soc. Lond. A 324 (1971) 301; "
                                 "Johnson, Contact Mechanics (1985), sec. 5.5",
                    .two_sided = false,

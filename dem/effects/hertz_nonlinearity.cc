@@ -2,6 +2,7 @@
 
 #include "dem/contact/power.h"
 #include "dem/contact/simd.h"
+#include "dem/effects/shared_parameters.h"
 
 namespace calib::dem {
 namespace {
@@ -59,30 +60,23 @@ EffectEntry HertzNonlinearity() {
   exponent.description =
       "n in F ~ u^n; 1 linear, 1.5 Hertz, 2 to 3 rough or conical; null 1 with linear, 1.5 with "
       "hertz_mindlin";
-  ParameterInfo pressure;
-  pressure.name = "reference_pressure";
-  pressure.unit = "Pa";
-  pressure.max = 1e10;
-  pressure.min_open = true;
-  pressure.default_prior = {.kind = "log_uniform", .min = 1e4, .max = 1e7};
-  pressure.default_value = 1e5;
-  pressure.scale = {.pressure = 1};
-  pressure.description = "p_ref, at which forces are those of the law itself";
-  return {.info = {.name = "hertz_nonlinearity",
-                   .kind = "contact",
-                   .description =
-                       "F = F_law(u_ref) (u/u_ref)^n with F_law(u_ref) = p_ref (4 r*)^2, shear "
-                       "stiffness in proportion to F; two-sided, vanishes at the exponent of the "
-                       "law (linear 1, hertz_mindlin 1.5)",
-                   .contacts = {"hertz_mindlin", "linear"},
-                   .parameters = {exponent, pressure},
-                   .reference = "Walton, J. Mech. Phys. Solids 35 (1987) 213; Agnolin & Roux, "
-                                "Phys. Rev. E 76 (2007) 061304",
-                   .two_sided = true,
-                   .rays = {{.parameter = "exponent",
-                             .steps = {0.2, 0.4},
-                             .held = {{"reference_pressure", 1}}}}},
-          .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
+  return {
+      .info = {.name = "hertz_nonlinearity",
+               .kind = "contact",
+               .description =
+                   "F = F_law(u_ref) (u/u_ref)^n with F_law(u_ref) = p_ref (4 r*)^2, shear "
+                   "stiffness in proportion to F; two-sided, vanishes at the exponent of the "
+                   "law (linear 1, hertz_mindlin 1.5)",
+               .contacts = {"hertz_mindlin", "linear"},
+               .parameters = {exponent, ReferencePressure(
+                                            "p_ref, at which forces are those of the law itself")},
+               .reference = "Walton, J. Mech. Phys. Solids 35 (1987) 213; Agnolin & Roux, "
+                            "Phys. Rev. E 76 (2007) 061304",
+               .two_sided = true,
+               .rays = {{.parameter = "exponent",
+                         .steps = {0.2, 0.4},
+                         .held = {{"reference_pressure", 1}}}}},
+      .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
 }
 
 }  // namespace calib::dem

@@ -2,6 +2,7 @@
 
 #include "dem/contact/power.h"
 #include "dem/contact/simd.h"
+#include "dem/effects/shared_parameters.h"
 
 namespace calib::dem {
 namespace {
@@ -45,15 +46,6 @@ EffectEntry PressureDependentFriction() {
   exponent.default_prior = {.kind = "uniform", .min = -0.6, .max = 0.6};
   exponent.null_value = 0;
   exponent.description = "m; friction falls with pressure where it is positive";
-  ParameterInfo pressure;
-  pressure.name = "reference_pressure";
-  pressure.unit = "Pa";
-  pressure.max = 1e10;
-  pressure.min_open = true;
-  pressure.default_prior = {.kind = "log_uniform", .min = 1e4, .max = 1e7};
-  pressure.default_value = 1e5;
-  pressure.scale = {.pressure = 1};
-  pressure.description = "p_ref, at which friction is tan(phi_mu)";
   return {.info = {.name = "pressure_dependent_friction",
                    .kind = "contact",
                    .description =
@@ -61,7 +53,8 @@ EffectEntry PressureDependentFriction() {
                        "sigma = Fn/(4 r*)^2, about the mean stress on average; two-sided, vanishes "
                        "at exponent 0; shows between pressures",
                    .contacts = {},
-                   .parameters = {exponent, pressure},
+                   .parameters = {exponent,
+                                  ReferencePressure("p_ref, at which friction is tan(phi_mu)")},
                    .reference = "Bowden & Tabor, The Friction and Lubrication of Solids (1950); "
                                 "Archard, Proc. R. Soc. Lond. A 243 (1957) 190",
                    .two_sided = true,

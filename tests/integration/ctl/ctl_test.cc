@@ -1,78 +1,19 @@
 // calibctl as a user meets it: real processes and exit codes.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <sys/wait.h>
 
 #include <chrono>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <nlohmann/json.hpp>
-#include <string>
+
+#include "tests/integration/ctl/calibctl_fixture.h"
 
 namespace calib::ctl {
 namespace {
 
 using ::testing::HasSubstr;
-using Json = nlohmann::json;
 
-std::string ReadAll(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-struct Answer {
-  int code = -1;
-  std::string out, err;
-  Json json() const { return Json::parse(out, nullptr, false); }
-};
-
-class Calibctl : public ::testing::Test {
+class Calibctl : public CalibctlFixture {
  protected:
-  Calibctl() {
-    std::string pattern =
-        (std::filesystem::temp_directory_path() / "calib-ctl-test-XXXXXX").string();
-    work_ = mkdtemp(pattern.data());
-    std::ofstream(work_ / "data.csv") << "axial_strain,q_over_p,volumetric_strain\n0.002,0.5,0."
-                                         "0008\n0.005,0.8,0.0012\n0.01,1.0,0.001\n";
-    std::ofstream(work_ / "good.yaml") << Campaign();
-  }
-  ~Calibctl() override { std::filesystem::remove_all(work_); }
-
-  static std::string Campaign() {
-    return R"(name: small
-model: {contact: linear, density: 2650000 kg/m^3, fixed: {poisson_ratio: 0.3}}
-parameters:
-  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e9 Pa}
-  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
-experiments:
-  - name: tx
-    test: triaxial_drained
-    confining_pressure: 100 kPa
-    packing: {generate: {particles: 64, porosity: 0.42, radii: {mean: 1 mm, spread: 0.2}, seed: 3}}
-    data: {file: data.csv, strain: logarithmic}
-    control: axial_strain
-    staging: {rate: 1 1/s, step: 0.005, damping: [0.3, 0.9], unbalanced: 5e-3}
-    observables: {q_over_p: {noise: {absolute: 0.3}}, volumetric_strain: {noise: {absolute: 0.002}}}
-inference: {method: iterative_bayesian_filter, samples: 6, max_iterations: 2}
-seed: 7
-)";
-  }
-
-  Answer Call(const std::string& arguments) const { return CallWith("", arguments); }
-
-  // wrapper: a program that starts calibctl and gives back its exit code (timeout
-  // --preserve-status).
-  Answer CallWith(const std::string& wrapper, const std::string& arguments) const {
-    const std::string command = "cd '" + work_.string() + "' && " + wrapper + " '" + CALIBCTL +
-                                "' " + arguments + " >out 2>err </dev/null";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, ReadAll(work_ / "out"),
-            ReadAll(work_ / "err")};
-  }
-
-  std::filesystem::path work_;
+  Calibctl() { Write("good.yaml", Campaign()); }
+  static std::string Campaign() { return SmallCampaign(6, 2); }
 };
 
 TEST_F(Calibctl, BadInputIsTwoWithOneLinePerProblem) {

@@ -1,52 +1,15 @@
 // predict as a user meets it, on a calibration of 64 grains.
-#include <gtest/gtest.h>
-#include <sys/wait.h>
-
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <nlohmann/json.hpp>
-#include <string>
+
+#include "tests/integration/ctl/calibctl_fixture.h"
 
 namespace calib::ctl {
 namespace {
 
-using Json = nlohmann::json;
-
-struct Answer {
-  int code = -1;
-  std::string out, err;
-  Json json() const { return Json::parse(out, nullptr, false); }
-};
-
-class Predicting : public ::testing::Test {
+class Predicting : public CalibctlFixture {
  protected:
   Predicting() {
-    std::string pattern =
-        (std::filesystem::temp_directory_path() / "calib-predict-XXXXXX").string();
-    work_ = mkdtemp(pattern.data());
-    Write("data.csv",
-          "axial_strain,q_over_p,volumetric_strain\n0.002,0.5,0.0008\n0.005,0.8,0.0012\n"
-          "0.01,1.0,0.001\n");
-    Write("small.yaml", R"(name: small
-model: {contact: linear, density: 2650000 kg/m^3, fixed: {poisson_ratio: 0.3}}
-parameters:
-  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e9 Pa}
-  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
-experiments:
-  - name: tx
-    test: triaxial_drained
-    confining_pressure: 100 kPa
-    packing: {generate: {particles: 64, porosity: 0.42, radii: {mean: 1 mm, spread: 0.2}, seed: 3}}
-    data: {file: data.csv, strain: logarithmic}
-    control: axial_strain
-    staging: {rate: 1 1/s, step: 0.005, damping: [0.3, 0.9], unbalanced: 5e-3}
-    observables: {q_over_p: {noise: {absolute: 0.3}}, volumetric_strain: {noise: {absolute: 0.002}}}
-inference: {method: iterative_bayesian_filter, samples: 12, max_iterations: 1}
-seed: 7
-)");
+    Write("small.yaml", SmallCampaign(12, 1));
     Write("other.yaml", R"(name: tx200
 test: triaxial_drained
 confining_pressure: 200 kPa
@@ -55,23 +18,6 @@ staging: {rate: 1 1/s, step: 0.005, damping: [0.3, 0.9], unbalanced: 5e-3}
 observables: [q_over_p, volumetric_strain]
 )");
   }
-  ~Predicting() override { std::filesystem::remove_all(work_); }
-
-  void Write(const char* name, const std::string& text) const {
-    std::ofstream(work_ / name) << text;
-  }
-  Answer Call(const std::string& arguments) const {
-    const std::string command =
-        "cd '" + work_.string() + "' && '" + CALIBCTL + "' " + arguments + " >out 2>err </dev/null";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, Read("out"), Read("err")};
-  }
-  std::string Read(const char* name) const {
-    std::ifstream file(work_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-
-  std::filesystem::path work_;
 };
 
 TEST_F(Predicting, PosteriorAtAnotherPressure) {

@@ -45,6 +45,17 @@ bool Print(const std::string& title, const Scenario& scenario) {
 
 int PrintAll() {
   bool good = true;
+  for (const char* law : {"tsuji", "kuwabara_kono", "extended_viscoelastic"}) {
+    Scenario scenario = test::SmallTriaxial(test::HertzModel());
+    scenario.path = {{.target = 0, .load_step = 0}, {.target = 0.002, .load_step = 1}};
+    scenario.model.contact = law;
+    scenario.model.parameters["tangential_stiffness"] = 5e5;
+    scenario.model.parameters["damping"] = 1;
+    if (std::string(law) == "extended_viscoelastic") {
+      scenario.model.parameters["damping_exponent"] = 0.3;
+    }
+    good = Print(law, scenario) && good;
+  }
   for (const Model& base : {test::HertzModel(), test::LinearModel()}) {
     Scenario scenario = test::SmallTriaxial(base);
     scenario.path = {{.target = 0, .load_step = 0}, {.target = 0.002, .load_step = 1}};
