@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/fitted_campaign.h"
+#include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
 #include "server/ctl/warm_fits.h"
 
@@ -18,6 +20,7 @@ constexpr std::size_t kWarmFits = 3;
 constexpr double kClearlyCloser = 0.8;  // of the base model's rms
 constexpr double kNotExcluded = 1.3;    // times the best run of what is named: a fit not judged
 constexpr std::size_t kMostNames = 3;
+constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
 
 class Inquiry {
  public:
@@ -31,7 +34,8 @@ class Inquiry {
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();
     if (auto possible = CheckPossible(); !possible.ok()) return possible;
-    if (!options_.only_adequacy) {
+    const bool elsewhere = base_.view().campaign.precomputed.has_value();
+    if (!options_.only_adequacy && !elsewhere) {
       auto nuisance = screen_.MeasureNuisance();
       if (!nuisance.ok()) return nuisance.status();
       nuisance_ = *std::move(nuisance);
@@ -42,7 +46,7 @@ class Inquiry {
       diagnosis_.verdict = fits ? "adequate" : "unexplained";
       return diagnosis_;
     }
-    if (auto status = ScreenEffects(); !status.ok()) return status;
+    if (auto status = elsewhere ? ScreenReadings() : ScreenEffects(); !status.ok()) return status;
     const bool hinted =
         !diagnosis_.candidates.empty() && diagnosis_.candidates.front().p_value < options_.level;
     if (fits && !hinted) {
@@ -51,7 +55,7 @@ class Inquiry {
     }
     if (auto status = FitWarm(); !status.ok()) return status;
     Conclude(fits);
-    if (options_.next_experiment && diagnosis_.verdict != "adequate") {
+    if (options_.next_experiment && !elsewhere && diagnosis_.verdict != "adequate") {
       if (auto status = PlanNext(); !status.ok()) return status;
     }
     return diagnosis_;
@@ -73,10 +77,6 @@ class Inquiry {
           absl::StrCat("campaign ", id,
                        " states no size of the errors (noise is inferred or "
                        "tempered), so its model cannot be judged; give the noise"));
-    }
-    if (view.campaign.precomputed && !options_.only_adequacy) {
-      return absl::FailedPreconditionError(absl::StrCat(
-          "the runs of ", id, " were made elsewhere; effects cannot be tried on them"));
     }
     if (base_.runs().sample.empty()) {
       return absl::FailedPreconditionError(absl::StrCat("no sample of ", id, " has finished"));
@@ -118,13 +118,81 @@ class Inquiry {
     return absl::OkStatus();
   }
 
+  // Runs that were made elsewhere cannot be repeated with an effect; what happens to their readings
+  // can be calculated.
+  absl::Status ScreenReadings() {
+    const campaign::Campaign& campaign = base_.view().campaign;
+    const std::vector<ReadingEffect> effects =
+        EffectsOnReadings(campaign, response_.model.histories, diagnosis_.not_excitable);
+    std::vector<inference::Signature> signatures;
+    for (const ReadingEffect& effect : effects) {
+      if (signatures.empty() || signatures.back().name != effect.effect) {
+        signatures.push_back({.name = effect.effect,
+                              .differences = {},
+                              .two_sided = dem::FindEffect(effect.effect)->two_sided});
+      }
+      signatures.back().differences.emplace_back(
+          effect.change.row(diagnosis_.adequacy.best).transpose());
+      steps_on_readings_[effect.effect].push_back(&effect);
+      AdoptJoined(effect);
+    }
+    for (const dem::EffectInfo& effect : dem::Effects()) {
+      const auto judged = [&](const auto& entry) { return entry.first == effect.name; };
+      if (steps_on_readings_.count(effect.name) > 0 ||
+          std::any_of(diagnosis_.not_excitable.begin(), diagnosis_.not_excitable.end(), judged)) {
+        continue;
+      }
+      diagnosis_.not_excitable.emplace_back(
+          effect.name, "the runs were made elsewhere, none can be made with it");
+    }
+    const auto scores = inference::Screen(
+        response_.model, signatures,
+        {.max_amplitude = kMostUnits, .level = options_.level, .seed = campaign.filter.seed});
+    if (!scores.ok()) return scores.status();
+    for (const inference::Score& score : *scores) AddCandidate(score);
+    steps_on_readings_.clear();
+    return absl::OkStatus();
+  }
+
+  // Of several strengths of an effect the one that comes closest is kept.
+  void AdoptJoined(const ReadingEffect& effect) {
+    const bool two_sided = dem::FindEffect(effect.effect)->two_sided;
+    Eigen::VectorXd strengths;
+    WarmFit fit;
+    fit.model = Join(response_.model, effect, two_sided ? -kMostUnits : 0, kMostUnits, strengths);
+    const auto adequacy = inference::TestAdequacy(*fit.model);
+    const auto advantage = inference::Compare(*fit.model, response_.model);
+    if (!adequacy.ok() || !advantage.ok()) return;
+    const WarmFit* before = fits_.Find(effect.effect);
+    if (before != nullptr && before->adequacy.chi2 <= adequacy->chi2) return;
+    fit.adequacy = *adequacy;
+    fit.over_base = *advantage;
+    fit.rms = fit.best_run = fit.model->histories.row(adequacy->best).norm() /
+                             std::sqrt(static_cast<double>(fit.model->histories.cols()));
+    fit.best = PointOf(base_.view(), response_.points, adequacy->best);
+    fit.best[effect.parameter] = strengths[adequacy->best] * effect.unit;
+    fits_.Adopt(effect.effect, std::move(fit));
+  }
+
+  std::map<std::string, double> StrengthOf(const std::string& effect, std::size_t which,
+                                           double multiple) const {
+    const auto found = steps_on_readings_.find(effect);
+    if (found == steps_on_readings_.end()) return screen_.StrengthOf(effect, which, multiple);
+    const ReadingEffect& step = *found->second[which];
+    return {{step.parameter, step.unit * multiple}};
+  }
+  std::size_t DifferencesOf(const std::string& effect) const {
+    const auto found = steps_on_readings_.find(effect);
+    return found == steps_on_readings_.end() ? screen_.DifferencesOf(effect) : found->second.size();
+  }
+
   void AddCandidate(const inference::Score& score) {
     diagnosis_.candidates.push_back(
         {.effect = score.name,
          .p_value = score.adjusted,
          .explained_fraction = score.explained,
-         .amplitude = screen_.StrengthOf(score.name, static_cast<std::size_t>(score.difference),
-                                         score.amplitude),
+         .amplitude =
+             StrengthOf(score.name, static_cast<std::size_t>(score.difference), score.amplitude),
          .predicted_rms_error = score.rms,
          .confusable_with = score.confusable_with,
          .campaign = "",
@@ -133,7 +201,7 @@ class Inquiry {
          .over_base = {}});
     if (std::isfinite(score.detectable)) {
       diagnosis_.detectable[score.name] =
-          screen_.StrengthOf(score.name, screen_.DifferencesOf(score.name) - 1, score.detectable);
+          StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
     }
   }
 
@@ -141,7 +209,9 @@ class Inquiry {
     const std::size_t count = std::min(kWarmFits, diagnosis_.candidates.size());
     std::vector<std::string> effects;
     for (std::size_t c = 0; c < count; ++c) effects.push_back(diagnosis_.candidates[c].effect);
-    if (auto status = fits_.Fit(effects); !status.ok()) return status;
+    if (!base_.view().campaign.precomputed) {
+      if (auto status = fits_.Fit(effects); !status.ok()) return status;
+    }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (std::size_t c = 0; c < count; ++c) Describe(diagnosis_.candidates[c]);
     // Those that explain the readings, by how well; then the other fits, by how close they come.
@@ -159,6 +229,7 @@ class Inquiry {
 
   // What the warm fit of a candidate says.
   void Describe(CandidateEffect& candidate) const {
+    if (fits_.Find(candidate.effect) == nullptr) return;
     const WarmFit& fit = *fits_.Find(candidate.effect);
     candidate.campaign = fit.view.status.campaign();
     candidate.predicted_rms_error = fit.rms;
@@ -260,6 +331,7 @@ class Inquiry {
   Response response_;
   EffectScreen screen_;
   WarmFits fits_;
+  std::map<std::string, std::vector<const ReadingEffect*>> steps_on_readings_;
   Diagnosis diagnosis_;
 };
 

@@ -94,6 +94,13 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
   const auto rows = static_cast<std::size_t>(
       std::clamp(static_cast<int>(std::max<double>(kMostRuns, share)) / experiments, 1, 2));
   const std::vector<Index> runs = base_.BestRuns(rows);
+  // All at once, so that no worker waits for the last run of an effect.
+  for (const dem::EffectInfo* effect : effects) {
+    for (std::size_t k = 0; k < StepsOf(*effect, rows).size(); ++k) {
+      const Pair pair = PairOf(*effect, k, runs, rows);
+      if (auto status = base_.Announce(pair.with, pair.what); !status.ok()) return status;
+    }
+  }
   for (const dem::EffectInfo* effect : effects) {
     auto signature = SignatureOf(*effect, runs, rows);
     if (!signature.ok()) return signature.status();
@@ -106,32 +113,38 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
   return signatures;
 }
 
-// Parameters of the ray are given by the rows; what it holds goes along.
+// A campaign for each step: rays set different parameters. Those of the ray are given by the rows;
+// what it holds goes along.
+EffectScreen::Pair EffectScreen::PairOf(const dem::EffectInfo& effect, std::size_t k,
+                                        const std::vector<Index>& runs, std::size_t rows) const {
+  const std::vector<Step> steps = StepsOf(effect, rows);
+  Pair pair{.step = steps[k],
+            .without = runs[std::min(k, runs.size() - 1)],
+            .with = base_.Derived("screen", absl::StrCat(effect.name, ", step ", k + 1)),
+            .what = absl::StrCat("screen of ", effect.name, " (", k + 1, "/", steps.size(), ")")};
+  pair.with.effects = {effect.name};
+  pair.with.fixed = dem::ParametersOnRay(effect, *pair.step.ray, pair.step.step,
+                                         base_.view().campaign.model.contact, base_.state());
+  pair.with.rows = {base_.RowLike(pair.without)};
+  return pair;
+}
+
 absl::StatusOr<inference::Signature> EffectScreen::SignatureOf(const dem::EffectInfo& effect,
                                                                const std::vector<Index>& runs,
                                                                std::size_t rows) {
   inference::Signature signature{
       .name = effect.name, .differences = {}, .two_sided = effect.two_sided};
   std::vector<Step>& tried = tried_[effect.name];
-  const std::vector<Step> steps = StepsOf(effect, rows);
-  for (std::size_t k = 0; k < steps.size(); ++k) {
-    // A campaign for each step: rays set different parameters.
-    const Index run = runs[std::min(k, runs.size() - 1)];
-    campaign::Derivation derivation =
-        base_.Derived("screen", absl::StrCat(effect.name, ", step ", k + 1));
-    derivation.effects = {effect.name};
-    derivation.fixed = dem::ParametersOnRay(effect, *steps[k].ray, steps[k].step,
-                                            base_.view().campaign.model.contact, base_.state());
-    derivation.rows = {base_.RowLike(run)};
-    const auto view = base_.Run(
-        derivation, absl::StrCat("screen of ", effect.name, " (", k + 1, "/", steps.size(), ")"));
+  for (std::size_t k = 0; k < StepsOf(effect, rows).size(); ++k) {
+    const Pair pair = PairOf(effect, k, runs, rows);
+    const auto view = base_.Run(pair.with, pair.what);
     if (!view.ok()) return view.status();
     evaluations_ += base_.fitted_experiments();
     const report::RunTable with = report::RunsOf(*view);
     if (with.sample.empty()) continue;
     signature.differences.emplace_back(
-        (with.histories.row(0) - base_.runs().histories.row(run)).transpose());
-    tried.push_back(steps[k]);
+        (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
+    tried.push_back(pair.step);
   }
   return signature;
 }

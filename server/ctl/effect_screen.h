@@ -47,6 +47,15 @@ class EffectScreen {
     const dem::StrengthRay* ray = nullptr;
     double step = 0;
   };
+  // A run without the effect and the campaign that repeats it with the effect.
+  struct Pair {
+    Step step;
+    Eigen::Index without = 0;
+    campaign::Derivation with;
+    std::string what;
+  };
+  Pair PairOf(const dem::EffectInfo& effect, std::size_t k, const std::vector<Eigen::Index>& runs,
+              std::size_t rows) const;
   static std::vector<Step> StepsOf(const dem::EffectInfo& effect, std::size_t rows);
   std::string WhyNotExcitable(const dem::EffectInfo& effect) const;
   std::vector<const dem::EffectInfo*> Excitable(const std::vector<std::string>& without);

@@ -55,6 +55,16 @@ campaign::Derivation FittedCampaign::Derived(const std::string& purpose,
           .rows = {}};
 }
 
+absl::Status FittedCampaign::Announce(const campaign::Derivation& derivation,
+                                      const std::string& what) const {
+  const auto text = campaign::Derive(view_.source.campaign_file(), derivation);
+  return text.ok() ? Announce(*text, what) : text.status();
+}
+
+absl::Status FittedCampaign::Announce(const std::string& text, const std::string& what) const {
+  return laboratory_.Submit(view_, text, what).status();
+}
+
 absl::StatusOr<report::CampaignView> FittedCampaign::Run(const campaign::Derivation& derivation,
                                                          const std::string& what) const {
   const auto text = campaign::Derive(view_.source.campaign_file(), derivation);

@@ -34,8 +34,11 @@ class FittedCampaign {
   /// Nothing changed yet, held-out experiments left out.
   campaign::Derivation Derived(const std::string& purpose, const std::string& what) const;
 
+  /// Submits without waiting.
+  absl::Status Announce(const campaign::Derivation& derivation, const std::string& what) const;
   absl::StatusOr<report::CampaignView> Run(const campaign::Derivation& derivation,
                                            const std::string& what) const;
+  absl::Status Announce(const std::string& text, const std::string& what) const;
   absl::StatusOr<report::CampaignView> Run(const std::string& text, const std::string& what) const;
 
  private:

@@ -32,6 +32,11 @@ absl::Status WarmFits::Fit(const std::vector<std::string>& effects) {
   const auto runs = static_cast<int>(base_.runs().sample.size());
   samples_ = std::max(kLeastSamples, runs / kShares);
   int spent = 0;
+  for (const std::string& effect : effects) {  // side by side
+    const auto text = TextOf(effect, kLeastIterations);
+    if (!text.ok()) return text.status();
+    if (auto status = base_.Announce(*text, effect); !status.ok()) return status;
+  }
   for (const std::string& effect : effects) {
     if (auto status = FitOne(effect, kLeastIterations); !status.ok()) return status;
     spent += kLeastIterations * samples_;
@@ -66,13 +71,17 @@ std::int64_t WarmFits::evaluations() const {
   return sum;
 }
 
-// The same text but for the number of iterations: what has been run is not run again.
+// The same but for the number of iterations: what has been run is not run again.
+absl::StatusOr<std::string> WarmFits::TextOf(const std::string& effect, int iterations) const {
+  return ExtensionText(base_.view(), {.effects = {effect},
+                                      .purpose = "warm_fit",
+                                      .held_out = false,
+                                      .samples = samples_,
+                                      .iterations = iterations});
+}
+
 absl::Status WarmFits::FitOne(const std::string& effect, int iterations) {
-  const auto text = ExtensionText(base_.view(), {.effects = {effect},
-                                                 .purpose = "warm_fit",
-                                                 .held_out = false,
-                                                 .samples = samples_,
-                                                 .iterations = iterations});
+  const auto text = TextOf(effect, iterations);
   if (!text.ok()) return text.status();
   auto view = base_.Run(*text, absl::StrCat("warm fit with ", effect));
   if (!view.ok()) return view.status();

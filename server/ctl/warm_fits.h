@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -17,7 +18,7 @@
 namespace calib::ctl {
 
 struct WarmFit {
-  report::CampaignView view;
+  report::CampaignView view{};
   int iterations = 0;
   std::map<std::string, double> best{};  ///< parameters at the best point, SI
   double best_run = 0;                   ///< rms of the closest run, residual over noise sd
@@ -46,10 +47,16 @@ class WarmFits {
   /// the runs.
   absl::Status Fit(const std::vector<std::string>& effects);
 
+  /// A fit that needed no runs.
+  void Adopt(const std::string& effect, WarmFit fit) {
+    fits_.insert_or_assign(effect, std::move(fit));
+  }
+
   const WarmFit* Find(const std::string& effect) const;
   std::int64_t evaluations() const;
 
  private:
+  absl::StatusOr<std::string> TextOf(const std::string& effect, int iterations) const;
   absl::Status FitOne(const std::string& effect, int iterations);
   void Judge(WarmFit& fit) const;
 
