@@ -93,6 +93,7 @@ class Inquiry {
     diagnosis_.adequacy = *adequacy;
     diagnosis_.emulator_error = response_.emulator_error;
     diagnosis_.scatter = response_.scatter;
+    diagnosis_.left_out_error = LeftOut(response_.model);
     diagnosis_.rms = response_.model.histories.row(adequacy->best).norm() /
                      std::sqrt(static_cast<double>(response_.model.histories.cols()));
     if (!response_.trustworthy) {
@@ -102,6 +103,11 @@ class Inquiry {
           "more samples"));
     }
     return absl::OkStatus();
+  }
+
+  std::optional<double> LeftOut(const inference::FittedModel& model) const {
+    const auto error = inference::LeftOutError(model, response_.parts);
+    return error.ok() ? std::optional<double>(*error) : std::nullopt;
   }
 
   absl::Status ScreenEffects() {
@@ -169,6 +175,7 @@ class Inquiry {
     fit.over_base = *advantage;
     fit.rms = fit.best_run = fit.model->histories.row(adequacy->best).norm() /
                              std::sqrt(static_cast<double>(fit.model->histories.cols()));
+    fit.left_out_error = LeftOut(*fit.model);
     fit.best = PointOf(base_.view(), response_.points, adequacy->best);
     fit.best[effect.parameter] = strengths[adequacy->best] * effect.unit;
     fits_.Adopt(effect.effect, std::move(fit));
@@ -198,7 +205,8 @@ class Inquiry {
          .campaign = "",
          .refit_p_value = -1,
          .refit_chi2 = 0,
-         .over_base = {}});
+         .over_base = {},
+         .left_out_error = {}});
     if (std::isfinite(score.detectable)) {
       diagnosis_.detectable[score.name] =
           StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
@@ -240,15 +248,19 @@ class Inquiry {
     candidate.refit_p_value = fit.adequacy.p_value;
     candidate.refit_chi2 = fit.adequacy.chi2;
     candidate.over_base = fit.over_base;
+    candidate.left_out_error = fit.left_out_error;
     candidate.explained_fraction =
         std::clamp((diagnosis_.adequacy.chi2 - fit.adequacy.chi2) /
                        std::max(1.0, diagnosis_.adequacy.chi2 - diagnosis_.adequacy.degrees),
                    0.0, 1.0);
   }
 
+  // Adequate, clearly better than the base model, and not worse on readings it was not fitted to.
   bool Explains(const CandidateEffect& candidate) const {
     const WarmFit* fit = fits_.Find(candidate.effect);
-    return fit != nullptr && fit->Explains(options_.level);
+    return fit != nullptr && fit->Explains(options_.level) &&
+           !(fit->left_out_error && diagnosis_.left_out_error &&
+             *fit->left_out_error > *diagnosis_.left_out_error);
   }
 
   bool ClearlyBetter(const WarmFit& a, const WarmFit& b) const {
@@ -268,7 +280,7 @@ class Inquiry {
     std::vector<std::string> rivals;
     for (const CandidateEffect& other : diagnosis_.candidates) {
       const WarmFit* fit = fits_.Find(other.effect);
-      if (fit == nullptr || fit == &best || (fit->model && !fit->Explains(options_.level))) {
+      if (fit == nullptr || fit == &best || (fit->model && !Explains(other))) {
         continue;
       }
       if (rivals.size() + 1 < kMostNames && !ClearlyBetter(best, *fit)) {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -50,6 +52,28 @@ Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
     }
   }
   return correlation;
+}
+
+// Which part of the data each reading belongs to: its experiment, or its stage of loading where
+// only one experiment is fitted.
+std::vector<int> PartsOf(const campaign::Campaign& campaign, const inference::DataSet& data) {
+  std::vector<int> parts;
+  std::set<int> experiments;
+  for (const inference::Reading& reading : data.readings) {
+    parts.push_back(reading.experiment);
+    experiments.insert(reading.experiment);
+  }
+  if (experiments.size() != 1) return parts;
+  std::map<std::string, int> stages;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const inference::Reading& reading = data.readings[k];
+    const auto& segment =
+        campaign.experiments[static_cast<std::size_t>(reading.experiment)].segment;
+    const auto step = static_cast<std::size_t>(reading.load_step);
+    const std::string stage = step < segment.size() ? segment[step] : "";
+    parts[k] = stages.emplace(stage, static_cast<int>(stages.size())).first->second;
+  }
+  return parts;
 }
 
 }  // namespace
@@ -198,6 +222,7 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
   }
   response.model.histories = std::move(histories);
   response.points = std::move(points);
+  response.parts = PartsOf(campaign, data);
   return response;
 }
 

@@ -22,6 +22,8 @@ struct Response {
   /// The emulator predicts runs well enough to judge by: what it does not know of them beyond their
   /// scatter would otherwise excuse any misfit.
   bool trustworthy = false;
+  /// Of each reading: its experiment, or its stage of loading where only one experiment is fitted.
+  std::vector<int> parts{};
 };
 
 /// nuisance: directions (T each) that a measurement may differ by for numerical reasons; they join

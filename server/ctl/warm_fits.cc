@@ -115,6 +115,9 @@ void WarmFits::Judge(WarmFit& fit) const {
   fit.rms = response->model.histories.row(adequacy->best).norm() /
             std::sqrt(static_cast<double>(response->model.histories.cols()));
   fit.model = response->model;
+  if (const auto error = inference::LeftOutError(*fit.model, response->parts); error.ok()) {
+    fit.left_out_error = *error;
+  }
 }
 
 }  // namespace calib::ctl

@@ -27,6 +27,8 @@ struct WarmFit {
   std::optional<inference::FittedModel> model{};
   inference::Adequacy adequacy{};
   inference::Advantage over_base{};
+  /// Of a part of the data that it was not fitted to; none where there is one part.
+  std::optional<double> left_out_error{};
 
   /// Adequate, and clearly better than the base model.
   bool Explains(double level) const {
