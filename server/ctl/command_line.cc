@@ -128,10 +128,15 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->add_option("--effect", b.arguments().effects, "name, as shown by `calibctl effects`")
       ->required()
       ->allow_extra_args(false);
-  b.AddOnCampaign("improve", &Improve,
-                  "Compare, diagnose, extend until the misfit is explained or nothing helps")
-      ->add_option("--max-effects", b.arguments().max_effects, "at most so many are added [3]")
+  auto* improve =
+      b.AddOnCampaign("improve", &Improve,
+                      "Compare, diagnose, extend until the misfit is explained or nothing helps");
+  improve->add_option("--max-effects", b.arguments().max_effects, "at most so many are added [3]")
       ->check(CLI::Range(1, 10));
+  improve
+      ->add_option("--max-evaluations", b.arguments().max_evaluations,
+                   "no calibration is begun after so many model evaluations")
+      ->check(CLI::PositiveNumber);
   auto* predict = b.AddOnCampaign(
       "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance");
   predict

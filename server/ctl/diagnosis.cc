@@ -18,7 +18,6 @@ namespace {
 
 constexpr std::size_t kWarmFits = 3;
 constexpr double kClearlyCloser = 0.8;  // of the base model's rms
-constexpr double kNotExcluded = 1.3;    // times the best run of what is named: a fit not judged
 constexpr std::size_t kMostNames = 3;
 constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
 
@@ -29,7 +28,7 @@ class Inquiry {
         options_(options),
         base_(laboratory, view),
         screen_(base_),
-        fits_(base_, response_.model, nuisance_) {}
+        fits_(base_, response_.run_covariance, response_.parts, options.level) {}
 
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();
@@ -53,6 +52,7 @@ class Inquiry {
       diagnosis_.verdict = "adequate";
       return diagnosis_;
     }
+    diagnosis_.left_out_error = LeftOut(elsewhere ? response_.model : fits_.BaseByRuns());
     if (auto status = FitWarm(); !status.ok()) return status;
     Conclude(fits);
     if (options_.next_experiment && !elsewhere && diagnosis_.verdict != "adequate") {
@@ -93,7 +93,6 @@ class Inquiry {
     diagnosis_.adequacy = *adequacy;
     diagnosis_.emulator_error = response_.emulator_error;
     diagnosis_.scatter = response_.scatter;
-    diagnosis_.left_out_error = LeftOut(response_.model);
     diagnosis_.rms = response_.model.histories.row(adequacy->best).norm() /
                      std::sqrt(static_cast<double>(response_.model.histories.cols()));
     if (!response_.trustworthy) {
@@ -165,17 +164,18 @@ class Inquiry {
     const bool two_sided = dem::FindEffect(effect.effect)->two_sided;
     Eigen::VectorXd strengths;
     WarmFit fit;
+    fit.stalled = true;  // there is nothing to continue
     fit.model = Join(response_.model, effect, two_sided ? -kMostUnits : 0, kMostUnits, strengths);
-    const auto adequacy = inference::TestAdequacy(*fit.model);
-    const auto advantage = inference::Compare(*fit.model, response_.model);
+    const auto adequacy = inference::TestAdequacy(fit.model);
+    const auto advantage = inference::Compare(fit.model, response_.model);
     if (!adequacy.ok() || !advantage.ok()) return;
     const WarmFit* before = fits_.Find(effect.effect);
     if (before != nullptr && before->adequacy.chi2 <= adequacy->chi2) return;
     fit.adequacy = *adequacy;
     fit.over_base = *advantage;
-    fit.rms = fit.best_run = fit.model->histories.row(adequacy->best).norm() /
-                             std::sqrt(static_cast<double>(fit.model->histories.cols()));
-    fit.left_out_error = LeftOut(*fit.model);
+    fit.rms = fit.model.histories.row(adequacy->best).norm() /
+              std::sqrt(static_cast<double>(fit.model.histories.cols()));
+    fit.left_out_error = LeftOut(fit.model);
     fit.best = PointOf(base_.view(), response_.points, adequacy->best);
     fit.best[effect.parameter] = strengths[adequacy->best] * effect.unit;
     fits_.Adopt(effect.effect, std::move(fit));
@@ -244,7 +244,6 @@ class Inquiry {
     for (const auto& [name, value] : fit.best) {
       if (name.starts_with(candidate.effect + ".")) candidate.amplitude[name] = value;
     }
-    if (!fit.model) return;
     candidate.refit_p_value = fit.adequacy.p_value;
     candidate.refit_chi2 = fit.adequacy.chi2;
     candidate.over_base = fit.over_base;
@@ -264,8 +263,7 @@ class Inquiry {
   }
 
   bool ClearlyBetter(const WarmFit& a, const WarmFit& b) const {
-    if (!b.model) return b.best_run > kNotExcluded * a.best_run;
-    const auto advantage = inference::Compare(*a.model, *b.model);
+    const auto advantage = inference::Compare(a.model, b.model);
     return advantage.ok() && advantage->nats > 2 * advantage->sd && advantage->nats > 0;
   }
 
@@ -277,15 +275,13 @@ class Inquiry {
     }
     CandidateEffect& first = diagnosis_.candidates.front();
     const WarmFit& best = *fits_.Find(first.effect);
+    // Those that do as well, and those whose fit is not at its end: they are not excluded.
     std::vector<std::string> rivals;
     for (const CandidateEffect& other : diagnosis_.candidates) {
       const WarmFit* fit = fits_.Find(other.effect);
-      if (fit == nullptr || fit == &best || (fit->model && !Explains(other))) {
-        continue;
-      }
-      if (rivals.size() + 1 < kMostNames && !ClearlyBetter(best, *fit)) {
-        rivals.push_back(other.effect);
-      }
+      if (fit == nullptr || fit == &best) continue;
+      const bool rival = Explains(other) ? !ClearlyBetter(best, *fit) : !fit->stalled;
+      if (rival && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
     }
     if (rivals.empty()) {
       diagnosis_.verdict = "missing_effect";

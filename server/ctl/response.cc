@@ -210,16 +210,20 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
   // What is not known of the mean history at the best point, and the scatter of a measurement.
   Index best = 0;
   histories.rowwise().squaredNorm().minCoeff(&best);
-  const Eigen::VectorXd sd =
+  // Of a history, from standard deviations of its scores.
+  const auto covariance_of = [&](const Eigen::VectorXd& sd) -> Eigen::MatrixXd {
+    const Eigen::MatrixXd factor = components.basis * sd.asDiagonal();
+    Eigen::MatrixXd covariance = factor * emulator.correlation() * factor.transpose();
+    covariance.diagonal() += components.remainder;
+    return covariance;
+  };
+  Eigen::MatrixXd noise = NoiseCorrelation(data);
+  for (const Eigen::VectorXd& direction : nuisance) noise += direction * direction.transpose();
+  const Eigen::VectorXd not_known =
       (unknown.row(best).transpose().array().square() + emulator.scatter_sd().array().square())
           .sqrt();
-  const Eigen::MatrixXd spread_basis = components.basis * sd.asDiagonal();
-  response.model.covariance = NoiseCorrelation(data);
-  response.model.covariance.diagonal() += components.remainder;
-  response.model.covariance += spread_basis * emulator.correlation() * spread_basis.transpose();
-  for (const Eigen::VectorXd& direction : nuisance) {
-    response.model.covariance += direction * direction.transpose();
-  }
+  response.model.covariance = noise + covariance_of(not_known);
+  response.run_covariance = noise + 2 * covariance_of(emulator.scatter_sd());
   response.model.histories = std::move(histories);
   response.points = std::move(points);
   response.parts = PartsOf(campaign, data);

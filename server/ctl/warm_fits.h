@@ -1,6 +1,8 @@
 #pragma once
-// The model refitted with one effect more, for the few effects that a screen ranks first: campaigns
-// of few samples, continued an iteration at a time where that promises most.
+// The model refitted with one effect more, for the few effects that a screen ranks first: small
+// batches of runs at points that an emulator of all that has been run chooses, until the fit is
+// adequate or comes no closer, continued where that promises most. Judged by runs, not by the
+// emulator: what an emulator does not know would excuse any misfit.
 
 #include <Eigen/Dense>
 #include <cstdint>
@@ -13,18 +15,17 @@
 #include "absl/status/statusor.h"
 #include "inference/diagnosis/screen.h"
 #include "server/ctl/fitted_campaign.h"
-#include "server/ctl/response.h"
 
 namespace calib::ctl {
 
 struct WarmFit {
-  report::CampaignView view{};
+  report::CampaignView view{};  ///< its first batch, a campaign of the extended model
+  report::RunTable runs{};      ///< of all batches
   int iterations = 0;
-  std::map<std::string, double> best{};  ///< parameters at the best point, SI
-  double best_run = 0;                   ///< rms of the closest run, residual over noise sd
-  double rms = 0;                        ///< of `best`: emulated where judged, else best_run
-  /// Where the emulator of its runs is good enough to judge by.
-  std::optional<inference::FittedModel> model{};
+  bool stalled = false;                  ///< the last batches have come no closer
+  std::map<std::string, double> best{};  ///< parameters of the closest run, SI
+  double rms = 0;                        ///< of that run, residual over noise sd
+  inference::FittedModel model{};        ///< the runs as points
   inference::Adequacy adequacy{};
   inference::Advantage over_base{};
   /// Of a part of the data that it was not fitted to; none where there is one part.
@@ -32,21 +33,20 @@ struct WarmFit {
 
   /// Adequate, and clearly better than the base model.
   bool Explains(double level) const {
-    return model && adequacy.p_value >= level && over_base.nats > 2 * over_base.sd;
+    return adequacy.p_value >= level && over_base.nats > 2 * over_base.sd;
   }
 };
 
 class WarmFits {
  public:
-  /// nuisance: directions that a measurement may differ by for numerical reasons. All must outlive
-  /// it.
-  WarmFits(const FittedCampaign& base, const inference::FittedModel& base_model,
-           const std::vector<Eigen::VectorXd>& nuisance)
-      : base_(base), base_model_(base_model), nuisance_(nuisance) {}
+  /// covariance: of the difference between a measurement and one run, in units of the noise sd.
+  /// parts: see Response. All must outlive it.
+  WarmFits(const FittedCampaign& base, const Eigen::MatrixXd& covariance,
+           const std::vector<int>& parts, double level)
+      : base_(base), covariance_(covariance), parts_(parts), level_(level) {}
 
-  /// Fits all of them and continues, the most promising first, until each is judged or as many
-  /// samples have been run as the campaign has (two iterations of each at least). Errors: those of
-  /// the runs.
+  /// Fits all of them and continues, the most promising first, until each explains the data or has
+  /// stalled, or as many samples have been run as the campaign has. Errors: those of the runs.
   absl::Status Fit(const std::vector<std::string>& effects);
 
   /// A fit that needed no runs.
@@ -55,17 +55,23 @@ class WarmFits {
   }
 
   const WarmFit* Find(const std::string& effect) const;
-  std::int64_t evaluations() const;
+  std::int64_t evaluations() const { return evaluations_; }
+
+  /// The base model judged in the same way, by its runs.
+  inference::FittedModel BaseByRuns() const;
 
  private:
-  absl::StatusOr<std::string> TextOf(const std::string& effect, int iterations) const;
-  absl::Status FitOne(const std::string& effect, int iterations);
+  absl::StatusOr<std::string> FirstText(const std::string& effect) const;
+  absl::Status Continue(const std::string& effect);
+  absl::StatusOr<Eigen::MatrixXd> NextPoints(const WarmFit& fit) const;
   void Judge(WarmFit& fit) const;
 
   const FittedCampaign& base_;
-  const inference::FittedModel& base_model_;
-  const std::vector<Eigen::VectorXd>& nuisance_;
-  int samples_ = 0;  // of an iteration
+  const Eigen::MatrixXd& covariance_;
+  const std::vector<int>& parts_;
+  double level_;
+  int samples_ = 0;  // of a batch
+  std::int64_t evaluations_ = 0;
   std::map<std::string, WarmFit> fits_;
 };
 
