@@ -28,7 +28,7 @@ class Inquiry {
         options_(options),
         base_(laboratory, view),
         screen_(base_),
-        fits_(base_, response_.run_covariance, response_.parts, options.level) {}
+        fits_(base_, response_.run_covariance, response_.parts) {}
 
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();
@@ -280,8 +280,8 @@ class Inquiry {
     for (const CandidateEffect& other : diagnosis_.candidates) {
       const WarmFit* fit = fits_.Find(other.effect);
       if (fit == nullptr || fit == &best) continue;
-      const bool rival = Explains(other) ? !ClearlyBetter(best, *fit) : !fit->stalled;
-      if (rival && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
+      const bool excluded = fit->stalled && (!Explains(other) || ClearlyBetter(best, *fit));
+      if (!excluded && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
     }
     if (rivals.empty()) {
       diagnosis_.verdict = "missing_effect";

@@ -73,7 +73,7 @@ absl::Status WarmFits::Fit(const std::vector<std::string>& effects) {
     double lowest = 0;
     for (const std::string& effect : effects) {
       const WarmFit& fit = fits_.at(effect);
-      if (fit.stalled || fit.Explains(level_) || fit.runs.histories.rows() == 0) continue;
+      if (fit.stalled || fit.runs.histories.rows() == 0) continue;
       const double price = fit.rms * std::pow(kPatience, fit.iterations);
       if (next == nullptr || price < lowest) {
         next = &effect;
@@ -109,7 +109,8 @@ absl::StatusOr<std::string> WarmFits::FirstText(const std::string& effect) const
 absl::Status WarmFits::Continue(const std::string& effect) {
   WarmFit& fit = fits_[effect];
   const std::string what = absl::StrCat("warm fit with ", effect, ", batch ", fit.iterations + 1);
-  const double before = fit.rms;
+  const double rms = fit.rms;
+  const double chi2 = fit.adequacy.chi2;
   if (fit.iterations == 0) {
     const auto text = FirstText(effect);
     if (!text.ok()) return text.status();
@@ -139,7 +140,8 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     return absl::OkStatus();
   }
   Judge(fit);
-  fit.stalled = fit.iterations > kBlind && fit.rms > kCloser * before;
+  fit.stalled =
+      fit.iterations > kBlind && fit.rms > kCloser * rms && fit.adequacy.chi2 > kCloser * chi2;
   return absl::OkStatus();
 }
 
@@ -177,8 +179,8 @@ void WarmFits::Judge(WarmFit& fit) const {
   fit.adequacy = *adequacy;
   fit.over_base = *advantage;
   fit.best = PointOf(fit.view, fit.runs.parameters, adequacy->best);
-  fit.rms = fit.runs.histories.row(adequacy->best).norm() /
-            std::sqrt(static_cast<double>(fit.runs.histories.cols()));
+  fit.rms = std::sqrt(fit.runs.histories.rowwise().squaredNorm().minCoeff() /
+                      static_cast<double>(fit.runs.histories.cols()));
   if (const auto error = inference::LeftOutError(fit.model, parts_); error.ok()) {
     fit.left_out_error = *error;
   }

@@ -23,8 +23,8 @@ struct WarmFit {
   report::RunTable runs{};      ///< of all batches
   int iterations = 0;
   bool stalled = false;                  ///< the last batches have come no closer
-  std::map<std::string, double> best{};  ///< parameters of the closest run, SI
-  double rms = 0;                        ///< of that run, residual over noise sd
+  std::map<std::string, double> best{};  ///< parameters of the run with the smallest chi2, SI
+  double rms = 0;                        ///< smallest of a run, residual over noise sd
   inference::FittedModel model{};        ///< the runs as points
   inference::Adequacy adequacy{};
   inference::Advantage over_base{};
@@ -42,11 +42,11 @@ class WarmFits {
   /// covariance: of the difference between a measurement and one run, in units of the noise sd.
   /// parts: see Response. All must outlive it.
   WarmFits(const FittedCampaign& base, const Eigen::MatrixXd& covariance,
-           const std::vector<int>& parts, double level)
-      : base_(base), covariance_(covariance), parts_(parts), level_(level) {}
+           const std::vector<int>& parts)
+      : base_(base), covariance_(covariance), parts_(parts) {}
 
-  /// Fits all of them and continues, the most promising first, until each explains the data or has
-  /// stalled, or as many samples have been run as the campaign has. Errors: those of the runs.
+  /// Fits all of them and continues, the most promising first, until each has stalled or as many
+  /// samples have been run as the campaign has. Errors: those of the runs.
   absl::Status Fit(const std::vector<std::string>& effects);
 
   /// A fit that needed no runs.
@@ -69,7 +69,6 @@ class WarmFits {
   const FittedCampaign& base_;
   const Eigen::MatrixXd& covariance_;
   const std::vector<int>& parts_;
-  double level_;
   int samples_ = 0;  // of a batch
   std::int64_t evaluations_ = 0;
   std::map<std::string, WarmFit> fits_;
