@@ -211,7 +211,8 @@ class Inquiry {
 
   absl::Status ScreenEffects() {
     std::vector<const dem::EffectInfo*> effects;
-    for (const dem::EffectInfo& effect : dem::Effects()) {
+    for (const dem::EffectInfo* info : dem::AllEffects(view_.campaign.model.user_effects)) {
+      const dem::EffectInfo& effect = *info;
       if (!WhyNotJoin(view_.campaign, effect.name).empty()) continue;
       if (std::find(options_.without.begin(), options_.without.end(), effect.name) !=
           options_.without.end()) {
@@ -284,7 +285,7 @@ class Inquiry {
   // Strength in SI of a multiple of what was tried; held parameters are part of it.
   std::map<std::string, double> StrengthOf(const std::string& name, std::size_t which,
                                            double multiple) const {
-    const dem::EffectInfo* effect = dem::FindEffect(name);
+    const dem::EffectInfo* effect = dem::FindEffect(view_.campaign.model.user_effects, name);
     const Step& step = steps_.at(name)[which];
     return dem::ParametersOnRay(*effect, *step.ray, step.step * multiple,
                                 view_.campaign.model.contact, state_);
