@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/registry.h"
+#include "dem/formula/user_effect.h"
 #include "dem/lab_tests/collision.h"
 
 namespace calib::dem {
@@ -280,6 +281,12 @@ std::string CatalogText() {
                     "} ", absl::StrJoin(t.observables, " "), "\n");
     for (const ParameterInfo& p : t.settings) {
       Append(text, p);
+    }
+  }
+  for (const auto& quantities :
+       {ContactQuantities(), StageQuantities(), ContactTargets(), ReadingTargets()}) {
+    for (const FormulaQuantity& q : quantities) {
+      absl::StrAppend(&text, "formula ", q.name, " [", q.unit, "]: ", q.description, "\n");
     }
   }
   for (const ObservableInfo& o : Observables()) {

@@ -54,6 +54,20 @@ ContactModel::ContactModel(const Model& model)
       }
     }
   }
+  for (const UserEffect& effect : model.user_effects) {
+    const std::string& name = effect.info.name;
+    if (effect.info.kind != "contact" ||
+        std::find(model.effects.begin(), model.effects.end(), name) == model.effects.end()) {
+      continue;
+    }
+    if (stage_ == nullptr && NeedsStage(effect)) {
+      stage_ = std::make_shared<StageState>();
+    }
+    formulas_.push_back(std::make_shared<FormulaKernel>(
+        effect, ResolveParameters(effect.info.parameters, name + ".", model.parameters),
+        model.density, stage_));
+    kernels.emplace_back(StageOf(effect), formulas_.back());
+  }
   wall_friction_ = walls.friction.value_or(walls.friction_ratio * sliding_friction_);
   if (law.make_dashpot != nullptr) {
     kernels.emplace_back(ContactStage::kNormalExtra, law.make_dashpot(law_context));
@@ -66,6 +80,15 @@ ContactModel::ContactModel(const Model& model)
     history_size_ += size;
   }
   assert(history_size_ <= kMaxHistory);
+}
+
+std::optional<ContactFault> ContactModel::Fault() const {
+  for (const auto& formula : formulas_) {
+    if (auto fault = formula->Fault()) {
+      return fault;
+    }
+  }
+  return std::nullopt;
 }
 
 double ContactModel::Reach(double largest_radius) const {

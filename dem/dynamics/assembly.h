@@ -194,6 +194,7 @@ class Assembly {
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
   void TakeBranchesBetweenBodies();
+  [[nodiscard]] absl::Status FormulasFinite() const;
 
   PeriodicCell cell_;
   ParticleArrays particles_;

@@ -2,6 +2,7 @@
 // the chain of kernels.
 #include <algorithm>
 
+#include "absl/strings/str_cat.h"
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/chunks.h"
 
@@ -52,6 +53,9 @@ absl::Status Assembly::EvaluateForces() {
   }
   ForEachChunk(static_cast<int>(sums_.size()), threads_,
                [this](int chunk) { EvaluateChunk(chunk); });
+  if (auto s = FormulasFinite(); !s.ok()) {
+    return s;
+  }
   stress_ = {0, 0, 0};
   shear_stress_ = 0;
   contacts_ = 0;
@@ -79,8 +83,22 @@ absl::Status Assembly::EvaluateForces() {
       return s;
     }
     contact_updates_ += walls_.contacts();
+    return FormulasFinite();
   }
   return absl::OkStatus();
+}
+
+absl::Status Assembly::FormulasFinite() const {
+  const auto fault = model_.Fault();
+  if (!fault) {
+    return absl::OkStatus();
+  }
+  const auto at = static_cast<std::size_t>(fault->pair);
+  const auto id = [this](int grain) { return particles_.id[static_cast<std::size_t>(grain)]; };
+  return absl::OutOfRangeError(
+      fault->wall ? absl::StrCat("grain ", id(fault->pair), " at a wall: ", fault->what)
+                  : absl::StrCat("grains ", id(list_.first[at]), " and ", id(list_.second[at]),
+                                 ": ", fault->what));
 }
 
 /// The stress of a rigid body is carried between centres of bodies: sum f d over contacts of

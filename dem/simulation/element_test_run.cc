@@ -11,6 +11,7 @@
 #include "dem/dynamics/crushing.h"
 #include "dem/dynamics/quasi_static.h"
 #include "dem/measure/observables.h"
+#include "dem/measure/reading_formulas.h"
 #include "dem/simulation/consolidation.h"
 #include "dem/simulation/shape_change.h"
 
@@ -91,7 +92,8 @@ class ElementTestRun {
         staging_(ResolveStaging(scenario, assembly_)),
         stages_(assembly_, OptionsFrom(staging_), std::move(stop)),
         apparatus_(alterations.apparatus),
-        preparation_(alterations.preparation) {
+        preparation_(alterations.preparation),
+        formulas_(scenario.model) {
     context_.settings = scenario.settings;
     for (const ParameterInfo& setting : entry_.info.settings) {
       if (setting.default_value) {
@@ -107,7 +109,15 @@ class ElementTestRun {
                           .size_loss = preparation_.size_loss};
     if (law.Acts()) {
       crushing_.emplace(law, scenario.seed, assembly_);
-      stages_.SetIntervention([this](Assembly& assembly) { crushing_->Crush(assembly); });
+    }
+    SetStage();
+    if (crushing_ || assembly_.model().stage() != nullptr) {
+      stages_.SetIntervention([this](Assembly& assembly) {
+        if (crushing_) {
+          crushing_->Crush(assembly);
+        }
+        SetStage();
+      });
     }
   }
 
@@ -146,7 +156,13 @@ class ElementTestRun {
       if (point.load_step < 0) {
         continue;
       }
-      State state{.load_step = point.load_step, .values = Select(Read(), entry_.info.observables)};
+      Measurement read = Read();
+      if (auto s = formulas_.Apply(read); !s.ok()) {
+        Summary summary = Finish(StageEnd::kDiverged, where);
+        summary.reason = absl::StrCat(where, ": ", s.message());
+        return summary;
+      }
+      State state{.load_step = point.load_step, .values = Select(read, entry_.info.observables)};
       for (std::size_t v = 0; v < state.values.size(); ++v) {
         if (!std::isfinite(state.values[v])) {
           Summary summary = Finish(StageEnd::kDiverged, where);
@@ -205,6 +221,26 @@ class ElementTestRun {
                                 entry_.rig_load == RigLoad::kAxial, Measure(assembly_, reference_));
     m.pore_pressure = context_.lateral_stress - m.lateral_stress;
     return m;
+  }
+
+  /// What user's formulas know of the specimen: until loading begins, where it is going to start.
+  void SetStage() const {
+    StageState* const stage = assembly_.model().stage();
+    if (stage == nullptr) {
+      return;
+    }
+    if (reference_[2] == 0) {
+      *stage = {.mean_stress = (context_.axial_stress + 2.0 * context_.lateral_stress) / 3.0,
+                .deviatoric_stress = context_.axial_stress - context_.lateral_stress,
+                .porosity = Porosity(assembly_)};
+      return;
+    }
+    const Measurement m = Measure(assembly_, reference_);
+    *stage = {.mean_stress = m.mean_stress,
+              .deviatoric_stress = m.deviatoric_stress,
+              .axial_strain = m.axial_strain,
+              .volumetric_strain = m.volumetric_strain,
+              .porosity = m.porosity};
   }
 
   /// Lets the stages be driven by readings where the apparatus alters them.
@@ -282,6 +318,7 @@ class ElementTestRun {
   ElementTestContext context_;
   Apparatus apparatus_;
   Preparation preparation_;
+  ReadingFormulas formulas_;
   std::optional<Crushing> crushing_;
   double rig_start_ = 0;  ///< RigStress() at the start of loading [Pa]
   double reference_[3] = {0, 0, 0};

@@ -166,7 +166,9 @@ void AddOtherVerbs(Builder& b) {
   b.Add("drain", &Drain, "Let a worker finish what it does and leave", "drain node1-4711")
       ->add_option("WORKER", b.arguments().worker, "name, as shown by `calibctl workers`")
       ->required();
-  b.Add("effects", &Effects, "Physical effects this build offers", "effects");
+  b.Add("effects", &Effects, "Physical effects this build offers", "effects")
+      ->add_option("--campaign", b.arguments().file,
+                   "file of a campaign, whose user_effects are listed too");
   b.Add("tests", &Tests, "Lab tests this build offers", "tests");
   b.Add("contacts", &Contacts, "Contact laws this build offers", "contacts");
 }

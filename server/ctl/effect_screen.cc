@@ -70,7 +70,8 @@ std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
 std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
     const std::vector<std::string>& without) {
   std::vector<const dem::EffectInfo*> effects;
-  for (const dem::EffectInfo& effect : dem::Effects()) {
+  for (const dem::EffectInfo* info : dem::AllEffects(base_.view().campaign.model.user_effects)) {
+    const dem::EffectInfo& effect = *info;
     if (!WhyNotJoin(base_.view().campaign, effect.name).empty()) continue;
     const bool left_out = std::find(without.begin(), without.end(), effect.name) != without.end();
     const std::string why = left_out ? "left out as asked for" : WhyNotExcitable(effect);
@@ -152,7 +153,8 @@ absl::StatusOr<inference::Signature> EffectScreen::SignatureOf(const dem::Effect
 std::map<std::string, double> EffectScreen::StrengthOf(const std::string& name, std::size_t which,
                                                        double multiple) const {
   const Step& step = tried_.at(name)[which];
-  return dem::ParametersOnRay(*dem::FindEffect(name), *step.ray, step.step * multiple,
+  const dem::EffectInfo* effect = dem::FindEffect(base_.view().campaign.model.user_effects, name);
+  return dem::ParametersOnRay(*effect, *step.ray, step.step * multiple,
                               base_.view().campaign.model.contact, base_.state());
 }
 

@@ -91,8 +91,8 @@ RunTable RunsWithoutEffect(const RunTable& without, const campaign::Campaign& pa
       }
     }
     if (from[static_cast<std::size_t>(j)] >= 0) continue;
-    const dem::ParameterInfo* info =
-        dem::FindParameter(extended.model.contact, extended.model.effects, own.name);
+    const dem::ParameterInfo* info = dem::FindParameter(
+        extended.model.user_effects, extended.model.contact, extended.model.effects, own.name);
     const auto null =
         info == nullptr ? std::nullopt : dem::NullValueOf(*info, extended.model.contact);
     // A prior over orders of magnitude ends where the effect no longer matters.
