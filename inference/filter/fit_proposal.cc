@@ -7,6 +7,7 @@
 #include <numeric>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "inference/filter/ensemble.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/filter/log_weights.h"
@@ -19,6 +20,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInsignificantShare = 1e-3;
 constexpr double kNegligibleWeight =
     1e-4;  // of a component: fewer than one in ten thousand samples
+constexpr double kWorthOfDraws = 100;  // draws of an emulator know no more than its runs
+constexpr double kWidening = 2;        // of their sd: an emulator is good inside its runs only
 
 // Indices, ascending, of the samples that matter: the lightest, which hold a thousandth of the
 // weight together and are often most of the samples, are left out. It costs the proposal nothing
@@ -92,6 +95,21 @@ int MostComponents(const FilterOptions& options, const WeightedPoints& points) {
   return std::clamp(affordable, 1, options.max_components);
 }
 
+absl::StatusOr<Proposal> FitMixture(std::span<const Prior> priors, const FilterOptions& options,
+                                    const WeightedPoints& points, std::size_t iterations) {
+  const auto mixture =
+      FitDirichletMixture(points, {.max_components = MostComponents(options, points),
+                                   .concentration = options.concentration,
+                                   .seed = options.seed,
+                                   .stream = iterations});
+  if (!mixture.ok()) return mixture.status();
+  Proposal proposal;
+  proposal.components = mixture->Predictive(kNegligibleWeight);
+  proposal.defensive_share = options.defensive_share;
+  proposal.log_acceptance = LogMassInSupport(proposal.components, priors);
+  return proposal;
+}
+
 }  // namespace
 
 absl::StatusOr<double> GuidingExponent(std::span<const Prior> priors, const DataSet& data,
@@ -123,18 +141,28 @@ absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSe
   if (!ensemble.ok()) return ensemble.status();
   const Eigen::VectorXd log_weights =
       TemperedLogWeights(*ensemble, TemperingExponent(options, *ensemble));
-  const WeightedPoints points = Standardized(priors, ensemble->parameters, log_weights);
-  const auto mixture =
-      FitDirichletMixture(points, {.max_components = MostComponents(options, points),
-                                   .concentration = options.concentration,
-                                   .seed = options.seed,
-                                   .stream = iterations.size()});
-  if (!mixture.ok()) return mixture.status();
+  return FitMixture(priors, options, Standardized(priors, ensemble->parameters, log_weights),
+                    iterations.size());
+}
 
-  Proposal proposal;
-  proposal.components = mixture->Predictive(kNegligibleWeight);
-  proposal.defensive_share = options.defensive_share;
-  proposal.log_acceptance = LogMassInSupport(proposal.components, priors);
+absl::StatusOr<Proposal> FitProposalToDraws(std::span<const Prior> priors,
+                                            const FilterOptions& options,
+                                            const Eigen::MatrixXd& draws, std::size_t iterations) {
+  const Eigen::Index n = draws.rows();
+  if (n == 0 || draws.cols() != static_cast<Eigen::Index>(priors.size())) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("a proposal cannot be fitted to ", n, " x ", draws.cols(), " draws of ",
+                     priors.size(), " parameters."));
+  }
+  const Eigen::VectorXd equal = Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
+  WeightedPoints points = Standardized(priors, draws, equal);
+  points.counts *= std::min(1.0, kWorthOfDraws / points.counts.sum());
+  auto proposal = FitMixture(priors, options, points, iterations);
+  if (!proposal.ok()) return proposal;
+  for (MixtureComponent& component : proposal->components) {
+    component.covariance *= kWidening * kWidening;
+  }
+  proposal->log_acceptance = LogMassInSupport(proposal->components, priors);
   return proposal;
 }
 

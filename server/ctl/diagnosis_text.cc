@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "dem/catalog/catalog.h"
@@ -165,8 +166,13 @@ std::string DiagnosisText(const Diagnosis& d) {
       text += fmt::format("  {}: {}\n", effect, Strength(strength));
     }
   }
+  std::map<std::string, std::string> by_reason;
   for (const auto& [effect, reason] : d.not_excitable) {
-    text += fmt::format("Not tried: {} ({}).\n", effect, reason);
+    std::string& names = by_reason[reason];
+    names += (names.empty() ? "" : ", ") + effect;
+  }
+  for (const auto& [reason, names] : by_reason) {
+    text += fmt::format("Not tried, because {}: {}.\n", reason, names);
   }
   if (d.next_experiment) text += NextText(*d.next_experiment);
   text += fmt::format("{} model evaluations for the screen, {} for warm fits.\n",

@@ -32,8 +32,7 @@ class FilterMethod final : public Method {
     if (outcome.converged || !affordable || iterations >= campaign::MostBatches(campaign_)) {
       return outcome;
     }
-    const auto proposal = inference::FitProposal(definition_.priors, definition_.data,
-                                                 campaign_.filter, history.iterations);
+    const auto proposal = NextProposal(outcome.answer, history);
     if (!proposal.ok()) {
       return proposal.status();
     }
@@ -46,6 +45,18 @@ class FilterMethod final : public Method {
   }
 
  private:
+  // Where the weights hold a handful of samples, the emulator of their states knows better where
+  // the posterior lies, even one that is not good enough for an interval yet.
+  absl::StatusOr<inference::Proposal> NextProposal(const Answer& answer,
+                                                   const History& history) const {
+    if (answer.emulated.has_value() && answer.emulated->draws.rows() > 0) {
+      return inference::FitProposalToDraws(definition_.priors, campaign_.filter,
+                                           answer.emulated->draws, history.iterations.size());
+    }
+    return inference::FitProposal(definition_.priors, definition_.data, campaign_.filter,
+                                  history.iterations);
+  }
+
   absl::StatusOr<bool> IsConverged(const Answer& answer, const History& history) const {
     if (!answer.HasIntervals()) {
       return false;
