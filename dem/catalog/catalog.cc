@@ -295,6 +295,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "4"; }
+std::string EngineVersion() { return "5"; }
 
 }  // namespace calib::dem

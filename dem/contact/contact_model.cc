@@ -9,6 +9,7 @@
 #include "dem/catalog/registry.h"
 #include "dem/contact/common_parameters.h"
 #include "dem/contact/contact_kinematics.h"
+#include "dem/contact/simd.h"
 #include "dem/contact/sliding.h"
 
 namespace calib::dem {
@@ -20,6 +21,14 @@ const ContactEntry& LawNamed(const std::string& name) {
                                [&](const ContactEntry& entry) { return entry.info.name == name; });
   assert(it != entries.end());
   return *it;
+}
+
+/// What only effects set.
+CALIB_DEM_CLONES void ClearExtras(ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    b.attraction[k] = b.holds[k] = b.normal_damping[k] = b.tangential_damping[k] = 0.0;
+    b.mx[k] = b.my[k] = b.mz[k] = b.rolling_stiffness[k] = b.twisting_stiffness[k] = 0.0;
+  }
 }
 
 }  // namespace
@@ -105,11 +114,7 @@ void ContactModel::Evaluate(ContactBlock& block) const {
   } else {
     ComputeKinematics(block);
   }
-  for (ContactBlock::Lane* lane :
-       {&block.attraction, &block.holds, &block.normal_damping, &block.tangential_damping,
-        &block.mx, &block.my, &block.mz, &block.rolling_stiffness, &block.twisting_stiffness}) {
-    std::fill(*lane, *lane + kBlock, 0.0);
-  }
+  ClearExtras(block);
   for (const Link& link : chain_) {
     link.kernel->Apply(block, link.first_history);
   }

@@ -107,7 +107,7 @@ class CollisionRun {
       flights_[k].viy = impact.speed * std::sin(impact.angle);
       flights_[k].wi = impact.spin;
     }
-    for (auto& column : block_.history) {
+    for (auto& column : block_.own_history) {
       std::fill(std::begin(column), std::end(column), 0.0);
     }
     const double half_period = ShortestHalfPeriod();
@@ -274,7 +274,7 @@ class CollisionRun {
       rate2 = std::max({rate2, block_.normal_stiffness[k] / mass, turning,
                         block_.tangential_stiffness[k] * (1.0 / mass + 2 * inertia)});
     }
-    for (auto& column : block_.history) {
+    for (auto& column : block_.own_history) {
       std::fill(std::begin(column), std::end(column), 0.0);
     }
     return std::numbers::pi / std::sqrt(rate2);
