@@ -109,7 +109,58 @@ absl::Status ValidateCovariances(const DataSet& data) {
   return absl::OkStatus();
 }
 
+absl::Status ValidateNoiseGroups(const DataSet& data) {
+  std::map<Group, int> seen;
+  for (const NoiseGroup& group : data.noise_groups) {
+    if (group.members.empty()) return absl::InvalidArgumentError("a noise group has no members.");
+    const VarianceFactorPrior& prior = group.prior;
+    if (!(prior.shape > 0 && prior.rate > 0) || !std::isfinite(prior.shape + prior.rate)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("the prior of a noise group's variance factor has shape ", prior.shape,
+                       " and rate ", prior.rate, "; both must be positive."));
+    }
+    for (const Group& member : group.members) {
+      if (++seen[member] == 1) continue;
+      return absl::InvalidArgumentError(absl::StrCat("observable ", member.second,
+                                                     " of experiment ", member.first,
+                                                     " stands in two noise groups."));
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
+
+std::vector<NoiseGroup> NoiseGroupsOf(const DataSet& data) {
+  const ReadingGroups groups = GroupsOf(data);
+  std::map<Group, NoiseGroup> by_first;
+  std::map<Group, bool> taken;
+  for (const NoiseGroup& given : data.noise_groups) {
+    NoiseGroup group{.members = {}, .prior = given.prior};
+    for (const Group& member : given.members) {
+      taken[member] = true;
+      if (groups.count(member) > 0) group.members.push_back(member);
+    }
+    if (group.members.empty()) continue;
+    std::sort(group.members.begin(), group.members.end());
+    by_first[group.members.front()] = std::move(group);
+  }
+  for (const auto& [key, readings] : groups) {
+    if (taken.count(key) == 0) by_first[key] = {.members = {key}};
+  }
+  std::vector<NoiseGroup> all;
+  for (auto& [first, group] : by_first) all.push_back(std::move(group));
+  return all;
+}
+
+DataSet Reversed(const DataSet& data) {
+  DataSet reversed = data;
+  std::reverse(reversed.readings.begin(), reversed.readings.end());
+  for (GroupCovariance& covariance : reversed.covariances) {
+    covariance.matrix = covariance.matrix.reverse().eval();
+  }
+  return reversed;
+}
 
 ReadingGroups GroupsOf(const DataSet& data) {
   ReadingGroups groups;
@@ -168,7 +219,8 @@ absl::Status ValidateData(const DataSet& data, NoiseMode noise) {
   }
   if (noise == NoiseMode::kEssTarget) return absl::OkStatus();
   if (auto valid = ValidateCorrelations(data); !valid.ok()) return valid;
-  return ValidateCovariances(data);
+  if (auto valid = ValidateCovariances(data); !valid.ok()) return valid;
+  return ValidateNoiseGroups(data);
 }
 
 DataSet Restricted(const DataSet& data, const std::vector<int>& readings) {

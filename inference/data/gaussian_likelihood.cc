@@ -55,8 +55,9 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
   likelihood.readings_ = static_cast<int>(data.readings.size());
   likelihood.inferred_ = noise == NoiseMode::kInferred;
   for (const Reading& reading : data.readings) likelihood.values_.push_back(reading.value);
+  likelihood.log_diagonal_.resize(likelihood.readings_);
 
-  for (auto& [key, indices] : GroupsOf(data)) {
+  for (const auto& [key, indices] : GroupsOf(data)) {
     Group group;
     const auto size = static_cast<Eigen::Index>(indices.size());
     if (IsCorrelated(data, key)) {
@@ -72,84 +73,131 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
         group.inverse_sd[k] = 1 / data.readings[indices[k]].sd;
       }
     }
-    group.log_constant.resize(size);
     for (Eigen::Index k = 0; k < size; ++k) {
-      // ln Gamma(after) - ln Gamma(before), without the cancellation of their difference.
-      const double before = likelihood.factor_prior_.shape + 0.5 * static_cast<double>(k);
-      group.log_constant[k] = -kLogSqrtTwoPi - group.log_diagonal[k] -
-                              std::log(boost::math::tgamma_delta_ratio(before, 0.5));
+      likelihood.log_diagonal_[indices[static_cast<std::size_t>(k)]] = group.log_diagonal[k];
     }
     group.readings = indices;
     likelihood.groups_.push_back(std::move(group));
   }
+  if (!likelihood.inferred_) return likelihood;
+  const ReadingGroups readings = GroupsOf(data);
+  for (const NoiseGroup& shared : NoiseGroupsOf(data)) {
+    FactorGroup factor{.prior = shared.prior, .readings = {}, .log_constant = {}};
+    for (const auto& member : shared.members) {
+      const std::vector<int>& of_member = readings.at(member);
+      factor.readings.insert(factor.readings.end(), of_member.begin(), of_member.end());
+    }
+    std::sort(factor.readings.begin(), factor.readings.end());
+    factor.log_constant.resize(static_cast<Eigen::Index>(factor.readings.size()));
+    for (Eigen::Index k = 0; k < factor.log_constant.size(); ++k) {
+      // Without the cancellation of the difference.
+      const double before = shared.prior.shape + 0.5 * static_cast<double>(k);
+      factor.log_constant[k] = -std::log(boost::math::tgamma_delta_ratio(before, 0.5));
+    }
+    likelihood.factors_.push_back(std::move(factor));
+  }
   return likelihood;
-}
-
-// ln of the conditional density of reading k of its group (from 0), z_k^2 = square_after -
-// square_before, where the squares are sums of z^2. With the factor integrated out, the ratio of
-// two multivariate t densities of k + 1 and k readings:  M_n = rate^a Gamma(a + n/2) / Gamma(a) (2
-// pi)^(-n/2) |L|^-1 (rate + q_n/2)^-(a + n/2).
-double GaussianLikelihood::LogFactor(const Group& group, int k, double square_before,
-                                     double square_after) const {
-  const double before = factor_prior_.shape + 0.5 * k;
-  const double after = before + 0.5;
-  return group.log_constant[k] + before * std::log(factor_prior_.rate + 0.5 * square_before) -
-         after * std::log(factor_prior_.rate + 0.5 * square_after);
 }
 
 // Column by column: every operation is on one element of a column at a time, so that a row's bits
 // do not depend on the other rows.
-Eigen::MatrixXd GaussianLikelihood::Fill(const Eigen::MatrixXd& predictions,
-                                         Missing missing) const {
+Eigen::MatrixXd GaussianLikelihood::Whiten(const Eigen::MatrixXd& predictions,
+                                           Missing missing) const {
   assert(predictions.cols() == readings_);
   const Eigen::Index n = predictions.rows();
-  Eigen::MatrixXd increments(n, readings_);
+  Eigen::MatrixXd whitened(n, readings_);
+  const bool complete = predictions.allFinite();
   std::vector<char> reached(static_cast<std::size_t>(n));
-  std::vector<double> square(static_cast<std::size_t>(inferred_ ? n : 0));
-  Eigen::MatrixXd whitened;  // z of a correlated group's readings so far
-  Eigen::VectorXd z(n);
   for (const Group& group : groups_) {
     const bool correlated = group.cholesky.size() > 0;
     const auto size = static_cast<Eigen::Index>(group.readings.size());
-    if (correlated) whitened.resize(n, size);
     std::fill(reached.begin(), reached.end(), 1);
-    std::fill(square.begin(), square.end(), 0.0);
     for (Eigen::Index k = 0; k < size; ++k) {
       const int t = group.readings[static_cast<std::size_t>(k)];
+      auto z = whitened.col(t);
       z = values_[static_cast<std::size_t>(t)] - predictions.col(t).array();
-      for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index i = 0; !complete && i < n; ++i) {
         char& row = reached[static_cast<std::size_t>(i)];
         row = static_cast<char>(row & static_cast<char>(std::isfinite(z[i])));
         if (row == 0) z[i] = 0;
       }
-      if (correlated) {  // forward substitution
-        for (Eigen::Index l = 0; l < k; ++l) z -= group.cholesky(k, l) * whitened.col(l);
-        z /= group.cholesky(k, k);
-        for (Eigen::Index i = 0; i < n; ++i) {
-          if (reached[static_cast<std::size_t>(i)] == 0) z[i] = 0;
-        }
-        whitened.col(k) = z;
-      } else {
+      if (!correlated) {
         z *= group.inverse_sd[k];
+        continue;
       }
-      auto out = increments.col(t);
-      if (!inferred_) {
-        out = (-kLogSqrtTwoPi - group.log_diagonal[k]) - 0.5 * z.array().square();
-      } else {
-        for (Eigen::Index i = 0; i < n; ++i) {
-          double& before = square[static_cast<std::size_t>(i)];
-          const double after = before + z[i] * z[i];
-          out[i] = LogFactor(group, static_cast<int>(k), before, after);
-          before = after;
-        }
+      for (Eigen::Index l = 0; l < k; ++l) {  // forward substitution
+        z -= group.cholesky(k, l) * whitened.col(group.readings[static_cast<std::size_t>(l)]);
       }
-      if (missing == Missing::kZeroResidual) continue;
+      z /= group.cholesky(k, k);
+      for (Eigen::Index i = 0; !complete && i < n; ++i) {
+        if (reached[static_cast<std::size_t>(i)] == 0) z[i] = 0;
+      }
+    }
+    if (complete || missing == Missing::kZeroResidual) continue;
+    std::fill(reached.begin(), reached.end(), 1);
+    for (const int t : group.readings) {
       for (Eigen::Index i = 0; i < n; ++i) {
-        if (reached[static_cast<std::size_t>(i)] == 0) out[i] = kNaN;
+        char& row = reached[static_cast<std::size_t>(i)];
+        row = static_cast<char>(row & static_cast<char>(std::isfinite(predictions(i, t))));
+        if (row == 0) whitened(i, t) = kNaN;
       }
     }
   }
+  return whitened;
+}
+
+// z of the group's readings to their increments: the ratio of two multivariate t densities of k + 1
+// and k readings, k those of the row so far,
+//   M_n = rate^a Gamma(a + n/2) / Gamma(a) (2 pi)^(-n/2) |L|^-1 (rate + q_n/2)^-(a + n/2).
+void GaussianLikelihood::IntegrateFactor(const FactorGroup& group, Eigen::MatrixXd& z) const {
+  const Eigen::Index n = z.rows();
+  std::vector<int> count(static_cast<std::size_t>(n), 0);
+  std::vector<double> square(static_cast<std::size_t>(n), 0.0);
+  std::vector<double> log_rate(static_cast<std::size_t>(n), std::log(group.prior.rate));
+  for (const int t : group.readings) {
+    const double constant = -kLogSqrtTwoPi - log_diagonal_[t];
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      double& value = z(i, t);
+      if (std::isnan(value)) continue;
+      square[row] += value * value;
+      const double before = group.prior.shape + 0.5 * count[row];
+      const double log_after = std::log(group.prior.rate + 0.5 * square[row]);
+      value = constant + group.log_constant[count[row]] + before * log_rate[row] -
+              (before + 0.5) * log_after;
+      log_rate[row] = log_after;
+      ++count[row];
+    }
+  }
+}
+
+Eigen::MatrixXd GaussianLikelihood::Fill(const Eigen::MatrixXd& predictions,
+                                         Missing missing) const {
+  Eigen::MatrixXd increments = Whiten(predictions, missing);
+  if (inferred_) {
+    for (const FactorGroup& group : factors_) IntegrateFactor(group, increments);
+    return increments;
+  }
+  for (int t = 0; t < readings_; ++t) {
+    auto column = increments.col(t).array();
+    column = (-kLogSqrtTwoPi - log_diagonal_[t]) - 0.5 * column.square();
+  }
   return increments;
+}
+
+GaussianLikelihood::FactorPosterior GaussianLikelihood::VarianceFactors(
+    const Eigen::MatrixXd& predictions) const {
+  const Eigen::MatrixXd z = Whiten(predictions, Missing::kStop);
+  FactorPosterior factors{
+      .shapes = Eigen::VectorXd(static_cast<Eigen::Index>(factors_.size())),
+      .rates = Eigen::MatrixXd(z.rows(), static_cast<Eigen::Index>(factors_.size()))};
+  for (Eigen::Index g = 0; g < factors.shapes.size(); ++g) {
+    const FactorGroup& group = factors_[static_cast<std::size_t>(g)];
+    factors.shapes[g] = group.prior.shape + 0.5 * static_cast<double>(group.readings.size());
+    factors.rates.col(g).setConstant(group.prior.rate);
+    for (const int t : group.readings) factors.rates.col(g) += 0.5 * z.col(t).cwiseAbs2();
+  }
+  return factors;
 }
 
 Eigen::MatrixXd GaussianLikelihood::Increments(const Eigen::MatrixXd& predictions) const {

@@ -9,24 +9,17 @@
 
 namespace calib::inference {
 
-/// Prior of the variance factor f of noise: inferred, inverse gamma: p(f) = rate^shape /
-/// Gamma(shape) f^(-shape-1) exp(-rate / f). The default weighs as much as one reading that lies
-/// one stated sd off: the stated sd is trusted within a factor of a few (f in [0.26, 254] with 90
-/// %), and a handful of readings overrules it.
-struct VarianceFactorPrior {
-  double shape = 0.5;
-  double rate = 0.5;
-};
-
 /// ln p(y | x) of readings y given predictions x, one independent block per (experiment,
 /// observable) group g:
 ///   kGiven:    N(y_g; x_g, S_g),  S_ij = sd_i sd_j exp(-|c_i - c_j| / length),  with the proper |2
-///   pi S|^(-1/2) kInferred: the same with f_g S_g, f_g integrated out over VarianceFactorPrior: a
-///   multivariate t density
+///   pi S|^(-1/2)
+///   kInferred: the same with f S_g, f common to the groups of a NoiseGroup and integrated out over
+///   its VarianceFactorPrior: a multivariate t density
 /// Written with S = L L^T and z = L^-1 (y - x), reading k of a group contributes a function of z_0
-/// ... z_k alone, its density conditional on the earlier readings of the group. Summed along the
-/// processing order the increments are the exact density after every reading, whatever the order
-/// [Cheng 2019, Eq. 14 and 15, normaliser corrected]. Thread safety: const after Create.
+/// ... z_k alone (kInferred: of the noise group), its density conditional on the earlier readings.
+/// Summed along the processing order the increments are the exact density after every reading,
+/// whatever the order [Cheng 2019, Eq. 14 and 15, normaliser corrected]. Thread safety: const after
+/// Create.
 class GaussianLikelihood {
  public:
   /// noise: kGiven or kInferred (kEssTarget: pass WithRelativeErrors(data, sigma) and kGiven).
@@ -36,8 +29,8 @@ class GaussianLikelihood {
 
   int readings() const { return readings_; }
 
-  /// N x T increments from N x T predictions. From the first prediction of a group that is not
-  /// finite on, the increments of that group are NaN.
+  /// N x T increments from N x T predictions. From the first prediction of an (experiment,
+  /// observable) that is not finite on, its increments are NaN.
   Eigen::MatrixXd Increments(const Eigen::MatrixXd& predictions) const;
 
   /// Sum of each row of increments in the order of readings, N; -inf where one is NaN.
@@ -56,25 +49,39 @@ class GaussianLikelihood {
   /// with every z^2.
   Eigen::VectorXd LogLikelihoodBound(const Eigen::MatrixXd& predictions) const;
 
+  /// kInferred: given x the variance factor of noise group g (NoiseGroupsOf) is inverse gamma of
+  /// shape shapes[g] and rate rates(i, g). NaN rates where a prediction is not finite.
+  struct FactorPosterior {
+    Eigen::VectorXd shapes;  ///< G
+    Eigen::MatrixXd rates;   ///< N x G
+  };
+  FactorPosterior VarianceFactors(const Eigen::MatrixXd& predictions) const;
+
  private:
   struct Group {
     std::vector<int> readings;     // indices in processing order
     Eigen::MatrixXd cholesky;      // L, lower; empty: diagonal
     Eigen::VectorXd log_diagonal;  // ln L_kk
-    Eigen::VectorXd log_constant;  // kInferred: what of an increment does not depend on z
     Eigen::VectorXd inverse_sd;    // diagonal groups only
+  };
+  struct FactorGroup {  // kInferred: readings that share a variance factor
+    VarianceFactorPrior prior;
+    std::vector<int> readings;     // indices in processing order
+    Eigen::VectorXd log_constant;  // ln Gamma(shape + (k + 1) / 2) - ln Gamma(shape + k / 2)
   };
   enum class Missing { kStop, kZeroResidual };
 
-  // Increments, N x T; NaN where not reached, or with zero residual there.
+  // z, N x T; NaN where not reached, or zero residual there.
+  Eigen::MatrixXd Whiten(const Eigen::MatrixXd& predictions, Missing missing) const;
   Eigen::MatrixXd Fill(const Eigen::MatrixXd& predictions, Missing missing) const;
-  double LogFactor(const Group& group, int k, double square_before, double square_after) const;
+  void IntegrateFactor(const FactorGroup& group, Eigen::MatrixXd& z) const;
 
   int readings_ = 0;
   bool inferred_ = false;
-  VarianceFactorPrior factor_prior_;
   std::vector<double> values_;
+  Eigen::VectorXd log_diagonal_;  // ln L_kk by reading
   std::vector<Group> groups_;
+  std::vector<FactorGroup> factors_;  // empty: kGiven
 };
 
 }  // namespace calib::inference

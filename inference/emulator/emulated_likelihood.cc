@@ -1,5 +1,6 @@
 #include "inference/emulator/emulated_likelihood.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -24,8 +25,15 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
   likelihood.scatter_variance_ = options.scatter_share * emulator.scatter_sd().array().square();
   likelihood.correlation_factor_ = Eigen::LLT<Eigen::MatrixXd>(emulator.correlation()).matrixL();
 
+  const std::vector<NoiseGroup> noise_groups = NoiseGroupsOf(data);
+  likelihood.groups_ = static_cast<int>(noise_groups.size());
   for (const auto& [key, members] : GroupsOf(data)) {
     Form form;
+    for (std::size_t g = 0; g < noise_groups.size(); ++g) {
+      const auto& shared = noise_groups[g].members;
+      if (std::find(shared.begin(), shared.end(), key) != shared.end())
+        form.noise_group = static_cast<int>(g);
+    }
     const auto size = static_cast<Index>(members.size());
     Eigen::MatrixXd covariance = options.correlated_noise ? ErrorCorrelation(data, key, members)
                                                           : Eigen::MatrixXd::Identity(size, size);
@@ -97,9 +105,8 @@ Eigen::VectorXd EmulatedLikelihood::LogLikelihood(const ScorePrediction& predict
     gram.setZero();
     projection.setZero();
     double sum = 0;
-    for (std::size_t g = 0; g < forms_.size(); ++g) {
-      const Form& form = forms_[g];
-      const double factor = factors.cols() == 0 ? 1 : factors(i, static_cast<Index>(g));
+    for (const Form& form : forms_) {
+      const double factor = factors.cols() == 0 ? 1 : factors(i, form.noise_group);
       gram += form.gram / factor;
       projection += form.projection / factor;
       sum += form.log_normaliser - 0.5 * form.square / factor -

@@ -30,7 +30,8 @@ class EmulatedLikelihood {
                                                    const StateEmulator& emulator,
                                                    const Options& options);
 
-  int groups() const { return static_cast<int>(forms_.size()); }
+  /// Noise groups (NoiseGroupsOf), one variance factor each.
+  int groups() const { return groups_; }
 
   /// ln p(readings | point) in the readings' own units, m entries; readings as measured (z = 0).
   /// factors: m x groups, > 0; 0 columns for all one.
@@ -46,6 +47,7 @@ class EmulatedLikelihood {
   // Of one group, whitened by W = chol(R + diag(remainder))^-1.
   struct Form {
     std::vector<Eigen::Index> readings;
+    int noise_group = 0;
     Eigen::MatrixXd whitening;       // W, lower
     Eigen::MatrixXd whitened_basis;  // W B
     Eigen::MatrixXd gram;            // B^T W^T W B
@@ -62,6 +64,7 @@ class EmulatedLikelihood {
   Eigen::VectorXd scatter_variance_;    // share * scatter_sd^2
   Eigen::MatrixXd correlation_factor_;  // lower Cholesky factor of C
   std::vector<Form> forms_;
+  int groups_ = 0;
 };
 
 }  // namespace calib::inference

@@ -1,6 +1,7 @@
 #include "inference/emulator/emulated_posterior.h"
 
 #include <algorithm>
+#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "inference/emulator/emulated_likelihood.h"
 #include "inference/filter/parameter_summary.h"
 #include "inference/filter/weighted_moments.h"
+#include "inference/prior/standard_normal.h"
 #include "inference/sampling/philox.h"
 #include "inference/tmcmc/tmcmc.h"
 
@@ -19,7 +21,7 @@ namespace {
 
 using Eigen::Index;
 
-Eigen::MatrixXd ToStandard(std::span<const Prior> priors, const Eigen::MatrixXd& parameters) {
+Eigen::MatrixXd ToStandard(const JointPrior& priors, const Eigen::MatrixXd& parameters) {
   Eigen::MatrixXd result(parameters.rows(), static_cast<Index>(priors.size()));
   for (Index j = 0; j < result.cols(); ++j) {
     const Prior& prior = priors[static_cast<std::size_t>(j)];
@@ -28,7 +30,7 @@ Eigen::MatrixXd ToStandard(std::span<const Prior> priors, const Eigen::MatrixXd&
   return result;
 }
 
-absl::StatusOr<Runs> CollectRuns(std::span<const Prior> priors, const DataSet& data,
+absl::StatusOr<Runs> CollectRuns(const JointPrior& priors, const DataSet& data,
                                  std::span<const Iteration> iterations) {
   const auto t = static_cast<Index>(data.readings.size());
   const auto d = static_cast<Index>(priors.size());
@@ -63,10 +65,56 @@ absl::StatusOr<Runs> CollectRuns(std::span<const Prior> priors, const DataSet& d
   return runs;
 }
 
-// f = 1 / z^2 per group; the columns after the parameters hold z.
-Eigen::MatrixXd Factors(const Eigen::MatrixXd& points, Index d) {
-  return points.rightCols(points.cols() - d).array().square().max(1e-12).inverse();
+// An inverse gamma of shape and rate 1/2 is the law of 1 / z^2, z standard normal.
+bool IsDefault(const VarianceFactorPrior& prior) { return prior.shape == 0.5 && prior.rate == 0.5; }
+
+// f per noise group; the columns after the parameters hold z.
+Eigen::MatrixXd Factors(const std::vector<NoiseGroup>& groups, const Eigen::MatrixXd& points,
+                        Index d) {
+  Eigen::MatrixXd factors = points.rightCols(points.cols() - d);
+  for (Index g = 0; g < factors.cols(); ++g) {
+    const VarianceFactorPrior& prior = groups[static_cast<std::size_t>(g)].prior;
+    for (Index i = 0; i < factors.rows(); ++i) {
+      double& z = factors(i, g);
+      constexpr double kFarthest = 8;  // sd of z
+      const double u =
+          IsDefault(prior) ? 0 : std::exp(LogNormalCdf(std::clamp(z, -kFarthest, kFarthest)));
+      z = IsDefault(prior) ? 1 / std::max(z * z, 1e-12)
+                           : prior.rate / boost::math::gamma_q_inv(prior.shape, u);
+    }
+  }
+  return factors;
 }
+
+// The columns that are sampled, and the held values in their places.
+struct Held {
+  std::vector<Index> free;
+  Eigen::RowVectorXd values;  // d, those of the free ones overwritten
+
+  Held(const JointPrior& priors, std::span<const Iteration> iterations)
+      : values(Eigen::RowVectorXd::Zero(static_cast<Index>(priors.size()))) {
+    const auto& frozen = iterations.empty() ? std::vector<std::optional<double>>{}
+                                            : iterations.back().proposal.frozen;
+    for (std::size_t j = 0; j < priors.size(); ++j) {
+      const auto column = static_cast<Index>(j);
+      if (frozen.empty() || !frozen[j]) {
+        free.push_back(column);
+      } else {
+        values[column] = *frozen[j];
+      }
+    }
+  }
+  bool any() const { return static_cast<Index>(free.size()) < values.size(); }
+  bool holds(Index j) const { return std::find(free.begin(), free.end(), j) == free.end(); }
+  // points: columns of the free parameters first.
+  Eigen::MatrixXd Complete(const Eigen::MatrixXd& points) const {
+    if (!any()) return points.leftCols(values.size());
+    Eigen::MatrixXd all = values.replicate(points.rows(), 1);
+    for (std::size_t k = 0; k < free.size(); ++k)
+      all.col(free[k]) = points.col(static_cast<Index>(k));
+    return all;
+  }
+};
 
 // Histories of the model at the draws: the mean history and what is not known of it.
 void AddPredictive(const DataSet& data, const StateEmulator& emulator,
@@ -117,8 +165,8 @@ void AddScatter(const DataSet& data, const StateEmulator& emulator, EmulatedResu
   Eigen::VectorXd sd(t);
   for (Index k = 0; k < t; ++k) sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
   const Eigen::MatrixXd factor = Eigen::LLT<Eigen::MatrixXd>(emulator.correlation()).matrixL();
-  result.scatter_factor = sd.asDiagonal() * emulator.components().basis *
-                          emulator.scatter_sd().asDiagonal() * factor;
+  result.scatter_factor =
+      sd.asDiagonal() * emulator.components().basis * emulator.scatter_sd().asDiagonal() * factor;
   result.scatter_white = sd.array().square() * emulator.components().remainder.array();
 }
 
@@ -206,15 +254,13 @@ absl::Status EmulatorOptions::Validate() const {
   return absl::OkStatus();
 }
 
-absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, const DataSet& data,
+absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const DataSet& data,
                                                  const EmulatorOptions& options,
                                                  std::span<const Iteration> iterations,
                                                  const std::stop_token& stop) {
   if (auto valid = options.Validate(); !valid.ok()) return valid;
   if (auto valid = ValidateData(data, options.noise); !valid.ok()) return valid;
-  for (const Prior& prior : priors) {
-    if (auto valid = prior.Validate(); !valid.ok()) return valid;
-  }
+  if (auto valid = priors.Validate(); !valid.ok()) return valid;
   const auto runs = CollectRuns(priors, data, iterations);
   if (!runs.ok()) return runs.status();
   const auto trained = TrainEmulator(*runs, data, options.training);
@@ -225,12 +271,18 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
 
   const auto d = static_cast<Index>(priors.size());
   int known = 0;  // points sampled where the emulator knows the model's history
-  std::vector<Prior> sampled(priors.begin(), priors.end());
+  const Held held(priors, iterations);
+  const auto free = static_cast<Index>(held.free.size());
+  JointPrior sampled = held.any() ? priors.Of(held.free) : priors;
+  std::vector<NoiseGroup> groups;
   if (options.noise == NoiseMode::kInferred) {
-    // An inverse gamma of shape and rate 1/2 is the law of 1 / z^2, z standard normal.
-    static_assert(VarianceFactorPrior{}.shape == 0.5 && VarianceFactorPrior{}.rate == 0.5);
-    sampled.resize(sampled.size() + static_cast<std::size_t>(likelihood->groups()),
-                   Prior{.kind = PriorKind::kNormal, .min = 0, .mean = 0, .sd = 1});
+    groups = NoiseGroupsOf(data);
+    std::vector<Prior> scales;
+    for (const NoiseGroup& group : groups) {
+      Prior& z = scales.emplace_back(Prior{.kind = PriorKind::kNormal, .mean = 0, .sd = 1});
+      if (IsDefault(group.prior)) z.min = 0;
+    }
+    sampled = sampled.With(scales);
   }
   const TmcmcOptions sampler{.samples = options.draws,
                              .target_cv = options.target_cv,
@@ -239,8 +291,10 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
   const auto state = RunTmcmc(
       sampled, sampler,
       [&](const Eigen::MatrixXd& points) {
-        const ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, points));
-        Eigen::VectorXd values = likelihood->LogLikelihood(prediction, Factors(points, d));
+        const ScorePrediction prediction =
+            trained->emulator.Predict(ToStandard(priors, held.Complete(points)));
+        Eigen::VectorXd values =
+            likelihood->LogLikelihood(prediction, Factors(groups, points, free));
         // Where no run has been, nothing can be said: a model that fits nowhere would otherwise
         // prefer the corner of which the emulator knows least.
         const double most =
@@ -262,7 +316,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
   if (!state.ok()) return state.status();
 
   EmulatedResult result;
-  result.draws = state->samples.leftCols(d);
+  result.draws = held.Complete(state->samples);
   result.log_evidence = state->log_evidence;
   result.log_evidence_se = state->LogEvidenceStandardError();
   const Index n = result.draws.rows();
@@ -271,15 +325,27 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, 
   for (Index j = 0; j < d; ++j) {
     result.parameters.push_back(
         Summarize(priors[static_cast<std::size_t>(j)], log_weights, result.draws.col(j)));
+    if (!held.holds(j)) continue;
+    ParameterSummary& fixed = result.parameters.back();
+    fixed.mean = held.values[j];
+    fixed.sd = fixed.cov = fixed.q05 = fixed.q50 = fixed.q95 =
+        std::numeric_limits<double>::quiet_NaN();
+    fixed.at_bound = false;
   }
   result.correlation = CorrelationOf(
       WeightedCovariance(log_weights, result.draws, WeightedMean(log_weights, result.draws)));
   double noise_variance = 1;
   if (options.noise == NoiseMode::kInferred) {
-    const Eigen::MatrixXd factors = Factors(state->samples, d);
+    const Eigen::MatrixXd factors = Factors(groups, state->samples, free);
     result.variance_factors.resize(factors.cols());
+    result.noise_scale.resize(factors.cols(), 3);
     for (Index g = 0; g < factors.cols(); ++g) {
       result.variance_factors[g] = WeightedQuantile(log_weights, factors.col(g), 0.5);
+      for (Index k = 0; k < 3; ++k) {
+        constexpr double kQuantiles[] = {0.05, 0.5, 0.95};
+        result.noise_scale(g, k) =
+            std::sqrt(WeightedQuantile(log_weights, factors.col(g), kQuantiles[k]));
+      }
     }
     noise_variance = result.variance_factors.mean();
   }

@@ -16,7 +16,7 @@
 #include "inference/data/data_set.h"
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
-#include "inference/prior/prior.h"
+#include "inference/prior/joint_prior.h"
 
 namespace calib::inference {
 
@@ -44,8 +44,9 @@ struct EmulatedResult {
   Eigen::MatrixXd correlation;       ///< d x d
   double log_evidence = 0;           ///< ln p(data), emulator error included
   double log_evidence_se = 0;        ///< of the sampling alone
-  Eigen::VectorXd variance_factors;  ///< kInferred: posterior median of f per group, groups in
-                                     ///< ascending order of (experiment, observable)
+  Eigen::VectorXd variance_factors;  ///< kInferred: posterior median of f per noise group
+                                     ///< (NoiseGroupsOf)
+  Eigen::MatrixXd noise_scale;       ///< kInferred: quantiles of sqrt(f), groups x 3 (5, 50, 95 %)
 
   /// History of the model over the posterior, T entries, in units of the readings: mean and
   /// quantiles over parameters and over what the emulator does not know of the mean history.
@@ -82,10 +83,12 @@ struct EmulatedResult {
 /// matter, which is what makes an emulated posterior independent of weights) and samples prior x
 /// likelihood by TMCMC. Deterministic in options.seed. About a second or two at 400 runs, 5
 /// parameters and 300 readings. With kInferred a variance factor f multiplies the noise of each
-/// (experiment, observable) group, inverse gamma prior (VarianceFactorPrior), sampled along as f =
-/// 1 / z^2, z half normal. Errors: INVALID_ARGUMENT for options, priors, data or shapes;
-/// FAILED_PRECONDITION with too few undiverged runs; CANCELLED.
-absl::StatusOr<EmulatedResult> EmulatedPosterior(std::span<const Prior> priors, const DataSet& data,
+/// noise group, inverse gamma prior (VarianceFactorPrior), sampled along as f = 1 / z^2, z half
+/// normal, where shape and rate are 1/2, else as its quantile at Phi(z), z normal. Parameters that
+/// the last iteration holds (Proposal::frozen) are held: the runs of all iterations teach the
+/// emulator, only the others are sampled. Errors: INVALID_ARGUMENT for options, priors, data or
+/// shapes; FAILED_PRECONDITION with too few undiverged runs; CANCELLED.
+absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const DataSet& data,
                                                  const EmulatorOptions& options,
                                                  std::span<const Iteration> iterations,
                                                  const std::stop_token& stop = {});

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-absl::Status ValidateShapes(std::span<const Prior> priors, const DataSet& data,
+absl::Status ValidateShapes(const JointPrior& priors, const DataSet& data,
                             std::span<const Iteration> iterations) {
   if (iterations.empty()) return absl::FailedPreconditionError("there is no finished iteration.");
   const auto d = static_cast<Eigen::Index>(priors.size());
@@ -46,7 +46,42 @@ absl::Status FindSigma(const DataSet& data, const FilterOptions& options,
   return absl::OkStatus();
 }
 
+// 1 for the samples whose predictions are all finite, 0 for the others.
+Eigen::VectorXd FiniteRows(std::span<const Iteration> iterations) {
+  Eigen::Index n = 0;
+  for (const Iteration& iteration : iterations) n += iteration.predictions.rows();
+  Eigen::VectorXd finite = Eigen::VectorXd::Ones(n);
+  Eigen::Index row = 0;
+  for (const Iteration& iteration : iterations) {
+    const Eigen::Index size = iteration.predictions.rows();
+    if (!iteration.predictions.allFinite()) {
+      for (Eigen::Index i = 0; i < size; ++i)
+        finite[row + i] = iteration.predictions.row(i).allFinite() ? 1 : 0;
+    }
+    row += size;
+  }
+  return finite;
+}
+
 }  // namespace
+
+Eigen::MatrixXd IncrementsOf(const GaussianLikelihood& likelihood,
+                             std::span<const Iteration> iterations, bool reversed) {
+  const auto of_one = [&](const Iteration& iteration) {
+    return reversed ? likelihood.Increments(iteration.predictions.rowwise().reverse())
+                    : likelihood.Increments(iteration.predictions);
+  };
+  if (iterations.size() == 1) return of_one(iterations.front());
+  Eigen::Index n = 0;
+  for (const Iteration& iteration : iterations) n += iteration.predictions.rows();
+  Eigen::MatrixXd increments(n, likelihood.readings());
+  Eigen::Index row = 0;
+  for (const Iteration& iteration : iterations) {
+    increments.middleRows(row, iteration.predictions.rows()) = of_one(iteration);
+    row += iteration.predictions.rows();
+  }
+  return increments;
+}
 
 StepOffsets LoadSteps(const DataSet& data) {
   StepOffsets steps;
@@ -59,39 +94,49 @@ StepOffsets LoadSteps(const DataSet& data) {
   return steps;
 }
 
-absl::StatusOr<Ensemble> MakeEnsemble(std::span<const Prior> priors, const DataSet& data,
+absl::StatusOr<GaussianLikelihood> LikelihoodOf(const Ensemble& ensemble, const DataSet& data,
+                                                const FilterOptions& options) {
+  return options.noise == NoiseMode::kEssTarget
+             ? GaussianLikelihood::Create(WithRelativeErrors(data, *ensemble.sigma),
+                                          NoiseMode::kGiven)
+             : GaussianLikelihood::Create(data, options.noise);
+}
+
+absl::StatusOr<Ensemble> MakeEnsemble(const JointPrior& priors, const DataSet& data,
                                       const FilterOptions& options,
                                       std::span<const Iteration> iterations) {
   if (auto valid = options.Validate(); !valid.ok()) return valid;
   if (auto valid = ValidateData(data, options.noise); !valid.ok()) return valid;
-  for (const Prior& prior : priors) {
-    if (auto valid = prior.Validate(); !valid.ok()) return valid;
-  }
+  if (auto valid = priors.Validate(); !valid.ok()) return valid;
   if (auto valid = ValidateShapes(priors, data, iterations); !valid.ok()) return valid;
 
   Ensemble ensemble;
   const bool last_only = options.noise == NoiseMode::kEssTarget;
-  const auto used = last_only ? iterations.last(1) : iterations;
+  std::size_t count = 1;
+  while (
+      !last_only && count < iterations.size() &&
+      SameFrozen(iterations[iterations.size() - 1 - count].proposal, iterations.back().proposal)) {
+    ++count;
+  }
+  const auto used = iterations.last(count);
+  ensemble.frozen = iterations.back().proposal.frozen;
   Eigen::Index n = 0;
   for (const Iteration& iteration : used) n += iteration.parameters.rows();
   for (const Iteration& iteration : iterations) ensemble.first += iteration.parameters.rows();
   ensemble.first -= n;
   ensemble.last_size = iterations.back().parameters.rows();
 
-  Eigen::MatrixXd predictions(n, static_cast<Eigen::Index>(data.readings.size()));
+  ensemble.used = used;
   ensemble.parameters.resize(n, static_cast<Eigen::Index>(priors.size()));
   Eigen::Index row = 0;
   for (const Iteration& iteration : used) {
     ensemble.parameters.middleRows(row, iteration.parameters.rows()) = iteration.parameters;
-    predictions.middleRows(row, iteration.parameters.rows()) = iteration.predictions;
     row += iteration.parameters.rows();
   }
   ensemble.log_start = LogImportance(priors, used);
-  Eigen::Array<bool, Eigen::Dynamic, 1> finite =
-      Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(n, true);
-  for (const auto& column : predictions.colwise()) finite = finite && column.array().isFinite();
+  const Eigen::VectorXd finite = FiniteRows(used);
   for (Eigen::Index i = 0; i < n; ++i) {
-    if (!finite[i]) {
+    if (finite[i] == 0) {
       ensemble.log_start[i] = -kInfinity;
       ++ensemble.diverged;
     } else if (ensemble.log_start[i] == -kInfinity) {
@@ -99,14 +144,13 @@ absl::StatusOr<Ensemble> MakeEnsemble(std::span<const Prior> priors, const DataS
     }
   }
   if (last_only) {
-    if (auto found = FindSigma(data, options, predictions, ensemble); !found.ok()) return found;
+    if (auto found = FindSigma(data, options, used.back().predictions, ensemble); !found.ok()) {
+      return found;
+    }
   }
-  const auto likelihood =
-      last_only
-          ? GaussianLikelihood::Create(WithRelativeErrors(data, *ensemble.sigma), NoiseMode::kGiven)
-          : GaussianLikelihood::Create(data, options.noise);
+  const auto likelihood = LikelihoodOf(ensemble, data, options);
   if (!likelihood.ok()) return likelihood.status();
-  ensemble.increments = likelihood->Increments(predictions);
+  ensemble.increments = IncrementsOf(*likelihood, used, false);
   ensemble.log_likelihood = GaussianLikelihood::Sum(ensemble.increments);
   for (Eigen::Index i = 0; i < n; ++i) {
     if (ensemble.log_start[i] > -kInfinity && ensemble.log_likelihood[i] > -kInfinity)

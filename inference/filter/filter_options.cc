@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "inference/filter/iterative_filter.h"
@@ -32,16 +33,25 @@ absl::Status FilterOptions::Validate() const {
   return absl::OkStatus();
 }
 
-bool MeansConverged(const Posterior& before, const Posterior& now, const FilterOptions& options) {
-  if (before.parameters.size() != now.parameters.size()) return false;
+std::vector<char> ConvergedMeans(const Posterior& before, const Posterior& now,
+                                 const FilterOptions& options) {
+  if (before.parameters.size() != now.parameters.size()) return {};
+  std::vector<char> converged;
   for (std::size_t j = 0; j < now.parameters.size(); ++j) {
     const ParameterSummary& parameter = now.parameters[j];
     const double scale = std::max(std::abs(parameter.mean), 0.1 * parameter.prior_sd);
     const double change = std::abs(parameter.mean - before.parameters[j].mean);
-    const double immaterial = options.noise == NoiseMode::kEssTarget ? 0 : parameter.sd / 3;
-    if (!(change <= std::max(options.tolerance * scale, immaterial))) return false;
+    const bool tempered = options.noise == NoiseMode::kEssTarget || std::isnan(parameter.sd);
+    const double immaterial = tempered ? 0 : parameter.sd / 3;
+    converged.push_back(change <= std::max(options.tolerance * scale, immaterial) ? 1 : 0);
   }
-  return true;
+  return converged;
+}
+
+bool MeansConverged(const Posterior& before, const Posterior& now, const FilterOptions& options) {
+  if (before.parameters.size() != now.parameters.size()) return false;
+  const std::vector<char> converged = ConvergedMeans(before, now, options);
+  return std::all_of(converged.begin(), converged.end(), [](char c) { return c != 0; });
 }
 
 }  // namespace calib::inference

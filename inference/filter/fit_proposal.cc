@@ -12,6 +12,8 @@
 #include "inference/filter/iterative_filter.h"
 #include "inference/filter/log_weights.h"
 #include "inference/mixture/dirichlet_mixture.h"
+#include "inference/prior/standard_normal.h"
+#include "inference/sampling/sobol.h"
 
 namespace calib::inference {
 namespace {
@@ -19,7 +21,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInsignificantShare = 1e-3;
 constexpr double kNegligibleWeight =
-    1e-4;  // of a component: fewer than one in ten thousand samples
+    1e-4;                              // of a component: fewer than one in ten thousand samples
 constexpr double kWorthOfDraws = 100;  // draws of an emulator know no more than its runs
 constexpr double kWidening = 2;        // of their sd: an emulator is good inside its runs only
 
@@ -47,18 +49,21 @@ std::vector<Eigen::Index> Significant(const Eigen::VectorXd& log_weights) {
 // Samples with weight, in standard coordinates, standing for as many observations as they are
 // worth: the counts sum to the effective sample size, not to a multiple of N as copies would [Cheng
 // 2019, footnote 1].
-WeightedPoints Standardized(std::span<const Prior> priors, const Eigen::MatrixXd& parameters,
-                            const Eigen::VectorXd& log_weights) {
+WeightedPoints Standardized(const JointPrior& priors, const std::vector<Eigen::Index>& columns,
+                            const Eigen::MatrixXd& parameters, const Eigen::VectorXd& log_weights) {
   const double ess = EffectiveSampleSize(log_weights);
   const std::vector<Eigen::Index> counted = Significant(log_weights);
-  const auto d = static_cast<Eigen::Index>(priors.size());
+  const auto d = static_cast<Eigen::Index>(columns.size());
   WeightedPoints data{.points = Eigen::MatrixXd(d, counted.size()),
                       .counts = Eigen::VectorXd(counted.size())};
   for (std::size_t k = 0; k < counted.size(); ++k) {
     const auto column = static_cast<Eigen::Index>(k);
     data.counts[column] = ess * std::exp(log_weights[counted[k]]);
-    for (Eigen::Index j = 0; j < d; ++j)
-      data.points(j, column) = priors[j].ToStandard(parameters(counted[k], j));
+    for (Eigen::Index j = 0; j < d; ++j) {
+      const Eigen::Index from = columns[static_cast<std::size_t>(j)];
+      data.points(j, column) =
+          priors[static_cast<std::size_t>(from)].ToStandard(parameters(counted[k], from));
+    }
   }
   return data;
 }
@@ -95,8 +100,8 @@ int MostComponents(const FilterOptions& options, const WeightedPoints& points) {
   return std::clamp(affordable, 1, options.max_components);
 }
 
-absl::StatusOr<Proposal> FitMixture(std::span<const Prior> priors, const FilterOptions& options,
-                                    const WeightedPoints& points, std::size_t iterations) {
+absl::StatusOr<Proposal> FitMixture(const FilterOptions& options, const WeightedPoints& points,
+                                    std::size_t iterations) {
   const auto mixture =
       FitDirichletMixture(points, {.max_components = MostComponents(options, points),
                                    .concentration = options.concentration,
@@ -106,13 +111,33 @@ absl::StatusOr<Proposal> FitMixture(std::span<const Prior> priors, const FilterO
   Proposal proposal;
   proposal.components = mixture->Predictive(kNegligibleWeight);
   proposal.defensive_share = options.defensive_share;
-  proposal.log_acceptance = LogMassInSupport(proposal.components, priors);
   return proposal;
+}
+
+// Parameters that are not held.
+std::vector<Eigen::Index> FreeOf(const JointPrior& priors,
+                                 const std::vector<std::optional<double>>& frozen) {
+  std::vector<Eigen::Index> free;
+  for (std::size_t j = 0; j < priors.size(); ++j) {
+    if (frozen.empty() || !frozen[j]) free.push_back(static_cast<Eigen::Index>(j));
+  }
+  return free;
+}
+
+// What is held, and the mass that is inside the support of the rest.
+void Complete(const JointPrior& priors, const std::vector<Eigen::Index>& free,
+              const std::vector<std::optional<double>>& frozen, Proposal& proposal) {
+  if (free.size() < priors.size()) {
+    proposal.frozen = frozen;
+    proposal.log_acceptance = LogMassInSupport(proposal.components, priors.Of(free));
+  } else {
+    proposal.log_acceptance = LogMassInSupport(proposal.components, priors);
+  }
 }
 
 }  // namespace
 
-absl::StatusOr<double> GuidingExponent(std::span<const Prior> priors, const DataSet& data,
+absl::StatusOr<double> GuidingExponent(const JointPrior& priors, const DataSet& data,
                                        const FilterOptions& options,
                                        std::span<const Iteration> iterations) {
   const auto ensemble = MakeEnsemble(priors, data, options, iterations);
@@ -120,8 +145,53 @@ absl::StatusOr<double> GuidingExponent(std::span<const Prior> priors, const Data
   return TemperingExponent(options, *ensemble);
 }
 
-double LogMassInSupport(std::span<const MixtureComponent> components,
-                        std::span<const Prior> priors) {
+namespace {
+
+// ln of the mass of the mixture where the support is more than a box.
+double LogMassInRegion(std::span<const MixtureComponent> components, const JointPrior& priors) {
+  constexpr int kPoints = 1 << 14;
+  const auto d = static_cast<int>(priors.size());
+  const Eigen::MatrixXd unit = ScrambledSobol(kPoints, d, 0);
+  Eigen::VectorXd z(d);
+  double total = 0;
+  double inside = 0;
+  for (const MixtureComponent& component : components) {
+    const Eigen::MatrixXd factor = Eigen::LLT<Eigen::MatrixXd>(component.covariance).matrixL();
+    int met = 0;
+    for (int i = 0; i < kPoints; ++i) {
+      for (Eigen::Index j = 0; j < d; ++j) z[j] = NormalQuantile(unit(i, j));
+      met += priors.InSupport(priors.FromStandard(component.mean + factor * z)) ? 1 : 0;
+    }
+    total += component.weight;
+    inside += component.weight * met / kPoints;
+  }
+  return std::log(inside / total);
+}
+
+absl::Status ValidateFrozen(const JointPrior& priors,
+                            const std::vector<std::optional<double>>& frozen) {
+  if (frozen.empty()) return absl::OkStatus();
+  if (frozen.size() != priors.size() || !priors.is_independent() || priors.is_constrained()) {
+    return absl::InvalidArgumentError(
+        "parameters can be held only where the priors are independent and unconstrained, with one "
+        "entry per parameter.");
+  }
+  bool any_free = false;
+  for (std::size_t j = 0; j < frozen.size(); ++j) {
+    any_free = any_free || !frozen[j];
+    if (frozen[j] && !priors[j].InSupport(*frozen[j])) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("parameter ", j, " is to be held at ", *frozen[j], ", outside its prior."));
+    }
+  }
+  if (any_free) return absl::OkStatus();
+  return absl::InvalidArgumentError("all parameters are to be held: nothing is left to infer.");
+}
+
+}  // namespace
+
+double LogMassInSupport(std::span<const MixtureComponent> components, const JointPrior& priors) {
+  if (priors.is_constrained()) return LogMassInRegion(components, priors);
   const auto d = static_cast<Eigen::Index>(priors.size());
   Eigen::VectorXd low(d);
   Eigen::VectorXd high(d);
@@ -134,35 +204,42 @@ double LogMassInSupport(std::span<const MixtureComponent> components,
   return GaussianMixture(components).LogBoxMass(low, high);
 }
 
-absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSet& data,
+absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& data,
                                      const FilterOptions& options,
-                                     std::span<const Iteration> iterations) {
+                                     std::span<const Iteration> iterations,
+                                     const std::vector<std::optional<double>>& frozen) {
+  if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
   const auto ensemble = MakeEnsemble(priors, data, options, iterations);
   if (!ensemble.ok()) return ensemble.status();
+  const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
   const Eigen::VectorXd log_weights =
       TemperedLogWeights(*ensemble, TemperingExponent(options, *ensemble));
-  return FitMixture(priors, options, Standardized(priors, ensemble->parameters, log_weights),
-                    iterations.size());
+  auto proposal = FitMixture(options, Standardized(priors, free, ensemble->parameters, log_weights),
+                             iterations.size());
+  if (proposal.ok()) Complete(priors, free, frozen, *proposal);
+  return proposal;
 }
 
-absl::StatusOr<Proposal> FitProposalToDraws(std::span<const Prior> priors,
-                                            const FilterOptions& options,
-                                            const Eigen::MatrixXd& draws, std::size_t iterations) {
+absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const FilterOptions& options,
+                                            const Eigen::MatrixXd& draws, std::size_t iterations,
+                                            const std::vector<std::optional<double>>& frozen) {
+  if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
   const Eigen::Index n = draws.rows();
   if (n == 0 || draws.cols() != static_cast<Eigen::Index>(priors.size())) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("a proposal cannot be fitted to ", n, " x ", draws.cols(), " draws of ",
-                     priors.size(), " parameters."));
+    return absl::InvalidArgumentError(absl::StrCat("a proposal cannot be fitted to ", n, " x ",
+                                                   draws.cols(), " draws of ", priors.size(),
+                                                   " parameters."));
   }
+  const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
   const Eigen::VectorXd equal = Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
-  WeightedPoints points = Standardized(priors, draws, equal);
+  WeightedPoints points = Standardized(priors, free, draws, equal);
   points.counts *= std::min(1.0, kWorthOfDraws / points.counts.sum());
-  auto proposal = FitMixture(priors, options, points, iterations);
+  auto proposal = FitMixture(options, points, iterations);
   if (!proposal.ok()) return proposal;
   for (MixtureComponent& component : proposal->components) {
     component.covariance *= kWidening * kWidening;
   }
-  proposal->log_acceptance = LogMassInSupport(proposal->components, priors);
+  Complete(priors, free, frozen, *proposal);
   return proposal;
 }
 

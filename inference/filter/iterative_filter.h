@@ -14,7 +14,7 @@
 #include "absl/status/statusor.h"
 #include "inference/data/data_set.h"
 #include "inference/mixture/gaussian_mixture.h"
-#include "inference/prior/prior.h"
+#include "inference/prior/joint_prior.h"
 
 namespace calib::inference {
 
@@ -32,6 +32,7 @@ struct FilterOptions {
   int max_components = 10;          ///< >= 1; truncation of the Dirichlet process
   double concentration = 0.01;      ///< > 0; its precision alpha [Cheng 2019, sec. 3.5]
   Design design = Design::kHalton;  ///< first iteration
+  bool reversed_path = false;       ///< also give the path with the readings in reversed order
   std::uint64_t seed = 0;
   /// INVALID_ARGUMENT naming the field, what was found and what is allowed.
   absl::Status Validate() const;
@@ -46,7 +47,12 @@ struct Proposal {
   std::vector<Component> components;
   double defensive_share = 0;
   double log_acceptance = 0;  ///< ln of the mixture's mass inside the support
+  /// Empty, or d entries: parameters held at a value, in their own unit [Cheng 2019, sec. 6.2]. The
+  /// mixture is then one of the others, in their order. Independent, unconstrained priors only.
+  std::vector<std::optional<double>> frozen = {};
 };
+/// Whether both hold the same parameters at the same values.
+bool SameFrozen(const Proposal& a, const Proposal& b);
 
 /// One finished iteration: N samples of d parameters, predictions of the T readings.
 struct Iteration {
@@ -58,20 +64,22 @@ struct Iteration {
   std::optional<Eigen::VectorXd> log_proposal;
 };
 
-/// ln of the mass that a mixture has inside the support of the priors: log_acceptance of a proposal.
-double LogMassInSupport(std::span<const MixtureComponent> components,
-                        std::span<const Prior> priors);
+/// ln of the mass that a mixture has inside the support of the priors: log_acceptance of a
+/// proposal. To about 1e-4 in a box; with constraints from 2^14 scrambled Sobol points per
+/// component, to about 1e-3.
+double LogMassInSupport(std::span<const MixtureComponent> components, const JointPrior& priors);
 
 /// Draws n samples (n x d). Deterministic in (options.seed, iteration, sample index), and row i
-/// does not depend on n (except of a Latin hypercube, which is made for n). Iteration 0 without a mixture: the quasi-random design through the prior's
-/// quantiles. Otherwise each sample has its own Philox stream; draws of the mixture outside the
-/// support are redrawn, never clipped. Errors: FAILED_PRECONDITION when a mixture has next to no
-/// mass (below 1e-3) inside the support.
-absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, std::span<const Prior> priors,
+/// does not depend on n (except of a Latin hypercube, which is made for n). Iteration 0 without a
+/// mixture: the quasi-random design through the prior's quantiles; points that violate a constraint
+/// are passed over (of a Latin hypercube: each replaced by a draw from the prior). Otherwise each
+/// sample has its own Philox stream; draws outside the support are redrawn, never clipped. Errors:
+/// FAILED_PRECONDITION when a mixture has next to no mass (below 1e-3) inside the support.
+absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, const JointPrior& priors,
                                             const FilterOptions& options, int iteration, int n);
 
 /// ln of the density of the proposal at each row of parameters, in the units of the parameters.
-Eigen::VectorXd LogDensity(const Proposal& proposal, std::span<const Prior> priors,
+Eigen::VectorXd LogDensity(const Proposal& proposal, const JointPrior& priors,
                            const Eigen::MatrixXd& parameters);
 
 struct ParameterSummary {
@@ -102,6 +110,19 @@ struct Posterior {
   double pareto_k = 0;          ///< tail index of the weights; > 0.7: they cannot be trusted
   std::optional<double> sigma;  ///< kEssTarget: the sigma found
   PosteriorPath path;
+  /// The same with the readings taken in from the last to the first [Cheng 2019, sec. 3.3.2], a
+  /// presentation: its last row is the last row of `path`. Empty unless options.reversed_path.
+  PosteriorPath reversed_path;
+  /// kInferred: posterior quantiles of sqrt(f) per noise group (NoiseGroupsOf), groups x 3 (5, 50,
+  /// 95 %): by how much the errors are larger than stated.
+  Eigen::MatrixXd noise_scale;
+  std::vector<std::optional<double>> frozen;  ///< of the last proposal: what all this is given
+  /// Split-half agreement, d: difference of the means of every second sample over the posterior sd,
+  /// NaN for what is held. About 2 / sqrt(ess) where the weights are enough.
+  Eigen::VectorXd split_half;
+  /// kGiven: posterior predictive p-value of the misfit, sum_i w_i P(chi^2_T >= chi^2(y, x_i)):
+  /// the share of data sets replicated from the posterior that fit no better [Gelman et al. 1996].
+  std::optional<double> predictive_p;
   std::vector<std::string> warnings;  ///< whole sentences: diverged samples, tempering, ...
   /// Empty: the weights carry the posterior. Otherwise a sentence saying why not: fewer than 50
   /// effective samples or a Pareto index above 0.7; sd, quantiles and evidence above are then
@@ -114,7 +135,7 @@ struct Posterior {
 /// counts. Proposal: the deterministic mixture sum_j N_j / N q_j over the iterations whose density
 /// is known everywhere [Owen & Zhou 2000]; an iteration with log_proposal stands for itself. -inf
 /// outside the prior's support.
-Eigen::VectorXd LogImportance(std::span<const Prior> priors, std::span<const Iteration> iterations);
+Eigen::VectorXd LogImportance(const JointPrior& priors, std::span<const Iteration> iterations);
 
 /// ln p(data | sample) of each row of predictions (N x T), with noise kGiven or kInferred; -inf
 /// where a row is not finite. Errors: INVALID_ARGUMENT from ValidateData or for another width;
@@ -130,35 +151,40 @@ absl::StatusOr<Eigen::VectorXd> LogLikelihoodBound(const DataSet& data,
                                                    const Eigen::MatrixXd& predictions);
 
 /// Posterior from all iterations together: weight ∝ prior x likelihood / deterministic mixture of
-/// all proposals, so that the data count once. kEssTarget uses the last iteration alone, as the
-/// paper does; its log_evidence is that of the sigma found. Errors: INVALID_ARGUMENT for priors,
-/// data, options or shapes that do not fit; FAILED_PRECONDITION when no sample has a finite weight
-/// (all diverged or outside the prior).
-absl::StatusOr<Posterior> ComputePosterior(std::span<const Prior> priors, const DataSet& data,
+/// all proposals, so that the data count once. Where the last proposal holds parameters, it is the
+/// posterior of the others given these, from the iterations that hold the same, the evidence ln
+/// p(data | held values); sd and quantiles of a held parameter are NaN. kEssTarget uses the last
+/// iteration alone, as the paper does; its log_evidence is that of the sigma found. Errors:
+/// INVALID_ARGUMENT for priors, data, options or shapes that do not fit; FAILED_PRECONDITION when
+/// no sample has a finite weight (all diverged or outside the prior).
+absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataSet& data,
                                            const FilterOptions& options,
                                            std::span<const Iteration> iterations);
 
 /// The exponent in (0, 1] of the likelihood whose weights guide what comes next (proposal, early
 /// stopping): the largest that leaves ess_target of one iteration's samples effective; 1 where the
 /// plain weights do, and with kEssTarget. Errors as ComputePosterior.
-absl::StatusOr<double> GuidingExponent(std::span<const Prior> priors, const DataSet& data,
+absl::StatusOr<double> GuidingExponent(const JointPrior& priors, const DataSet& data,
                                        const FilterOptions& options,
                                        std::span<const Iteration> iterations);
 
 /// Proposal of the next iteration: variational Dirichlet-process mixture fitted to the tempered
-/// weights of all iterations (kEssTarget: the weights of the last). Errors as ComputePosterior.
-absl::StatusOr<Proposal> FitProposal(std::span<const Prior> priors, const DataSet& data,
+/// weights of all iterations (kEssTarget: the weights of the last), over the parameters that
+/// `frozen` (empty, or d entries) leaves free. Errors as ComputePosterior, and INVALID_ARGUMENT
+/// when frozen leaves none free, lies outside the prior, or the prior is correlated or constrained.
+absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& data,
                                      const FilterOptions& options,
-                                     std::span<const Iteration> iterations);
+                                     std::span<const Iteration> iterations,
+                                     const std::vector<std::optional<double>>& frozen = {});
 
 /// The proposal of the next iteration where weights carry next to nothing: a mixture fitted to
 /// equally weighted draws (n x d, SI) of an emulated posterior, its covariances widened fourfold, so
 /// that the next runs surround the posterior and the emulator interpolates there. The defensive
 /// share of the prior joins as always. `iterations`: how many there are so far, which chooses the
 /// random stream. Errors: INVALID_ARGUMENT for shapes; those of the mixture.
-absl::StatusOr<Proposal> FitProposalToDraws(std::span<const Prior> priors,
-                                            const FilterOptions& options,
-                                            const Eigen::MatrixXd& draws, std::size_t iterations);
+absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const FilterOptions& options,
+                                            const Eigen::MatrixXd& draws, std::size_t iterations,
+                                            const std::vector<std::optional<double>>& frozen = {});
 
 /// True when every posterior mean moved by less than options.tolerance relative to itself [Table 1,
 /// step 7], or, where it lies closer to zero than a tenth of the prior's sd, relative to that
@@ -166,6 +192,9 @@ absl::StatusOr<Proposal> FitProposalToDraws(std::span<const Prior> priors,
 /// kEssTarget, whose sd is no uncertainty). It says nothing about the weights: means can stand
 /// still because one sample carries them all, so look at Posterior::degeneracy too.
 bool MeansConverged(const Posterior& before, const Posterior& now, const FilterOptions& options);
+/// The same of each parameter, d entries; none where the two have not the same parameters.
+std::vector<char> ConvergedMeans(const Posterior& before, const Posterior& now,
+                                 const FilterOptions& options);
 
 /// State of the running iteration from the readings that have arrived, for the live view: only load
 /// steps that every undiverged sample has reached count, per experiment. Weights are likelihoods

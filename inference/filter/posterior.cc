@@ -1,7 +1,11 @@
 // The posterior and its path from all finished iterations.
 
+#include <algorithm>
+#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "inference/evidence/importance_evidence.h"
@@ -12,6 +16,7 @@
 #include "inference/filter/parameter_summary.h"
 #include "inference/filter/sequential_filter.h"
 #include "inference/filter/weighted_moments.h"
+#include "inference/sampling/halton.h"
 
 namespace calib::inference {
 namespace {
@@ -20,10 +25,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastEss = 50;
 constexpr double kLargestParetoIndex = 0.7;
 
-PosteriorPath MakePath(const DataSet& data, const Ensemble& ensemble) {
+PosteriorPath MakePath(const DataSet& data, const Ensemble& ensemble,
+                       const Eigen::MatrixXd& increments) {
   const StepOffsets steps = LoadSteps(data);
   const SequentialResult along =
-      SequentialFilter(ensemble.log_start, ensemble.increments, steps, ensemble.parameters);
+      SequentialFilter(ensemble.log_start, increments, steps, ensemble.parameters);
   PosteriorPath path;
   path.mean = along.mean;
   path.cov = along.cov;
@@ -40,6 +46,106 @@ PosteriorPath MakePath(const DataSet& data, const Ensemble& ensemble) {
     path.log_evidence[s] = log_evidence;
   }
   return path;
+}
+
+// The readings taken in from the last to the first: where they depend on each other, each given
+// those after it. Final weights and evidence stay those of the forward order, up to rounding.
+absl::StatusOr<PosteriorPath> MakeReversedPath(const DataSet& data, const FilterOptions& options,
+                                               const Ensemble& ensemble) {
+  const DataSet reversed = Reversed(data);
+  const auto likelihood = LikelihoodOf(ensemble, reversed, options);
+  if (!likelihood.ok()) return likelihood.status();
+  return MakePath(reversed, ensemble, IncrementsOf(*likelihood, ensemble.used, true));
+}
+
+// Quantiles of sqrt(f) over the posterior, by equally probable draws: sample by sample the factor
+// is inverse gamma.
+absl::StatusOr<Eigen::MatrixXd> NoiseScale(const DataSet& data, const FilterOptions& options,
+                                           const Ensemble& ensemble,
+                                           const Eigen::VectorXd& log_weights) {
+  constexpr int kDraws = 2000;
+  const auto likelihood = LikelihoodOf(ensemble, data, options);
+  if (!likelihood.ok()) return likelihood.status();
+  Eigen::VectorXd shapes;
+  Eigen::MatrixXd rates;
+  Eigen::Index row = 0;
+  for (const Iteration& iteration : ensemble.used) {
+    const auto factors = likelihood->VarianceFactors(iteration.predictions);
+    shapes = factors.shapes;
+    rates.conservativeResize(log_weights.size(), shapes.size());
+    rates.middleRows(row, factors.rates.rows()) = factors.rates;
+    row += factors.rates.rows();
+  }
+  Eigen::MatrixXd scale(shapes.size(), 3);
+  std::vector<double> draws(kDraws);
+  for (Eigen::Index g = 0; g < scale.rows(); ++g) {
+    Eigen::Index i = 0;  // the last sample of positive weight passed
+    Eigen::Index next = 0;
+    double passed = 0;
+    for (int m = 0; m < kDraws; ++m) {
+      for (; passed < (m + 0.5) / kDraws && next < log_weights.size(); ++next) {
+        const double weight = std::exp(log_weights[next]);
+        if (weight > 0) i = next;
+        passed += weight;
+      }
+      const double u = RadicalInverse(static_cast<std::uint64_t>(m) + 1, 2);
+      draws[static_cast<std::size_t>(m)] =
+          std::sqrt(rates(i, g) / boost::math::gamma_q_inv(shapes[g], u));
+    }
+    std::sort(draws.begin(), draws.end());
+    scale.row(g) << draws[kDraws / 20], draws[kDraws / 2], draws[kDraws - 1 - kDraws / 20];
+  }
+  return scale;
+}
+
+// ln L = const - chi^2 / 2 with stated errors, the constant that of zero residuals.
+double PredictiveP(const DataSet& data, const Ensemble& ensemble,
+                   const Eigen::VectorXd& log_weights) {
+  const auto likelihood = GaussianLikelihood::Create(data, NoiseMode::kGiven);
+  double p = 0;
+  if (!likelihood.ok()) return std::numeric_limits<double>::quiet_NaN();
+  const auto readings = static_cast<Eigen::Index>(data.readings.size());
+  const double perfect = likelihood->LogLikelihoodBound(
+      Eigen::MatrixXd::Constant(1, readings, std::numeric_limits<double>::quiet_NaN()))[0];
+  for (Eigen::Index i = 0; i < log_weights.size(); ++i) {
+    const double weight = std::exp(log_weights[i]);
+    if (weight < 1e-12) continue;
+    const double half = std::max(0.0, perfect - ensemble.log_likelihood[i]);
+    p += weight * boost::math::gamma_q(0.5 * static_cast<double>(readings), half);
+  }
+  return p;
+}
+
+// Differences of the means of every second sample over sd.
+Eigen::VectorXd SplitHalf(const Ensemble& ensemble, const Eigen::VectorXd& log_weights,
+                          const std::vector<ParameterSummary>& parameters) {
+  const Eigen::Index d = ensemble.parameters.cols();
+  double mass[2] = {0, 0};
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(2, d);
+  for (Eigen::Index i = 0; i < log_weights.size(); ++i) {
+    const double weight = std::exp(log_weights[i]);
+    mass[i % 2] += weight;
+    for (Eigen::Index j = 0; j < d; ++j)
+      sums(i % 2, j) += weight * (ensemble.parameters(i, j) - parameters[j].mean);
+  }
+  Eigen::VectorXd difference(d);
+  for (Eigen::Index j = 0; j < d; ++j) {
+    difference[j] = std::abs(sums(0, j) / mass[0] - sums(1, j) / mass[1]) / parameters[j].sd;
+  }
+  return difference;
+}
+
+// What is held has no uncertainty to state.
+void MarkFrozen(const Ensemble& ensemble, Posterior& posterior) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t j = 0; j < ensemble.frozen.size(); ++j) {
+    if (!ensemble.frozen[j]) continue;
+    ParameterSummary& parameter = posterior.parameters[j];
+    parameter.mean = *ensemble.frozen[j];
+    parameter.sd = parameter.cov = parameter.q05 = parameter.q50 = parameter.q95 = kNone;
+    parameter.at_bound = false;
+    posterior.split_half[static_cast<Eigen::Index>(j)] = kNone;
+  }
 }
 
 std::vector<std::string> Warnings(const FilterOptions& options, const Ensemble& ensemble,
@@ -76,16 +182,16 @@ std::string Degeneracy(const FilterOptions& options, const Ensemble& ensemble,
                        const Posterior& posterior) {
   const bool heavy = posterior.pareto_k > kLargestParetoIndex;
   if (options.noise == NoiseMode::kEssTarget || (posterior.ess >= kLeastEss && !heavy)) return "";
-  return absl::StrCat("The weighted samples alone do not make a posterior: ",
-                      std::floor(posterior.ess * 10) / 10, " of ", ensemble.log_start.size(),
-                      " are effective and the Pareto index of their weights is ",
-                      std::round(posterior.pareto_k * 100) / 100, " (wanted: at least ", kLeastEss,
-                      " and at most ", kLargestParetoIndex, ").");
+  return absl::StrCat(
+      "The weighted samples alone do not make a posterior: ", std::floor(posterior.ess * 10) / 10,
+      " of ", ensemble.log_start.size(), " are effective and the Pareto index of their weights is ",
+      std::round(posterior.pareto_k * 100) / 100, " (wanted: at least ", kLeastEss, " and at most ",
+      kLargestParetoIndex, ").");
 }
 
 }  // namespace
 
-absl::StatusOr<Posterior> ComputePosterior(std::span<const Prior> priors, const DataSet& data,
+absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataSet& data,
                                            const FilterOptions& options,
                                            std::span<const Iteration> iterations) {
   const auto ensemble = MakeEnsemble(priors, data, options, iterations);
@@ -100,8 +206,7 @@ absl::StatusOr<Posterior> ComputePosterior(std::span<const Prior> priors, const 
   const Eigen::VectorXd mean = WeightedMean(log_weights, ensemble->parameters);
   const Eigen::MatrixXd covariance = WeightedCovariance(log_weights, ensemble->parameters, mean);
   for (Eigen::Index j = 0; j < mean.size(); ++j) {
-    posterior.parameters.push_back(
-        Summarize(priors[j], log_weights, ensemble->parameters.col(j)));
+    posterior.parameters.push_back(Summarize(priors[j], log_weights, ensemble->parameters.col(j)));
   }
   posterior.correlation = CorrelationOf(covariance);
   const EvidenceEstimate evidence = ImportanceEvidence(unnormalized);
@@ -110,7 +215,23 @@ absl::StatusOr<Posterior> ComputePosterior(std::span<const Prior> priors, const 
   posterior.ess = EffectiveSampleSize(log_weights);
   posterior.pareto_k = ParetoTailIndex(log_weights);
   posterior.sigma = ensemble->sigma;
-  posterior.path = MakePath(data, *ensemble);
+  posterior.path = MakePath(data, *ensemble, ensemble->increments);
+  if (options.reversed_path) {
+    auto reversed = MakeReversedPath(data, options, *ensemble);
+    if (!reversed.ok()) return reversed.status();
+    posterior.reversed_path = *std::move(reversed);
+  }
+  if (options.noise == NoiseMode::kInferred) {
+    auto scale = NoiseScale(data, options, *ensemble, log_weights);
+    if (!scale.ok()) return scale.status();
+    posterior.noise_scale = *std::move(scale);
+  }
+  if (options.noise == NoiseMode::kGiven) {
+    posterior.predictive_p = PredictiveP(data, *ensemble, log_weights);
+  }
+  posterior.split_half = SplitHalf(*ensemble, log_weights, posterior.parameters);
+  posterior.frozen = ensemble->frozen;
+  MarkFrozen(*ensemble, posterior);
   posterior.warnings = Warnings(options, *ensemble, posterior);
   posterior.degeneracy = Degeneracy(options, *ensemble, posterior);
   return posterior;

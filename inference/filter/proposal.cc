@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "inference/filter/iterative_filter.h"
@@ -20,45 +21,17 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastAcceptance = 1e-3;
 constexpr int kMostRedraws = 100'000;  // below 1e-43 of ever being reached at that acceptance
 
-bool InSupport(std::span<const Prior> priors, const Eigen::VectorXd& x) {
-  for (std::size_t j = 0; j < priors.size(); ++j) {
-    if (!priors[j].InSupport(x[static_cast<Eigen::Index>(j)])) return false;
-  }
-  return true;
-}
-
-Eigen::VectorXd ToStandard(std::span<const Prior> priors, const Eigen::VectorXd& x) {
-  Eigen::VectorXd s(x.size());
-  for (Eigen::Index j = 0; j < x.size(); ++j) s[j] = priors[j].ToStandard(x[j]);
-  return s;
-}
-
-Eigen::VectorXd FromStandard(std::span<const Prior> priors, const Eigen::VectorXd& s) {
-  Eigen::VectorXd x(s.size());
-  for (Eigen::Index j = 0; j < s.size(); ++j) x[j] = priors[j].FromStandard(s[j]);
-  return x;
-}
-
-double LogPrior(std::span<const Prior> priors, const Eigen::VectorXd& x) {
-  double sum = 0;
-  for (std::size_t j = 0; j < priors.size(); ++j)
-    sum += priors[j].LogDensity(x[static_cast<Eigen::Index>(j)]);
-  return sum;
-}
-
 // One sample of (1 - share) mixture, truncated, + share prior; false when the mixture never meets
 // the support.
-bool DrawOne(const GaussianMixture& mixture, double defensive_share, std::span<const Prior> priors,
+bool DrawOne(const GaussianMixture& mixture, double defensive_share, const JointPrior& priors,
              PhiloxStream& stream, Eigen::VectorXd& x) {
   if (stream.Uniform() < defensive_share) {
-    for (std::size_t j = 0; j < priors.size(); ++j) {
-      x[static_cast<Eigen::Index>(j)] = priors[j].Quantile(stream.Uniform());
-    }
+    x = priors.Draw(stream);
     return true;
   }
   for (int attempt = 0; attempt < kMostRedraws; ++attempt) {
-    x = FromStandard(priors, mixture.Draw(stream));
-    if (InSupport(priors, x)) return true;
+    x = priors.FromStandard(mixture.Draw(stream));
+    if (priors.InSupport(x)) return true;
   }
   return false;
 }
@@ -79,9 +52,66 @@ absl::StatusOr<Eigen::MatrixXd> UnitDesign(const FilterOptions& options, int n, 
        .seed = options.seed});
 }
 
+PhiloxStream DrawStream(const FilterOptions& options, int iteration, int sample) {
+  return PhiloxStream({.seed = options.seed,
+                       .purpose = StreamPurpose::kProposalDraws,
+                       .iteration = static_cast<std::uint64_t>(iteration),
+                       .sample = static_cast<std::uint64_t>(sample)});
+}
+
+// The points of a design that meet the constraints. A sequence goes on past those that do not, so
+// that row i is the i-th one that does, whatever n; a Latin hypercube has no further points, and a
+// draw from the prior takes the place of each.
+absl::StatusOr<Eigen::MatrixXd> FirstSamples(const JointPrior& priors, const FilterOptions& options,
+                                             int n) {
+  const auto d = static_cast<int>(priors.size());
+  const bool sequence = options.design == Design::kHalton || options.design == Design::kSobol;
+  const double share = std::exp(priors.log_mass());
+  Eigen::MatrixXd samples(n, d);
+  int points = sequence && priors.is_constrained() ? static_cast<int>(1.1 * n / share) + 16 : n;
+  for (;; points *= 2) {
+    const auto design = UnitDesign(options, points, d);
+    if (!design.ok()) return design;
+    int filled = 0;
+    for (int i = 0; i < points && filled < n; ++i) {
+      Eigen::VectorXd x = priors.FromUnit(design->row(i));
+      if (!priors.MeetsConstraints(x)) {
+        if (sequence) continue;
+        PhiloxStream stream = DrawStream(options, 0, i);
+        x = priors.Draw(stream);
+      }
+      samples.row(filled++) = x;
+    }
+    if (filled == n) return samples;
+  }
+}
+
+// The columns of the parameters that a proposal leaves free.
+std::vector<Eigen::Index> FreeColumns(const Proposal& proposal, std::size_t parameters) {
+  std::vector<Eigen::Index> free;
+  for (std::size_t j = 0; j < parameters; ++j) {
+    if (proposal.frozen.empty() || !proposal.frozen[j])
+      free.push_back(static_cast<Eigen::Index>(j));
+  }
+  return free;
+}
+
+Proposal WithoutFrozen(Proposal proposal) {
+  proposal.frozen.clear();
+  return proposal;
+}
+
 }  // namespace
 
-absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, std::span<const Prior> priors,
+bool SameFrozen(const Proposal& a, const Proposal& b) {
+  const auto any = [](const Proposal& p) {
+    return std::any_of(p.frozen.begin(), p.frozen.end(),
+                       [](const auto& f) { return f.has_value(); });
+  };
+  return any(a) == any(b) && (!any(a) || a.frozen == b.frozen);
+}
+
+absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, const JointPrior& priors,
                                             const FilterOptions& options, int iteration, int n) {
   const auto d = static_cast<int>(priors.size());
   if (n < 1 || d < 1 || iteration < 0) {
@@ -89,23 +119,27 @@ absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, std::span<
                                                    " parameters in iteration ", iteration,
                                                    ": need at least one of each."));
   }
+  if (!proposal.frozen.empty()) {
+    const std::vector<Eigen::Index> free = FreeColumns(proposal, priors.size());
+    auto drawn = DrawSamples(WithoutFrozen(proposal), priors.Of(free), options, iteration, n);
+    if (!drawn.ok()) return drawn;
+    Eigen::MatrixXd all(n, d);
+    for (int j = 0; j < d; ++j) {
+      const auto& held = proposal.frozen[static_cast<std::size_t>(j)];
+      if (held) all.col(j).setConstant(*held);
+    }
+    for (std::size_t k = 0; k < free.size(); ++k)
+      all.col(free[k]) = drawn->col(static_cast<Eigen::Index>(k));
+    return all;
+  }
+  // A design may be used once only: a later iteration that falls back to the prior draws new
+  // points.
+  if (proposal.components.empty() && iteration == 0) return FirstSamples(priors, options, n);
   Eigen::MatrixXd samples(n, d);
   if (proposal.components.empty()) {
-    // A design may be used once only: a later iteration that falls back to the prior draws new
-    // points.
-    if (iteration == 0) {
-      auto design = UnitDesign(options, n, d);
-      if (!design.ok()) return design;
-      samples = *std::move(design);
-    }
     for (int i = 0; i < n; ++i) {
-      PhiloxStream stream({.seed = options.seed,
-                           .purpose = StreamPurpose::kProposalDraws,
-                           .iteration = static_cast<std::uint64_t>(iteration),
-                           .sample = static_cast<std::uint64_t>(i)});
-      for (int j = 0; j < d; ++j) {
-        samples(i, j) = priors[j].Quantile(iteration == 0 ? samples(i, j) : stream.Uniform());
-      }
+      PhiloxStream stream = DrawStream(options, iteration, i);
+      samples.row(i) = priors.Draw(stream);
     }
     return samples;
   }
@@ -116,18 +150,19 @@ absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, std::span<
   const GaussianMixture mixture(proposal.components);
   Eigen::VectorXd x(d);
   for (int i = 0; i < n; ++i) {
-    PhiloxStream stream({.seed = options.seed,
-                         .purpose = StreamPurpose::kProposalDraws,
-                         .iteration = static_cast<std::uint64_t>(iteration),
-                         .sample = static_cast<std::uint64_t>(i)});
+    PhiloxStream stream = DrawStream(options, iteration, i);
     if (!DrawOne(mixture, proposal.defensive_share, priors, stream, x)) return barren;
     samples.row(i) = x;
   }
   return samples;
 }
 
-Eigen::VectorXd LogDensity(const Proposal& proposal, std::span<const Prior> priors,
+Eigen::VectorXd LogDensity(const Proposal& proposal, const JointPrior& priors,
                            const Eigen::MatrixXd& parameters) {
+  if (!proposal.frozen.empty()) {
+    const std::vector<Eigen::Index> free = FreeColumns(proposal, priors.size());
+    return LogDensity(WithoutFrozen(proposal), priors.Of(free), parameters(Eigen::all, free));
+  }
   const Eigen::Index n = parameters.rows();
   Eigen::VectorXd result(n);
   const bool has_mixture = !proposal.components.empty();
@@ -135,12 +170,8 @@ Eigen::VectorXd LogDensity(const Proposal& proposal, std::span<const Prior> prio
       has_mixture ? std::optional<GaussianMixture>(proposal.components) : std::nullopt;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Eigen::VectorXd x = parameters.row(i);
-    if (!InSupport(priors, x)) {
-      result[i] = -kInfinity;
-      continue;
-    }
-    const double log_prior = LogPrior(priors, x);
-    if (!has_mixture) {
+    const double log_prior = priors.LogDensity(x);
+    if (!has_mixture || log_prior == -kInfinity) {
       result[i] = log_prior;
       continue;
     }
@@ -149,23 +180,34 @@ Eigen::VectorXd LogDensity(const Proposal& proposal, std::span<const Prior> prio
       log_jacobian += priors[j].LogJacobian(x[static_cast<Eigen::Index>(j)]);
     }
     const double log_mixture =
-        mixture->LogDensity(ToStandard(priors, x)) + log_jacobian - proposal.log_acceptance;
+        mixture->LogDensity(priors.ToStandard(x)) + log_jacobian - proposal.log_acceptance;
     result[i] = LogSumExp(Eigen::Vector2d(std::log1p(-proposal.defensive_share) + log_mixture,
                                           std::log(proposal.defensive_share) + log_prior));
   }
   return result;
 }
 
-Eigen::VectorXd LogImportance(std::span<const Prior> priors,
-                              std::span<const Iteration> iterations) {
+Eigen::VectorXd LogImportance(const JointPrior& priors, std::span<const Iteration> iterations) {
   Eigen::Index total = 0;
   Eigen::Index known = 0;  // samples of iterations whose density can be evaluated anywhere
   for (const Iteration& iteration : iterations) {
     total += iteration.parameters.rows();
     if (!iteration.log_proposal) known += iteration.parameters.rows();
   }
-  Eigen::VectorXd result(total);
+  Eigen::VectorXd result = Eigen::VectorXd::Constant(total, -kInfinity);
   Eigen::Index row = 0;
+  // Iterations that hold other parameters have no density in common with the last one.
+  while (!iterations.empty() &&
+         !SameFrozen(iterations.front().proposal, iterations.back().proposal)) {
+    const Eigen::Index n = iterations.front().parameters.rows();
+    if (!iterations.front().log_proposal) known -= n;
+    row += n;
+    iterations = iterations.subspan(1);
+  }
+  const bool held = !iterations.empty() && !iterations.back().proposal.frozen.empty();
+  const std::vector<Eigen::Index> free =
+      held ? FreeColumns(iterations.back().proposal, priors.size()) : std::vector<Eigen::Index>{};
+  const JointPrior of_free = held ? priors.Of(free) : priors;
   for (const Iteration& iteration : iterations) {
     const Eigen::Index n = iteration.parameters.rows();
     Eigen::MatrixXd log_terms(n, static_cast<Eigen::Index>(iterations.size()));
@@ -181,7 +223,8 @@ Eigen::VectorXd LogImportance(std::span<const Prior> priors,
       }
     }
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double log_prior = LogPrior(priors, iteration.parameters.row(i));
+      const double log_prior = held ? of_free.LogDensity(iteration.parameters(i, free).transpose())
+                                    : priors.LogDensity(iteration.parameters.row(i));
       const double log_proposal =
           iteration.log_proposal ? (*iteration.log_proposal)[i] : LogSumExp(log_terms.row(i));
       result[row + i] = log_prior == -kInfinity ? -kInfinity : log_prior - log_proposal;

@@ -22,45 +22,38 @@ SequentialResult SequentialFilter(const Eigen::VectorXd& log_start,
   result.mean.resize(steps.steps(), d);
   result.cov.resize(steps.steps(), d);
   result.log_evidence_increments.resize(steps.steps());
-  Eigen::VectorXd log_weights = NormalizedLogWeights(log_start);
-  Eigen::VectorXd weights(n);
+  Eigen::ArrayXd log_weights = NormalizedLogWeights(log_start).array();
+  // Increments of samples that do not count may be NaN.
+  const bool all_count = log_weights.minCoeff() > -kInfinity;
+  const Eigen::ArrayXd counted = (log_weights > -kInfinity).cast<double>();
+  const Eigen::MatrixXd relative = parameters.rowwise() - parameters.row(0).eval();
+  Eigen::ArrayXd weights(n);
   for (int s = 0; s < steps.steps(); ++s) {
     for (int t = steps.offsets[s]; t < steps.offsets[s + 1]; ++t) {
-      for (Eigen::Index i = 0; i < n; ++i) {
-        if (log_weights[i] > -kInfinity) log_weights[i] += increments(i, t);
+      if (all_count) {
+        log_weights += increments.col(t).array();
+      } else {
+        log_weights = (counted > 0).select(log_weights + increments.col(t).array(), -kInfinity);
       }
     }
     // One exponential per sample: weights relative to the largest serve everything.
     const double largest = log_weights.maxCoeff();
-    double sum = 0;
-    double squares = 0;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double relative = log_weights[i] - largest;
-      weights[i] = relative > kSmallest ? std::exp(relative) : 0;
-      sum += weights[i];
-      squares += weights[i] * weights[i];
-    }
+    weights = (log_weights - largest).max(kSmallest).exp() * counted;
+    const double sum = weights.sum();
     const double log_sum = std::log(sum);
     result.log_evidence_increments[s] = largest + log_sum;
     // The largest is taken off first: subtracting largest + log_sum at once would lose digits of
     // small differences.
-    log_weights = (log_weights.array() - largest) - log_sum;
+    log_weights = (log_weights - largest) - log_sum;
     result.log_weights.col(s) = log_weights;
-    result.ess[s] = sum * sum / (squares * static_cast<double>(n));
+    result.ess[s] = sum * sum / (weights.square().sum() * static_cast<double>(n));
+    const Eigen::VectorXd shift = relative.transpose() * weights.matrix() / sum;
     for (Eigen::Index j = 0; j < d; ++j) {
-      double shift = 0;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        shift += weights[i] * (parameters(i, j) - parameters(0, j));
-      }
-      const double mean = parameters(0, j) + shift / sum;
-      double variance = 0;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const double difference = parameters(i, j) - mean;
-        variance += weights[i] * difference * difference;
-      }
+      const double mean = parameters(0, j) + shift[j];
+      const double variance = (weights * (relative.col(j).array() - shift[j]).square()).sum() / sum;
       result.mean(s, j) = mean;
       result.cov(s, j) = mean == 0 ? std::numeric_limits<double>::quiet_NaN()
-                                   : std::sqrt(variance / sum) / std::abs(mean);
+                                   : std::sqrt(variance) / std::abs(mean);
     }
   }
   return result;

@@ -53,17 +53,28 @@ Eigen::MatrixXd StartResponsibilities(const WeightedPoints& data, int clusters, 
 
 // E and M steps until the bound changes by less than the tolerance or the iterations, earlier ones
 // counted, run out.
-void Ascend(const WeightedPoints& data, int max_iterations, double tolerance,
-            DirichletMixture& fit) {
+void Ascend(const WeightedPoints& data, const QuadraticFeatures& features, int max_iterations,
+            double tolerance, DirichletMixture& fit) {
   fit.converged = false;
   while (fit.iterations < max_iterations && !fit.converged) {
-    const Expectation expectation = EStep(data.points, fit.state);
-    fit.state = MStep(data, fit.prior, expectation.responsibilities);
+    const Expectation expectation = EStep(features, fit.state);
+    fit.state = MStep(features, data.counts, fit.prior, expectation.responsibilities);
     const double bound = IterationBound(data, fit.state, expectation);
     fit.converged = std::abs(bound - fit.lower_bound) < tolerance;
     fit.lower_bound = bound;
     ++fit.iterations;
   }
+}
+
+DirichletMixture Begin(const WeightedPoints& data, const QuadraticFeatures& features,
+                       const MixturePrior& prior, const DirichletMixtureOptions& options,
+                       const Eigen::MatrixXd& responsibilities) {
+  DirichletMixture fit;
+  fit.prior = prior;
+  fit.state = MStep(features, data.counts, fit.prior, responsibilities);
+  fit.lower_bound = -std::numeric_limits<double>::infinity();
+  Ascend(data, features, options.max_iterations, options.tolerance, fit);
+  return fit;
 }
 
 }  // namespace
@@ -109,12 +120,8 @@ std::vector<MixtureComponent> DirichletMixture::Predictive(double negligible) co
 
 DirichletMixture FitFrom(const WeightedPoints& data, const DirichletMixtureOptions& options,
                          const Eigen::MatrixXd& responsibilities) {
-  DirichletMixture fit;
-  fit.prior = EmpiricalPrior(data, options.concentration, options.covariance_floor);
-  fit.state = MStep(data, fit.prior, responsibilities);
-  fit.lower_bound = -std::numeric_limits<double>::infinity();
-  Ascend(data, options.max_iterations, options.tolerance, fit);
-  return fit;
+  const MixturePrior prior = EmpiricalPrior(data, options.concentration, options.covariance_floor);
+  return Begin(data, FeaturesOf(data.points, prior.mean), prior, options, responsibilities);
 }
 
 absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
@@ -127,6 +134,7 @@ absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
         "the samples with weight do not span all directions of parameter space: no covariance can "
         "be estimated.");
   }
+  const QuadraticFeatures features = FeaturesOf(data.points, prior.mean);
   DirichletMixtureOptions coarse = options;
   coarse.tolerance = std::max(options.tolerance, kCoarseTolerance);
   std::vector<DirichletMixture> fits;
@@ -136,16 +144,17 @@ absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
                          .iteration = options.stream,
                          .sample = static_cast<std::uint64_t>(start)});
     const int variation = start % 2 == 0 ? 0 : start / 2 % options.max_components;
-    fits.push_back(FitFrom(data, coarse,
-                           StartResponsibilities(data, options.max_components - variation,
-                                                 options.max_components, stream)));
+    fits.push_back(Begin(data, features, prior, coarse,
+                         StartResponsibilities(data, options.max_components - variation,
+                                               options.max_components, stream)));
   }
   const auto larger_bound = [](const DirichletMixture& a, const DirichletMixture& b) {
     return a.lower_bound > b.lower_bound;
   };
   std::stable_sort(fits.begin(), fits.end(), larger_bound);
   fits.resize(std::min(fits.size(), kFinalists));
-  for (DirichletMixture& fit : fits) Ascend(data, options.max_iterations, options.tolerance, fit);
+  for (DirichletMixture& fit : fits)
+    Ascend(data, features, options.max_iterations, options.tolerance, fit);
   std::stable_sort(fits.begin(), fits.end(), larger_bound);
   return std::move(fits.front());
 }

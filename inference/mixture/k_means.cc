@@ -70,9 +70,14 @@ std::vector<int> KMeans(const WeightedPoints& data, int clusters, PhiloxStream& 
     bool changed = false;
     Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(centres.rows(), clusters);
     Eigen::VectorXd sizes = Eigen::VectorXd::Zero(clusters);
+    // |x - c|^2 - |x|^2, cluster by cluster: points far from the origin lose digits of the
+    // distance, which decides ties alone.
+    Eigen::MatrixXd distances(clusters, n);
+    distances.noalias() = -2 * centres.transpose() * data.points;
+    distances.colwise() += centres.colwise().squaredNorm().transpose();
     for (Eigen::Index i = 0; i < n; ++i) {
       Eigen::Index nearest = 0;
-      SquaredDistances(centres, data.points.col(i)).minCoeff(&nearest);
+      distances.col(i).minCoeff(&nearest);
       changed = changed || labels[i] != nearest;
       labels[i] = static_cast<int>(nearest);
       sums.col(nearest) += data.counts[i] * data.points.col(i);

@@ -1,5 +1,6 @@
 #include "inference/mixture/variational_steps.h"
 
+#include <algorithm>
 #include <boost/math/special_functions/digamma.hpp>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cassert>
@@ -102,76 +103,101 @@ Eigen::VectorXd MixtureState::Weights() const {
   return weights / total;
 }
 
+QuadraticFeatures FeaturesOf(const Eigen::MatrixXd& points, const Eigen::VectorXd& origin) {
+  const Eigen::Index d = points.rows();
+  const Eigen::MatrixXd centred = (points.colwise() - origin).transpose();
+  QuadraticFeatures features{.origin = origin,
+                             .values = Eigen::MatrixXd(points.cols(), 1 + d + d * (d + 1) / 2)};
+  features.values.col(0).setOnes();
+  features.values.middleCols(1, d) = centred;
+  Eigen::Index column = 1 + d;
+  for (Eigen::Index l = 0; l < d; ++l) {
+    for (Eigen::Index j = l; j < d; ++j) {
+      features.values.col(column++) = centred.col(j).cwiseProduct(centred.col(l));
+    }
+  }
+  return features;
+}
+
 Expectation EStep(const Eigen::MatrixXd& points, const MixtureState& state) {
-  const auto d = static_cast<double>(points.rows());
-  const Eigen::Index n = points.cols();
+  return EStep(FeaturesOf(points, state.means.rowwise().mean()), state);
+}
+
+Expectation EStep(const QuadraticFeatures& features, const MixtureState& state) {
+  const Eigen::Index d = state.means.rows();
+  const auto dimensions = static_cast<double>(d);
+  const Eigen::Index n = features.values.rows();
   const Eigen::VectorXd log_weights = ExpectedLogWeights(state);
-  Expectation expectation{.responsibilities = Eigen::MatrixXd(n, state.size()),
-                          .log_responsibilities = Eigen::MatrixXd(n, state.size()),
-                          .log_density = Eigen::VectorXd(n)};
-  Eigen::MatrixXd& log_rho = expectation.log_responsibilities;
+  Eigen::MatrixXd coefficients(features.values.cols(), state.size());
   for (Eigen::Index k = 0; k < state.size(); ++k) {
     // E ln N = (E ln|L| - d/beta - nu (x - m)^T W (x - m) - d ln 2 pi) / 2  [Bishop 2006,
     // Eq. 10.64]
-    const Eigen::MatrixXd whiten =
-        LowerFactor(state.covariances[k])
-            .triangularView<Eigen::Lower>()
-            .solve(Eigen::MatrixXd::Identity(points.rows(), points.rows()));
-    const double constant =
-        log_weights[k] + 0.5 * (ExpectedLogPrecision(state, k) - d / state.mean_precision[k] -
-                                d * std::log(2 * std::numbers::pi));
-    const Eigen::MatrixXd z = whiten * (points.colwise() - state.means.col(k));
-    log_rho.col(k) = constant - 0.5 * z.colwise().squaredNorm().transpose().array();
+    const Eigen::MatrixXd whiten = LowerFactor(state.covariances[k])
+                                       .triangularView<Eigen::Lower>()
+                                       .solve(Eigen::MatrixXd::Identity(d, d));
+    const Eigen::MatrixXd precision = whiten.transpose() * whiten;
+    const Eigen::VectorXd mean = state.means.col(k) - features.origin;
+    const Eigen::VectorXd pulled = precision * mean;
+    coefficients(0, k) =
+        log_weights[k] +
+        0.5 * (ExpectedLogPrecision(state, k) - dimensions / state.mean_precision[k] -
+               dimensions * std::log(2 * std::numbers::pi) - mean.dot(pulled));
+    coefficients.col(k).segment(1, d) = pulled;
+    Eigen::Index row = 1 + d;
+    for (Eigen::Index l = 0; l < d; ++l) {
+      for (Eigen::Index j = l; j < d; ++j)
+        coefficients(row++, k) = (j == l ? -0.5 : -1.0) * precision(j, l);
+    }
   }
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const double largest = log_rho.row(i).maxCoeff();
-    double sum = 0;
-    for (Eigen::Index k = 0; k < state.size(); ++k) {
-      const double rho = std::exp(log_rho(i, k) - largest);
-      expectation.responsibilities(i, k) = rho;
-      sum += rho;
-    }
-    const double log_density = largest + std::log(sum);
-    expectation.log_density[i] = log_density;
-    for (Eigen::Index k = 0; k < state.size(); ++k) {
-      expectation.responsibilities(i, k) /= sum;
-      log_rho(i, k) -= log_density;
-    }
+  Expectation expectation;
+  Eigen::MatrixXd& log_rho = expectation.log_responsibilities;
+  log_rho.noalias() = features.values * coefficients;
+  const Eigen::VectorXd largest = log_rho.rowwise().maxCoeff();
+  expectation.responsibilities.resize(n, state.size());
+  Eigen::ArrayXd sum = Eigen::ArrayXd::Zero(n);
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    expectation.responsibilities.col(k) = (log_rho.col(k) - largest).array().exp();
+    sum += expectation.responsibilities.col(k).array();
+  }
+  expectation.log_density = largest.array() + sum.log();
+  const Eigen::ArrayXd share = sum.inverse();
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    expectation.responsibilities.col(k).array() *= share;
+    log_rho.col(k) -= expectation.log_density;
   }
   return expectation;
 }
 
 MixtureState MStep(const WeightedPoints& data, const MixturePrior& prior,
                    const Eigen::MatrixXd& responsibilities) {
-  const Eigen::Index d = data.points.rows();
-  const Eigen::Index n = data.points.cols();
+  return MStep(FeaturesOf(data.points, prior.mean), data.counts, prior, responsibilities);
+}
+
+MixtureState MStep(const QuadraticFeatures& features, const Eigen::VectorXd& counts,
+                   const MixturePrior& prior, const Eigen::MatrixXd& responsibilities) {
+  const Eigen::Index d = prior.mean.size();
   const Eigen::Index components = responsibilities.cols();
-  assert(responsibilities.rows() == n);
+  assert(responsibilities.rows() == features.values.rows());
   MixtureState state{.a = Eigen::VectorXd(components),
                      .b = Eigen::VectorXd(components),
                      .mean_precision = Eigen::VectorXd(components),
                      .degrees_of_freedom = Eigen::VectorXd(components),
                      .means = Eigen::MatrixXd(d, components),
                      .covariances = std::vector<Eigen::MatrixXd>(components)};
-  Eigen::VectorXd size(components);
+  const Eigen::MatrixXd shares = counts.asDiagonal() * responsibilities;
+  const Eigen::MatrixXd moments = features.values.transpose() * shares;
+  const Eigen::VectorXd size =
+      moments.row(0).transpose().array() + 10 * std::numeric_limits<double>::epsilon();
   for (Eigen::Index k = 0; k < components; ++k) {
-    size[k] = 10 * std::numeric_limits<double>::epsilon();
-    Eigen::VectorXd mean = Eigen::VectorXd::Zero(d);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double share = data.counts[i] * responsibilities(i, k);
-      size[k] += share;
-      mean += share * data.points.col(i);
-    }
-    mean /= size[k];
-    Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(d, d);  // lower triangle of N_k S_k
-    Eigen::VectorXd difference(d);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double share = data.counts[i] * responsibilities(i, k);
-      if (share == 0) continue;
-      difference = data.points.col(i) - mean;
-      for (Eigen::Index j = 0; j < d; ++j) {
-        const double scaled = share * difference[j];
-        for (Eigen::Index l = j; l < d; ++l) scatter(l, j) += scaled * difference[l];
+    const Eigen::VectorXd about = moments.col(k).segment(1, d) / size[k];  // the origin
+    const Eigen::VectorXd mean = features.origin + about;
+    Eigen::MatrixXd scatter(d, d);  // N_k S_k
+    Eigen::Index row = 1 + d;
+    for (Eigen::Index l = 0; l < d; ++l) {
+      for (Eigen::Index j = l; j < d; ++j) {
+        // About the mean: sum r x x^T - N m m^T; a variance that rounding leaves negative is none.
+        const double value = moments(row++, k) - moments(0, k) * about[j] * about[l];
+        scatter(j, l) = scatter(l, j) = j == l ? std::max(value, 0.0) : value;
       }
     }
     state.mean_precision[k] = prior.mean_precision + size[k];
@@ -179,11 +205,10 @@ MixtureState MStep(const WeightedPoints& data, const MixturePrior& prior,
     state.means.col(k) =
         (prior.mean_precision * prior.mean + size[k] * mean) / state.mean_precision[k];
     const Eigen::VectorXd pull = mean - prior.mean;
-    Eigen::MatrixXd inverse_scale = scatter.selfadjointView<Eigen::Lower>();
-    inverse_scale.diagonal().array() += size[k] * prior.covariance_floor;
-    inverse_scale += prior.inverse_scale + size[k] * prior.mean_precision /
-                                               state.mean_precision[k] * pull * pull.transpose();
-    state.covariances[k] = inverse_scale / state.degrees_of_freedom[k];
+    scatter.diagonal().array() += size[k] * prior.covariance_floor;
+    scatter += prior.inverse_scale +
+               size[k] * prior.mean_precision / state.mean_precision[k] * pull * pull.transpose();
+    state.covariances[k] = scatter / state.degrees_of_freedom[k];
   }
   double later = 0;
   for (Eigen::Index k = components - 1; k >= 0; --k) {
@@ -200,10 +225,9 @@ double IterationBound(const WeightedPoints& data, const MixtureState& state,
   const auto dimensions = static_cast<double>(d);
   double bound = 0;
   for (Eigen::Index k = 0; k < state.size(); ++k) {
-    for (Eigen::Index i = 0; i < data.points.cols(); ++i) {
-      bound -= data.counts[i] * expectation.responsibilities(i, k) *
-               expectation.log_responsibilities(i, k);
-    }
+    bound -= (data.counts.array() * expectation.responsibilities.col(k).array() *
+              expectation.log_responsibilities.col(k).array())
+                 .sum();
     const double nu = state.degrees_of_freedom[k];
     bound += 0.5 * nu * (LogDeterminantOfScale(state, k) + dimensions * std::numbers::ln2) +
              SumOverDimensions(nu, d, LogGamma);

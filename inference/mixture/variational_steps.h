@@ -43,6 +43,16 @@ struct MixtureState {
   Eigen::VectorXd Weights() const;
 };
 
+/// 1, x - origin and the products of its coordinates for each point: quadratic forms of the points
+/// and their weighted moments are then matrix products. What cancels is of the order of the squared
+/// distance from the origin over the smallest variance, times the machine epsilon; with the mean of
+/// the data as origin and the covariance floor that is below 1e-9.
+struct QuadraticFeatures {
+  Eigen::VectorXd origin;  ///< d
+  Eigen::MatrixXd values;  ///< n x (1 + d + d (d + 1) / 2): 1, x_j, then x_j x_l by columns j >= l
+};
+QuadraticFeatures FeaturesOf(const Eigen::MatrixXd& points, const Eigen::VectorXd& origin);
+
 /// E step. ln rho_nk = E ln pi_k + E ln N(x_n; mu_k, L_k^-1)                                [Bishop
 /// 2006, Eq. 10.46]
 struct Expectation {
@@ -51,6 +61,7 @@ struct Expectation {
   Eigen::VectorXd log_density;           ///< n, ln sum_k rho_nk: scikit-learn's score_samples
 };
 Expectation EStep(const Eigen::MatrixXd& points, const MixtureState& state);
+Expectation EStep(const QuadraticFeatures& features, const MixtureState& state);
 
 /// M step: the Gauss-Wishart and Beta posteriors for given responsibilities       [Bishop 2006,
 /// Eqs. 10.51-10.63]
@@ -60,6 +71,8 @@ Expectation EStep(const Eigen::MatrixXd& points, const MixtureState& state);
 /// by zero.
 MixtureState MStep(const WeightedPoints& data, const MixturePrior& prior,
                    const Eigen::MatrixXd& responsibilities);
+MixtureState MStep(const QuadraticFeatures& features, const Eigen::VectorXd& counts,
+                   const MixturePrior& prior, const Eigen::MatrixXd& responsibilities);
 
 /// Lower bound up to a constant of data and prior, valid right after the M step that used these
 /// responsibilities: cheap, watched for convergence. Equals scikit-learn's lower_bound_.

@@ -139,6 +139,37 @@ double Prior::Quantile(double u) const {
   return std::clamp(FromPlain(*this, mean + sd * std::clamp(z, a, b)), min, max);
 }
 
+double Prior::NormalScore(double x) const {
+  double log_lower = 0;
+  double log_upper = 0;
+  if (!IsNormal(kind)) {
+    const auto [low, high] = PlainBounds(*this);
+    const double t = std::clamp(ToPlain(*this, x), low, high);
+    log_lower = std::log((t - low) / (high - low));
+    log_upper = std::log((high - t) / (high - low));
+  } else {
+    const auto [a, b] = NormalBounds(*this);
+    const double z = std::clamp((ToPlain(*this, x) - mean) / sd, a, b);
+    if (a == -kInfinity && b == kInfinity) return z;
+    const double log_mass = LogNormalMass(a, b);
+    log_lower = std::min(0.0, LogNormalMass(a, z) - log_mass);
+    log_upper = std::min(0.0, LogNormalMass(z, b) - log_mass);
+  }
+  return log_lower < log_upper ? NormalQuantileFromLog(log_lower)
+                               : -NormalQuantileFromLog(log_upper);
+}
+
+double Prior::FromNormalScore(double z) const {
+  if (IsNormal(kind)) {
+    const auto [a, b] = NormalBounds(*this);
+    if (a == -kInfinity && b == kInfinity) return FromPlain(*this, mean + sd * z);
+  }
+  // The nearest numbers to 0 and 1 that Quantile takes.
+  constexpr double kLeast = std::numeric_limits<double>::min();
+  constexpr double kMost = 1 - 0x1p-53;
+  return Quantile(std::clamp(std::exp(LogNormalCdf(z)), kLeast, kMost));
+}
+
 double Prior::StandardDeviation() const {
   if (!IsLog(kind)) return PlainScaling(*this).width;
   // Midpoint rule over equally probable strips.

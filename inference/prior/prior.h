@@ -30,6 +30,10 @@ struct Prior {
   /// Inverse of the distribution function, u in (0, 1); accurate also where the bounds leave a far
   /// tail only.
   double Quantile(double u) const;
+  /// Phi^-1(F(x)), x in the support: the normal score, -inf and inf at the bounds; and its inverse.
+  /// Both keep their digits in the tails.
+  double NormalScore(double x) const;
+  double FromNormalScore(double z) const;
   /// Standard deviation of x itself (not of ln x), by quadrature over the quantiles where no short
   /// closed form exists.
   double StandardDeviation() const;

@@ -20,6 +20,8 @@ enum class StreamPurpose : std::uint64_t {
   kResponseSurface = 19,
   kEvidenceErrors = 20,
   kDiagnosisNull = 21,
+  kExpectedImprovement = 22,
+  kSensitivity = 23,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

@@ -22,6 +22,10 @@ int InitialPoints(const ResponseSurfaceOptions& options) {
                                     : 2 * options.dimensions + 1 + options.workers;
 }
 
+bool IsAdmissible(const ResponseSurfaceOptions& options, const Eigen::VectorXd& point) {
+  return !options.admissible || options.admissible(point);
+}
+
 // Perturbations of the best point, cut off at the faces of the cube so that an optimum on a face
 // can be met exactly.
 Eigen::MatrixXd Candidates(const ResponseSurfaceOptions& options,
@@ -34,11 +38,42 @@ Eigen::MatrixXd Candidates(const ResponseSurfaceOptions& options,
                          .purpose = StreamPurpose::kResponseSurface,
                          .iteration = state.evaluations.size(),
                          .sample = static_cast<std::uint64_t>(k)});
-    for (Index j = 0; j < options.dimensions; ++j) {
-      candidates(j, k) = std::clamp(best[j] + state.step * stream.Normal(), 0.0, 1.0);
+    // Redrawn where not admissible, ever closer to the best point, which is.
+    constexpr int kPerStep = 20;
+    Eigen::VectorXd point(options.dimensions);
+    double step = state.step;
+    for (int draw = 1;; ++draw) {
+      for (Index j = 0; j < options.dimensions; ++j) {
+        point[j] = std::clamp(best[j] + step * stream.Normal(), 0.0, 1.0);
+      }
+      if (IsAdmissible(options, point) || step < 1e-12) break;
+      if (draw % kPerStep == 0) step /= 2;
     }
+    candidates.col(k) = step < 1e-12 ? best : point;
   }
   return candidates;
+}
+
+// Uniform draws in the place of design points that are not admissible.
+absl::Status ReplaceInadmissible(const ResponseSurfaceOptions& options, Eigen::MatrixXd& design) {
+  constexpr int kTries = 1'000'000;
+  constexpr std::uint64_t kDesign = ~std::uint64_t{0};  // no count of evaluations
+  for (Index i = 0; i < design.rows(); ++i) {
+    Eigen::VectorXd point = design.row(i);
+    PhiloxStream stream({.seed = options.seed,
+                         .purpose = StreamPurpose::kResponseSurface,
+                         .iteration = kDesign,
+                         .sample = static_cast<std::uint64_t>(i)});
+    for (int k = 0; !IsAdmissible(options, point); ++k) {
+      if (k == kTries) {
+        return absl::FailedPreconditionError(
+            "surrogate_msrs: of a million points of the prior none meets the constraints.");
+      }
+      for (double& value : point) value = stream.Uniform();
+    }
+    design.row(i) = point;
+  }
+  return absl::OkStatus();
 }
 
 // Distances of a point to the columns' points (m x d).
@@ -123,6 +158,7 @@ absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceO
     auto points = LatinHypercube(design);
     if (!points.ok()) return points.status();
     state.design = *std::move(points);
+    if (auto replaced = ReplaceInadmissible(options, state.design); !replaced.ok()) return replaced;
     if (SpansLinearFunctions(state.design)) return state;
     ++design.seed;
   }

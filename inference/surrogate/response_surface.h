@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -28,6 +29,8 @@ struct ResponseSurfaceOptions {
   std::vector<double> weights = {0.3, 0.5, 0.8,
                                  0.95};  ///< of the merit, one after the other, each in [0, 1]
   double min_distance = 1e-3;            ///< between any two points, see MeritOptions
+  /// Where points may lie besides in the cube; empty: everywhere. Never called concurrently.
+  std::function<bool(const Eigen::VectorXd&)> admissible = {};
   double termination =
       10;  ///< a: c = a, a/2, a/4 in the halves and quarters after the initial design
   std::uint64_t seed = 0;
@@ -58,17 +61,18 @@ struct ResponseSurfaceState {
   int best = -1;                        ///< index of the smallest value, -1: none yet
 };
 
-/// Symmetric Latin hypercube, the maximin one of 1000 that spans the linear tail.
-/// Errors: INVALID_ARGUMENT from Validate.
+/// Symmetric Latin hypercube, the maximin one of 1000 that spans the linear tail; points that are
+/// not admissible are replaced by uniform draws that are.
+/// Errors: INVALID_ARGUMENT from Validate; FAILED_PRECONDITION when next to nothing is admissible.
 absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceOptions& options);
 
 /// The next point to evaluate, recorded as pending; its id is state.evaluations.size() - 1. First
-/// the initial design, then the best of `candidates` normal perturbations of the best point by the
-/// merit, weights cycling. Depends on the state alone, whatever the order in which pending
-/// evaluations finish afterwards. surrogate: kept by the caller between calls so that each new
-/// value costs O(n^2); brought up to date here from state.completed. A new one gives the same bits,
-/// at O(n^3). nullopt: the budget is dispatched, or fewer than 2 d + 1 points are done yet and the
-/// design is used up (wait).
+/// the initial design, then the best of `candidates` admissible normal perturbations of the best
+/// point by the merit, weights cycling. Depends on the state alone, whatever the order in which
+/// pending evaluations finish afterwards. surrogate: kept by the caller between calls so that each
+/// new value costs O(n^2); brought up to date here from state.completed. A new one gives the same
+/// bits, at O(n^3). nullopt: the budget is dispatched, or fewer than 2 d + 1 points are done yet
+/// and the design is used up (wait).
 std::optional<Eigen::VectorXd> NextPoint(const ResponseSurfaceOptions& options,
                                          ResponseSurfaceState& state, CubicRbf& surrogate);
 

@@ -25,20 +25,9 @@ PhiloxStream Stream(const TmcmcOptions& options, std::size_t stage, int step, In
        .sample = static_cast<std::uint64_t>(row)});
 }
 
-// Log density of the prior in standardised coordinates.
-double LogPrior(std::span<const Prior> priors, const Eigen::RowVectorXd& parameters) {
-  double sum = 0;
-  for (std::size_t j = 0; j < priors.size(); ++j) {
-    const double x = parameters[static_cast<Index>(j)];
-    if (!priors[j].InSupport(x)) return -kInfinity;
-    sum += priors[j].LogDensity(x) - priors[j].LogJacobian(x);
-  }
-  return sum;
-}
-
 // Draws the proposals of the next Metropolis step and the likelihood each must exceed:
 //   accept if ln u < exponent (L' - L) + (P' - P).
-void Propose(std::span<const Prior> priors, const TmcmcOptions& options, TmcmcState& state) {
+void Propose(const JointPrior& priors, const TmcmcOptions& options, TmcmcState& state) {
   const Index n = state.samples.rows();
   const Index d = state.samples.cols();
   state.proposals.resize(n, d);
@@ -52,7 +41,7 @@ void Propose(std::span<const Prior> priors, const TmcmcOptions& options, TmcmcSt
       const Prior& prior = priors[static_cast<std::size_t>(j)];
       state.proposals(i, j) = prior.FromStandard(prior.ToStandard(state.samples(i, j)) + jump[j]);
     }
-    const double log_prior = LogPrior(priors, state.proposals.row(i));
+    const double log_prior = priors.LogStandardDensity(state.proposals.row(i));
     const double log_u = std::log(stream.Uniform());
     state.accept_above[i] =
         log_prior == -kInfinity
@@ -61,14 +50,13 @@ void Propose(std::span<const Prior> priors, const TmcmcOptions& options, TmcmcSt
   }
 }
 
-void Accept(std::span<const Prior> priors, const Eigen::VectorXd& log_likelihood,
-            TmcmcState& state) {
+void Accept(const JointPrior& priors, const Eigen::VectorXd& log_likelihood, TmcmcState& state) {
   int accepted = 0;
   for (Index i = 0; i < state.samples.rows(); ++i) {
     if (!(log_likelihood[i] > state.accept_above[i])) continue;
     state.samples.row(i) = state.proposals.row(i);
     state.log_likelihood[i] = log_likelihood[i];
-    state.log_prior[i] = LogPrior(priors, state.samples.row(i));
+    state.log_prior[i] = priors.LogStandardDensity(state.samples.row(i));
     state.origin[static_cast<std::size_t>(i)] = state.evaluated + i;
     ++accepted;
   }
@@ -106,8 +94,7 @@ Eigen::VectorXd EvaluateInSupport(const TmcmcState& state,
 }
 
 // Chooses the next exponent, adds its mean weight to the evidence and resamples.
-absl::Status BeginStage(std::span<const Prior> priors, const TmcmcOptions& options,
-                        TmcmcState& state) {
+absl::Status BeginStage(const JointPrior& priors, const TmcmcOptions& options, TmcmcState& state) {
   if (static_cast<int>(state.stages.size()) == options.max_stages) {
     return absl::FailedPreconditionError(absl::StrCat(
         "tempering has reached exponent ", state.exponent, " only after the ", options.max_stages,
@@ -175,26 +162,22 @@ double TmcmcState::LogEvidenceStandardError() const {
   return std::sqrt(std::max(genealogical, mixing));
 }
 
-absl::StatusOr<TmcmcState> StartTmcmc(std::span<const Prior> priors, const TmcmcOptions& options) {
+absl::StatusOr<TmcmcState> StartTmcmc(const JointPrior& priors, const TmcmcOptions& options) {
   if (auto valid = options.Validate(); !valid.ok()) return valid;
   if (priors.empty()) return absl::InvalidArgumentError("tmcmc: there is no parameter to sample.");
-  for (const Prior& prior : priors) {
-    if (auto valid = prior.Validate(); !valid.ok()) return valid;
-  }
+  if (auto valid = priors.Validate(); !valid.ok()) return valid;
   TmcmcState state;
   state.proposals.resize(options.samples, static_cast<Index>(priors.size()));
   for (Index i = 0; i < state.proposals.rows(); ++i) {
     PhiloxStream stream = Stream(options, 0, 0, i);
-    for (std::size_t j = 0; j < priors.size(); ++j) {
-      state.proposals(i, static_cast<Index>(j)) = priors[j].Quantile(stream.Uniform());
-    }
+    state.proposals.row(i) = priors.Draw(stream);
   }
   state.accept_above = Eigen::VectorXd::Constant(options.samples, -kInfinity);
   state.scale = 2.38 / std::sqrt(static_cast<double>(priors.size()));
   return state;
 }
 
-absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
+absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
                           const Eigen::VectorXd& log_likelihood, TmcmcState& state) {
   const Index n = state.proposals.rows();
   if (log_likelihood.size() != n) {
@@ -220,7 +203,7 @@ absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& opt
     next.ancestor.resize(static_cast<std::size_t>(n));
     next.origin.resize(static_cast<std::size_t>(n));
     for (Index i = 0; i < n; ++i) {
-      next.log_prior[i] = LogPrior(priors, next.samples.row(i));
+      next.log_prior[i] = priors.LogStandardDensity(next.samples.row(i));
       next.ancestor[static_cast<std::size_t>(i)] = static_cast<int>(i);
       next.origin[static_cast<std::size_t>(i)] = i;
     }
@@ -247,7 +230,7 @@ absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& opt
   return absl::OkStatus();
 }
 
-absl::StatusOr<TmcmcState> RunTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
+absl::StatusOr<TmcmcState> RunTmcmc(const JointPrior& priors, const TmcmcOptions& options,
                                     const BatchLogLikelihood& log_likelihood,
                                     const std::stop_token& stop) {
   auto state = StartTmcmc(priors, options);

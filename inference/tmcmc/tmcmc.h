@@ -13,7 +13,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "inference/prior/prior.h"
+#include "inference/prior/joint_prior.h"
 
 namespace calib::inference {
 
@@ -76,21 +76,21 @@ struct TmcmcState {
 /// N draws from the prior as first proposals. Every random number is a function of (seed, stage,
 /// step, row): neither the order in which likelihoods arrive nor the number of workers matters.
 /// Errors: INVALID_ARGUMENT (options, a prior, no parameter).
-absl::StatusOr<TmcmcState> StartTmcmc(std::span<const Prior> priors, const TmcmcOptions& options);
+absl::StatusOr<TmcmcState> StartTmcmc(const JointPrior& priors, const TmcmcOptions& options);
 
 /// Takes ln p(data | proposals), N entries in the order of state.proposals (NaN counts as -inf: a
 /// diverged run), and prepares the next batch; one call per Metropolis step. Finished when
 /// state.finished(): the samples are equally weighted draws from the posterior. Errors:
 /// INVALID_ARGUMENT for a wrong number of entries or +inf; FAILED_PRECONDITION when fewer than two
 /// prior draws have a likelihood, or after max_stages. The state is unchanged then.
-absl::Status AdvanceTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
+absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
                           const Eigen::VectorXd& log_likelihood, TmcmcState& state);
 
 /// ln p(data | parameters) of each row of an M x d matrix, M entries.
 using BatchLogLikelihood = std::function<Eigen::VectorXd(const Eigen::MatrixXd&)>;
 
 /// The whole run in this thread. Looks at `stop` before each batch: CANCELLED.
-absl::StatusOr<TmcmcState> RunTmcmc(std::span<const Prior> priors, const TmcmcOptions& options,
+absl::StatusOr<TmcmcState> RunTmcmc(const JointPrior& priors, const TmcmcOptions& options,
                                     const BatchLogLikelihood& log_likelihood,
                                     const std::stop_token& stop = {});
 

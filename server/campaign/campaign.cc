@@ -113,15 +113,22 @@ inference::DataSet MakeDataSet(const Campaign& campaign, Role role) {
       }
     }
   }
+  for (const SharedNoise& shared : campaign.shared_noise) {
+    data.noise_groups.push_back({.members = shared.members, .prior = shared.prior});
+  }
   return data;
 }
 
-std::vector<inference::Prior> Priors(const Campaign& campaign) {
+std::vector<inference::Prior> MarginalPriors(const Campaign& campaign) {
   std::vector<inference::Prior> priors;
   for (const CalibratedParameter& parameter : campaign.parameters) {
     priors.push_back(parameter.prior);
   }
   return priors;
+}
+
+inference::JointPrior Priors(const Campaign& campaign) {
+  return campaign.tied_prior ? *campaign.tied_prior : MarginalPriors(campaign);
 }
 
 int StreamOf(const Campaign& campaign, int sample) {
@@ -133,7 +140,7 @@ inference::Proposal FirstProposalOf(const Campaign& campaign) {
   inference::Proposal proposal;
   if (!campaign.first_proposal) return proposal;
   const auto d = static_cast<Eigen::Index>(campaign.parameters.size());
-  const std::vector<inference::Prior> priors = Priors(campaign);
+  const inference::JointPrior priors = Priors(campaign);
   inference::MixtureComponent component{
       .weight = 1, .mean = Eigen::VectorXd::Zero(d), .covariance = Eigen::MatrixXd::Identity(d, d)};
   for (Eigen::Index j = 0; j < d; ++j) {

@@ -6,13 +6,14 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "dem/simulation/scenario.h"
 #include "inference/data/data_set.h"
 #include "inference/filter/iterative_filter.h"
-#include "inference/prior/prior.h"
+#include "inference/prior/joint_prior.h"
 #include "inference/tmcmc/tmcmc.h"
 
 namespace calib::campaign {
@@ -125,6 +126,21 @@ struct Lineage {
   std::string purpose;  ///< screen, nuisance, warm_fit, extension
 };
 
+/// Parameters that an iteration of the filter and all later ones hold at their mean so far.
+struct Freeze {
+  bool converged = false;          ///< those whose mean the iteration before has left alone
+  std::vector<std::string> names;  ///< and these
+};
+
+/// Observables that share one inferred factor of their noise.
+struct SharedNoise {
+  std::vector<std::pair<int, int>> members;  ///< (experiment, observable)
+  inference::VarianceFactorPrior prior = {};
+};
+
+/// What surrogate_msrs asks where to look next.
+enum class SurrogateModel { kCubicRbf, kGaussianProcess };
+
 struct EarlyStopping {
   double discard_at_most = 1e-3;
 };
@@ -142,6 +158,8 @@ struct Campaign {
   dem::Model model;  ///< parameters: the fixed ones
   std::optional<Precomputed> precomputed;
   std::vector<CalibratedParameter> parameters;
+  /// Where correlations or constraints tie them; their priors are its marginals.
+  std::optional<inference::JointPrior> tied_prior;
   std::vector<Experiment> experiments;
   Method method = Method::kIterativeBayesianFilter;
   int samples = 100;
@@ -150,7 +168,10 @@ struct Campaign {
   std::optional<Table> table;  ///< with kTable
   std::optional<FirstProposal> first_proposal;
   std::optional<Lineage> lineage;
+  std::map<int, Freeze> freeze;  ///< by iteration, from 1
+  std::vector<SharedNoise> shared_noise;
   inference::FilterOptions filter;
+  SurrogateModel surrogate = SurrogateModel::kCubicRbf;
   inference::TmcmcOptions tmcmc;  ///< steps and target_cv; the rest is set where it is used
   std::optional<EarlyStopping> early_stopping;
   Failure failure;
@@ -180,8 +201,9 @@ double ScatterShare(const Experiment& experiment);
 /// campaign.experiments.
 inference::DataSet MakeDataSet(const Campaign& campaign, Role role = Role::kCalibrate);
 
-/// The priors of the calibrated parameters in order.
-std::vector<inference::Prior> Priors(const Campaign& campaign);
+/// The priors of the calibrated parameters in order, without and with what ties them.
+std::vector<inference::Prior> MarginalPriors(const Campaign& campaign);
+inference::JointPrior Priors(const Campaign& campaign);
 
 /// The sample number that decides on specimen and seed: its own, or the one a table's row names.
 int StreamOf(const Campaign& campaign, int sample);

@@ -12,7 +12,9 @@
 #include "server/campaign/read_context.h"
 #include "server/campaign/read_experiment.h"
 #include "server/campaign/read_inference.h"
+#include "server/campaign/read_joint_prior.h"
 #include "server/campaign/read_model.h"
+#include "server/campaign/read_noise_groups.h"
 #include "server/campaign/read_precomputed.h"
 #include "server/campaign/yaml_tree.h"
 
@@ -103,10 +105,18 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     ReadName(map, campaign);
     ReadModel(map, campaign);
     ReadInference(map, campaign);
+    const std::size_t sound = problems.size();
     ReadParameters(map, campaign);
+    if (problems.size() == sound) {
+      ReadJointPrior(map, campaign);
+    } else {
+      map.Ignore({"prior_correlation", "constraints"});  // of parameters that could not be read
+    }
     CheckSamples(map, campaign);
     ReadStart(map, campaign);
+    const std::size_t before = problems.size();
     ReadExperiments(map, context, campaign);
+    if (problems.size() == before) ReadNoiseGroups(map, campaign);
     if (campaign.precomputed) {
       ReadPrecomputed(map, context, campaign);
       if (campaign.table || campaign.first_proposal) {

@@ -1,6 +1,7 @@
 #include "server/campaign/derive.h"
 
 #include <algorithm>
+#include <cctype>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -11,6 +12,34 @@ namespace calib::campaign {
 namespace {
 
 using Kind = YamlNode::Kind;
+
+// What ties a parameter to others goes with it: entries of the lists that name it.
+void Untie(const std::string& name, YamlNode& root) {
+  const auto names = [&name](const YamlNode& item) {
+    for (const YamlNode& part : item.items) {
+      if (part.scalar == name) return true;
+    }
+    // In the text of a constraint, as a whole word.
+    for (std::size_t at = item.scalar.find(name); at != std::string::npos;
+         at = item.scalar.find(name, at + 1)) {
+      const auto part_of_name = [&item](std::size_t i) {
+        return i < item.scalar.size() &&
+               (std::isalnum(static_cast<unsigned char>(item.scalar[i])) != 0 ||
+                item.scalar[i] == '_' || item.scalar[i] == '.');
+      };
+      if (!part_of_name(at - 1) && !part_of_name(at + name.size())) return true;
+    }
+    return false;
+  };
+  for (const char* key : {"prior_correlation", "constraints"}) {
+    if (YamlFind(root, key) == nullptr) continue;
+    YamlNode& list = YamlAt(root, key);
+    if (list.kind == Kind::kScalar ? names(list)
+                                   : (std::erase_if(list.items, names), list.items.empty())) {
+      YamlErase(root, key);
+    }
+  }
+}
 
 void ChangeModel(const Derivation& derivation, YamlNode& root) {
   YamlNode& model = YamlAt(root, "model");
@@ -31,6 +60,7 @@ void ChangeModel(const Derivation& derivation, YamlNode& root) {
   }
   for (const auto& [name, value] : derivation.fixed) {
     YamlErase(parameters, name);
+    Untie(name, root);
     YamlAt(YamlAt(model, "fixed"), name) = YamlNumber(value);
   }
 }

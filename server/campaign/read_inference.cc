@@ -1,7 +1,10 @@
 #include "server/campaign/read_inference.h"
 
+#include <algorithm>
 #include <array>
+#include <set>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "server/campaign/suggestion.h"
 
@@ -18,7 +21,14 @@ void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
   if (node == nullptr) return;
   if (node->kind == YamlNode::Kind::kMap) {
     auto noise = map.Map("noise");
-    noise->Require("ess_target", "allowed: given, inferred or {ess_target: 0.2}");
+    if (noise->Has("inferred")) {  // its groups are read once the experiments are known
+      filter.noise = NoiseMode::kInferred;
+      noise->Ignore({"inferred"});
+      noise->Finish();
+      return;
+    }
+    noise->Require("ess_target",
+                   "allowed: given, inferred, {inferred: [...]} or {ess_target: 0.2}");
     filter.noise = NoiseMode::kEssTarget;
     filter.ess_target = noise->Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
     noise->Finish();
@@ -80,12 +90,46 @@ void ReadFilterOptions(MapReader& map, Campaign& campaign) {
   filter.concentration =
       map.Quantity("concentration", "1", kPositive).value_or(filter.concentration);
   ReadDesign(map, filter);
+  if (const auto reversed = map.Choice("reversed_path", {"true", "false"})) {
+    filter.reversed_path = *reversed == "true";
+  }
   if (campaign.filter.noise != NoiseMode::kEssTarget) {
     filter.ess_target = map.Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
   } else if (map.Has("ess_target")) {
     map.Ignore({"ess_target"});
     map.Problem("ess_target", "is given by noise: {ess_target: ...} already; remove it here");
   }
+}
+
+// freeze: {2: [young_modulus], 3: converged}; the names are looked at once the parameters are
+// known.
+void ReadFreeze(MapReader& inference, Campaign& campaign) {
+  if (!inference.Has("freeze")) return;
+  if (campaign.method != Method::kIterativeBayesianFilter || campaign.precomputed) {
+    inference.Ignore({"freeze"});
+    inference.Problem("freeze",
+                      "belongs to method: iterative_bayesian_filter with runs still to be made");
+    return;
+  }
+  auto map = inference.Map("freeze");
+  if (!map) return;
+  for (const std::string& key : map->Keys()) {
+    int iteration = 0;
+    if (!absl::SimpleAtoi(key, &iteration) || iteration < 1 ||
+        iteration >= campaign.max_iterations) {
+      map->Ignore({key});
+      map->Problem(key, absl::StrCat("is no iteration after the first; allowed: 1 to ",
+                                     campaign.max_iterations - 1, " (the first is 0)"));
+      continue;
+    }
+    Freeze freeze;
+    const auto names = map->TextList(key);
+    if (!names) continue;
+    freeze.converged = *names == std::vector<std::string>{"converged"};
+    if (!freeze.converged) freeze.names = *names;
+    campaign.freeze[iteration] = std::move(freeze);
+  }
+  map->Finish();
 }
 
 void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
@@ -101,6 +145,11 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
     campaign.max_iterations = static_cast<int>(
         map->Integer("max_iterations", 1, kMostIterations).value_or(campaign.max_iterations));
     if (IsFilter(campaign.method)) ReadFilterOptions(*map, campaign);
+    ReadFreeze(*map, campaign);
+    if (campaign.method == Method::kSurrogateMsrs &&
+        map->Choice("surrogate", {"cubic_rbf", "gaussian_process"}) == "gaussian_process") {
+      campaign.surrogate = SurrogateModel::kGaussianProcess;
+    }
     if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
     map->Ignore({"rows", "first_proposal"});  // read once the parameters are known
     if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&
@@ -222,6 +271,24 @@ void ReadFirstProposal(MapReader& inference_map, Campaign& campaign) {
   campaign.first_proposal = std::move(proposal);
 }
 
+void CheckFreeze(MapReader& inference, const Campaign& campaign) {
+  std::set<std::string> held;
+  for (const auto& [iteration, freeze] : campaign.freeze) {
+    for (const std::string& name : freeze.names) {
+      const auto is_it = [&name](const CalibratedParameter& p) { return p.name == name; };
+      if (std::none_of(campaign.parameters.begin(), campaign.parameters.end(), is_it)) {
+        inference.Problem("freeze", absl::StrCat("'", name,
+                                                 "' is not calibrated here; write names "
+                                                 "of parameters, or converged alone"));
+      }
+      held.insert(name);
+    }
+  }
+  if (!held.empty() && held.size() >= campaign.parameters.size()) {
+    inference.Problem("freeze", "holds every parameter; leave at least one to be inferred");
+  }
+}
+
 void ReadLineage(MapReader& campaign_map, Campaign& campaign) {
   auto map = campaign_map.Map("lineage");
   if (!map) return;
@@ -241,6 +308,7 @@ void ReadStart(MapReader& campaign_map, Campaign& campaign) {
   auto map = campaign_map.Map("inference");
   if (!map) return;
   ReadTable(*map, campaign);
+  CheckFreeze(*map, campaign);
   ReadFirstProposal(*map, campaign);
 }
 

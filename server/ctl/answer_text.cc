@@ -40,7 +40,9 @@ std::string PosteriorText(const v1::Posterior& posterior,
     };
     table.AddRow({p.name(), shown(p.mean(), 4), shown(p.sd(), 2), report::Percent(p.cov(), 2),
                   shown(p.q05(), 4), shown(p.q50(), 4), shown(p.q95(), 4), unit.label,
-                  p.at_bound() ? "at a bound of the prior" : ""});
+                  p.conditioned_on() ? "held (conditioned on)"
+                  : p.at_bound()     ? "at a bound of the prior"
+                                     : ""});
   }
   std::string text = table.ToString();
   text += fmt::format(
@@ -55,6 +57,12 @@ std::string PosteriorText(const v1::Posterior& posterior,
     text += fmt::format(" ({} stopped early)", posterior.stopped_early());
   }
   text += ".\n";
+  for (const auto& scale : posterior.noise_scale()) {
+    text += Wrapped(fmt::format("Errors of {} are {} times as large as stated (5-95 %: {} to {}).",
+                                fmt::join(scale.observables(), ", "), Number(scale.q50(), 2),
+                                Number(scale.q05(), 2), Number(scale.q95(), 2)),
+                    "", "  ");
+  }
   for (const std::string& warning : warnings) text += Wrapped(warning, "! ", "  ");
   return text;
 }
@@ -125,6 +133,41 @@ std::string ModelsText(const report::ModelComparison& comparison) {
   std::string text = table.ToString();
   text += "\nBayes factors are to the first; all models are equally probable before the data.\n";
   for (const std::string& warning : comparison.warnings) text += Wrapped(warning, "! ", "  ");
+  return text;
+}
+
+std::string SensitivityText(const report::Sensitivity& sensitivity) {
+  const auto with_error = [](const Eigen::VectorXd& values, const Eigen::VectorXd& errors, int j) {
+    if (j >= values.size()) return std::string("–");
+    return fmt::format("{:.2f} ± {:.2f}", values[j], errors[j]);
+  };
+  std::string text;
+  for (const report::Quantity& q : sensitivity.quantities) {
+    text += fmt::format("{}, {}: {} runs, of whose variance an emulator predicts {} left out.\n",
+                        q.experiment, report::NameForPeople(q.name), q.runs,
+                        report::Percent(q.prior.explained, 3));
+    if (q.posterior.correlation.size() > 0) {
+      text += fmt::format("Posterior: {} ± {}.\n",
+                          report::NumberWithUnit(q.posterior.mean, q.name, q.unit, 4),
+                          report::NumberWithUnit(q.posterior.sd, q.name, q.unit, 2));
+    }
+    TextTable table({"<parameter", "first order", "total", "rank corr., prior", "posterior"});
+    for (int j = 0; j < static_cast<int>(sensitivity.parameters.size()); ++j) {
+      table.AddRow({sensitivity.parameters[static_cast<std::size_t>(j)],
+                    with_error(q.prior.indices.first, q.prior.indices.first_error, j),
+                    with_error(q.prior.indices.total, q.prior.indices.total_error, j),
+                    with_error(q.prior.correlation, q.prior.correlation_error, j),
+                    with_error(q.posterior.correlation, q.posterior.correlation_error, j)});
+    }
+    text += table.ToString() + "\n";
+  }
+  if (!sensitivity.independent) {
+    text += Wrapped(
+        "Sobol indices need parameters that are independent before the data: the "
+        "priors here are correlated or constrained.",
+        "! ", "  ");
+  }
+  for (const std::string& what : sensitivity.left_out) text += Wrapped(what, "! ", "  ");
   return text;
 }
 

@@ -7,6 +7,7 @@
 #include "calib/v1/campaign.pb.h"
 #include "server/report/comparison.h"
 #include "server/report/model_comparison.h"
+#include "server/report/sensitivity.h"
 
 namespace calib::ctl {
 
@@ -18,6 +19,9 @@ std::string ComparisonText(const report::Comparison& comparison);
 
 /// Rival models with evidence, Bayes factor to the best and probability.
 std::string ModelsText(const report::ModelComparison& comparison);
+
+/// First-order and total Sobol indices and rank correlations, per quantity.
+std::string SensitivityText(const report::Sensitivity& sensitivity);
 
 /// One campaign in a few lines.
 std::string StatusText(const v1::CampaignStatus& status);

@@ -115,6 +115,8 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->check(CLI::NonNegativeNumber);
   b.AddOnCampaign("compare", &Compare,
                   "Model against measurements: where it fits and where it fails");
+  b.AddOnCampaign("sensitivity", &Sensitivity,
+                  "Which parameters move what: Sobol indices, correlations with bulk properties");
   b.Add("models", &Models, "Which model do the data favour: evidence, Bayes factors, probabilities",
         "models c1 c2 --state calib-state")
       ->add_option("ID", b.arguments().campaigns, "campaigns on the same data, two or more")

@@ -27,8 +27,7 @@ constexpr int kRounds = 4;
 constexpr double kMostUncovered = 2;
 constexpr double kMostUnknown = 3;  // noise sd of what the emulator may not know of a point
 
-Eigen::MatrixXd Standard(const std::vector<inference::Prior>& priors,
-                         const Eigen::MatrixXd& values) {
+Eigen::MatrixXd Standard(const inference::JointPrior& priors, const Eigen::MatrixXd& values) {
   Eigen::MatrixXd standard(values.rows(), values.cols());
   for (Index j = 0; j < values.cols(); ++j) {
     for (Index i = 0; i < values.rows(); ++i) {
@@ -123,7 +122,7 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
                                    const RunTable& further) {
   const campaign::Campaign& campaign = view.campaign;
   const inference::DataSet data = campaign::MakeDataSet(campaign);
-  const std::vector<inference::Prior> priors = campaign::Priors(campaign);
+  const inference::JointPrior priors = campaign::Priors(campaign);
   RunTable table = RunsOf(view);
   if (further.parameters.rows() > 0) {
     const Index own = table.parameters.rows();

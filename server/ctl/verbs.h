@@ -16,6 +16,7 @@ int Posterior(const Arguments& arguments);
 int Samples(const Arguments& arguments);
 int States(const Arguments& arguments);
 int Models(const Arguments& arguments);
+int Sensitivity(const Arguments& arguments);
 int Compare(const Arguments& arguments);
 int Diagnose(const Arguments& arguments);
 int Extend(const Arguments& arguments);

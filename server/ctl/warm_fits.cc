@@ -17,7 +17,7 @@ using Eigen::Index;
 constexpr int kLeastSamples = 8;
 constexpr int kShares = 11;        // batches that the campaign's number of samples pays for
 constexpr double kPatience = 1.2;  // a batch more must bring a fit this much closer
-constexpr int kBlind = 2;          // batches before one can say that nothing comes closer
+constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
 constexpr double kCloser = 0.9;    // times the rms so far: the next batch was worth it
 constexpr int kDraws = 1000;       // of the emulated posterior
 
@@ -64,9 +64,11 @@ absl::Status WarmFits::Fit(const std::vector<std::string>& effects) {
     if (!text.ok()) return text.status();
     if (auto status = base_.Announce(*text, effect); !status.ok()) return status;
   }
-  for (const std::string& effect : effects) {
-    if (auto status = Continue(effect); !status.ok()) return status;
-    spent += samples_;
+  for (int batch = 0; batch < kLeastBatches; ++batch) {
+    for (const std::string& effect : effects) {
+      if (auto status = Continue(effect); !status.ok()) return status;
+      spent += samples_;
+    }
   }
   while (spent + samples_ <= runs) {
     const std::string* next = nullptr;
@@ -140,8 +142,8 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     return absl::OkStatus();
   }
   Judge(fit);
-  fit.stalled =
-      fit.iterations > kBlind && fit.rms > kCloser * rms && fit.adequacy.chi2 > kCloser * chi2;
+  fit.stalled = fit.iterations > kLeastBatches && fit.rms > kCloser * rms &&
+                fit.adequacy.chi2 > kCloser * chi2;
   return absl::OkStatus();
 }
 
@@ -150,7 +152,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
 absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
   const campaign::Campaign& campaign = fit.view.campaign;
   const inference::DataSet data = campaign::MakeDataSet(campaign);
-  const std::vector<inference::Prior> priors = campaign::Priors(campaign);
+  const inference::JointPrior priors = campaign::Priors(campaign);
   std::vector<inference::Iteration> iterations = {IterationOf(fit.runs, data)};
   if (const auto nulls = RunsWithoutEffect(base_.runs(), base_.view().campaign, campaign);
       nulls.parameters.rows() > 0) {

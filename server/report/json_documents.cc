@@ -61,6 +61,20 @@ Json Emulator(const v1::Posterior& p) {
           {"calibration", e.calibration()}};
 }
 
+// The posterior along the readings: means and coefficients of variation in the order of the
+// parameters.
+Json Path(const google::protobuf::RepeatedPtrField<v1::Posterior::PathPoint>& points) {
+  Json path = Json::array();
+  for (const auto& point : points) {
+    path.push_back({{"experiment", point.experiment()},
+                    {"load_step", point.load_step()},
+                    {"mean", std::vector<double>(point.mean().begin(), point.mean().end())},
+                    {"cov", std::vector<double>(point.cov().begin(), point.cov().end())},
+                    {"ess", point.ess()}});
+  }
+  return path;
+}
+
 Json Pattern(const ResidualPattern& p) {
   return {{"name", p.name}, {"size", p.size}, {"z", p.z}, {"explained", p.explained}};
 }
@@ -100,7 +114,17 @@ std::string PosteriorJson(const v1::Posterior& p) {
                             {"unit", q.unit()},
                             {"at_bound", q.at_bound()},
                             {"prior_min", q.prior_min()},
-                            {"prior_max", q.prior_max()}};
+                            {"prior_max", q.prior_max()},
+                            {"conditioned_on", q.conditioned_on()},
+                            {"split_half", q.split_half()}};
+  }
+  Json noise_scale = Json::array();
+  for (const auto& scale : p.noise_scale()) {
+    noise_scale.push_back({{"observables", std::vector<std::string>(scale.observables().begin(),
+                                                                    scale.observables().end())},
+                           {"q05", scale.q05()},
+                           {"q50", scale.q50()},
+                           {"q95", scale.q95()}});
   }
   Json correlation = Json::array();
   const int d = p.parameters_size();
@@ -125,10 +149,55 @@ std::string PosteriorJson(const v1::Posterior& p) {
                {"emulator", Emulator(p)},
                {"sigma", p.has_sigma() ? Json(p.sigma()) : Json(nullptr)},
                {"noise", p.noise()},
+               {"noise_scale", noise_scale},
+               {"predictive_p", p.has_predictive_p() ? Json(p.predictive_p()) : Json(nullptr)},
+               {"path", Path(p.path())},
+               {"reversed_path", Path(p.reversed_path())},
                {"model_evaluations", p.model_evaluations()},
                {"stopped_early", p.stopped_early()},
                {"core_hours", p.core_hours()},
                {"warnings", warnings}});
+}
+
+std::string SensitivityJson(const std::string& campaign, const Sensitivity& s) {
+  const auto by_parameter = [&s](const Eigen::VectorXd& values, const Eigen::VectorXd& errors,
+                                 const char* name) -> Json {
+    if (values.size() == 0) return nullptr;
+    Json json = Json::object();
+    for (std::size_t j = 0; j < s.parameters.size(); ++j) {
+      const auto row = static_cast<Eigen::Index>(j);
+      json[s.parameters[j]] = {{name, values[row]}, {"error", errors[row]}};
+    }
+    return json;
+  };
+  Json quantities = Json::array();
+  for (const Quantity& q : s.quantities) {
+    const bool posterior = q.posterior.correlation.size() > 0;
+    quantities.push_back(
+        {{"experiment", q.experiment},
+         {"quantity", q.name},
+         {"unit", q.unit},
+         {"runs", q.runs},
+         {"explained", q.prior.explained},
+         {"first_order", by_parameter(q.prior.indices.first, q.prior.indices.first_error, "index")},
+         {"total", by_parameter(q.prior.indices.total, q.prior.indices.total_error, "index")},
+         {"prior",
+          {{"mean", q.prior.mean},
+           {"sd", q.prior.sd},
+           {"correlation", by_parameter(q.prior.correlation, q.prior.correlation_error, "rank")}}},
+         {"posterior",
+          posterior ? Json{{"mean", q.posterior.mean},
+                           {"sd", q.posterior.sd},
+                           {"correlation", by_parameter(q.posterior.correlation,
+                                                        q.posterior.correlation_error, "rank")}}
+                    : Json(nullptr)}});
+  }
+  return Dump({{"campaign", campaign},
+               {"parameters", s.parameters},
+               {"independent", s.independent},
+               {"posterior_from", s.points_from},
+               {"quantities", quantities},
+               {"left_out", s.left_out}});
 }
 
 std::string ComparisonJson(const std::string& campaign, const Comparison& c) {

@@ -10,11 +10,13 @@
 #include "server/report/campaign_view.h"
 #include "server/report/comparison.h"
 #include "server/report/model_comparison.h"
+#include "server/report/sensitivity.h"
 
 namespace calib::report {
 
 std::string PosteriorJson(const v1::Posterior& posterior);
 std::string ComparisonJson(const std::string& campaign, const Comparison& comparison);
+std::string SensitivityJson(const std::string& campaign, const Sensitivity& sensitivity);
 std::string ModelsJson(const ModelComparison& comparison);
 std::string StatusJson(const v1::CampaignStatus& status);
 std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses);

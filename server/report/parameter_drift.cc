@@ -140,7 +140,7 @@ absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& 
         "parameters are not fitted part by part: the size of the errors was not stated");
   }
   const inference::DataSet data = campaign::MakeDataSet(view.campaign);
-  const std::vector<inference::Prior> priors = campaign::Priors(view.campaign);
+  const inference::JointPrior priors = campaign::Priors(view.campaign);
   const RunTable runs = RunsOf(view);
   const std::vector<Part> parts = PartsOf(view.campaign, data);
   const auto d = static_cast<Index>(priors.size());

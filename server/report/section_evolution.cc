@@ -46,13 +46,15 @@ std::string OverIterations(const CampaignView& view, int k) {
 }
 
 // Mean +- sd of one parameter while the readings are taken in one after the other.
-std::string AlongPath(const CampaignView& view, int k) {
+using Path = google::protobuf::RepeatedPtrField<v1::Posterior::PathPoint>;
+
+std::string AlongPath(const CampaignView& view, const Path& path, const std::string& axis, int k) {
   const auto& parameter = view.posterior.parameters(k);
   const DisplayUnit unit = ParameterUnit(parameter);
   std::vector<double> mean;
   std::vector<double> low;
   std::vector<double> high;
-  for (const auto& point : view.posterior.path()) {
+  for (const auto& point : path) {
     if (k >= point.mean_size() || k >= point.cov_size()) continue;
     const double sd = std::abs(point.mean(k)) * point.cov(k);
     mean.push_back(point.mean(k) * unit.factor);
@@ -62,10 +64,9 @@ std::string AlongPath(const CampaignView& view, int k) {
   const std::vector<double> x = Counting(mean.size());
   std::vector<double> shown = low;
   shown.insert(shown.end(), high.begin(), high.end());
-  Plot plot(
-      {.width = 330, .height = 200},
-      Axis("load steps taken in", 0, static_cast<double>(x.size()), 5, Axis::Scale::kLinear, true),
-      Axis::Covering(LabelWithUnit(parameter.name(), unit), shown, 4));
+  Plot plot({.width = 330, .height = 200},
+            Axis(axis, 0, static_cast<double>(x.size()), 5, Axis::Scale::kLinear, true),
+            Axis::Covering(LabelWithUnit(parameter.name(), unit), shown, 4));
   plot.AddBand(x, low, high);
   plot.AddLine(x, mean);
   return "<figure>" +
@@ -125,8 +126,21 @@ std::string EvolutionSection(const ReportData& data) {
           "sample size beside.";
     }
     html += "</p>\n<div class=\"grid\">\n";
-    for (int k = 0; k < view.posterior.parameters_size(); ++k) html += AlongPath(view, k);
+    for (int k = 0; k < view.posterior.parameters_size(); ++k) {
+      html += AlongPath(view, view.posterior.path(), "load steps taken in", k);
+    }
     html += EssAlongPath(view) + "</div>\n";
+  }
+  if (view.posterior.reversed_path_size() > 1) {
+    html +=
+        "<h3>Along the loading path, reversed</h3>\n<p class=\"sub\">The same readings taken in "
+        "from the last to the first: what the end of the test says alone. Both orders end in the "
+        "same posterior.</p>\n<div class=\"grid\">\n";
+    for (int k = 0; k < view.posterior.parameters_size(); ++k) {
+      html +=
+          AlongPath(view, view.posterior.reversed_path(), "load steps taken in, from the last", k);
+    }
+    html += "</div>\n";
   }
   return html;
 }

@@ -66,6 +66,29 @@ void AskEmulator(const Definition& definition, std::span<const inference::Iterat
   }
 }
 
+namespace {
+
+// One sentence on what the posterior is given.
+std::string ConditionedOn(const Definition& definition,
+                          const std::vector<std::optional<double>>& frozen) {
+  std::string held;
+  for (std::size_t j = 0; j < frozen.size(); ++j) {
+    if (!frozen[j].has_value()) {
+      continue;
+    }
+    const campaign::CalibratedParameter& parameter = definition.campaign.parameters[j];
+    absl::StrAppend(&held, held.empty() ? "" : " and ", parameter.name, " = ", *frozen[j],
+                    parameter.unit == "1" ? "" : " ", parameter.unit == "1" ? "" : parameter.unit);
+  }
+  return held.empty() ? ""
+                      : absl::StrCat("Conditioned on ", held,
+                                     ": held since it had converged or by request, not inferred; "
+                                     "what is said of the others and the log evidence hold given "
+                                     "this, and leave its uncertainty out.");
+}
+
+}  // namespace
+
 absl::StatusOr<Answer> FindAnswer(const Definition& definition,
                                   std::span<const inference::Iteration> iterations) {
   auto weighted = inference::ComputePosterior(definition.priors, definition.data,
@@ -76,6 +99,9 @@ absl::StatusOr<Answer> FindAnswer(const Definition& definition,
   Answer answer;
   answer.weighted = *std::move(weighted);
   answer.warnings = answer.weighted.warnings;
+  if (std::string held = ConditionedOn(definition, answer.weighted.frozen); !held.empty()) {
+    answer.warnings.insert(answer.warnings.begin(), std::move(held));
+  }
   if (!answer.FromWeights()) {
     AskEmulator(definition, iterations, answer);
   }

@@ -95,7 +95,7 @@ campaign::FileReader StoredFiles(store::Reader& reader,
 
 std::shared_ptr<const Definition> MakeDefinition(campaign::Campaign campaign) {
   inference::DataSet data = campaign::MakeDataSet(campaign);
-  std::vector<inference::Prior> priors = campaign::Priors(campaign);
+  inference::JointPrior priors = campaign::Priors(campaign);
   ReadingIndex readings(campaign, data);
   return std::make_shared<const Definition>(Definition{.campaign = std::move(campaign),
                                                        .data = std::move(data),

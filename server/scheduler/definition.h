@@ -40,7 +40,7 @@ struct Definition {
   inference::DataSet data;  ///< errors of a reading about a run
   /// Errors of a reading about the mean history, where the scatter of runs is part of `data`.
   std::optional<inference::DataSet> mean_data{};
-  std::vector<inference::Prior> priors;
+  inference::JointPrior priors;
   ReadingIndex readings;
 
   /// Load steps that a complete evaluation of the experiment has.

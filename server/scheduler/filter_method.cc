@@ -1,6 +1,8 @@
 // sqmc and the iterative Bayesian filter: weighted samples of all iterations.
 
+#include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "server/scheduler/early_stopping.h"
 #include "server/scheduler/method.h"
@@ -32,7 +34,11 @@ class FilterMethod final : public Method {
     if (outcome.converged || !affordable || iterations >= campaign::MostBatches(campaign_)) {
       return outcome;
     }
-    const auto proposal = NextProposal(outcome.answer, history);
+    const auto frozen = Hold(outcome.answer, history);
+    if (!frozen.ok()) {
+      return frozen.status();
+    }
+    const auto proposal = NextProposal(outcome.answer, history, *frozen);
     if (!proposal.ok()) {
       return proposal.status();
     }
@@ -47,14 +53,16 @@ class FilterMethod final : public Method {
  private:
   // Where the weights hold a handful of samples, the emulator of their states knows better where
   // the posterior lies, even one that is not good enough for an interval yet.
-  absl::StatusOr<inference::Proposal> NextProposal(const Answer& answer,
-                                                   const History& history) const {
+  absl::StatusOr<inference::Proposal> NextProposal(
+      const Answer& answer, const History& history,
+      const std::vector<std::optional<double>>& frozen) const {
     if (answer.emulated.has_value() && answer.emulated->draws.rows() > 0) {
       return inference::FitProposalToDraws(definition_.priors, campaign_.filter,
-                                           answer.emulated->draws, history.iterations.size());
+                                           answer.emulated->draws, history.iterations.size(),
+                                           frozen);
     }
     return inference::FitProposal(definition_.priors, definition_.data, campaign_.filter,
-                                  history.iterations);
+                                  history.iterations, frozen);
   }
 
   absl::StatusOr<bool> IsConverged(const Answer& answer, const History& history) const {
@@ -77,6 +85,41 @@ class FilterMethod final : public Method {
     inference::Posterior now;
     now.parameters = answer.Parameters();
     return inference::MeansConverged(MeansOf(*before), now, campaign_.filter);
+  }
+
+  /// What the next iteration holds: what this one held, and what `freeze` says of the next, at the
+  /// mean so far. At least one parameter stays free.
+  absl::StatusOr<std::vector<std::optional<double>>> Hold(const Answer& answer,
+                                                          const History& history) const {
+    std::vector<std::optional<double>> frozen = history.iterations.back().proposal.frozen;
+    const auto rule = campaign_.freeze.find(static_cast<int>(history.iterations.size()));
+    if (rule == campaign_.freeze.end()) {
+      return frozen;
+    }
+    const std::vector<inference::ParameterSummary> now = answer.Parameters();
+    std::vector<char> still(now.size(), 0);
+    if (rule->second.converged && answer.HasIntervals() && history.last_posterior.has_value()) {
+      const auto before = PosteriorFromJson(*history.last_posterior);
+      if (!before.ok()) {
+        return before.status();
+      }
+      inference::Posterior posterior;
+      posterior.parameters = now;
+      still = inference::ConvergedMeans(MeansOf(*before), posterior, campaign_.filter);
+    }
+    frozen.resize(now.size());
+    auto free = std::count(frozen.begin(), frozen.end(), std::nullopt);
+    for (std::size_t j = 0; j < now.size() && free > 1; ++j) {
+      const auto& names = rule->second.names;
+      const bool named =
+          std::find(names.begin(), names.end(), campaign_.parameters[j].name) != names.end();
+      if (!frozen[j].has_value() && (named || still[j] != 0)) {
+        frozen[j] = now[j].mean;
+        --free;
+      }
+    }
+    return free < static_cast<std::ptrdiff_t>(now.size()) ? frozen
+                                                          : std::vector<std::optional<double>>{};
   }
 
   absl::StatusOr<Batch> Draw(const History& history, const inference::Proposal& proposal) const {

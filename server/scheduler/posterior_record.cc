@@ -46,16 +46,22 @@ void AddParameters(const Definition& definition, const Answer& answer, v1::Poste
     out.set_q50(summary.q50);
     out.set_q95(summary.q95);
     out.set_at_bound(summary.at_bound);
+    const auto& frozen = answer.weighted.frozen;
+    out.set_conditioned_on(!frozen.empty() && frozen[i].has_value());
+    const Eigen::VectorXd& halves = answer.weighted.split_half;
+    out.set_split_half(answer.FromWeights() && halves.size() > 0
+                           ? halves[static_cast<Eigen::Index>(i)]
+                           : std::numeric_limits<double>::quiet_NaN());
     out.set_prior_min(std::isfinite(prior.min) ? prior.min : prior.Quantile(kTail));
     out.set_prior_max(std::isfinite(prior.max) ? prior.max : prior.Quantile(1 - kTail));
   }
 }
 
 void AddPath(const Definition& definition, const inference::PosteriorPath& path,
-             v1::Posterior& message) {
+             google::protobuf::RepeatedPtrField<v1::Posterior::PathPoint>& points) {
   for (std::size_t s = 0; s < path.load_step.size(); ++s) {
     const auto row = static_cast<Eigen::Index>(s);
-    v1::Posterior::PathPoint& point = *message.add_path();
+    v1::Posterior::PathPoint& point = *points.Add();
     point.set_experiment(
         definition.campaign.experiments[static_cast<std::size_t>(path.experiment[s])].name);
     point.set_load_step(path.load_step[s]);
@@ -64,6 +70,26 @@ void AddPath(const Definition& definition, const inference::PosteriorPath& path,
       point.add_cov(path.cov(row, j));
     }
     point.set_ess(path.ess(row));
+  }
+}
+
+void AddNoiseScale(const Definition& definition, const Eigen::MatrixXd& scale,
+                   v1::Posterior& message) {
+  const auto groups = inference::NoiseGroupsOf(definition.data);
+  if (scale.rows() != static_cast<Eigen::Index>(groups.size())) {
+    return;  // not inferred
+  }
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    v1::Posterior::NoiseScale& out = *message.add_noise_scale();
+    for (const auto& [e, j] : groups[g].members) {
+      const auto& experiment = definition.campaign.experiments[static_cast<std::size_t>(e)];
+      out.add_observables(absl::StrCat(experiment.name, ".",
+                                       experiment.observables[static_cast<std::size_t>(j)].name));
+    }
+    const auto row = static_cast<Eigen::Index>(g);
+    out.set_q05(scale(row, 0));
+    out.set_q50(scale(row, 1));
+    out.set_q95(scale(row, 2));
   }
 }
 
@@ -179,7 +205,13 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
     AddEmulator(definition, *answer.emulated, message);
   }
   AddScatter(definition, answer, message);
-  AddPath(definition, posterior.path, message);
+  AddPath(definition, posterior.path, *message.mutable_path());
+  AddPath(definition, posterior.reversed_path, *message.mutable_reversed_path());
+  AddNoiseScale(definition, emulated ? answer.emulated->noise_scale : posterior.noise_scale,
+                message);
+  if (answer.FromWeights() && posterior.predictive_p.has_value()) {
+    message.set_predictive_p(*posterior.predictive_p);
+  }
   message.mutable_warnings()->Add(answer.warnings.begin(), answer.warnings.end());
   message.set_noise(ToString(definition.campaign.filter.noise));
   return message;
@@ -207,6 +239,9 @@ std::string ProposalToJson(const inference::Proposal& proposal) {
   Json json{{"defensive_share", proposal.defensive_share},
             {"log_acceptance", proposal.log_acceptance},
             {"components", Json::array()}};
+  for (const std::optional<double>& held : proposal.frozen) {
+    json["frozen"].push_back(held.has_value() ? Json(*held) : Json(nullptr));
+  }
   for (const auto& component : proposal.components) {
     json["components"].push_back({{"weight", component.weight},
                                   {"mean", ToJson(component.mean)},
@@ -221,6 +256,10 @@ absl::StatusOr<inference::Proposal> ProposalFromJson(const std::string& text) {
     inference::Proposal proposal;
     proposal.defensive_share = json.at("defensive_share").get<double>();
     proposal.log_acceptance = json.at("log_acceptance").get<double>();
+    for (const Json& item : json.value("frozen", Json::array())) {
+      proposal.frozen.push_back(item.is_null() ? std::nullopt
+                                               : std::optional<double>(item.get<double>()));
+    }
     for (const Json& item : json.at("components")) {
       inference::Proposal::Component component;
       component.weight = item.at("weight").get<double>();

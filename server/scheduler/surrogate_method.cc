@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/surrogate/expected_improvement.h"
 #include "inference/surrogate/response_surface.h"
 #include "server/scheduler/method.h"
 #include "server/scheduler/posterior_record.h"
@@ -22,16 +23,22 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kUnitPoints = "unit_points";
 
 /// A point of the unit cube in the parameters' units, through the prior's quantiles. A face is the
-/// prior's bound; where there is none, its outermost 1e-4.
-double FromUnit(const inference::Prior& prior, double u) {
+/// prior's bound; where there is none, its outermost 1e-4. Correlated priors have no faces of their
+/// own and end there.
+Eigen::VectorXd FromUnit(const inference::JointPrior& priors, const Eigen::VectorXd& u) {
   constexpr double kOutermost = 1e-4;
-  if (u <= 0 && std::isfinite(prior.min)) {
-    return prior.min;
+  const Eigen::VectorXd inside = u.array().max(kOutermost).min(1 - kOutermost);
+  Eigen::VectorXd x = priors.FromUnit(inside);
+  for (Eigen::Index j = 0; priors.is_independent() && j < u.size(); ++j) {
+    const inference::Prior& prior = priors[static_cast<std::size_t>(j)];
+    if (u(j) <= 0 && std::isfinite(prior.min)) {
+      x(j) = prior.min;
+    }
+    if (u(j) >= 1 && std::isfinite(prior.max)) {
+      x(j) = prior.max;
+    }
   }
-  if (u >= 1 && std::isfinite(prior.max)) {
-    return prior.max;
-  }
-  return prior.Quantile(std::clamp(u, kOutermost, 1 - kOutermost));
+  return x;
 }
 
 class SurrogateMethod final : public Method {
@@ -43,6 +50,11 @@ class SurrogateMethod final : public Method {
     options_.max_evaluations = MostEvaluations();
     options_.workers = campaign::LaterBatch(campaign_);
     options_.seed = campaign_.seed;
+    if (definition.priors.is_constrained()) {
+      options_.admissible = [&definition](const Eigen::VectorXd& u) {
+        return definition.priors.MeetsConstraints(FromUnit(definition.priors, u));
+      };
+    }
   }
 
   absl::StatusOr<Batch> First() const override {
@@ -71,7 +83,12 @@ class SurrogateMethod final : public Method {
     outcome.log = absl::StrCat("best chi-squared per reading ",
                                state->evaluations[static_cast<std::size_t>(state->best)].value,
                                ", step ", state->step);
-    const Eigen::MatrixXd points = affordable ? ChoosePoints(*state) : Eigen::MatrixXd{};
+    const absl::StatusOr<Eigen::MatrixXd> chosen =
+        affordable ? ChoosePoints(*state) : Eigen::MatrixXd{};
+    if (!chosen.ok()) {
+      return chosen.status();
+    }
+    const Eigen::MatrixXd& points = *chosen;
     if (points.rows() > 0) {
       outcome.answer.warnings.push_back(outcome.answer.weighted.degeneracy);
       outcome.next = MakeBatch(points);
@@ -95,10 +112,7 @@ class SurrogateMethod final : public Method {
     for (Eigen::Index i = 0; i < unit.rows(); ++i) {
       const Eigen::VectorXd row = unit.row(i);
       rows.push_back(std::vector<double>(row.begin(), row.end()));
-      for (Eigen::Index j = 0; j < unit.cols(); ++j) {
-        batch.parameters(i, j) =
-            FromUnit(definition_.priors[static_cast<std::size_t>(j)], unit(i, j));
-      }
+      batch.parameters.row(i) = FromUnit(definition_.priors, row);
     }
     batch.proposal = Json{{kUnitPoints, rows}}.dump();
     batch.stop_below.assign(static_cast<std::size_t>(unit.rows()), store::kUnknown);
@@ -178,15 +192,21 @@ class SurrogateMethod final : public Method {
   }
 
   /// The next round; no rows: the budget is used up, or too few runs have a value.
-  Eigen::MatrixXd ChoosePoints(inference::ResponseSurfaceState& state) const {
+  absl::StatusOr<Eigen::MatrixXd> ChoosePoints(inference::ResponseSurfaceState& state) const {
     inference::CubicRbf surrogate(options_.dimensions);
     std::vector<Eigen::VectorXd> chosen;
     while (static_cast<int>(chosen.size()) < campaign::LaterBatch(campaign_)) {
-      const auto point = inference::NextPoint(options_, state, surrogate);
-      if (!point.has_value()) {
+      absl::StatusOr<std::optional<Eigen::VectorXd>> point =
+          campaign_.surrogate == campaign::SurrogateModel::kGaussianProcess
+              ? inference::NextByExpectedImprovement(options_, state)
+              : inference::NextPoint(options_, state, surrogate);
+      if (!point.ok()) {
+        return point.status();
+      }
+      if (!point->has_value()) {
         break;
       }
-      chosen.push_back(*point);
+      chosen.push_back(**point);
     }
     Eigen::MatrixXd points(static_cast<Eigen::Index>(chosen.size()), options_.dimensions);
     for (std::size_t i = 0; i < chosen.size(); ++i) {

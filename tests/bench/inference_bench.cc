@@ -10,6 +10,8 @@
 #include "inference/filter/iterative_filter.h"
 #include "inference/filter/sequential_filter.h"
 #include "inference/mixture/dirichlet_mixture.h"
+#include "inference/sampling/sobol.h"
+#include "inference/surrogate/response_surface.h"
 
 namespace calib::inference {
 namespace {
@@ -83,10 +85,11 @@ void BM_PosteriorCorrelated(benchmark::State& state) {
 }
 BENCHMARK(BM_PosteriorCorrelated)->Arg(100)->Arg(2000)->Unit(benchmark::kMillisecond);
 
-// One fit of ten starts to samples of equal weight from two Gaussians.
+// One fit of ten starts to samples of equal weight from two Gaussians in 7 dimensions (or 4), ten
+// components at most; mixture_bench.py times scikit-learn on the same.
 void BM_MixtureFit(benchmark::State& state) {
   PhiloxStream stream({.seed = 3});
-  WeightedPoints data{.points = Eigen::MatrixXd(kParameters, state.range(0)),
+  WeightedPoints data{.points = Eigen::MatrixXd(state.range(1), state.range(0)),
                       .counts = Eigen::VectorXd::Ones(state.range(0))};
   for (Eigen::Index i = 0; i < data.points.cols(); ++i) {
     for (double& x : data.points.col(i)) x = stream.Normal() + (i % 3 == 0 ? 3 : 0);
@@ -94,7 +97,13 @@ void BM_MixtureFit(benchmark::State& state) {
   for (auto _ : state)
     benchmark::DoNotOptimize(FitDirichletMixture(data, {.seed = 1})->lower_bound);
 }
-BENCHMARK(BM_MixtureFit)->Arg(100)->Arg(2000)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_MixtureFit)
+    ->Args({100, 4})
+    ->Args({100, 7})
+    ->Args({500, 7})
+    ->Args({2000, 4})
+    ->Args({2000, 7})
+    ->Unit(benchmark::kMillisecond);
 
 // From finished runs to the next proposal: tempering, mixture, its mass inside the prior.
 void BM_FitProposal(benchmark::State& state) {
@@ -106,6 +115,32 @@ void BM_FitProposal(benchmark::State& state) {
   }
 }
 BENCHMARK(BM_FitProposal)->Arg(100)->Arg(2000)->Unit(benchmark::kMillisecond);
+
+// The response surface with n values, one more value and the next point in 5 dimensions.
+void BM_NextPoint(benchmark::State& state) {
+  ResponseSurfaceOptions options{.dimensions = 5, .max_evaluations = 1 << 20, .seed = 1};
+  options.initial_points = static_cast<int>(state.range(0));
+  ResponseSurfaceState begun;
+  begun.step = options.max_step;
+  begun.design = ScrambledSobol(options.initial_points, 5, 1);
+  CubicRbf surrogate(5);
+  const auto value = [](const Eigen::VectorXd& x) { return (x.array() - 0.3).square().sum(); };
+  for (int k = 0; k < options.initial_points; ++k) {
+    const auto point = NextPoint(options, begun, surrogate);
+    if (!Report(options, k, value(*point), begun).ok()) return state.SkipWithError("report");
+  }
+  NextPoint(options, begun, surrogate);  // brings the interpolant up to date
+  const auto last = static_cast<int>(begun.evaluations.size()) - 1;
+  if (!Report(options, last, 1.0, begun).ok()) return state.SkipWithError("report");
+  for (auto _ : state) {
+    state.PauseTiming();
+    ResponseSurfaceState one = begun;
+    CubicRbf own = surrogate;  // lacks the last value
+    state.ResumeTiming();
+    benchmark::DoNotOptimize(NextPoint(options, one, own));
+  }
+}
+BENCHMARK(BM_NextPoint)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace calib::inference

@@ -30,6 +30,76 @@ TEST_P(BadCampaign, IsRefusedInOneLine) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
+    TiedPriors, BadCampaign,
+    ::testing::Values(
+        Mistake{"CorrelationOfNobody", "noise: given",
+                "prior_correlation: [[young_modulus, friction, 0.5]]\nnoise: given",
+                "c.yaml:35: prior_correlation: 'friction' is not calibrated here; calibrated are "
+                "young_modulus, friction_angle, rolling_resistance.stiffness, "
+                "rolling_resistance.friction"},
+        Mistake{
+            "CorrelationOfOne", "noise: given",
+            "prior_correlation: [[young_modulus, friction_angle, 1]]\nnoise: given",
+            "c.yaml:35: prior_correlation: '1' is outside what is allowed: between -1 (excluded) "
+            "and 1 (excluded)"},
+        Mistake{
+            "CorrelationTwice", "noise: given",
+            "prior_correlation:\n  - [young_modulus, friction_angle, 0.5]\n  - [friction_angle, "
+            "young_modulus, 0.4]\nnoise: given",
+            "c.yaml:37: prior_correlation: the correlation of friction_angle and young_modulus "
+            "is given twice"},
+        Mistake{"CorrelationsContradict", "noise: given",
+                "prior_correlation: [[young_modulus, friction_angle, 0.9], [young_modulus, "
+                "rolling_resistance.friction, 0.9], [friction_angle, rolling_resistance.friction, "
+                "-0.9]]\nnoise: given",
+                "c.yaml:35: prior_correlation: these correlations contradict each other: their "
+                "matrix is not positive definite; weaken one of them"},
+        Mistake{"ConstraintOnNobody", "noise: given",
+                "constraints: [rolling_resistance.friction <= 2 * friction]\nnoise: given",
+                "c.yaml:35: constraints: 'friction' is not calibrated here; calibrated are "
+                "young_modulus, friction_angle, rolling_resistance.stiffness, "
+                "rolling_resistance.friction"},
+        Mistake{"ConstraintOfOtherUnits", "noise: given",
+                "constraints:\n  - rolling_resistance.friction <= friction_angle\nnoise: given",
+                "c.yaml:36: constraints: 'friction_angle' is in rad, what stands before it in 1; "
+                "give its number the unit that is missing"},
+        Mistake{"ConstraintWithoutInequality", "noise: given",
+                "constraints: [rolling_resistance.friction = 0.2]\nnoise: given",
+                "c.yaml:35: constraints: 'rolling_resistance.friction = 0.2' is no constraint; "
+                "write one inequality, e.g. friction_angle <= 2 * other"},
+        Mistake{"ConstraintsLeaveNothing", "noise: given",
+                "constraints: [friction_angle >= 50 deg]\nnoise: given",
+                "c.yaml:35: constraints: the constraints leave a share of 0 of the prior; at least "
+                "0.0001 is needed: loosen them or move the priors."},
+        Mistake{"NoiseGroupOfNobody", "noise: given",
+                "noise:\n  inferred:\n    - {observables: [porosity]}",
+                "c.yaml:37: noise.inferred[1].observables: 'porosity' is not fitted in any "
+                "experiment; fitted are stress_ratio, volumetric_strain, alone or as "
+                "EXPERIMENT.NAME"},
+        Mistake{"NoiseGroupTwice", "noise: given",
+                "noise:\n  inferred:\n    - {observables: [stress_ratio]}\n    - {observables: "
+                "[tx02.stress_ratio]}",
+                "c.yaml:38: noise.inferred[2].observables: 'tx02.stress_ratio' stands in two "
+                "groups; its errors have one factor"},
+        Mistake{"NoiseGroupsNoList", "noise: given", "noise: {inferred: yes}",
+                "c.yaml:35: noise.inferred: has to be a list of groups, each with its observables; "
+                "without groups write noise: inferred"},
+        Mistake{"FreezeInTheFirstIteration", "max_iterations: 3}",
+                "max_iterations: 3, freeze: {0: [young_modulus]}}",
+                "c.yaml:36: inference.freeze.0: is no iteration after the first; allowed: 1 to 2 "
+                "(the first is 0)"},
+        Mistake{"FreezeNobody", "max_iterations: 3}",
+                "max_iterations: 3, freeze: {1: [youngs_modulus]}}",
+                "c.yaml:36: inference.freeze: 'youngs_modulus' is not calibrated here; write names "
+                "of parameters, or converged alone"},
+        Mistake{"FreezeWithConstraints", "max_iterations: 3}",
+                "max_iterations: 3, freeze: {1: converged}}\nconstraints: "
+                "[rolling_resistance.friction <= 2 1/rad * friction_angle]",
+                "c.yaml:37: constraints: does not go with inference.freeze: parameters can be held "
+                "only where the priors are independent of each other"}),
+    [](const auto& mistake) { return std::string(mistake.param.name); });
+
+INSTANTIATE_TEST_SUITE_P(
     Table, BadCampaign,
     ::testing::Values(
         Mistake{"UnknownTopKey", "seed: 7", "sede: 7",

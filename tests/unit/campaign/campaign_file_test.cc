@@ -205,6 +205,51 @@ TEST(CampaignFile, AnObservableThatIsOnlyPredictedNeedNoColumn) {
   EXPECT_THAT(c.experiments[1].observables[1].values, IsEmpty());
 }
 
+TEST(CampaignFile, ReadsWhatTiesThePriors) {
+  const Campaign c =
+      Read(Spoiled("noise: given",
+                   "prior_correlation: [[young_modulus, friction_angle, -0.4]]\n"
+                   "constraints:\n"
+                   "  - rolling_resistance.friction <= 2 1/rad * friction_angle - 0.1\n"
+                   "  - 5 deg/GPa * young_modulus >= friction_angle - 30 deg\n"
+                   "noise: given"))
+          .campaign;
+  ASSERT_TRUE(c.tied_prior.has_value());
+  EXPECT_DOUBLE_EQ(c.tied_prior->correlation()(0, 1), -0.4);
+  EXPECT_LT(c.tied_prior->log_mass(), 0);
+  const double degree = std::numbers::pi / 180;
+  const auto meets = [&c](double e, double angle, double friction) {
+    return c.tied_prior->MeetsConstraints(Eigen::Vector4d(e, angle, 0.5, friction));
+  };
+  EXPECT_TRUE(meets(1e9, 0.5, 0.89));
+  EXPECT_FALSE(meets(1e9, 0.5, 0.91)) << "2 * 0.5 - 0.1";
+  EXPECT_TRUE(meets(1e9, 34.9 * degree, 0.5));
+  EXPECT_FALSE(meets(1e9, 35.1 * degree, 0.5)) << "30 deg + 5 deg/GPa * 1 GPa";
+}
+
+TEST(CampaignFile, ReadsGroupsOfNoise) {
+  const Campaign c = Read(Spoiled("noise: given",
+                                  "noise:\n  inferred:\n"
+                                  "    - {observables: [stress_ratio, tx02.volumetric_strain], "
+                                  "shape: 3, rate: 2}"))
+                         .campaign;
+  EXPECT_EQ(c.filter.noise, inference::NoiseMode::kInferred);
+  const inference::DataSet data = MakeDataSet(c);
+  ASSERT_THAT(data.noise_groups, SizeIs(1));
+  EXPECT_THAT(data.noise_groups[0].members, ElementsAre(std::pair(0, 0), std::pair(0, 1)));
+  EXPECT_EQ(data.noise_groups[0].prior.shape, 3);
+}
+
+TEST(CampaignFile, ReadsWhatIsHeldWhen) {
+  const Campaign c = Read(Spoiled("max_iterations: 3}",
+                                  "max_iterations: 3, freeze: {1: [young_modulus], 2: converged}, "
+                                  "reversed_path: true}"))
+                         .campaign;
+  EXPECT_THAT(c.freeze.at(1).names, ElementsAre("young_modulus"));
+  EXPECT_TRUE(c.freeze.at(2).converged);
+  EXPECT_TRUE(c.filter.reversed_path);
+}
+
 TEST(Identity, ChangesWithEverythingSubmitted) {
   Submission a{
       .campaign_file = "x", .file_name = "c.yaml", .files = {{"p", "d"}}, .seed = std::nullopt};

@@ -36,17 +36,31 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
                                        .places = {{"young_modulus", {.center = 1e9, .sd = 1e7}}}},
        .rate_factor = 2});
   ASSERT_TRUE(text.ok()) << text.status();
-  EXPECT_EQ(*text,
-            "name: a + rolling_resistance\n"
-            "model: {contact: linear, effects: [rolling_resistance]}\n"
-            "parameters: {young_modulus: default, rolling_resistance.friction: {prior: uniform, min: "
-            "0, max: 1}}\n"
-            "experiments: [{name: x, staging: {rate: 0.4}}]\n"
-            "lineage: {parent: c1, purpose: warm_fit}\n"
-            "inference:\n"
-            "  samples: 12\n"
-            "  first_proposal: {prior_share: 0.5, young_modulus: {center: 1e+09, sd: 1e+07}}\n")
+  EXPECT_EQ(
+      *text,
+      "name: a + rolling_resistance\n"
+      "model: {contact: linear, effects: [rolling_resistance]}\n"
+      "parameters: {young_modulus: default, rolling_resistance.friction: {prior: uniform, min: "
+      "0, max: 1}}\n"
+      "experiments: [{name: x, staging: {rate: 0.4}}]\n"
+      "lineage: {parent: c1, purpose: warm_fit}\n"
+      "inference:\n"
+      "  samples: 12\n"
+      "  first_proposal: {prior_share: 0.5, young_modulus: {center: 1e+09, sd: 1e+07}}\n")
       << *text;
+}
+
+TEST(Derive, WhatTiesAParameterGoesWithIt) {
+  const auto text = Derive(
+      "name: a\nmodel: {contact: linear}\nparameters: {f: default, f.g: default, h: default}\n"
+      "prior_correlation: [[f, h, 0.5], [f.g, h, 0.2]]\nconstraints: [f <= h, 2 * f.g <= h]\n",
+      {.name = "b",
+       .lineage = {.parent = "c1", .purpose = "screen"},
+       .fixed = {{"f", 1}},
+       .first_proposal = std::nullopt});
+  ASSERT_TRUE(text.ok()) << text.status();
+  EXPECT_NE(text->find("prior_correlation: [[f.g, h, 0.2]]"), std::string::npos) << *text;
+  EXPECT_NE(text->find("constraints: [\"2 * f.g <= h\"]"), std::string::npos) << *text;
 }
 
 }  // namespace

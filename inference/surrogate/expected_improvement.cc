@@ -1,0 +1,139 @@
+#include "inference/surrogate/expected_improvement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "inference/emulator/gaussian_process.h"
+#include "inference/prior/standard_normal.h"
+#include "inference/sampling/philox.h"
+#include "inference/sampling/sobol.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+constexpr int kSpread = 1 << 11;  // candidates over the cube, and as many about the best point
+constexpr int kRounds = 6;        // of refinement
+constexpr int kRefined = 64;      // candidates each
+constexpr double kFirstStep = 0.05;
+
+// Evaluations with a value, ln of it where all are positive.
+void ValuesDone(const ResponseSurfaceState& state, Eigen::MatrixXd& points,
+                Eigen::VectorXd& values) {
+  const auto done = static_cast<Index>(state.completed.size());
+  points.resize(done, state.design.cols());
+  values.resize(done);
+  bool positive = true;
+  for (Index i = 0; i < done; ++i) {
+    const Evaluation& evaluation =
+        state.evaluations[static_cast<std::size_t>(state.completed[static_cast<std::size_t>(i)])];
+    points.row(i) = evaluation.point;
+    values[i] = evaluation.value;
+    positive = positive && evaluation.value > 0;
+  }
+  if (positive) values = values.array().log();
+}
+
+Eigen::MatrixXd PointsWithoutValue(const ResponseSurfaceState& state) {
+  std::vector<Eigen::VectorXd> others;
+  for (const Evaluation& evaluation : state.evaluations) {
+    if (evaluation.status != EvaluationStatus::kDone) others.push_back(evaluation.point);
+  }
+  Eigen::MatrixXd points(static_cast<Index>(others.size()), state.design.cols());
+  for (std::size_t i = 0; i < others.size(); ++i) points.row(static_cast<Index>(i)) = others[i];
+  return points;
+}
+
+struct Candidate {
+  Eigen::VectorXd point;
+  double improvement = -1;
+};
+
+}  // namespace
+
+double ExpectedImprovement(double best, double mean, double sd) {
+  if (!(sd > 0)) return std::max(best - mean, 0.0);
+  const double u = (best - mean) / sd;
+  const double value = sd * (u * std::exp(LogNormalCdf(u)) + std::exp(LogNormalDensity(u)));
+  return std::max(value, 0.0);
+}
+
+absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
+    const ResponseSurfaceOptions& options, ResponseSurfaceState& state) {
+  const auto dispatched = static_cast<int>(state.evaluations.size());
+  if (dispatched >= options.max_evaluations) return std::nullopt;
+  if (dispatched < state.design.rows()) {
+    state.evaluations.push_back({.point = state.design.row(dispatched)});
+    return state.evaluations.back().point;
+  }
+  const auto d = static_cast<Index>(options.dimensions);
+  if (static_cast<Index>(state.completed.size()) < 2 * d + 1) return std::nullopt;
+
+  Eigen::MatrixXd done;
+  Eigen::VectorXd values;
+  ValuesDone(state, done, values);
+  auto process = GaussianProcess::Fit(done, values);
+  if (!process.ok()) return process.status();
+  const Eigen::VectorXd at_done = process->Predict(done).mean;
+  const double best = at_done.minCoeff();
+  const Eigen::MatrixXd others = PointsWithoutValue(state);
+  if (others.rows() > 0) {
+    Eigen::MatrixXd all(done.rows() + others.rows(), d);
+    all << done, others;
+    Eigen::VectorXd believed(all.rows());
+    believed << values, process->Predict(others).mean;
+    process = GaussianProcess::Fit(all, believed);
+    if (!process.ok()) return process.status();
+  }
+
+  Candidate chosen;
+  Candidate farthest;  // where nothing promises to improve
+  const auto consider = [&](const Eigen::MatrixXd& points) {
+    const GaussianProcessPrediction prediction = process->Predict(points);
+    for (Index i = 0; i < points.rows(); ++i) {
+      const Eigen::VectorXd point = points.row(i);
+      if (options.admissible && !options.admissible(point)) continue;
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const Evaluation& evaluation : state.evaluations)
+        nearest = std::min(nearest, (evaluation.point - point).norm());
+      if (nearest > farthest.improvement) farthest = {.point = point, .improvement = nearest};
+      if (nearest < options.min_distance) continue;
+      const double improvement = ExpectedImprovement(
+          best, prediction.mean[i], std::sqrt(std::max(prediction.variance[i], 0.0)));
+      if (improvement > chosen.improvement) chosen = {.point = point, .improvement = improvement};
+    }
+  };
+  std::uint64_t drawn = 0;
+  const auto about = [&](const Eigen::VectorXd& center, double step, int count) {
+    Eigen::MatrixXd points(count, d);
+    for (int k = 0; k < count; ++k) {
+      PhiloxStream stream({.seed = options.seed,
+                           .purpose = StreamPurpose::kExpectedImprovement,
+                           .iteration = state.evaluations.size(),
+                           .sample = drawn++});
+      for (Index j = 0; j < d; ++j)
+        points(k, j) = std::clamp(center[j] + step * stream.Normal(), 0.0, 1.0);
+    }
+    return points;
+  };
+  consider(ScrambledSobol(kSpread, static_cast<int>(d), options.seed + state.evaluations.size()));
+  Index lowest = 0;
+  at_done.minCoeff(&lowest);
+  consider(about(done.row(lowest), kFirstStep, kSpread));
+  double step = kFirstStep;
+  for (int round = 0; round < kRounds && chosen.improvement > 0; ++round) {
+    consider(about(chosen.point, step, kRefined));
+    step /= 2;
+  }
+  if (!(chosen.improvement > 0)) chosen = farthest;
+  state.evaluations.push_back({.point = chosen.point});
+  return state.evaluations.back().point;
+}
+
+}  // namespace calib::inference

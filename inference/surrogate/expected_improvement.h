@@ -1,0 +1,28 @@
+#pragma once
+// The next point of an expensive minimisation by expected improvement on a Gaussian process [Jones,
+// Schonlau & Welch 1998], the alternative to the response surface's merit.
+
+#include <Eigen/Dense>
+#include <optional>
+
+#include "absl/status/statusor.h"
+#include "inference/surrogate/response_surface.h"
+
+namespace calib::inference {
+
+/// E[max(best - f, 0)] for f ~ N(mean, sd^2); max(best - mean, 0) for sd = 0. Never negative.
+double ExpectedImprovement(double best, double mean, double sd);
+
+/// The admissible point of the unit cube with the largest expected improvement, recorded as
+/// pending; before that the initial design. The process is fitted to the values of all evaluations
+/// done (to their logarithms where all are positive: misfits span decades); pending ones, and those
+/// that were terminated, count with the process's own prediction there [kriging believer,
+/// Ginsbourger et al. 2010], so that points chosen together lie apart. best: the smallest mean at a
+/// point done, for values that scatter. The maximum is looked for among 2^11 scrambled Sobol points
+/// of the cube and as many perturbations of the best point, and refined by ever smaller
+/// perturbations of the best candidate. Depends on the state alone. nullopt as NextPoint. Errors:
+/// FAILED_PRECONDITION when no process can be fitted.
+absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
+    const ResponseSurfaceOptions& options, ResponseSurfaceState& state);
+
+}  // namespace calib::inference

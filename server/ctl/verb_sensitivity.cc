@@ -1,0 +1,25 @@
+#include <iostream>
+
+#include "server/ctl/answer_text.h"
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/load_view.h"
+#include "server/ctl/session.h"
+#include "server/ctl/verbs.h"
+#include "server/report/json_documents.h"
+#include "server/report/sensitivity.h"
+
+namespace calib::ctl {
+
+int Sensitivity(const Arguments& arguments) {
+  const auto session = Session::Open(arguments);
+  if (!session.ok()) return Fail(session.status());
+  const auto view = LoadView((*session)->client(), arguments.campaign);
+  if (!view.ok()) return Fail(view.status());
+  const auto sensitivity = report::AnalyseCampaign(*view);
+  if (!sensitivity.ok()) return Fail(sensitivity.status());
+  std::cout << (arguments.json ? report::SensitivityJson(arguments.campaign, *sensitivity)
+                               : SensitivityText(*sensitivity));
+  return kDone;
+}
+
+}  // namespace calib::ctl
