@@ -209,18 +209,8 @@ StageEnd QuasiStatic::Settle(const CellTarget& asked) {
 }
 
 StageEnd QuasiStatic::MoveTo(const CellTarget& target) {
-  if (const StageEnd end = MoveThrough(target); end != StageEnd::kDone) {
-    return end;
-  }
-  // What the servos have learned is the rate of straining, which ends here and comes back with the
-  // next stage: unlearning and learning it would take longer than settling.
-  const auto straining = servo_;
-  for (StressServo& servo : servo_) {
-    servo.Reset();
-  }
-  const StageEnd end = Settle(target);
-  servo_ = straining;
-  return end;
+  const StageEnd end = MoveThrough(target);
+  return end == StageEnd::kDone ? Settle(target) : end;
 }
 
 StageEnd QuasiStatic::MoveThrough(const CellTarget& target) {
