@@ -1,6 +1,7 @@
 #include "worker/scenario_from_spec.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace calib::worker {
 namespace {
@@ -25,12 +26,35 @@ dem::Staging StagingFromMessage(const v1::Staging& message) {
   return staging;
 }
 
+dem::UserEffect UserEffectFromMessage(const v1::UserEffect& message) {
+  dem::UserEffect effect;
+  effect.info.name = message.name();
+  effect.info.kind = dem::KindOfTarget(message.target());
+  effect.action = message.scales() ? dem::FormulaAction::kScales : dem::FormulaAction::kAdds;
+  effect.target = message.target();
+  effect.formula = message.formula();
+  for (const v1::UserParameter& parameter : message.parameters()) {
+    dem::ParameterInfo info;
+    info.name = parameter.name();
+    info.min = parameter.min();
+    info.max = parameter.max();
+    if (parameter.has_default_value()) {
+      info.default_value = parameter.default_value();
+    }
+    effect.info.parameters.push_back(std::move(info));
+  }
+  return effect;
+}
+
 }  // namespace
 
 dem::Scenario ScenarioFromSpec(const v1::AttemptSpec& spec) {
   dem::Scenario scenario;
   scenario.model.contact = spec.contact();
   scenario.model.effects.assign(spec.effects().begin(), spec.effects().end());
+  for (const v1::UserEffect& effect : spec.user_effects()) {
+    scenario.model.user_effects.push_back(UserEffectFromMessage(effect));
+  }
   scenario.model.density = spec.density();
   scenario.model.parameters.insert(spec.parameters().begin(), spec.parameters().end());
   scenario.test = spec.test();

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/registry.h"
+#include "dem/formula/user_effect.h"
 #include "dem/lab_tests/collision.h"
 
 namespace calib::dem {
@@ -282,12 +283,18 @@ std::string CatalogText() {
       Append(text, p);
     }
   }
+  for (const auto& quantities :
+       {ContactQuantities(), StageQuantities(), ContactTargets(), ReadingTargets()}) {
+    for (const FormulaQuantity& q : quantities) {
+      absl::StrAppend(&text, "formula ", q.name, " [", q.unit, "]: ", q.description, "\n");
+    }
+  }
   for (const ObservableInfo& o : Observables()) {
     absl::StrAppend(&text, "observable ", o.name, " [", o.unit, "]: ", o.description, "\n");
   }
   return text;
 }
 
-std::string EngineVersion() { return "4"; }
+std::string EngineVersion() { return "5"; }
 
 }  // namespace calib::dem

@@ -4,6 +4,8 @@
 // compiler turns into vector instructions.
 
 #include <algorithm>
+#include <cassert>
+#include <cstring>
 
 namespace calib::dem {
 
@@ -16,6 +18,16 @@ inline constexpr int kMaxHistory = 16;  ///< doubles that one contact can rememb
 /// grain i.
 struct alignas(64) ContactBlock {
   using Lane = double[kBlock];
+
+  ContactBlock() = default;
+  ~ContactBlock() = default;
+  /// Precondition: what the other remembers is its own.
+  ContactBlock(const ContactBlock& other) {
+    assert(other.history == other.own_history);
+    std::memcpy(static_cast<void*>(this), static_cast<const void*>(&other), sizeof other);
+    history = own_history;
+  }
+  ContactBlock& operator=(const ContactBlock&) = delete;
 
   // Set by the caller for the whole block.
   int count = 0;  ///< lanes in use
@@ -67,8 +79,10 @@ struct alignas(64) ContactBlock {
   Lane torque_ix, torque_iy, torque_iz;  ///< on i [N m]
   Lane torque_jx, torque_jy, torque_jz;  ///< on j [N m]
 
-  /// What the contacts remember; a kernel owns the columns from the `first` it was given on.
-  double history[kMaxHistory][kBlock];
+  /// What the contacts remember; a kernel owns the columns from the `first` it was given on. In
+  /// the block itself, or where the caller keeps them between steps (aligned as a block).
+  Lane own_history[kMaxHistory];
+  Lane* history = own_history;
 };
 
 /// Repeats lane 0 in the unused lanes, so that kernels meet valid numbers everywhere;

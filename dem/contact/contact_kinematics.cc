@@ -39,7 +39,8 @@ CALIB_DEM_CLONES void ComputeKinematics(ContactBlock& b) {
     const double rj = b.radius_j[k];
     const double sum = ri + rj;
     const double distance = std::sqrt(b.dx[k] * b.dx[k] + b.dy[k] * b.dy[k] + b.dz[k] * b.dz[k]);
-    const double inverse = 1.0 / distance;
+    const double both = 1.0 / (distance * sum);  // one division serves two
+    const double inverse = both * sum;
     const double nx = b.dx[k] * inverse;
     const double ny = b.dy[k] * inverse;
     const double nz = b.dz[k] * inverse;
@@ -47,7 +48,7 @@ CALIB_DEM_CLONES void ComputeKinematics(ContactBlock& b) {
     b.ny[k] = ny;
     b.nz[k] = nz;
     b.overlap[k] = sum - distance;
-    b.effective_radius[k] = ri * rj / sum;
+    b.effective_radius[k] = ri * rj * (both * distance);
 
     const double vx = b.vx[k] + lx * b.dx[k] + shear * b.dz[k];
     const double vy = b.vy[k] + ly * b.dy[k];
@@ -109,18 +110,13 @@ CALIB_DEM_CLONES void TransportTangential(ContactBlock& b, int first) {
   double* const sz = b.history[first + 2];
 #pragma GCC ivdep
   for (int k = 0; k < kBlock; ++k) {
-    const double nx = b.nx[k];
-    const double ny = b.ny[k];
-    const double nz = b.nz[k];
-    const double along = nx * sx[k] + ny * sy[k] + nz * sz[k];
-    const double px = sx[k] - along * (nx - b.tilt_x[k]);
-    const double py = sy[k] - along * (ny - b.tilt_y[k]);
-    const double pz = sz[k] - along * (nz - b.tilt_z[k]);
-    const double spin = b.spin[k];
-    const double keep = 1.0 - 0.5 * spin * spin;
-    sx[k] = keep * px + spin * (ny * pz - nz * py);
-    sy[k] = keep * py + spin * (nz * px - nx * pz);
-    sz[k] = keep * pz + spin * (nx * py - ny * px);
+    double x = sx[k];
+    double y = sy[k];
+    double z = sz[k];
+    TransportLane(b, k, x, y, z);
+    sx[k] = x;
+    sy[k] = y;
+    sz[k] = z;
   }
 }
 

@@ -2,6 +2,7 @@
 // Geometry and relative motion of touching spheres, and the transport of what a contact remembers.
 
 #include "dem/contact/contact_block.h"
+#include "dem/contact/quad.h"
 
 namespace calib::dem {
 
@@ -24,10 +25,26 @@ void ComputeKinematics(ContactBlock& block);
 /// r_i, and the effective mass is that of the grain (block.mass_factor = 2).
 void ComputeWallKinematics(ContactBlock& block);
 
-/// Carries a tangential vector (three history columns from `first` on) from the last tangent plane
-/// to the present one and turns it with the mean spin of the grains about n:
+/// Carries a tangential vector (x, y, z) of lane k from the last tangent plane to the present one
+/// and turns it with the mean spin of the grains about n:
 ///   s' = s - (n.s)(n - dn/2),   s'' = s' + spin n x s' - spin^2/2 s'.
 /// s' is tangential; its length is kept to fourth order in the angle of the step.
+CALIB_DEM_INLINE void TransportLane(const ContactBlock& b, int k, double& x, double& y, double& z) {
+  const double nx = b.nx[k];
+  const double ny = b.ny[k];
+  const double nz = b.nz[k];
+  const double along = nx * x + ny * y + nz * z;
+  const double px = x - along * (nx - b.tilt_x[k]);
+  const double py = y - along * (ny - b.tilt_y[k]);
+  const double pz = z - along * (nz - b.tilt_z[k]);
+  const double spin = b.spin[k];
+  const double keep = 1.0 - 0.5 * spin * spin;
+  x = keep * px + spin * (ny * pz - nz * py);
+  y = keep * py + spin * (nz * px - nx * pz);
+  z = keep * pz + spin * (nx * py - ny * px);
+}
+
+/// The same for all lanes of three history columns from `first` on.
 void TransportTangential(ContactBlock& block, int first);
 
 /// Adds up what the contact does to its grains: force on j, torques with arms to the middle of the

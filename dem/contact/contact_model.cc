@@ -9,6 +9,7 @@
 #include "dem/catalog/registry.h"
 #include "dem/contact/common_parameters.h"
 #include "dem/contact/contact_kinematics.h"
+#include "dem/contact/simd.h"
 #include "dem/contact/sliding.h"
 
 namespace calib::dem {
@@ -20,6 +21,14 @@ const ContactEntry& LawNamed(const std::string& name) {
                                [&](const ContactEntry& entry) { return entry.info.name == name; });
   assert(it != entries.end());
   return *it;
+}
+
+/// What only effects set.
+CALIB_DEM_CLONES void ClearExtras(ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    b.attraction[k] = b.holds[k] = b.normal_damping[k] = b.tangential_damping[k] = 0.0;
+    b.mx[k] = b.my[k] = b.mz[k] = b.rolling_stiffness[k] = b.twisting_stiffness[k] = 0.0;
+  }
 }
 
 }  // namespace
@@ -54,6 +63,20 @@ ContactModel::ContactModel(const Model& model)
       }
     }
   }
+  for (const UserEffect& effect : model.user_effects) {
+    const std::string& name = effect.info.name;
+    if (effect.info.kind != "contact" ||
+        std::find(model.effects.begin(), model.effects.end(), name) == model.effects.end()) {
+      continue;
+    }
+    if (stage_ == nullptr && NeedsStage(effect)) {
+      stage_ = std::make_shared<StageState>();
+    }
+    formulas_.push_back(std::make_shared<FormulaKernel>(
+        effect, ResolveParameters(effect.info.parameters, name + ".", model.parameters),
+        model.density, stage_));
+    kernels.emplace_back(StageOf(effect), formulas_.back());
+  }
   wall_friction_ = walls.friction.value_or(walls.friction_ratio * sliding_friction_);
   if (law.make_dashpot != nullptr) {
     kernels.emplace_back(ContactStage::kNormalExtra, law.make_dashpot(law_context));
@@ -66,6 +89,15 @@ ContactModel::ContactModel(const Model& model)
     history_size_ += size;
   }
   assert(history_size_ <= kMaxHistory);
+}
+
+std::optional<ContactFault> ContactModel::Fault() const {
+  for (const auto& formula : formulas_) {
+    if (auto fault = formula->Fault()) {
+      return fault;
+    }
+  }
+  return std::nullopt;
 }
 
 double ContactModel::Reach(double largest_radius) const {
@@ -82,11 +114,7 @@ void ContactModel::Evaluate(ContactBlock& block) const {
   } else {
     ComputeKinematics(block);
   }
-  for (ContactBlock::Lane* lane :
-       {&block.attraction, &block.holds, &block.normal_damping, &block.tangential_damping,
-        &block.mx, &block.my, &block.mz, &block.rolling_stiffness, &block.twisting_stiffness}) {
-    std::fill(*lane, *lane + kBlock, 0.0);
-  }
+  ClearExtras(block);
   for (const Link& link : chain_) {
     link.kernel->Apply(block, link.first_history);
   }

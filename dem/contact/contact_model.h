@@ -2,9 +2,11 @@
 // A contact law joined by its effects: the chain of kernels that every block of contacts passes.
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "dem/contact/contact_kernel.h"
+#include "dem/formula/formula_kernel.h"
 #include "dem/simulation/scenario.h"
 
 namespace calib::dem {
@@ -31,12 +33,21 @@ class ContactModel {
   /// set; its history is read and updated.
   void Evaluate(ContactBlock& block) const;
 
+  /// Where a user's formula has given no finite number since the model was made.
+  [[nodiscard]] std::optional<ContactFault> Fault() const;
+
+  /// What user's formulas know of the specimen, to be kept up to date by whoever drives it; null:
+  /// they ask for nothing. Shared between copies.
+  [[nodiscard]] StageState* stage() const { return stage_.get(); }
+
  private:
   struct Link {
     std::shared_ptr<const ContactKernel> kernel;
     int first_history = 0;
   };
   std::vector<Link> chain_;
+  std::vector<std::shared_ptr<const FormulaKernel>> formulas_;
+  std::shared_ptr<StageState> stage_;
   int history_size_ = 0;
   double sliding_friction_ = 0;
   double wall_friction_ = 0;

@@ -22,10 +22,14 @@ CALIB_DEM_CLONES void IntegrateShear(ContactBlock& b, int first) {
   double* const sz = b.history[first + 2];
 #pragma GCC ivdep
   for (int k = 0; k < kBlock; ++k) {
+    double x = sx[k];
+    double y = sy[k];
+    double z = sz[k];
+    TransportLane(b, k, x, y, z);
     const double ks = b.tangential_stiffness[k];
-    const double x = sx[k] - ks * b.slip_x[k];
-    const double y = sy[k] - ks * b.slip_y[k];
-    const double z = sz[k] - ks * b.slip_z[k];
+    x -= ks * b.slip_x[k];
+    y -= ks * b.slip_y[k];
+    z -= ks * b.slip_z[k];
     const double size = std::sqrt(x * x + y * y + z * z);
     const double limit = b.sliding_limit[k];
     const double cut = size > limit ? limit / size : 1.0;
@@ -43,10 +47,7 @@ class CoulombLimit final : public ContactKernel {
 class TangentialSpring final : public ContactKernel {
  public:
   [[nodiscard]] int HistorySize() const override { return 3; }
-  void Apply(ContactBlock& block, int first) const override {
-    TransportTangential(block, first);
-    IntegrateShear(block, first);
-  }
+  void Apply(ContactBlock& block, int first) const override { IntegrateShear(block, first); }
 };
 
 }  // namespace

@@ -66,6 +66,7 @@ void Assembly::Shrink(const std::vector<std::pair<int, double>>& radii) {
     particles_.inverse_inertia[g] *= ratio * ratio * ratio * ratio * ratio;
   }
   nominal_critical_step_ = CriticalStepAt(1e-4);
+  PackAllGrains();
 }
 
 }  // namespace calib::dem

@@ -12,6 +12,7 @@
 #include "dem/contact/contact_model.h"
 #include "dem/dynamics/grain_load.h"
 #include "dem/dynamics/leapfrog.h"
+#include "dem/dynamics/pair_blocks.h"
 #include "dem/dynamics/rigid_clumps.h"
 #include "dem/dynamics/wall_contacts.h"
 #include "dem/geometry/periodic_cell.h"
@@ -121,7 +122,7 @@ class Assembly {
     return touching_[static_cast<std::size_t>(slot)] != 0;
   }
 
-  /// What slot s does to its grain j: force and torque [N, N m].
+  /// What slot s of neighbors() does to its grain j: force and torque [N, N m].
   [[nodiscard]] const GrainLoad& load_on_j(int slot) const {
     return loads_[static_cast<std::size_t>(list_.place_j[static_cast<std::size_t>(slot)])];
   }
@@ -162,7 +163,8 @@ class Assembly {
     archive(sliding_friction_, viscous_, gravity_, density_, next_id_, planar_, walls_, stale_,
             reach_, last_dt_);
     archive(list_.skin, list_.row, list_.first, list_.second, list_.image, list_.place_row,
-            list_.place_i, list_.place_j);
+            list_.place_i, list_.place_j, order_, lanes_.first, lanes_.second, lanes_.place_i,
+            lanes_.place_j, lanes_.image, records_);
     archive(searched_[0], searched_[1], searched_[2], searched_length_, searched_tilt_, moved_,
             skin_, largest_radius_, touching_, history_, loads_, shift_, sums_, stress_,
             shear_stress_, contacts_);
@@ -175,18 +177,22 @@ class Assembly {
 
  private:
   struct ChunkSums {
-    double stress[3] = {0, 0, 0};
-    double shear = 0;
+    LaneSums lanes;
     std::int64_t contacts = 0;
   };
 
   absl::Status SearchNeighbors();
+  void ArrangeLanes();
+  void CarryMemory(const NeighborList& old, const std::vector<int>& old_order);
   void EvaluateChunk(int chunk);
-  void LoadLane(int slot, ContactBlock& block) const;
-  void StoreBlock(ContactBlock& block, ChunkSums& sums);
-  void OpenContact(std::size_t slot);
-  int CollectActive(std::size_t begin, std::size_t end, int* active);
-  void GatherLoads(std::size_t begin, std::size_t end);
+  void PrepareBlock(ContactBlock& block) const;
+  void SetShifts();
+  void PackAllGrains();
+  [[nodiscard]] bool AnyTouching(int b) const;
+  /// First column of block b in the memory.
+  [[nodiscard]] std::size_t ColumnsOf(std::size_t b) const {
+    return b * static_cast<std::size_t>(model_.history_size());
+  }
   void AddSurroundings(int begin, int end);
   void Renumber(const std::vector<int>& to);
   double MoveChunk(int chunk, const Motion& motion);
@@ -194,6 +200,7 @@ class Assembly {
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
   void TakeBranchesBetweenBodies();
+  [[nodiscard]] absl::Status FormulasFinite() const;
 
   PeriodicCell cell_;
   ParticleArrays particles_;
@@ -218,10 +225,13 @@ class Assembly {
   double skin_ = 0;
   double largest_radius_ = 0;
 
-  std::vector<std::uint8_t> touching_;  ///< per slot
-  std::vector<double> history_;         ///< per slot, history_size() doubles
-  std::vector<GrainLoad> loads_;        ///< per place of the list; zero where not touching
-  std::array<std::array<double, 3>, kImages> shift_{};  ///< translation of each image now [m]
+  std::vector<int> order_;  ///< slots by (i, j); the list itself has those together that touch
+  PairLanes lanes_;         ///< the list, padded to whole blocks
+  std::vector<std::uint8_t> touching_;  ///< per lane
+  LaneMemory history_;                  ///< per block, history_size() columns of kBlock lanes
+  std::vector<GrainLoad> loads_;  ///< per place of the list, and one more; zero where not touching
+  std::vector<GrainRecord> records_;  ///< of the grains, at the last evaluation
+  ImageShift shift_[kImages] = {};    ///< translation of each image now [m]
   std::vector<ChunkSums> sums_;
   std::array<double, 3> stress_ = {0, 0, 0};
   double shear_stress_ = 0;

@@ -71,11 +71,23 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
       damping[j][a + 3] += across * b.radius_j[k] * b.radius_j[k];
     }
   };
-  const auto add = [&] {
-    PadLanes(model_.history_size(), b);
+  const auto width = static_cast<std::size_t>(model_.history_size());
+  for (int block = 0; block < lanes_.blocks(); ++block) {
+    if (!AnyTouching(block)) {
+      continue;
+    }
+    LoadBranches(lanes_, block, records_.data(), shift_, b);
+    LoadGrains(lanes_, block, records_.data(), b);
+    for (std::size_t c = 0; c < width; ++c) {  // copies: evaluating must not move the memory on
+      const double* const column = history_[ColumnsOf(static_cast<std::size_t>(block)) + c].lane;
+      std::copy_n(column, kBlock, b.history[c]);
+    }
     model_.Evaluate(b);
-    for (int k = 0; k < b.count; ++k) {
-      const auto slot = static_cast<std::size_t>(b.pair[k]);
+    for (int k = 0; k < kBlock; ++k) {
+      const auto slot = static_cast<std::size_t>(block) * kBlock + static_cast<std::size_t>(k);
+      if (touching_[slot] == 0) {
+        continue;
+      }
       const auto i = static_cast<std::size_t>(list_.first[slot]);
       const auto j = static_cast<std::size_t>(list_.second[slot]);
       if (!(b.overlap[k] <= 0.5 * std::min(b.radius_i[k], b.radius_j[k])) && status.ok()) {
@@ -99,19 +111,6 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
         modulus[a] += translation * d[a] * d[a];
       }
     }
-    b.count = 0;
-  };
-  for (int s = 0; s < list_.size(); ++s) {
-    if (!touching(s)) {
-      continue;
-    }
-    LoadLane(s, b);
-    if (b.count == kBlock) {
-      add();
-    }
-  }
-  if (b.count > 0) {
-    add();
   }
   walls_.VisitBlocks(p, model_, viscous_, [&](const ContactBlock& w, const int* grains) {
     for (int k = 0; k < w.count; ++k) {

@@ -34,25 +34,19 @@ void Keep(const std::vector<int>& to, ParticleArrays& p) {
 }  // namespace
 
 void Assembly::Renumber(const std::vector<int>& to) {
-  const auto width = static_cast<std::size_t>(model_.history_size());
-  std::size_t kept = 0;  // only what the next search reads of the list: pairs and their memory
-  for (std::size_t s = 0; s < list_.second.size(); ++s) {
-    const int i = to[static_cast<std::size_t>(list_.first[s])];
-    const int j = to[static_cast<std::size_t>(list_.second[s])];
-    if (i == kGone || j == kGone) {
-      continue;
+  // The next search reads pairs in order and their memory, which stays where it is.
+  std::size_t kept = 0;
+  for (const int slot : order_) {
+    const auto s = static_cast<std::size_t>(slot);
+    list_.first[s] = to[static_cast<std::size_t>(list_.first[s])];
+    list_.second[s] = to[static_cast<std::size_t>(list_.second[s])];
+    if (list_.first[s] == kGone || list_.second[s] == kGone) {
+      touching_[s] = 0;
+    } else {
+      order_[kept++] = slot;
     }
-    list_.first[kept] = i;
-    list_.second[kept] = j;
-    touching_[kept] = touching_[s];
-    std::copy_n(history_.begin() + static_cast<std::ptrdiff_t>(s * width), width,
-                history_.begin() + static_cast<std::ptrdiff_t>(kept * width));
-    ++kept;
   }
-  list_.first.resize(kept);
-  list_.second.resize(kept);
-  touching_.resize(kept);
-  history_.resize(kept * width);
+  order_.resize(kept);
   walls_.Renumber(to);
   stale_ = true;
 }

@@ -49,27 +49,6 @@ CALIB_DEM_CLONES double LargestShift2(const ParticleArrays& p,
 
 }  // namespace
 
-void Assembly::GatherLoads(std::size_t begin, std::size_t end) {
-  ParticleArrays& p = particles_;
-  const GrainLoad* load = loads_.data() + list_.place_row[begin];
-  for (std::size_t g = begin; g < end; ++g) {
-    const GrainLoad* const row_end = loads_.data() + list_.place_row.data()[g + 1];
-    GrainLoad sum{};
-    for (; load != row_end; ++load) {
-      for (int a = 0; a < 3; ++a) {
-        sum.force[a] += load->force[a];
-        sum.torque[a] += load->torque[a];
-      }
-    }
-    p.fx.data()[g] = sum.force[0];
-    p.fy.data()[g] = sum.force[1];
-    p.fz.data()[g] = sum.force[2];
-    p.tx.data()[g] = sum.torque[0];
-    p.ty.data()[g] = sum.torque[1];
-    p.tz.data()[g] = sum.torque[2];
-  }
-}
-
 void Assembly::AddSurroundings(int begin, int end) {
   ParticleArrays& p = particles_;
   if (!walls_.empty()) {
@@ -95,7 +74,8 @@ void Assembly::AddSurroundings(int begin, int end) {
 double Assembly::MoveChunk(int chunk, const Motion& motion) {
   const auto begin = static_cast<std::size_t>(chunk) * kGrainChunk;
   const auto end = std::min(begin + kGrainChunk, particles_.x.size());
-  GatherLoads(begin, end);
+  GatherPlaces(list_.place_row.data(), loads_.data(), static_cast<int>(begin),
+               static_cast<int>(end), particles_);
   AddSurroundings(static_cast<int>(begin), static_cast<int>(end));
   AdvanceGrains(motion, static_cast<int>(begin), static_cast<int>(end), particles_);
   return LargestShift2OfChunk(chunk);

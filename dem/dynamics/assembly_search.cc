@@ -27,7 +27,8 @@ double Assembly::ShearSinceSearch() const {
 
 absl::Status Assembly::SearchNeighbors() {
   cell_.Reduce();
-  NeighborList old = std::exchange(list_, {});
+  const NeighborList old = std::exchange(list_, {});
+  const std::vector<int> old_order = std::exchange(order_, {});
   if (auto s = BuildNeighborList(cell_, skin_, particles_, list_); !s.ok()) {
     return s;
   }
@@ -42,28 +43,103 @@ absl::Status Assembly::SearchNeighbors() {
   if (!walls_.empty()) {
     walls_.Search(particles_, skin_);
   }
+  ArrangeLanes();
+  CarryMemory(old, old_order);
+  loads_.assign(2 * static_cast<std::size_t>(list_.size()) + 1, GrainLoad{});
+  sums_.assign(static_cast<std::size_t>(ChunkCount(list_.size(), kPairChunk)), {});
+  return absl::OkStatus();
+}
 
-  const auto slots = static_cast<std::size_t>(list_.size());
+/// Within each chunk of the sorted list pairs that touch come first, then those that are close to
+/// it: blocks of lanes then act wholly or not at all, as far as possible.
+void Assembly::ArrangeLanes() {
+  SetShifts();
+  const ParticleArrays& p = particles_;
+  const NeighborList sorted = list_;
+  const auto slots = sorted.second.size();
+  std::vector<std::uint8_t> group(slots);
+  for (std::size_t s = 0; s < slots; ++s) {
+    const auto i = static_cast<std::size_t>(sorted.first[s]);
+    const auto j = static_cast<std::size_t>(sorted.second[s]);
+    const ImageShift& shift = shift_[sorted.image[s]];
+    const double dx = p.x[j] + shift[0] - p.x[i];
+    const double dy = p.y[j] + shift[1] - p.y[i];
+    const double dz = p.z[j] + shift[2] - p.z[i];
+    const double d2 = dx * dx + dy * dy + dz * dz;
+    const double touching = p.radius[i] + p.radius[j];
+    const double close = touching + 0.25 * skin_;
+    group[s] = d2 < touching * touching ? 0 : (d2 < close * close ? 1 : 2);
+  }
+  order_.resize(slots);
+  int slot = 0;
+  for (std::size_t begin = 0; begin < slots; begin += kPairChunk) {
+    const std::size_t end = std::min(begin + kPairChunk, slots);
+    for (int wanted = 0; wanted < 3; ++wanted) {
+      for (std::size_t s = begin; s < end; ++s) {
+        if (group[s] == wanted) {
+          order_[s] = slot++;
+        }
+      }
+    }
+  }
+  for (std::size_t s = 0; s < slots; ++s) {
+    const auto to = static_cast<std::size_t>(order_[s]);
+    list_.first[to] = sorted.first[s];
+    list_.second[to] = sorted.second[s];
+    list_.image[to] = sorted.image[s];
+    list_.place_i[to] = sorted.place_i[s];
+    list_.place_j[to] = sorted.place_j[s];
+  }
+  const std::size_t lanes = (slots + kBlock - 1) / kBlock * kBlock;
+  const std::size_t last = slots == 0 ? 0 : (slots - 1) / kBlock * kBlock;  // begin of last block
+  const auto padded = [&](const auto& values, const auto& with) {
+    auto all = values;
+    all.resize(lanes, with);
+    return all;
+  };
+  if (slots == 0) {
+    lanes_ = {};
+    return;
+  }
+  const auto nowhere = static_cast<int>(2 * slots);
+  lanes_ = {.first = padded(list_.first, list_.first[last]),
+            .second = padded(list_.second, list_.second[last]),
+            .place_i = padded(list_.place_i, nowhere),
+            .place_j = padded(list_.place_j, nowhere),
+            .image = padded(list_.image, list_.image[last])};
+}
+
+/// Both lists are visited in the order of (i, j): one merge carries over what contacts remember.
+void Assembly::CarryMemory(const NeighborList& old, const std::vector<int>& old_order) {
   const auto width = static_cast<std::size_t>(model_.history_size());
-  std::vector<std::uint8_t> touching(slots, 0);
-  std::vector<double> history(slots * width, 0.0);
-  std::size_t o = 0;  // both lists are sorted by (i, j): one merge carries what contacts remember
-  for (std::size_t s = 0; s < slots && !old.second.empty(); ++s) {
+  const auto blocks = static_cast<std::size_t>(lanes_.blocks());
+  std::vector<std::uint8_t> touching(blocks * kBlock, 0);
+  LaneMemory history(blocks * width, LaneColumn{});
+  auto o = old_order.begin();
+  for (const int slot : order_) {
+    const auto s = static_cast<std::size_t>(slot);
     const std::pair key(list_.first[s], list_.second[s]);
-    while (o < old.second.size() && std::pair(old.first[o], old.second[o]) < key) {
+    const auto key_of = [&old](int before) {
+      const auto b = static_cast<std::size_t>(before);
+      return std::pair(old.first[b], old.second[b]);
+    };
+    while (o != old_order.end() && key_of(*o) < key) {
       ++o;
     }
-    if (o < old.second.size() && std::pair(old.first[o], old.second[o]) == key &&
-        touching_[o] != 0) {
+    if (o == old_order.end()) {
+      break;
+    }
+    const auto from = static_cast<std::size_t>(*o);
+    if (key_of(*o) == key && touching_[from] != 0) {
       touching[s] = 1;
-      std::copy_n(&history_[o * width], width, &history[s * width]);
+      for (std::size_t c = 0; c < width; ++c) {
+        history[s / kBlock * width + c].lane[s % kBlock] =
+            history_[from / kBlock * width + c].lane[from % kBlock];
+      }
     }
   }
   touching_ = std::move(touching);
   history_ = std::move(history);
-  loads_.assign(2 * slots, GrainLoad{});
-  sums_.assign(static_cast<std::size_t>(ChunkCount(list_.size(), kPairChunk)), {});
-  return absl::OkStatus();
 }
 
 }  // namespace calib::dem

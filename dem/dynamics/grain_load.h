@@ -2,10 +2,11 @@
 
 namespace calib::dem {
 
-/// What one contact does to one of its grains.
-struct GrainLoad {
-  double force[3];   ///< [N]
-  double torque[3];  ///< about the centre [N m]
+/// What one contact does to one of its grains. The last element of either is zero: a load is two
+/// vector registers.
+struct alignas(64) GrainLoad {
+  double force[4];   ///< [N]
+  double torque[4];  ///< about the centre [N m]
 };
 
 }  // namespace calib::dem

@@ -76,8 +76,8 @@ StageEnd QuasiStatic::Inspect() {
   }
   const double largest =
       std::min(kMaxStrainPerStep / options_.rate, assembly_->NominalCriticalStep());
-  dt_ =
-      kSafety * (estimate.critical_step > 0 ? std::min(largest, estimate.critical_step) : largest);
+  dt_ = options_.step_share *
+        (estimate.critical_step > 0 ? std::min(largest, estimate.critical_step) : largest);
   for (std::size_t a = 0; a < 3; ++a) {
     // A dashpot answers a strain rate at once, in the same step: the servo must see it as
     // stiffness.
@@ -209,8 +209,18 @@ StageEnd QuasiStatic::Settle(const CellTarget& asked) {
 }
 
 StageEnd QuasiStatic::MoveTo(const CellTarget& target) {
-  const StageEnd end = MoveThrough(target);
-  return end == StageEnd::kDone ? Settle(target) : end;
+  if (const StageEnd end = MoveThrough(target); end != StageEnd::kDone) {
+    return end;
+  }
+  // What the servos have learned is the rate of straining, which ends here and comes back with the
+  // next stage: unlearning and learning it would take longer than settling.
+  const auto straining = servo_;
+  for (StressServo& servo : servo_) {
+    servo.Reset();
+  }
+  const StageEnd end = Settle(target);
+  servo_ = straining;
+  return end;
 }
 
 StageEnd QuasiStatic::MoveThrough(const CellTarget& target) {

@@ -34,6 +34,9 @@ struct StageOptions {
       5e-4;  ///< mean unbalanced over mean contact force that ends a settling [-] > 0
   double stress_tolerance =
       1e-3;                 ///< relative error of held stresses at the end of a settling [-] > 0
+  double step_share = 0.8;  ///< time step over the smallest sqrt(m/K) of all grains; two grains
+                            ///< that move against each other allow sqrt(2). [Cundall & Strack 1979;
+                            ///< O'Sullivan & Bray 2004]
   double least_volume = 0;  ///< a settling ends where the cell has shrunk to this [m^3]
   std::int64_t max_settling_steps = 200'000;  ///< a settling that takes longer has diverged
   std::int64_t max_loading_steps = 20'000'000;
@@ -54,11 +57,6 @@ enum class StageEnd { kDone, kStopped, kDiverged };
 /// the stop token every step.
 class QuasiStatic {
  public:
-  /// safety: time step over the smallest sqrt(m/K) of all grains; 0.8 is well inside the limit
-  /// sqrt(2) of two grains that move against each other. [Cundall & Strack 1979; O'Sullivan & Bray
-  /// 2004]
-  static constexpr double kSafety = 0.8;
-
   QuasiStatic(Assembly& assembly, const StageOptions& options, std::stop_token stop);
 
   /// Moves to the target with damping_loading, then settles.

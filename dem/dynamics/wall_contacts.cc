@@ -124,6 +124,7 @@ void WallContacts::LoadLane(const ParticleArrays& p, const ContactModel& model, 
   const Wall& wall = walls_[static_cast<std::size_t>(contact.wall)];
   const Vec3 d = contact.point - Vec3{p.x[g], p.y[g], p.z[g]};
   const Vec3 v = wall.VelocityAt(contact.point) - Vec3{p.vx[g], p.vy[g], p.vz[g]};
+  b.pair[k] = row.grain;
   b.dx[k] = d.x;
   b.dy[k] = d.y;
   b.dz[k] = d.z;

@@ -17,9 +17,13 @@ CALIB_DEM_CLONES void IntegrateRolling(const MomentResponse& response, ContactBl
   for (int k = 0; k < kBlock; ++k) {
     const double stiffness = response.stiffness[k];
     const double limit = response.limit[k];
-    const double x = hx[k] - stiffness * b.roll_x[k];
-    const double y = hy[k] - stiffness * b.roll_y[k];
-    const double z = hz[k] - stiffness * b.roll_z[k];
+    double x = hx[k];
+    double y = hy[k];
+    double z = hz[k];
+    TransportLane(b, k, x, y, z);
+    x -= stiffness * b.roll_x[k];
+    y -= stiffness * b.roll_y[k];
+    z -= stiffness * b.roll_z[k];
     const double size = std::sqrt(x * x + y * y + z * z);
     const double cut = size > limit ? limit / size : 1.0;
     hx[k] = cut * x;
@@ -37,7 +41,6 @@ class RollingKernel final : public ContactKernel {
   explicit RollingKernel(const MomentLaw& law) : law_(law) {}
   [[nodiscard]] int HistorySize() const override { return 3; }
   void Apply(ContactBlock& block, int first) const override {
-    TransportTangential(block, first);
     MomentResponse response;
     EvaluateMoment(law_, block, response);
     IntegrateRolling(response, block, first);

@@ -10,10 +10,7 @@ double Porosity(const Assembly& assembly) {
   return 1.0 - assembly.solid_volume() / assembly.cell().Volume();
 }
 
-namespace {
-
-/// What follows from the two stresses and from porosity.
-void Derive(Measurement& m) {
+void DeriveReadings(Measurement& m) {
   m.mean_stress = (m.axial_stress + 2.0 * m.lateral_stress) / 3.0;
   m.deviatoric_stress = m.axial_stress - m.lateral_stress;
   m.stress_ratio = m.axial_stress / m.lateral_stress;
@@ -21,8 +18,6 @@ void Derive(Measurement& m) {
   m.shear_stress_ratio = m.shear_stress / m.axial_stress;
   m.void_ratio = m.porosity / (1.0 - m.porosity);
 }
-
-}  // namespace
 
 Measurement ReadThrough(const Apparatus& apparatus, double x, bool by_axial, Measurement m) {
   if (!apparatus.Alters()) {
@@ -39,7 +34,7 @@ Measurement ReadThrough(const Apparatus& apparatus, double x, bool by_axial, Mea
     }
     m.lateral_strain = 0.5 * (m.volumetric_strain - m.axial_strain);
   }
-  Derive(m);
+  DeriveReadings(m);
   return m;
 }
 
@@ -59,12 +54,12 @@ Measurement Measure(const Assembly& assembly, const double reference[3]) {
   m.shear_strain = cell.displacement / reference[2];
   m.shear_stress = assembly.shear_stress();
   m.porosity = Porosity(assembly);
-  Derive(m);
+  DeriveReadings(m);
   m.coordination_number = 2.0 * static_cast<double>(assembly.contacts()) / assembly.bodies();
   return m;
 }
 
-std::vector<double> Select(const Measurement& m, const std::vector<std::string>& names) {
+double Measurement::*MemberNamed(const std::string& name) {
   static const std::map<std::string, double Measurement::*> members = {
       {"axial_strain", &Measurement::axial_strain},
       {"volumetric_strain", &Measurement::volumetric_strain},
@@ -83,12 +78,17 @@ std::vector<double> Select(const Measurement& m, const std::vector<std::string>&
       {"void_ratio", &Measurement::void_ratio},
       {"coordination_number", &Measurement::coordination_number},
   };
+  const auto it = members.find(name);
+  return it == members.end() ? nullptr : it->second;
+}
+
+std::vector<double> Select(const Measurement& m, const std::vector<std::string>& names) {
   std::vector<double> values;
   values.reserve(names.size());
   for (const std::string& name : names) {
-    const auto it = members.find(name);
-    assert(it != members.end());
-    values.push_back(m.*(it->second));
+    double Measurement::*const member = MemberNamed(name);
+    assert(member != nullptr);
+    values.push_back(m.*member);
   }
   return values;
 }

@@ -30,6 +30,12 @@ Measurement Measure(const Assembly& assembly, const double reference[3]);
 /// follow.
 Measurement ReadThrough(const Apparatus& apparatus, double x, bool by_axial, Measurement m);
 
+/// A member of Measurement by the name of its observable, or null.
+double Measurement::*MemberNamed(const std::string& name);
+
+/// Renews what follows from the axial and lateral stress, the shear stress and the porosity.
+void DeriveReadings(Measurement& measurement);
+
 /// Values of the named observables. Precondition: every name is a member of Measurement.
 std::vector<double> Select(const Measurement& measurement, const std::vector<std::string>& names);
 

@@ -94,8 +94,11 @@ class CollisionRun {
     block_.mass_factor = IsWall() ? 2.0 : 1.0;
   }
 
-  /// Runs up to kBlock impacts to their ends; false: stopped.
+  [[nodiscard]] std::optional<ContactFault> Fault() const { return model_.Fault(); }
+
+  /// Runs up to kBlock impacts to their ends; false: stopped, or a formula is not finite.
   bool Run(const Impact* impacts, int count) {
+    impacts_ = count;
     for (int k = 0; k < kBlock; ++k) {
       const Impact& impact = impacts[std::min(k, count - 1)];
       flights_[k] = {};
@@ -104,7 +107,7 @@ class CollisionRun {
       flights_[k].viy = impact.speed * std::sin(impact.angle);
       flights_[k].wi = impact.spin;
     }
-    for (auto& column : block_.history) {
+    for (auto& column : block_.own_history) {
       std::fill(std::begin(column), std::end(column), 0.0);
     }
     const double half_period = ShortestHalfPeriod();
@@ -119,6 +122,9 @@ class CollisionRun {
       LoadBlock();
       model_.Evaluate(block_);
       ++steps_;
+      if (Fault()) {
+        return false;
+      }
       if (!Kick(static_cast<double>(step) * dt_)) {
         break;
       }
@@ -174,6 +180,7 @@ class CollisionRun {
     block_.count = kBlock;
     for (int k = 0; k < kBlock; ++k) {
       const Flight& f = flights_[k];
+      block_.pair[k] = std::min(k, impacts_ - 1);
       block_.dx[k] = f.dx;
       block_.dy[k] = f.dy;
       block_.dz[k] = 0;
@@ -267,7 +274,7 @@ class CollisionRun {
       rate2 = std::max({rate2, block_.normal_stiffness[k] / mass, turning,
                         block_.tangential_stiffness[k] * (1.0 / mass + 2 * inertia)});
     }
-    for (auto& column : block_.history) {
+    for (auto& column : block_.own_history) {
       std::fill(std::begin(column), std::end(column), 0.0);
     }
     return std::numbers::pi / std::sqrt(rate2);
@@ -279,6 +286,7 @@ class CollisionRun {
   ContactBlock block_{};
   std::array<Flight, kBlock> flights_{};
   double dt_ = 0;
+  int impacts_ = 0;
   std::int64_t steps_ = 0;
 };
 
@@ -293,6 +301,13 @@ Summary RunCollision(const Scenario& scenario, const StateSink& sink, std::stop_
     const bool finished = run.Run(&impacts[first], count);
     summary.steps = summary.contact_updates = run.steps();
     summary.time_step = run.time_step();
+    if (const auto fault = run.Fault()) {
+      const Impact& impact = impacts[first + static_cast<std::size_t>(fault->pair)];
+      summary.outcome = Outcome::kDiverged;
+      summary.reason = absl::StrCat("load step ", impact.load_step, " (angle ", impact.angle,
+                                    ", speed ", impact.speed, "): ", fault->what);
+      return summary;
+    }
     if (!finished) {
       summary.outcome = Outcome::kStopped;
       return summary;

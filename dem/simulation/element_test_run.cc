@@ -11,6 +11,7 @@
 #include "dem/dynamics/crushing.h"
 #include "dem/dynamics/quasi_static.h"
 #include "dem/measure/observables.h"
+#include "dem/measure/reading_formulas.h"
 #include "dem/simulation/consolidation.h"
 #include "dem/simulation/shape_change.h"
 
@@ -24,6 +25,9 @@ constexpr double kStep = 0.002;
 constexpr double kDampingLoading = 0.2;
 constexpr double kDampingSettling = 0.9;
 constexpr double kUnbalanced = 5e-4;
+
+/// Time step over the smallest sqrt(m/K) where grains are slow and damped.
+constexpr double kStepShare = 1.1;
 
 /// Share of the strain to a reading that one step may take, and how near a reading must come.
 constexpr double kFollowGain = 0.3;
@@ -52,6 +56,20 @@ Staging ResolveStaging(const Scenario& scenario, const Assembly& assembly) {
           .damping_loading = given.damping_loading.value_or(kDampingLoading),
           .damping_settling = given.damping_settling.value_or(kDampingSettling),
           .unbalanced = given.unbalanced.value_or(kUnbalanced)};
+}
+
+/// The smallest grains ask for the smallest step, sqrt(m/K) being proportional to the radius. Where
+/// inertia does not matter, grains below the mean size get the mass and the inertia that give them
+/// the step of the mean one; the larger grains, which carry most of the mass, keep theirs.
+void EqualiseSteps(Assembly& assembly) {
+  ParticleArrays& p = assembly.mutable_particles();
+  const double mean = 0.5 * assembly.mean_diameter();
+  for (std::size_t g = 0; g < p.radius.size(); ++g) {
+    const double ratio = p.radius[g] < mean ? p.radius[g] / mean : 1.0;
+    p.inverse_mass[g] *= ratio * ratio;
+    p.inverse_inertia[g] *= ratio * ratio;
+  }
+  assembly.Shrink({});  // no radius changes, but what follows from masses does
 }
 
 /// What the effects of the model ask of readings and initial state.
@@ -91,7 +109,12 @@ class ElementTestRun {
         staging_(ResolveStaging(scenario, assembly_)),
         stages_(assembly_, OptionsFrom(staging_), std::move(stop)),
         apparatus_(alterations.apparatus),
-        preparation_(alterations.preparation) {
+        preparation_(alterations.preparation),
+        formulas_(scenario.model) {
+    if (!scenario.loading_rate && assembly_.clumps().empty()) {
+      EqualiseSteps(assembly_);
+      stages_.options().step_share = kStepShare;
+    }
     context_.settings = scenario.settings;
     for (const ParameterInfo& setting : entry_.info.settings) {
       if (setting.default_value) {
@@ -107,7 +130,15 @@ class ElementTestRun {
                           .size_loss = preparation_.size_loss};
     if (law.Acts()) {
       crushing_.emplace(law, scenario.seed, assembly_);
-      stages_.SetIntervention([this](Assembly& assembly) { crushing_->Crush(assembly); });
+    }
+    SetStage();
+    if (crushing_ || assembly_.model().stage() != nullptr) {
+      stages_.SetIntervention([this](Assembly& assembly) {
+        if (crushing_) {
+          crushing_->Crush(assembly);
+        }
+        SetStage();
+      });
     }
   }
 
@@ -146,7 +177,13 @@ class ElementTestRun {
       if (point.load_step < 0) {
         continue;
       }
-      State state{.load_step = point.load_step, .values = Select(Read(), entry_.info.observables)};
+      Measurement read = Read();
+      if (auto s = formulas_.Apply(read); !s.ok()) {
+        Summary summary = Finish(StageEnd::kDiverged, where);
+        summary.reason = absl::StrCat(where, ": ", s.message());
+        return summary;
+      }
+      State state{.load_step = point.load_step, .values = Select(read, entry_.info.observables)};
       for (std::size_t v = 0; v < state.values.size(); ++v) {
         if (!std::isfinite(state.values[v])) {
           Summary summary = Finish(StageEnd::kDiverged, where);
@@ -205,6 +242,26 @@ class ElementTestRun {
                                 entry_.rig_load == RigLoad::kAxial, Measure(assembly_, reference_));
     m.pore_pressure = context_.lateral_stress - m.lateral_stress;
     return m;
+  }
+
+  /// What user's formulas know of the specimen: until loading begins, where it is going to start.
+  void SetStage() const {
+    StageState* const stage = assembly_.model().stage();
+    if (stage == nullptr) {
+      return;
+    }
+    if (reference_[2] == 0) {
+      *stage = {.mean_stress = (context_.axial_stress + 2.0 * context_.lateral_stress) / 3.0,
+                .deviatoric_stress = context_.axial_stress - context_.lateral_stress,
+                .porosity = Porosity(assembly_)};
+      return;
+    }
+    const Measurement m = Measure(assembly_, reference_);
+    *stage = {.mean_stress = m.mean_stress,
+              .deviatoric_stress = m.deviatoric_stress,
+              .axial_strain = m.axial_strain,
+              .volumetric_strain = m.volumetric_strain,
+              .porosity = m.porosity};
   }
 
   /// Lets the stages be driven by readings where the apparatus alters them.
@@ -282,6 +339,7 @@ class ElementTestRun {
   ElementTestContext context_;
   Apparatus apparatus_;
   Preparation preparation_;
+  ReadingFormulas formulas_;
   std::optional<Crushing> crushing_;
   double rig_start_ = 0;  ///< RigStress() at the start of loading [Pa]
   double reference_[3] = {0, 0, 0};

@@ -12,6 +12,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "dem/formula/user_effect.h"
 #include "dem/particles/packing.h"
 
 namespace calib::dem {
@@ -20,9 +21,10 @@ namespace calib::dem {
 /// "rolling_resistance.stiffness").
 struct Model {
   std::string contact;                       ///< a name of Contacts()
-  std::vector<std::string> effects;          ///< names of Effects()
+  std::vector<std::string> effects;          ///< names of Effects() or of user_effects
   double density = 2650;                     ///< of the grains [kg/m^3] > 0
   std::map<std::string, double> parameters;  ///< every parameter without a default must be present
+  std::vector<UserEffect> user_effects{};    ///< declared; those that `effects` names act
 };
 
 /// Friction during consolidation, restored before loading. At most one is set; none: the model's

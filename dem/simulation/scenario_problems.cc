@@ -19,6 +19,9 @@ using Problems = std::vector<std::string>;
 /// Strains beyond this would need a cell that shrinks to a third: a mistake of units.
 constexpr double kLargestStrain = 1.0;
 
+/// Each may ask a contact to remember a number.
+constexpr int kMostFormulas = 4;
+
 template <class Infos>
 std::string NamesOf(const Infos& infos) {
   return absl::StrJoin(infos, ", ",
@@ -93,7 +96,7 @@ void CheckModel(const Model& model, Problems& problems) {
   CheckParameters(contact->parameters, "", model, problems);
   std::set<std::string> seen;
   for (const std::string& name : model.effects) {
-    const EffectInfo* effect = FindEffect(name);
+    const EffectInfo* effect = FindEffect(model.user_effects, name);
     if (effect == nullptr) {
       problems.push_back(absl::StrCat("no effect \"", name, "\"; there are ", NamesOf(Effects())));
       continue;
@@ -110,9 +113,50 @@ void CheckModel(const Model& model, Problems& problems) {
     CheckParameters(effect->parameters, name + ".", model, problems);
   }
   for (const auto& [name, value] : model.parameters) {
-    if (FindParameter(model.contact, model.effects, name) == nullptr) {
+    if (FindParameter(model.user_effects, model.contact, model.effects, name) == nullptr) {
       problems.push_back(absl::StrCat("the model has no parameter \"", name, "\""));
     }
+  }
+}
+
+/// User's effects: that they can run, and run in this test.
+void CheckFormulas(const Scenario& scenario, Problems& problems) {
+  const Model& model = scenario.model;
+  const TestInfo* test = FindTest(scenario.test);
+  std::set<std::string> seen;
+  int acting = 0;
+  for (const UserEffect& effect : model.user_effects) {
+    const std::string& name = effect.info.name;
+    if (!seen.insert(name).second) {
+      problems.push_back(absl::StrCat("effect ", name, " is declared twice"));
+    }
+    if (std::find(model.effects.begin(), model.effects.end(), name) == model.effects.end()) {
+      continue;
+    }
+    const auto found = UserEffectProblems(effect);
+    for (const std::string& problem : found) {
+      problems.push_back(absl::StrCat("effect ", name, ": ", problem));
+    }
+    if (!found.empty() || test == nullptr) {
+      continue;
+    }
+    acting += effect.info.kind == "contact" ? 1 : 0;
+    const bool cell = test->needs_packing && !test->poured;
+    if (!cell && (effect.info.kind == "measurement" || NeedsStage(effect))) {
+      problems.push_back(absl::StrCat("effect ", name, " ",
+                                      effect.info.kind == "measurement" ? "changes" : "asks for",
+                                      " readings of a specimen in the periodic cell, which test ",
+                                      test->name, " does not have"));
+    }
+    const bool stress = effect.target == "axial_stress" || effect.target == "lateral_stress";
+    if (effect.target == test->control || (stress && test->control == "mean_stress")) {
+      problems.push_back(absl::StrCat("effect ", name, " changes ", effect.target,
+                                      ", by which test ", test->name, " is driven"));
+    }
+  }
+  if (acting > kMostFormulas) {
+    problems.push_back(absl::StrCat(acting, " of the user's effects act at contacts; at most ",
+                                    kMostFormulas, " can"));
   }
 }
 
@@ -308,6 +352,7 @@ std::vector<std::string> ScenarioProblems(const Scenario& scenario) {
     CheckShapes(scenario, poured, problems);
   }
   CheckTest(scenario, problems);
+  CheckFormulas(scenario, problems);
   CheckPreparation(scenario, problems);
   return problems;
 }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <set>
 
 #include "inference/sampling/philox.h"
 
@@ -28,7 +29,8 @@ absl::StatusOr<Whitened> Whiten(const FittedModel& model) {
       model.covariance.cols() != t || !model.histories.allFinite()) {
     return absl::InvalidArgumentError("diagnosis: histories and covariance do not fit together");
   }
-  Whitened whitened{.factor = Eigen::LLT<Eigen::MatrixXd>(model.covariance), .points = {}, .squares = {}};
+  Whitened whitened{
+      .factor = Eigen::LLT<Eigen::MatrixXd>(model.covariance), .points = {}, .squares = {}};
   if (whitened.factor.info() != Eigen::Success) {
     return absl::InvalidArgumentError("diagnosis: the covariance is not positive definite");
   }
@@ -93,8 +95,8 @@ double TailOf(double gain, const std::vector<double>& simulated, std::size_t dif
       std::count_if(simulated.begin(), simulated.end(), [&](double s) { return s >= gain; }));
   constexpr double kEnough = 10;
   if (above >= kEnough) return (1 + above) / (1 + n);
-  const double tail = static_cast<double>(differences) *
-                      boost::math::gamma_q(0.5, 0.5 * std::max(gain, 0.0));
+  const double tail =
+      static_cast<double>(differences) * boost::math::gamma_q(0.5, 0.5 * std::max(gain, 0.0));
   return std::min((1 + above) / (1 + n), std::max(tail, std::numeric_limits<double>::min()));
 }
 
@@ -106,9 +108,8 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   Adequacy adequacy;
   adequacy.chi2 = whitened->squares.minCoeff(&adequacy.best);
   adequacy.degrees = static_cast<double>(model.histories.cols() - model.parameters);
-  adequacy.p_value = adequacy.degrees > 0
-                         ? boost::math::gamma_q(0.5 * adequacy.degrees, 0.5 * adequacy.chi2)
-                         : 1;
+  adequacy.p_value =
+      adequacy.degrees > 0 ? boost::math::gamma_q(0.5 * adequacy.degrees, 0.5 * adequacy.chi2) : 1;
   return adequacy;
 }
 
@@ -126,7 +127,8 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
       if (difference.size() != t || !difference.allFinite()) {
         return absl::InvalidArgumentError("diagnosis: a signature does not fit the histories");
       }
-      Direction direction{.whitened = whitened->factor.matrixL().solve(difference), .square = 0, .along = {}};
+      Direction direction{
+          .whitened = whitened->factor.matrixL().solve(difference), .square = 0, .along = {}};
       direction.square = direction.whitened.squaredNorm();
       direction.along = whitened->points.transpose() * direction.whitened;
       own.push_back(std::move(direction));
@@ -156,10 +158,10 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   std::vector<Eigen::VectorXd> visible;  // what no choice of the parameters imitates
   const double excess = std::max(adequacy->chi2 - adequacy->degrees, 1.0);
   const boost::math::normal normal;
-  const double reach = boost::math::quantile(normal, 1 - options.level /
-                                                             static_cast<double>(std::max<std::size_t>(
-                                                                 1, candidates.size()))) +
-                       boost::math::quantile(normal, 0.9);
+  const double reach =
+      boost::math::quantile(normal, 1 - options.level / static_cast<double>(std::max<std::size_t>(
+                                                            1, candidates.size()))) +
+      boost::math::quantile(normal, 0.9);
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     Score score{.name = candidates[c].name};
     const Fit fit = BestFit(directions[c], whitened->squares, nullptr, candidates[c].two_sided,
@@ -181,8 +183,7 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
       Index imitation = 0;
       (whitened->squares - 2 * (whitened->points.transpose() * (fitted + direction.whitened)))
           .minCoeff(&imitation);
-      const Eigen::VectorXd rest =
-          fitted + direction.whitened - whitened->points.col(imitation);
+      const Eigen::VectorXd rest = fitted + direction.whitened - whitened->points.col(imitation);
       if (rest.squaredNorm() > strongest.squaredNorm()) strongest = rest;
     }
     const double norm = strongest.norm();
@@ -232,6 +233,36 @@ absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, in
   double square = 0;
   for (const double sum : sums) square += (sum - mean) * (sum - mean);
   return Advantage{.nats = difference.sum(), .sd = std::sqrt(square)};
+}
+
+absl::StatusOr<double> LeftOutError(const FittedModel& model, const std::vector<int>& group) {
+  const Index t = model.histories.cols();
+  const std::set<int> groups(group.begin(), group.end());
+  if (static_cast<Index>(group.size()) != t || groups.size() < 2) {
+    return absl::InvalidArgumentError(
+        "diagnosis: leaving out needs two groups of readings or more");
+  }
+  // The model at some of the readings.
+  const auto at = [&model](const std::vector<Index>& readings) {
+    return FittedModel{.histories = model.histories(Eigen::all, readings),
+                       .covariance = model.covariance(readings, readings),
+                       .parameters = model.parameters};
+  };
+  double sum = 0;
+  for (const int one : groups) {
+    std::vector<Index> own;
+    std::vector<Index> others;
+    for (Index k = 0; k < t; ++k)
+      (group[static_cast<std::size_t>(k)] == one ? own : others).push_back(k);
+    const auto fitted = Whiten(at(others));
+    if (!fitted.ok()) return fitted.status();
+    const auto judged = Whiten(at(own));
+    if (!judged.ok()) return judged.status();
+    Index best = 0;
+    fitted->squares.minCoeff(&best);
+    sum += judged->squares[best];
+  }
+  return std::sqrt(sum / static_cast<double>(t));
 }
 
 }  // namespace calib::inference

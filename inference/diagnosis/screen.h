@@ -22,8 +22,8 @@ struct FittedModel {
 /// How an effect would change the histories.
 struct Signature {
   std::string name{};                          ///< of the effect
-  std::vector<Eigen::VectorXd> differences{};  ///< T each: with minus without the effect, one per ray
-                                             ///< and strength tried
+  std::vector<Eigen::VectorXd> differences{};  ///< T each: with minus without the effect, one per
+                                               ///< ray and strength tried
   bool two_sided = false;
 };
 
@@ -51,9 +51,9 @@ struct Score {
 };
 
 struct ScreenOptions {
-  int simulations = 500;      ///< of the null, [50, 1e5]
-  double max_amplitude = 4;   ///< of a difference, > 0
-  double level = 0.01;        ///< of the test, (0, 0.5)
+  int simulations = 500;     ///< of the null, [50, 1e5]
+  double max_amplitude = 4;  ///< of a difference, > 0
+  double level = 0.01;       ///< of the test, (0, 0.5)
   std::uint64_t seed = 0;
 };
 
@@ -72,5 +72,11 @@ struct Advantage {
   double sd = 0;
 };
 absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, int block = 8);
+
+/// rms over all readings of what the model misses of a group of them when it is fitted to the other
+/// groups only, in standard deviations of a measurement: a model that is merely more flexible does
+/// not gain by it. group: T entries, of each reading; two groups at least. Errors:
+/// INVALID_ARGUMENT.
+absl::StatusOr<double> LeftOutError(const FittedModel& model, const std::vector<int>& group);
 
 }  // namespace calib::inference

@@ -21,7 +21,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInsignificantShare = 1e-3;
 constexpr double kNegligibleWeight =
-    1e-4;  // of a component: fewer than one in ten thousand samples
+    1e-4;                              // of a component: fewer than one in ten thousand samples
+constexpr double kWorthOfDraws = 100;  // draws of an emulator know no more than its runs
+constexpr double kWidening = 2;        // of their sd: an emulator is good inside its runs only
 
 // Indices, ascending, of the samples that matter: the lightest, which hold a thousandth of the
 // weight together and are often most of the samples, are left out. It costs the proposal nothing
@@ -96,6 +98,41 @@ int MostComponents(const FilterOptions& options, const WeightedPoints& points) {
   const double least_size = std::max(10.0, 2.0 * static_cast<double>(points.points.rows()));
   const int affordable = static_cast<int>(points.counts.sum() / least_size);
   return std::clamp(affordable, 1, options.max_components);
+}
+
+// ln of the mixture's mass inside the support of the parameters left free.
+double LogMassOf(const Proposal& proposal, const JointPrior& priors,
+                 const std::vector<Eigen::Index>& free) {
+  return free.size() < priors.size() ? LogMassInSupport(proposal.components, priors.Of(free))
+                                     : LogMassInSupport(proposal.components, priors);
+}
+
+// The parameters left free.
+std::vector<Eigen::Index> FreeOf(const JointPrior& priors,
+                                 const std::vector<std::optional<double>>& frozen) {
+  std::vector<Eigen::Index> free;
+  for (std::size_t j = 0; j < priors.size(); ++j) {
+    if (frozen.empty() || !frozen[j]) free.push_back(static_cast<Eigen::Index>(j));
+  }
+  return free;
+}
+
+// points: of the free parameters.
+absl::StatusOr<Proposal> FitMixture(const JointPrior& priors, const FilterOptions& options,
+                                    const WeightedPoints& points, std::size_t iterations,
+                                    const std::vector<std::optional<double>>& frozen) {
+  const auto mixture =
+      FitDirichletMixture(points, {.max_components = MostComponents(options, points),
+                                   .concentration = options.concentration,
+                                   .seed = options.seed,
+                                   .stream = iterations});
+  if (!mixture.ok()) return mixture.status();
+  Proposal proposal;
+  proposal.components = mixture->Predictive(kNegligibleWeight);
+  proposal.defensive_share = options.defensive_share;
+  proposal.frozen = frozen;
+  proposal.log_acceptance = LogMassOf(proposal, priors, FreeOf(priors, frozen));
+  return proposal;
 }
 
 }  // namespace
@@ -174,29 +211,33 @@ absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& da
   if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
   const auto ensemble = MakeEnsemble(priors, data, options, iterations);
   if (!ensemble.ok()) return ensemble.status();
-  std::vector<Eigen::Index> free;
-  for (std::size_t j = 0; j < priors.size(); ++j) {
-    if (frozen.empty() || !frozen[j]) free.push_back(static_cast<Eigen::Index>(j));
-  }
   const Eigen::VectorXd log_weights =
       TemperedLogWeights(*ensemble, TemperingExponent(options, *ensemble));
-  const WeightedPoints points = Standardized(priors, free, ensemble->parameters, log_weights);
-  const auto mixture =
-      FitDirichletMixture(points, {.max_components = MostComponents(options, points),
-                                   .concentration = options.concentration,
-                                   .seed = options.seed,
-                                   .stream = iterations.size()});
-  if (!mixture.ok()) return mixture.status();
+  const WeightedPoints points =
+      Standardized(priors, FreeOf(priors, frozen), ensemble->parameters, log_weights);
+  return FitMixture(priors, options, points, iterations.size(), frozen);
+}
 
-  Proposal proposal;
-  proposal.components = mixture->Predictive(kNegligibleWeight);
-  proposal.defensive_share = options.defensive_share;
-  if (free.size() < priors.size()) {
-    proposal.frozen = frozen;
-    proposal.log_acceptance = LogMassInSupport(proposal.components, priors.Of(free));
-  } else {
-    proposal.log_acceptance = LogMassInSupport(proposal.components, priors);
+absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const FilterOptions& options,
+                                            const Eigen::MatrixXd& draws, std::size_t iterations,
+                                            const std::vector<std::optional<double>>& frozen) {
+  if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
+  const Eigen::Index n = draws.rows();
+  if (n == 0 || draws.cols() != static_cast<Eigen::Index>(priors.size())) {
+    return absl::InvalidArgumentError(absl::StrCat("a proposal cannot be fitted to ", n, " x ",
+                                                   draws.cols(), " draws of ", priors.size(),
+                                                   " parameters."));
   }
+  const Eigen::VectorXd equal = Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
+  const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
+  WeightedPoints points = Standardized(priors, free, draws, equal);
+  points.counts *= std::min(1.0, kWorthOfDraws / points.counts.sum());
+  auto proposal = FitMixture(priors, options, points, iterations, frozen);
+  if (!proposal.ok()) return proposal;
+  for (MixtureComponent& component : proposal->components) {
+    component.covariance *= kWidening * kWidening;
+  }
+  proposal->log_acceptance = LogMassOf(*proposal, priors, free);
   return proposal;
 }
 

@@ -38,6 +38,18 @@ double Quantile(const QuantityPrediction& prediction, Index t, double p) {
   return low + 0.5 * (high - low);
 }
 
+void SetQuantiles(QuantityPrediction& result) {
+  const Index t = result.mean.size();
+  result.q05.resize(t);
+  result.q50.resize(t);
+  result.q95.resize(t);
+  for (Index k = 0; k < t; ++k) {
+    result.q05[k] = Quantile(result, k, 0.05);
+    result.q50[k] = Quantile(result, k, 0.5);
+    result.q95[k] = Quantile(result, k, 0.95);
+  }
+}
+
 }  // namespace
 
 absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parameters,
@@ -86,15 +98,16 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
     const Eigen::VectorXd shrink = (raw > 0).select(own / raw.max(1e-300), 0.0).sqrt();
     result.conditional_mean = (fitted * shrink.asDiagonal()).rowwise() + result.mean.transpose();
   }
-  result.q05.resize(t);
-  result.q50.resize(t);
-  result.q95.resize(t);
-  for (Index k = 0; k < t; ++k) {
-    result.q05[k] = Quantile(result, k, 0.05);
-    result.q50[k] = Quantile(result, k, 0.5);
-    result.q95[k] = Quantile(result, k, 0.95);
-  }
+  SetQuantiles(result);
   return result;
+}
+
+QuantityPrediction WithModelError(QuantityPrediction prediction, const Eigen::VectorXd& sd) {
+  for (Eigen::VectorXd* own : {&prediction.sd, &prediction.sd_model, &prediction.conditional_sd}) {
+    *own = (own->array().square() + sd.array().square()).sqrt();
+  }
+  SetQuantiles(prediction);
+  return prediction;
 }
 
 Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, double level) {

@@ -32,6 +32,10 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
                                                    const Eigen::MatrixXd& runs,
                                                    const Eigen::VectorXd& error_sd);
 
+/// The prediction with a further error of the model of standard deviation sd (T, >= 0),
+/// independent of scatter and parameters: it joins sd_model, sd and the quantiles, not the mean.
+QuantityPrediction WithModelError(QuantityPrediction prediction, const Eigen::VectorXd& sd);
+
 /// Pr(Q_t >= level) for each of the T quantities                                       [Eqs. 11,
 /// 12]
 Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, double level);

@@ -7,6 +7,7 @@
 #include "dem/catalog/catalog.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/read_prior.h"
+#include "server/campaign/read_user_effects.h"
 #include "server/campaign/suggestion.h"
 
 namespace calib::campaign {
@@ -24,7 +25,7 @@ std::vector<ModelParameter> ParametersOf(const dem::Model& model) {
     for (const dem::ParameterInfo& info : contact->parameters) all.push_back({info.name, &info});
   }
   for (const std::string& name : model.effects) {
-    const dem::EffectInfo* effect = dem::FindEffect(name);
+    const dem::EffectInfo* effect = dem::FindEffect(model.user_effects, name);
     if (effect == nullptr) continue;
     for (const dem::ParameterInfo& info : effect->parameters) {
       all.push_back({name + "." + info.name, &info});
@@ -64,7 +65,7 @@ std::string UnknownParameter(const std::string& name, const dem::Model& model) {
                                      model.effects.empty() ? "" : " with " + Listed(model.effects));
   const std::size_t dot = name.find('.');
   const std::string effect = name.substr(0, dot);
-  if (dot != std::string::npos && dem::FindEffect(effect) != nullptr &&
+  if (dot != std::string::npos && dem::FindEffect(model.user_effects, effect) != nullptr &&
       std::find(model.effects.begin(), model.effects.end(), effect) == model.effects.end()) {
     return absl::StrCat(message, "; add ", effect, " to model.effects to use it");
   }
@@ -76,9 +77,12 @@ void ReadEffects(MapReader& map, dem::Model& model) {
   if (!names) return;
   if (*names == std::vector<std::string>{"none"}) names->clear();
   for (const std::string& name : *names) {
-    const dem::EffectInfo* effect = dem::FindEffect(name);
+    const dem::EffectInfo* effect = dem::FindEffect(model.user_effects, name);
     if (effect == nullptr) {
-      const std::vector<std::string> offered = NamesOf(dem::Effects());
+      std::vector<std::string> offered;
+      for (const dem::EffectInfo* info : dem::AllEffects(model.user_effects)) {
+        offered.push_back(info->name);
+      }
       map.Problem("effects", absl::StrCat(Quoted(name), " is not an effect of this build; ",
                                           Suggestion(name, offered)));
       // With the effect that was probably meant its parameters are no further problems.
@@ -102,7 +106,8 @@ void ReadFixed(MapReader& map, dem::Model& model) {
   auto fixed = map.Map("fixed");
   if (!fixed) return;
   for (const std::string& name : fixed->Keys()) {
-    const dem::ParameterInfo* info = dem::FindParameter(model.contact, model.effects, name);
+    const dem::ParameterInfo* info =
+        dem::FindParameter(model.user_effects, model.contact, model.effects, name);
     if (info == nullptr) {
       fixed->Ignore({name});
       if (!model.contact.empty()) fixed->Problem(name, UnknownParameter(name, model));
@@ -142,8 +147,8 @@ void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign)
     campaign.parameters.push_back(parameter);
     return;
   }
-  const dem::ParameterInfo* info =
-      dem::FindParameter(campaign.model.contact, campaign.model.effects, name);
+  const dem::ParameterInfo* info = dem::FindParameter(
+      campaign.model.user_effects, campaign.model.contact, campaign.model.effects, name);
   if (info == nullptr) {
     if (!campaign.model.contact.empty()) {
       parameters.Problem(name, UnknownParameter(name, campaign.model));
@@ -208,8 +213,8 @@ void ReadModel(MapReader& campaign_map, Campaign& campaign) {
   if (node == nullptr) return;
   MapReader map(*node, campaign_map.PathOf("model"), campaign_map.problems());
   if (map.Has("precomputed")) {
-    map.Ignore(
-        {"precomputed", "contact", "effects", "density", "fixed"});  // read with the experiments
+    map.Ignore({"precomputed", "contact", "effects", "user_effects", "density",
+                "fixed"});  // read with the experiments
     campaign.precomputed.emplace();
     map.Finish();
     return;
@@ -220,6 +225,7 @@ void ReadModel(MapReader& campaign_map, Campaign& campaign) {
   if (map.Require("contact", "one of " + Listed(contacts)) != nullptr) {
     model.contact = map.Choice("contact", contacts).value_or("");
   }
+  ReadUserEffects(map, model);
   ReadEffects(map, model);
   model.density =
       map.Quantity("density", "kg/m^3", {.min = 0, .min_open = true}).value_or(model.density);

@@ -45,11 +45,13 @@ class Converter {
  private:
   void AppendEntry(const YAML::Node& key, const YAML::Node& value, int depth, YamlNode& tree) {
     const int line = key.Mark().line >= 0 ? key.Mark().line + 1 : tree.line;
-    if (!key.IsScalar()) {
+    if (!key.IsScalar() && !key.IsNull()) {
       error = YamlError{line, "has a key that is a list or a map; keys are names"};
       return;
     }
-    tree.entries.push_back({key.Scalar(), line, Convert(value, line, depth + 1)});
+    // The word null is a name here, as of a parameter's null value.
+    tree.entries.push_back(
+        {key.IsNull() ? "null" : key.Scalar(), line, Convert(value, line, depth + 1)});
   }
 
   int nodes_ = 0;

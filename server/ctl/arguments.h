@@ -27,11 +27,12 @@ struct Arguments {
   std::vector<std::string> set;      ///< NAME=VALUE
   std::vector<std::string> effects;  ///< to join the model
   int max_effects = 3;
-  std::string test;                 ///< file with the tests to predict
-  int draws = 20;                   ///< of the posterior, to predict from
-  std::vector<std::string> exceed;  ///< OBSERVABLE=LEVEL
-  std::string output;               ///< file or folder; empty: standard output
-  std::string vtk;                  ///< folder
+  std::optional<std::int64_t> max_evaluations;  ///< of improve
+  std::string test;                             ///< file with the tests to predict
+  int draws = 20;                               ///< of the posterior, to predict from
+  std::vector<std::string> exceed;              ///< OBSERVABLE=LEVEL
+  std::string output;                           ///< file or folder; empty: standard output
+  std::string vtk;                              ///< folder
 };
 
 }  // namespace calib::ctl

@@ -33,8 +33,8 @@ std::string Apply(const std::string& assignment, const campaign::Campaign& campa
                         " is not NAME=VALUE, e.g. --set young_modulus='2 GPa'");
   }
   const std::string name = assignment.substr(0, equals);
-  const dem::ParameterInfo* info =
-      dem::FindParameter(campaign.model.contact, campaign.model.effects, name);
+  const dem::ParameterInfo* info = dem::FindParameter(
+      campaign.model.user_effects, campaign.model.contact, campaign.model.effects, name);
   if (info == nullptr) {
     return absl::StrCat("--set ", name, ": the model has no such parameter; ",
                         campaign::Suggestion(name, KnownNames(campaign)));

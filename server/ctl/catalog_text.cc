@@ -25,8 +25,9 @@ std::string ParameterTable(const std::vector<dem::ParameterInfo>& parameters) {
     };
     table.AddRow(
         {"  " + p.name, Units(p), report::Number(p.min, 3) + " .. " + report::Number(p.max, 3),
-         p.default_prior.kind + " " + shown(p.default_prior.min) + " .. " +
-             shown(p.default_prior.max),
+         p.default_prior.kind.empty() ? ""
+                                      : p.default_prior.kind + " " + shown(p.default_prior.min) +
+                                            " .. " + shown(p.default_prior.max),
          p.default_value ? report::Number(*p.default_value)
                          : (p.alternative_to.empty() ? "" : "instead of " + p.alternative_to)});
   }

@@ -130,10 +130,15 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->add_option("--effect", b.arguments().effects, "name, as shown by `calibctl effects`")
       ->required()
       ->allow_extra_args(false);
-  b.AddOnCampaign("improve", &Improve,
-                  "Compare, diagnose, extend until the misfit is explained or nothing helps")
-      ->add_option("--max-effects", b.arguments().max_effects, "at most so many are added [3]")
+  auto* improve =
+      b.AddOnCampaign("improve", &Improve,
+                      "Compare, diagnose, extend until the misfit is explained or nothing helps");
+  improve->add_option("--max-effects", b.arguments().max_effects, "at most so many are added [3]")
       ->check(CLI::Range(1, 10));
+  improve
+      ->add_option("--max-evaluations", b.arguments().max_evaluations,
+                   "no calibration is begun after so many model evaluations")
+      ->check(CLI::PositiveNumber);
   auto* predict = b.AddOnCampaign(
       "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance");
   predict
@@ -163,7 +168,9 @@ void AddOtherVerbs(Builder& b) {
   b.Add("drain", &Drain, "Let a worker finish what it does and leave", "drain node1-4711")
       ->add_option("WORKER", b.arguments().worker, "name, as shown by `calibctl workers`")
       ->required();
-  b.Add("effects", &Effects, "Physical effects this build offers", "effects");
+  b.Add("effects", &Effects, "Physical effects this build offers", "effects")
+      ->add_option("--campaign", b.arguments().file,
+                   "file of a campaign, whose user_effects are listed too");
   b.Add("tests", &Tests, "Lab tests this build offers", "tests");
   b.Add("contacts", &Contacts, "Contact laws this build offers", "contacts");
 }

@@ -2,97 +2,60 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iostream>
+#include <map>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
-#include "server/campaign/derive.h"
-#include "server/ctl/extension.h"
+#include "server/ctl/effect_screen.h"
+#include "server/ctl/fitted_campaign.h"
+#include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
+#include "server/ctl/warm_fits.h"
 
 namespace calib::ctl {
 namespace {
 
-using Eigen::Index;
-using report::RunsOf;
-using report::RunTable;
-
-constexpr int kMostRuns = 4;           // of one effect in the screen, or
-constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all effects
 constexpr std::size_t kWarmFits = 3;
-constexpr int kWarmIterations = 3;
-constexpr int kWarmMore = 2;  // iterations at a time, where the fit cannot be judged yet
-constexpr int kMostWarmIterations = 11;
-constexpr int kWarmShare = 2;  // times the campaign's evaluations, for all of these
-constexpr int kLeastWarmSamples = 16;
-constexpr double kNotExcluded = 3;      // times the rms of the best: a fit not judged yet
 constexpr double kClearlyCloser = 0.8;  // of the base model's rms
 constexpr std::size_t kMostNames = 3;
-
-// One step away from the model without the effect.
-struct Step {
-  const dem::StrengthRay* ray = nullptr;
-  double step = 0;
-};
-
-std::vector<Step> StepsOf(const dem::EffectInfo& effect, std::size_t rows) {
-  std::vector<Step> steps;
-  for (const dem::StrengthRay& ray : effect.rays) {
-    if (effect.rays.size() == 1 && rows > 1) steps.push_back({&ray, ray.steps[0]});
-    steps.push_back({&ray, ray.steps[1]});
-  }
-  if (steps.size() > rows) steps.resize(rows);
-  return steps;
-}
+constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
 
 class Inquiry {
  public:
   Inquiry(Laboratory& laboratory, const report::CampaignView& view, const DiagnosisOptions& options)
       : laboratory_(laboratory),
-        view_(view),
         options_(options),
-        table_(RunsOf(view)),
-        state_(ReferenceOf(view)) {}
+        base_(laboratory, view),
+        screen_(base_),
+        fits_(base_, response_.run_covariance, response_.parts) {}
 
   absl::StatusOr<Diagnosis> Run() {
-    diagnosis_.campaign = view_.status.campaign();
+    diagnosis_.campaign = base_.id();
     if (auto possible = CheckPossible(); !possible.ok()) return possible;
-    if (!options_.only_adequacy) {
-      if (auto status = MeasureNuisance(); !status.ok()) return status;
+    const bool elsewhere = base_.view().campaign.precomputed.has_value();
+    if (!options_.only_adequacy && !elsewhere) {
+      auto nuisance = screen_.MeasureNuisance();
+      if (!nuisance.ok()) return nuisance.status();
+      nuisance_ = *std::move(nuisance);
     }
-    auto base = RespondTo(view_, nuisance_);
-    if (!base.ok()) return base.status();
-    base_ = *std::move(base);
-    const auto adequacy = inference::TestAdequacy(base_.model);
-    if (!adequacy.ok()) return adequacy.status();
-    diagnosis_.adequacy = *adequacy;
-    diagnosis_.emulator_error = base_.emulator_error;
-    diagnosis_.scatter = base_.scatter;
-    const auto t = static_cast<double>(base_.model.histories.cols());
-    diagnosis_.rms = base_.model.histories.row(adequacy->best).norm() / std::sqrt(t);
-    if (!base_.trustworthy) {
-      return absl::FailedPreconditionError(absl::StrCat(
-          "the emulator misses the runs of ", diagnosis_.campaign,
-          " by more than twice the noise beyond their scatter, too much to judge the model by; run "
-          "more samples"));
-    }
-    const bool fits = adequacy->p_value >= options_.level;
+    if (auto status = JudgeBase(); !status.ok()) return status;
+    const bool fits = diagnosis_.adequacy.p_value >= options_.level;
     if (options_.only_adequacy) {
       diagnosis_.verdict = fits ? "adequate" : "unexplained";
       return diagnosis_;
     }
-    if (auto status = ScreenEffects(); !status.ok()) return status;
-    const bool hinted = !scores_.empty() && scores_.front().adjusted < options_.level;
+    if (auto status = elsewhere ? ScreenReadings() : ScreenEffects(); !status.ok()) return status;
+    const bool hinted =
+        !diagnosis_.candidates.empty() && diagnosis_.candidates.front().p_value < options_.level;
     if (fits && !hinted) {
       diagnosis_.verdict = "adequate";
       return diagnosis_;
     }
+    diagnosis_.left_out_error = LeftOut(elsewhere ? response_.model : fits_.BaseByRuns());
     if (auto status = FitWarm(); !status.ok()) return status;
     Conclude(fits);
-    if (options_.next_experiment && diagnosis_.verdict != "adequate") {
+    if (options_.next_experiment && !elsewhere && diagnosis_.verdict != "adequate") {
       if (auto status = PlanNext(); !status.ok()) return status;
     }
     return diagnosis_;
@@ -100,194 +63,134 @@ class Inquiry {
 
  private:
   absl::Status CheckPossible() const {
-    const std::string& id = view_.status.campaign();
-    if (view_.posterior.posterior_from().empty() || view_.posterior.posterior_from() == "none") {
+    const report::CampaignView& view = base_.view();
+    const std::string& id = base_.id();
+    if (view.posterior.posterior_from().empty() || view.posterior.posterior_from() == "none") {
       return absl::FailedPreconditionError(
           absl::StrCat("campaign ", id,
                        " has no posterior, so nothing can be said about its model: see "
                        "`calibctl posterior ",
                        id, "`"));
     }
-    if (view_.campaign.filter.noise != inference::NoiseMode::kGiven) {
+    if (view.campaign.filter.noise != inference::NoiseMode::kGiven) {
       return absl::FailedPreconditionError(
           absl::StrCat("campaign ", id,
                        " states no size of the errors (noise is inferred or "
                        "tempered), so its model cannot be judged; give the noise"));
     }
-    if (view_.campaign.precomputed && !options_.only_adequacy) {
-      return absl::FailedPreconditionError(absl::StrCat(
-          "the runs of ", id, " were made elsewhere; effects cannot be tried on them"));
-    }
-    if (table_.sample.empty()) {
+    if (base_.runs().sample.empty()) {
       return absl::FailedPreconditionError(absl::StrCat("no sample of ", id, " has finished"));
     }
     return absl::OkStatus();
   }
 
-  int FittedExperiments() const {
-    return static_cast<int>(
-        std::count_if(view_.campaign.experiments.begin(), view_.campaign.experiments.end(),
-                      [](const auto& e) { return e.role == campaign::Role::kCalibrate; }));
-  }
-
-  // Rows of the table, best first: runs that exist and fit best; the emulator's best point is near.
-  std::vector<Index> BestRuns(std::size_t count) const {
-    std::vector<Index> order(table_.sample.size());
-    for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Index>(i);
-    std::stable_sort(order.begin(), order.end(), [this](Index a, Index b) {
-      return table_.histories.row(a).squaredNorm() < table_.histories.row(b).squaredNorm();
-    });
-    order.resize(std::min(order.size(), count));
-    return order;
-  }
-
-  campaign::Derivation::Row RowLike(Index run) const {
-    campaign::Derivation::Row row{.like = table_.sample[static_cast<std::size_t>(run)],
-                                  .values = {}};
-    for (std::size_t j = 0; j < view_.campaign.parameters.size(); ++j) {
-      row.values[view_.campaign.parameters[j].name] = table_.parameters(run, static_cast<Index>(j));
-    }
-    return row;
-  }
-
-  campaign::Derivation Derived(const std::string& purpose, const std::string& what) const {
-    return {.name = absl::StrCat(view_.campaign.name, ": ", what),
-            .lineage = {.parent = view_.status.campaign(), .purpose = purpose},
-            .effects = {},
-            .parameters = {},
-            .fixed = {},
-            .held_out = false,
-            .samples = std::nullopt,
-            .max_iterations = std::nullopt,
-            .first_proposal = std::nullopt,
-            .rows = {}};
-  }
-
-  absl::StatusOr<report::CampaignView> RunDerived(const campaign::Derivation& derivation,
-                                                  const std::string& what) {
-    const auto text = campaign::Derive(view_.source.campaign_file(), derivation);
-    if (!text.ok()) return text.status();
-    return laboratory_.Run(view_, *text, what);
-  }
-
-  // Curves depend on the rate of staging: what twice the rate changes is no physics.
-  absl::Status MeasureNuisance() {
-    const bool given = std::any_of(
-        view_.campaign.experiments.begin(), view_.campaign.experiments.end(),
-        [](const auto& e) { return e.staging.rate && e.role == campaign::Role::kCalibrate; });
-    if (!given) return absl::OkStatus();
-    const Index best = BestRuns(1).front();
-    campaign::Derivation derivation = Derived("nuisance", "twice the rate");
-    derivation.rate_factor = 2;
-    derivation.rows = {RowLike(best)};
-    const auto view = RunDerived(derivation, "influence of the loading rate");
-    if (!view.ok()) return view.status();
-    diagnosis_.screen_evaluations += FittedExperiments();
-    const RunTable runs = RunsOf(*view);
-    if (!runs.sample.empty()) {
-      nuisance_.emplace_back((runs.histories.row(0) - table_.histories.row(best)).transpose());
+  absl::Status JudgeBase() {
+    auto response = RespondTo(base_.view(), nuisance_);
+    if (!response.ok()) return response.status();
+    response_ = *std::move(response);
+    const auto adequacy = inference::TestAdequacy(response_.model);
+    if (!adequacy.ok()) return adequacy.status();
+    diagnosis_.adequacy = *adequacy;
+    diagnosis_.emulator_error = response_.emulator_error;
+    diagnosis_.scatter = response_.scatter;
+    diagnosis_.rms = response_.model.histories.row(adequacy->best).norm() /
+                     std::sqrt(static_cast<double>(response_.model.histories.cols()));
+    if (!response_.trustworthy) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "the emulator misses the runs of ", base_.id(),
+          " by more than twice the noise beyond their scatter, too much to judge the model by; run "
+          "more samples"));
     }
     return absl::OkStatus();
   }
 
-  // Why the tests cannot show an effect; empty: they can.
-  std::string WhyNotExcitable(const dem::EffectInfo& effect) const {
-    std::set<double> pressures;
-    bool excited = false;
-    for (const campaign::Experiment& e : view_.campaign.experiments) {
-      if (e.role != campaign::Role::kCalibrate) continue;
-      const auto pressure = e.settings.find("confining_pressure");
-      if (pressure != e.settings.end()) pressures.insert(pressure->second);
-      excited = excited || effect.excited_by.empty() ||
-                std::find(effect.excited_by.begin(), effect.excited_by.end(), e.test) !=
-                    effect.excited_by.end();
-    }
-    if (!excited) return "none of the fitted tests can show it";
-    if (effect.across_pressures && pressures.size() < 2) {
-      return "it shows only between tests at different pressures";
-    }
-    return effect.rays.empty() ? "the catalogue gives no strength to try" : "";
+  std::optional<double> LeftOut(const inference::FittedModel& model) const {
+    const auto error = inference::LeftOutError(model, response_.parts);
+    return error.ok() ? std::optional<double>(*error) : std::nullopt;
   }
 
   absl::Status ScreenEffects() {
-    std::vector<const dem::EffectInfo*> effects;
-    for (const dem::EffectInfo& effect : dem::Effects()) {
-      if (!WhyNotJoin(view_.campaign, effect.name).empty()) continue;
-      if (std::find(options_.without.begin(), options_.without.end(), effect.name) !=
-          options_.without.end()) {
-        diagnosis_.not_excitable.emplace_back(effect.name, "left out as asked for");
-        continue;
-      }
-      const std::string why = WhyNotExcitable(effect);
-      if (!why.empty()) {
-        diagnosis_.not_excitable.emplace_back(effect.name, why);
-      } else {
-        effects.push_back(&effect);
-      }
-    }
-    if (effects.empty()) return absl::OkStatus();
-    const int experiments = std::max(1, FittedExperiments());
-    const double share = kScreenShare * static_cast<double>(table_.sample.size()) * experiments /
-                         static_cast<double>(effects.size());
-    const auto rows = static_cast<std::size_t>(
-        std::clamp(static_cast<int>(std::max<double>(kMostRuns, share)) / experiments, 1, 2));
-    const std::vector<Index> runs = BestRuns(rows);
-    std::vector<inference::Signature> signatures;
-    for (const dem::EffectInfo* effect : effects) {
-      auto signature = SignatureOf(*effect, runs, rows);
-      if (!signature.ok()) return signature.status();
-      if (signature->differences.empty()) {
-        diagnosis_.not_excitable.emplace_back(effect->name, "runs with it diverge");
-      } else {
-        signatures.push_back(*std::move(signature));
-      }
-    }
-    auto scores = inference::Screen(base_.model, signatures,
-                                    {.level = options_.level, .seed = view_.campaign.filter.seed});
+    const auto signatures = screen_.MeasureSignatures(options_.without);
+    if (!signatures.ok()) return signatures.status();
+    diagnosis_.not_excitable = screen_.not_excitable();
+    diagnosis_.screen_evaluations = screen_.evaluations();
+    if (signatures->empty()) return absl::OkStatus();
+    const auto scores =
+        inference::Screen(response_.model, *signatures,
+                          {.level = options_.level, .seed = base_.view().campaign.filter.seed});
     if (!scores.ok()) return scores.status();
-    scores_ = *std::move(scores);
-    for (const inference::Score& score : scores_) AddCandidate(score);
+    for (const inference::Score& score : *scores) AddCandidate(score);
     return absl::OkStatus();
   }
 
-  // Pairs of runs with and without the effect. Parameters of the ray are given by the rows; what it
-  // holds goes along.
-  absl::StatusOr<inference::Signature> SignatureOf(const dem::EffectInfo& effect,
-                                                   const std::vector<Index>& runs,
-                                                   std::size_t rows) {
-    inference::Signature signature{
-        .name = effect.name, .differences = {}, .two_sided = effect.two_sided};
-    std::vector<Step>& tried = steps_[effect.name];
-    const std::vector<Step> steps = StepsOf(effect, rows);
-    for (std::size_t k = 0; k < steps.size(); ++k) {
-      // A campaign for each step: rays set different parameters.
-      const Index run = runs[std::min(k, runs.size() - 1)];
-      campaign::Derivation derivation =
-          Derived("screen", absl::StrCat(effect.name, ", step ", k + 1));
-      derivation.effects = {effect.name};
-      derivation.fixed = dem::ParametersOnRay(effect, *steps[k].ray, steps[k].step,
-                                              view_.campaign.model.contact, state_);
-      derivation.rows = {RowLike(run)};
-      const auto view = RunDerived(
-          derivation, absl::StrCat("screen of ", effect.name, " (", k + 1, "/", steps.size(), ")"));
-      if (!view.ok()) return view.status();
-      diagnosis_.screen_evaluations += FittedExperiments();
-      const RunTable with = RunsOf(*view);
-      if (with.sample.empty()) continue;
-      signature.differences.emplace_back(
-          (with.histories.row(0) - table_.histories.row(run)).transpose());
-      tried.push_back(steps[k]);
+  // Runs that were made elsewhere cannot be repeated with an effect; what happens to their readings
+  // can be calculated.
+  absl::Status ScreenReadings() {
+    const campaign::Campaign& campaign = base_.view().campaign;
+    const std::vector<ReadingEffect> effects =
+        EffectsOnReadings(campaign, response_.model.histories, diagnosis_.not_excitable);
+    std::vector<inference::Signature> signatures;
+    for (const ReadingEffect& effect : effects) {
+      if (signatures.empty() || signatures.back().name != effect.effect) {
+        signatures.push_back({.name = effect.effect,
+                              .differences = {},
+                              .two_sided = dem::FindEffect(effect.effect)->two_sided});
+      }
+      signatures.back().differences.emplace_back(
+          effect.change.row(diagnosis_.adequacy.best).transpose());
+      steps_on_readings_[effect.effect].push_back(&effect);
+      AdoptJoined(effect);
     }
-    return signature;
+    for (const dem::EffectInfo& effect : dem::Effects()) {
+      const auto judged = [&](const auto& entry) { return entry.first == effect.name; };
+      if (steps_on_readings_.count(effect.name) > 0 ||
+          std::any_of(diagnosis_.not_excitable.begin(), diagnosis_.not_excitable.end(), judged)) {
+        continue;
+      }
+      diagnosis_.not_excitable.emplace_back(
+          effect.name, "the runs were made elsewhere, none can be made with it");
+    }
+    const auto scores = inference::Screen(
+        response_.model, signatures,
+        {.max_amplitude = kMostUnits, .level = options_.level, .seed = campaign.filter.seed});
+    if (!scores.ok()) return scores.status();
+    for (const inference::Score& score : *scores) AddCandidate(score);
+    steps_on_readings_.clear();
+    return absl::OkStatus();
   }
 
-  // Strength in SI of a multiple of what was tried; held parameters are part of it.
-  std::map<std::string, double> StrengthOf(const std::string& name, std::size_t which,
+  // Of several strengths of an effect the one that comes closest is kept.
+  void AdoptJoined(const ReadingEffect& effect) {
+    const bool two_sided = dem::FindEffect(effect.effect)->two_sided;
+    Eigen::VectorXd strengths;
+    WarmFit fit;
+    fit.stalled = true;  // there is nothing to continue
+    fit.model = Join(response_.model, effect, two_sided ? -kMostUnits : 0, kMostUnits, strengths);
+    const auto adequacy = inference::TestAdequacy(fit.model);
+    const auto advantage = inference::Compare(fit.model, response_.model);
+    if (!adequacy.ok() || !advantage.ok()) return;
+    const WarmFit* before = fits_.Find(effect.effect);
+    if (before != nullptr && before->adequacy.chi2 <= adequacy->chi2) return;
+    fit.adequacy = *adequacy;
+    fit.over_base = *advantage;
+    fit.rms = fit.model.histories.row(adequacy->best).norm() /
+              std::sqrt(static_cast<double>(fit.model.histories.cols()));
+    fit.left_out_error = LeftOut(fit.model);
+    fit.best = PointOf(base_.view(), response_.points, adequacy->best);
+    fit.best[effect.parameter] = strengths[adequacy->best] * effect.unit;
+    fits_.Adopt(effect.effect, std::move(fit));
+  }
+
+  std::map<std::string, double> StrengthOf(const std::string& effect, std::size_t which,
                                            double multiple) const {
-    const dem::EffectInfo* effect = dem::FindEffect(name);
-    const Step& step = steps_.at(name)[which];
-    return dem::ParametersOnRay(*effect, *step.ray, step.step * multiple,
-                                view_.campaign.model.contact, state_);
+    const auto found = steps_on_readings_.find(effect);
+    if (found == steps_on_readings_.end()) return screen_.StrengthOf(effect, which, multiple);
+    const ReadingEffect& step = *found->second[which];
+    return {{step.parameter, step.unit * multiple}};
+  }
+  std::size_t DifferencesOf(const std::string& effect) const {
+    const auto found = steps_on_readings_.find(effect);
+    return found == steps_on_readings_.end() ? screen_.DifferencesOf(effect) : found->second.size();
   }
 
   void AddCandidate(const inference::Score& score) {
@@ -302,48 +205,23 @@ class Inquiry {
          .campaign = "",
          .refit_p_value = -1,
          .refit_chi2 = 0,
-         .over_base = {}});
+         .over_base = {},
+         .left_out_error = {}});
     if (std::isfinite(score.detectable)) {
-      const std::size_t last = steps_.at(score.name).size() - 1;
-      diagnosis_.detectable[score.name] = StrengthOf(score.name, last, score.detectable);
+      diagnosis_.detectable[score.name] =
+          StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
     }
   }
 
   absl::Status FitWarm() {
     const std::size_t count = std::min(kWarmFits, diagnosis_.candidates.size());
-    if (count == 0) return absl::OkStatus();
-    const auto runs = static_cast<int>(table_.sample.size());
-    const int samples =
-        std::max(kLeastWarmSamples, runs / (static_cast<int>(count) * kWarmIterations));
-    for (std::size_t c = 0; c < count; ++c) {
-      if (auto s = FitOne(diagnosis_.candidates[c], samples, kWarmIterations); !s.ok()) return s;
+    std::vector<std::string> effects;
+    for (std::size_t c = 0; c < count; ++c) effects.push_back(diagnosis_.candidates[c].effect);
+    if (!base_.view().campaign.precomputed) {
+      if (auto status = fits_.Fit(effects); !status.ok()) return status;
     }
-    // Where the emulator is not good enough to judge by, more iterations for the closest of them.
-    const std::int64_t limit = diagnosis_.warm_evaluations +
-                               static_cast<std::int64_t>(kWarmShare) * runs * FittedExperiments();
-    const std::int64_t cost = static_cast<std::int64_t>(samples) * kWarmMore * FittedExperiments();
-    std::map<std::string, int> iterations;
-    const bool misses = diagnosis_.adequacy.p_value < options_.level;
-    while (misses && diagnosis_.warm_evaluations + cost <= limit) {
-      CandidateEffect* closest = nullptr;
-      for (std::size_t c = 0; c < count; ++c) {
-        CandidateEffect& candidate = diagnosis_.candidates[c];
-        if (candidate.refit_p_value >= 0 ||
-            kWarmIterations + iterations[candidate.effect] + kWarmMore > kMostWarmIterations) {
-          continue;
-        }
-        if (closest == nullptr || candidate.predicted_rms_error < closest->predicted_rms_error) {
-          closest = &candidate;
-        }
-      }
-      // With an adequate one at hand the others need not be pursued.
-      if (closest == nullptr || AnyAdequate()) break;
-      iterations[closest->effect] += kWarmMore;
-      if (auto s = FitOne(*closest, samples, kWarmIterations + iterations[closest->effect]);
-          !s.ok()) {
-        return s;
-      }
-    }
+    diagnosis_.warm_evaluations = fits_.evaluations();
+    for (std::size_t c = 0; c < count; ++c) Describe(diagnosis_.candidates[c]);
     // Those that explain the readings, by how well; then the other fits, by how close they come.
     const auto rank = [this](const CandidateEffect& c) {
       return Explains(c) ? 0 : (c.campaign.empty() ? 2 : 1);
@@ -357,80 +235,73 @@ class Inquiry {
     return absl::OkStatus();
   }
 
-  bool Explains(const CandidateEffect& candidate) const {
-    return candidate.refit_p_value >= options_.level &&
-           candidate.over_base.nats > 2 * candidate.over_base.sd;
-  }
-  bool AnyAdequate() const {
-    return std::any_of(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
-                       [this](const CandidateEffect& c) { return Explains(c); });
-  }
-
-  // The model with the effect, refitted; refit_p_value stays below zero where the emulator of its
-  // runs is not good enough to judge by, predicted_rms_error is then that of the best run.
-  absl::Status FitOne(CandidateEffect& candidate, int samples, int iterations) {
-    const auto text = ExtensionText(view_, {.effects = {candidate.effect},
-                                            .purpose = "warm_fit",
-                                            .held_out = false,
-                                            .samples = samples,
-                                            .iterations = iterations});
-    if (!text.ok()) return text.status();
-    const auto view =
-        laboratory_.Run(view_, *text, absl::StrCat("warm fit with ", candidate.effect));
-    if (!view.ok()) return view.status();
-    candidate.campaign = view->status.campaign();
-    diagnosis_.warm_evaluations += view->status.model_evaluations();
-    const RunTable own = RunsOf(*view);
-    const auto readings = static_cast<double>(table_.histories.cols());
-    if (own.histories.rows() > 0) {
-      Index best = 0;
-      candidate.predicted_rms_error =
-          std::sqrt(own.histories.rowwise().squaredNorm().minCoeff(&best) / readings);
-      std::map<std::string, double> values;
-      for (Index j = 0; j < own.parameters.cols(); ++j) {
-        values[view->campaign.parameters[static_cast<std::size_t>(j)].name] =
-            own.parameters(best, j);
-      }
-      warm_.insert_or_assign(candidate.effect, WarmFit{.view = *view, .best = values});
-      for (const auto& [name, value] : values) {
-        if (name.starts_with(candidate.effect + ".")) candidate.amplitude[name] = value;
-      }
+  // What the warm fit of a candidate says.
+  void Describe(CandidateEffect& candidate) const {
+    if (fits_.Find(candidate.effect) == nullptr) return;
+    const WarmFit& fit = *fits_.Find(candidate.effect);
+    candidate.campaign = fit.view.status.campaign();
+    candidate.predicted_rms_error = fit.rms;
+    for (const auto& [name, value] : fit.best) {
+      if (name.starts_with(candidate.effect + ".")) candidate.amplitude[name] = value;
     }
-    const auto response =
-        RespondTo(*view, nuisance_, RunsWithoutEffect(table_, view_.campaign, view->campaign));
-    if (!response.ok() || !response->trustworthy) return absl::OkStatus();
-    const auto adequacy = inference::TestAdequacy(response->model);
-    const auto advantage = inference::Compare(response->model, base_.model);
-    if (!adequacy.ok() || !advantage.ok()) return absl::OkStatus();
-    candidate.refit_p_value = adequacy->p_value;
-    candidate.refit_chi2 = adequacy->chi2;
-    candidate.over_base = *advantage;
-    candidate.predicted_rms_error =
-        response->model.histories.row(adequacy->best).norm() / std::sqrt(readings);
+    candidate.refit_p_value = fit.adequacy.p_value;
+    candidate.refit_chi2 = fit.adequacy.chi2;
+    candidate.over_base = fit.over_base;
+    candidate.left_out_error = fit.left_out_error;
     candidate.explained_fraction =
-        std::clamp((diagnosis_.adequacy.chi2 - adequacy->chi2) /
+        std::clamp((diagnosis_.adequacy.chi2 - fit.adequacy.chi2) /
                        std::max(1.0, diagnosis_.adequacy.chi2 - diagnosis_.adequacy.degrees),
                    0.0, 1.0);
-    for (Index j = 0; j < response->points.cols(); ++j) {
-      const std::string& name = view->campaign.parameters[static_cast<std::size_t>(j)].name;
-      if (name.starts_with(candidate.effect + ".")) {
-        candidate.amplitude[name] = response->points(adequacy->best, j);
-      }
-    }
-    warm_.insert_or_assign(
-        candidate.effect,
-        WarmFit{.view = *view, .best = PointOf(*view, *response, adequacy->best)});
-    fitted_.insert_or_assign(candidate.effect, response->model);
-    return absl::OkStatus();
   }
 
-  static std::map<std::string, double> PointOf(const report::CampaignView& view,
-                                               const Response& response, Index row) {
-    std::map<std::string, double> values;
-    for (Index j = 0; j < response.points.cols(); ++j) {
-      values[view.campaign.parameters[static_cast<std::size_t>(j)].name] = response.points(row, j);
+  // Adequate, clearly better than the base model, and not worse on readings it was not fitted to.
+  bool Explains(const CandidateEffect& candidate) const {
+    const WarmFit* fit = fits_.Find(candidate.effect);
+    return fit != nullptr && fit->Explains(options_.level) &&
+           !(fit->left_out_error && diagnosis_.left_out_error &&
+             *fit->left_out_error > *diagnosis_.left_out_error);
+  }
+
+  bool ClearlyBetter(const WarmFit& a, const WarmFit& b) const {
+    const auto advantage = inference::Compare(a.model, b.model);
+    return advantage.ok() && advantage->nats > 2 * advantage->sd && advantage->nats > 0;
+  }
+
+  void Conclude(bool base_fits) {
+    if (diagnosis_.candidates.empty() || !Explains(diagnosis_.candidates.front())) {
+      diagnosis_.verdict = base_fits ? "adequate" : "unexplained";
+      if (!base_fits) diagnosis_.best_partial = Closest();
+      return;
     }
-    return values;
+    CandidateEffect& first = diagnosis_.candidates.front();
+    const WarmFit& best = *fits_.Find(first.effect);
+    // Those that do as well, and those whose fit is not at its end: they are not excluded.
+    std::vector<std::string> rivals;
+    for (const CandidateEffect& other : diagnosis_.candidates) {
+      const WarmFit* fit = fits_.Find(other.effect);
+      if (fit == nullptr || fit == &best) continue;
+      const bool excluded = fit->stalled && (!Explains(other) || ClearlyBetter(best, *fit));
+      if (!excluded && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
+    }
+    if (rivals.empty()) {
+      diagnosis_.verdict = "missing_effect";
+      diagnosis_.effect = first.effect;
+    } else {
+      diagnosis_.verdict = "ambiguous";
+      first.confusable_with = rivals;
+    }
+  }
+
+  // Judged or not: the fit that comes closest, if it comes clearly closer than the base model.
+  std::string Closest() const {
+    std::string name;
+    double lowest = kClearlyCloser * diagnosis_.rms;
+    for (const CandidateEffect& candidate : diagnosis_.candidates) {
+      if (candidate.campaign.empty() || candidate.predicted_rms_error >= lowest) continue;
+      name = candidate.effect;
+      lowest = candidate.predicted_rms_error;
+    }
+    return name;
   }
 
   // The named effect, or the best, against what comes next; the base model where there is no
@@ -438,93 +309,37 @@ class Inquiry {
   absl::Status PlanNext() {
     std::vector<Rival> rivals;
     for (const CandidateEffect& candidate : diagnosis_.candidates) {
-      const auto found = warm_.find(candidate.effect);
-      if (found == warm_.end() || rivals.size() >= kMostNames) continue;
-      const bool named =
-          diagnosis_.verdict != "ambiguous" || rivals.empty() ||
-          std::find(diagnosis_.candidates.front().confusable_with.begin(),
-                    diagnosis_.candidates.front().confusable_with.end(),
-                    candidate.effect) != diagnosis_.candidates.front().confusable_with.end();
+      const WarmFit* fit = fits_.Find(candidate.effect);
+      if (fit == nullptr || rivals.size() >= kMostNames) continue;
+      const auto& group = diagnosis_.candidates.front().confusable_with;
+      const bool named = diagnosis_.verdict != "ambiguous" || rivals.empty() ||
+                         std::find(group.begin(), group.end(), candidate.effect) != group.end();
       if (!named) continue;
-      rivals.push_back(
-          {.name = candidate.effect, .view = &found->second.view, .values = found->second.best});
+      rivals.push_back({.name = candidate.effect, .view = &fit->view, .values = fit->best});
       if (diagnosis_.verdict != "ambiguous" && rivals.size() == 2) break;
     }
     if (rivals.size() == 1) {
-      rivals.push_back({.name = "base",
-                        .view = &view_,
-                        .values = PointOf(view_, base_, diagnosis_.adequacy.best)});
+      rivals.push_back(
+          {.name = "base",
+           .view = &base_.view(),
+           .values = PointOf(base_.view(), response_.points, diagnosis_.adequacy.best)});
     }
-    auto next = PlanNextExperiment(laboratory_, rivals,
-                                   table_.sample[static_cast<std::size_t>(BestRuns(1).front())],
-                                   base_.scatter);
+    const auto like = static_cast<std::size_t>(base_.BestRuns(1).front());
+    auto next =
+        PlanNextExperiment(laboratory_, rivals, base_.runs().sample[like], response_.scatter);
     if (!next.ok()) return next.status();
     diagnosis_.next_experiment = *std::move(next);
     return absl::OkStatus();
   }
 
-  bool ClearlyBetter(const std::string& a, const std::string& b) const {
-    const auto advantage = inference::Compare(fitted_.at(a), fitted_.at(b));
-    return advantage.ok() && advantage->nats > 2 * advantage->sd && advantage->nats > 0;
-  }
-
-  void Conclude(bool base_fits) {
-    std::vector<std::string> adequate;
-    for (const CandidateEffect& candidate : diagnosis_.candidates) {
-      if (Explains(candidate)) {
-        adequate.push_back(candidate.effect);
-      }
-    }
-    if (adequate.empty()) {
-      diagnosis_.verdict = base_fits ? "adequate" : "unexplained";
-      // Judged or not: the one that comes closest, if it comes clearly closer than the base model.
-      const CandidateEffect* closest = nullptr;
-      for (const CandidateEffect& candidate : diagnosis_.candidates) {
-        if (candidate.campaign.empty()) continue;
-        const bool worse =
-            closest != nullptr && candidate.predicted_rms_error >= closest->predicted_rms_error;
-        if (!worse && candidate.predicted_rms_error < kClearlyCloser * diagnosis_.rms) {
-          closest = &candidate;
-        }
-      }
-      if (!base_fits && closest != nullptr) diagnosis_.best_partial = closest->effect;
-      return;
-    }
-    std::vector<std::string> rivals;
-    for (std::size_t k = 1; k < adequate.size(); ++k) {
-      if (!ClearlyBetter(adequate.front(), adequate[k])) rivals.push_back(adequate[k]);
-    }
-    CandidateEffect& first =
-        *std::find_if(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
-                      [&](const CandidateEffect& c) { return c.effect == adequate.front(); });
-    if (rivals.empty()) {
-      diagnosis_.verdict = "missing_effect";
-      diagnosis_.effect = first.effect;
-    } else {
-      diagnosis_.verdict = "ambiguous";
-      if (rivals.size() > kMostNames - 1) rivals.resize(kMostNames - 1);
-      first.confusable_with = rivals;
-    }
-    std::rotate(diagnosis_.candidates.begin(),
-                diagnosis_.candidates.begin() + (&first - diagnosis_.candidates.data()),
-                diagnosis_.candidates.begin() + (&first - diagnosis_.candidates.data()) + 1);
-  }
-
   Laboratory& laboratory_;
-  const report::CampaignView& view_;
   const DiagnosisOptions& options_;
-  RunTable table_;
-  dem::ReferenceState state_;
+  FittedCampaign base_;
   std::vector<Eigen::VectorXd> nuisance_;
-  Response base_;
-  std::map<std::string, std::vector<Step>> steps_;
-  std::vector<inference::Score> scores_;
-  std::map<std::string, inference::FittedModel> fitted_;
-  struct WarmFit {
-    report::CampaignView view;
-    std::map<std::string, double> best;
-  };
-  std::map<std::string, WarmFit> warm_;
+  Response response_;
+  EffectScreen screen_;
+  WarmFits fits_;
+  std::map<std::string, std::vector<const ReadingEffect*>> steps_on_readings_;
   Diagnosis diagnosis_;
 };
 

@@ -27,6 +27,7 @@ struct CandidateEffect {
   double refit_p_value = -1;  ///< adequacy of the extended model
   double refit_chi2 = 0;
   inference::Advantage over_base{};
+  std::optional<double> left_out_error{};  ///< see Diagnosis
 };
 
 struct Diagnosis {
@@ -39,6 +40,9 @@ struct Diagnosis {
   std::string best_partial;  ///< with unexplained: the effect that helps most, if any does
   inference::Adequacy adequacy;
   double rms = 0;  ///< of the best fit, residual over noise sd
+  /// rms of what the model misses of an experiment (or a stage, where there is one experiment) that
+  /// it was not fitted to, in sd of a measurement; none where there is nothing to leave out.
+  std::optional<double> left_out_error{};
   double emulator_error = 0, scatter = 0;
   std::int64_t screen_evaluations = 0, warm_evaluations = 0;
   std::optional<NextExperiment> next_experiment;

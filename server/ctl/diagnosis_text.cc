@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "dem/catalog/catalog.h"
@@ -15,6 +16,7 @@ using Json = nlohmann::json;
 using report::Number;
 
 Json OrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 Json CandidateJson(const CandidateEffect& c) {
   Json json = {{"effect", c.effect},
@@ -27,6 +29,7 @@ Json CandidateJson(const CandidateEffect& c) {
     json["warm_fit"] = {{"campaign", c.campaign},
                         {"p_value", c.refit_p_value < 0 ? Json(nullptr) : Json(c.refit_p_value)},
                         {"chi2", c.refit_chi2},
+                        {"left_out_error", OrNull(c.left_out_error)},
                         {"advantage_nats", c.over_base.nats},
                         {"advantage_sd", c.over_base.sd}};
   }
@@ -132,6 +135,7 @@ std::string DiagnosisJson(const Diagnosis& d) {
                  {"degrees", d.adequacy.degrees},
                  {"p_value", d.adequacy.p_value},
                  {"rms", d.rms},
+                 {"left_out_error", OrNull(d.left_out_error)},
                  {"emulator_error", d.emulator_error},
                  {"scatter", d.scatter}}}};
   if (d.verdict == "adequate") json["detectable"] = d.detectable;
@@ -147,17 +151,25 @@ std::string DiagnosisText(const Diagnosis& d) {
       Number(d.rms, 3), Number(d.adequacy.chi2, 4), Number(d.adequacy.degrees, 4),
       Number(d.adequacy.p_value, 2));
   if (!d.candidates.empty()) {
-    TextTable table(
-        {"<effect", "p (screen)", "explains", "rms with it", "refitted p", "<strength", "<like"});
+    TextTable table({"<effect", "p (screen)", "explains", "rms with it", "refitted p", "left out",
+                     "<strength", "<like"});
     for (const CandidateEffect& c : d.candidates) {
       std::string like;
       for (const std::string& name : c.confusable_with) like += (like.empty() ? "" : ", ") + name;
-      table.AddRow({c.effect, Number(c.p_value, 2), report::Percent(c.explained_fraction, 2),
-                    Number(c.predicted_rms_error, 3),
-                    c.refit_p_value < 0 ? "–" : Number(c.refit_p_value, 2), Strength(c.amplitude),
-                    like});
+      table.AddRow(
+          {c.effect, Number(c.p_value, 2), report::Percent(c.explained_fraction, 2),
+           Number(c.predicted_rms_error, 3), c.refit_p_value < 0 ? "–" : Number(c.refit_p_value, 2),
+           c.left_out_error ? Number(*c.left_out_error, 3) : "–", Strength(c.amplitude), like});
     }
     text += "\n" + table.ToString();
+    if (d.left_out_error) {
+      text += Wrapped(
+          fmt::format("Left out: rms of what a model misses of data it was not fitted to, one "
+                      "experiment or stage after the other, in sd of a measurement; {} without any "
+                      "of these effects.",
+                      Number(*d.left_out_error, 3)),
+          "", "");
+    }
   }
   if (d.verdict == "adequate" && !d.detectable.empty()) {
     text += "\nWould have been found with 90 % power from:\n";
@@ -165,8 +177,13 @@ std::string DiagnosisText(const Diagnosis& d) {
       text += fmt::format("  {}: {}\n", effect, Strength(strength));
     }
   }
+  std::map<std::string, std::string> by_reason;
   for (const auto& [effect, reason] : d.not_excitable) {
-    text += fmt::format("Not tried: {} ({}).\n", effect, reason);
+    std::string& names = by_reason[reason];
+    names += (names.empty() ? "" : ", ") + effect;
+  }
+  for (const auto& [reason, names] : by_reason) {
+    text += Wrapped(fmt::format("Not tried, because {}: {}.", reason, names), "", "  ");
   }
   if (d.next_experiment) text += NextText(*d.next_experiment);
   text += fmt::format("{} model evaluations for the screen, {} for warm fits.\n",

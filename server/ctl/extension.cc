@@ -86,10 +86,11 @@ dem::ReferenceState ReferenceOf(const report::CampaignView& view) {
 }
 
 std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& name) {
-  const dem::EffectInfo* effect = dem::FindEffect(name);
+  const auto& declared = campaign.model.user_effects;
+  const dem::EffectInfo* effect = dem::FindEffect(declared, name);
   if (effect == nullptr) {
     std::vector<std::string> names;
-    for (const dem::EffectInfo& info : dem::Effects()) names.push_back(info.name);
+    for (const dem::EffectInfo* info : dem::AllEffects(declared)) names.push_back(info->name);
     return absl::StrCat("there is no effect ", name, "; this build has ",
                         absl::StrJoin(names, ", "));
   }
@@ -131,7 +132,8 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
       return absl::InvalidArgumentError(why);
     }
     derivation.parameters.merge(
-        ParametersOf(*dem::FindEffect(name), parent.campaign.model.contact, state));
+        ParametersOf(*dem::FindEffect(parent.campaign.model.user_effects, name),
+                     parent.campaign.model.contact, state));
   }
   for (int j = 0; j < parent.posterior.parameters_size(); ++j) {
     const v1::Posterior::Parameter& parameter = parent.posterior.parameters(j);

@@ -60,9 +60,9 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
   }
 }
 
-absl::StatusOr<report::CampaignView> Laboratory::Run(
-    const report::CampaignView& parent, const std::string& yaml, const std::string& what,
-    const std::map<std::string, std::string>& further) {
+absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& parent,
+                                               const std::string& yaml, const std::string& what,
+                                               const std::map<std::string, std::string>& further) {
   v1::SubmitRequest request;
   request.set_campaign_file(yaml);
   request.set_file_name(parent.source.file_name());
@@ -102,8 +102,16 @@ absl::StatusOr<report::CampaignView> Laboratory::Run(
     }
     workers_started_ = true;
   }
-  if (auto ended = Wait(campaign, what); !ended.ok()) return ended;
-  return LoadView(session_.client(), campaign);
+  return campaign;
+}
+
+absl::StatusOr<report::CampaignView> Laboratory::Run(
+    const report::CampaignView& parent, const std::string& yaml, const std::string& what,
+    const std::map<std::string, std::string>& further) {
+  const auto campaign = Submit(parent, yaml, what, further);
+  if (!campaign.ok()) return campaign.status();
+  if (auto ended = Wait(*campaign, what); !ended.ok()) return ended;
+  return LoadView(session_.client(), *campaign);
 }
 
 }  // namespace calib::ctl

@@ -22,6 +22,12 @@ class Laboratory {
   /// A finished campaign. FAILED_PRECONDITION with a sentence when it is not finished.
   absl::StatusOr<report::CampaignView> Finished(const std::string& campaign);
 
+  /// Submits the text with the parent's files and does not wait, so that several campaigns keep all
+  /// workers busy; returns the campaign's id. Submitted again it is the same campaign.
+  absl::StatusOr<std::string> Submit(const report::CampaignView& parent, const std::string& yaml,
+                                     const std::string& what,
+                                     const std::map<std::string, std::string>& further = {});
+
   /// Submits the text with the parent's files and waits for the end, progress on standard error.
   /// further: files by the path that the text names them by, in addition to the parent's.
   /// ABORTED when the campaign failed or was cancelled, CANCELLED on Ctrl-C (nothing is lost).

@@ -19,6 +19,7 @@
 #include "server/campaign/suggestion.h"
 #include "server/campaign/yaml_text.h"
 #include "server/ctl/text_table.h"
+#include "server/report/discrepancies.h"
 #include "server/report/people_units.h"
 
 namespace calib::ctl {
@@ -30,6 +31,7 @@ using Kind = YamlNode::Kind;
 using Json = nlohmann::json;
 
 constexpr int kMostReadings = 10000;
+constexpr double kStays = 0.95;  // probability of a discrepancy that is spoken of
 
 absl::StatusOr<std::string> ReadText(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -200,8 +202,15 @@ std::string UnitOf(const std::string& observable) {
   return info != nullptr ? info->unit : "1";
 }
 
+// What the model is known to miss where it was calibrated.
+struct Misfit {
+  const report::CampaignView* parent = nullptr;
+  std::vector<report::FittedDiscrepancy> discrepancies;
+};
+
 absl::Status AddExperiment(const report::CampaignView& view, const campaign::Experiment& experiment,
-                           const std::vector<Level>& levels, Prediction& prediction) {
+                           const std::vector<Level>& levels, const Misfit& misfit,
+                           Prediction& prediction) {
   for (const campaign::MeasuredObservable& observable : experiment.observables) {
     const RunsOfObservable runs = Collect(view, experiment, observable.name);
     const auto t = static_cast<Index>(experiment.control.size());
@@ -214,12 +223,18 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
     if (!observable.sd.empty()) error = Eigen::Map<const Eigen::VectorXd>(observable.sd.data(), t);
     auto quantity = inference::PredictQuantity(runs.parameters, runs.values, error);
     if (!quantity.ok()) return quantity.status();
+    inference::DiscrepancyBand discrepancy = report::DiscrepancyAt(
+        *misfit.parent, misfit.discrepancies, experiment, observable.name, quantity->mean);
+    if (discrepancy.mean.size() > 0) {
+      quantity = inference::WithModelError(*std::move(quantity), discrepancy.rms);
+    }
     PredictedObservable out{.experiment = experiment.name,
                             .observable = observable.name,
                             .control_name = experiment.control_name,
                             .control = experiment.control,
                             .quantity = *std::move(quantity),
                             .measured = observable.values,
+                            .discrepancy = std::move(discrepancy),
                             .exceedance = {}};
     for (const Level& level : levels) {
       if (level.observable != observable.name) continue;
@@ -235,6 +250,10 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
     prediction.observables.push_back(std::move(out));
   }
   return absl::OkStatus();
+}
+
+Json At(const Eigen::VectorXd& values, Index k) {
+  return k < values.size() ? Json(values[k]) : Json(nullptr);
 }
 
 Json OrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -352,10 +371,13 @@ absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::Campaig
   Prediction prediction;
   prediction.parent = id;
   prediction.campaign = view->status.campaign();
+  const Misfit misfit{
+      .parent = &parent,
+      .discrepancies = report::FitDiscrepancies(parent, report::PredictReadings(parent))};
   bool errors = true;
   bool separated = true;
   for (const campaign::Experiment& experiment : view->campaign.experiments) {
-    if (auto added = AddExperiment(*view, experiment, *levels, prediction); !added.ok()) {
+    if (auto added = AddExperiment(*view, experiment, *levels, misfit, prediction); !added.ok()) {
       return added;
     }
     for (const auto& observable : experiment.observables) errors &= !observable.sd.empty();
@@ -365,6 +387,23 @@ absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::Campaig
     prediction.notes.emplace_back(
         "Where the test states no noise of an observable, its prediction is that of a perfectly "
         "measured specimen.");
+  }
+  for (const PredictedObservable& o : prediction.observables) {
+    if (o.discrepancy.mean.size() == 0) {
+      prediction.notes.push_back(absl::StrCat(
+          o.experiment, ", ", o.observable, ": the campaign was not fitted to it along ",
+          o.control_name,
+          " with stated errors, so that nothing is known of what the model misses there."));
+    }
+  }
+  for (const report::FittedDiscrepancy& d : misfit.discrepancies) {
+    if (d.fit.probability() > kStays) {
+      prediction.notes.push_back(
+          absl::StrCat(d.observable,
+                       ": the model misses the fitted measurements by a smooth misfit beyond noise "
+                       "and scatter (see `calibctl compare ",
+                       id, "`); it is carried as model error here."));
+    }
   }
   if (!separated) {
     prediction.notes.emplace_back(
@@ -393,6 +432,8 @@ std::string PredictionJson(const Prediction& prediction) {
                         {"q95", o.quantity.q95[k]},
                         {"sd_parameters", OrNull(o.quantity.sd_parameters[k])},
                         {"sd_model_error", OrNull(o.quantity.sd_model[k])},
+                        {"sd_discrepancy", At(o.discrepancy.rms, k)},
+                        {"discrepancy_mean", At(o.discrepancy.mean, k)},
                         {"measured", o.measured.empty() ? Json(nullptr) : Json(o.measured[i])}});
     }
     Json exceedance = Json::array();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "inference/discrepancy/discrepancy.h"
 #include "inference/prediction/prediction.h"
 #include "server/campaign/yaml_tree.h"
 #include "server/ctl/laboratory.h"
@@ -36,6 +37,9 @@ struct PredictedObservable {
   std::vector<double> control;             ///< at each reading, SI
   inference::QuantityPrediction quantity;  ///< at each reading, SI
   std::vector<double> measured;            ///< SI; empty: not measured
+  /// Of the model, learnt where it was calibrated (model - measurement); part of quantity.sd_model.
+  /// Empty: nothing is known of it.
+  inference::DiscrepancyBand discrepancy{};
   struct Exceedance {
     double level = 0;             ///< SI
     Eigen::VectorXd probability;  ///< at each reading

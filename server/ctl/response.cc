@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -51,6 +53,28 @@ Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
   return correlation;
 }
 
+// Which part of the data each reading belongs to: its experiment, or its stage of loading where
+// only one experiment is fitted.
+std::vector<int> PartsOf(const campaign::Campaign& campaign, const inference::DataSet& data) {
+  std::vector<int> parts;
+  std::set<int> experiments;
+  for (const inference::Reading& reading : data.readings) {
+    parts.push_back(reading.experiment);
+    experiments.insert(reading.experiment);
+  }
+  if (experiments.size() != 1) return parts;
+  std::map<std::string, int> stages;
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const inference::Reading& reading = data.readings[k];
+    const auto& segment =
+        campaign.experiments[static_cast<std::size_t>(reading.experiment)].segment;
+    const auto step = static_cast<std::size_t>(reading.load_step);
+    const std::string stage = step < segment.size() ? segment[step] : "";
+    parts[k] = stages.emplace(stage, static_cast<int>(stages.size())).first->second;
+  }
+  return parts;
+}
+
 }  // namespace
 
 RunTable RunsWithoutEffect(const RunTable& without, const campaign::Campaign& parent,
@@ -66,8 +90,8 @@ RunTable RunsWithoutEffect(const RunTable& without, const campaign::Campaign& pa
       }
     }
     if (from[static_cast<std::size_t>(j)] >= 0) continue;
-    const dem::ParameterInfo* info =
-        dem::FindParameter(extended.model.contact, extended.model.effects, own.name);
+    const dem::ParameterInfo* info = dem::FindParameter(
+        extended.model.user_effects, extended.model.contact, extended.model.effects, own.name);
     const auto null =
         info == nullptr ? std::nullopt : dem::NullValueOf(*info, extended.model.contact);
     // A prior over orders of magnitude ends where the effect no longer matters.
@@ -185,18 +209,23 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
   // What is not known of the mean history at the best point, and the scatter of a measurement.
   Index best = 0;
   histories.rowwise().squaredNorm().minCoeff(&best);
-  const Eigen::VectorXd sd =
+  // Of a history, from standard deviations of its scores.
+  const auto covariance_of = [&](const Eigen::VectorXd& sd) -> Eigen::MatrixXd {
+    const Eigen::MatrixXd factor = components.basis * sd.asDiagonal();
+    Eigen::MatrixXd covariance = factor * emulator.correlation() * factor.transpose();
+    covariance.diagonal() += components.remainder;
+    return covariance;
+  };
+  Eigen::MatrixXd noise = NoiseCorrelation(data);
+  for (const Eigen::VectorXd& direction : nuisance) noise += direction * direction.transpose();
+  const Eigen::VectorXd not_known =
       (unknown.row(best).transpose().array().square() + emulator.scatter_sd().array().square())
           .sqrt();
-  const Eigen::MatrixXd spread_basis = components.basis * sd.asDiagonal();
-  response.model.covariance = NoiseCorrelation(data);
-  response.model.covariance.diagonal() += components.remainder;
-  response.model.covariance += spread_basis * emulator.correlation() * spread_basis.transpose();
-  for (const Eigen::VectorXd& direction : nuisance) {
-    response.model.covariance += direction * direction.transpose();
-  }
+  response.model.covariance = noise + covariance_of(not_known);
+  response.run_covariance = noise + 2 * covariance_of(emulator.scatter_sd());
   response.model.histories = std::move(histories);
   response.points = std::move(points);
+  response.parts = PartsOf(campaign, data);
   return response;
 }
 

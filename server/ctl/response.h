@@ -22,6 +22,11 @@ struct Response {
   /// The emulator predicts runs well enough to judge by: what it does not know of them beyond their
   /// scatter would otherwise excuse any misfit.
   bool trustworthy = false;
+  /// T x T, of the difference between a measurement and one run of the model at the right point:
+  /// noise, nuisance, and the scatter of both.
+  Eigen::MatrixXd run_covariance{};
+  /// Of each reading: its experiment, or its stage of loading where only one experiment is fitted.
+  std::vector<int> parts{};
 };
 
 /// nuisance: directions (T each) that a measurement may differ by for numerical reasons; they join

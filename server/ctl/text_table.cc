@@ -62,4 +62,24 @@ std::string TextTable::ToString() const {
   return text;
 }
 
+std::string Wrapped(const std::string& text, const std::string& first, const std::string& indent) {
+  constexpr std::size_t kWidth = 98;
+  std::string out = first;
+  std::size_t column = first.size();
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const std::size_t end = std::min(text.find(' ', at), text.size());
+    if (column + (end - at) + 1 > kWidth) {
+      out.erase(out.find_last_not_of(' ') + 1);
+      out += "\n" + indent;
+      column = indent.size();
+    }
+    out += text.substr(at, end - at) + " ";
+    column += end - at + 1;
+    at = end + 1;
+  }
+  while (!out.empty() && out.back() == ' ') out.pop_back();
+  return out + "\n";
+}
+
 }  // namespace calib::ctl

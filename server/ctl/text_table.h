@@ -22,4 +22,8 @@ class TextTable {
   std::vector<bool> left_;
 };
 
+/// Words in lines of at most 98 columns; `first` begins the first of them, `indent`
+/// the others.
+std::string Wrapped(const std::string& text, const std::string& first, const std::string& indent);
+
 }  // namespace calib::ctl

@@ -7,6 +7,7 @@
 #include "server/ctl/load_view.h"
 #include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
+#include "server/report/discrepancies.h"
 #include "server/report/json_documents.h"
 #include "server/report/parameter_drift.h"
 
@@ -21,7 +22,9 @@ int Compare(const Arguments& arguments) {
     return Fail(absl::FailedPreconditionError("no iteration of " + arguments.campaign +
                                               " is complete yet: nothing to compare"));
   }
-  report::Comparison comparison = report::Compare(*view, report::PredictReadings(*view));
+  const auto predictions = report::PredictReadings(*view);
+  report::Comparison comparison = report::Compare(*view, predictions);
+  report::AddDiscrepancies(*view, predictions, comparison);
   if (auto drifts = report::ParameterDrifts(*view); drifts.ok()) {
     comparison.parameter_drift = *std::move(drifts);
   } else {

@@ -1,6 +1,6 @@
 #include <iostream>
 
-#include "dem/catalog/catalog.h"
+#include "dem/formula/user_effect.h"
 #include "server/ctl/diagnosis.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/interrupt.h"
@@ -16,7 +16,7 @@ int Diagnose(const Arguments& arguments) {
   const auto view = laboratory.Finished(arguments.campaign);
   if (!view.ok()) return Fail(view.status());
   for (const std::string& name : arguments.effects) {
-    if (dem::FindEffect(name) == nullptr) {
+    if (dem::FindEffect(view->campaign.model.user_effects, name) == nullptr) {
       return Fail(absl::InvalidArgumentError("there is no effect " + name +
                                              " to leave out; see `calibctl effects`"));
     }

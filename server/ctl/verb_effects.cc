@@ -2,20 +2,27 @@
 
 #include "server/ctl/catalog_text.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/source_files.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 
 namespace calib::ctl {
 
 int Effects(const Arguments& arguments) {
+  std::vector<dem::UserEffect> declared;
+  if (!arguments.file.empty()) {
+    const auto source = ReadSourceFiles(arguments);
+    if (!source) return kBadInput;
+    declared = source->outcome.campaign.model.user_effects;
+  }
   if (arguments.json) {
-    std::cout << report::EffectsJson();
+    std::cout << report::EffectsJson(declared);
     return kDone;
   }
-  for (const dem::EffectInfo& effect : dem::Effects()) {
-    std::cout << effect.name << " (" << effect.kind << ")\n  " << effect.description << "\n  "
-              << effect.reference << "\n"
-              << ParameterTable(effect.parameters) << "\n";
+  for (const dem::EffectInfo* effect : dem::AllEffects(declared)) {
+    std::cout << effect->name << " (" << effect->kind << ")\n  " << effect->description << "\n  "
+              << effect->reference << "\n"
+              << ParameterTable(effect->parameters) << "\n";
   }
   return kDone;
 }

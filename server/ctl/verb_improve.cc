@@ -2,12 +2,14 @@
 // looked at for the first and the last model alone, after the verdict.
 #include <fmt/format.h>
 
-#include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
+#include "absl/strings/str_join.h"
 #include "server/campaign/sha256.h"
 #include "server/ctl/diagnosis.h"
 #include "server/ctl/exit_codes.h"
@@ -39,7 +41,8 @@ std::string NextEffect(const Diagnosis& diagnosis) {
   return diagnosis.best_partial;
 }
 
-Json ToJson(const std::vector<ImproveStep>& steps, const std::string& digest) {
+Json ToJson(const std::vector<ImproveStep>& steps, const std::string& digest,
+            std::int64_t evaluations) {
   Json list = Json::array();
   for (const ImproveStep& step : steps) {
     list.push_back({{"campaign", step.campaign},
@@ -53,7 +56,8 @@ Json ToJson(const std::vector<ImproveStep>& steps, const std::string& digest) {
   return {{"steps", list},
           {"verdict", steps.back().verdict},
           {"final_campaign", steps.back().campaign},
-          {"verdict_digest", digest}};
+          {"verdict_digest", digest},
+          {"model_evaluations", evaluations}};
 }
 
 std::string ToText(const std::vector<ImproveStep>& steps) {
@@ -82,59 +86,97 @@ std::string ToText(const std::vector<ImproveStep>& steps) {
 
 class Improvement {
  public:
-  Improvement(Laboratory& laboratory, Client& client, int max_effects)
-      : laboratory_(laboratory), client_(client), max_effects_(max_effects) {}
+  Improvement(Laboratory& laboratory, Client& client, const Arguments& limits)
+      : laboratory_(laboratory),
+        client_(client),
+        max_effects_(limits.max_effects),
+        max_evaluations_(limits.max_evaluations) {}
 
   absl::Status From(report::CampaignView view) {
     first_ = view;
-    for (int added = 0;; ++added) {
-      const bool last = added >= max_effects_;
-      const auto diagnosis =
-          Diagnose(laboratory_, view,
-                   {.only_adequacy = last || (added > 0 && Fits(view)), .next_experiment = false});
+    std::vector<std::string> added;
+    for (;;) {
+      const bool last = static_cast<int>(added.size()) >= max_effects_ || Spent();
+      const auto diagnosis = Judge(view, last || (!added.empty() && Fits(view)));
       if (!diagnosis.ok()) return diagnosis.status();
-      const auto comparison = report::Compare(view, report::PredictReadings(view));
-      steps_.push_back({.campaign = view.status.campaign(),
-                        .effects = view.campaign.model.effects,
-                        .rms_error = comparison.rms_error,
-                        .heldout_rms_error = std::nullopt,
-                        .log_evidence = view.posterior.log_evidence(),
-                        .verdict = diagnosis->verdict});
       const std::string next = NextEffect(*diagnosis);
       if (diagnosis->verdict == "adequate" || last || next.empty()) break;
-      auto extended = Extended(view, next);
+      if (Spent()) {
+        std::cerr << next << " is not tried: " << evaluations_
+                  << " model evaluations are as many as --max-evaluations allows\n";
+        break;
+      }
+      auto extended = Extended(view, {next});
       if (!extended.ok()) return extended.status();
       if (extended->posterior.posterior_from() == "none") {
         std::cerr << "the calibration with " << next << " (" << extended->status.campaign()
                   << ") has no posterior, so it is no step: run more samples\n";
         break;
       }
+      added.push_back(next);
       view = *std::move(extended);
     }
     last_ = std::move(view);
+    if (auto status = Prune(added); !status.ok()) return status;
     return Open();
   }
 
   const std::vector<ImproveStep>& steps() const { return steps_; }
   const std::string& digest() const { return digest_; }
+  std::int64_t evaluations() const { return evaluations_; }
 
  private:
+  bool Spent() const { return max_evaluations_ && evaluations_ >= *max_evaluations_; }
+
+  // Adds a step.
+  absl::StatusOr<Diagnosis> Judge(const report::CampaignView& view, bool only_adequacy) {
+    auto diagnosis =
+        Diagnose(laboratory_, view, {.only_adequacy = only_adequacy, .next_experiment = false});
+    if (!diagnosis.ok()) return diagnosis;
+    evaluations_ += diagnosis->screen_evaluations + diagnosis->warm_evaluations;
+    const auto comparison = report::Compare(view, report::PredictReadings(view));
+    steps_.push_back({.campaign = view.status.campaign(),
+                      .effects = view.campaign.model.effects,
+                      .rms_error = comparison.rms_error,
+                      .heldout_rms_error = std::nullopt,
+                      .log_evidence = view.posterior.log_evidence(),
+                      .verdict = diagnosis->verdict});
+    return diagnosis;
+  }
+
+  // An effect that was added early may be needless beside the later ones: the model is kept without
+  // the first that it is adequate without.
+  absl::Status Prune(const std::vector<std::string>& added) {
+    if (steps_.back().verdict != "adequate") return absl::OkStatus();
+    for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
+      std::vector<std::string> others = added;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+      auto without = Extended(*first_, others);
+      if (!without.ok()) return without.status();
+      if (without->posterior.posterior_from() == "none" || !Fits(*without)) continue;
+      last_ = *std::move(without);
+      return Judge(*last_, true).status();
+    }
+    return absl::OkStatus();
+  }
+
   // With one parameter more the parent's iterations may not do: then as many again.
   absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
-                                                const std::string& effect) {
+                                                const std::vector<std::string>& effects) {
     absl::StatusOr<report::CampaignView> extended = absl::UnknownError("not run");
     for (const int times : {1, 2}) {
       const auto text = ExtensionText(
           view,
-          {.effects = {effect},
+          {.effects = effects,
            .purpose = "extension",
            .samples = std::nullopt,
            .iterations = times == 1 ? std::nullopt
                                     : std::optional<int>(times * view.campaign.max_iterations)});
       if (!text.ok()) return text.status();
-      extended = laboratory_.Run(view, *text, "calibration with " + effect);
+      extended = laboratory_.Run(view, *text, "calibration with " + absl::StrJoin(effects, " + "));
       if (!extended.ok() || extended->posterior.posterior_from() != "none") break;
     }
+    if (extended.ok()) evaluations_ += extended->status.model_evaluations();
     return extended;
   }
 
@@ -145,7 +187,7 @@ class Improvement {
 
   // The verdict is stored by its digest before held-out data are looked at.
   absl::Status Open() {
-    const std::string verdict = ToJson(steps_, "").dump();
+    const std::string verdict = ToJson(steps_, "", evaluations_).dump();
     if (auto stored = client_.PutBlob(verdict); !stored.ok()) return stored;
     digest_ = campaign::Sha256Hex(verdict);
     steps_.front().heldout_rms_error =
@@ -158,6 +200,8 @@ class Improvement {
   Laboratory& laboratory_;
   Client& client_;
   int max_effects_;
+  std::optional<std::int64_t> max_evaluations_;
+  std::int64_t evaluations_ = 0;
   std::vector<ImproveStep> steps_;
   std::optional<report::CampaignView> first_, last_;
   std::string digest_;
@@ -172,10 +216,13 @@ int Improve(const Arguments& arguments) {
   Laboratory laboratory(**session, arguments);
   auto view = laboratory.Finished(arguments.campaign);
   if (!view.ok()) return Fail(view.status());
-  Improvement improvement(laboratory, (*session)->client(), arguments.max_effects);
+  Improvement improvement(laboratory, (*session)->client(), arguments);
   if (auto status = improvement.From(*std::move(view)); !status.ok()) return Fail(status);
-  std::cout << (arguments.json ? ToJson(improvement.steps(), improvement.digest()).dump(2) + "\n"
-                               : ToText(improvement.steps()));
+  std::cout << (arguments.json
+                    ? ToJson(improvement.steps(), improvement.digest(), improvement.evaluations())
+                              .dump(2) +
+                          "\n"
+                    : ToText(improvement.steps()));
   return kDone;
 }
 

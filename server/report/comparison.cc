@@ -5,102 +5,12 @@
 #include <map>
 #include <set>
 
-#include "inference/scatter/scatter.h"
+#include "server/report/residual_group.h"
 
 namespace calib::report {
 namespace {
 
-// Residuals of one observable of one experiment at the readings that the prediction covers.
-struct Group {
-  const campaign::Experiment* experiment = nullptr;
-  const campaign::MeasuredObservable* observable = nullptr;
-  std::vector<std::size_t> readings;
-  Eigen::VectorXd residual;    // model - measurement
-  Eigen::MatrixXd covariance;  // of noise and packing scatter together
-  double scatter = 0;          // rms of its sd over that of the noise
-  std::string scatter_from{};
-  Eigen::VectorXd model;
-};
-
-// Noise, correlated along the path of the control where a length is given.
-Eigen::MatrixXd NoiseCovariance(const Eigen::VectorXd& sd, const Eigen::VectorXd& travelled,
-                                double length) {
-  Eigen::MatrixXd covariance = sd.cwiseAbs2().asDiagonal();
-  for (Eigen::Index i = 0; length > 0 && i < sd.size(); ++i) {
-    for (Eigen::Index j = 0; j < i; ++j) {
-      covariance(i, j) = covariance(j, i) =
-          sd[i] * sd[j] * std::exp(-(travelled[i] - travelled[j]) / length);
-    }
-  }
-  return covariance;
-}
-
-const v1::Posterior::Scatter* FindScatter(const v1::Posterior& posterior,
-                                          const std::string& experiment,
-                                          const std::string& observable) {
-  for (const v1::Posterior::Scatter& scatter : posterior.scatter()) {
-    if (scatter.experiment() == experiment && scatter.observable() == observable) return &scatter;
-  }
-  return nullptr;
-}
-
-// The measured specimen is one packing of many; so is the model's where no mean over several runs
-// can be given.
-void AddScatter(const CampaignView& view, const Eigen::VectorXd& travelled, Group& group) {
-  const v1::Posterior::Scatter* scatter =
-      FindScatter(view.posterior, group.experiment->name, group.observable->name);
-  if (scatter == nullptr) return;
-  inference::GroupScatter found{.sd = Eigen::VectorXd(travelled.size()),
-                                .length = scatter->correlation_length()};
-  for (Eigen::Index i = 0; i < travelled.size(); ++i) {
-    const auto reading = static_cast<int>(group.readings[static_cast<std::size_t>(i)]);
-    found.sd[i] = reading < scatter->sd_size() ? scatter->sd(reading) : 0;
-  }
-  const double times = scatter->share() + (view.posterior.posterior_from() == "none" ? 1 : 0);
-  const Eigen::MatrixXd covariance = times * inference::ScatterCovariance(found, travelled);
-  const Eigen::VectorXd ratio = covariance.diagonal().cwiseQuotient(group.covariance.diagonal());
-  group.scatter = std::sqrt(ratio.mean());
-  group.scatter_from = scatter->from();
-  group.covariance += covariance;
-}
-
-Group MakeGroup(const CampaignView& view, const campaign::Experiment& experiment, std::size_t j,
-                const ObservablePrediction& prediction) {
-  Group group{.experiment = &experiment,
-              .observable = &experiment.observables[j],
-              .readings = {},
-              .residual = {},
-              .covariance = {},
-              .model = {}};
-  std::vector<double> residual;
-  std::vector<double> sd;
-  std::vector<double> travelled;
-  std::vector<double> model;
-  const std::vector<double> distance =
-      campaign::TravelledControl(experiment, group.observable->correlation_length);
-  for (std::size_t i = 0; i < experiment.control.size(); ++i) {
-    if (!std::isfinite(prediction.mean[i])) continue;
-    group.readings.push_back(i);
-    residual.push_back(prediction.mean[i] - group.observable->values[i]);
-    sd.push_back(ErrorOf(view, *group.observable, i));
-    travelled.push_back(distance[i]);
-    model.push_back(prediction.mean[i]);
-  }
-  const auto size = static_cast<Eigen::Index>(residual.size());
-  group.residual = Eigen::Map<const Eigen::VectorXd>(residual.data(), size);
-  const Eigen::Map<const Eigen::VectorXd> path(travelled.data(), size);
-  if (group.observable->covariance.size() > 0) {
-    std::vector<Eigen::Index> kept;
-    for (const std::size_t i : group.readings) kept.push_back(static_cast<Eigen::Index>(i));
-    group.covariance = Eigen::MatrixXd(group.observable->covariance(kept, kept));
-  } else {
-    group.covariance = NoiseCovariance(Eigen::Map<const Eigen::VectorXd>(sd.data(), size), path,
-                                       group.observable->correlation_length);
-  }
-  if (size > 0) AddScatter(view, path, group);
-  group.model = Eigen::Map<const Eigen::VectorXd>(model.data(), size);
-  return group;
-}
+using Group = ResidualGroup;
 
 ResidualCurve CurveOf(const Group& group, Eigen::Index first, Eigen::Index count) {
   const Eigen::VectorXd sd = group.covariance.diagonal().cwiseSqrt();
@@ -270,7 +180,7 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
     const campaign::Experiment& experiment = view.campaign.experiments[e];
     const bool validation = experiment.role == campaign::Role::kValidate;
     for (std::size_t j = 0; j < experiment.observables.size(); ++j) {
-      const Group group = MakeGroup(view, experiment, j, predictions[e].observables[j]);
+      const Group group = MakeResidualGroup(view, experiment, j, predictions[e].observables[j]);
       const auto n = static_cast<double>(group.readings.size());
       if (group.readings.empty()) continue;
       const double squared =

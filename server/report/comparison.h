@@ -53,6 +53,23 @@ struct BiasTrend {
   double z = 0;           ///< over its standard deviation
 };
 
+/// What stays unexplained of an observable along the path of an experiment, beyond noise and
+/// scatter: a smooth process [Kennedy & O'Hagan 2001]. SI; model - measurement.
+struct ObservableDiscrepancy {
+  std::string experiment, observable, control_name;
+  bool heldout = false;          ///< expected of it from the fitted experiments
+  double probability = 0;        ///< that there is one
+  double log_bayes_factor = 0;   ///< for one, of all experiments of the observable together
+  double amplitude = 0;          ///< typical size if there is one
+  double length = 0;             ///< of the control, over which it changes
+  int experiments = 1;           ///< from which it is known
+  double alike = 0;              ///< correlation between their discrepancies, [0, 1)
+  std::vector<double> mean, sd;  ///< one per reading
+  std::size_t largest = 0;       ///< reading with the largest mean
+  double largest_at = 0;         ///< its control
+  std::string segment{};         ///< its loading stage
+};
+
 struct Comparison {
   double rms_error = 0;  ///< over all calibrated readings; NaN: nothing to compare yet
   std::optional<double> reduced_chi2;  ///< chi-squared / (readings - parameters)
@@ -63,7 +80,8 @@ struct Comparison {
   std::vector<BiasTrend> trends;      ///< those beyond 3 sd, calibrated experiments only
   std::vector<std::string> at_bound;  ///< parameters pressed against a bound of their prior
   std::vector<ParameterDrift> parameter_drift;  ///< filled by whoever has the time: ParameterDrifts
-  std::string note;                             ///< why something is not given; may be empty
+  std::vector<ObservableDiscrepancy> discrepancies;  ///< filled by AddDiscrepancies()
+  std::string note;                                  ///< why something is not given; may be empty
 };
 
 /// Errors are those stated in the campaign, correlated where a correlation length is given, and the

@@ -11,17 +11,18 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json Parameter(const dem::ParameterInfo& p) {
-  Json json = {{"name", p.name},
-               {"unit", p.unit},
-               {"min", p.min},
-               {"max", p.max},
-               {"default_prior",
-                {{"prior", p.default_prior.kind},
-                 {"min", p.default_prior.min},
-                 {"max", p.default_prior.max}}},
-               {"default_value", p.default_value ? Json(*p.default_value) : Json(nullptr)},
-               {"null_value", p.null_value ? Json(*p.null_value) : Json(nullptr)},
-               {"description", p.description}};
+  Json json = {
+      {"name", p.name},
+      {"unit", p.unit},
+      {"min", p.min},
+      {"max", p.max},
+      {"default_prior", p.default_prior.kind.empty() ? Json(nullptr)
+                                                     : Json({{"prior", p.default_prior.kind},
+                                                             {"min", p.default_prior.min},
+                                                             {"max", p.default_prior.max}})},
+      {"default_value", p.default_value ? Json(*p.default_value) : Json(nullptr)},
+      {"null_value", p.null_value ? Json(*p.null_value) : Json(nullptr)},
+      {"description", p.description}};
   if (!p.null_by_contact.empty()) json["null_by_contact"] = p.null_by_contact;
   if (!p.unit_by_contact.empty()) json["unit_by_contact"] = p.unit_by_contact;
   if (!p.alternative_to.empty()) json["alternative_to"] = p.alternative_to;
@@ -47,15 +48,15 @@ std::string ContactsJson() {
   return list.dump(2) + "\n";
 }
 
-std::string EffectsJson() {
+std::string EffectsJson(std::span<const dem::UserEffect> declared) {
   Json list = Json::array();
-  for (const dem::EffectInfo& e : dem::Effects()) {
-    list.push_back({{"name", e.name},
-                    {"kind", e.kind},
-                    {"description", e.description},
-                    {"contacts", e.contacts},
-                    {"parameters", Parameters(e.parameters)},
-                    {"reference", e.reference}});
+  for (const dem::EffectInfo* e : dem::AllEffects(declared)) {
+    list.push_back({{"name", e->name},
+                    {"kind", e->kind},
+                    {"description", e->description},
+                    {"contacts", e->contacts},
+                    {"parameters", Parameters(e->parameters)},
+                    {"reference", e->reference}});
   }
   return list.dump(2) + "\n";
 }

@@ -233,6 +233,24 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
   }
   Json drift = Json::array();
   for (const ParameterDrift& d : c.parameter_drift) drift.push_back(Drift(d));
+  Json discrepancy = Json::array();
+  for (const ObservableDiscrepancy& d : c.discrepancies) {
+    discrepancy.push_back({{"experiment", d.experiment},
+                           {"observable", d.observable},
+                           {"heldout", d.heldout},
+                           {"probability", d.probability},
+                           {"log_bayes_factor", d.log_bayes_factor},
+                           {"amplitude", d.amplitude},
+                           {"length", d.length},
+                           {"alike", d.alike},
+                           {"mean", d.mean},
+                           {"sd", d.sd},
+                           {"largest",
+                            {{"control", d.largest_at},
+                             {"segment", d.segment},
+                             {"mean", d.mean[d.largest]},
+                             {"sd", d.sd[d.largest]}}}});
+  }
   Json trends = Json::array();
   for (const BiasTrend& t : c.trends) {
     trends.push_back({{"observable", t.observable},
@@ -250,6 +268,7 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                {"by_segment", by_segment},
                {"parameter_drift", drift},
                {"trends", trends},
+               {"discrepancy", discrepancy},
                {"at_bound", c.at_bound},
                {"note", c.note}});
 }

@@ -1,9 +1,11 @@
 #pragma once
 // The JSON documents that the command line prints and exports. NaN and infinities become null.
 
+#include <span>
 #include <string>
 #include <vector>
 
+#include "dem/formula/user_effect.h"
 #include "server/campaign/campaign.h"
 #include "server/report/campaign_view.h"
 #include "server/report/comparison.h"
@@ -32,7 +34,8 @@ std::string DataJson(const campaign::Campaign& campaign);
 
 /// What this build offers.
 std::string ContactsJson();
-std::string EffectsJson();
+/// declared: effects of a campaign file, after those of the build.
+std::string EffectsJson(std::span<const dem::UserEffect> declared = {});
 std::string TestsJson();
 
 }  // namespace calib::report

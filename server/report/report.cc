@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "server/report/discrepancies.h"
 #include "server/report/html.h"
 #include "server/report/sections.h"
 
@@ -11,13 +12,13 @@ namespace calib::report {
 std::string RenderReport(const CampaignView& view, const Story& story) {
   std::vector<ExperimentPrediction> predictions = PredictReadings(view);
   Comparison comparison = Compare(view, predictions);
+  AddDiscrepancies(view, predictions, comparison);
   comparison.parameter_drift = story.drift;
   const ReportData data{view, std::move(predictions), std::move(comparison), story};
   std::string body = SummarySection(data);
   if (view.posterior.parameters_size() > 0) {
-    body +=
-        ParameterSection(data) + FitSection(data) + MissingPhysicsSection(data) +
-        PosteriorSection(data) + EvolutionSection(data);
+    body += ParameterSection(data) + FitSection(data) + MissingPhysicsSection(data) +
+            PosteriorSection(data) + EvolutionSection(data);
   } else {
     body += "<p>No iteration is complete yet, so there is no posterior to show.</p>\n";
   }

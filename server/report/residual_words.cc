@@ -14,6 +14,8 @@ namespace {
 constexpr double kClear = 3;       // sd of a bias
 constexpr double kDrifts = 0.01;   // p of equal parameters
 constexpr double kLargeRms = 1.5;  // residual / sd
+constexpr double kStays = 0.95;    // probability of a discrepancy
+constexpr double kAlike = 0.7;
 
 std::string Shown(double value, const std::string& observable) {
   const dem::ObservableInfo* info = dem::FindObservable(observable);
@@ -68,6 +70,24 @@ std::string DriftSentence(const ParameterDrift& d) {
   return text + ", the mark of missing physics.";
 }
 
+std::string DiscrepancySentence(const ObservableDiscrepancy& d) {
+  const dem::ObservableInfo* control = dem::FindObservable(d.control_name);
+  const auto along = [&](double value) {
+    return NumberWithUnit(value, d.control_name, control != nullptr ? control->unit : "1", 2);
+  };
+  std::string text = fmt::format(
+      "{}, {}: beyond noise and scatter a smooth misfit of about {} stays, which changes over "
+      "about "
+      "{} of {}; it is largest at {} ({}), where the model is too {} by {} ± {}",
+      d.experiment, NameForPeople(d.observable), Shown(d.amplitude, d.observable), along(d.length),
+      NameForPeople(d.control_name), along(d.largest_at), NameForPeople(d.segment),
+      d.mean[d.largest] > 0 ? "high" : "low", Shown(std::abs(d.mean[d.largest]), d.observable),
+      Shown(d.sd[d.largest], d.observable));
+  if (d.experiments > 1 && d.alike > kAlike) text += ", much the same in all experiments";
+  if (d.experiments > 1 && d.alike < 1 - kAlike) text += ", another in each experiment";
+  return text + ".";
+}
+
 }  // namespace
 
 std::vector<std::string> WhereItFails(const Comparison& comparison) {
@@ -82,6 +102,15 @@ std::vector<std::string> WhereItFails(const Comparison& comparison) {
   if (bad.size() > static_cast<std::size_t>(kMostStages)) bad.resize(kMostStages);
   std::vector<std::string> sentences;
   for (const SegmentMisfit* m : bad) sentences.push_back(StageSentence(*m));
+  std::vector<const ObservableDiscrepancy*> smooth;
+  for (const ObservableDiscrepancy& d : comparison.discrepancies) {
+    if (!d.heldout && d.probability > kStays) smooth.push_back(&d);
+  }
+  std::stable_sort(smooth.begin(), smooth.end(), [](const auto* a, const auto* b) {
+    return a->log_bayes_factor > b->log_bayes_factor;
+  });
+  if (smooth.size() > static_cast<std::size_t>(kMostStages)) smooth.resize(kMostStages);
+  for (const ObservableDiscrepancy* d : smooth) sentences.push_back(DiscrepancySentence(*d));
   for (const BiasTrend& t : comparison.trends) {
     sentences.push_back(
         fmt::format("{}, {}: model minus measurement {} with {}, by {} per factor ten ({} sd).",

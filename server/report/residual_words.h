@@ -1,6 +1,6 @@
 #pragma once
 // What a model leaves unexplained, in sentences: which observable, which stage, sign, shape,
-// dependence on pressure or rate, parameters that are bent.
+// discrepancy along the path, dependence on pressure or rate, parameters that are bent.
 
 #include <string>
 #include <vector>

@@ -11,6 +11,8 @@
 namespace calib::report {
 namespace {
 
+constexpr double kNinety = 1.645;  // sd, to 5 and 95 %
+
 std::vector<double> Scaled(std::vector<double> values, double factor) {
   for (double& value : values) value *= factor;
   return values;
@@ -94,6 +96,17 @@ std::string ResidualPlot(const ReportData& data, std::size_t e, std::size_t j) {
       in_sd ? "residual / sd" : "residual" + (unit.label.empty() ? "" : " (" + unit.label + ")");
   Plot plot({.height = 130}, Axis::Covering(control.label, control.values),
             Axis(label, -largest, largest, 3));
+  for (const ObservableDiscrepancy& d : data.comparison.discrepancies) {
+    if (d.experiment != experiment.name || d.observable != observable.name) continue;
+    std::vector<double> low;
+    std::vector<double> high;
+    for (std::size_t i = 0; i < d.mean.size() && i < observable.values.size(); ++i) {
+      const double scale = in_sd ? 1 / ErrorOf(data.view, observable, i) : unit.factor;
+      low.push_back((d.mean[i] - kNinety * d.sd[i]) * scale);
+      high.push_back((d.mean[i] + kNinety * d.sd[i]) * scale);
+    }
+    plot.AddBand(control.values, low, high, "band");
+  }
   plot.AddHorizontal(0);
   if (in_sd) {
     plot.AddHorizontal(2);
@@ -105,7 +118,7 @@ std::string ResidualPlot(const ReportData& data, std::size_t e, std::size_t j) {
       fmt::format("{}: residuals of {}", experiment.name, NameForPeople(observable.name)),
       in_sd ? "model minus measurement over the standard deviation of the error; dashed lines at 0 "
               "and plus "
-              "and minus 2"
+              "and minus 2; as a band the smooth misfit beyond noise and scatter"
             : "model minus measurement");
 }
 
@@ -177,10 +190,13 @@ std::string FitSection(const ReportData& data) {
   html += fmt::format(
       "<span class=\"key\" style=\"color:var(--model)\"></span>{}."
       "<span class=\"key\" style=\"color:var(--held)\"></span>held out. Below each curve: model "
-      "minus measurement.</p>\n",
+      "minus measurement{}.</p>\n",
       data.view.posterior.posterior_from() == "none"
           ? "mean of the weighted samples, without a band since there is no posterior"
-          : "posterior mean, shaded: 5&#8239;%&#8239;to&#8239;95&#8239;%");
+          : "posterior mean, shaded: 5&#8239;%&#8239;to&#8239;95&#8239;%",
+      data.comparison.discrepancies.empty()
+          ? ""
+          : ", shaded: what of it is smooth misfit, beyond noise and scatter (5 to 95&#8239;%)");
   if (!data.comparison.note.empty()) {
     html += "<p class=\"sub\">" + Escape(data.comparison.note) + "</p>\n";
   }

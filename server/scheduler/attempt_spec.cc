@@ -3,6 +3,7 @@
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
+#include <algorithm>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
@@ -49,6 +50,28 @@ v1::Staging ToMessage(const dem::Staging& staging) {
   return message;
 }
 
+// Declared effects that the model does not use have no part in what a run is.
+void SetUserEffects(const dem::Model& model, v1::AttemptSpec& spec) {
+  for (const dem::UserEffect& effect : model.user_effects) {
+    if (std::find(model.effects.begin(), model.effects.end(), effect.info.name) ==
+        model.effects.end()) {
+      continue;
+    }
+    v1::UserEffect& message = *spec.add_user_effects();
+    message.set_name(effect.info.name);
+    message.set_scales(effect.action == dem::FormulaAction::kScales);
+    message.set_target(effect.target);
+    message.set_formula(effect.formula);
+    for (const dem::ParameterInfo& p : effect.info.parameters) {
+      v1::UserParameter& parameter = *message.add_parameters();
+      parameter.set_name(p.name);
+      parameter.set_min(p.min);
+      parameter.set_max(p.max);
+      if (p.default_value) parameter.set_default_value(*p.default_value);
+    }
+  }
+}
+
 }  // namespace
 
 v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& specimen,
@@ -84,6 +107,7 @@ v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& 
   spec.set_seed(scenario.seed);
   spec.set_threads(scenario.threads);
   spec.set_experiment(experiment);
+  SetUserEffects(scenario.model, spec);
   return spec;
 }
 

@@ -38,8 +38,7 @@ class FilterMethod final : public Method {
     if (!frozen.ok()) {
       return frozen.status();
     }
-    const auto proposal = inference::FitProposal(definition_.priors, definition_.data,
-                                                 campaign_.filter, history.iterations, *frozen);
+    const auto proposal = NextProposal(outcome.answer, history, *frozen);
     if (!proposal.ok()) {
       return proposal.status();
     }
@@ -52,6 +51,20 @@ class FilterMethod final : public Method {
   }
 
  private:
+  // Where the weights hold a handful of samples, the emulator of their states knows better where
+  // the posterior lies, even one that is not good enough for an interval yet.
+  absl::StatusOr<inference::Proposal> NextProposal(
+      const Answer& answer, const History& history,
+      const std::vector<std::optional<double>>& frozen) const {
+    if (answer.emulated.has_value() && answer.emulated->draws.rows() > 0) {
+      return inference::FitProposalToDraws(definition_.priors, campaign_.filter,
+                                           answer.emulated->draws, history.iterations.size(),
+                                           frozen);
+    }
+    return inference::FitProposal(definition_.priors, definition_.data, campaign_.filter,
+                                  history.iterations, frozen);
+  }
+
   absl::StatusOr<bool> IsConverged(const Answer& answer, const History& history) const {
     if (!answer.HasIntervals()) {
       return false;

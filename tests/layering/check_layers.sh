@@ -15,9 +15,9 @@ worker            worker/,dem/,proto/rpc/,calib/v1/                             
 server/campaign   server/campaign/,dem/,inference/                                    yaml-cpp
 server/store      server/store/,server/campaign/,inference/                           SQLiteCpp|sqlite3|chrono|spdlog
 server/scheduler  server/scheduler/,server/store/,server/campaign/,inference/,dem/,calib/v1/   chrono|spdlog|nlohmann
-server/report     server/report/,server/campaign/,inference/,dem/catalog/,calib/v1/   nlohmann|chrono
+server/report     server/report/,server/campaign/,inference/,dem/catalog/,dem/formula/,calib/v1/   nlohmann|chrono
 server/service    server/service/,server/scheduler/,server/store/,server/campaign/,inference/,dem/,proto/rpc/,calib/v1/  grpcpp|spdlog|chrono|nlohmann
-server/ctl        server/,proto/rpc/,calib/v1/,dem/catalog/,dem/simulation/,inference/  grpcpp|CLI|nlohmann|chrono|spdlog
+server/ctl        server/,proto/rpc/,calib/v1/,dem/catalog/,dem/formula/,dem/simulation/,inference/  grpcpp|CLI|nlohmann|chrono|spdlog
 server            server/service/,server/store/,server/scheduler/                     spdlog|CLI|chrono
 '
 watched='grpcpp|SQLiteCpp|sqlite3|yaml-cpp|spdlog|CLI|nlohmann|chrono'

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Times YADE, LAMMPS, LIGGGHTS and this engine on the same packings: see deploy/bench/peers.
 
-usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--only speed|evaluation] [--quick]
+usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|evaluation] [--quick]
 Every round runs all codes once, one after the other, so that what disturbs the machine disturbs all of them; the tables
-hold medians over the rounds. Prints Markdown.
+hold medians over the rounds. One thread is timed by processor time, so that other work on the machine takes nothing
+from anybody; two threads by wall time, which wants an idle machine. Prints Markdown.
 """
 import argparse
 import csv
@@ -18,13 +19,13 @@ import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 DATA = os.path.join(os.environ["CALIB_DATA"], "toyoura_triaxial")
-THREADS = (1, 2)
 SKIN = {1000: 2e-4, 5000: 1e-4, 10000: 8e-5}  # m, near the fastest of LAMMPS and LIGGGHTS
 STEP = {1000: 4e-5, 5000: 1.5e-5, 10000: 1e-5}  # s, of LAMMPS and LIGGGHTS
 
 
 def run(command, environment=None):
-    """Runs to the end; wall time [s], largest resident memory [MiB], output. Ends the program with the output on failure."""
+    """Runs to the end; wall and processor time [s], largest resident memory [MiB], output. Ends the program with the
+    output on failure."""
     start = time.time()
     with tempfile.TemporaryFile("w+") as output:
         child = subprocess.Popen(
@@ -37,7 +38,7 @@ def run(command, environment=None):
         text = output.read()
     if child.returncode != 0:
         sys.exit(f"{' '.join(command)} ended with {child.returncode}:\n{text[-2000:]}")
-    return wall, usage.ru_maxrss / 1024, text
+    return (wall, usage.ru_utime + usage.ru_stime), usage.ru_maxrss / 1024, text
 
 
 class Work:
@@ -59,7 +60,7 @@ class Work:
                             out, str(self.steps(grains))])
         with open(out + ".json") as file:
             timed = json.load(file)
-        return timed["contacts"] * timed["steps"] / timed["wall"] / 1e6, memory
+        return timed["contacts"] * timed["steps"] / timed["cpu" if threads == 1 else "wall"] / 1e6, memory
 
     def data_file(self, grains):
         """The dense state as LAMMPS and LIGGGHTS read it."""
@@ -83,8 +84,10 @@ class Work:
                    "-var", "skin", str(SKIN[grains]), "-var", "dt", str(STEP[grains]), "-var", "steps", str(steps)]
         if threads > 1:
             command = ["mpirun", "--allow-run-as-root", "--bind-to", "core", "-np", str(threads)] + command
-        _, memory, text = run(command, {"OMP_NUM_THREADS": "1"})
+        (wall, cpu), memory, text = run(command, {"OMP_NUM_THREADS": "1"})
         loop = [float(word) for word in re.findall(r"^Loop time of ([\d.eE+-]+)", text, re.M)][-1]
+        if threads == 1:  # these codes time the loop by wall time only: what of it was their own
+            loop *= min(cpu / wall, 1.0)
         rows = [line.split() for line in text.splitlines() if re.fullmatch(r"\s*\d+(\s+[\d.eE+-]+){2,}\s*", line)]
         rows = [row for row in rows if len(row) == 3][-2:]
         twice = statistics.mean(float(row[2]) for row in rows)
@@ -96,7 +99,8 @@ class Work:
              "--benchmark_format=json", f"--benchmark_min_time={0.3 if self.quick else 1.5}"],
             {"OMP_WAIT_POLICY": "active"})
         found = json.loads(text[text.index("{"):])["benchmarks"][0]
-        return found["contact_updates/s"] / 1e6, memory
+        own = found["cpu_time"] / found["real_time"] if threads == 1 else 1.0
+        return found["contact_updates/s"] / own / 1e6, memory
 
     def rate(self, code, grains, threads):
         if code == "YADE":
@@ -109,10 +113,10 @@ class Work:
 
     def yade_evaluation(self, repeat):
         out = self.path("triaxial_yade.txt")
-        wall, _, _ = run(["yade", "-n", "-x", "-j1", os.path.join(HERE, "yade_triaxial.py"), self.packing(1000), out, str(repeat)])
+        run(["yade", "-n", "-x", "-j1", os.path.join(HERE, "yade_triaxial.py"), self.packing(1000), out, str(repeat)])
         with open(out) as file:
             rows = [[float(word) for word in line.split()] for line in file]
-        return rows[-1][4], int(rows[-1][3]), [row[2] for row in rows], [row[1] for row in rows]
+        return rows[-1][5], int(rows[-1][3]), [row[2] for row in rows], [row[1] for row in rows]
 
     def our_evaluation(self, repeat):
         campaign, out = self.path("triaxial.yaml"), self.path("triaxial.csv")
@@ -146,38 +150,39 @@ experiments:
     staging: {rate: 0.1 1/s, step: 0.004, damping: [0.2, 0.9], unbalanced: 1e-3}
     observables: {stress_ratio: {noise: {absolute: 0.1}}, volumetric_strain: {noise: {absolute: 1e-3}}}
 """)
-        wall, _, _ = run([os.path.join(self.binaries, "calibctl"), "simulate", campaign, "--set", "friction_angle=29deg", "-o", out],
+        (_, cpu), _, _ = run([os.path.join(self.binaries, "calibctl"), "simulate", campaign, "--set", "friction_angle=29deg", "-o", out],
                          {"OMP_NUM_THREADS": "1"})
         with open(out) as file:
             rows = list(csv.DictReader(file))
-        return wall, None, [float(row["stress_ratio"]) for row in rows], [float(row["volumetric_strain"]) for row in rows]
+        return cpu, None, [float(row["stress_ratio"]) for row in rows], [float(row["volumetric_strain"]) for row in rows]
 
 
-def speed(work, grains_list, repeats):
+def speed(work, grains_list, threads_list, repeats):
     codes = ("YADE", "LAMMPS", "LIGGGHTS", "calib")
     found = {}
     for repeat in range(repeats):
         for grains in grains_list:
-            for threads in THREADS:
+            for threads in threads_list:
                 for code in codes:
                     rate, memory = work.rate(code, grains, threads)
                     found.setdefault((code, grains, threads), []).append((rate, memory))
                     print(f"round {repeat + 1}, {grains} grains, {threads} threads, {code}: {rate:.2f}", file=sys.stderr, flush=True)
     median = {key: statistics.median(rate for rate, _ in values) for key, values in found.items()}
-    print(f"\nHertz-Mindlin with rolling resistance, million contact updates per second of wall time, medians of {repeats}:\n")
+    print(f"\nHertz-Mindlin with rolling resistance, million contact updates per second (of processor time on one thread, of wall time on "
+          f"two), medians of {repeats}:\n")
     print("| grains | threads | " + " | ".join(codes) + " | calib / fastest peer | calib / YADE | calib against its one thread |")
     print("|---" * (len(codes) + 5) + "|")
     for grains in grains_list:
-        for threads in THREADS:
+        for threads in threads_list:
             values = [median[code, grains, threads] for code in codes]
             print(f"| {grains} | {threads} | " + " | ".join(f"{value:.2f}" for value in values)
-                  + f" | {values[3] / max(values[:3]):.2f} | {values[3] / values[0]:.1f} | {values[3] / median['calib', grains, 1]:.2f} |")
+                  + f" | {values[3] / max(values[:3]):.2f} | {values[3] / values[0]:.1f} | {values[3] / median['calib', grains, threads_list[0]]:.2f} |")
     print("\nLargest resident memory of one process, MiB, one thread:\n")
     print("| grains | " + " | ".join(codes) + " |")
     print("|---" * (len(codes) + 1) + "|")
     for grains in grains_list:
         print(f"| {grains} | " + " | ".join(
-            f"{statistics.median(memory for _, memory in found[code, grains, 1]):.0f}" for code in codes) + " |")
+            f"{statistics.median(memory for _, memory in found[code, grains, threads_list[0]]):.0f}" for code in codes) + " |")
 
 
 def evaluation(work, repeats):
@@ -188,7 +193,7 @@ def evaluation(work, repeats):
         print(f"evaluation {repeat + 1}: YADE {rows['YADE'][-1][0]:.1f} s, calib {rows['calib'][-1][0]:.1f} s", file=sys.stderr, flush=True)
     print(f"\nOne drained triaxial evaluation, 1000 grains, linear contacts with rolling and twisting, 50 stages to 20 %, one thread, "
           f"{repeats} repeats of shifted grains:\n")
-    print("| | wall time, median [s] | peak stress ratio, mean (least .. largest) | mean over 16-20 % | volumetric strain at 20 % |")
+    print("| | processor time, median [s] | peak stress ratio, mean (least .. largest) | mean over 16-20 % | volumetric strain at 20 % |")
     print("|---|---|---|---|---|")
     for code, values in rows.items():
         peaks, late, volume = ([max(v[2]) for v in values], [statistics.mean(v[2][40:]) for v in values], [v[3][-1] for v in values])
@@ -196,7 +201,7 @@ def evaluation(work, repeats):
             f"{statistics.mean(x):.{digits}f} ({min(x):.{digits}f} .. {max(x):.{digits}f})"
             for x, digits in ((peaks, 2), (late, 2), (volume, 4))) + " |")
     ratio = statistics.median(y[0] / c[0] for y, c in zip(rows["YADE"], rows["calib"]))
-    print(f"\nratio of wall times, median of pairs: {ratio:.1f}")
+    print(f"\nratio of processor times, median of pairs: {ratio:.1f}")
 
 
 def main():
@@ -204,6 +209,7 @@ def main():
     parser.add_argument("binaries")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--grains", default="1000,5000,10000")
+    parser.add_argument("--threads", default="1,2")
     parser.add_argument("--only", choices=("speed", "evaluation"), help="one of the two parts")
     parser.add_argument("--quick", action="store_true", help="few steps, one repeat: shows that all programs run")
     arguments = parser.parse_args()
@@ -215,7 +221,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="calib-peers-") as folder:
         work = Work(os.path.abspath(arguments.binaries), folder, arguments.quick)
         if arguments.only != "evaluation":
-            speed(work, grains, repeats)
+            speed(work, grains, [int(word) for word in arguments.threads.split(",")], repeats)
         if arguments.only != "speed":
             evaluation(work, repeats)
 

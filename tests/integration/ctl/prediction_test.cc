@@ -40,6 +40,9 @@ TEST_F(Predicting, PosteriorAtAnotherPressure) {
     EXPECT_LT(point["q05"], point["q95"]);
     EXPECT_GT(point["mean"], 0);
     EXPECT_TRUE(point["measured"].is_null());
+    EXPECT_GE(point["sd_discrepancy"].get<double>(), 0);
+    EXPECT_LE(point["sd_discrepancy"], point["sd_model_error"]);
+    EXPECT_TRUE(point["discrepancy_mean"].is_number());
     const double parts =
         std::hypot(point["sd_parameters"].get<double>(), point["sd_model_error"].get<double>());
     EXPECT_NEAR(point["sd"].get<double>(), parts, 1e-9 * parts);

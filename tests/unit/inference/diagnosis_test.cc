@@ -102,6 +102,23 @@ TEST(Diagnosis, BetterModelHasTheAdvantage) {
   EXPECT_EQ(Compare(extended, extended)->nats, 0);
 }
 
+// Two halves of a straight line predict each other; a line through the origin fitted to one half of
+// a parabola misses the other, and a model of many bumps that can follow each half alone does too.
+TEST(Diagnosis, LeftOutReadingsAreMissedByAWrongModel) {
+  std::vector<int> halves(kReadings, 0);
+  std::fill(halves.begin() + kReadings / 2, halves.end(), 1);
+  EXPECT_NEAR(LeftOutError(Line(12 * Curve(0) + Noise(3)), halves).value(), 1, 0.3);
+  EXPECT_GT(LeftOutError(Line(30 * Curve(1) + Noise(3)), halves).value(), 3);
+
+  FittedModel bumps = Line(12 * Curve(0));
+  bumps.histories.resize(2, kReadings);
+  bumps.histories.setConstant(10);
+  bumps.histories.row(0).head(kReadings / 2).setZero();
+  bumps.histories.row(1).tail(kReadings / 2).setZero();
+  EXPECT_NEAR(LeftOutError(bumps, halves).value(), 10, 1e-9);
+  EXPECT_FALSE(LeftOutError(bumps, std::vector<int>(kReadings, 0)).ok());
+}
+
 TEST(Diagnosis, ShapesThatDoNotFitAreRefused) {
   FittedModel model = Line(Curve(0));
   EXPECT_FALSE(Screen(model, {{"short", {Eigen::VectorXd::Ones(3)}, false}}).ok());

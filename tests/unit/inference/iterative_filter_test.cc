@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "inference/sampling/philox.h"
+
 namespace calib::inference {
 namespace {
 
@@ -89,6 +91,39 @@ TEST(LogImportance, DefensiveShareBoundsTheWeights) {
   const Eigen::VectorXd log_weights = LogImportance(Priors(), iterations);
   EXPECT_LE(log_weights.maxCoeff(), -std::log(share) + 1e-12);
   EXPECT_NEAR(log_weights.array().exp().mean(), 1, 0.15);
+}
+
+// One normal lump of draws, in standard coordinates: mean kept, sd doubled.
+TEST(FitProposalToDraws, SurroundsTheDraws) {
+  const FilterOptions options{.seed = 3};
+  const int n = 2000;
+  Eigen::MatrixXd draws(n, 2);
+  for (int i = 0; i < n; ++i) {
+    PhiloxStream stream({.seed = 9,
+                         .purpose = StreamPurpose::kDiagnosisNull,
+                         .iteration = 0,
+                         .sample = static_cast<std::uint64_t>(i)});
+    for (int j = 0; j < 2; ++j) {
+      draws(i, j) = Priors()[j].FromStandard((j == 0 ? 0.5 : -0.2) + 0.1 * stream.Normal());
+    }
+  }
+  const auto proposal = FitProposalToDraws(Priors(), options, draws, 1);
+  ASSERT_TRUE(proposal.ok()) << proposal.status();
+  ASSERT_EQ(proposal->components.size(), 1);
+  EXPECT_NEAR(proposal->components[0].mean[0], 0.5, 0.02);
+  EXPECT_NEAR(proposal->components[0].mean[1], -0.2, 0.02);
+  for (int j = 0; j < 2; ++j) {
+    EXPECT_NEAR(std::sqrt(proposal->components[0].covariance(j, j)), 0.2, 0.02);
+  }
+  EXPECT_EQ(proposal->defensive_share, options.defensive_share);
+  EXPECT_NEAR(proposal->log_acceptance, 0, 1e-3);
+}
+
+TEST(FitProposalToDraws, NothingToFitTo) {
+  EXPECT_EQ(FitProposalToDraws(Priors(), {}, Eigen::MatrixXd(0, 2), 1).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(FitProposalToDraws(Priors(), {}, Eigen::MatrixXd::Zero(5, 3), 1).status().code(),
+            absl::StatusCode::kInvalidArgument);
 }
 
 TEST(ComputePosterior, TinyNoiseStaysFinite) {

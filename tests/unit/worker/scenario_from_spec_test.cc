@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
+
 #include "server/scheduler/attempt_spec.h"
 
 namespace calib::worker {
@@ -46,6 +49,48 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
   EXPECT_EQ(RecipeFromMessage(spec.recipe()).particles, 321);
   // Going round once more changes nothing.
   EXPECT_EQ(scheduler::SpecDigest(scheduler::ToSpec(back, RecipeFromMessage(spec.recipe()), "x")),
+            scheduler::SpecDigest(spec));
+}
+
+TEST(ScenarioFromSpec, UserEffectsTravelWhereTheyAreUsed) {
+  dem::UserEffect used;
+  used.info.name = "mine";
+  used.info.kind = "measurement";
+  used.action = dem::FormulaAction::kScales;
+  used.target = "axial_stress";
+  used.formula = "1 + g * x0";
+  used.info.parameters.resize(2);
+  used.info.parameters[0].name = "g";
+  used.info.parameters[0].min = -1;
+  used.info.parameters[0].max = std::numeric_limits<double>::infinity();
+  used.info.parameters[1].name = "x0";
+  used.info.parameters[1].max = 7;
+  used.info.parameters[1].default_value = 0.3;
+  dem::UserEffect unused = used;
+  unused.info.name = "spare";
+  dem::Scenario scenario;
+  scenario.model.contact = "linear";
+  const v1::AttemptSpec without = scheduler::ToSpec(scenario, campaign::NoPacking{}, "x");
+  scenario.model.user_effects = {unused, used};
+  EXPECT_EQ(scheduler::SpecDigest(scheduler::ToSpec(scenario, campaign::NoPacking{}, "x")),
+            scheduler::SpecDigest(without));
+  scenario.model.effects = {"mine"};
+  const v1::AttemptSpec spec = scheduler::ToSpec(scenario, campaign::NoPacking{}, "x");
+  const dem::Scenario back = ScenarioFromSpec(spec);
+  ASSERT_EQ(back.model.user_effects.size(), 1U);
+  const dem::UserEffect& effect = back.model.user_effects[0];
+  EXPECT_EQ(effect.info.name, "mine");
+  EXPECT_EQ(effect.info.kind, "measurement");
+  EXPECT_EQ(effect.action, dem::FormulaAction::kScales);
+  EXPECT_EQ(effect.target, "axial_stress");
+  EXPECT_EQ(effect.formula, "1 + g * x0");
+  ASSERT_EQ(effect.info.parameters.size(), 2U);
+  EXPECT_EQ(effect.info.parameters[0].min, -1);
+  EXPECT_TRUE(std::isinf(effect.info.parameters[0].max));
+  EXPECT_FALSE(effect.info.parameters[0].default_value.has_value());
+  EXPECT_EQ(effect.info.parameters[1].default_value, 0.3);
+  scenario.model.user_effects[1].formula = "1 + g";
+  EXPECT_NE(scheduler::SpecDigest(scheduler::ToSpec(scenario, campaign::NoPacking{}, "x")),
             scheduler::SpecDigest(spec));
 }
 

@@ -1,0 +1,161 @@
+#include "server/ctl/effect_screen.h"
+
+#include <algorithm>
+#include <set>
+
+#include "absl/strings/str_cat.h"
+#include "server/ctl/extension.h"
+
+namespace calib::ctl {
+namespace {
+
+using Eigen::Index;
+
+constexpr int kMostRuns = 4;           // of one effect, or
+constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all effects
+
+}  // namespace
+
+std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& effect,
+                                                      std::size_t rows) {
+  std::vector<Step> steps;
+  for (const dem::StrengthRay& ray : effect.rays) {
+    if (effect.rays.size() == 1 && rows > 1) steps.push_back({&ray, ray.steps[0]});
+    steps.push_back({&ray, ray.steps[1]});
+  }
+  if (steps.size() > rows) steps.resize(rows);
+  return steps;
+}
+
+absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
+  std::vector<Eigen::VectorXd> directions;
+  const auto& experiments = base_.view().campaign.experiments;
+  const bool given = std::any_of(experiments.begin(), experiments.end(), [](const auto& e) {
+    return e.staging.rate && e.role == campaign::Role::kCalibrate;
+  });
+  if (!given) return directions;
+  const Index best = base_.BestRuns(1).front();
+  campaign::Derivation derivation = base_.Derived("nuisance", "twice the rate");
+  derivation.rate_factor = 2;
+  derivation.rows = {base_.RowLike(best)};
+  const auto view = base_.Run(derivation, "influence of the loading rate");
+  if (!view.ok()) return view.status();
+  evaluations_ += base_.fitted_experiments();
+  const report::RunTable runs = report::RunsOf(*view);
+  if (!runs.sample.empty()) {
+    directions.emplace_back((runs.histories.row(0) - base_.runs().histories.row(best)).transpose());
+  }
+  return directions;
+}
+
+// Empty: the tests can show it.
+std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
+  std::set<double> pressures;
+  bool excited = false;
+  for (const campaign::Experiment& e : base_.view().campaign.experiments) {
+    if (e.role != campaign::Role::kCalibrate) continue;
+    const auto pressure = e.settings.find("confining_pressure");
+    if (pressure != e.settings.end()) pressures.insert(pressure->second);
+    excited = excited || effect.excited_by.empty() ||
+              std::find(effect.excited_by.begin(), effect.excited_by.end(), e.test) !=
+                  effect.excited_by.end();
+  }
+  if (!excited) return "none of the fitted tests can show it";
+  if (effect.across_pressures && pressures.size() < 2) {
+    return "it shows only between tests at different pressures";
+  }
+  return effect.rays.empty() ? "the catalogue gives no strength to try" : "";
+}
+
+std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
+    const std::vector<std::string>& without) {
+  std::vector<const dem::EffectInfo*> effects;
+  for (const dem::EffectInfo* info : dem::AllEffects(base_.view().campaign.model.user_effects)) {
+    const dem::EffectInfo& effect = *info;
+    if (!WhyNotJoin(base_.view().campaign, effect.name).empty()) continue;
+    const bool left_out = std::find(without.begin(), without.end(), effect.name) != without.end();
+    const std::string why = left_out ? "left out as asked for" : WhyNotExcitable(effect);
+    if (why.empty()) {
+      effects.push_back(&effect);
+    } else {
+      not_excitable_.emplace_back(effect.name, why);
+    }
+  }
+  return effects;
+}
+
+absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignatures(
+    const std::vector<std::string>& without) {
+  std::vector<inference::Signature> signatures;
+  const std::vector<const dem::EffectInfo*> effects = Excitable(without);
+  if (effects.empty()) return signatures;
+  const int experiments = std::max(1, base_.fitted_experiments());
+  const double share = kScreenShare * static_cast<double>(base_.runs().sample.size()) *
+                       experiments / static_cast<double>(effects.size());
+  const auto rows = static_cast<std::size_t>(
+      std::clamp(static_cast<int>(std::max<double>(kMostRuns, share)) / experiments, 1, 2));
+  const std::vector<Index> runs = base_.BestRuns(rows);
+  // All at once, so that no worker waits for the last run of an effect.
+  for (const dem::EffectInfo* effect : effects) {
+    for (std::size_t k = 0; k < StepsOf(*effect, rows).size(); ++k) {
+      const Pair pair = PairOf(*effect, k, runs, rows);
+      if (auto status = base_.Announce(pair.with, pair.what); !status.ok()) return status;
+    }
+  }
+  for (const dem::EffectInfo* effect : effects) {
+    auto signature = SignatureOf(*effect, runs, rows);
+    if (!signature.ok()) return signature.status();
+    if (signature->differences.empty()) {
+      not_excitable_.emplace_back(effect->name, "runs with it diverge");
+    } else {
+      signatures.push_back(*std::move(signature));
+    }
+  }
+  return signatures;
+}
+
+// A campaign for each step: rays set different parameters. Those of the ray are given by the rows;
+// what it holds goes along.
+EffectScreen::Pair EffectScreen::PairOf(const dem::EffectInfo& effect, std::size_t k,
+                                        const std::vector<Index>& runs, std::size_t rows) const {
+  const std::vector<Step> steps = StepsOf(effect, rows);
+  Pair pair{.step = steps[k],
+            .without = runs[std::min(k, runs.size() - 1)],
+            .with = base_.Derived("screen", absl::StrCat(effect.name, ", step ", k + 1)),
+            .what = absl::StrCat("screen of ", effect.name, " (", k + 1, "/", steps.size(), ")")};
+  pair.with.effects = {effect.name};
+  pair.with.fixed = dem::ParametersOnRay(effect, *pair.step.ray, pair.step.step,
+                                         base_.view().campaign.model.contact, base_.state());
+  pair.with.rows = {base_.RowLike(pair.without)};
+  return pair;
+}
+
+absl::StatusOr<inference::Signature> EffectScreen::SignatureOf(const dem::EffectInfo& effect,
+                                                               const std::vector<Index>& runs,
+                                                               std::size_t rows) {
+  inference::Signature signature{
+      .name = effect.name, .differences = {}, .two_sided = effect.two_sided};
+  std::vector<Step>& tried = tried_[effect.name];
+  for (std::size_t k = 0; k < StepsOf(effect, rows).size(); ++k) {
+    const Pair pair = PairOf(effect, k, runs, rows);
+    const auto view = base_.Run(pair.with, pair.what);
+    if (!view.ok()) return view.status();
+    evaluations_ += base_.fitted_experiments();
+    const report::RunTable with = report::RunsOf(*view);
+    if (with.sample.empty()) continue;
+    signature.differences.emplace_back(
+        (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
+    tried.push_back(pair.step);
+  }
+  return signature;
+}
+
+std::map<std::string, double> EffectScreen::StrengthOf(const std::string& name, std::size_t which,
+                                                       double multiple) const {
+  const Step& step = tried_.at(name)[which];
+  const dem::EffectInfo* effect = dem::FindEffect(base_.view().campaign.model.user_effects, name);
+  return dem::ParametersOnRay(*effect, *step.ray, step.step * multiple,
+                              base_.view().campaign.model.contact, base_.state());
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,72 @@
+#pragma once
+// What each effect would change: pairs of runs with and without it, from the best runs of a fitted
+// campaign, on the same packing with the same seed.
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "dem/catalog/catalog.h"
+#include "inference/diagnosis/screen.h"
+#include "server/ctl/fitted_campaign.h"
+
+namespace calib::ctl {
+
+class EffectScreen {
+ public:
+  explicit EffectScreen(const FittedCampaign& base) : base_(base) {}
+
+  /// What twice the rate of staging changes: no physics. Empty where the campaign leaves the rate
+  /// to the engine.
+  absl::StatusOr<std::vector<Eigen::VectorXd>> MeasureNuisance();
+
+  /// One signature of each effect that the fitted tests can show. `without` take no part. At most
+  /// the larger of a quarter of the campaign's evaluations and four runs for each effect.
+  absl::StatusOr<std::vector<inference::Signature>> MeasureSignatures(
+      const std::vector<std::string>& without);
+
+  /// Parameters in SI at a multiple of the `which`th difference of a signature; what the ray of
+  /// strength holds constant is part of it.
+  std::map<std::string, double> StrengthOf(const std::string& effect, std::size_t which,
+                                           double multiple) const;
+  std::size_t DifferencesOf(const std::string& effect) const { return tried_.at(effect).size(); }
+
+  /// Effects that could not be judged, and why.
+  const std::vector<std::pair<std::string, std::string>>& not_excitable() const {
+    return not_excitable_;
+  }
+  std::int64_t evaluations() const { return evaluations_; }
+
+ private:
+  // One step away from the model without the effect.
+  struct Step {
+    const dem::StrengthRay* ray = nullptr;
+    double step = 0;
+  };
+  // A run without the effect and the campaign that repeats it with the effect.
+  struct Pair {
+    Step step;
+    Eigen::Index without = 0;
+    campaign::Derivation with;
+    std::string what;
+  };
+  Pair PairOf(const dem::EffectInfo& effect, std::size_t k, const std::vector<Eigen::Index>& runs,
+              std::size_t rows) const;
+  static std::vector<Step> StepsOf(const dem::EffectInfo& effect, std::size_t rows);
+  std::string WhyNotExcitable(const dem::EffectInfo& effect) const;
+  std::vector<const dem::EffectInfo*> Excitable(const std::vector<std::string>& without);
+  absl::StatusOr<inference::Signature> SignatureOf(const dem::EffectInfo& effect,
+                                                   const std::vector<Eigen::Index>& runs,
+                                                   std::size_t rows);
+
+  const FittedCampaign& base_;
+  std::map<std::string, std::vector<Step>> tried_;
+  std::vector<std::pair<std::string, std::string>> not_excitable_;
+  std::int64_t evaluations_ = 0;
+};
+
+}  // namespace calib::ctl

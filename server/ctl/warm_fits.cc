@@ -1,0 +1,189 @@
+#include "server/ctl/warm_fits.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "absl/strings/str_cat.h"
+#include "inference/emulator/emulated_posterior.h"
+#include "server/ctl/extension.h"
+#include "server/ctl/response.h"
+
+namespace calib::ctl {
+namespace {
+
+using Eigen::Index;
+
+constexpr int kLeastSamples = 8;
+constexpr int kShares = 11;        // batches that the campaign's number of samples pays for
+constexpr double kPatience = 1.2;  // a batch more must bring a fit this much closer
+constexpr int kBlind = 2;          // batches before one can say that nothing comes closer
+constexpr double kCloser = 0.9;    // times the rms so far: the next batch was worth it
+constexpr int kDraws = 1000;       // of the emulated posterior
+
+void Append(const report::RunTable& more, report::RunTable& runs) {
+  const Index before = runs.histories.rows();
+  const Index n = more.histories.rows();
+  runs.parameters.conservativeResize(before + n, more.parameters.cols());
+  runs.histories.conservativeResize(before + n, more.histories.cols());
+  runs.parameters.bottomRows(n) = more.parameters;
+  runs.histories.bottomRows(n) = more.histories;
+  runs.sample.insert(runs.sample.end(), more.sample.begin(), more.sample.end());
+}
+
+// As the inference sees runs: predictions in the units of the readings.
+inference::Iteration IterationOf(const report::RunTable& runs, const inference::DataSet& data) {
+  inference::Iteration iteration;
+  iteration.parameters = runs.parameters;
+  iteration.predictions = runs.histories;
+  for (Index k = 0; k < runs.histories.cols(); ++k) {
+    const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
+    iteration.predictions.col(k) =
+        (runs.histories.col(k).array() * reading.sd + reading.value).matrix();
+  }
+  return iteration;
+}
+
+}  // namespace
+
+std::map<std::string, double> PointOf(const report::CampaignView& view,
+                                      const Eigen::MatrixXd& points, Index row) {
+  std::map<std::string, double> values;
+  for (Index j = 0; j < points.cols(); ++j) {
+    values[view.campaign.parameters[static_cast<std::size_t>(j)].name] = points(row, j);
+  }
+  return values;
+}
+
+absl::Status WarmFits::Fit(const std::vector<std::string>& effects) {
+  const auto runs = static_cast<int>(base_.runs().sample.size());
+  samples_ = std::max(kLeastSamples, runs / kShares);
+  int spent = 0;
+  for (const std::string& effect : effects) {  // side by side
+    const auto text = FirstText(effect);
+    if (!text.ok()) return text.status();
+    if (auto status = base_.Announce(*text, effect); !status.ok()) return status;
+  }
+  for (const std::string& effect : effects) {
+    if (auto status = Continue(effect); !status.ok()) return status;
+    spent += samples_;
+  }
+  while (spent + samples_ <= runs) {
+    const std::string* next = nullptr;
+    double lowest = 0;
+    for (const std::string& effect : effects) {
+      const WarmFit& fit = fits_.at(effect);
+      if (fit.stalled || fit.runs.histories.rows() == 0) continue;
+      const double price = fit.rms * std::pow(kPatience, fit.iterations);
+      if (next == nullptr || price < lowest) {
+        next = &effect;
+        lowest = price;
+      }
+    }
+    if (next == nullptr) break;
+    if (auto status = Continue(*next); !status.ok()) return status;
+    spent += samples_;
+  }
+  return absl::OkStatus();
+}
+
+const WarmFit* WarmFits::Find(const std::string& effect) const {
+  const auto found = fits_.find(effect);
+  return found == fits_.end() ? nullptr : &found->second;
+}
+
+inference::FittedModel WarmFits::BaseByRuns() const {
+  return {.histories = base_.runs().histories,
+          .covariance = covariance_,
+          .parameters = static_cast<int>(base_.runs().parameters.cols())};
+}
+
+absl::StatusOr<std::string> WarmFits::FirstText(const std::string& effect) const {
+  return ExtensionText(base_.view(), {.effects = {effect},
+                                      .purpose = "warm_fit",
+                                      .held_out = false,
+                                      .samples = samples_,
+                                      .iterations = 1});
+}
+
+absl::Status WarmFits::Continue(const std::string& effect) {
+  WarmFit& fit = fits_[effect];
+  const std::string what = absl::StrCat("warm fit with ", effect, ", batch ", fit.iterations + 1);
+  const double rms = fit.rms;
+  const double chi2 = fit.adequacy.chi2;
+  if (fit.iterations == 0) {
+    const auto text = FirstText(effect);
+    if (!text.ok()) return text.status();
+    auto view = base_.Run(*text, what);
+    if (!view.ok()) return view.status();
+    evaluations_ += view->status.model_evaluations();
+    fit.view = *std::move(view);
+    Append(report::RunsOf(fit.view), fit.runs);
+  } else {
+    const auto points = NextPoints(fit);
+    if (!points.ok()) return points.status();
+    campaign::Derivation derivation = base_.Derived("warm_fit_batch", what);
+    for (Index i = 0; i < points->rows(); ++i) {
+      derivation.rows.push_back({.like = fit.iterations * samples_ + static_cast<int>(i),
+                                 .values = PointOf(fit.view, *points, i)});
+    }
+    const auto text = campaign::Derive(fit.view.source.campaign_file(), derivation);
+    if (!text.ok()) return text.status();
+    const auto view = base_.Run(*text, what);
+    if (!view.ok()) return view.status();
+    evaluations_ += view->status.model_evaluations();
+    Append(report::RunsOf(*view), fit.runs);
+  }
+  ++fit.iterations;
+  if (fit.runs.histories.rows() == 0) {
+    fit.rms = std::numeric_limits<double>::infinity();
+    return absl::OkStatus();
+  }
+  Judge(fit);
+  fit.stalled =
+      fit.iterations > kBlind && fit.rms > kCloser * rms && fit.adequacy.chi2 > kCloser * chi2;
+  return absl::OkStatus();
+}
+
+// About the posterior that an emulator of all runs gives, those without the effect among them: at
+// its null the base model's runs are runs of this one. The prior where there is nothing to go by.
+absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
+  const campaign::Campaign& campaign = fit.view.campaign;
+  const inference::DataSet data = campaign::MakeDataSet(campaign);
+  const inference::JointPrior priors = campaign::Priors(campaign);
+  std::vector<inference::Iteration> iterations = {IterationOf(fit.runs, data)};
+  if (const auto nulls = RunsWithoutEffect(base_.runs(), base_.view().campaign, campaign);
+      nulls.parameters.rows() > 0) {
+    iterations.push_back(IterationOf(nulls, data));
+  }
+  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
+  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
+  const auto emulated = inference::EmulatedPosterior(priors, data, options, iterations);
+  inference::Proposal proposal;
+  if (emulated.ok() && emulated->draws.rows() > 0) {
+    auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
+                                                static_cast<std::size_t>(fit.iterations));
+    if (!fitted.ok()) return fitted.status();
+    proposal = *std::move(fitted);
+  }
+  return inference::DrawSamples(proposal, priors, campaign.filter, fit.iterations, samples_);
+}
+
+void WarmFits::Judge(WarmFit& fit) const {
+  fit.model = {.histories = fit.runs.histories,
+               .covariance = covariance_,
+               .parameters = static_cast<int>(fit.runs.parameters.cols())};
+  const auto adequacy = inference::TestAdequacy(fit.model);
+  const auto advantage = inference::Compare(fit.model, BaseByRuns());
+  if (!adequacy.ok() || !advantage.ok()) return;
+  fit.adequacy = *adequacy;
+  fit.over_base = *advantage;
+  fit.best = PointOf(fit.view, fit.runs.parameters, adequacy->best);
+  fit.rms = std::sqrt(fit.runs.histories.rowwise().squaredNorm().minCoeff() /
+                      static_cast<double>(fit.runs.histories.cols()));
+  if (const auto error = inference::LeftOutError(fit.model, parts_); error.ok()) {
+    fit.left_out_error = *error;
+  }
+}
+
+}  // namespace calib::ctl

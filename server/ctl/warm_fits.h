@@ -1,0 +1,81 @@
+#pragma once
+// The model refitted with one effect more, for the few effects that a screen ranks first: small
+// batches of runs at points that an emulator of all that has been run chooses, until the fit is
+// adequate or comes no closer, continued where that promises most. Judged by runs, not by the
+// emulator: what an emulator does not know would excuse any misfit.
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/diagnosis/screen.h"
+#include "server/ctl/fitted_campaign.h"
+
+namespace calib::ctl {
+
+struct WarmFit {
+  report::CampaignView view{};  ///< its first batch, a campaign of the extended model
+  report::RunTable runs{};      ///< of all batches
+  int iterations = 0;
+  bool stalled = false;                  ///< the last batches have come no closer
+  std::map<std::string, double> best{};  ///< parameters of the run with the smallest chi2, SI
+  double rms = 0;                        ///< smallest of a run, residual over noise sd
+  inference::FittedModel model{};        ///< the runs as points
+  inference::Adequacy adequacy{};
+  inference::Advantage over_base{};
+  /// Of a part of the data that it was not fitted to; none where there is one part.
+  std::optional<double> left_out_error{};
+
+  /// Adequate, and clearly better than the base model.
+  bool Explains(double level) const {
+    return adequacy.p_value >= level && over_base.nats > 2 * over_base.sd;
+  }
+};
+
+class WarmFits {
+ public:
+  /// covariance: of the difference between a measurement and one run, in units of the noise sd.
+  /// parts: see Response. All must outlive it.
+  WarmFits(const FittedCampaign& base, const Eigen::MatrixXd& covariance,
+           const std::vector<int>& parts)
+      : base_(base), covariance_(covariance), parts_(parts) {}
+
+  /// Fits all of them and continues, the most promising first, until each has stalled or as many
+  /// samples have been run as the campaign has. Errors: those of the runs.
+  absl::Status Fit(const std::vector<std::string>& effects);
+
+  /// A fit that needed no runs.
+  void Adopt(const std::string& effect, WarmFit fit) {
+    fits_.insert_or_assign(effect, std::move(fit));
+  }
+
+  const WarmFit* Find(const std::string& effect) const;
+  std::int64_t evaluations() const { return evaluations_; }
+
+  /// The base model judged in the same way, by its runs.
+  inference::FittedModel BaseByRuns() const;
+
+ private:
+  absl::StatusOr<std::string> FirstText(const std::string& effect) const;
+  absl::Status Continue(const std::string& effect);
+  absl::StatusOr<Eigen::MatrixXd> NextPoints(const WarmFit& fit) const;
+  void Judge(WarmFit& fit) const;
+
+  const FittedCampaign& base_;
+  const Eigen::MatrixXd& covariance_;
+  const std::vector<int>& parts_;
+  int samples_ = 0;  // of a batch
+  std::int64_t evaluations_ = 0;
+  std::map<std::string, WarmFit> fits_;
+};
+
+/// Calibrated parameters of a campaign at a row of `points`, by name.
+std::map<std::string, double> PointOf(const report::CampaignView& view,
+                                      const Eigen::MatrixXd& points, Eigen::Index row);
+
+}  // namespace calib::ctl

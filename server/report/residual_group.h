@@ -1,0 +1,29 @@
+#pragma once
+// Residuals of one observable of one experiment with what is known of their errors.
+
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "server/report/campaign_view.h"
+#include "server/report/predictions.h"
+
+namespace calib::report {
+
+/// At the readings that the prediction covers, in the order of loading; may be none.
+struct ResidualGroup {
+  const campaign::Experiment* experiment = nullptr;
+  const campaign::MeasuredObservable* observable = nullptr;
+  std::vector<std::size_t> readings;  ///< of the experiment
+  Eigen::VectorXd residual;           ///< model - measurement
+  Eigen::MatrixXd covariance;         ///< of noise and packing scatter together
+  double scatter = 0;                 ///< rms of its sd over that of the noise
+  std::string scatter_from{};
+  Eigen::VectorXd model;
+};
+
+/// Of the experiment's observable j.
+ResidualGroup MakeResidualGroup(const CampaignView& view, const campaign::Experiment& experiment,
+                                std::size_t j, const ObservablePrediction& prediction);
+
+}  // namespace calib::report

@@ -1,0 +1,117 @@
+#include "server/ctl/reading_effects.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace calib::ctl {
+namespace {
+
+constexpr double kPressure = 1e5;
+
+// A triaxial test read at five strains, the fourth after unloading: the model agrees with it.
+campaign::Campaign Triaxial(const std::string& observable, const std::vector<double>& values,
+                            double sd) {
+  campaign::Experiment experiment;
+  experiment.name = "tx";
+  experiment.test = "triaxial_drained";
+  experiment.settings["confining_pressure"] = kPressure;
+  experiment.control_name = "axial_strain";
+  experiment.control = {0, 0.01, 0.02, 0.015, 0.02};
+  for (int k = 0; k < 5; ++k) {
+    experiment.path.push_back(
+        {.target = experiment.control[static_cast<std::size_t>(k)], .load_step = k});
+  }
+  experiment.segment = {"initial_loading", "initial_loading", "initial_loading", "unload_1",
+                        "reload_1"};
+  experiment.observables.push_back(
+      {.name = observable, .values = values, .sd = std::vector<double>(values.size(), sd)});
+  campaign::Campaign campaign;
+  campaign.experiments.push_back(experiment);
+  return campaign;
+}
+
+const ReadingEffect* Find(const std::vector<ReadingEffect>& effects, const std::string& parameter) {
+  for (const ReadingEffect& effect : effects) {
+    if (effect.parameter == parameter) return &effect;
+  }
+  return nullptr;
+}
+
+const std::vector<double> kRatio = {1, 2, 3, 2, 3};
+
+// sigma_a is read as sigma_a + g (q - q0) [dem/effects/load_cell_error.h], here R + g (R - 1).
+TEST(EffectsOnReadings, GainOfTheLoadCell) {
+  std::vector<std::pair<std::string, std::string>> impossible;
+  const auto effects = EffectsOnReadings(Triaxial("stress_ratio", kRatio, 0.1),
+                                         Eigen::MatrixXd::Zero(1, 5), impossible);
+  const ReadingEffect* gain = Find(effects, "load_cell_error.gain");
+  ASSERT_NE(gain, nullptr);
+  for (int k = 0; k < 5; ++k) {
+    EXPECT_NEAR(gain->change(0, k), gain->unit * (kRatio[static_cast<std::size_t>(k)] - 1) / 0.1,
+                1e-12);
+  }
+  ASSERT_EQ(impossible.size(), 1U);
+  EXPECT_EQ(impossible[0].first, "initial_density");
+}
+
+// The same through q/p: R = (1 + 2 m / 3) / (1 - m / 3).
+TEST(EffectsOnReadings, StressesFromTheirRatio) {
+  std::vector<double> q_over_p;
+  for (const double r : kRatio) q_over_p.push_back(3 * (r - 1) / (r + 2));
+  std::vector<std::pair<std::string, std::string>> impossible;
+  const auto effects = EffectsOnReadings(Triaxial("q_over_p", q_over_p, 0.1),
+                                         Eigen::MatrixXd::Zero(1, 5), impossible);
+  const ReadingEffect* gain = Find(effects, "load_cell_error.gain");
+  ASSERT_NE(gain, nullptr);
+  for (std::size_t k = 0; k < 5; ++k) {
+    const double r = kRatio[k] + gain->unit * (kRatio[k] - 1);
+    EXPECT_NEAR(gain->change(0, static_cast<Eigen::Index>(k)),
+                (3 * (r - 1) / (r + 2) - q_over_p[k]) / 0.1, 1e-12);
+  }
+}
+
+// y read at strain e is y(e - x C): minus the slope of its stage times x C.
+TEST(EffectsOnReadings, ComplianceOfTheFrame) {
+  std::vector<std::pair<std::string, std::string>> impossible;
+  const auto effects = EffectsOnReadings(Triaxial("stress_ratio", kRatio, 0.1),
+                                         Eigen::MatrixXd::Zero(1, 5), impossible);
+  const ReadingEffect* compliance = Find(effects, "apparatus_compliance.compliance");
+  ASSERT_NE(compliance, nullptr);
+  const auto strain = [&](double ratio) { return compliance->unit * kPressure * (ratio - 1); };
+  EXPECT_NEAR(compliance->change(0, 0), 0, 1e-12);
+  EXPECT_NEAR(compliance->change(0, 2), -100 * strain(3) / 0.1, 1e-9);
+  EXPECT_NEAR(compliance->change(0, 3), 0, 1e-12) << "no neighbour on its stage";
+}
+
+// A measurement made with a gain is explained by it exactly, and never by a negative strength of a
+// one-sided effect.
+TEST(Join, FindsTheStrength) {
+  const double gain = 0.08;
+  std::vector<double> read;
+  for (const double r : kRatio) read.push_back(r + gain * (r - 1));
+  const auto campaign = Triaxial("stress_ratio", read, 0.1);
+  Eigen::MatrixXd histories(1, 5);  // the model: kRatio
+  for (Eigen::Index k = 0; k < 5; ++k) {
+    histories(0, k) =
+        (kRatio[static_cast<std::size_t>(k)] - read[static_cast<std::size_t>(k)]) / 0.1;
+  }
+  std::vector<std::pair<std::string, std::string>> impossible;
+  const auto effects = EffectsOnReadings(campaign, histories, impossible);
+  const ReadingEffect* effect = Find(effects, "load_cell_error.gain");
+  ASSERT_NE(effect, nullptr);
+  const inference::FittedModel model{
+      .histories = histories, .covariance = Eigen::MatrixXd::Identity(5, 5), .parameters = 1};
+  Eigen::VectorXd strengths;
+  const auto joined = Join(model, *effect, -10, 10, strengths);
+  EXPECT_NEAR(strengths[0] * effect->unit, gain, 1e-12);
+  EXPECT_NEAR(joined.histories.norm(), 0, 1e-12);
+  EXPECT_EQ(joined.parameters, 2);
+  Join({.histories = -histories, .covariance = model.covariance, .parameters = 1}, *effect, 0, 10,
+       strengths);
+  EXPECT_EQ(strengths[0], 0);
+}
+
+}  // namespace
+}  // namespace calib::ctl
