@@ -118,8 +118,7 @@ std::vector<std::string> SplitTerms(const std::string& side) {
     const bool sign = (side[i] == '+' || side[i] == '-') && i > 0 && side[i - 1] == ' ' &&
                       i + 1 < side.size() && side[i + 1] == ' ';
     if (sign && !absl::StripAsciiWhitespace(terms.back()).empty()) {
-      terms.emplace_back();
-      if (side[i] == '-') terms.back() = "-";
+      terms.emplace_back(side[i] == '-' ? 1 : 0, '-');
       ++i;  // the blank behind it
     } else {
       terms.back() += side[i];
