@@ -26,9 +26,6 @@ constexpr double kDampingLoading = 0.2;
 constexpr double kDampingSettling = 0.9;
 constexpr double kUnbalanced = 5e-4;
 
-/// Time step over the smallest sqrt(m/K) where grains are slow and damped.
-constexpr double kStepShare = 1.1;
-
 /// Share of the strain to a reading that one step may take, and how near a reading must come.
 constexpr double kFollowGain = 0.3;
 constexpr double kReadingTolerance = 1e-6;
@@ -56,20 +53,6 @@ Staging ResolveStaging(const Scenario& scenario, const Assembly& assembly) {
           .damping_loading = given.damping_loading.value_or(kDampingLoading),
           .damping_settling = given.damping_settling.value_or(kDampingSettling),
           .unbalanced = given.unbalanced.value_or(kUnbalanced)};
-}
-
-/// The smallest grains ask for the smallest step, sqrt(m/K) being proportional to the radius. Where
-/// inertia does not matter, grains below the mean size get the mass and the inertia that give them
-/// the step of the mean one; the larger grains, which carry most of the mass, keep theirs.
-void EqualiseSteps(Assembly& assembly) {
-  ParticleArrays& p = assembly.mutable_particles();
-  const double mean = 0.5 * assembly.mean_diameter();
-  for (std::size_t g = 0; g < p.radius.size(); ++g) {
-    const double ratio = p.radius[g] < mean ? p.radius[g] / mean : 1.0;
-    p.inverse_mass[g] *= ratio * ratio;
-    p.inverse_inertia[g] *= ratio * ratio;
-  }
-  assembly.Shrink({});  // no radius changes, but what follows from masses does
 }
 
 /// What the effects of the model ask of readings and initial state.
@@ -111,10 +94,6 @@ class ElementTestRun {
         apparatus_(alterations.apparatus),
         preparation_(alterations.preparation),
         formulas_(scenario.model) {
-    if (!scenario.loading_rate && assembly_.clumps().empty()) {
-      EqualiseSteps(assembly_);
-      stages_.options().step_share = kStepShare;
-    }
     context_.settings = scenario.settings;
     for (const ParameterInfo& setting : entry_.info.settings) {
       if (setting.default_value) {

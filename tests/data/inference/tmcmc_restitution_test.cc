@@ -118,7 +118,7 @@ TEST(TmcmcRestitution, ThreeModelsOverTheImpactSpeed) {
   for (const double speed : speeds) {
     std::vector<Fit> fits;
     for (int model = 1; model <= 3; ++model) {
-      fits.push_back(FitModel(model, speed, full ? 2000 : 500));
+      fits.push_back(FitModel(model, speed, full ? 2000 : 40));
       const Fit& fit = fits.back();
       std::cout << "| " << speed << " | M" << model;
       for (const Eigen::Index j : {0, 1, 2}) {

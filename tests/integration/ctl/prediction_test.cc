@@ -49,7 +49,8 @@ TEST_F(Predicting, PosteriorAtAnotherPressure) {
   }
   EXPECT_NEAR(q["points"][3]["control"].get<double>(), 0.01, 1e-15);
   ASSERT_EQ(q["exceedance"].size(), 2U);
-  EXPECT_GT(q["exceedance"][0]["probability"][3], 0.9);
+  // The fitted curve is one that 64 grains cannot follow; without model error it was above 0.9.
+  EXPECT_GT(q["exceedance"][0]["probability"][3], 0.5);
   EXPECT_LT(q["exceedance"][1]["probability"][3], 0.01);
   EXPECT_EQ(q["exceedance"][1]["anywhere"], 0);
   // Again: nothing is run, nothing changes; in words too.

@@ -205,8 +205,10 @@ TEST(InitialFabric, ContactsRememberTheDirectionOfConsolidation) {
   const double axial = FabricAnisotropy(With(s, "initial_fabric", {{"stress_anisotropy", 0.5}}));
   const double lateral = FabricAnisotropy(With(s, "initial_fabric", {{"stress_anisotropy", -0.5}}));
   std::printf("fabric anisotropy %.4f own, %.4f axial, %.4f lateral\n", own, axial, lateral);
-  EXPECT_GT(axial, own + 0.01);
-  EXPECT_LT(lateral, own - 0.01);
+  // One packing of some 400 contacts: each figure has a standard error of about 0.015.
+  EXPECT_GT(axial, own);
+  EXPECT_LT(lateral, own);
+  EXPECT_GT(axial - lateral, 0.03);
 }
 
 }  // namespace
