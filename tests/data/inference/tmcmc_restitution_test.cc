@@ -109,10 +109,12 @@ Fit FitModel(int model, double speed, int samples) {
   return {.state = *std::move(state)};
 }
 
-// $CALIB_RESTITUTION=full prints the table of inference/tmcmc/README.md (minutes).
+// A study, not part of the suite: CALIB_RESTITUTION=quick takes more than five minutes, full hours. It
+// has not been run to its end yet, so its limits are expectations.
 TEST(TmcmcRestitution, ThreeModelsOverTheImpactSpeed) {
   const char* text = std::getenv("CALIB_RESTITUTION");
-  const bool full = text != nullptr && std::string(text) == "full";
+  if (text == nullptr) GTEST_SKIP() << "set CALIB_RESTITUTION to quick or full";
+  const bool full = std::string(text) == "full";
   const std::vector<double> speeds =
       full ? std::vector<double>{1, 2, 2.5, 3, 4} : std::vector<double>{3};
   for (const double speed : speeds) {
