@@ -171,27 +171,24 @@ struct LanePlaces {
   const int* j;
 };
 
+/// Three quantities of four lanes, contact by contact: row[l] = {x[l], y[l], z[l], 0}.
+CALIB_DEM_INLINE void Rows(const double* x, const double* y, const double* z, Quad (&row)[4]) {
+  LoadQuad(x, row[0]);
+  LoadQuad(y, row[1]);
+  LoadQuad(z, row[2]);
+  row[3] = Quad{0, 0, 0, 0};
+  Transpose(row);
+}
+
 CALIB_DEM_CLONES void Leave(const LanePlaces place, const ContactBlock& b, GrainLoad* loads) {
   const Quad zero = {0, 0, 0, 0};
   for (int k = 0; k < kBlock; k += kQuad) {
     Quad f[4];
-    LoadQuad(b.force_x + k, f[0]);
-    LoadQuad(b.force_y + k, f[1]);
-    LoadQuad(b.force_z + k, f[2]);
-    f[3] = zero;
-    Transpose(f);
+    Rows(b.force_x + k, b.force_y + k, b.force_z + k, f);
     Quad ti[4];
-    LoadQuad(b.torque_ix + k, ti[0]);
-    LoadQuad(b.torque_iy + k, ti[1]);
-    LoadQuad(b.torque_iz + k, ti[2]);
-    ti[3] = zero;
-    Transpose(ti);
+    Rows(b.torque_ix + k, b.torque_iy + k, b.torque_iz + k, ti);
     Quad tj[4];
-    LoadQuad(b.torque_jx + k, tj[0]);
-    LoadQuad(b.torque_jy + k, tj[1]);
-    LoadQuad(b.torque_jz + k, tj[2]);
-    tj[3] = zero;
-    Transpose(tj);
+    Rows(b.torque_jx + k, b.torque_jy + k, b.torque_jz + k, tj);
     for (int l = 0; l < kQuad; ++l) {
       GrainLoad& on_i = loads[place.i[k + l]];
       GrainLoad& on_j = loads[place.j[k + l]];

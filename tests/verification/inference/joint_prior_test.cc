@@ -14,6 +14,7 @@
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/standard_normal.h"
 #include "inference/tmcmc/tmcmc.h"
+#include "tests/verification/inference/linear_model.h"
 
 namespace calib::inference {
 namespace {
@@ -66,26 +67,11 @@ struct CorrelatedLinear {
   }
 };
 
-template <typename Predict>
-std::vector<Iteration> RunCampaign(const JointPrior& priors, const DataSet& data,
-                                   const FilterOptions& options, int count, int n,
-                                   const Predict& predict) {
-  std::vector<Iteration> iterations;
-  for (int k = 0; k < count; ++k) {
-    Iteration iteration;
-    if (k > 0) iteration.proposal = FitProposal(priors, data, options, iterations).value();
-    iteration.parameters = DrawSamples(iteration.proposal, priors, options, k, n).value();
-    iteration.predictions = predict(iteration.parameters);
-    iterations.push_back(std::move(iteration));
-  }
-  return iterations;
-}
-
 TEST(JointPrior, CorrelatedGaussianPosteriorAndEvidenceByTheFilter) {
   const CorrelatedLinear model;
   const FilterOptions options{.design = Design::kSobol, .seed = 3};
-  const auto runs = RunCampaign(model.Prior3(), model.Data(), options, 3, 1000,
-                                [&](const Eigen::MatrixXd& p) { return model.Predict(p); });
+  const auto runs = RunIterations(model.Prior3(), model.Data(), options, 3, 1000,
+                                  [&](const Eigen::MatrixXd& p) { return model.Predict(p); });
   const auto posterior = ComputePosterior(model.Prior3(), model.Data(), options, runs);
   ASSERT_TRUE(posterior.ok()) << posterior.status();
   EXPECT_EQ(posterior->degeneracy, "");
@@ -155,7 +141,8 @@ TEST(JointPrior, ConstrainedGaussianByTheFilterInEveryDesign) {
   for (const Design design : {Design::kHalton, Design::kSobol, Design::kLatinHypercube,
                               Design::kSymmetricLatinHypercube}) {
     const FilterOptions options{.design = design, .seed = 7};
-    const auto runs = RunCampaign(model.Prior2(), model.Data(), options, 3, 500, &Ordered::Predict);
+    const auto runs =
+        RunIterations(model.Prior2(), model.Data(), options, 3, 500, &Ordered::Predict);
     for (const Iteration& iteration : runs) {
       EXPECT_LE((iteration.parameters.col(0) - iteration.parameters.col(1)).maxCoeff(), 0);
     }
@@ -188,7 +175,7 @@ TEST(JointPrior, ConstrainedGaussianByTmcmc) {
 TEST(JointPrior, ConstrainedGaussianOnTheEmulator) {
   const Ordered model;
   const FilterOptions options{.seed = 7};
-  const auto runs = RunCampaign(model.Prior2(), model.Data(), options, 1, 60, &Ordered::Predict);
+  const auto runs = RunIterations(model.Prior2(), model.Data(), options, 1, 60, &Ordered::Predict);
   const auto result = EmulatedPosterior(model.Prior2(), model.Data(), {.seed = 4}, runs);
   ASSERT_TRUE(result.ok()) << result.status();
   ASSERT_TRUE(result->adequate) << result->reason;

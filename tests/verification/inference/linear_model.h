@@ -78,7 +78,7 @@ struct LinearModel {
 
 // `count` iterations of n samples of a model that is a function of one row of parameters.
 template <typename Predict>
-std::vector<Iteration> RunIterations(const std::vector<Prior>& priors, const DataSet& data,
+std::vector<Iteration> RunIterations(const JointPrior& priors, const DataSet& data,
                                      const FilterOptions& options, int count, int n,
                                      const Predict& predict) {
   std::vector<Iteration> iterations;
