@@ -206,7 +206,8 @@ class Inquiry {
          .refit_p_value = -1,
          .refit_chi2 = 0,
          .over_base = {},
-         .left_out_error = {}});
+         .left_out_error = {},
+         .over_base_evidence = {}});
     if (std::isfinite(score.detectable)) {
       diagnosis_.detectable[score.name] =
           StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
@@ -222,6 +223,7 @@ class Inquiry {
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (std::size_t c = 0; c < count; ++c) Describe(diagnosis_.candidates[c]);
+    WeighEvidence();
     // Those that explain the readings, by how well; then the other fits, by how close they come.
     const auto rank = [this](const CandidateEffect& c) {
       return Explains(c) ? 0 : (c.campaign.empty() ? 2 : 1);
@@ -254,6 +256,29 @@ class Inquiry {
                    0.0, 1.0);
   }
 
+  // Of those that explain the readings: how they stand to the base model and to each other for
+  // three widths of the prior on their strength.
+  void WeighEvidence() {
+    std::optional<double> base;
+    for (CandidateEffect& candidate : diagnosis_.candidates) {
+      if (!Explains(candidate)) continue;
+      if (!base) base = fits_.BaseLogEvidence();
+      if (!base) return;
+      fits_.WeighEvidence(candidate.effect);
+      candidate.over_base_evidence = fits_.Find(candidate.effect)->evidence;
+      if (!candidate.over_base_evidence) continue;
+      for (double& value : candidate.over_base_evidence->log_evidence) value -= *base;
+    }
+  }
+
+  // Whatever the width of the prior on the strengths; true where no evidence is known.
+  static bool EvidenceFavours(const std::optional<ScaledEvidence>& a,
+                              const std::optional<ScaledEvidence>& b) {
+    if (!a || !b) return true;
+    return std::equal(a->log_evidence.begin(), a->log_evidence.end(), b->log_evidence.begin(),
+                      [](double x, double y) { return x > y; });
+  }
+
   // Adequate, clearly better than the base model, and not worse on readings it was not fitted to.
   bool Explains(const CandidateEffect& candidate) const {
     const WarmFit* fit = fits_.Find(candidate.effect);
@@ -275,12 +300,18 @@ class Inquiry {
     }
     CandidateEffect& first = diagnosis_.candidates.front();
     const WarmFit& best = *fits_.Find(first.effect);
+    if (base_fits && !EvidenceFavours(first.over_base_evidence, ScaledEvidence{})) {
+      diagnosis_.verdict = "adequate";  // a hint that depends on the prior of its strength
+      return;
+    }
     // Those that do as well, and those whose fit is not at its end: they are not excluded.
     std::vector<std::string> rivals;
     for (const CandidateEffect& other : diagnosis_.candidates) {
       const WarmFit* fit = fits_.Find(other.effect);
       if (fit == nullptr || fit == &best) continue;
-      const bool excluded = fit->stalled && (!Explains(other) || ClearlyBetter(best, *fit));
+      const bool excluded =
+          fit->stalled && (!Explains(other) || (ClearlyBetter(best, *fit) &&
+                                                EvidenceFavours(best.evidence, fit->evidence)));
       if (!excluded && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
     }
     if (rivals.empty()) {

@@ -44,6 +44,14 @@ inference::Iteration IterationOf(const report::RunTable& runs, const inference::
   return iteration;
 }
 
+absl::StatusOr<inference::EmulatedResult> Emulate(
+    const campaign::Campaign& campaign, const std::vector<inference::Iteration>& iterations) {
+  const inference::JointPrior priors = campaign::Priors(campaign);
+  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
+  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
+  return inference::EmulatedPosterior(priors, campaign::MakeDataSet(campaign), options, iterations);
+}
+
 }  // namespace
 
 std::map<std::string, double> PointOf(const report::CampaignView& view,
@@ -147,20 +155,24 @@ absl::Status WarmFits::Continue(const std::string& effect) {
   return absl::OkStatus();
 }
 
-// About the posterior that an emulator of all runs gives, those without the effect among them: at
-// its null the base model's runs are runs of this one. The prior where there is nothing to go by.
-absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
+// Those without the effect among them: at its null the base model's runs are runs of this one.
+std::vector<inference::Iteration> WarmFits::RunsFor(const WarmFit& fit) const {
   const campaign::Campaign& campaign = fit.view.campaign;
   const inference::DataSet data = campaign::MakeDataSet(campaign);
-  const inference::JointPrior priors = campaign::Priors(campaign);
   std::vector<inference::Iteration> iterations = {IterationOf(fit.runs, data)};
   if (const auto nulls = RunsWithoutEffect(base_.runs(), base_.view().campaign, campaign);
       nulls.parameters.rows() > 0) {
     iterations.push_back(IterationOf(nulls, data));
   }
-  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
-  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
-  const auto emulated = inference::EmulatedPosterior(priors, data, options, iterations);
+  return iterations;
+}
+
+// About the posterior that an emulator of all runs gives. The prior where there is nothing to go
+// by.
+absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
+  const campaign::Campaign& campaign = fit.view.campaign;
+  const inference::JointPrior priors = campaign::Priors(campaign);
+  const auto emulated = Emulate(campaign, RunsFor(fit));
   inference::Proposal proposal;
   if (emulated.ok() && emulated->draws.rows() > 0) {
     auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
@@ -169,6 +181,29 @@ absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
     proposal = *std::move(fitted);
   }
   return inference::DrawSamples(proposal, priors, campaign.filter, fit.iterations, samples_);
+}
+
+void WarmFits::WeighEvidence(const std::string& effect) {
+  const auto found = fits_.find(effect);
+  if (found == fits_.end() || found->second.runs.histories.rows() == 0) return;
+  const std::vector<inference::Iteration> runs = RunsFor(found->second);
+  ScaledEvidence evidence;
+  for (std::size_t s = 0; s < kStrengthScales.size(); ++s) {
+    const auto emulated =
+        Emulate(WithStrengthScaled(found->second.view.campaign, effect, kStrengthScales[s]), runs);
+    if (!emulated.ok() || !emulated->adequate) return;
+    evidence.log_evidence[s] = emulated->log_evidence;
+    evidence.standard_error = std::max(evidence.standard_error, emulated->log_evidence_se);
+  }
+  found->second.evidence = evidence;
+}
+
+std::optional<double> WarmFits::BaseLogEvidence() const {
+  const auto emulated =
+      Emulate(base_.view().campaign,
+              {IterationOf(base_.runs(), campaign::MakeDataSet(base_.view().campaign))});
+  if (!emulated.ok() || !emulated->adequate) return std::nullopt;
+  return emulated->log_evidence;
 }
 
 void WarmFits::Judge(WarmFit& fit) const {

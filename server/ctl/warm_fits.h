@@ -14,7 +14,9 @@
 
 #include "absl/status/statusor.h"
 #include "inference/diagnosis/screen.h"
+#include "inference/filter/iterative_filter.h"
 #include "server/ctl/fitted_campaign.h"
+#include "server/ctl/strength_scale.h"
 
 namespace calib::ctl {
 
@@ -30,6 +32,8 @@ struct WarmFit {
   inference::Advantage over_base{};
   /// Of a part of the data that it was not fitted to; none where there is one part.
   std::optional<double> left_out_error{};
+  /// None before WeighEvidence, or where the emulator does not know the runs well enough.
+  std::optional<ScaledEvidence> evidence{};
 
   /// Adequate, and clearly better than the base model.
   bool Explains(double level) const {
@@ -60,10 +64,16 @@ class WarmFits {
   /// The base model judged in the same way, by its runs.
   inference::FittedModel BaseByRuns() const;
 
+  /// The evidence of a fit that has runs; and that of the base model on an emulator of its own runs
+  /// (no effect, hence one figure; none as in WarmFit).
+  void WeighEvidence(const std::string& effect);
+  std::optional<double> BaseLogEvidence() const;
+
  private:
   absl::StatusOr<std::string> FirstText(const std::string& effect) const;
   absl::Status Continue(const std::string& effect);
   absl::StatusOr<Eigen::MatrixXd> NextPoints(const WarmFit& fit) const;
+  std::vector<inference::Iteration> RunsFor(const WarmFit& fit) const;
   void Judge(WarmFit& fit) const;
 
   const FittedCampaign& base_;
