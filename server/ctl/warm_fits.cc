@@ -18,7 +18,8 @@ constexpr int kLeastSamples = 8;
 constexpr int kShares = 11;        // batches that the campaign's number of samples pays for
 constexpr double kPatience = 1.2;  // a batch more must bring a fit this much closer
 constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
-constexpr double kCloser = 0.9;    // times the rms so far: the next batch was worth it
+constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
+constexpr int kMostIdle = 2;       // batches in a row that were not
 constexpr int kDraws = 1000;       // of the emulated posterior
 
 void Append(const report::RunTable& more, report::RunTable& runs) {
@@ -79,11 +80,17 @@ absl::Status WarmFits::Fit(const std::vector<std::string>& effects) {
     }
   }
   while (spent + samples_ <= runs) {
+    double closest = std::numeric_limits<double>::infinity();
+    for (const std::string& effect : effects) {
+      const WarmFit& fit = fits_.at(effect);
+      if (fit.model.histories.rows() > 0) closest = std::min(closest, fit.adequacy.chi2);
+    }
     const std::string* next = nullptr;
     double lowest = 0;
     for (const std::string& effect : effects) {
       const WarmFit& fit = fits_.at(effect);
       if (fit.stalled || fit.runs.histories.rows() == 0) continue;
+      if (fit.Satisfied() && fit.adequacy.chi2 <= closest) continue;
       const double price = fit.rms * std::pow(kPatience, fit.iterations);
       if (next == nullptr || price < lowest) {
         next = &effect;
@@ -150,8 +157,9 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     return absl::OkStatus();
   }
   Judge(fit);
-  fit.stalled = fit.iterations > kLeastBatches && fit.rms > kCloser * rms &&
-                fit.adequacy.chi2 > kCloser * chi2;
+  const bool closer = fit.rms < kCloser * rms || fit.adequacy.chi2 < kCloser * chi2;
+  fit.idle = fit.iterations == 1 || closer ? 0 : fit.idle + 1;
+  fit.stalled = fit.idle >= kMostIdle;
   return absl::OkStatus();
 }
 

@@ -24,7 +24,8 @@ struct WarmFit {
   report::CampaignView view{};  ///< its first batch, a campaign of the extended model
   report::RunTable runs{};      ///< of all batches
   int iterations = 0;
-  bool stalled = false;                  ///< the last batches have come no closer
+  int idle = 0;                          ///< batches since one came clearly closer
+  bool stalled = false;                  ///< several batches have come no closer
   std::map<std::string, double> best{};  ///< parameters of the run with the smallest chi2, SI
   double rms = 0;                        ///< smallest of a run, residual over noise sd
   inference::FittedModel model{};        ///< the runs as points
@@ -34,6 +35,9 @@ struct WarmFit {
   std::optional<double> left_out_error{};
   /// None before WeighEvidence, or where the emulator does not know the runs well enough.
   std::optional<ScaledEvidence> evidence{};
+
+  /// As close as noise and scatter allow: more runs are better spent on its rivals.
+  bool Satisfied() const { return adequacy.degrees > 0 && adequacy.chi2 <= adequacy.degrees; }
 
   /// Adequate, and clearly better than the base model.
   bool Explains(double level) const {
@@ -49,8 +53,9 @@ class WarmFits {
            const std::vector<int>& parts)
       : base_(base), covariance_(covariance), parts_(parts) {}
 
-  /// Fits all of them and continues, the most promising first, until each has stalled or as many
-  /// samples have been run as the campaign has. Errors: those of the runs.
+  /// Fits all of them and continues, the most promising first, until each has stalled, or is the
+  /// best and satisfied, or as many samples have been run as the campaign has. Errors: those of the
+  /// runs.
   absl::Status Fit(const std::vector<std::string>& effects);
 
   /// A fit that needed no runs.
