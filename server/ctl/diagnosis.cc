@@ -11,15 +11,15 @@
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
+#include "server/ctl/verdict.h"
 #include "server/ctl/warm_fits.h"
 
 namespace calib::ctl {
 namespace {
 
 constexpr std::size_t kWarmFits = 3;
-constexpr double kClearlyCloser = 0.8;  // of the base model's rms
-constexpr std::size_t kMostNames = 3;
-constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
+constexpr std::size_t kMostRivals = 3;  // that the next experiment is to separate
+constexpr double kMostUnits = 10;       // of an effect that is calculated on readings
 
 class Inquiry {
  public:
@@ -54,7 +54,7 @@ class Inquiry {
     }
     diagnosis_.left_out_error = LeftOut(elsewhere ? response_.model : fits_.BaseByRuns());
     if (auto status = FitWarm(); !status.ok()) return status;
-    Conclude(fits);
+    Verdict(diagnosis_, fits_, options_.level).Conclude(fits);
     if (options_.next_experiment && !elsewhere && diagnosis_.verdict != "adequate") {
       if (auto status = PlanNext(); !status.ok()) return status;
     }
@@ -223,10 +223,11 @@ class Inquiry {
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (std::size_t c = 0; c < count; ++c) Describe(diagnosis_.candidates[c]);
-    WeighEvidence();
+    Verdict verdict(diagnosis_, fits_, options_.level);
+    verdict.WeighEvidence();
     // Those that explain the readings, by how well; then the other fits, by how close they come.
-    const auto rank = [this](const CandidateEffect& c) {
-      return Explains(c) ? 0 : (c.campaign.empty() ? 2 : 1);
+    const auto rank = [&verdict](const CandidateEffect& c) {
+      return verdict.Explains(c) ? 0 : (c.campaign.empty() ? 2 : 1);
     };
     std::stable_sort(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
                      [&rank](const CandidateEffect& a, const CandidateEffect& b) {
@@ -256,103 +257,13 @@ class Inquiry {
                    0.0, 1.0);
   }
 
-  // How the fitted effects stand to the base model and to each other for three widths of the prior
-  // on their strength; asked for where one of them explains the readings.
-  void WeighEvidence() {
-    if (std::none_of(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
-                     [this](const CandidateEffect& c) { return Explains(c); })) {
-      return;
-    }
-    const std::optional<double> base = fits_.BaseLogEvidence();
-    for (CandidateEffect& candidate : diagnosis_.candidates) {
-      if (fits_.Find(candidate.effect) == nullptr) continue;
-      fits_.WeighEvidence(candidate.effect);
-      if (!base) continue;
-      candidate.over_base_evidence = fits_.Find(candidate.effect)->evidence;
-      if (!candidate.over_base_evidence) continue;
-      for (double& value : candidate.over_base_evidence->log_evidence) value -= *base;
-    }
-  }
-
-  // Whatever the width of the prior on the strengths. An evidence is unknown where the emulator
-  // does not know what the model can do: nothing is favoured over that.
-  static bool EvidenceFavours(const std::optional<ScaledEvidence>& a,
-                              const std::optional<ScaledEvidence>& b) {
-    return a && b &&
-           std::equal(a->log_evidence.begin(), a->log_evidence.end(), b->log_evidence.begin(),
-                      [](double x, double y) { return x > y; });
-  }
-
-  // Adequate, clearly better than the base model, and not worse on readings it was not fitted to.
-  bool Explains(const CandidateEffect& candidate) const {
-    const WarmFit* fit = fits_.Find(candidate.effect);
-    return fit != nullptr && fit->Explains(options_.level) &&
-           !(fit->left_out_error && diagnosis_.left_out_error &&
-             *fit->left_out_error > *diagnosis_.left_out_error);
-  }
-
-  bool ClearlyBetter(const WarmFit& a, const WarmFit& b) const {
-    const auto advantage = inference::Compare(a.model, b.model);
-    return advantage.ok() && advantage->nats > 2 * advantage->sd && advantage->nats > 0;
-  }
-
-  // Beaten, at its end or with the evidence against it. A fit that was made without runs has no
-  // evidence and needs none: all its points are known.
-  bool Excluded(const CandidateEffect& other, const WarmFit& best) const {
-    const WarmFit& fit = *fits_.Find(other.effect);
-    const bool outweighed = EvidenceFavours(best.evidence, fit.evidence);
-    if (!Explains(other)) return fit.stalled || outweighed;
-    return ClearlyBetter(best, fit) && (outweighed || fit.runs.histories.rows() == 0);
-  }
-
-  void Conclude(bool base_fits) {
-    if (diagnosis_.candidates.empty() || !Explains(diagnosis_.candidates.front())) {
-      diagnosis_.verdict = base_fits ? "adequate" : "unexplained";
-      if (!base_fits) diagnosis_.best_partial = Closest();
-      return;
-    }
-    CandidateEffect& first = diagnosis_.candidates.front();
-    const WarmFit& best = *fits_.Find(first.effect);
-    if (base_fits && first.over_base_evidence &&
-        !EvidenceFavours(first.over_base_evidence, ScaledEvidence{})) {
-      diagnosis_.verdict = "adequate";  // a hint that depends on the prior of its strength
-      return;
-    }
-    // Those that do as well, and those of which it is not known yet how well they can do.
-    std::vector<std::string> rivals;
-    for (const CandidateEffect& other : diagnosis_.candidates) {
-      const WarmFit* fit = fits_.Find(other.effect);
-      if (fit == nullptr || fit == &best) continue;
-      if (!Excluded(other, best) && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
-    }
-    if (rivals.empty()) {
-      diagnosis_.verdict = "missing_effect";
-      diagnosis_.effect = first.effect;
-    } else {
-      diagnosis_.verdict = "ambiguous";
-      first.confusable_with = rivals;
-    }
-  }
-
-  // Judged or not: the fit that comes closest, if it comes clearly closer than the base model.
-  std::string Closest() const {
-    std::string name;
-    double lowest = kClearlyCloser * diagnosis_.rms;
-    for (const CandidateEffect& candidate : diagnosis_.candidates) {
-      if (candidate.campaign.empty() || candidate.predicted_rms_error >= lowest) continue;
-      name = candidate.effect;
-      lowest = candidate.predicted_rms_error;
-    }
-    return name;
-  }
-
   // The named effect, or the best, against what comes next; the base model where there is no
   // second.
   absl::Status PlanNext() {
     std::vector<Rival> rivals;
     for (const CandidateEffect& candidate : diagnosis_.candidates) {
       const WarmFit* fit = fits_.Find(candidate.effect);
-      if (fit == nullptr || rivals.size() >= kMostNames) continue;
+      if (fit == nullptr || rivals.size() >= kMostRivals) continue;
       const auto& group = diagnosis_.candidates.front().confusable_with;
       const bool named = diagnosis_.verdict != "ambiguous" || rivals.empty() ||
                          std::find(group.begin(), group.end(), candidate.effect) != group.end();

@@ -14,12 +14,12 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int kLeastSamples = 8;
-constexpr int kShares = 11;        // batches that the campaign's number of samples pays for
-constexpr double kPatience = 1.2;  // a batch more must bring a fit this much closer
+constexpr int kLeastSamples = 6;
+constexpr int kShares = 16;        // batches that the campaign's number of samples pays for
+constexpr double kPatience = 1.5;  // a batch more must bring a fit this much closer
 constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
 constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
-constexpr int kMostIdle = 2;       // batches in a row that were not
+constexpr int kMostIdle = 3;       // batches in a row that were not
 constexpr int kDraws = 1000;       // of the emulated posterior
 
 void Append(const report::RunTable& more, report::RunTable& runs) {
@@ -65,6 +65,7 @@ std::map<std::string, double> PointOf(const report::CampaignView& view,
 }
 
 absl::Status WarmFits::Fit(const std::vector<std::string>& effects) {
+  if (effects.empty()) return absl::OkStatus();
   const auto runs = static_cast<int>(base_.runs().sample.size());
   samples_ = std::max(kLeastSamples, runs / kShares);
   int spent = 0;
@@ -80,28 +81,39 @@ absl::Status WarmFits::Fit(const std::vector<std::string>& effects) {
     }
   }
   while (spent + samples_ <= runs) {
-    double closest = std::numeric_limits<double>::infinity();
-    for (const std::string& effect : effects) {
-      const WarmFit& fit = fits_.at(effect);
-      if (fit.model.histories.rows() > 0) closest = std::min(closest, fit.adequacy.chi2);
-    }
-    const std::string* next = nullptr;
-    double lowest = 0;
-    for (const std::string& effect : effects) {
-      const WarmFit& fit = fits_.at(effect);
-      if (fit.stalled || fit.runs.histories.rows() == 0) continue;
-      if (fit.Satisfied() && fit.adequacy.chi2 <= closest) continue;
-      const double price = fit.rms * std::pow(kPatience, fit.iterations);
-      if (next == nullptr || price < lowest) {
-        next = &effect;
-        lowest = price;
-      }
-    }
+    const std::string* next = Next(effects);
     if (next == nullptr) break;
     if (auto status = Continue(*next); !status.ok()) return status;
     spent += samples_;
   }
   return absl::OkStatus();
+}
+
+// The one that promises most; the best comes last once it is as close as noise and scatter allow:
+// it is its rivals that are not known yet.
+const std::string* WarmFits::Next(const std::vector<std::string>& effects) const {
+  const auto chi2 = [this](const std::string& effect) {
+    const WarmFit& fit = fits_.at(effect);
+    return fit.model.histories.rows() > 0 ? fit.adequacy.chi2
+                                          : std::numeric_limits<double>::infinity();
+  };
+  const std::string& best = *std::min_element(
+      effects.begin(), effects.end(),
+      [&chi2](const std::string& a, const std::string& b) { return chi2(a) < chi2(b); });
+  const std::string* next = nullptr;
+  double lowest = 0;
+  for (const std::string& effect : effects) {
+    const WarmFit& fit = fits_.at(effect);
+    if (fit.stalled || fit.runs.histories.rows() == 0) continue;
+    const double price = effect == best && fit.Satisfied()
+                             ? std::numeric_limits<double>::infinity()
+                             : fit.rms * std::pow(kPatience, fit.iterations);
+    if (next == nullptr || price < lowest) {
+      next = &effect;
+      lowest = price;
+    }
+  }
+  return next;
 }
 
 const WarmFit* WarmFits::Find(const std::string& effect) const {

@@ -53,8 +53,8 @@ class WarmFits {
            const std::vector<int>& parts)
       : base_(base), covariance_(covariance), parts_(parts) {}
 
-  /// Fits all of them and continues, the most promising first, until each has stalled, or is the
-  /// best and satisfied, or as many samples have been run as the campaign has. Errors: those of the
+  /// Fits all of them and continues, the most promising first, until each has stalled or as many
+  /// samples have been run as the campaign has. Errors: those of the
   /// runs.
   absl::Status Fit(const std::vector<std::string>& effects);
 
@@ -77,6 +77,8 @@ class WarmFits {
  private:
   absl::StatusOr<std::string> FirstText(const std::string& effect) const;
   absl::Status Continue(const std::string& effect);
+  /// nullptr when every fit has stalled.
+  const std::string* Next(const std::vector<std::string>& effects) const;
   absl::StatusOr<Eigen::MatrixXd> NextPoints(const WarmFit& fit) const;
   std::vector<inference::Iteration> RunsFor(const WarmFit& fit) const;
   void Judge(WarmFit& fit) const;

@@ -1,0 +1,101 @@
+#include "server/ctl/verdict.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace calib::ctl {
+namespace {
+
+constexpr double kClearlyCloser = 0.8;  // of the base model's rms
+constexpr std::size_t kMostNames = 3;
+
+bool ClearlyBetter(const WarmFit& a, const WarmFit& b) {
+  const auto advantage = inference::Compare(a.model, b.model);
+  return advantage.ok() && advantage->nats > 2 * advantage->sd && advantage->nats > 0;
+}
+
+// Whatever the width of the prior on the strengths. An evidence is unknown where the emulator
+// does not know what the model can do: nothing is favoured over that.
+bool EvidenceFavours(const std::optional<ScaledEvidence>& a,
+                     const std::optional<ScaledEvidence>& b) {
+  return a && b &&
+         std::equal(a->log_evidence.begin(), a->log_evidence.end(), b->log_evidence.begin(),
+                    [](double x, double y) { return x > y; });
+}
+
+}  // namespace
+
+bool Verdict::Explains(const CandidateEffect& candidate) const {
+  const WarmFit* fit = fits_.Find(candidate.effect);
+  return fit != nullptr && fit->Explains(level_) &&
+         !(fit->left_out_error && diagnosis_.left_out_error &&
+           *fit->left_out_error > *diagnosis_.left_out_error);
+}
+
+void Verdict::WeighEvidence() {
+  if (std::none_of(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
+                   [this](const CandidateEffect& c) { return Explains(c); })) {
+    return;
+  }
+  const std::optional<double> base = fits_.BaseLogEvidence();
+  for (CandidateEffect& candidate : diagnosis_.candidates) {
+    if (fits_.Find(candidate.effect) == nullptr) continue;
+    fits_.WeighEvidence(candidate.effect);
+    if (!base) continue;
+    candidate.over_base_evidence = fits_.Find(candidate.effect)->evidence;
+    if (!candidate.over_base_evidence) continue;
+    for (double& value : candidate.over_base_evidence->log_evidence) value -= *base;
+  }
+}
+
+// Beaten, at its end or with the evidence against it. A fit that was made without runs has no
+// evidence and needs none: all its points are known.
+bool Verdict::Excluded(const CandidateEffect& other, const WarmFit& best) const {
+  const WarmFit& fit = *fits_.Find(other.effect);
+  const bool outweighed = EvidenceFavours(best.evidence, fit.evidence);
+  if (!Explains(other)) return fit.stalled || outweighed;
+  return ClearlyBetter(best, fit) && (outweighed || fit.runs.histories.rows() == 0);
+}
+
+void Verdict::Conclude(bool base_fits) {
+  if (diagnosis_.candidates.empty() || !Explains(diagnosis_.candidates.front())) {
+    diagnosis_.verdict = base_fits ? "adequate" : "unexplained";
+    if (!base_fits) diagnosis_.best_partial = Closest();
+    return;
+  }
+  CandidateEffect& first = diagnosis_.candidates.front();
+  const WarmFit& best = *fits_.Find(first.effect);
+  if (base_fits && first.over_base_evidence &&
+      !EvidenceFavours(first.over_base_evidence, ScaledEvidence{})) {
+    diagnosis_.verdict = "adequate";  // a hint that depends on the prior of its strength
+    return;
+  }
+  // Those that do as well, and those of which it is not known yet how well they can do.
+  std::vector<std::string> rivals;
+  for (const CandidateEffect& other : diagnosis_.candidates) {
+    const WarmFit* fit = fits_.Find(other.effect);
+    if (fit == nullptr || fit == &best) continue;
+    if (!Excluded(other, best) && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
+  }
+  if (rivals.empty()) {
+    diagnosis_.verdict = "missing_effect";
+    diagnosis_.effect = first.effect;
+  } else {
+    diagnosis_.verdict = "ambiguous";
+    first.confusable_with = rivals;
+  }
+}
+
+// Judged or not: the fit that comes closest, if it comes clearly closer than the base model.
+std::string Verdict::Closest() const {
+  std::string name;
+  double lowest = kClearlyCloser * diagnosis_.rms;
+  for (const CandidateEffect& candidate : diagnosis_.candidates) {
+    if (candidate.campaign.empty() || candidate.predicted_rms_error >= lowest) continue;
+    name = candidate.effect;
+    lowest = candidate.predicted_rms_error;
+  }
+  return name;
+}
+
+}  // namespace calib::ctl
