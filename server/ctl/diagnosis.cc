@@ -17,7 +17,7 @@
 namespace calib::ctl {
 namespace {
 
-constexpr std::size_t kWarmFits = 3;
+constexpr std::size_t kWarmFits = 6;    // that two batches each pick the few to continue from
 constexpr std::size_t kMostRivals = 3;  // that the next experiment is to separate
 constexpr double kMostUnits = 10;       // of an effect that is calculated on readings
 
@@ -65,12 +65,9 @@ class Inquiry {
   absl::Status CheckPossible() const {
     const report::CampaignView& view = base_.view();
     const std::string& id = base_.id();
-    if (view.posterior.posterior_from().empty() || view.posterior.posterior_from() == "none") {
-      return absl::FailedPreconditionError(
-          absl::StrCat("campaign ", id,
-                       " has no posterior, so nothing can be said about its model: see "
-                       "`calibctl posterior ",
-                       id, "`"));
+    if (view.posterior.posterior_from().empty()) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "no iteration of ", id, " is complete, so nothing can be said about its model"));
     }
     if (view.campaign.filter.noise != inference::NoiseMode::kGiven) {
       return absl::FailedPreconditionError(
@@ -95,7 +92,8 @@ class Inquiry {
     diagnosis_.scatter = response_.scatter;
     diagnosis_.rms = response_.model.histories.row(adequacy->best).norm() /
                      std::sqrt(static_cast<double>(response_.model.histories.cols()));
-    if (!response_.trustworthy) {
+    // A misfit beyond all that the emulator does not know is one however little that is.
+    if (!response_.trustworthy && adequacy->p_value >= options_.level) {
       return absl::FailedPreconditionError(absl::StrCat(
           "the emulator misses the runs of ", base_.id(),
           " by more than twice the noise beyond their scatter, too much to judge the model by; run "
@@ -233,7 +231,7 @@ class Inquiry {
                      [&rank](const CandidateEffect& a, const CandidateEffect& b) {
                        if (rank(a) != rank(b)) return rank(a) < rank(b);
                        if (rank(a) == 0) return a.over_base.nats > b.over_base.nats;
-                       return rank(a) == 1 && a.predicted_rms_error < b.predicted_rms_error;
+                       return rank(a) == 1 && a.refit_chi2 < b.refit_chi2;
                      });
     return absl::OkStatus();
   }

@@ -109,11 +109,10 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
 
 absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
                                           const ExtensionPlan& plan) {
-  if (parent.posterior.posterior_from().empty() || parent.posterior.posterior_from() == "none") {
+  if (parent.posterior.posterior_from().empty()) {
     return absl::FailedPreconditionError(
-        absl::StrCat("campaign ", parent.status.campaign(),
-                     " has no posterior to start from (see `calibctl posterior ",
-                     parent.status.campaign(), "`)"));
+        absl::StrCat("no iteration of campaign ", parent.status.campaign(),
+                     " is complete, so there is nothing to start from"));
   }
   const dem::ReferenceState state = ReferenceOf(parent);
   campaign::Derivation derivation{

@@ -6,7 +6,7 @@
 namespace calib::ctl {
 namespace {
 
-constexpr double kClearlyCloser = 0.8;  // of the base model's rms
+constexpr double kClearlyCloser = 0.64;  // of the base model's chi-squared
 constexpr std::size_t kMostNames = 3;
 
 bool ClearlyBetter(const WarmFit& a, const WarmFit& b) {
@@ -89,11 +89,13 @@ void Verdict::Conclude(bool base_fits) {
 // Judged or not: the fit that comes closest, if it comes clearly closer than the base model.
 std::string Verdict::Closest() const {
   std::string name;
-  double lowest = kClearlyCloser * diagnosis_.rms;
+  const auto base = inference::TestAdequacy(fits_.BaseByRuns());
+  if (!base.ok()) return name;
+  double lowest = kClearlyCloser * base->chi2;
   for (const CandidateEffect& candidate : diagnosis_.candidates) {
-    if (candidate.campaign.empty() || candidate.predicted_rms_error >= lowest) continue;
+    if (candidate.campaign.empty() || candidate.refit_chi2 >= lowest) continue;
     name = candidate.effect;
-    lowest = candidate.predicted_rms_error;
+    lowest = candidate.refit_chi2;
   }
   return name;
 }

@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int kLeastSamples = 6;
-constexpr int kShares = 16;        // batches that the campaign's number of samples pays for
+constexpr int kLeastSamples = 5;
+constexpr int kShares = 18;        // batches that the campaign's number of samples pays for
 constexpr double kPatience = 1.5;  // a batch more must bring a fit this much closer
 constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
 constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
@@ -107,7 +107,7 @@ const std::string* WarmFits::Next(const std::vector<std::string>& effects) const
     if (fit.stalled || fit.runs.histories.rows() == 0) continue;
     const double price = effect == best && fit.Satisfied()
                              ? std::numeric_limits<double>::infinity()
-                             : fit.rms * std::pow(kPatience, fit.iterations);
+                             : std::sqrt(chi2(effect)) * std::pow(kPatience, fit.iterations);
     if (next == nullptr || price < lowest) {
       next = &effect;
       lowest = price;
