@@ -67,21 +67,24 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", once.output, "CSV file of --once [standard output]")->needs(spec);
   app.add_option("--vtk", once.vtk, "folder for the grains after each load step of --once")
       ->needs(spec);
+  app.add_option("--checkpoint", once.checkpoint,
+                 "file to go on from after an interruption, renewed after each load step of --once")
+      ->needs(spec);
   server->excludes(spec);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
-  if (!once.spec.empty()) {
-    return calib::worker::RunOnce(once, std::cerr);
-  }
-  if (options.server.empty()) {
+  if (once.spec.empty() && options.server.empty()) {
     std::cerr << "either --server HOST:PORT or --once SPEC is needed\n";
     return 2;
   }
   if (parent >= 0 && !ExitWithParent(parent)) {
     return 0;
+  }
+  if (!once.spec.empty()) {
+    return calib::worker::RunOnce(once, std::cerr);
   }
   spdlog::set_default_logger(spdlog::stderr_logger_mt("calib-worker"));
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %v");

@@ -38,7 +38,7 @@ v1::Finished Ended(v1::Finished::Outcome outcome, const absl::Status& status) {
 }  // namespace
 
 v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const dem::StateSink& sink,
-                      std::stop_token stop, const std::string& vtk_directory) {
+                      std::stop_token stop, const dem::Recording& recording) {
   const auto start = std::chrono::steady_clock::now();
   const auto packing = specimens.Get(spec, stop);
   if (!packing.ok()) {
@@ -51,9 +51,7 @@ v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const d
     ++states;
     sink(state);
   };
-  const auto summary = vtk_directory.empty() ? dem::Simulate(scenario, counted, stop)
-                                             : dem::SimulateWithVtk(scenario, counted, stop,
-                                                                    {.directory = vtk_directory});
+  const auto summary = dem::Simulate(scenario, counted, stop, recording);
   v1::Finished finished;
   if (summary.ok()) {
     finished.set_outcome(ToMessage(summary->outcome));

@@ -2,7 +2,6 @@
 // One attempt from spec to end, on the calling thread.
 
 #include <stop_token>
-#include <string>
 
 #include "absl/status/statusor.h"
 #include "calib/v1/worker.pb.h"
@@ -11,10 +10,10 @@
 
 namespace calib::worker {
 
-/// Runs a spec; sink gets every state as soon as it is reached. vtk_directory: empty for none.
-/// Never fails: what went wrong is the outcome (OUTCOME_FAILED: not the model's fault) with its
-/// reason. finished.attempt is left to the caller.
+/// Runs a spec; sink gets every state as soon as it is reached. Never fails: what went wrong is the
+/// outcome (OUTCOME_FAILED: not the model's fault) with its reason. finished.attempt is left to the
+/// caller.
 v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const dem::StateSink& sink,
-                      std::stop_token stop, const std::string& vtk_directory = "");
+                      std::stop_token stop, const dem::Recording& recording = {});
 
 }  // namespace calib::worker

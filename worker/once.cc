@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <google/protobuf/util/json_util.h>
 
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -11,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "dem/simulation/whole_file.h"
 #include "proto/rpc/digest.h"
 #include "worker/evaluate.h"
 #include "worker/scenario_from_spec.h"
@@ -63,6 +65,19 @@ Fetch FromFile(const std::string& path) {
   };
 }
 
+/// Why the run cannot go on from a checkpoint; empty: it can, or has no packing, which it says
+/// itself.
+std::string ProblemWith(const std::string& checkpoint, const v1::AttemptSpec& spec,
+                        Specimens& specimens) {
+  const auto packing = specimens.Get(spec, {});
+  if (!packing.ok()) {
+    return "";
+  }
+  dem::Scenario scenario = ScenarioFromSpec(spec);
+  scenario.packing = **packing;
+  return dem::CheckpointProblem(scenario, checkpoint);
+}
+
 }  // namespace
 
 int RunOnce(const OnceOptions& options, std::ostream& errors) {
@@ -75,6 +90,22 @@ int RunOnce(const OnceOptions& options, std::ostream& errors) {
   if (test == nullptr) {
     errors << options.spec << ": there is no test \"" << spec->test() << "\"\n";
     return kBadSpec;
+  }
+  Specimens specimens(FromFile(options.packing));
+  dem::Recording recording{.vtk_directory = options.vtk};
+  if (!options.checkpoint.empty()) {
+    recording.resume_from = ReadFile(options.checkpoint).value_or("");
+    recording.checkpoint = [&](const std::string& checkpoint) {
+      return dem::WriteWholeFile(options.checkpoint, checkpoint);
+    };
+    if (std::filesystem::exists(options.checkpoint)) {
+      if (const auto problem = ProblemWith(recording.resume_from, *spec, specimens);
+          !problem.empty()) {
+        errors << options.checkpoint << ": " << problem
+               << "; without this file the run starts from the beginning\n";
+        return kRefusedCheckpoint;
+      }
+    }
   }
   std::ofstream file;
   if (!options.output.empty()) {
@@ -91,7 +122,6 @@ int RunOnce(const OnceOptions& options, std::ostream& errors) {
   }
   out << '\n';
 
-  Specimens specimens(FromFile(options.packing));
   const auto write = [&out](const dem::State& state) {
     std::string row = std::to_string(state.load_step);
     for (const double value : state.values) {
@@ -99,7 +129,7 @@ int RunOnce(const OnceOptions& options, std::ostream& errors) {
     }
     out << row << std::endl;  // a reader sees each state when it is reached
   };
-  const v1::Finished finished = Evaluate(*spec, specimens, write, {}, options.vtk);
+  const v1::Finished finished = Evaluate(*spec, specimens, write, {}, recording);
   if (finished.outcome() == v1::Finished::OUTCOME_COMPLETED) {
     return kCompleted;
   }

@@ -12,14 +12,18 @@ struct OnceOptions {
       packing{};  ///< file whose text has the spec's packing_digest; empty: the spec has a recipe
   std::string output{};  ///< CSV file; empty: standard output
   std::string vtk{};     ///< folder for grains; empty: none
+  /// File that is replaced after each load step by what the run goes on from; when it is there, the
+  /// run begins behind it. Empty: none.
+  std::string checkpoint{};
 };
 
 inline constexpr int kCompleted = 0;
 inline constexpr int kDiverged = 1;
 inline constexpr int kBadSpec = 2;
+inline constexpr int kRefusedCheckpoint = 3;  ///< it is there, but this run cannot go on from it
 
 /// Writes `load_step,<observables>` and a row per state as soon as it is reached (17 significant
-/// digits), messages to `errors`. Returns one of the exit codes above.
+/// digits), of a resumed run all rows, messages to `errors`. Returns one of the exit codes above.
 int RunOnce(const OnceOptions& options, std::ostream& errors);
 
 }  // namespace calib::worker

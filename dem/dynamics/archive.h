@@ -9,6 +9,10 @@
 
 namespace calib::dem {
 
+/// Goes to an archive as it lies in memory. Types with a Visit() of their own are not asked.
+template <class T>
+inline constexpr bool kPlain = std::is_trivially_copyable_v<T>;
+
 /// Appends members to `bytes`. Plain numbers and structs as they lie in memory (little-endian IEEE
 /// machines only), vectors and strings with their length in front, other types by their Visit().
 class SaveArchive {
@@ -25,7 +29,7 @@ class SaveArchive {
     if constexpr (requires { value.Visit(*this); }) {
       value.Visit(*this);
     } else {
-      static_assert(std::is_trivially_copyable_v<T>);
+      static_assert(kPlain<T>);
       bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
     }
   }
@@ -33,8 +37,12 @@ class SaveArchive {
   void Put(std::vector<T>& values) {
     std::uint64_t size = values.size();
     Put(size);
-    for (T& value : values) {
-      Put(value);
+    if constexpr (kPlain<T>) {
+      bytes_.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+    } else {
+      for (T& value : values) {
+        Put(value);
+      }
     }
   }
   void Put(std::string& text) {
@@ -66,7 +74,7 @@ class LoadArchive {
     if constexpr (requires { value.Visit(*this); }) {
       value.Visit(*this);
     } else {
-      static_assert(std::is_trivially_copyable_v<T>);
+      static_assert(kPlain<T>);
       Take(&value, sizeof value);
     }
   }
@@ -74,8 +82,12 @@ class LoadArchive {
   void Get(std::vector<T>& values) {
     const std::uint64_t size = Size();
     values.assign(size, T{});
-    for (T& value : values) {
-      Get(value);
+    if constexpr (kPlain<T>) {
+      Take(values.data(), values.size() * sizeof(T));
+    } else {
+      for (T& value : values) {
+        Get(value);
+      }
     }
   }
   void Get(std::string& text) {

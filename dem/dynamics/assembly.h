@@ -154,7 +154,7 @@ class Assembly {
   [[nodiscard]] std::int64_t contact_updates() const { return contact_updates_; }
 
   /// Everything that determines what follows, but the model and the number of threads, for archives
-  /// (dynamics/archive.h). Precondition: no clumps, which poured tests do not have.
+  /// (dynamics/archive.h).
   template <class Archive>
   void Visit(Archive& archive) {
     ParticleArrays& p = particles_;
@@ -168,7 +168,7 @@ class Assembly {
     archive(searched_[0], searched_[1], searched_[2], searched_length_, searched_tilt_, moved_,
             skin_, largest_radius_, touching_, history_, loads_, shift_, sums_, stress_,
             shear_stress_, contacts_);
-    archive(bodies_, solid_volume_, mean_diameter_, nominal_critical_step_, steps_,
+    archive(clumps_, bodies_, solid_volume_, mean_diameter_, nominal_critical_step_, steps_,
             contact_updates_);
   }
 

@@ -81,6 +81,12 @@ class QuasiStatic {
   [[nodiscard]] Assembly& assembly() { return *assembly_; }
   [[nodiscard]] double time_step() const { return dt_; }
 
+  /// For archives: all that options, follow and intervention do not bring with them.
+  template <class Archive>
+  void Visit(Archive& archive) {
+    archive(servo_, modulus_, dt_, since_inspection_, begun_);
+  }
+
   /// Why the last call returned kDiverged.
   [[nodiscard]] const std::string& reason() const { return reason_; }
 

@@ -25,6 +25,13 @@ struct Clump {
   std::vector<std::array<double, 3>> at;   ///< centres of the members, principal axes [m]
   std::vector<std::array<double, 3>> arm;  ///< the same in cell axes now [m]
   std::vector<std::array<int, 3>> image;   ///< whole lattice vectors between member and body
+
+  /// For archives: all state.
+  template <class Archive>
+  void Visit(Archive& archive) {
+    archive(members, mass, volume, inertia, centre, velocity, momentum, orientation, at, arm,
+            image);
+  }
 };
 
 /// Bodies of an assembly; none where every grain is a sphere of its own. Mass and inertia are those
@@ -57,6 +64,12 @@ class RigidClumps {
   /// Collects stiffness (or damping) of members, three translations and three rotations each, at
   /// the first member: translations add up, rotations gain what translation does on the arms.
   void Fold(std::vector<std::array<double, 6>>& stiffness) const;
+
+  /// For archives: all state.
+  template <class Archive>
+  void Visit(Archive& archive) {
+    archive(clumps_);
+  }
 
  private:
   std::vector<Clump> clumps_;

@@ -80,11 +80,7 @@ StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
 }  // namespace
 
 StageEnd RunAngleOfRepose(GravityRun& run) {
-  StageEnd end = StageEnd::kDone;
-  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
-    end = Repeat(run, run.path()[k]);
-  }
-  return end;
+  return run.Walk([&](const ControlPoint& point) { return Repeat(run, point); });
 }
 
 }  // namespace calib::dem

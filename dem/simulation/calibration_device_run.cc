@@ -199,11 +199,7 @@ StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point
 
 StageEnd RunCalibrationDevice(GravityRun& run) {
   const Device device = Plan(run);
-  StageEnd end = StageEnd::kDone;
-  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
-    end = Repeat(run, device, run.path()[k]);
-  }
-  return end;
+  return run.Walk([&](const ControlPoint& point) { return Repeat(run, device, point); });
 }
 
 }  // namespace calib::dem

@@ -8,86 +8,28 @@
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/registry.h"
 #include "dem/contact/contact_model.h"
+#include "dem/dynamics/archive.h"
 #include "dem/dynamics/crushing.h"
 #include "dem/dynamics/quasi_static.h"
 #include "dem/measure/observables.h"
 #include "dem/measure/reading_formulas.h"
 #include "dem/simulation/consolidation.h"
+#include "dem/simulation/element_test_setup.h"
 #include "dem/simulation/shape_change.h"
 
 namespace calib::dem {
 namespace {
 
-/// Inertial number I = rate d sqrt(rho/p) of an unset rate: curves no longer depend on it beyond
-/// their scatter (dem/VERIFICATION.md, rate study). [GDR MiDi 2004: quasi-static below about 1e-3]
-constexpr double kInertialNumber = 5e-4;
-constexpr double kStep = 0.002;
-constexpr double kDampingLoading = 0.2;
-constexpr double kDampingSettling = 0.9;
-constexpr double kUnbalanced = 5e-4;
-
 /// Share of the strain to a reading that one step may take, and how near a reading must come.
 constexpr double kFollowGain = 0.3;
 constexpr double kReadingTolerance = 1e-6;
-
-const ElementTestEntry& EntryOf(const std::string& test) {
-  const auto entries = ElementTestEntries();
-  return *std::find_if(entries.begin(), entries.end(),
-                       [&](const ElementTestEntry& entry) { return entry.info.name == test; });
-}
-
-double PressureScale(const Scenario& scenario) {
-  const double pressure = scenario.settings.at("confining_pressure");
-  return scenario.initial_stress ? std::min({pressure, scenario.initial_stress->axial,
-                                             scenario.initial_stress->lateral})
-                                 : pressure;
-}
-
-/// Staging with every field set: the user's, or the engine's choice.
-Staging ResolveStaging(const Scenario& scenario, const Assembly& assembly) {
-  const Staging& given = scenario.staging;
-  const double quasi_static_rate = kInertialNumber / assembly.mean_diameter() *
-                                   std::sqrt(PressureScale(scenario) / scenario.model.density);
-  return {.rate = given.rate.value_or(quasi_static_rate),
-          .step = given.step.value_or(kStep),
-          .damping_loading = given.damping_loading.value_or(kDampingLoading),
-          .damping_settling = given.damping_settling.value_or(kDampingSettling),
-          .unbalanced = given.unbalanced.value_or(kUnbalanced)};
-}
-
-/// What the effects of the model ask of readings and initial state.
-struct Alterations {
-  Apparatus apparatus;
-  Preparation preparation;
-};
-
-Alterations AlterationsOf(const Scenario& scenario) {
-  Alterations result;
-  const bool rig = EntryOf(scenario.test).rig_load != RigLoad::kNone;
-  const auto& chosen = scenario.model.effects;
-  for (const EffectEntry& effect : EffectEntries()) {
-    const std::string& name = effect.info.name;
-    if (std::find(chosen.begin(), chosen.end(), name) == chosen.end()) {
-      continue;
-    }
-    const ParameterSet parameters =
-        ResolveParameters(effect.info.parameters, name + ".", scenario.model.parameters);
-    if (effect.alter != nullptr && rig) {
-      effect.alter(parameters, result.apparatus);
-    }
-    if (effect.prepare != nullptr) {
-      effect.prepare(parameters, result.preparation);
-    }
-  }
-  return result;
-}
 
 class ElementTestRun {
  public:
   ElementTestRun(const Scenario& scenario, const Packing& packing, const Alterations& alterations,
                  std::stop_token stop)
       : scenario_(scenario),
-        entry_(EntryOf(scenario.test)),
+        entry_(ElementTestNamed(scenario.test)),
         assembly_(packing, scenario.model.density, ContactModel(scenario.model), scenario.threads),
         staging_(ResolveStaging(scenario, assembly_)),
         stages_(assembly_, OptionsFrom(staging_), std::move(stop)),
@@ -121,7 +63,66 @@ class ElementTestRun {
     }
   }
 
-  absl::StatusOr<Summary> Run(const LoadStepSink& sink) {
+  absl::StatusOr<Summary> Run(RunRecord& record) {
+    if (!record.resumed()) {
+      if (const auto ended = Prepare()) {
+        return *ended;
+      }
+    } else if (!Restore(record.procedure())) {
+      return absl::InvalidArgumentError("the checkpoint does not fit the specimen");
+    }
+    FollowReadings();
+    if (scenario_.loading_rate) {
+      stages_.options().rate = *scenario_.loading_rate;
+    }
+    for (std::size_t k = record.next(); k < scenario_.path.size(); ++k) {
+      const ControlPoint& point = scenario_.path[k];
+      const std::string where =
+          absl::StrCat("path point ", k, " (", entry_.info.control, " ", point.target, ")");
+      if (const StageEnd end = MoveToPoint(point.target); end != StageEnd::kDone) {
+        return Finish(end, where);
+      }
+      if (point.load_step >= 0) {
+        State state;
+        state.load_step = point.load_step;
+        if (const std::string problem = ReadInto(state); !problem.empty()) {
+          Summary summary = Finish(StageEnd::kDiverged, where);
+          summary.reason = absl::StrCat(where, ": ", problem);
+          return summary;
+        }
+        if (auto s = record.Reach(state, assembly_); !s.ok()) {
+          return s;
+        }
+      }
+      if (record.keeps()) {
+        SaveArchive archive;
+        archive(*this);
+        if (auto s = record.Keep(k + 1, std::move(archive.bytes())); !s.ok()) {
+          return s;
+        }
+      }
+    }
+    return Finish(StageEnd::kDone, "");
+  }
+
+  /// What follows from neither scenario nor packing, for archives.
+  template <class Archive>
+  void Visit(Archive& archive) {
+    archive(assembly_, stages_, rig_start_, reference_, control_);
+    if (StageState* const stage = assembly_.model().stage(); stage != nullptr) {
+      archive(*stage);
+    }
+  }
+
+ private:
+  bool Restore(const std::string& bytes) {
+    LoadArchive archive(bytes);
+    archive(*this);
+    return archive.complete();
+  }
+
+  /// Consolidation, to where loading begins; the answer of a run that ended here.
+  std::optional<absl::StatusOr<Summary>> Prepare() {
     StageEnd end = StageEnd::kDone;
     const ConsolidationPlan plan{.pressure = scenario_.settings.at("confining_pressure"),
                                  .consolidation = scenario_.consolidation,
@@ -141,43 +142,25 @@ class ElementTestRun {
       return Finish(end, "consolidation");
     }
     std::copy_n(assembly_.cell().length, 3, reference_);
-    FollowReadings();
-    if (scenario_.loading_rate) {
-      stages_.options().rate = *scenario_.loading_rate;
-    }
-    for (std::size_t k = 0; k < scenario_.path.size(); ++k) {
-      const ControlPoint& point = scenario_.path[k];
-      const std::string where =
-          absl::StrCat("path point ", k, " (", entry_.info.control, " ", point.target, ")");
-      end = MoveToPoint(point.target);
-      if (end != StageEnd::kDone) {
-        return Finish(end, where);
-      }
-      if (point.load_step < 0) {
-        continue;
-      }
-      Measurement read = Read();
-      if (auto s = formulas_.Apply(read); !s.ok()) {
-        Summary summary = Finish(StageEnd::kDiverged, where);
-        summary.reason = absl::StrCat(where, ": ", s.message());
-        return summary;
-      }
-      State state{.load_step = point.load_step, .values = Select(read, entry_.info.observables)};
-      for (std::size_t v = 0; v < state.values.size(); ++v) {
-        if (!std::isfinite(state.values[v])) {
-          Summary summary = Finish(StageEnd::kDiverged, where);
-          summary.reason = absl::StrCat(where, ": ", entry_.info.observables[v], " is not finite");
-          return summary;
-        }
-      }
-      if (auto s = sink(state, assembly_); !s.ok()) {
-        return s;
-      }
-    }
-    return Finish(StageEnd::kDone, "");
+    rig_start_ = RigStress();
+    return std::nullopt;
   }
 
- private:
+  /// The present readings; what is wrong with them.
+  std::string ReadInto(State& state) const {
+    Measurement read = Read();
+    if (auto s = formulas_.Apply(read); !s.ok()) {
+      return std::string(s.message());
+    }
+    state.values = Select(read, entry_.info.observables);
+    for (std::size_t v = 0; v < state.values.size(); ++v) {
+      if (!std::isfinite(state.values[v])) {
+        return entry_.info.observables[v] + " is not finite";
+      }
+    }
+    return "";
+  }
+
   static StageOptions OptionsFrom(const Staging& staging) {
     StageOptions options;
     options.rate = *staging.rate;
@@ -245,7 +228,6 @@ class ElementTestRun {
 
   /// Lets the stages be driven by readings where the apparatus alters them.
   void FollowReadings() {
-    rig_start_ = RigStress();
     if (apparatus_.AltersStrain() || apparatus_.membrane != 0) {
       stages_.SetFollow([this](const std::array<double, 3>& modulus, CellTarget& target) {
         return FollowReading(modulus, target);
@@ -327,11 +309,11 @@ class ElementTestRun {
 
 }  // namespace
 
-absl::StatusOr<Summary> RunElementTest(const Scenario& scenario, const LoadStepSink& sink,
+absl::StatusOr<Summary> RunElementTest(const Scenario& scenario, RunRecord& record,
                                        std::stop_token stop) {
   const Alterations alterations = AlterationsOf(scenario);
   if (alterations.preparation.aspect == 1) {
-    return ElementTestRun(scenario, scenario.packing, alterations, std::move(stop)).Run(sink);
+    return ElementTestRun(scenario, scenario.packing, alterations, std::move(stop)).Run(record);
   }
   const auto packing =
       Elongate(scenario.packing, alterations.preparation.aspect, scenario.threads, stop);
@@ -341,7 +323,13 @@ absl::StatusOr<Summary> RunElementTest(const Scenario& scenario, const LoadStepS
     summary.reason = std::string(packing.status().message());
     return summary;
   }
-  return ElementTestRun(scenario, *packing, alterations, std::move(stop)).Run(sink);
+  return ElementTestRun(scenario, *packing, alterations, std::move(stop)).Run(record);
+}
+
+absl::StatusOr<Summary> RunElementTest(const Scenario& scenario, const LoadStepSink& sink,
+                                       std::stop_token stop) {
+  RunRecord record(sink);
+  return RunElementTest(scenario, record, std::move(stop));
 }
 
 }  // namespace calib::dem

@@ -10,9 +10,9 @@
 
 namespace calib::dem {
 
-GravityRun::GravityRun(const Scenario& scenario, const LoadStepSink& sink, std::stop_token stop)
+GravityRun::GravityRun(const Scenario& scenario, RunRecord& record, std::stop_token stop)
     : scenario_(scenario),
-      sink_(sink),
+      record_(record),
       stop_(std::move(stop)),
       observables_(FindTest(scenario.test)->observables) {
   double sum = 0;
@@ -21,6 +21,41 @@ GravityRun::GravityRun(const Scenario& scenario, const LoadStepSink& sink, std::
     largest_diameter_ = std::max(largest_diameter_, 2 * r);
   }
   mean_diameter_ = sum / static_cast<double>(radii().size());
+  if (resumed()) {
+    LoadArchive archive(record_.procedure());
+    archive(summary_.steps, summary_.contact_updates, summary_.time_step, state_);
+    if (!archive.complete()) {
+      Abandon(DoesNotFit());
+    }
+  }
+}
+
+absl::Status GravityRun::DoesNotFit() {
+  return absl::InvalidArgumentError("the checkpoint does not fit the procedure of the test");
+}
+
+StageEnd GravityRun::Abandon(absl::Status status) {
+  status_ = std::move(status);
+  return StageEnd::kDiverged;
+}
+
+StageEnd GravityRun::Keep(std::size_t next, std::string state) {
+  SaveArchive archive;
+  archive(summary_.steps, summary_.contact_updates, summary_.time_step, state);
+  status_ = record_.Keep(next, std::move(archive.bytes()));
+  return status_.ok() ? StageEnd::kDone : StageEnd::kDiverged;
+}
+
+StageEnd GravityRun::Walk(const std::function<StageEnd(const ControlPoint& point)>& visit,
+                          const std::function<std::string()>& state) {
+  StageEnd end = status_.ok() ? StageEnd::kDone : StageEnd::kDiverged;
+  for (std::size_t k = record_.next(); k < path().size() && end == StageEnd::kDone; ++k) {
+    end = visit(path()[k]);
+    if (end == StageEnd::kDone && record_.keeps()) {
+      end = Keep(k + 1, state ? state() : "");
+    }
+  }
+  return end;
 }
 
 double GravityRun::Setting(const std::string& name) const {
@@ -57,6 +92,23 @@ StageEnd GravityRun::Fail(std::string reason) {
   return StageEnd::kDiverged;
 }
 
+StageEnd GravityRun::WalkFrom(Assembly& assembly, const FlowOptions& options, double longest,
+                              const std::function<StageEnd(const ControlPoint& point)>& visit) {
+  StageEnd end = StageEnd::kDone;
+  if (resumed()) {
+    end = Recall(assembly);
+  } else {
+    Flow filling = Drive(assembly, options);
+    end = Close(filling.Settle(longest, kSettling), filling, {}, "filling");
+  }
+  const auto filled = [&assembly] {
+    SaveArchive archive;
+    archive(assembly);
+    return std::move(archive.bytes());
+  };
+  return end == StageEnd::kDone ? Walk(visit, filled) : end;
+}
+
 StageEnd GravityRun::Report(const ControlPoint& point, const std::vector<double>& values,
                             const Assembly& assembly) {
   if (point.load_step < 0) {
@@ -68,8 +120,8 @@ StageEnd GravityRun::Report(const ControlPoint& point, const std::vector<double>
           absl::StrCat("load step ", point.load_step, ": ", observables_[v], " is not finite"));
     }
   }
-  sink_status_ = sink_({.load_step = point.load_step, .values = values}, assembly);
-  return sink_status_.ok() ? StageEnd::kDone : Fail("the state could not be given on");
+  status_ = record_.Reach({.load_step = point.load_step, .values = values}, assembly);
+  return status_.ok() ? StageEnd::kDone : StageEnd::kDiverged;
 }
 
 StageEnd GravityRun::Close(StageEnd end, const Flow& flow, const Mark& first,
@@ -85,8 +137,8 @@ StageEnd GravityRun::Close(StageEnd end, const Flow& flow, const Mark& first,
 }
 
 absl::StatusOr<Summary> GravityRun::Finish(StageEnd end) const {
-  if (!sink_status_.ok()) {
-    return sink_status_;
+  if (!status_.ok()) {
+    return status_;
   }
   Summary summary = summary_;
   summary.outcome = end == StageEnd::kDone      ? Outcome::kCompleted
@@ -96,13 +148,13 @@ absl::StatusOr<Summary> GravityRun::Finish(StageEnd end) const {
   return summary;
 }
 
-absl::StatusOr<Summary> RunGravityTest(const Scenario& scenario, const LoadStepSink& sink,
+absl::StatusOr<Summary> RunGravityTest(const Scenario& scenario, RunRecord& record,
                                        std::stop_token stop) {
   static const std::map<std::string, StageEnd (*)(GravityRun&)> procedures = {
       {"angle_of_repose", &RunAngleOfRepose}, {"silo_discharge", &RunSiloDischarge},
       {"rotating_drum", &RunRotatingDrum},    {"calibration_device", &RunCalibrationDevice},
       {"transfer_chute", &RunTransferChute},  {"shaken_box", &RunShakenBox}};
-  GravityRun run(scenario, sink, std::move(stop));
+  GravityRun run(scenario, record, std::move(stop));
   return run.Finish(procedures.at(scenario.test)(run));
 }
 

@@ -2,29 +2,57 @@
 // Walks a test of grains under gravity: settings, pouring, reporting; the tests' own procedures are
 // in the files NAME_run.cc.
 
+#include <functional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "dem/dynamics/archive.h"
 #include "dem/dynamics/flow.h"
 #include "dem/particles/loose_fill.h"
-#include "dem/simulation/element_test_run.h"
+#include "dem/simulation/run_record.h"
 #include "dem/simulation/scenario.h"
 
 namespace calib::dem {
 
 /// Precondition: ScenarioProblems(scenario) is empty and its test is poured. Errors: those of the
-/// sink.
-absl::StatusOr<Summary> RunGravityTest(const Scenario& scenario, const LoadStepSink& sink,
+/// record, and INVALID_ARGUMENT for a checkpoint that does not fit.
+absl::StatusOr<Summary> RunGravityTest(const Scenario& scenario, RunRecord& record,
                                        std::stop_token stop);
 
 /// What the procedure of a test has at hand.
 class GravityRun {
  public:
-  GravityRun(const Scenario& scenario, const LoadStepSink& sink, std::stop_token stop);
+  GravityRun(const Scenario& scenario, RunRecord& record, std::stop_token stop);
 
   [[nodiscard]] const std::vector<ControlPoint>& path() const { return scenario_.path; }
+
+  /// Calls `visit` for the points of the path in order, from where the run begins, until one does
+  /// not end well. After each the run can go on from what `state` gives: members for Recall(),
+  /// archived; empty where every point starts anew.
+  StageEnd Walk(const std::function<StageEnd(const ControlPoint& point)>& visit,
+                const std::function<std::string()>& state = {});
+
+  /// The same for tests whose points all start from one filling: lets `assembly` come to rest for
+  /// at most `longest` [s], or takes the filling from the checkpoint, then walks.
+  StageEnd WalkFrom(Assembly& assembly, const FlowOptions& options, double longest,
+                    const std::function<StageEnd(const ControlPoint& point)>& visit);
+
+  /// Whether the run goes on from a checkpoint.
+  [[nodiscard]] bool resumed() const { return record_.resumed(); }
+
+  /// Takes members back from what Walk's `state` gave before the interruption.
+  template <class... T>
+  StageEnd Recall(T&... members) {
+    LoadArchive archive(state_);
+    archive(members...);
+    return archive.complete() ? StageEnd::kDone : Abandon(DoesNotFit());
+  }
+
+  /// Ends the run with an error.
+  StageEnd Abandon(absl::Status status);
+
   [[nodiscard]] double Setting(const std::string& name) const;
   /// The setting, or `chosen` where it is 0.
   [[nodiscard]] double SettingOr(const std::string& name, double chosen) const;
@@ -67,15 +95,19 @@ class GravityRun {
   [[nodiscard]] absl::StatusOr<Summary> Finish(StageEnd end) const;
 
  private:
+  [[nodiscard]] static absl::Status DoesNotFit();
+  StageEnd Keep(std::size_t next, std::string state);
+
   const Scenario& scenario_;
-  const LoadStepSink& sink_;
+  RunRecord& record_;
   std::stop_token stop_;
   const std::vector<std::string>& observables_;
   double mean_diameter_ = 0;
   double largest_diameter_ = 0;
   std::string reason_;
-  absl::Status sink_status_;
-  Summary summary_;
+  absl::Status status_;
+  Summary summary_;    ///< what it counts so far
+  std::string state_;  ///< of the procedure, at the interruption
 };
 
 StageEnd RunAngleOfRepose(GravityRun& run);

@@ -91,13 +91,9 @@ StageEnd RunRotatingDrum(GravityRun& run) {
   const double far = 2 * radius + d;
   const FlowOptions options{
       .drop_height = 2 * radius, .low = {-d, -1e300, -d}, .high = {far, 1e300, far}};
-  Flow filling = run.Drive(assembly, options);
-  StageEnd end = filling.Settle(40 * std::sqrt(2 * radius / run.gravity()), GravityRun::kSettling);
-  end = run.Close(end, filling, {}, "filling");
-  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
-    end = Turn(run, assembly, options, run.path()[k]);
-  }
-  return end;
+  return run.WalkFrom(
+      assembly, options, 40 * std::sqrt(2 * radius / run.gravity()),
+      [&](const ControlPoint& point) { return Turn(run, assembly, options, point); });
 }
 
 }  // namespace calib::dem

@@ -104,20 +104,30 @@ using StateSink = std::function<void(const State&)>;
 /// runnable.
 std::vector<std::string> ScenarioProblems(const Scenario& scenario);
 
+/// Bytes from which a run goes on, after a point of its path; they replace those of before. An
+/// error ends the run with that error.
+using CheckpointSink = std::function<absl::Status(const std::string& checkpoint)>;
+
+/// How a run is recorded; nothing here changes its states.
+struct Recording {
+  std::string vtk_directory{};  ///< for a series of grains, contacts and walls after each load step
+                                ///< (simulation/vtk_series.h); empty: none. Not of `collision`.
+  CheckpointSink checkpoint{};  ///< called after each point of the path, when its state has been
+                                ///< given to the sink; empty: no checkpoints. `collision` has none.
+  std::string resume_from{};    ///< a checkpoint of this scenario: its states are given to the sink
+                              ///< again, and the run goes on from there; empty: from the beginning
+};
+
+/// Why a run of this scenario cannot go on from a checkpoint, in a sentence; empty: it can.
+std::string CheckpointProblem(const Scenario& scenario, const std::string& checkpoint);
+
 /// Runs the scenario, calling sink once per load step as soon as it is reached, from the calling
 /// thread. The stop token is looked at every time step. A diverged run is a result (Outcome), not
-/// an error. Errors: INVALID_ARGUMENT (joined ScenarioProblems), OUT_OF_RANGE (unreachable
-/// consolidation porosity). Same scenario, same bits, for any number of threads. Thread-safe (no
-/// shared state).
+/// an error. Errors: INVALID_ARGUMENT (joined ScenarioProblems, CheckpointProblem), OUT_OF_RANGE
+/// (unreachable consolidation porosity), UNAVAILABLE naming a VTK file that cannot be written, and
+/// those of the checkpoint sink. Same scenario, same bits, for any number of threads and however
+/// often it was interrupted. Thread-safe (no shared state).
 absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink,
-                                 std::stop_token stop);
-
-/// Writes the grains (position, radius, velocity) after each load step as legacy VTK polydata
-/// `DIR/grains_NNNN.vtk`.
-struct VtkOutput {
-  std::string directory;
-};
-absl::StatusOr<Summary> SimulateWithVtk(const Scenario& scenario, const StateSink& sink,
-                                        std::stop_token stop, const VtkOutput& vtk);
+                                 std::stop_token stop, const Recording& recording = {});
 
 }  // namespace calib::dem

@@ -87,8 +87,18 @@ StageEnd RunShakenBox(GravityRun& run) {
   Flow flow = run.Drive(assembly, {.drop_height = top + fastest * fastest / (2 * run.gravity()),
                                    .low = {-reach, -reach, -reach},
                                    .high = {side + width + reach, reach, 2 * reach}});
-  StageEnd end = flow.Settle(40 * std::sqrt(top / run.gravity()), GravityRun::kSettling);
-  const double begun = flow.time();
+  StageEnd end = StageEnd::kDone;
+  double begun = 0;
+  if (run.resumed()) {
+    std::string moving;
+    end = run.Recall(moving, begun, watch);
+    if (auto s = end == StageEnd::kDone ? flow.Restore(moving) : absl::OkStatus(); !s.ok()) {
+      end = run.Abandon(std::move(s));
+    }
+  } else {
+    end = flow.Settle(40 * std::sqrt(top / run.gravity()), GravityRun::kSettling);
+    begun = flow.time();
+  }
 
   /// Height of the intruder above the floor, along the box.
   const auto intruder_height = [&] {
@@ -110,17 +120,25 @@ StageEnd RunShakenBox(GravityRun& run) {
     now.velocity = (1.0 / dt) * (rest + shaking.Shift(t + dt) - now.centre);
     now.angular_velocity = {0, (shaking.Tilt(t + dt) - shaking.Tilt(t)) / dt, 0};
   });
-  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
-    const ControlPoint& point = run.path()[k];
-    end = flow.Advance(point.target - (flow.time() - begun));
-    if (end == StageEnd::kDone) {
-      const double t = flow.time() - begun;
-      end = run.Report(point,
-                       {point.target, intruder_height(), t > 0 ? watch.above / t : 0.0,
-                        watch.first < 0 ? point.target : watch.first},
-                       assembly);
+  const auto shake = [&](const ControlPoint& point) {
+    if (const StageEnd shaken = flow.Advance(point.target - (flow.time() - begun));
+        shaken != StageEnd::kDone) {
+      return shaken;
     }
-  }
+    const double t = flow.time() - begun;
+    return run.Report(point,
+                      {point.target, intruder_height(), t > 0 ? watch.above / t : 0.0,
+                       watch.first < 0 ? point.target : watch.first},
+                      assembly);
+  };
+  const auto state = [&] {
+    SaveArchive archive;
+    std::string moving = flow.Checkpoint();
+    double since = begun;
+    archive(moving, since, watch);
+    return std::move(archive.bytes());
+  };
+  end = end == StageEnd::kDone ? run.Walk(shake, state) : end;
   return run.Close(end, flow, {}, "shaking");
 }
 

@@ -211,13 +211,9 @@ StageEnd RunSiloDischarge(GravityRun& run) {
   const double far = silo.width + top;
   const FlowOptions options{
       .drop_height = top, .low = {-far, -far, -far}, .high = {2 * far, 2 * far, 3 * far}};
-  Flow filling = run.Drive(assembly, options);
-  StageEnd end = filling.Settle(40 * std::sqrt(top / run.gravity()), GravityRun::kSettling);
-  end = run.Close(end, filling, {}, "filling");
-  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
-    end = Discharge(run, silo, assembly, options, run.path()[k]);
-  }
-  return end;
+  return run.WalkFrom(
+      assembly, options, 40 * std::sqrt(top / run.gravity()),
+      [&](const ControlPoint& point) { return Discharge(run, silo, assembly, options, point); });
 }
 
 }  // namespace calib::dem

@@ -224,11 +224,7 @@ StageEnd Convey(GravityRun& run, const ControlPoint& point) {
 }  // namespace
 
 StageEnd RunTransferChute(GravityRun& run) {
-  StageEnd end = StageEnd::kDone;
-  for (std::size_t k = 0; k < run.path().size() && end == StageEnd::kDone; ++k) {
-    end = Convey(run, run.path()[k]);
-  }
-  return end;
+  return run.Walk([&](const ControlPoint& point) { return Convey(run, point); });
 }
 
 }  // namespace calib::dem

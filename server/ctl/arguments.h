@@ -33,6 +33,7 @@ struct Arguments {
   std::vector<std::string> exceed;              ///< OBSERVABLE=LEVEL
   std::string output;                           ///< file or folder; empty: standard output
   std::string vtk;                              ///< folder
+  std::string checkpoint;                       ///< folder
 };
 
 }  // namespace calib::ctl

@@ -83,7 +83,11 @@ void AddVerbsOnFiles(Builder& b) {
   simulate->add_option("-o,--output", b.arguments().output,
                        "CSV file, a row per load step [standard output]");
   simulate->add_option("--vtk", b.arguments().vtk,
-                       "folder for the grains after each load step (VTK)");
+                       "folder for grains, contacts and walls after each load step, one below it "
+                       "per experiment: open grains.pvd in ParaView");
+  simulate->add_option("--checkpoint", b.arguments().checkpoint,
+                       "folder for a checkpoint per experiment, renewed after each load step: the "
+                       "same command again goes on from there, to the same bits");
 
   auto* run = b.Add("run", &Run,
                     "The whole campaign on this machine: server, workers and answer in one command",

@@ -1,6 +1,7 @@
 #include "server/ctl/evaluation.h"
 
 #include <google/protobuf/util/json_util.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -12,6 +13,8 @@
 
 namespace calib::ctl {
 namespace {
+
+constexpr int kRefusedCheckpoint = 3;  // of calib-worker --once
 
 std::string ReadAll(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -27,13 +30,20 @@ absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const T
     return absl::InternalError("the evaluation cannot be written as JSON");
   }
   if (auto written = WriteFile(folder + "/spec.json", json); !written.ok()) return written;
-  std::vector<std::string> arguments = {"--once", folder + "/spec.json", "-o",
-                                        folder + "/states.csv"};
+  std::vector<std::string> arguments = {"--once",
+                                        folder + "/spec.json",
+                                        "-o",
+                                        folder + "/states.csv",
+                                        "--exit-with-parent",
+                                        std::to_string(getpid())};
   if (!task.packing.empty()) {
     if (auto written = WriteFile(folder + "/packing.txt", task.packing); !written.ok()) {
       return written;
     }
     arguments.insert(arguments.end(), {"--packing", folder + "/packing.txt"});
+  }
+  if (!task.checkpoint.empty()) {
+    arguments.insert(arguments.end(), {"--checkpoint", task.checkpoint});
   }
   if (!task.vtk.empty()) arguments.insert(arguments.end(), {"--vtk", task.vtk});
   auto process = ChildProcess::Start(program, arguments, folder + "/log");
@@ -54,6 +64,7 @@ absl::Status Evaluation::Result() {
   std::string said = ReadAll(folder_ + "/log");
   said = std::string(absl::StripAsciiWhitespace(said));
   if (code == 1) return absl::AbortedError(said.empty() ? "the model diverged" : said);
+  if (code == kRefusedCheckpoint) return absl::InvalidArgumentError(said);
   return absl::InternalError(said.empty() ? absl::StrCat("calib-worker ended with status ", code)
                                           : said);
 }

@@ -15,8 +15,9 @@ class Evaluation {
  public:
   struct Task {
     v1::AttemptSpec spec;
-    std::string packing;  ///< text of the packing file; empty with a recipe
-    std::string vtk;      ///< folder for grains; empty: none
+    std::string packing;     ///< text of the packing file; empty with a recipe
+    std::string vtk;         ///< folder for grains; empty: none
+    std::string checkpoint;  ///< file to go on from and to renew; empty: none
   };
   /// folder: an existing folder for the files in between.
   static absl::StatusOr<Evaluation> Start(const std::string& program, const Task& task,
@@ -28,7 +29,8 @@ class Evaluation {
   int StatesSoFar() const;
   /// The table of states, `load_step,<observables>`; complete or not.
   std::string Table() const;
-  /// OK; ABORTED with the reason when the model diverged; INTERNAL otherwise. Only after Poll() has
+  /// OK; ABORTED with the reason when the model diverged; INVALID_ARGUMENT when the checkpoint is
+  /// not of this run; INTERNAL otherwise. Only after Poll() has
   /// said true.
   absl::Status Result();
 

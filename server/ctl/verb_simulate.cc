@@ -31,19 +31,31 @@ std::string PackingText(const campaign::Experiment& experiment, const SourceFile
   return file != nullptr ? source.contents.at(file->path) : "";
 }
 
+// Path of a name in a folder; empty without a folder.
+std::string Below(const std::string& folder, const std::string& name) {
+  return folder.empty() ? "" : (std::filesystem::path(folder) / name).string();
+}
+
 class Simulation {
  public:
   Simulation(const SourceFiles& source, const campaign::Campaign& campaign,
-             std::vector<double> values, std::string vtk)
-      : source_(source), campaign_(campaign), values_(std::move(values)), vtk_(std::move(vtk)) {}
+             std::vector<double> values, const Arguments& arguments)
+      : source_(source), campaign_(campaign), values_(std::move(values)), arguments_(arguments) {}
 
-  // Starts what there is a core for and waits for all; the first failure to start ends it.
+  // Starts what there is a core for and waits for all; the first failure to start, or checkpoint
+  // of another run, ends it.
   absl::Status RunAll(const std::string& program, const std::string& folder) {
     const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
     ProgressLine line;
     for (;;) {
       std::size_t running = 0;
-      for (Evaluation& evaluation : evaluations_) running += evaluation.Poll() ? 0 : 1;
+      for (Evaluation& evaluation : evaluations_) {
+        if (!evaluation.Poll()) {
+          ++running;
+        } else if (auto ended = evaluation.Result(); absl::IsInvalidArgument(ended)) {
+          return ended;
+        }
+      }
       const bool all_started = evaluations_.size() == campaign_.experiments.size();
       if (all_started && running == 0) return absl::OkStatus();
       if (Interrupted()) return absl::CancelledError("stopped");
@@ -85,10 +97,14 @@ class Simulation {
     Evaluation::Task task{
         .spec = scheduler::SpecOf(campaign_, static_cast<int>(e), values_, 0),
         .packing = PackingText(experiment, source_),
-        .vtk = vtk_.empty() ? "" : (std::filesystem::path(vtk_) / experiment.name).string()};
+        .vtk = Below(arguments_.vtk, experiment.name),
+        .checkpoint = Below(arguments_.checkpoint, experiment.name + ".checkpoint")};
     std::error_code error;
     std::filesystem::create_directories(own, error);
     if (!error && !task.vtk.empty()) std::filesystem::create_directories(task.vtk, error);
+    if (!error && !task.checkpoint.empty()) {
+      std::filesystem::create_directories(arguments_.checkpoint, error);
+    }
     if (error) {
       return absl::PermissionDeniedError(
           absl::StrCat("a folder cannot be made: ", error.message()));
@@ -119,7 +135,7 @@ class Simulation {
   const SourceFiles& source_;
   const campaign::Campaign& campaign_;
   std::vector<double> values_;
-  std::string vtk_;
+  const Arguments& arguments_;
   std::vector<Evaluation> evaluations_;
 };
 
@@ -141,7 +157,7 @@ int Simulate(const Arguments& arguments) {
   const auto folder = TemporaryFolder::Make();
   if (!folder.ok()) return Fail(folder.status());
   CatchInterrupts();
-  Simulation simulation(*source, campaign, *std::move(values), arguments.vtk);
+  Simulation simulation(*source, campaign, *std::move(values), arguments);
   if (auto ran = simulation.RunAll(*program, folder->path()); !ran.ok()) return Fail(ran);
   const std::string table = simulation.Table();
   if (!arguments.output.empty()) {

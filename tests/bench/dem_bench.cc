@@ -2,6 +2,7 @@
 // and threads.
 #include <benchmark/benchmark.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -54,23 +55,22 @@ const Packing& PackingOf(int grains) {
   return packings.emplace(grains, std::move(packing)).first->second;
 }
 
-/// Dense at 0.5 MPa, then compressed along z at 0.1/s: every iteration is one step of the engine.
-void ContactUpdates(benchmark::State& state, Law law) {
-  const Model model = BenchModel(law);
-  const int threads = static_cast<int>(state.range(1));
-  Assembly assembly(PackingOf(static_cast<int>(state.range(0))), model.density, ContactModel(model),
-                    threads);
+/// Settles under 0.5 MPa on all axes; the time step to go on with, 0: diverged.
+double SettleAt500kPa(Assembly& assembly, benchmark::State& state) {
   StageOptions options;
   options.unbalanced = 5e-3;
   QuasiStatic stages(assembly, options, {});
   const AxisTarget axis{.mode = AxisTarget::Mode::kStress, .value = 5e5};
   if (stages.MoveTo({axis, axis, axis}) != StageEnd::kDone) {
     state.SkipWithError(stages.reason().c_str());
-    return;
+    return 0;
   }
-  const std::int64_t updates = assembly.contact_updates();
-  const std::int64_t steps = assembly.steps();
-  const Motion motion{.stretch = {0.05, 0.05, -0.1}, .dt = stages.time_step(), .damping = 0.2};
+  return stages.time_step();
+}
+
+/// Compression along z at 0.1/s: every iteration is one step of the engine.
+void Compress(Assembly& assembly, double dt, benchmark::State& state) {
+  const Motion motion{.stretch = {0.05, 0.05, -0.1}, .dt = dt, .damping = 0.2};
   while (state.KeepRunning()) {
     assembly.Move(motion);
     if (!assembly.EvaluateForces().ok()) {
@@ -78,6 +78,21 @@ void ContactUpdates(benchmark::State& state, Law law) {
       return;
     }
   }
+}
+
+/// Dense at 0.5 MPa, then compressed.
+void ContactUpdates(benchmark::State& state, Law law) {
+  const Model model = BenchModel(law);
+  const int threads = static_cast<int>(state.range(1));
+  Assembly assembly(PackingOf(static_cast<int>(state.range(0))), model.density, ContactModel(model),
+                    threads);
+  const double dt = SettleAt500kPa(assembly, state);
+  if (dt == 0) {
+    return;
+  }
+  const std::int64_t updates = assembly.contact_updates();
+  const std::int64_t steps = assembly.steps();
+  Compress(assembly, dt, state);
   const auto rate = [](std::int64_t count) {
     return benchmark::Counter(static_cast<double>(count), benchmark::Counter::kIsRate);
   };
@@ -94,6 +109,55 @@ void Arguments(benchmark::internal::Benchmark* bench) {
     }
   }
   bench->UseRealTime();
+}
+
+/// The settled grains again and again along the axes of their cell.
+Packing Tiled(const Assembly& settled, const std::array<int, 3>& times) {
+  const ParticleArrays& p = settled.particles();
+  const double* const length = settled.cell().length;
+  Packing tiled;
+  for (int k = 0; k < times[0] * times[1] * times[2]; ++k) {
+    const int at[3] = {k % times[0], k / times[0] % times[1], k / times[0] / times[1]};
+    for (std::size_t g = 0; g < p.x.size(); ++g) {
+      tiled.x.push_back(p.x[g] + at[0] * length[0]);
+      tiled.y.push_back(p.y[g] + at[1] * length[1]);
+      tiled.z.push_back(p.z[g] + at[2] * length[2]);
+      tiled.radius.push_back(p.radius[g]);
+      tiled.clump.push_back(-1);
+    }
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    tiled.length[a] = times[a] * length[a];
+  }
+  return tiled;
+}
+
+/// One thread, 1000 grains at 0.5 MPa put side by side until they are so many: what a contact and a
+/// grain cost when caches are left.
+void CostAgainstSize(benchmark::State& state) {
+  static const std::map<std::int64_t, std::array<int, 3>> kTimes = {
+      {1000, {1, 1, 1}}, {5000, {5, 1, 1}}, {20'000, {5, 2, 2}}, {100'000, {5, 5, 4}}};
+  const Model model = BenchModel(Law::kHertzRolling);
+  Assembly one(PackingOf(1000), model.density, ContactModel(model), 1);
+  const double dt = SettleAt500kPa(one, state);
+  if (dt == 0) {
+    return;
+  }
+  Assembly assembly(Tiled(one, kTimes.at(state.range(0))), model.density, ContactModel(model), 1);
+  if (!assembly.EvaluateForces().ok()) {
+    state.SkipWithError("diverged");
+    return;
+  }
+  const std::int64_t updates = assembly.contact_updates();
+  Compress(assembly, dt, state);
+  const auto cost = [](std::int64_t count) {
+    return benchmark::Counter(static_cast<double>(count),
+                              benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  };
+  state.counters["s/contact_update"] = cost(assembly.contact_updates() - updates);
+  state.counters["s/particle_step"] = cost(assembly.steps() * assembly.particles().size());
+  state.counters["contacts/particle"] =
+      static_cast<double>(assembly.contacts()) / assembly.particles().size();
 }
 
 /// Grains that settle in a cylinder: every iteration is one step of a flow between walls.
@@ -154,6 +218,7 @@ void PouringIntoASilo(benchmark::State& state) {
   state.counters["contact_updates/s"] = rate(assembly.contact_updates() - updates);
 }
 
+BENCHMARK(CostAgainstSize)->Arg(1000)->Arg(5000)->Arg(20'000)->Arg(100'000);
 BENCHMARK(PouringIntoASilo)->Arg(500)->Arg(10000);
 BENCHMARK_CAPTURE(ContactUpdates, hertz, Law::kHertz)->Apply(Arguments);
 BENCHMARK_CAPTURE(ContactUpdates, hertz_rolling, Law::kHertzRolling)->Apply(Arguments);

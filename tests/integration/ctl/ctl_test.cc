@@ -54,7 +54,8 @@ TEST_F(Calibctl, SimulateWritesARowPerLoadStep) {
   const std::string table = ReadAll(work_ / "states.csv");
   EXPECT_THAT(table, ::testing::StartsWith("experiment,load_step,axial_strain,volumetric_strain,"));
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 4);
-  EXPECT_FALSE(std::filesystem::is_empty(work_ / "grains" / "tx"));
+  EXPECT_TRUE(std::filesystem::exists(work_ / "grains" / "tx" / "grains.pvd"));
+  EXPECT_TRUE(std::filesystem::exists(work_ / "grains" / "tx" / "contacts_0002.vtp"));
 }
 
 TEST_F(Calibctl, ACalibrationFromEndToEnd) {

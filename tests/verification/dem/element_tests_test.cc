@@ -2,8 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
 #include "dem/catalog/catalog.h"
 #include "tests/support/dem/scenarios.h"
 
@@ -152,25 +150,6 @@ TEST(Failure, StopIsObeyedBetweenTwoSteps) {
   ASSERT_TRUE(summary.ok());
   EXPECT_EQ(summary->outcome, Outcome::kStopped);
   EXPECT_EQ(states, 1);
-}
-
-TEST(Vtk, WritesAFilePerLoadStep) {
-  const auto directory = std::filesystem::path(testing::TempDir()) / "calib_dem_vtk";
-  std::filesystem::remove_all(directory);
-  const auto summary = SimulateWithVtk(test::SmallTriaxial(test::HertzModel()), [](const State&) {},
-                                       {}, {.directory = directory.string()});
-  ASSERT_TRUE(summary.ok());
-  const std::string text = test::ReadFile((directory / "grains_0002.vtk").string());
-  EXPECT_THAT(text, HasSubstr("POINTS 60 double"));
-  EXPECT_THAT(text, HasSubstr("VECTORS velocity double"));
-  std::filesystem::remove_all(directory);
-}
-
-TEST(Vtk, NamesTheFileThatCannotBeWritten) {
-  const auto summary = SimulateWithVtk(test::SmallTriaxial(test::HertzModel()), [](const State&) {},
-                                       {}, {.directory = "/proc/nowhere"});
-  EXPECT_EQ(summary.status().code(), absl::StatusCode::kUnavailable);
-  EXPECT_THAT(std::string(summary.status().message()), HasSubstr("/proc/nowhere/grains_0000.vtk"));
 }
 
 }  // namespace

@@ -159,22 +159,6 @@ TEST(GravityTests, ThreadsChangeNoBit) {
   EXPECT_EQ(one.summary.steps, two.summary.steps);
 }
 
-TEST(GravityTests, VtkHoldsTheGrainsThatAreLeft) {
-  Scenario silo = Pour("silo_discharge", 150, {7 * kDiameter});
-  silo.settings = {{"flat", 1}, {"silo_width", 14 * kDiameter}, {"duration", 0.3}};
-  const std::string folder = ::testing::TempDir() + "silo_vtk";
-  std::vector<double> values;
-  const auto summary = SimulateWithVtk(silo, [&](const State& state) { values = state.values; }, {},
-                                       {.directory = folder});
-  ASSERT_TRUE(summary.ok()) << summary.status();
-  const std::string text = test::ReadFile(folder + "/grains_0000.vtk");
-  const auto at = text.find("POINTS ");
-  ASSERT_NE(at, std::string::npos);
-  const int left = std::stoi(text.substr(at + 7));
-  EXPECT_GT(left, 0);
-  EXPECT_LT(left, 150);
-}
-
 TEST(GravityTests, BadSettingsAndFailuresAreSentences) {
   Scenario drum = Pour("rotating_drum", 100, {-1});
   drum.settings = {{"turns", 0}, {"width", 1}};

@@ -1,0 +1,66 @@
+#include "dem/simulation/element_test_setup.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dem/catalog/registry.h"
+
+namespace calib::dem {
+namespace {
+
+/// Inertial number I = rate d sqrt(rho/p) of an unset rate: curves no longer depend on it beyond
+/// their scatter (dem/VERIFICATION.md, rate study). [GDR MiDi 2004: quasi-static below about 1e-3]
+constexpr double kInertialNumber = 5e-4;
+constexpr double kStep = 0.002;
+constexpr double kDampingLoading = 0.2;
+constexpr double kDampingSettling = 0.9;
+constexpr double kUnbalanced = 5e-4;
+
+double PressureScale(const Scenario& scenario) {
+  const double pressure = scenario.settings.at("confining_pressure");
+  return scenario.initial_stress ? std::min({pressure, scenario.initial_stress->axial,
+                                             scenario.initial_stress->lateral})
+                                 : pressure;
+}
+
+}  // namespace
+
+const ElementTestEntry& ElementTestNamed(const std::string& test) {
+  const auto entries = ElementTestEntries();
+  return *std::find_if(entries.begin(), entries.end(),
+                       [&](const ElementTestEntry& entry) { return entry.info.name == test; });
+}
+
+Staging ResolveStaging(const Scenario& scenario, const Assembly& assembly) {
+  const Staging& given = scenario.staging;
+  const double quasi_static_rate = kInertialNumber / assembly.mean_diameter() *
+                                   std::sqrt(PressureScale(scenario) / scenario.model.density);
+  return {.rate = given.rate.value_or(quasi_static_rate),
+          .step = given.step.value_or(kStep),
+          .damping_loading = given.damping_loading.value_or(kDampingLoading),
+          .damping_settling = given.damping_settling.value_or(kDampingSettling),
+          .unbalanced = given.unbalanced.value_or(kUnbalanced)};
+}
+
+Alterations AlterationsOf(const Scenario& scenario) {
+  Alterations result;
+  const bool rig = ElementTestNamed(scenario.test).rig_load != RigLoad::kNone;
+  const auto& chosen = scenario.model.effects;
+  for (const EffectEntry& effect : EffectEntries()) {
+    const std::string& name = effect.info.name;
+    if (std::find(chosen.begin(), chosen.end(), name) == chosen.end()) {
+      continue;
+    }
+    const ParameterSet parameters =
+        ResolveParameters(effect.info.parameters, name + ".", scenario.model.parameters);
+    if (effect.alter != nullptr && rig) {
+      effect.alter(parameters, result.apparatus);
+    }
+    if (effect.prepare != nullptr) {
+      effect.prepare(parameters, result.preparation);
+    }
+  }
+  return result;
+}
+
+}  // namespace calib::dem
