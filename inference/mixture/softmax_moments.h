@@ -5,6 +5,8 @@
 #include <Eigen/Dense>
 #include <vector>
 
+#include "inference/filter/wide_exponential.h"
+
 namespace calib::inference {
 
 /// For features f_n (F entries), counts c_n and coefficients a_k of K components:
@@ -23,8 +25,6 @@ class SoftmaxMoments {
   double entropy() const { return entropy_; }                  ///< nats
 
  private:
-  static constexpr int kLanes = 8;
-  using Lanes = double __attribute__((vector_size(8 * kLanes)));
   struct alignas(8 * kLanes) Group {  // one number of each of eight samples
     Lanes of;
   };
