@@ -15,7 +15,7 @@ if(CALIB_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
 endif()
 
 # Shortens a first build; off where builds are incremental and ccache keeps objects.
-option(CALIB_PRECOMPILE "precompile the large headers of others" OFF)
+option(CALIB_PRECOMPILE "precompile the large headers of others, compile short files together" OFF)
 
 # One flag set for the whole tree. -ffp-contract=off: the same bits whatever the compiler fuses.
 add_library(calib_flags INTERFACE)
@@ -38,11 +38,15 @@ function(calib_precompile name)
   endif()
 endfunction()
 
-# calib_library(NAME SOURCES a.cc ... LINKS x ... [PRECOMPILE <header> ...]): a static library of this tree; sources by name,
-# no globs. PRECOMPILE: large headers of others that most of its files include anyway.
+# calib_library(NAME SOURCES a.cc ... LINKS x ... [PRECOMPILE <header> ...] [TOGETHER]): a static library of this tree; sources by
+# name, no globs. PRECOMPILE: large headers of others that most of its files include anyway. TOGETHER: its files are short beside
+# what they include, and compiled several at a time where that is on; names in anonymous namespaces then meet.
 function(calib_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRECOMPILE" ${ARGN})
+  cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;LINKS;PRECOMPILE" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})
+  if(ARG_TOGETHER AND CALIB_PRECOMPILE)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  endif()
   calib_precompile(${name} ${ARG_PRECOMPILE})
   target_link_libraries(${name} PUBLIC ${ARG_LINKS} PRIVATE calib_flags)
   target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})

@@ -56,8 +56,8 @@ std::vector<std::pair<std::string, double>> ReadUnits(MapReader& data, bool free
       units->Problem(name, absl::StrCat("is not an observable; ", Suggestion(name, KnownNames())));
     } else if (info != nullptr &&
                !SameKind(unit->dimension, ParseUnit(info->unit).value_or(Unit{}).dimension)) {
-      units->Problem(name,
-                     absl::StrCat(*text, " is ", Kind(*text), ", expected ", Kind(info->unit)));
+      units->Problem(name, absl::StrCat(*text, " is ", KindOfUnit(*text), ", expected ",
+                                        KindOfUnit(info->unit)));
     } else {
       factors.back().second = unit->factor;
     }

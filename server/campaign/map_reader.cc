@@ -115,7 +115,7 @@ std::optional<double> ReadQuantity(const YamlNode& node, const std::string& path
                                    ProblemList& problems) {
   if (node.kind != YamlNode::Kind::kScalar) {
     problems.Add(node.line, path,
-                 absl::StrCat("is ", KindName(node), ", expected ", Kind(si_unit)));
+                 absl::StrCat("is ", KindName(node), ", expected ", KindOfUnit(si_unit)));
     return std::nullopt;
   }
   const auto value = ParseQuantity(node.scalar, si_unit);

@@ -25,6 +25,7 @@ struct Range {
   /// "greater than 0", "between 0 and 0.5", ...; unit is appended unless "1".
   std::string Describe(const std::string& unit = "1") const;
 };
+constexpr Range kPositive{.min = 0, .min_open = true};
 
 /// The node and the problem list must outlive the reader. A node that is no map is reported once
 /// and then reads as empty.

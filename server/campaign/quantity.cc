@@ -204,7 +204,7 @@ std::string SiName(const Dimension& dimension) {
   return name;
 }
 
-std::string Kind(const std::string& unit) {
+std::string KindOfUnit(const std::string& unit) {
   const auto parsed = ParseUnit(unit);
   return parsed.ok() ? Describe(parsed->dimension) : "a quantity in " + unit;
 }
@@ -232,18 +232,18 @@ absl::StatusOr<double> ParseQuantity(const std::string& text, const std::string&
   const auto quantity = SplitQuantity(text);
   if (!quantity.ok()) {
     return absl::InvalidArgumentError(
-        absl::StrCat(quantity.status().message(), ", expected ", Kind(si_unit)));
+        absl::StrCat(quantity.status().message(), ", expected ", KindOfUnit(si_unit)));
   }
   if (quantity->unit.empty()) return quantity->value;
   const auto unit = ParseUnit(quantity->unit);
   if (!unit.ok()) {
     return absl::InvalidArgumentError(
-        absl::StrCat(unit.status().message(), ", expected ", Kind(si_unit)));
+        absl::StrCat(unit.status().message(), ", expected ", KindOfUnit(si_unit)));
   }
   const auto wanted = ParseUnit(si_unit);
   if (wanted.ok() && !SameKind(unit->dimension, wanted->dimension)) {
     return absl::InvalidArgumentError(absl::StrCat(
-        quantity->unit, " is ", Describe(unit->dimension), ", expected ", Kind(si_unit)));
+        quantity->unit, " is ", Describe(unit->dimension), ", expected ", KindOfUnit(si_unit)));
   }
   return quantity->value * unit->factor;
 }

@@ -33,7 +33,7 @@ bool SameKind(const Dimension& a, const Dimension& b);
 std::string SiName(const Dimension& dimension);
 
 /// What a unit measures and how it may be written: "a pressure (Pa, kPa, MPa, GPa)".
-std::string Kind(const std::string& unit);
+std::string KindOfUnit(const std::string& unit);
 
 /// A number and the unit behind it, as written; unit is empty for a plain number. "inf" and ".inf"
 /// are numbers, NaN is not.

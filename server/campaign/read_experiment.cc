@@ -14,7 +14,6 @@
 namespace calib::campaign {
 namespace {
 
-constexpr Range kPositive{.min = 0, .min_open = true};
 constexpr Range kDamping{.min = 0, .max = 1, .max_open = true};
 
 std::vector<std::string> TestNames() {

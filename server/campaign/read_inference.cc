@@ -14,7 +14,6 @@ namespace {
 using inference::NoiseMode;
 
 constexpr Range kFraction{.min = 0, .max = 1, .min_open = true, .max_open = true};
-constexpr Range kPositive{.min = 0, .min_open = true};
 
 void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
   const YamlNode* node = map.Find("noise");

@@ -12,7 +12,6 @@
 namespace calib::campaign {
 namespace {
 
-constexpr Range kPositive{.min = 0, .min_open = true};
 constexpr Range kNotNegative{.min = 0};
 constexpr double kNextToNothing = 1e-9;  // of the largest reading
 

@@ -44,7 +44,6 @@ void ReadGroup(const YamlNode& node, const std::string& path, std::set<Member>& 
                Campaign& campaign, ProblemList& problems) {
   MapReader map(node, path, problems);
   if (node.kind != YamlNode::Kind::kMap) return;
-  constexpr Range kPositive{.min = 0, .min_open = true};
   SharedNoise shared;
   if (map.Require("observables", "the names whose errors share one factor") != nullptr) {
     for (const std::string& name :

@@ -77,8 +77,8 @@ double FactorOf(const MapReader& map, const std::string& key, const NameMap& uni
   }
   const auto wanted = ParseUnit(si_unit);
   if (wanted.ok() && !SameKind(unit->dimension, wanted->dimension)) {
-    map.Problem(key,
-                absl::StrCat(name, ": ", *text, " is ", Kind(*text), ", expected ", Kind(si_unit)));
+    map.Problem(key, absl::StrCat(name, ": ", *text, " is ", KindOfUnit(*text), ", expected ",
+                                  KindOfUnit(si_unit)));
   }
   return unit->factor;
 }

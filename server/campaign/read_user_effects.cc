@@ -194,9 +194,9 @@ bool UnitsAreSound(const MapReader& map, const dem::UserEffect& effect) {
   const std::string wanted = UnitOfTarget(effect);
   if (!units.anything && !SameKind(units.dimension, DimensionOf(wanted))) {
     map.Problem("formula",
-                absl::StrCat("gives ", Kind(SiName(units.dimension)), ", but what it ",
+                absl::StrCat("gives ", KindOfUnit(SiName(units.dimension)), ", but what it ",
                              effect.action == dem::FormulaAction::kScales ? "scales " : "adds to ",
-                             effect.target, " has to be ", Kind(wanted)));
+                             effect.target, " has to be ", KindOfUnit(wanted)));
     return false;
   }
   return true;

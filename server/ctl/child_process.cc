@@ -24,7 +24,7 @@ namespace calib::ctl {
 namespace {
 
 constexpr const char* kProgram = "calib-worker";
-constexpr std::chrono::milliseconds kPoll{20};
+constexpr std::chrono::milliseconds kPollChild{20};
 constexpr std::chrono::seconds kPatience{5};
 
 int ExitCode(int status) {
@@ -101,7 +101,7 @@ std::optional<int> ChildProcess::Poll() {
 }
 
 int ChildProcess::Wait() {
-  while (!Poll()) std::this_thread::sleep_for(kPoll);
+  while (!Poll()) std::this_thread::sleep_for(kPollChild);
   return *exit_;
 }
 
@@ -112,7 +112,8 @@ void ChildProcess::AskToStop() {
 void ChildProcess::Stop() {
   AskToStop();
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  while (!Poll() && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(kPoll);
+  while (!Poll() && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(kPollChild);
   if (Poll()) return;
   kill(pid_, SIGKILL);
   Wait();

@@ -206,7 +206,8 @@ class Inquiry {
          .refit_p_value = -1,
          .refit_chi2 = 0,
          .over_base = {},
-         .left_out_error = {}});
+         .left_out_error = {},
+         .over_base_evidence = {}});
     if (std::isfinite(score.detectable)) {
       diagnosis_.detectable[score.name] =
           StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
@@ -222,6 +223,7 @@ class Inquiry {
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (std::size_t c = 0; c < count; ++c) Describe(diagnosis_.candidates[c]);
+    WeighEvidence();
     // Those that explain the readings, by how well; then the other fits, by how close they come.
     const auto rank = [this](const CandidateEffect& c) {
       return Explains(c) ? 0 : (c.campaign.empty() ? 2 : 1);
@@ -254,6 +256,33 @@ class Inquiry {
                    0.0, 1.0);
   }
 
+  // How the fitted effects stand to the base model and to each other for three widths of the prior
+  // on their strength; asked for where one of them explains the readings.
+  void WeighEvidence() {
+    if (std::none_of(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
+                     [this](const CandidateEffect& c) { return Explains(c); })) {
+      return;
+    }
+    const std::optional<double> base = fits_.BaseLogEvidence();
+    for (CandidateEffect& candidate : diagnosis_.candidates) {
+      if (fits_.Find(candidate.effect) == nullptr) continue;
+      fits_.WeighEvidence(candidate.effect);
+      if (!base) continue;
+      candidate.over_base_evidence = fits_.Find(candidate.effect)->evidence;
+      if (!candidate.over_base_evidence) continue;
+      for (double& value : candidate.over_base_evidence->log_evidence) value -= *base;
+    }
+  }
+
+  // Whatever the width of the prior on the strengths. An evidence is unknown where the emulator
+  // does not know what the model can do: nothing is favoured over that.
+  static bool EvidenceFavours(const std::optional<ScaledEvidence>& a,
+                              const std::optional<ScaledEvidence>& b) {
+    return a && b &&
+           std::equal(a->log_evidence.begin(), a->log_evidence.end(), b->log_evidence.begin(),
+                      [](double x, double y) { return x > y; });
+  }
+
   // Adequate, clearly better than the base model, and not worse on readings it was not fitted to.
   bool Explains(const CandidateEffect& candidate) const {
     const WarmFit* fit = fits_.Find(candidate.effect);
@@ -267,6 +296,15 @@ class Inquiry {
     return advantage.ok() && advantage->nats > 2 * advantage->sd && advantage->nats > 0;
   }
 
+  // Beaten, at its end or with the evidence against it. A fit that was made without runs has no
+  // evidence and needs none: all its points are known.
+  bool Excluded(const CandidateEffect& other, const WarmFit& best) const {
+    const WarmFit& fit = *fits_.Find(other.effect);
+    const bool outweighed = EvidenceFavours(best.evidence, fit.evidence);
+    if (!Explains(other)) return fit.stalled || outweighed;
+    return ClearlyBetter(best, fit) && (outweighed || fit.runs.histories.rows() == 0);
+  }
+
   void Conclude(bool base_fits) {
     if (diagnosis_.candidates.empty() || !Explains(diagnosis_.candidates.front())) {
       diagnosis_.verdict = base_fits ? "adequate" : "unexplained";
@@ -275,13 +313,17 @@ class Inquiry {
     }
     CandidateEffect& first = diagnosis_.candidates.front();
     const WarmFit& best = *fits_.Find(first.effect);
-    // Those that do as well, and those whose fit is not at its end: they are not excluded.
+    if (base_fits && first.over_base_evidence &&
+        !EvidenceFavours(first.over_base_evidence, ScaledEvidence{})) {
+      diagnosis_.verdict = "adequate";  // a hint that depends on the prior of its strength
+      return;
+    }
+    // Those that do as well, and those of which it is not known yet how well they can do.
     std::vector<std::string> rivals;
     for (const CandidateEffect& other : diagnosis_.candidates) {
       const WarmFit* fit = fits_.Find(other.effect);
       if (fit == nullptr || fit == &best) continue;
-      const bool excluded = fit->stalled && (!Explains(other) || ClearlyBetter(best, *fit));
-      if (!excluded && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
+      if (!Excluded(other, best) && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
     }
     if (rivals.empty()) {
       diagnosis_.verdict = "missing_effect";

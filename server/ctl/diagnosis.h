@@ -12,6 +12,7 @@
 #include "inference/diagnosis/screen.h"
 #include "server/ctl/laboratory.h"
 #include "server/ctl/next_experiment.h"
+#include "server/ctl/strength_scale.h"
 
 namespace calib::ctl {
 
@@ -28,6 +29,9 @@ struct CandidateEffect {
   double refit_chi2 = 0;
   inference::Advantage over_base{};
   std::optional<double> left_out_error{};  ///< see Diagnosis
+  /// ln of the Bayes factor over the base model where the strength's prior is kStrengthScales times
+  /// as wide; of those that explain the readings and are known well enough by an emulator.
+  std::optional<ScaledEvidence> over_base_evidence{};
 };
 
 struct Diagnosis {

@@ -18,6 +18,13 @@ using report::Number;
 Json OrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
+Json EvidenceJson(const std::optional<ScaledEvidence>& evidence) {
+  if (!evidence) return nullptr;
+  return {{"strength_prior_scale", kStrengthScales},
+          {"log_bayes_factor", evidence->log_evidence},
+          {"standard_error", evidence->standard_error}};
+}
+
 Json CandidateJson(const CandidateEffect& c) {
   Json json = {{"effect", c.effect},
                {"p_value", c.p_value},
@@ -31,7 +38,8 @@ Json CandidateJson(const CandidateEffect& c) {
                         {"chi2", c.refit_chi2},
                         {"left_out_error", OrNull(c.left_out_error)},
                         {"advantage_nats", c.over_base.nats},
-                        {"advantage_sd", c.over_base.sd}};
+                        {"advantage_sd", c.over_base.sd},
+                        {"evidence", EvidenceJson(c.over_base_evidence)}};
   }
   return json;
 }
@@ -170,6 +178,15 @@ std::string DiagnosisText(const Diagnosis& d) {
                       Number(*d.left_out_error, 3)),
           "", "");
     }
+  }
+  for (const CandidateEffect& c : d.candidates) {
+    if (!c.over_base_evidence) continue;
+    const auto& nats = c.over_base_evidence->log_evidence;
+    text += Wrapped(
+        fmt::format("Log Bayes factor of {} over the model without it: {}, {}, {} where the prior "
+                    "of its strength is a quarter, once and four times as wide.",
+                    c.effect, Number(nats[0], 3), Number(nats[1], 3), Number(nats[2], 3)),
+        "", "");
   }
   if (d.verdict == "adequate" && !d.detectable.empty()) {
     text += "\nWould have been found with 90 % power from:\n";

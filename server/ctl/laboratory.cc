@@ -17,7 +17,7 @@
 namespace calib::ctl {
 namespace {
 
-constexpr std::chrono::milliseconds kPoll{100};
+constexpr std::chrono::milliseconds kPollServer{100};
 
 bool IsOver(const std::string& state) {
   return state == "finished" || state == "failed" || state == "cancelled";
@@ -56,7 +56,7 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
       return absl::CancelledError("stopped; nothing is lost, the same command goes on from here");
     }
     if (auto alive = session_.CheckWorkers(); !alive.ok()) return alive;
-    std::this_thread::sleep_for(kPoll);
+    std::this_thread::sleep_for(kPollServer);
   }
 }
 

@@ -19,7 +19,7 @@ namespace calib::ctl {
 namespace {
 
 constexpr const char* kDefaultState = "calib-state";
-constexpr std::chrono::milliseconds kPoll{200};
+constexpr std::chrono::milliseconds kPollCampaign{200};
 
 bool IsOver(const v1::CampaignStatus& status) {
   return status.state() == "finished" || status.state() == "failed" ||
@@ -46,7 +46,7 @@ absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& c
                   kMilestones * status->samples_done() / std::max(1, status->samples()));
     if (IsOver(*status) || status->state() == "paused" || Interrupted()) return status;
     if (auto alive = session.CheckWorkers(); !alive.ok()) return alive;
-    std::this_thread::sleep_for(kPoll);
+    std::this_thread::sleep_for(kPollCampaign);
   }
 }
 

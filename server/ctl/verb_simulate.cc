@@ -23,7 +23,7 @@
 namespace calib::ctl {
 namespace {
 
-constexpr std::chrono::milliseconds kPoll{100};
+constexpr std::chrono::milliseconds kPollWorkers{100};
 
 // The text of the packing that sample 0 of an experiment starts from; empty with a recipe.
 std::string PackingText(const campaign::Experiment& experiment, const SourceFiles& source) {
@@ -52,7 +52,7 @@ class Simulation {
         continue;
       }
       ShowProgress(line);
-      std::this_thread::sleep_for(kPoll);
+      std::this_thread::sleep_for(kPollWorkers);
     }
   }
 

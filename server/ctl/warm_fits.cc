@@ -18,7 +18,8 @@ constexpr int kLeastSamples = 8;
 constexpr int kShares = 11;        // batches that the campaign's number of samples pays for
 constexpr double kPatience = 1.2;  // a batch more must bring a fit this much closer
 constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
-constexpr double kCloser = 0.9;    // times the rms so far: the next batch was worth it
+constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
+constexpr int kMostIdle = 2;       // batches in a row that were not
 constexpr int kDraws = 1000;       // of the emulated posterior
 
 void Append(const report::RunTable& more, report::RunTable& runs) {
@@ -42,6 +43,14 @@ inference::Iteration IterationOf(const report::RunTable& runs, const inference::
         (runs.histories.col(k).array() * reading.sd + reading.value).matrix();
   }
   return iteration;
+}
+
+absl::StatusOr<inference::EmulatedResult> Emulate(
+    const campaign::Campaign& campaign, const std::vector<inference::Iteration>& iterations) {
+  const inference::JointPrior priors = campaign::Priors(campaign);
+  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
+  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
+  return inference::EmulatedPosterior(priors, campaign::MakeDataSet(campaign), options, iterations);
 }
 
 }  // namespace
@@ -71,11 +80,17 @@ absl::Status WarmFits::Fit(const std::vector<std::string>& effects) {
     }
   }
   while (spent + samples_ <= runs) {
+    double closest = std::numeric_limits<double>::infinity();
+    for (const std::string& effect : effects) {
+      const WarmFit& fit = fits_.at(effect);
+      if (fit.model.histories.rows() > 0) closest = std::min(closest, fit.adequacy.chi2);
+    }
     const std::string* next = nullptr;
     double lowest = 0;
     for (const std::string& effect : effects) {
       const WarmFit& fit = fits_.at(effect);
       if (fit.stalled || fit.runs.histories.rows() == 0) continue;
+      if (fit.Satisfied() && fit.adequacy.chi2 <= closest) continue;
       const double price = fit.rms * std::pow(kPatience, fit.iterations);
       if (next == nullptr || price < lowest) {
         next = &effect;
@@ -142,25 +157,30 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     return absl::OkStatus();
   }
   Judge(fit);
-  fit.stalled = fit.iterations > kLeastBatches && fit.rms > kCloser * rms &&
-                fit.adequacy.chi2 > kCloser * chi2;
+  const bool closer = fit.rms < kCloser * rms || fit.adequacy.chi2 < kCloser * chi2;
+  fit.idle = fit.iterations == 1 || closer ? 0 : fit.idle + 1;
+  fit.stalled = fit.idle >= kMostIdle;
   return absl::OkStatus();
 }
 
-// About the posterior that an emulator of all runs gives, those without the effect among them: at
-// its null the base model's runs are runs of this one. The prior where there is nothing to go by.
-absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
+// Those without the effect among them: at its null the base model's runs are runs of this one.
+std::vector<inference::Iteration> WarmFits::RunsFor(const WarmFit& fit) const {
   const campaign::Campaign& campaign = fit.view.campaign;
   const inference::DataSet data = campaign::MakeDataSet(campaign);
-  const inference::JointPrior priors = campaign::Priors(campaign);
   std::vector<inference::Iteration> iterations = {IterationOf(fit.runs, data)};
   if (const auto nulls = RunsWithoutEffect(base_.runs(), base_.view().campaign, campaign);
       nulls.parameters.rows() > 0) {
     iterations.push_back(IterationOf(nulls, data));
   }
-  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
-  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
-  const auto emulated = inference::EmulatedPosterior(priors, data, options, iterations);
+  return iterations;
+}
+
+// About the posterior that an emulator of all runs gives. The prior where there is nothing to go
+// by.
+absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
+  const campaign::Campaign& campaign = fit.view.campaign;
+  const inference::JointPrior priors = campaign::Priors(campaign);
+  const auto emulated = Emulate(campaign, RunsFor(fit));
   inference::Proposal proposal;
   if (emulated.ok() && emulated->draws.rows() > 0) {
     auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
@@ -169,6 +189,29 @@ absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
     proposal = *std::move(fitted);
   }
   return inference::DrawSamples(proposal, priors, campaign.filter, fit.iterations, samples_);
+}
+
+void WarmFits::WeighEvidence(const std::string& effect) {
+  const auto found = fits_.find(effect);
+  if (found == fits_.end() || found->second.runs.histories.rows() == 0) return;
+  const std::vector<inference::Iteration> runs = RunsFor(found->second);
+  ScaledEvidence evidence;
+  for (std::size_t s = 0; s < kStrengthScales.size(); ++s) {
+    const auto emulated =
+        Emulate(WithStrengthScaled(found->second.view.campaign, effect, kStrengthScales[s]), runs);
+    if (!emulated.ok() || !emulated->adequate) return;
+    evidence.log_evidence[s] = emulated->log_evidence;
+    evidence.standard_error = std::max(evidence.standard_error, emulated->log_evidence_se);
+  }
+  found->second.evidence = evidence;
+}
+
+std::optional<double> WarmFits::BaseLogEvidence() const {
+  const auto emulated =
+      Emulate(base_.view().campaign,
+              {IterationOf(base_.runs(), campaign::MakeDataSet(base_.view().campaign))});
+  if (!emulated.ok() || !emulated->adequate) return std::nullopt;
+  return emulated->log_evidence;
 }
 
 void WarmFits::Judge(WarmFit& fit) const {

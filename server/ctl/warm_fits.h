@@ -14,7 +14,9 @@
 
 #include "absl/status/statusor.h"
 #include "inference/diagnosis/screen.h"
+#include "inference/filter/iterative_filter.h"
 #include "server/ctl/fitted_campaign.h"
+#include "server/ctl/strength_scale.h"
 
 namespace calib::ctl {
 
@@ -22,7 +24,8 @@ struct WarmFit {
   report::CampaignView view{};  ///< its first batch, a campaign of the extended model
   report::RunTable runs{};      ///< of all batches
   int iterations = 0;
-  bool stalled = false;                  ///< the last batches have come no closer
+  int idle = 0;                          ///< batches since one came clearly closer
+  bool stalled = false;                  ///< several batches have come no closer
   std::map<std::string, double> best{};  ///< parameters of the run with the smallest chi2, SI
   double rms = 0;                        ///< smallest of a run, residual over noise sd
   inference::FittedModel model{};        ///< the runs as points
@@ -30,6 +33,11 @@ struct WarmFit {
   inference::Advantage over_base{};
   /// Of a part of the data that it was not fitted to; none where there is one part.
   std::optional<double> left_out_error{};
+  /// None before WeighEvidence, or where the emulator does not know the runs well enough.
+  std::optional<ScaledEvidence> evidence{};
+
+  /// As close as noise and scatter allow: more runs are better spent on its rivals.
+  bool Satisfied() const { return adequacy.degrees > 0 && adequacy.chi2 <= adequacy.degrees; }
 
   /// Adequate, and clearly better than the base model.
   bool Explains(double level) const {
@@ -45,8 +53,9 @@ class WarmFits {
            const std::vector<int>& parts)
       : base_(base), covariance_(covariance), parts_(parts) {}
 
-  /// Fits all of them and continues, the most promising first, until each has stalled or as many
-  /// samples have been run as the campaign has. Errors: those of the runs.
+  /// Fits all of them and continues, the most promising first, until each has stalled, or is the
+  /// best and satisfied, or as many samples have been run as the campaign has. Errors: those of the
+  /// runs.
   absl::Status Fit(const std::vector<std::string>& effects);
 
   /// A fit that needed no runs.
@@ -60,10 +69,16 @@ class WarmFits {
   /// The base model judged in the same way, by its runs.
   inference::FittedModel BaseByRuns() const;
 
+  /// The evidence of a fit that has runs; and that of the base model on an emulator of its own runs
+  /// (no effect, hence one figure; none as in WarmFit).
+  void WeighEvidence(const std::string& effect);
+  std::optional<double> BaseLogEvidence() const;
+
  private:
   absl::StatusOr<std::string> FirstText(const std::string& effect) const;
   absl::Status Continue(const std::string& effect);
   absl::StatusOr<Eigen::MatrixXd> NextPoints(const WarmFit& fit) const;
+  std::vector<inference::Iteration> RunsFor(const WarmFit& fit) const;
   void Judge(WarmFit& fit) const;
 
   const FittedCampaign& base_;

@@ -143,7 +143,6 @@ std::vector<BiasTrend> TrendsOf(const campaign::Campaign& campaign,
       if (used < 2 || used != misfits.size() || !(spread > kDistinct * sxx)) continue;
       const double slope = (sxy - sx * sy / sw) / spread;
       const double z = slope * std::sqrt(spread);
-      constexpr double kClear = 3;
       if (std::abs(z) < kClear) continue;
       trends.push_back({.observable = stage.first,
                         .segment = stage.second,

@@ -13,7 +13,6 @@ using Eigen::Index;
 
 constexpr double kFits = 0.01;  // p of chi-squared above which there is nothing to name
 constexpr double kMostOfIt = 0.5;
-constexpr double kClear = 3;      // sd
 constexpr double kAsGood = 0.95;  // of the best: an earlier, simpler shape is preferred
 
 // Central differences; repeated controls take the step beyond them.

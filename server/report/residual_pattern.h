@@ -15,6 +15,9 @@ struct ResidualCurve {
   Eigen::VectorXd model;
 };
 
+/// A bias or a shape is called clear beyond this many of its standard deviations.
+constexpr double kClear = 3;
+
 struct ResidualPattern {
   /// none       what is left is noise (p of chi-squared above 0.01)
   /// offset     residual = size                                       [observable]

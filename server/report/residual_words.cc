@@ -11,7 +11,6 @@
 namespace calib::report {
 namespace {
 
-constexpr double kClear = 3;       // sd of a bias
 constexpr double kDrifts = 0.01;   // p of equal parameters
 constexpr double kLargeRms = 1.5;  // residual / sd
 constexpr double kStays = 0.95;    // probability of a discrepancy

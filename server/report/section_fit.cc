@@ -166,7 +166,6 @@ std::string SegmentTable(const ReportData& data) {
       "<th>z</th><th>rms / sd</th><th>share of the misfit</th><th class=\"l\">shape</th></tr>\n";
   for (const SegmentMisfit& segment : data.comparison.by_segment) {
     const dem::ObservableInfo* info = dem::FindObservable(segment.observable);
-    constexpr double kClear = 3;
     const bool bad = segment.z && std::abs(*segment.z) > kClear;
     html += fmt::format(
         "<tr><td>{}{}</td><td class=\"l\">{}</td><td class=\"l\">{}</td><td>{}</td><td "

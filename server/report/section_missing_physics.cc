@@ -11,7 +11,7 @@
 namespace calib::report {
 namespace {
 
-std::string Joined(const std::vector<std::string>& effects) {
+std::string InWords(const std::vector<std::string>& effects) {
   std::string text;
   for (const std::string& name : effects) text += (text.empty() ? "" : " + ") + NameForPeople(name);
   return text.empty() ? "no effect" : text;
@@ -31,7 +31,6 @@ std::string DriftTable(const std::vector<ParameterDrift>& drifts) {
   std::string rows;
   for (const ParameterDrift& d : drifts) {
     for (const PartialFit& fit : d.fits) {
-      constexpr double kClear = 3;
       rows += fmt::format(
           "<tr><td>{}</td><td class=\"l\">{}</td><td class=\"l\">{}</td><td>{} ± {}</td><td "
           "class=\"{}\">{}</td></tr>\n",
@@ -58,7 +57,7 @@ void AddBranch(const std::vector<Relative>& family, const std::string& parent,
   html += "<ul>\n";
   for (const Relative& r : family) {
     if (r.parent != parent) continue;
-    const std::string name = Escape(r.campaign + ": " + Joined(r.effects));
+    const std::string name = Escape(r.campaign + ": " + InWords(r.effects));
     html += fmt::format("<li>{}{}{}{}</li>\n", r.campaign == shown ? "<strong>" : "", name,
                         r.campaign == shown ? "</strong>" : "",
                         (r.purpose == "warm_fit" ? " (tried)" : "") +
@@ -121,7 +120,7 @@ std::string ErrorChart(const std::vector<ErrorStep>& steps) {
       if (m.heldout && !step.heldout_rms_error) continue;
       html += fmt::format(
           "<tr><td>{}</td><td class=\"l\">{}{}</td><td class=\"l\">{}</td><td>{}</td></tr>\n",
-          Escape(Joined(step.effects)), Escape(m.experiment), m.heldout ? " (held out)" : "",
+          Escape(InWords(step.effects)), Escape(m.experiment), m.heldout ? " (held out)" : "",
           Escape(NameForPeople(m.observable)), Number(m.rms_error, 3));
     }
   }

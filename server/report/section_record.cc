@@ -13,7 +13,7 @@ std::string Entry(const std::string& term, const std::string& text) {
   return fmt::format("<dt>{}</dt><dd>{}</dd>\n", Escape(term), Escape(text));
 }
 
-std::string Joined(const std::vector<std::string>& words) {
+std::string Listed(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
   return text.empty() ? "none" : text;
@@ -61,7 +61,7 @@ std::string RecordSection(const ReportData& data) {
       "<h2>Record</h2>\n<dl>\n" + Entry("campaign", view.status.campaign()) +
       Entry("submitted", Date(view.status.created_unix_ms())) +
       Entry("model", campaign.precomputed ? "runs made elsewhere" : campaign.model.contact) +
-      Entry("effects", campaign.precomputed ? "–" : Joined(campaign.model.effects)) +
+      Entry("effects", campaign.precomputed ? "–" : Listed(campaign.model.effects)) +
       Entry("engine", dem::EngineVersion()) + Entry("seed", std::to_string(campaign.seed)) +
       Entry("noise", NoiseSentence(campaign)) +
       Entry("samples", fmt::format("{} per iteration, at most {} iterations", campaign.samples,

@@ -8,15 +8,15 @@
 namespace calib::scheduler {
 namespace {
 
-constexpr double kNone = -std::numeric_limits<double>::infinity();
+constexpr double kNoMass = -std::numeric_limits<double>::infinity();
 
 double LogSumExp(const std::vector<double>& terms) {
-  double largest = kNone;
+  double largest = kNoMass;
   for (const double term : terms) {
     largest = std::max(largest, term);
   }
   if (!std::isfinite(largest)) {
-    return kNone;
+    return kNoMass;
   }
   double sum = 0;
   for (const double term : terms) {
@@ -36,7 +36,7 @@ absl::StatusOr<Finished> FinishedMass(const Definition& definition, const Histor
   const auto exponent = inference::GuidingExponent(definition.priors, definition.data,
                                                    definition.campaign.filter, history.iterations);
   if (absl::IsFailedPrecondition(exponent.status())) {  // no sample has weight
-    return Finished{.exponent = 1, .log_mass = kNone};
+    return Finished{.exponent = 1, .log_mass = kNoMass};
   }
   if (!exponent.ok()) {
     return exponent.status();
@@ -51,7 +51,7 @@ absl::StatusOr<Finished> FinishedMass(const Definition& definition, const Histor
     }
     for (Eigen::Index i = 0; i < likelihood->size(); ++i) {
       const bool counts = std::isfinite((*likelihood)(i)) && std::isfinite(importance(at));
-      weights.push_back(counts ? importance(at) + *exponent * (*likelihood)(i) : kNone);
+      weights.push_back(counts ? importance(at) + *exponent * (*likelihood)(i) : kNoMass);
       ++at;
     }
   }

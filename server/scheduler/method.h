@@ -3,6 +3,7 @@
 // that have ended. One .cc per family: filter_method, tmcmc_method, surrogate_method.
 
 #include <Eigen/Dense>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,6 +15,9 @@
 #include "server/scheduler/history.h"
 
 namespace calib::scheduler {
+
+/// What a method does not say of its answer.
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// Samples to be evaluated together: one iteration of the store.
 struct Batch {

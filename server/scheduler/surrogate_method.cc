@@ -19,7 +19,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kUnitPoints = "unit_points";
 
 /// A point of the unit cube in the parameters' units, through the prior's quantiles. A face is the

@@ -20,7 +20,6 @@ namespace calib::scheduler {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 /// Quantiles of fewer different draws say nothing (the limit that the filter's weights have to
 /// meet).
 constexpr double kFewestDraws = 50;
