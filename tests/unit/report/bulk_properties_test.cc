@@ -26,11 +26,11 @@ double VolumetricStrain(double strain) {
 
 enum class Reported { kStrainAndStress, kRatioOfInvariants };
 
-struct Run {
+struct KnownRun {
   campaign::Experiment experiment;
   StateHistory history;
 
-  explicit Run(Reported reported) {
+  explicit KnownRun(Reported reported) {
     experiment.test = "triaxial_drained";
     experiment.settings["confining_pressure"] = kPressure;
     experiment.control_name = "axial_strain";
@@ -61,7 +61,7 @@ struct Run {
 
 TEST(BulkProperties, OfAKnownCurve) {
   for (const Reported reported : {Reported::kStrainAndStress, Reported::kRatioOfInvariants}) {
-    const Run run(reported);
+    const KnownRun run(reported);
     const std::vector<BulkProperty> found = BulkProperties(run.experiment, run.history);
     ASSERT_EQ(found.size(), 4u);
     EXPECT_EQ(found[0].name, "secant_modulus");
@@ -78,7 +78,7 @@ TEST(BulkProperties, OfAKnownCurve) {
 }
 
 TEST(BulkProperties, OfACurveThatEndsBeforeOnePercent) {
-  Run run(Reported::kStrainAndStress);
+  KnownRun run(Reported::kStrainAndStress);
   run.history.states.resize(3);
   const std::vector<BulkProperty> found = BulkProperties(run.experiment, run.history);
   ASSERT_EQ(found.size(), 4u);
@@ -88,7 +88,7 @@ TEST(BulkProperties, OfACurveThatEndsBeforeOnePercent) {
 }
 
 TEST(BulkProperties, OfAnotherTestAreNone) {
-  Run run(Reported::kStrainAndStress);
+  KnownRun run(Reported::kStrainAndStress);
   run.experiment.test = "oedometric";
   EXPECT_TRUE(BulkProperties(run.experiment, run.history).empty());
 }
