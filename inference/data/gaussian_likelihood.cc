@@ -17,6 +17,13 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
 
+// No early exit, so that it is vectorised: 0 x is NaN for what is not finite.
+bool AllFinite(const Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>& values) {
+  double sum = 0;
+  for (const auto& column : values.colwise()) sum += (0.0 * column).sum();
+  return sum == 0;
+}
+
 // Lower Cholesky factor of Sigma; its smallest pivot tells how much of the last reading the earlier
 // ones leave open.
 absl::StatusOr<Eigen::MatrixXd> CorrelatedCholesky(const DataSet& data, std::pair<int, int> key,
@@ -56,25 +63,22 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
   likelihood.inferred_ = noise == NoiseMode::kInferred;
   for (const Reading& reading : data.readings) likelihood.values_.push_back(reading.value);
   likelihood.log_diagonal_.resize(likelihood.readings_);
+  likelihood.inverse_sd_.resize(likelihood.readings_);
+  for (int t = 0; t < likelihood.readings_; ++t)
+    likelihood.inverse_sd_[t] = 1 / data.readings[static_cast<std::size_t>(t)].sd;
+  likelihood.is_plain_ = !likelihood.inferred_;
 
   for (const auto& [key, indices] : GroupsOf(data)) {
     Group group;
-    const auto size = static_cast<Eigen::Index>(indices.size());
     if (IsCorrelated(data, key)) {
       auto factor = CorrelatedCholesky(data, key, indices);
       if (!factor.ok()) return factor.status();
-      group.log_diagonal = factor->diagonal().array().log();
+      for (Eigen::Index k = 0; k < factor->rows(); ++k)
+        likelihood.log_diagonal_[indices[static_cast<std::size_t>(k)]] = std::log((*factor)(k, k));
       group.cholesky = *std::move(factor);
+      likelihood.is_plain_ = false;
     } else {
-      group.log_diagonal.resize(size);
-      group.inverse_sd.resize(size);
-      for (Eigen::Index k = 0; k < size; ++k) {
-        group.log_diagonal[k] = std::log(data.readings[indices[k]].sd);
-        group.inverse_sd[k] = 1 / data.readings[indices[k]].sd;
-      }
-    }
-    for (Eigen::Index k = 0; k < size; ++k) {
-      likelihood.log_diagonal_[indices[static_cast<std::size_t>(k)]] = group.log_diagonal[k];
+      for (const int t : indices) likelihood.log_diagonal_[t] = std::log(data.readings[t].sd);
     }
     group.readings = indices;
     likelihood.groups_.push_back(std::move(group));
@@ -101,12 +105,10 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
 
 // Column by column: every operation is on one element of a column at a time, so that a row's bits
 // do not depend on the other rows.
-Eigen::MatrixXd GaussianLikelihood::Whiten(const Eigen::MatrixXd& predictions,
-                                           Missing missing) const {
+void GaussianLikelihood::Whiten(const Rows& predictions, Missing missing, MutableRows z_all) const {
   assert(predictions.cols() == readings_);
   const Eigen::Index n = predictions.rows();
-  Eigen::MatrixXd whitened(n, readings_);
-  const bool complete = predictions.allFinite();
+  const bool complete = AllFinite(predictions);
   std::vector<char> reached(static_cast<std::size_t>(n));
   for (const Group& group : groups_) {
     const bool correlated = group.cholesky.size() > 0;
@@ -114,7 +116,7 @@ Eigen::MatrixXd GaussianLikelihood::Whiten(const Eigen::MatrixXd& predictions,
     std::fill(reached.begin(), reached.end(), 1);
     for (Eigen::Index k = 0; k < size; ++k) {
       const int t = group.readings[static_cast<std::size_t>(k)];
-      auto z = whitened.col(t);
+      auto z = z_all.col(t);
       z = values_[static_cast<std::size_t>(t)] - predictions.col(t).array();
       for (Eigen::Index i = 0; !complete && i < n; ++i) {
         char& row = reached[static_cast<std::size_t>(i)];
@@ -122,11 +124,11 @@ Eigen::MatrixXd GaussianLikelihood::Whiten(const Eigen::MatrixXd& predictions,
         if (row == 0) z[i] = 0;
       }
       if (!correlated) {
-        z *= group.inverse_sd[k];
+        z *= inverse_sd_[t];
         continue;
       }
       for (Eigen::Index l = 0; l < k; ++l) {  // forward substitution
-        z -= group.cholesky(k, l) * whitened.col(group.readings[static_cast<std::size_t>(l)]);
+        z -= group.cholesky(k, l) * z_all.col(group.readings[static_cast<std::size_t>(l)]);
       }
       z /= group.cholesky(k, k);
       for (Eigen::Index i = 0; !complete && i < n; ++i) {
@@ -139,17 +141,16 @@ Eigen::MatrixXd GaussianLikelihood::Whiten(const Eigen::MatrixXd& predictions,
       for (Eigen::Index i = 0; i < n; ++i) {
         char& row = reached[static_cast<std::size_t>(i)];
         row = static_cast<char>(row & static_cast<char>(std::isfinite(predictions(i, t))));
-        if (row == 0) whitened(i, t) = kNaN;
+        if (row == 0) z_all(i, t) = kNaN;
       }
     }
   }
-  return whitened;
 }
 
 // z of the group's readings to their increments: the ratio of two multivariate t densities of k + 1
 // and k readings, k those of the row so far,
 //   M_n = rate^a Gamma(a + n/2) / Gamma(a) (2 pi)^(-n/2) |L|^-1 (rate + q_n/2)^-(a + n/2).
-void GaussianLikelihood::IntegrateFactor(const FactorGroup& group, Eigen::MatrixXd& z) const {
+void GaussianLikelihood::IntegrateFactor(const FactorGroup& group, MutableRows z) const {
   const Eigen::Index n = z.rows();
   std::vector<int> count(static_cast<std::size_t>(n), 0);
   std::vector<double> square(static_cast<std::size_t>(n), 0.0);
@@ -173,21 +174,35 @@ void GaussianLikelihood::IntegrateFactor(const FactorGroup& group, Eigen::Matrix
 
 Eigen::MatrixXd GaussianLikelihood::Fill(const Eigen::MatrixXd& predictions,
                                          Missing missing) const {
-  Eigen::MatrixXd increments = Whiten(predictions, missing);
-  if (inferred_) {
-    for (const FactorGroup& group : factors_) IntegrateFactor(group, increments);
+  Eigen::MatrixXd increments(predictions.rows(), readings_);
+  if (is_plain_ && AllFinite(predictions)) {
+    for (int t = 0; t < readings_; ++t) {
+      increments.col(t) =
+          (-kLogSqrtTwoPi - log_diagonal_[t]) -
+          0.5 *
+              ((values_[static_cast<std::size_t>(t)] - predictions.col(t).array()) * inverse_sd_[t])
+                  .square();
+    }
     return increments;
   }
-  for (int t = 0; t < readings_; ++t) {
-    auto column = increments.col(t).array();
-    column = (-kLogSqrtTwoPi - log_diagonal_[t]) - 0.5 * column.square();
+  constexpr Eigen::Index kBlock = 256;  // rows whose columns stay in the cache
+  for (Eigen::Index first = 0; first < predictions.rows(); first += kBlock) {
+    const Eigen::Index size = std::min(kBlock, predictions.rows() - first);
+    MutableRows block = increments.middleRows(first, size);
+    Whiten(predictions.middleRows(first, size), missing, block);
+    for (const FactorGroup& group : factors_) IntegrateFactor(group, block);
+    for (int t = 0; !inferred_ && t < readings_; ++t) {
+      auto column = block.col(t).array();
+      column = (-kLogSqrtTwoPi - log_diagonal_[t]) - 0.5 * column.square();
+    }
   }
   return increments;
 }
 
 GaussianLikelihood::FactorPosterior GaussianLikelihood::VarianceFactors(
     const Eigen::MatrixXd& predictions) const {
-  const Eigen::MatrixXd z = Whiten(predictions, Missing::kStop);
+  Eigen::MatrixXd z(predictions.rows(), readings_);
+  Whiten(predictions, Missing::kStop, z);
   FactorPosterior factors{
       .shapes = Eigen::VectorXd(static_cast<Eigen::Index>(factors_.size())),
       .rates = Eigen::MatrixXd(z.rows(), static_cast<Eigen::Index>(factors_.size()))};

@@ -59,10 +59,8 @@ class GaussianLikelihood {
 
  private:
   struct Group {
-    std::vector<int> readings;     // indices in processing order
-    Eigen::MatrixXd cholesky;      // L, lower; empty: diagonal
-    Eigen::VectorXd log_diagonal;  // ln L_kk
-    Eigen::VectorXd inverse_sd;    // diagonal groups only
+    std::vector<int> readings;  // indices in processing order
+    Eigen::MatrixXd cholesky;   // L, lower; empty: diagonal
   };
   struct FactorGroup {  // kInferred: readings that share a variance factor
     VarianceFactorPrior prior;
@@ -71,15 +69,19 @@ class GaussianLikelihood {
   };
   enum class Missing { kStop, kZeroResidual };
 
+  using Rows = Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+  using MutableRows = Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
   // z, N x T; NaN where not reached, or zero residual there.
-  Eigen::MatrixXd Whiten(const Eigen::MatrixXd& predictions, Missing missing) const;
+  void Whiten(const Rows& predictions, Missing missing, MutableRows z) const;
   Eigen::MatrixXd Fill(const Eigen::MatrixXd& predictions, Missing missing) const;
-  void IntegrateFactor(const FactorGroup& group, Eigen::MatrixXd& z) const;
+  void IntegrateFactor(const FactorGroup& group, MutableRows z) const;
 
   int readings_ = 0;
   bool inferred_ = false;
+  bool is_plain_ = false;  // kGiven and no group correlated
   std::vector<double> values_;
   Eigen::VectorXd log_diagonal_;  // ln L_kk by reading
+  Eigen::VectorXd inverse_sd_;    // by reading
   std::vector<Group> groups_;
   std::vector<FactorGroup> factors_;  // empty: kGiven
 };

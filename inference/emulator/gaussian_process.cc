@@ -24,13 +24,14 @@ struct HyperParameters {
   double value = std::numeric_limits<double>::infinity();
 };
 
-HyperParameters MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs) {
+HyperParameters MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs,
+                             double max_scatter) {
   const Index d = inputs.cols();
   const KernelObjective objective(inputs, outputs);
   Eigen::VectorXd lower(d + 2);
   Eigen::VectorXd upper(d + 2);
   lower << Eigen::VectorXd::Constant(d, std::log(0.2)), std::log(1e-8), std::log(1e-9);
-  upper << Eigen::VectorXd::Constant(d, std::log(100.0)), std::log(1e3), std::log(2.0);
+  upper << Eigen::VectorXd::Constant(d, std::log(100.0)), std::log(1e3), std::log(max_scatter);
   HyperParameters best;
   struct Start {
     double length, signal, scatter;
@@ -38,7 +39,7 @@ HyperParameters MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorX
   for (const Start& start : {Start{4, 1, 1e-3}, Start{1, 0.3, 1e-2}}) {
     Eigen::VectorXd x(d + 2);
     x << Eigen::VectorXd::Constant(d, std::log(start.length)), std::log(start.signal),
-        std::log(start.scatter);
+        std::log(std::min(start.scatter, max_scatter));
     Eigen::VectorXd gradient(d + 2);
     if (!std::isfinite(objective(x, gradient))) continue;
     const Minimum minimum =
@@ -51,8 +52,10 @@ HyperParameters MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorX
 }  // namespace
 
 absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inputs,
-                                                     const Eigen::VectorXd& outputs) {
+                                                     const Eigen::VectorXd& outputs,
+                                                     const GaussianProcessOptions& options) {
   assert(inputs.rows() == outputs.size() && inputs.rows() >= 4);
+  assert(options.max_scatter >= 1e-8 && options.max_scatter <= 2);
   const Index n = inputs.rows();
   const Index d = inputs.cols();
   GaussianProcess process;
@@ -66,7 +69,7 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
       (inputs.rowwise() - process.input_mean_).array().rowwise() / process.input_sd_.array();
   const Eigen::VectorXd scaled = (outputs.array() - process.output_mean_) / process.output_sd_;
 
-  const HyperParameters hyper = MostProbable(process.train_, scaled);
+  const HyperParameters hyper = MostProbable(process.train_, scaled, options.max_scatter);
   if (!std::isfinite(hyper.value)) {
     return absl::FailedPreconditionError(
         "the emulator's covariance matrix cannot be factorised: are the runs' parameters all the "
@@ -75,7 +78,8 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   // The same density of the best constant, whose scatter has the outputs' variance, one; Gaussian
   // normalisers and the prior of the scatter, which both have, left out.
   const auto count = static_cast<double>(n);
-  if (hyper.value > 0.5 * count + 0.5 * std::log1p(count * kTrendVariance)) {
+  if (options.may_be_constant &&
+      hyper.value > 0.5 * count + 0.5 * std::log1p(count * kTrendVariance)) {
     process.SetConstant(outputs);
     return process;
   }

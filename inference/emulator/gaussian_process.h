@@ -18,6 +18,13 @@ struct GaussianProcessPrediction {
   Eigen::VectorXd variance;  ///< of the function itself, without the scatter of a run
 };
 
+struct GaussianProcessOptions {
+  /// Whether a constant takes the place of a function that explains the outputs no better. A search
+  /// says no: it must know where it has not looked yet.
+  bool may_be_constant = true;
+  double max_scatter = 2;  ///< variance of the scatter over that of the outputs, [1e-8, 2]
+};
+
 /// output = f(input) + scatter,  f ~ GP(0, k),  scatter ~ N(0, scatter variance) independent,
 ///   k(x, x') = b^2 (1 + x . x') + s (1 + sqrt5 r + 5/3 r^2) exp(-sqrt5 r),  r^2 = sum_j (x_j -
 ///   x'_j)^2 / l_j^2,
@@ -33,7 +40,8 @@ class GaussianProcess {
   /// in: inputs n x d, outputs n, n >= 4, all finite.
   /// Errors: FAILED_PRECONDITION when no start can be factorised.
   static absl::StatusOr<GaussianProcess> Fit(const Eigen::MatrixXd& inputs,
-                                             const Eigen::VectorXd& outputs);
+                                             const Eigen::VectorXd& outputs,
+                                             const GaussianProcessOptions& options = {});
 
   /// Mean and variance of f at the rows of an m x d matrix; O(m n^2).
   GaussianProcessPrediction Predict(const Eigen::MatrixXd& inputs) const;

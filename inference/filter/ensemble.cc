@@ -46,21 +46,20 @@ absl::Status FindSigma(const DataSet& data, const FilterOptions& options,
   return absl::OkStatus();
 }
 
-// 1 for the samples whose predictions are all finite, 0 for the others.
-Eigen::VectorXd FiniteRows(std::span<const Iteration> iterations) {
-  Eigen::Index n = 0;
-  for (const Iteration& iteration : iterations) n += iteration.predictions.rows();
-  Eigen::VectorXd finite = Eigen::VectorXd::Ones(n);
+// Samples whose predictions are not all finite have weight zero. Their likelihood is zero, so that
+// only rows of zero likelihood need a look.
+void MarkDiverged(Ensemble& ensemble) {
   Eigen::Index row = 0;
-  for (const Iteration& iteration : iterations) {
-    const Eigen::Index size = iteration.predictions.rows();
-    if (!iteration.predictions.allFinite()) {
-      for (Eigen::Index i = 0; i < size; ++i)
-        finite[row + i] = iteration.predictions.row(i).allFinite() ? 1 : 0;
+  for (const Iteration& iteration : ensemble.used) {
+    for (Eigen::Index i = 0; i < iteration.predictions.rows(); ++i, ++row) {
+      if (ensemble.log_likelihood[row] == -kInfinity && !iteration.predictions.row(i).allFinite()) {
+        ensemble.log_start[row] = -kInfinity;
+        ++ensemble.diverged;
+      } else if (ensemble.log_start[row] == -kInfinity) {
+        ++ensemble.outside;
+      }
     }
-    row += size;
   }
-  return finite;
 }
 
 }  // namespace
@@ -134,15 +133,6 @@ absl::StatusOr<Ensemble> MakeEnsemble(const JointPrior& priors, const DataSet& d
     row += iteration.parameters.rows();
   }
   ensemble.log_start = LogImportance(priors, used);
-  const Eigen::VectorXd finite = FiniteRows(used);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (finite[i] == 0) {
-      ensemble.log_start[i] = -kInfinity;
-      ++ensemble.diverged;
-    } else if (ensemble.log_start[i] == -kInfinity) {
-      ++ensemble.outside;
-    }
-  }
   if (last_only) {
     if (auto found = FindSigma(data, options, used.back().predictions, ensemble); !found.ok()) {
       return found;
@@ -152,6 +142,7 @@ absl::StatusOr<Ensemble> MakeEnsemble(const JointPrior& priors, const DataSet& d
   if (!likelihood.ok()) return likelihood.status();
   ensemble.increments = IncrementsOf(*likelihood, used, false);
   ensemble.log_likelihood = GaussianLikelihood::Sum(ensemble.increments);
+  MarkDiverged(ensemble);
   for (Eigen::Index i = 0; i < n; ++i) {
     if (ensemble.log_start[i] > -kInfinity && ensemble.log_likelihood[i] > -kInfinity)
       return ensemble;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "inference/filter/weighted_moments.h"
 
@@ -30,9 +31,10 @@ ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weight
   summary.mean = mean[0];
   summary.sd = std::sqrt(WeightedCovariance(log_weights, values, mean)(0, 0));
   summary.cov = summary.sd / std::abs(summary.mean);
-  summary.q05 = WeightedQuantile(log_weights, values, 0.05);
-  summary.q50 = WeightedQuantile(log_weights, values, 0.5);
-  summary.q95 = WeightedQuantile(log_weights, values, 0.95);
+  const std::vector<double> quantiles = WeightedQuantiles(log_weights, values, {0.05, 0.5, 0.95});
+  summary.q05 = quantiles[0];
+  summary.q50 = quantiles[1];
+  summary.q95 = quantiles[2];
   summary.prior_sd = prior.StandardDeviation();
   summary.at_bound =
       MassWhere(log_weights, values, -kInfinity, prior.Quantile(kOuterShare)) > kBoundShare ||

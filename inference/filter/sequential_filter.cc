@@ -2,17 +2,41 @@
 
 #include <cassert>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "inference/filter/log_weights.h"
+#include "inference/filter/wide_exponential.h"
 
 namespace calib::inference {
+namespace {
+
+// weights <- e^(log_weights - largest), n entries.
+CALIB_INFERENCE_CLONES void RelativeWeights(const double* log_weights, double largest,
+                                            Eigen::Index n, double* weights) {
+  Lanes x;
+  Eigen::Index i = 0;
+  for (; i + kLanes <= n; i += kLanes) {
+    std::memcpy(&x, log_weights + i, sizeof(x));
+    x -= largest;
+    Exponential(x);
+    std::memcpy(weights + i, &x, sizeof(x));
+  }
+  if (i == n) return;
+  const auto rest = static_cast<std::size_t>(n - i) * sizeof(double);
+  x = Lanes{};
+  std::memcpy(&x, log_weights + i, rest);
+  x -= largest;
+  Exponential(x);
+  std::memcpy(weights + i, &x, rest);
+}
+
+}  // namespace
 
 SequentialResult SequentialFilter(const Eigen::VectorXd& log_start,
                                   const Eigen::MatrixXd& increments, const StepOffsets& steps,
                                   const Eigen::MatrixXd& parameters) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  constexpr double kSmallest = -745;  // below it exp is zero
   const Eigen::Index n = log_start.size();
   const Eigen::Index d = parameters.cols();
   assert(increments.rows() == n && parameters.rows() == n && steps.steps() >= 0);
@@ -38,7 +62,8 @@ SequentialResult SequentialFilter(const Eigen::VectorXd& log_start,
     }
     // One exponential per sample: weights relative to the largest serve everything.
     const double largest = log_weights.maxCoeff();
-    weights = (log_weights - largest).max(kSmallest).exp() * counted;
+    RelativeWeights(log_weights.data(), largest, n, weights.data());
+    weights *= counted;
     const double sum = weights.sum();
     const double log_sum = std::log(sum);
     result.log_evidence_increments[s] = largest + log_sum;

@@ -52,30 +52,44 @@ Eigen::MatrixXd CorrelationOf(const Eigen::MatrixXd& covariance) {
 
 double WeightedQuantile(const Eigen::VectorXd& log_weights, const Eigen::VectorXd& values,
                         double p) {
-  assert(values.size() == log_weights.size());
-  std::vector<Eigen::Index> order;
+  return WeightedQuantiles(log_weights, values, {p}).front();
+}
+
+std::vector<double> WeightedQuantiles(const Eigen::VectorXd& log_weights,
+                                      const Eigen::VectorXd& values, const std::vector<double>& p) {
+  assert(values.size() == log_weights.size() && std::is_sorted(p.begin(), p.end()));
+  struct Sample {
+    double value, weight;
+  };
+  std::vector<Sample> samples;
+  samples.reserve(static_cast<std::size_t>(values.size()));
   for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (std::exp(log_weights[i]) > 0) order.push_back(i);
+    const double weight = std::exp(log_weights[i]);
+    if (weight > 0) samples.push_back({.value = values[i], .weight = weight});
   }
-  if (order.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::stable_sort(order.begin(), order.end(),
-                   [&](Eigen::Index a, Eigen::Index b) { return values[a] < values[b]; });
+  std::vector<double> quantiles;
+  if (samples.empty()) {
+    quantiles.assign(p.size(), std::numeric_limits<double>::quiet_NaN());
+    return quantiles;
+  }
+  std::stable_sort(samples.begin(), samples.end(),
+                   [](const Sample& a, const Sample& b) { return a.value < b.value; });
   double before = 0;
   double last_position = 0;
-  double last_value = values[order.front()];
-  for (const Eigen::Index i : order) {
-    const double weight = std::exp(log_weights[i]);
-    const double position = before + 0.5 * weight;
-    if (position >= p) {
-      const double span = position - last_position;
-      return span > 0 ? last_value + (values[i] - last_value) * (p - last_position) / span
-                      : values[i];
+  double last_value = samples.front().value;
+  for (const Sample& sample : samples) {
+    const double position = before + 0.5 * sample.weight;
+    const double span = position - last_position;
+    while (quantiles.size() < p.size() && position >= p[quantiles.size()]) {
+      const double share = span > 0 ? (p[quantiles.size()] - last_position) / span : 1;
+      quantiles.push_back(last_value + (sample.value - last_value) * share);
     }
-    before += weight;
+    before += sample.weight;
     last_position = position;
-    last_value = values[i];
+    last_value = sample.value;
   }
-  return last_value;
+  quantiles.resize(p.size(), last_value);
+  return quantiles;
 }
 
 }  // namespace calib::inference

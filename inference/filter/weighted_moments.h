@@ -3,6 +3,7 @@
 // index order.
 
 #include <Eigen/Dense>
+#include <vector>
 
 namespace calib::inference {
 
@@ -24,5 +25,9 @@ Eigen::MatrixXd CorrelationOf(const Eigen::MatrixXd& covariance);
 /// zero play no part.
 double WeightedQuantile(const Eigen::VectorXd& log_weights, const Eigen::VectorXd& values,
                         double p);
+
+/// The same for ascending probabilities, one pass over samples sorted once; as many as p.
+std::vector<double> WeightedQuantiles(const Eigen::VectorXd& log_weights,
+                                      const Eigen::VectorXd& values, const std::vector<double>& p);
 
 }  // namespace calib::inference

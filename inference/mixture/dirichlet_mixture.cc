@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "inference/mixture/k_means.h"
+#include "inference/mixture/softmax_moments.h"
 
 namespace calib::inference {
 namespace {
@@ -30,11 +31,11 @@ absl::Status ValidateData(const WeightedPoints& data) {
   return absl::OkStatus();
 }
 
-// Hard responsibilities from k-means. The largest cluster takes the first stick: sticks are not
-// exchangeable, and the bound prefers them in falling order, an exchange that coordinate ascent
-// cannot make.
-Eigen::MatrixXd StartResponsibilities(const WeightedPoints& data, int clusters, int components,
-                                      PhiloxStream& stream) {
+// Moments of hard responsibilities from k-means. The largest cluster takes the first stick: sticks
+// are not exchangeable, and the bound prefers them in falling order, an exchange that coordinate
+// ascent cannot make.
+Eigen::MatrixXd StartMoments(const WeightedPoints& data, const Eigen::MatrixXd& features,
+                             int clusters, int components, PhiloxStream& stream) {
   const std::vector<int> labels = KMeans(data, clusters, stream);
   std::vector<double> sizes(clusters, 0);
   for (std::size_t i = 0; i < labels.size(); ++i)
@@ -45,35 +46,37 @@ Eigen::MatrixXd StartResponsibilities(const WeightedPoints& data, int clusters, 
                    [&sizes](int a, int b) { return sizes[a] > sizes[b]; });
   std::vector<int> rank(clusters);
   for (int k = 0; k < clusters; ++k) rank[order[k]] = k;
-  Eigen::MatrixXd responsibilities = Eigen::MatrixXd::Zero(data.points.cols(), components);
-  for (std::size_t i = 0; i < labels.size(); ++i)
-    responsibilities(static_cast<Eigen::Index>(i), rank[labels[i]]) = 1;
-  return responsibilities;
+  Eigen::MatrixXd moments = Eigen::MatrixXd::Zero(features.cols(), components);
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    moments.col(rank[labels[i]]) += data.counts[row] * features.row(row).transpose();
+  }
+  return moments;
 }
 
 // E and M steps until the bound changes by less than the tolerance or the iterations, earlier ones
 // counted, run out.
-void Ascend(const WeightedPoints& data, const QuadraticFeatures& features, int max_iterations,
-            double tolerance, DirichletMixture& fit) {
+void Ascend(int max_iterations, double tolerance, SoftmaxMoments& samples, DirichletMixture& fit) {
+  CovarianceFactors factors = FactorsOf(fit.state);
   fit.converged = false;
   while (fit.iterations < max_iterations && !fit.converged) {
-    const Expectation expectation = EStep(features, fit.state);
-    fit.state = MStep(features, data.counts, fit.prior, expectation.responsibilities);
-    const double bound = IterationBound(data, fit.state, expectation);
+    samples.Pass(LogDensityCoefficients(fit.state, factors, fit.prior.mean));
+    fit.state = MStep(fit.prior, samples.moments());
+    factors = FactorsOf(fit.state);
+    const double bound = IterationBound(fit.state, factors, samples.entropy());
     fit.converged = std::abs(bound - fit.lower_bound) < tolerance;
     fit.lower_bound = bound;
     ++fit.iterations;
   }
 }
 
-DirichletMixture Begin(const WeightedPoints& data, const QuadraticFeatures& features,
-                       const MixturePrior& prior, const DirichletMixtureOptions& options,
-                       const Eigen::MatrixXd& responsibilities) {
+DirichletMixture Begin(const MixturePrior& prior, const DirichletMixtureOptions& options,
+                       const Eigen::MatrixXd& moments, SoftmaxMoments& samples) {
   DirichletMixture fit;
   fit.prior = prior;
-  fit.state = MStep(features, data.counts, fit.prior, responsibilities);
+  fit.state = MStep(fit.prior, moments);
   fit.lower_bound = -std::numeric_limits<double>::infinity();
-  Ascend(data, features, options.max_iterations, options.tolerance, fit);
+  Ascend(options.max_iterations, options.tolerance, samples, fit);
   return fit;
 }
 
@@ -121,7 +124,10 @@ std::vector<MixtureComponent> DirichletMixture::Predictive(double negligible) co
 DirichletMixture FitFrom(const WeightedPoints& data, const DirichletMixtureOptions& options,
                          const Eigen::MatrixXd& responsibilities) {
   const MixturePrior prior = EmpiricalPrior(data, options.concentration, options.covariance_floor);
-  return Begin(data, FeaturesOf(data.points, prior.mean), prior, options, responsibilities);
+  const Eigen::MatrixXd features = QuadraticFeatures(data.points, prior.mean);
+  SoftmaxMoments samples(features, data.counts, static_cast<int>(responsibilities.cols()));
+  return Begin(prior, options, features.transpose() * (data.counts.asDiagonal() * responsibilities),
+               samples);
 }
 
 absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
@@ -134,7 +140,8 @@ absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
         "the samples with weight do not span all directions of parameter space: no covariance can "
         "be estimated.");
   }
-  const QuadraticFeatures features = FeaturesOf(data.points, prior.mean);
+  const Eigen::MatrixXd features = QuadraticFeatures(data.points, prior.mean);
+  SoftmaxMoments samples(features, data.counts, options.max_components);
   DirichletMixtureOptions coarse = options;
   coarse.tolerance = std::max(options.tolerance, kCoarseTolerance);
   std::vector<DirichletMixture> fits;
@@ -144,9 +151,10 @@ absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
                          .iteration = options.stream,
                          .sample = static_cast<std::uint64_t>(start)});
     const int variation = start % 2 == 0 ? 0 : start / 2 % options.max_components;
-    fits.push_back(Begin(data, features, prior, coarse,
-                         StartResponsibilities(data, options.max_components - variation,
-                                               options.max_components, stream)));
+    fits.push_back(Begin(prior, coarse,
+                         StartMoments(data, features, options.max_components - variation,
+                                      options.max_components, stream),
+                         samples));
   }
   const auto larger_bound = [](const DirichletMixture& a, const DirichletMixture& b) {
     return a.lower_bound > b.lower_bound;
@@ -154,7 +162,7 @@ absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
   std::stable_sort(fits.begin(), fits.end(), larger_bound);
   fits.resize(std::min(fits.size(), kFinalists));
   for (DirichletMixture& fit : fits)
-    Ascend(data, features, options.max_iterations, options.tolerance, fit);
+    Ascend(options.max_iterations, options.tolerance, samples, fit);
   std::stable_sort(fits.begin(), fits.end(), larger_bound);
   return std::move(fits.front());
 }

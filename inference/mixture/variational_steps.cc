@@ -39,18 +39,19 @@ double LogDeterminantOfFactor(const Eigen::MatrixXd& lower) {
 }
 
 // ln |W_k| from C_k = W_k^-1 / nu_k.
-double LogDeterminantOfScale(const MixtureState& state, Eigen::Index k) {
-  const auto d = static_cast<double>(state.means.rows());
-  return -2 * LogDeterminantOfFactor(LowerFactor(state.covariances[k])) -
-         d * std::log(state.degrees_of_freedom[k]);
+double LogDeterminantOfScale(const MixtureState& state, const CovarianceFactors& factors,
+                             Eigen::Index k) {
+  return -factors.log_determinant[k] -
+         static_cast<double>(state.means.rows()) * std::log(state.degrees_of_freedom[k]);
 }
 
 // E ln |L_k|                                                                      [Bishop 2006,
 // Eq. 10.65]
-double ExpectedLogPrecision(const MixtureState& state, Eigen::Index k) {
+double ExpectedLogPrecision(const MixtureState& state, const CovarianceFactors& factors,
+                            Eigen::Index k) {
   const Eigen::Index d = state.means.rows();
   return SumOverDimensions(state.degrees_of_freedom[k], d, Digamma) +
-         static_cast<double>(d) * std::numbers::ln2 + LogDeterminantOfScale(state, k);
+         static_cast<double>(d) * std::numbers::ln2 + LogDeterminantOfScale(state, factors, k);
 }
 
 // E ln pi_k = E ln v_k + sum_{l<k} E ln (1 - v_l).
@@ -103,44 +104,49 @@ Eigen::VectorXd MixtureState::Weights() const {
   return weights / total;
 }
 
-QuadraticFeatures FeaturesOf(const Eigen::MatrixXd& points, const Eigen::VectorXd& origin) {
+Eigen::MatrixXd QuadraticFeatures(const Eigen::MatrixXd& points, const Eigen::VectorXd& origin) {
   const Eigen::Index d = points.rows();
   const Eigen::MatrixXd centred = (points.colwise() - origin).transpose();
-  QuadraticFeatures features{.origin = origin,
-                             .values = Eigen::MatrixXd(points.cols(), 1 + d + d * (d + 1) / 2)};
-  features.values.col(0).setOnes();
-  features.values.middleCols(1, d) = centred;
+  Eigen::MatrixXd features(points.cols(), 1 + d + d * (d + 1) / 2);
+  features.col(0).setOnes();
+  features.middleCols(1, d) = centred;
   Eigen::Index column = 1 + d;
   for (Eigen::Index l = 0; l < d; ++l) {
-    for (Eigen::Index j = l; j < d; ++j) {
-      features.values.col(column++) = centred.col(j).cwiseProduct(centred.col(l));
-    }
+    for (Eigen::Index j = l; j < d; ++j)
+      features.col(column++) = centred.col(j).cwiseProduct(centred.col(l));
   }
   return features;
 }
 
-Expectation EStep(const Eigen::MatrixXd& points, const MixtureState& state) {
-  return EStep(FeaturesOf(points, state.means.rowwise().mean()), state);
+CovarianceFactors FactorsOf(const MixtureState& state) {
+  CovarianceFactors factors{.lower = {}, .log_determinant = Eigen::VectorXd(state.size())};
+  for (Eigen::Index k = 0; k < state.size(); ++k) {
+    factors.lower.push_back(LowerFactor(state.covariances[k]));
+    factors.log_determinant[k] = 2 * LogDeterminantOfFactor(factors.lower.back());
+  }
+  return factors;
 }
 
-Expectation EStep(const QuadraticFeatures& features, const MixtureState& state) {
+Eigen::MatrixXd LogDensityCoefficients(const MixtureState& state, const CovarianceFactors& factors,
+                                       const Eigen::VectorXd& origin) {
   const Eigen::Index d = state.means.rows();
   const auto dimensions = static_cast<double>(d);
-  const Eigen::Index n = features.values.rows();
   const Eigen::VectorXd log_weights = ExpectedLogWeights(state);
-  Eigen::MatrixXd coefficients(features.values.cols(), state.size());
+  Eigen::MatrixXd coefficients(1 + d + d * (d + 1) / 2, state.size());
+  Eigen::MatrixXd precision(d, d);
+  Eigen::VectorXd pulled(d);
   for (Eigen::Index k = 0; k < state.size(); ++k) {
     // E ln N = (E ln|L| - d/beta - nu (x - m)^T W (x - m) - d ln 2 pi) / 2  [Bishop 2006,
     // Eq. 10.64]
-    const Eigen::MatrixXd whiten = LowerFactor(state.covariances[k])
-                                       .triangularView<Eigen::Lower>()
-                                       .solve(Eigen::MatrixXd::Identity(d, d));
-    const Eigen::MatrixXd precision = whiten.transpose() * whiten;
-    const Eigen::VectorXd mean = state.means.col(k) - features.origin;
-    const Eigen::VectorXd pulled = precision * mean;
+    const auto lower = factors.lower[k].triangularView<Eigen::Lower>();
+    precision.setIdentity();
+    lower.solveInPlace(precision);
+    lower.transpose().solveInPlace(precision);
+    const Eigen::VectorXd mean = state.means.col(k) - origin;
+    pulled.noalias() = precision.lazyProduct(mean);
     coefficients(0, k) =
         log_weights[k] +
-        0.5 * (ExpectedLogPrecision(state, k) - dimensions / state.mean_precision[k] -
+        0.5 * (ExpectedLogPrecision(state, factors, k) - dimensions / state.mean_precision[k] -
                dimensions * std::log(2 * std::numbers::pi) - mean.dot(pulled));
     coefficients.col(k).segment(1, d) = pulled;
     Eigen::Index row = 1 + d;
@@ -149,66 +155,54 @@ Expectation EStep(const QuadraticFeatures& features, const MixtureState& state) 
         coefficients(row++, k) = (j == l ? -0.5 : -1.0) * precision(j, l);
     }
   }
-  Expectation expectation;
-  Eigen::MatrixXd& log_rho = expectation.log_responsibilities;
-  log_rho.noalias() = features.values * coefficients;
+  return coefficients;
+}
+
+Expectation EStep(const Eigen::MatrixXd& points, const MixtureState& state) {
+  const Eigen::VectorXd origin = state.means.rowwise().mean();
+  const Eigen::MatrixXd log_rho =
+      QuadraticFeatures(points, origin) * LogDensityCoefficients(state, FactorsOf(state), origin);
   const Eigen::VectorXd largest = log_rho.rowwise().maxCoeff();
-  expectation.responsibilities.resize(n, state.size());
-  Eigen::ArrayXd sum = Eigen::ArrayXd::Zero(n);
-  for (Eigen::Index k = 0; k < state.size(); ++k) {
-    expectation.responsibilities.col(k) = (log_rho.col(k) - largest).array().exp();
-    sum += expectation.responsibilities.col(k).array();
-  }
-  expectation.log_density = largest.array() + sum.log();
-  const Eigen::ArrayXd share = sum.inverse();
-  for (Eigen::Index k = 0; k < state.size(); ++k) {
-    expectation.responsibilities.col(k).array() *= share;
-    log_rho.col(k) -= expectation.log_density;
-  }
+  Expectation expectation;
+  expectation.responsibilities = (log_rho.colwise() - largest).array().exp();
+  const Eigen::VectorXd sum = expectation.responsibilities.rowwise().sum();
+  expectation.log_density = largest.array() + sum.array().log();
+  expectation.responsibilities.array().colwise() /= sum.array();
   return expectation;
 }
 
-MixtureState MStep(const WeightedPoints& data, const MixturePrior& prior,
-                   const Eigen::MatrixXd& responsibilities) {
-  return MStep(FeaturesOf(data.points, prior.mean), data.counts, prior, responsibilities);
-}
-
-MixtureState MStep(const QuadraticFeatures& features, const Eigen::VectorXd& counts,
-                   const MixturePrior& prior, const Eigen::MatrixXd& responsibilities) {
+MixtureState MStep(const MixturePrior& prior, const Eigen::MatrixXd& moments) {
   const Eigen::Index d = prior.mean.size();
-  const Eigen::Index components = responsibilities.cols();
-  assert(responsibilities.rows() == features.values.rows());
+  const Eigen::Index components = moments.cols();
   MixtureState state{.a = Eigen::VectorXd(components),
                      .b = Eigen::VectorXd(components),
                      .mean_precision = Eigen::VectorXd(components),
                      .degrees_of_freedom = Eigen::VectorXd(components),
                      .means = Eigen::MatrixXd(d, components),
                      .covariances = std::vector<Eigen::MatrixXd>(components)};
-  const Eigen::MatrixXd shares = counts.asDiagonal() * responsibilities;
-  const Eigen::MatrixXd moments = features.values.transpose() * shares;
   const Eigen::VectorXd size =
       moments.row(0).transpose().array() + 10 * std::numeric_limits<double>::epsilon();
   for (Eigen::Index k = 0; k < components; ++k) {
-    const Eigen::VectorXd about = moments.col(k).segment(1, d) / size[k];  // the origin
-    const Eigen::VectorXd mean = features.origin + about;
-    Eigen::MatrixXd scatter(d, d);  // N_k S_k
+    const Eigen::VectorXd about = moments.col(k).segment(1, d) / size[k];  // the prior's mean
+    Eigen::MatrixXd& covariance = state.covariances[k];
+    covariance.resize(d, d);
+    state.mean_precision[k] = prior.mean_precision + size[k];
+    state.degrees_of_freedom[k] = prior.degrees_of_freedom + size[k];
+    state.means.col(k) = prior.mean + size[k] / state.mean_precision[k] * about;
+    const double pull = size[k] * prior.mean_precision / state.mean_precision[k];
+    const double share = 1 / state.degrees_of_freedom[k];
     Eigen::Index row = 1 + d;
     for (Eigen::Index l = 0; l < d; ++l) {
       for (Eigen::Index j = l; j < d; ++j) {
-        // About the mean: sum r x x^T - N m m^T; a variance that rounding leaves negative is none.
-        const double value = moments(row++, k) - moments(0, k) * about[j] * about[l];
-        scatter(j, l) = scatter(l, j) = j == l ? std::max(value, 0.0) : value;
+        // N_k S_k about the mean: sum r x x^T - N m m^T; a variance that rounding leaves negative
+        // is none.
+        const double product = about[j] * about[l];
+        double scatter = moments(row++, k) - moments(0, k) * product;
+        if (j == l) scatter = std::max(scatter, 0.0) + size[k] * prior.covariance_floor;
+        covariance(j, l) = covariance(l, j) =
+            share * (scatter + prior.inverse_scale(j, l) + pull * product);
       }
     }
-    state.mean_precision[k] = prior.mean_precision + size[k];
-    state.degrees_of_freedom[k] = prior.degrees_of_freedom + size[k];
-    state.means.col(k) =
-        (prior.mean_precision * prior.mean + size[k] * mean) / state.mean_precision[k];
-    const Eigen::VectorXd pull = mean - prior.mean;
-    scatter.diagonal().array() += size[k] * prior.covariance_floor;
-    scatter += prior.inverse_scale +
-               size[k] * prior.mean_precision / state.mean_precision[k] * pull * pull.transpose();
-    state.covariances[k] = scatter / state.degrees_of_freedom[k];
   }
   double later = 0;
   for (Eigen::Index k = components - 1; k >= 0; --k) {
@@ -219,18 +213,15 @@ MixtureState MStep(const QuadraticFeatures& features, const Eigen::VectorXd& cou
   return state;
 }
 
-double IterationBound(const WeightedPoints& data, const MixtureState& state,
-                      const Expectation& expectation) {
+double IterationBound(const MixtureState& state, const CovarianceFactors& factors, double entropy) {
   const Eigen::Index d = state.means.rows();
   const auto dimensions = static_cast<double>(d);
-  double bound = 0;
+  double bound = entropy;
   for (Eigen::Index k = 0; k < state.size(); ++k) {
-    bound -= (data.counts.array() * expectation.responsibilities.col(k).array() *
-              expectation.log_responsibilities.col(k).array())
-                 .sum();
     const double nu = state.degrees_of_freedom[k];
-    bound += 0.5 * nu * (LogDeterminantOfScale(state, k) + dimensions * std::numbers::ln2) +
-             SumOverDimensions(nu, d, LogGamma);
+    bound +=
+        0.5 * nu * (LogDeterminantOfScale(state, factors, k) + dimensions * std::numbers::ln2) +
+        SumOverDimensions(nu, d, LogGamma);
     bound += LogBeta(state.a[k], state.b[k]) - 0.5 * dimensions * std::log(state.mean_precision[k]);
   }
   return bound;
@@ -245,7 +236,9 @@ double EvidenceLowerBound(const WeightedPoints& data, const MixturePrior& prior,
   for (Eigen::Index i = 0; i < data.points.cols(); ++i)
     bound += data.counts[i] * expectation.log_density[i];
   const double nu0 = prior.degrees_of_freedom;
-  const double log_scale0 = -2 * LogDeterminantOfFactor(LowerFactor(prior.inverse_scale));
+  const Eigen::MatrixXd factor0 = LowerFactor(prior.inverse_scale);
+  const double log_scale0 = -2 * LogDeterminantOfFactor(factor0);
+  const CovarianceFactors factors = FactorsOf(state);
   for (Eigen::Index k = 0; k < state.size(); ++k) {
     const double a = state.a[k];
     const double b = state.b[k];
@@ -254,18 +247,17 @@ double EvidenceLowerBound(const WeightedPoints& data, const MixturePrior& prior,
                            (1 - a + prior.concentration - b) * Digamma(a + b);
     const double nu = state.degrees_of_freedom[k];
     const double beta_ratio = prior.mean_precision / state.mean_precision[k];
-    const Eigen::MatrixXd factor = LowerFactor(state.covariances[k]);
-    const auto lower = factor.triangularView<Eigen::Lower>();
+    const auto lower = factors.lower[k].triangularView<Eigen::Lower>();
     // nu W = C^-1, so quadratic forms of W come from C.
     const double pull = lower.solve(state.means.col(k) - prior.mean).squaredNorm();
     const double kl_mean = 0.5 * (-dimensions * std::log(beta_ratio) + dimensions * beta_ratio +
                                   prior.mean_precision * pull - dimensions);
-    const double trace =
-        lower.solve(LowerFactor(prior.inverse_scale)).squaredNorm();  // nu tr(W0^-1 W)
-    const double kl_wishart =
-        0.5 * (nu0 * (log_scale0 - LogDeterminantOfScale(state, k)) + trace - nu * dimensions) +
-        SumOverDimensions(nu0, d, LogGamma) - SumOverDimensions(nu, d, LogGamma) +
-        0.5 * (nu - nu0) * SumOverDimensions(nu, d, Digamma);
+    const double trace = lower.solve(factor0).squaredNorm();  // nu tr(W0^-1 W)
+    const double kl_wishart = 0.5 * (nu0 * (log_scale0 - LogDeterminantOfScale(state, factors, k)) +
+                                     trace - nu * dimensions) +
+                              SumOverDimensions(nu0, d, LogGamma) -
+                              SumOverDimensions(nu, d, LogGamma) +
+                              0.5 * (nu - nu0) * SumOverDimensions(nu, d, Digamma);
     bound -= kl_beta + kl_mean + kl_wishart;
   }
   return bound;

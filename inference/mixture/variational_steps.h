@@ -44,40 +44,42 @@ struct MixtureState {
 };
 
 /// 1, x - origin and the products of its coordinates for each point: quadratic forms of the points
-/// and their weighted moments are then matrix products. What cancels is of the order of the squared
+/// and their weighted moments are then linear in them. What cancels is of the order of the squared
 /// distance from the origin over the smallest variance, times the machine epsilon; with the mean of
 /// the data as origin and the covariance floor that is below 1e-9.
-struct QuadraticFeatures {
-  Eigen::VectorXd origin;  ///< d
-  Eigen::MatrixXd values;  ///< n x (1 + d + d (d + 1) / 2): 1, x_j, then x_j x_l by columns j >= l
-};
-QuadraticFeatures FeaturesOf(const Eigen::MatrixXd& points, const Eigen::VectorXd& origin);
+/// n x F, F = 1 + d + d (d + 1) / 2: 1, x_j, then x_j x_l by columns j >= l
+Eigen::MatrixXd QuadraticFeatures(const Eigen::MatrixXd& points, const Eigen::VectorXd& origin);
 
-/// E step. ln rho_nk = E ln pi_k + E ln N(x_n; mu_k, L_k^-1)                                [Bishop
-/// 2006, Eq. 10.46]
+/// Lower Cholesky factors of the C_k and ln |C_k|, which E step and bounds share.
+struct CovarianceFactors {
+  std::vector<Eigen::MatrixXd> lower;  ///< K of d x d
+  Eigen::VectorXd log_determinant;     ///< K
+};
+CovarianceFactors FactorsOf(const MixtureState& state);
+
+/// ln rho_nk = E ln pi_k + E ln N(x_n; mu_k, L_k^-1) as a linear function of QuadraticFeatures(x,
+/// origin): F x K.                                                      [Bishop 2006, Eq. 10.46]
+Eigen::MatrixXd LogDensityCoefficients(const MixtureState& state, const CovarianceFactors& factors,
+                                       const Eigen::VectorXd& origin);
+
+/// E step.
 struct Expectation {
-  Eigen::MatrixXd responsibilities;      ///< n x K, rho_nk normalised: rows sum to one
-  Eigen::MatrixXd log_responsibilities;  ///< n x K
-  Eigen::VectorXd log_density;           ///< n, ln sum_k rho_nk: scikit-learn's score_samples
+  Eigen::MatrixXd responsibilities;  ///< n x K, rho_nk normalised: rows sum to one
+  Eigen::VectorXd log_density;       ///< n, ln sum_k rho_nk: scikit-learn's score_samples
 };
 Expectation EStep(const Eigen::MatrixXd& points, const MixtureState& state);
-Expectation EStep(const QuadraticFeatures& features, const MixtureState& state);
 
-/// M step: the Gauss-Wishart and Beta posteriors for given responsibilities       [Bishop 2006,
-/// Eqs. 10.51-10.63]
-///   a_k = 1 + N_k, b_k = gamma + sum_{l>k} N_l                                   [Blei & Jordan
-///   2006, Eqs. 18-19]
+/// M step: the Gauss-Wishart and Beta posteriors given the moments sum_n c_n r_nk
+/// QuadraticFeatures(x_n, prior.mean), F x K                  [Bishop 2006, Eqs. 10.51-10.63]
+///   a_k = 1 + N_k, b_k = gamma + sum_{l>k} N_l               [Blei & Jordan 2006, Eqs. 18-19]
 /// N_k carries ten machine epsilons so that an empty component keeps its prior without a division
 /// by zero.
-MixtureState MStep(const WeightedPoints& data, const MixturePrior& prior,
-                   const Eigen::MatrixXd& responsibilities);
-MixtureState MStep(const QuadraticFeatures& features, const Eigen::VectorXd& counts,
-                   const MixturePrior& prior, const Eigen::MatrixXd& responsibilities);
+MixtureState MStep(const MixturePrior& prior, const Eigen::MatrixXd& moments);
 
-/// Lower bound up to a constant of data and prior, valid right after the M step that used these
-/// responsibilities: cheap, watched for convergence. Equals scikit-learn's lower_bound_.
-double IterationBound(const WeightedPoints& data, const MixtureState& state,
-                      const Expectation& expectation);
+/// Lower bound up to a constant of data and prior, valid right after the M step that used the
+/// responsibilities r_nk of entropy - sum_n c_n sum_k r_nk ln r_nk: cheap, watched for convergence.
+/// Equals scikit-learn's lower_bound_. factors: of the state
+double IterationBound(const MixtureState& state, const CovarianceFactors& factors, double entropy);
 
 /// The complete evidence lower bound at a state with its own E step:
 ///   sum_n c_n ln sum_k rho_nk - sum_k KL(Beta) - sum_k KL(Gauss-Wishart)          [Bishop 2006,

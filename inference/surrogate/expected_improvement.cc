@@ -22,6 +22,9 @@ constexpr int kSpread = 1 << 11;  // candidates over the cube, and as many about
 constexpr int kRounds = 6;        // of refinement
 constexpr int kRefined = 64;      // candidates each
 constexpr double kFirstStep = 0.05;
+// Scatter with a standard deviation of at most a hundredth of that of the values: a well that few
+// points show would otherwise be put down to scatter, and left.
+constexpr GaussianProcessOptions kProcess{.may_be_constant = false, .max_scatter = 1e-4};
 
 // Evaluations with a value, ln of it where all are positive.
 void ValuesDone(const ResponseSurfaceState& state, Eigen::MatrixXd& points,
@@ -78,7 +81,7 @@ absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
   Eigen::MatrixXd done;
   Eigen::VectorXd values;
   ValuesDone(state, done, values);
-  auto process = GaussianProcess::Fit(done, values);
+  auto process = GaussianProcess::Fit(done, values, kProcess);
   if (!process.ok()) return process.status();
   const Eigen::VectorXd at_done = process->Predict(done).mean;
   const double best = at_done.minCoeff();
@@ -88,7 +91,7 @@ absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
     all << done, others;
     Eigen::VectorXd believed(all.rows());
     believed << values, process->Predict(others).mean;
-    process = GaussianProcess::Fit(all, believed);
+    process = GaussianProcess::Fit(all, believed, kProcess);
     if (!process.ok()) return process.status();
   }
 

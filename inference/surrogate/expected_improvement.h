@@ -17,7 +17,8 @@ double ExpectedImprovement(double best, double mean, double sd);
 /// pending; before that the initial design. The process is fitted to the values of all evaluations
 /// done (to their logarithms where all are positive: misfits span decades); pending ones, and those
 /// that were terminated, count with the process's own prediction there [kriging believer,
-/// Ginsbourger et al. 2010], so that points chosen together lie apart. best: the smallest mean at a
+/// Ginsbourger et al. 2010], so that points chosen together lie apart. The process passes within a
+/// hundredth of the values' spread of each of them. best: the smallest mean at a
 /// point done, for values that scatter. The maximum is looked for among 2^11 scrambled Sobol points
 /// of the cube and as many perturbations of the best point, and refined by ever smaller
 /// perturbations of the best candidate. Depends on the state alone. nullopt as NextPoint. Errors:

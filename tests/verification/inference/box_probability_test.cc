@@ -27,17 +27,18 @@ TEST(BoxProbability, OrthantsInTwoAndThreeDimensions) {
     const Eigen::MatrixXd cholesky = covariance.llt().matrixL();
     EXPECT_NEAR(
         BoxProbability(cholesky, Eigen::Vector2d::Zero(), Eigen::Vector2d::Constant(INFINITY)),
-        0.25 + std::asin(r) / (2 * std::numbers::pi), 3e-4);
+        0.25 + std::asin(r) / (2 * std::numbers::pi), 1e-4);
   }
   Eigen::Matrix3d covariance;
   covariance << 1, 0.6, 0.3, 0.6, 1, -0.2, 0.3, -0.2, 1;
   const Eigen::MatrixXd cholesky = covariance.llt().matrixL();
   EXPECT_NEAR(
       BoxProbability(cholesky, Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(INFINITY)),
-      0.125 + (std::asin(0.6) + std::asin(0.3) + std::asin(-0.2)) / (4 * std::numbers::pi), 3e-4);
+      0.125 + (std::asin(0.6) + std::asin(0.3) + std::asin(-0.2)) / (4 * std::numbers::pi), 2e-4);
 }
 
-// Equicorrelated orthant, r = 1/2: 1 / (d + 1).
+// Equicorrelated orthant, r = 1/2: 1 / (d + 1). The points are fixed and so is the error,
+// of 1.7e-3; limits in two and three dimensions are two to three times the errors found there.
 TEST(BoxProbability, OrthantInSixDimensions) {
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(6, 6, 0.5);
   covariance.diagonal().setOnes();
