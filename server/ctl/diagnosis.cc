@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -17,7 +18,7 @@
 namespace calib::ctl {
 namespace {
 
-constexpr std::size_t kWarmFits = 6;    // that two batches each pick the few to continue from
+constexpr std::size_t kWarmFits = 4;    // two batches each pick the few to continue from
 constexpr std::size_t kMostRivals = 3;  // that the next experiment is to separate
 constexpr double kMostUnits = 10;       // of an effect that is calculated on readings
 
@@ -28,7 +29,7 @@ class Inquiry {
         options_(options),
         base_(laboratory, view),
         screen_(base_),
-        fits_(base_, response_.run_covariance, response_.parts) {}
+        fits_(base_, screen_, response_.run_covariance, response_.parts) {}
 
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();
@@ -212,15 +213,25 @@ class Inquiry {
     }
   }
 
-  absl::Status FitWarm() {
-    const std::size_t count = std::min(kWarmFits, diagnosis_.candidates.size());
+  // The first by the screen; of several that it cannot tell apart the first of them.
+  std::vector<std::string> WorthARefit() const {
     std::vector<std::string> effects;
-    for (std::size_t c = 0; c < count; ++c) effects.push_back(diagnosis_.candidates[c].effect);
+    std::set<std::string> alike;
+    for (const CandidateEffect& candidate : diagnosis_.candidates) {
+      if (effects.size() == kWarmFits) break;
+      if (alike.count(candidate.effect) > 0) continue;
+      effects.push_back(candidate.effect);
+      alike.insert(candidate.confusable_with.begin(), candidate.confusable_with.end());
+    }
+    return effects;
+  }
+
+  absl::Status FitWarm() {
     if (!base_.view().campaign.precomputed) {
-      if (auto status = fits_.Fit(effects); !status.ok()) return status;
+      if (auto status = fits_.Fit(WorthARefit()); !status.ok()) return status;
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
-    for (std::size_t c = 0; c < count; ++c) Describe(diagnosis_.candidates[c]);
+    for (CandidateEffect& candidate : diagnosis_.candidates) Describe(candidate);
     Verdict verdict(diagnosis_, fits_, options_.level);
     verdict.WeighEvidence();
     // Those that explain the readings, by how well; then the other fits, by how close they come.

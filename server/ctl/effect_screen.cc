@@ -146,8 +146,16 @@ absl::StatusOr<inference::Signature> EffectScreen::SignatureOf(const dem::Effect
     signature.differences.emplace_back(
         (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
     tried.push_back(pair.step);
+    EffectRun run{.values = pair.with.rows.front().values, .history = with.histories.row(0)};
+    run.values.insert(pair.with.fixed.begin(), pair.with.fixed.end());
+    runs_with_[effect.name].push_back(std::move(run));
   }
   return signature;
+}
+
+std::vector<EffectScreen::EffectRun> EffectScreen::RunsWith(const std::string& effect) const {
+  const auto found = runs_with_.find(effect);
+  return found == runs_with_.end() ? std::vector<EffectRun>{} : found->second;
 }
 
 std::map<std::string, double> EffectScreen::StrengthOf(const std::string& name, std::size_t which,

@@ -41,6 +41,13 @@ class EffectScreen {
   }
   std::int64_t evaluations() const { return evaluations_; }
 
+  /// A run with an effect: everything that its parameters are set to, SI, and its history.
+  struct EffectRun {
+    std::map<std::string, double> values;
+    Eigen::VectorXd history;
+  };
+  std::vector<EffectRun> RunsWith(const std::string& effect) const;
+
  private:
   // One step away from the model without the effect.
   struct Step {
@@ -65,6 +72,7 @@ class EffectScreen {
 
   const FittedCampaign& base_;
   std::map<std::string, std::vector<Step>> tried_;
+  std::map<std::string, std::vector<EffectRun>> runs_with_;
   std::vector<std::pair<std::string, std::string>> not_excitable_;
   std::int64_t evaluations_ = 0;
 };

@@ -1,6 +1,7 @@
 #include "server/ctl/verdict.h"
 
 #include <algorithm>
+#include <iterator>
 #include <vector>
 
 namespace calib::ctl {
@@ -70,13 +71,21 @@ void Verdict::Conclude(bool base_fits) {
     diagnosis_.verdict = "adequate";  // a hint that depends on the prior of its strength
     return;
   }
-  // Those that do as well, and those of which it is not known yet how well they can do.
-  std::vector<std::string> rivals;
+  // Those that do as well; those that the screen cannot tell from it, which were not fitted for
+  // that reason; those of which it is not known yet how well they can do.
+  std::vector<std::string> as_good;
+  std::vector<std::string> unknown;
   for (const CandidateEffect& other : diagnosis_.candidates) {
     const WarmFit* fit = fits_.Find(other.effect);
-    if (fit == nullptr || fit == &best) continue;
-    if (!Excluded(other, best) && rivals.size() + 1 < kMostNames) rivals.push_back(other.effect);
+    if (fit == nullptr || fit == &best || Excluded(other, best)) continue;
+    (Explains(other) ? as_good : unknown).push_back(other.effect);
   }
+  std::vector<std::string> rivals = as_good;
+  std::copy_if(first.confusable_with.begin(), first.confusable_with.end(),
+               std::back_inserter(rivals),
+               [this](const std::string& other) { return fits_.Find(other) == nullptr; });
+  rivals.insert(rivals.end(), unknown.begin(), unknown.end());
+  rivals.resize(std::min(rivals.size(), kMostNames - 1));
   if (rivals.empty()) {
     diagnosis_.verdict = "missing_effect";
     diagnosis_.effect = first.effect;

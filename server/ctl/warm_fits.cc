@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int kLeastSamples = 5;
-constexpr int kShares = 18;        // batches that the campaign's number of samples pays for
+constexpr int kLeastSamples = 6;
+constexpr int kShares = 15;        // batches that the campaign's number of samples pays for
 constexpr double kPatience = 1.5;  // a batch more must bring a fit this much closer
 constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
 constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
@@ -43,6 +43,29 @@ inference::Iteration IterationOf(const report::RunTable& runs, const inference::
         (runs.histories.col(k).array() * reading.sd + reading.value).matrix();
   }
   return iteration;
+}
+
+// As runs of the extended model; those that leave one of its parameters open are left out.
+report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
+                              const campaign::Campaign& extended) {
+  report::RunTable table;
+  for (const EffectScreen::EffectRun& run : runs) {
+    Eigen::RowVectorXd point(static_cast<Index>(extended.parameters.size()));
+    bool known = true;
+    for (Index j = 0; j < point.size(); ++j) {
+      const campaign::CalibratedParameter& parameter =
+          extended.parameters[static_cast<std::size_t>(j)];
+      const auto value = run.values.find(parameter.name);
+      known = known && value != run.values.end() && parameter.prior.InSupport(value->second);
+      if (known) point(j) = value->second;
+    }
+    if (!known) continue;
+    report::RunTable one;
+    one.parameters = point;
+    one.histories = run.history.transpose();
+    Append(one, table);
+  }
+  return table;
 }
 
 absl::StatusOr<inference::EmulatedResult> Emulate(
@@ -149,7 +172,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     fit.view = *std::move(view);
     Append(report::RunsOf(fit.view), fit.runs);
   } else {
-    const auto points = NextPoints(fit);
+    const auto points = NextPoints(effect);
     if (!points.ok()) return points.status();
     campaign::Derivation derivation = base_.Derived("warm_fit_batch", what);
     for (Index i = 0; i < points->rows(); ++i) {
@@ -175,8 +198,10 @@ absl::Status WarmFits::Continue(const std::string& effect) {
   return absl::OkStatus();
 }
 
-// Those without the effect among them: at its null the base model's runs are runs of this one.
-std::vector<inference::Iteration> WarmFits::RunsFor(const WarmFit& fit) const {
+// Those of the screen and those without the effect among them: at its null the base model's runs
+// are runs of this one.
+std::vector<inference::Iteration> WarmFits::RunsFor(const std::string& effect) const {
+  const WarmFit& fit = fits_.at(effect);
   const campaign::Campaign& campaign = fit.view.campaign;
   const inference::DataSet data = campaign::MakeDataSet(campaign);
   std::vector<inference::Iteration> iterations = {IterationOf(fit.runs, data)};
@@ -184,15 +209,20 @@ std::vector<inference::Iteration> WarmFits::RunsFor(const WarmFit& fit) const {
       nulls.parameters.rows() > 0) {
     iterations.push_back(IterationOf(nulls, data));
   }
+  if (const auto screened = RunsOfScreen(screen_.RunsWith(effect), campaign);
+      screened.parameters.rows() > 0) {
+    iterations.push_back(IterationOf(screened, data));
+  }
   return iterations;
 }
 
 // About the posterior that an emulator of all runs gives. The prior where there is nothing to go
 // by.
-absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
+absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const std::string& effect) const {
+  const WarmFit& fit = fits_.at(effect);
   const campaign::Campaign& campaign = fit.view.campaign;
   const inference::JointPrior priors = campaign::Priors(campaign);
-  const auto emulated = Emulate(campaign, RunsFor(fit));
+  const auto emulated = Emulate(campaign, RunsFor(effect));
   inference::Proposal proposal;
   if (emulated.ok() && emulated->draws.rows() > 0) {
     auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
@@ -206,7 +236,7 @@ absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const WarmFit& fit) const {
 void WarmFits::WeighEvidence(const std::string& effect) {
   const auto found = fits_.find(effect);
   if (found == fits_.end() || found->second.runs.histories.rows() == 0) return;
-  const std::vector<inference::Iteration> runs = RunsFor(found->second);
+  const std::vector<inference::Iteration> runs = RunsFor(effect);
   ScaledEvidence evidence;
   for (std::size_t s = 0; s < kStrengthScales.size(); ++s) {
     const auto emulated =

@@ -15,6 +15,7 @@
 #include "absl/status/statusor.h"
 #include "inference/diagnosis/screen.h"
 #include "inference/filter/iterative_filter.h"
+#include "server/ctl/effect_screen.h"
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/strength_scale.h"
 
@@ -47,11 +48,11 @@ struct WarmFit {
 
 class WarmFits {
  public:
-  /// covariance: of the difference between a measurement and one run, in units of the noise sd.
-  /// parts: see Response. All must outlive it.
-  WarmFits(const FittedCampaign& base, const Eigen::MatrixXd& covariance,
-           const std::vector<int>& parts)
-      : base_(base), covariance_(covariance), parts_(parts) {}
+  /// screen: its runs teach the emulators too. covariance: of the difference between a measurement
+  /// and one run, in units of the noise sd. parts: see Response. All must outlive it.
+  WarmFits(const FittedCampaign& base, const EffectScreen& screen,
+           const Eigen::MatrixXd& covariance, const std::vector<int>& parts)
+      : base_(base), screen_(screen), covariance_(covariance), parts_(parts) {}
 
   /// Fits all of them and continues, the most promising first, until each has stalled or as many
   /// samples have been run as the campaign has. Errors: those of the
@@ -79,11 +80,12 @@ class WarmFits {
   absl::Status Continue(const std::string& effect);
   /// nullptr when every fit has stalled.
   const std::string* Next(const std::vector<std::string>& effects) const;
-  absl::StatusOr<Eigen::MatrixXd> NextPoints(const WarmFit& fit) const;
-  std::vector<inference::Iteration> RunsFor(const WarmFit& fit) const;
+  absl::StatusOr<Eigen::MatrixXd> NextPoints(const std::string& effect) const;
+  std::vector<inference::Iteration> RunsFor(const std::string& effect) const;
   void Judge(WarmFit& fit) const;
 
   const FittedCampaign& base_;
+  const EffectScreen& screen_;
   const Eigen::MatrixXd& covariance_;
   const std::vector<int>& parts_;
   int samples_ = 0;  // of a batch
