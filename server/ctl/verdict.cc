@@ -74,17 +74,24 @@ void Verdict::Conclude(bool base_fits) {
   // Those that do as well; those that the screen cannot tell from it, which were not fitted for
   // that reason; those of which it is not known yet how well they can do.
   std::vector<std::string> as_good;
-  std::vector<std::string> unknown;
+  std::vector<const CandidateEffect*> unknown;
   for (const CandidateEffect& other : diagnosis_.candidates) {
     const WarmFit* fit = fits_.Find(other.effect);
     if (fit == nullptr || fit == &best || Excluded(other, best)) continue;
-    (Explains(other) ? as_good : unknown).push_back(other.effect);
+    if (Explains(other)) {
+      as_good.push_back(other.effect);
+    } else {
+      unknown.push_back(&other);
+    }
   }
+  // How close those have come is luck so far; the screen knows more of them.
+  std::stable_sort(unknown.begin(), unknown.end(),
+                   [](const auto* a, const auto* b) { return a->p_value < b->p_value; });
   std::vector<std::string> rivals = as_good;
   std::copy_if(first.confusable_with.begin(), first.confusable_with.end(),
                std::back_inserter(rivals),
                [this](const std::string& other) { return fits_.Find(other) == nullptr; });
-  rivals.insert(rivals.end(), unknown.begin(), unknown.end());
+  for (const CandidateEffect* other : unknown) rivals.push_back(other->effect);
   rivals.resize(std::min(rivals.size(), kMostNames - 1));
   if (rivals.empty()) {
     diagnosis_.verdict = "missing_effect";

@@ -5,9 +5,9 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
-#include "inference/emulator/emulated_posterior.h"
 #include "server/ctl/extension.h"
 #include "server/ctl/response.h"
+#include "server/ctl/warm_points.h"
 
 namespace calib::ctl {
 namespace {
@@ -20,62 +20,6 @@ constexpr double kPatience = 1.5;  // a batch more must bring a fit this much cl
 constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
 constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
 constexpr int kMostIdle = 3;       // batches in a row that were not
-constexpr int kDraws = 1000;       // of the emulated posterior
-
-void Append(const report::RunTable& more, report::RunTable& runs) {
-  const Index before = runs.histories.rows();
-  const Index n = more.histories.rows();
-  runs.parameters.conservativeResize(before + n, more.parameters.cols());
-  runs.histories.conservativeResize(before + n, more.histories.cols());
-  runs.parameters.bottomRows(n) = more.parameters;
-  runs.histories.bottomRows(n) = more.histories;
-  runs.sample.insert(runs.sample.end(), more.sample.begin(), more.sample.end());
-}
-
-// As the inference sees runs: predictions in the units of the readings.
-inference::Iteration IterationOf(const report::RunTable& runs, const inference::DataSet& data) {
-  inference::Iteration iteration;
-  iteration.parameters = runs.parameters;
-  iteration.predictions = runs.histories;
-  for (Index k = 0; k < runs.histories.cols(); ++k) {
-    const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
-    iteration.predictions.col(k) =
-        (runs.histories.col(k).array() * reading.sd + reading.value).matrix();
-  }
-  return iteration;
-}
-
-// As runs of the extended model; those that leave one of its parameters open are left out.
-report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
-                              const campaign::Campaign& extended) {
-  report::RunTable table;
-  for (const EffectScreen::EffectRun& run : runs) {
-    Eigen::RowVectorXd point(static_cast<Index>(extended.parameters.size()));
-    bool known = true;
-    for (Index j = 0; j < point.size(); ++j) {
-      const campaign::CalibratedParameter& parameter =
-          extended.parameters[static_cast<std::size_t>(j)];
-      const auto value = run.values.find(parameter.name);
-      known = known && value != run.values.end() && parameter.prior.InSupport(value->second);
-      if (known) point(j) = value->second;
-    }
-    if (!known) continue;
-    report::RunTable one;
-    one.parameters = point;
-    one.histories = run.history.transpose();
-    Append(one, table);
-  }
-  return table;
-}
-
-absl::StatusOr<inference::EmulatedResult> Emulate(
-    const campaign::Campaign& campaign, const std::vector<inference::Iteration>& iterations) {
-  const inference::JointPrior priors = campaign::Priors(campaign);
-  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
-  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
-  return inference::EmulatedPosterior(priors, campaign::MakeDataSet(campaign), options, iterations);
-}
-
 }  // namespace
 
 std::map<std::string, double> PointOf(const report::CampaignView& view,
@@ -123,14 +67,18 @@ const std::string* WarmFits::Next(const std::vector<std::string>& effects) const
   const std::string& best = *std::min_element(
       effects.begin(), effects.end(),
       [&chi2](const std::string& a, const std::string& b) { return chi2(a) < chi2(b); });
+  // Without the effect it is the base model: a fit that is further off has merely not been found.
+  const auto adequacy = inference::TestAdequacy(BaseByRuns());
+  const double base = adequacy.ok() ? adequacy->chi2 : std::numeric_limits<double>::infinity();
   const std::string* next = nullptr;
   double lowest = 0;
   for (const std::string& effect : effects) {
     const WarmFit& fit = fits_.at(effect);
     if (fit.stalled || fit.runs.histories.rows() == 0) continue;
-    const double price = effect == best && fit.Satisfied()
-                             ? std::numeric_limits<double>::infinity()
-                             : std::sqrt(chi2(effect)) * std::pow(kPatience, fit.iterations);
+    const double price =
+        effect == best && fit.Satisfied()
+            ? std::numeric_limits<double>::infinity()
+            : std::sqrt(std::min(chi2(effect), base)) * std::pow(kPatience, fit.iterations);
     if (next == nullptr || price < lowest) {
       next = &effect;
       lowest = price;
@@ -172,7 +120,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     fit.view = *std::move(view);
     Append(report::RunsOf(fit.view), fit.runs);
   } else {
-    const auto points = NextPoints(effect);
+    const auto points = PointsFor(effect);
     if (!points.ok()) return points.status();
     campaign::Derivation derivation = base_.Derived("warm_fit_batch", what);
     for (Index i = 0; i < points->rows(); ++i) {
@@ -198,45 +146,32 @@ absl::Status WarmFits::Continue(const std::string& effect) {
   return absl::OkStatus();
 }
 
-// Those of the screen and those without the effect among them: at its null the base model's runs
-// are runs of this one.
-std::vector<inference::Iteration> WarmFits::RunsFor(const std::string& effect) const {
+// Its own, those of the screen, and the base model's: at its null an effect changes nothing.
+report::RunTable WarmFits::RunsFor(const std::string& effect) const {
   const WarmFit& fit = fits_.at(effect);
   const campaign::Campaign& campaign = fit.view.campaign;
-  const inference::DataSet data = campaign::MakeDataSet(campaign);
-  std::vector<inference::Iteration> iterations = {IterationOf(fit.runs, data)};
-  if (const auto nulls = RunsWithoutEffect(base_.runs(), base_.view().campaign, campaign);
-      nulls.parameters.rows() > 0) {
-    iterations.push_back(IterationOf(nulls, data));
-  }
-  if (const auto screened = RunsOfScreen(screen_.RunsWith(effect), campaign);
-      screened.parameters.rows() > 0) {
-    iterations.push_back(IterationOf(screened, data));
-  }
-  return iterations;
+  report::RunTable runs = fit.runs;
+  Append(RunsOfScreen(screen_.RunsWith(effect), campaign), runs);
+  Append(RunsWithoutEffect(base_.runs(), base_.view().campaign, campaign), runs);
+  return runs;
 }
 
-// About the posterior that an emulator of all runs gives. The prior where there is nothing to go
-// by.
-absl::StatusOr<Eigen::MatrixXd> WarmFits::NextPoints(const std::string& effect) const {
+absl::StatusOr<Eigen::MatrixXd> WarmFits::PointsFor(const std::string& effect) const {
   const WarmFit& fit = fits_.at(effect);
-  const campaign::Campaign& campaign = fit.view.campaign;
-  const inference::JointPrior priors = campaign::Priors(campaign);
-  const auto emulated = Emulate(campaign, RunsFor(effect));
-  inference::Proposal proposal;
-  if (emulated.ok() && emulated->draws.rows() > 0) {
-    auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
-                                                static_cast<std::size_t>(fit.iterations));
-    if (!fitted.ok()) return fitted.status();
-    proposal = *std::move(fitted);
-  }
-  return inference::DrawSamples(proposal, priors, campaign.filter, fit.iterations, samples_);
+  const report::RunTable runs = RunsFor(effect);
+  const Eigen::LLT<Eigen::MatrixXd> factor(covariance_);
+  const Eigen::VectorXd chi2 =
+      factor.matrixL().solve(runs.histories.transpose()).colwise().squaredNorm().transpose();
+  const Index with_effect =
+      fit.runs.histories.rows() +
+      RunsOfScreen(screen_.RunsWith(effect), fit.view.campaign).histories.rows();
+  return NextPoints(fit.view.campaign, runs, chi2, with_effect, fit.iterations, samples_);
 }
 
 void WarmFits::WeighEvidence(const std::string& effect) {
   const auto found = fits_.find(effect);
   if (found == fits_.end() || found->second.runs.histories.rows() == 0) return;
-  const std::vector<inference::Iteration> runs = RunsFor(effect);
+  const report::RunTable runs = RunsFor(effect);
   ScaledEvidence evidence;
   for (std::size_t s = 0; s < kStrengthScales.size(); ++s) {
     const auto emulated =
@@ -249,9 +184,7 @@ void WarmFits::WeighEvidence(const std::string& effect) {
 }
 
 std::optional<double> WarmFits::BaseLogEvidence() const {
-  const auto emulated =
-      Emulate(base_.view().campaign,
-              {IterationOf(base_.runs(), campaign::MakeDataSet(base_.view().campaign))});
+  const auto emulated = Emulate(base_.view().campaign, base_.runs());
   if (!emulated.ok() || !emulated->adequate) return std::nullopt;
   return emulated->log_evidence;
 }

@@ -1,6 +1,6 @@
 #pragma once
 // The model refitted with one effect more, for the few effects that a screen ranks first: small
-// batches of runs at points that an emulator of all that has been run chooses, until the fit is
+// batches of runs at points that all that has been run suggests (warm_points.h), until the fit is
 // adequate or comes no closer, continued where that promises most. Judged by runs, not by the
 // emulator: what an emulator does not know would excuse any misfit.
 
@@ -14,7 +14,6 @@
 
 #include "absl/status/statusor.h"
 #include "inference/diagnosis/screen.h"
-#include "inference/filter/iterative_filter.h"
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/strength_scale.h"
@@ -80,8 +79,8 @@ class WarmFits {
   absl::Status Continue(const std::string& effect);
   /// nullptr when every fit has stalled.
   const std::string* Next(const std::vector<std::string>& effects) const;
-  absl::StatusOr<Eigen::MatrixXd> NextPoints(const std::string& effect) const;
-  std::vector<inference::Iteration> RunsFor(const std::string& effect) const;
+  absl::StatusOr<Eigen::MatrixXd> PointsFor(const std::string& effect) const;
+  report::RunTable RunsFor(const std::string& effect) const;
   void Judge(WarmFit& fit) const;
 
   const FittedCampaign& base_;

@@ -1,0 +1,39 @@
+#pragma once
+// Where a warm fit runs next: from everything that has been run of the extended model, those of the
+// screen and of the base model at the effect's null among it.
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/emulator/emulated_posterior.h"
+#include "server/ctl/effect_screen.h"
+#include "server/report/run_table.h"
+
+namespace calib::ctl {
+
+/// The screen's runs with an effect as runs of the extended model; those that leave one of its
+/// parameters open or lie outside its prior are left out. Sample numbers are empty.
+report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
+                              const campaign::Campaign& extended);
+
+/// The rows of `more` behind those of `runs`.
+void Append(const report::RunTable& more, report::RunTable& runs);
+
+/// Posterior and evidence of the campaign on an emulator of the runs. Errors: those of
+/// inference::EmulatedPosterior.
+absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& campaign,
+                                                  const report::RunTable& runs);
+
+/// `count` points, SI: draws from the posterior that an emulator of all runs gives, where it knows
+/// the model's history somewhere in the prior; else steps of the response surface method on ln chi2
+/// of the runs with the effect, from the best of them (the others would hold it at the null);
+/// else draws from the prior. chi2:
+/// of each run; with_effect: how many of the first rows are such. batch: number of batches so far,
+/// decides the random numbers. Errors: those of the two methods.
+absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
+                                           const report::RunTable& runs,
+                                           const Eigen::VectorXd& chi2, Eigen::Index with_effect,
+                                           int batch, int count);
+
+}  // namespace calib::ctl
