@@ -202,6 +202,7 @@ class Inquiry {
          .predicted_rms_error = score.rms,
          .confusable_with = score.confusable_with,
          .campaign = "",
+         .closest = {},
          .refit_p_value = -1,
          .refit_chi2 = 0,
          .over_base = {},
@@ -256,6 +257,7 @@ class Inquiry {
     for (const auto& [name, value] : fit.best) {
       if (name.starts_with(candidate.effect + ".")) candidate.amplitude[name] = value;
     }
+    candidate.closest = fit.best;
     candidate.refit_p_value = fit.adequacy.p_value;
     candidate.refit_chi2 = fit.adequacy.chi2;
     candidate.over_base = fit.over_base;

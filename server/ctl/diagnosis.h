@@ -24,8 +24,9 @@ struct CandidateEffect {
   double predicted_rms_error = 0;             ///< residual over noise sd with the effect
   std::vector<std::string> confusable_with{};
   // Of the warm fit, where there was one.
-  std::string campaign{};     ///< id
-  double refit_p_value = -1;  ///< adequacy of the extended model
+  std::string campaign{};                   ///< id
+  std::map<std::string, double> closest{};  ///< all parameters of its closest run, SI
+  double refit_p_value = -1;                ///< adequacy of the extended model
   double refit_chi2 = 0;
   inference::Advantage over_base{};
   std::optional<double> left_out_error{};  ///< see Diagnosis

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kTempered = 10;  // times the parent's standard deviation
 constexpr double kPriorShare = 0.5;
+constexpr double kNear = 0.2;  // times a value that is known to be good
 
 double DiameterOf(const campaign::Experiment& experiment) {
   for (const campaign::Specimen& specimen : experiment.specimens) {
@@ -140,6 +141,11 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
     if (!(parameter.sd() > 0) || !prior.InSupport(parameter.mean())) continue;
     derivation.first_proposal->places[parameter.name()] = {.center = parameter.mean(),
                                                            .sd = kTempered * parameter.sd()};
+  }
+  for (const auto& [name, value] : plan.near) {
+    if (value != 0) {
+      derivation.first_proposal->places[name] = {.center = value, .sd = kNear * std::abs(value)};
+    }
   }
   return campaign::Derive(parent.source.campaign_file(), derivation);
 }

@@ -1,6 +1,7 @@
 #pragma once
 // A campaign joined by effects: its text, warm-started from the posterior of the campaign without.
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,7 +20,10 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& ef
 
 struct ExtensionPlan {
   std::vector<std::string> effects{};
-  std::string purpose{};            ///< extension | warm_fit
+  std::string purpose{};  ///< extension | warm_fit
+  /// Parameters of a run that is known to come close, SI; takes the place of the parent's posterior
+  /// in the half of the first samples that is not from the prior.
+  std::map<std::string, double> near{};
   bool held_out = true;             ///< false: held-out experiments stay closed
   std::optional<int> samples{};     ///< as the parent
   std::optional<int> iterations{};  ///< as the parent
@@ -28,7 +32,7 @@ struct ExtensionPlan {
 /// Half of the first samples from the prior, half about the parent's posterior ten times as wide:
 /// parameters that were bent to hide an effect lie far from where they belong.
 /// Errors: INVALID_ARGUMENT for effects that are unknown or cannot join; FAILED_PRECONDITION when
-/// the parent has no posterior.
+/// no iteration of the parent is complete.
 absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
                                           const ExtensionPlan& plan);
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
@@ -39,6 +40,15 @@ std::string NextEffect(const Diagnosis& diagnosis) {
   if (!diagnosis.effect.empty()) return diagnosis.effect;
   if (diagnosis.verdict == "ambiguous") return diagnosis.candidates.front().effect;
   return diagnosis.best_partial;
+}
+
+// Where the warm fit of an effect has come closest; empty without one.
+std::map<std::string, double> ClosestRunWith(const std::string& effect,
+                                             const Diagnosis& diagnosis) {
+  for (const CandidateEffect& candidate : diagnosis.candidates) {
+    if (candidate.effect == effect) return candidate.closest;
+  }
+  return {};
 }
 
 Json ToJson(const std::vector<ImproveStep>& steps, const std::string& digest,
@@ -106,11 +116,12 @@ class Improvement {
                   << " model evaluations are as many as --max-evaluations allows\n";
         break;
       }
-      auto extended = Extended(view, {next});
+      auto extended = Extended(view, {next}, ClosestRunWith(next, *diagnosis));
       if (!extended.ok()) return extended.status();
-      if (extended->posterior.posterior_from() == "none") {
+      if (extended->posterior.posterior_from() == "none" &&
+          !(ErrorOf(*extended) < steps_.back().rms_error)) {
         std::cerr << "the calibration with " << next << " (" << extended->status.campaign()
-                  << ") has no posterior, so it is no step: run more samples\n";
+                  << ") has no posterior and comes no closer, so it is no step: run more samples\n";
         break;
       }
       added.push_back(next);
@@ -126,18 +137,26 @@ class Improvement {
   std::int64_t evaluations() const { return evaluations_; }
 
  private:
+  static double ErrorOf(const report::CampaignView& view) {
+    return report::Compare(view, report::PredictReadings(view)).rms_error;
+  }
   bool Spent() const { return max_evaluations_ && evaluations_ >= *max_evaluations_; }
 
   // Adds a step.
   absl::StatusOr<Diagnosis> Judge(const report::CampaignView& view, bool only_adequacy) {
     auto diagnosis =
         Diagnose(laboratory_, view, {.only_adequacy = only_adequacy, .next_experiment = false});
-    if (!diagnosis.ok()) return diagnosis;
+    if (!diagnosis.ok()) {
+      if (steps_.empty() || !absl::IsFailedPrecondition(diagnosis.status())) return diagnosis;
+      // It comes closer, but how well it could do is not known: no adequacy without support.
+      std::cerr << diagnosis.status().message() << "\n";
+      diagnosis = Diagnosis{};
+      diagnosis->verdict = "unexplained";
+    }
     evaluations_ += diagnosis->screen_evaluations + diagnosis->warm_evaluations;
-    const auto comparison = report::Compare(view, report::PredictReadings(view));
     steps_.push_back({.campaign = view.status.campaign(),
                       .effects = view.campaign.model.effects,
-                      .rms_error = comparison.rms_error,
+                      .rms_error = ErrorOf(view),
                       .heldout_rms_error = std::nullopt,
                       .log_evidence = view.posterior.log_evidence(),
                       .verdict = diagnosis->verdict});
@@ -151,7 +170,7 @@ class Improvement {
     for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
       std::vector<std::string> others = added;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-      auto without = Extended(*first_, others);
+      auto without = Extended(*first_, others, {});
       if (!without.ok()) return without.status();
       if (without->posterior.posterior_from() == "none" || !Fits(*without)) continue;
       last_ = *std::move(without);
@@ -162,13 +181,15 @@ class Improvement {
 
   // With one parameter more the parent's iterations may not do: then as many again.
   absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
-                                                const std::vector<std::string>& effects) {
+                                                const std::vector<std::string>& effects,
+                                                const std::map<std::string, double>& near) {
     absl::StatusOr<report::CampaignView> extended = absl::UnknownError("not run");
     for (const int times : {1, 2}) {
       const auto text = ExtensionText(
           view,
           {.effects = effects,
            .purpose = "extension",
+           .near = near,
            .samples = std::nullopt,
            .iterations = times == 1 ? std::nullopt
                                     : std::optional<int>(times * view.campaign.max_iterations)});
