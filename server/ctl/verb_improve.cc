@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -42,11 +43,16 @@ std::string NextEffect(const Diagnosis& diagnosis) {
   return diagnosis.best_partial;
 }
 
-// Where the warm fit of an effect has come closest; empty without one.
-std::map<std::string, double> ClosestRunWith(const std::string& effect,
-                                             const Diagnosis& diagnosis) {
+// Where the warm fit of an effect has come closest.
+struct ClosestRun {
+  std::map<std::string, double> values{};
+  double rms = std::numeric_limits<double>::infinity();  // residual over noise sd
+};
+ClosestRun ClosestRunWith(const std::string& effect, const Diagnosis& diagnosis) {
   for (const CandidateEffect& candidate : diagnosis.candidates) {
-    if (candidate.effect == effect) return candidate.closest;
+    if (candidate.effect == effect && !candidate.closest.empty()) {
+      return {.values = candidate.closest, .rms = candidate.predicted_rms_error};
+    }
   }
   return {};
 }
@@ -170,7 +176,7 @@ class Improvement {
     for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
       std::vector<std::string> others = added;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-      auto without = Extended(*first_, others, {});
+      auto without = Extended(*first_, others, ClosestRun{});
       if (!without.ok()) return without.status();
       if (without->posterior.posterior_from() == "none" || !Fits(*without)) continue;
       last_ = *std::move(without);
@@ -179,23 +185,27 @@ class Improvement {
     return absl::OkStatus();
   }
 
-  // With one parameter more the parent's iterations may not do: then as many again.
+  // With a parameter more the parent's iterations may not do: then as many again.
   absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
                                                 const std::vector<std::string>& effects,
-                                                const std::map<std::string, double>& near) {
+                                                const ClosestRun& closest) {
     absl::StatusOr<report::CampaignView> extended = absl::UnknownError("not run");
     for (const int times : {1, 2}) {
       const auto text = ExtensionText(
           view,
           {.effects = effects,
            .purpose = "extension",
-           .near = near,
+           .near = closest.values,
            .samples = std::nullopt,
            .iterations = times == 1 ? std::nullopt
                                     : std::optional<int>(times * view.campaign.max_iterations)});
       if (!text.ok()) return text.status();
       extended = laboratory_.Run(view, *text, "calibration with " + absl::StrJoin(effects, " + "));
-      if (!extended.ok() || extended->posterior.posterior_from() != "none") break;
+      if (!extended.ok()) break;
+      // A posterior that misses more than a single run did has not been found yet.
+      if (extended->posterior.posterior_from() != "none" && ErrorOf(*extended) <= closest.rms) {
+        break;
+      }
     }
     if (extended.ok()) evaluations_ += extended->status.model_evaluations();
     return extended;
