@@ -103,7 +103,7 @@ class LoadArchive {
   }
   void Take(void* to, std::size_t size) {
     ok_ = ok_ && size <= bytes_.size() - at_;
-    if (ok_) {
+    if (ok_ && size > 0) {  // an empty vector has no place to copy to
       std::memcpy(to, bytes_.data() + at_, size);
       at_ += size;
     }
