@@ -158,14 +158,7 @@ report::RunTable WarmFits::RunsFor(const std::string& effect) const {
 
 absl::StatusOr<Eigen::MatrixXd> WarmFits::PointsFor(const std::string& effect) const {
   const WarmFit& fit = fits_.at(effect);
-  const report::RunTable runs = RunsFor(effect);
-  const Eigen::LLT<Eigen::MatrixXd> factor(covariance_);
-  const Eigen::VectorXd chi2 =
-      factor.matrixL().solve(runs.histories.transpose()).colwise().squaredNorm().transpose();
-  const Index with_effect =
-      fit.runs.histories.rows() +
-      RunsOfScreen(screen_.RunsWith(effect), fit.view.campaign).histories.rows();
-  return NextPoints(fit.view.campaign, runs, chi2, with_effect, fit.iterations, samples_);
+  return NextPoints(fit.view.campaign, RunsFor(effect), fit.iterations, samples_);
 }
 
 void WarmFits::WeighEvidence(const std::string& effect) {

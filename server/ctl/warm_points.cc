@@ -1,21 +1,13 @@
 #include "server/ctl/warm_points.h"
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
-#include <cmath>
-#include <limits>
-#include <numeric>
-
-#include "absl/strings/str_cat.h"
-#include "inference/surrogate/response_surface.h"
 
 namespace calib::ctl {
 namespace {
 
 using Eigen::Index;
 
-constexpr int kDraws = 1000;             // of the emulated posterior
-constexpr std::size_t kMostKnown = 150;  // runs the response surface goes through, the best of all
+constexpr int kDraws = 1000;  // of the emulated posterior
 
 // As the inference sees runs: predictions in the units of the readings.
 inference::Iteration IterationOf(const report::RunTable& runs, const inference::DataSet& data) {
@@ -28,62 +20,6 @@ inference::Iteration IterationOf(const report::RunTable& runs, const inference::
         (runs.histories.col(k).array() * reading.sd + reading.value).matrix();
   }
   return iteration;
-}
-
-// Into the unit cube by the marginals, and back.
-double ToUnit(const inference::Prior& prior, double x) {
-  const double score = prior.NormalScore(x);
-  if (!std::isfinite(score)) return score > 0 ? 1 : 0;
-  return boost::math::cdf(boost::math::normal(), score);
-}
-double FromUnit(const inference::Prior& prior, double u) {
-  constexpr double kEdge = 1e-9;
-  return prior.Quantile(std::clamp(u, kEdge, 1 - kEdge));
-}
-
-Eigen::VectorXd FromCube(const inference::JointPrior& priors, const Eigen::VectorXd& u) {
-  Eigen::VectorXd x(u.size());
-  for (Index j = 0; j < u.size(); ++j) x(j) = FromUnit(priors[static_cast<std::size_t>(j)], u(j));
-  return x;
-}
-
-absl::StatusOr<Eigen::MatrixXd> StepsFromTheBest(const inference::JointPrior& priors,
-                                                 const report::RunTable& runs,
-                                                 const Eigen::VectorXd& chi2, std::uint64_t seed,
-                                                 int count) {
-  const auto d = static_cast<Index>(priors.size());
-  std::vector<Index> order(static_cast<std::size_t>(chi2.size()));
-  std::iota(order.begin(), order.end(), Index{0});
-  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) { return chi2(a) < chi2(b); });
-  order.resize(std::min(order.size(), kMostKnown));
-  inference::ResponseSurfaceState state;
-  state.design.resize(0, d);
-  for (const Index i : order) {
-    inference::Evaluation evaluation{.point = Eigen::VectorXd(d),
-                                     .status = inference::EvaluationStatus::kDone,
-                                     .value = std::log(chi2(i))};
-    for (Index j = 0; j < d; ++j) {
-      evaluation.point(j) = ToUnit(priors[static_cast<std::size_t>(j)], runs.parameters(i, j));
-    }
-    state.completed.push_back(static_cast<int>(state.evaluations.size()));
-    state.evaluations.push_back(std::move(evaluation));
-  }
-  state.best = 0;
-  inference::ResponseSurfaceOptions options{.dimensions = static_cast<int>(d)};
-  options.max_evaluations = static_cast<int>(state.evaluations.size()) + count;
-  options.seed = seed;
-  options.admissible = [&priors](const Eigen::VectorXd& u) {
-    return priors.MeetsConstraints(FromCube(priors, u));
-  };
-  state.step = options.max_step;
-  inference::CubicRbf surrogate(static_cast<int>(d));
-  Eigen::MatrixXd points(count, d);
-  for (int i = 0; i < count; ++i) {
-    const auto point = inference::NextPoint(options, state, surrogate);
-    if (!point) return absl::FailedPreconditionError("too few runs to go on from");
-    points.row(i) = FromCube(priors, *point).transpose();
-  }
-  return points;
 }
 
 }  // namespace
@@ -132,22 +68,17 @@ absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& camp
 }
 
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
-                                           const report::RunTable& runs,
-                                           const Eigen::VectorXd& chi2, Index with_effect,
-                                           int batch, int count) {
+                                           const report::RunTable& runs, int batch, int count) {
   const inference::JointPrior priors = campaign::Priors(campaign);
   const auto emulated = Emulate(campaign, runs);
+  inference::Proposal proposal;  // the prior
   if (emulated.ok() && emulated->draws.rows() > 0) {
-    const auto proposal = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
-                                                        static_cast<std::size_t>(batch));
-    if (!proposal.ok()) return proposal.status();
-    return inference::DrawSamples(*proposal, priors, campaign.filter, batch, count);
+    auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
+                                                static_cast<std::size_t>(batch));
+    if (!fitted.ok()) return fitted.status();
+    proposal = *std::move(fitted);
   }
-  if (with_effect < static_cast<Index>(2 * priors.size() + 1)) {
-    return inference::DrawSamples(inference::Proposal{}, priors, campaign.filter, batch, count);
-  }
-  return StepsFromTheBest(priors, runs, chi2.head(with_effect),
-                          campaign.filter.seed + static_cast<std::uint64_t>(batch), count);
+  return inference::DrawSamples(proposal, priors, campaign.filter, batch, count);
 }
 
 }  // namespace calib::ctl

@@ -25,15 +25,10 @@ void Append(const report::RunTable& more, report::RunTable& runs);
 absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& campaign,
                                                   const report::RunTable& runs);
 
-/// `count` points, SI: draws from the posterior that an emulator of all runs gives, where it knows
-/// the model's history somewhere in the prior; else steps of the response surface method on ln chi2
-/// of the runs with the effect, from the best of them (the others would hold it at the null);
-/// else draws from the prior. chi2:
-/// of each run; with_effect: how many of the first rows are such. batch: number of batches so far,
-/// decides the random numbers. Errors: those of the two methods.
+/// `count` points, SI: draws from the posterior that an emulator of the runs gives, where it knows
+/// the model's history somewhere in the prior; else from the prior. batch: number of batches so
+/// far, decides the random numbers. Errors: those of inference::FitProposalToDraws and DrawSamples.
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
-                                           const report::RunTable& runs,
-                                           const Eigen::VectorXd& chi2, Eigen::Index with_effect,
-                                           int batch, int count);
+                                           const report::RunTable& runs, int batch, int count);
 
 }  // namespace calib::ctl

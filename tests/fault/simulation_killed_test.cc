@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include "tests/support/process.h"
+#include "tests/support/sixty_four_grains.h"
 
 namespace calib::testing {
 namespace {
@@ -15,36 +15,14 @@ namespace {
 constexpr std::chrono::minutes kLong{2};
 constexpr int kLoadSteps = 60;
 
-std::string ReadAll(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 class SimulationKilled : public ::testing::Test {
  protected:
   SimulationKilled() : folder_(FreshFolder("simulation-killed")) {
     std::ofstream data(folder_ + "/data.csv");
     data << "axial_strain,q_over_p\n";
     for (int k = 1; k <= kLoadSteps; ++k) data << 0.001 * k << ",1\n";
-    std::ofstream(folder_ + "/sand.yaml") << R"(name: small
-model: {contact: linear, density: 2650000 kg/m^3, fixed: {poisson_ratio: 0.3}}
-parameters:
-  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e9 Pa}
-  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
-experiments:
-  - name: tx
-    test: triaxial_drained
-    confining_pressure: 100 kPa
-    packing: {generate: {particles: 64, porosity: 0.42, radii: {mean: 1 mm, spread: 0.2}, seed: 3}}
-    data: {file: data.csv, strain: logarithmic}
-    control: axial_strain
-    staging: {rate: 1 1/s, step: 0.005, damping: [0.3, 0.9], unbalanced: 5e-3}
-    observables: {q_over_p: {noise: {absolute: 0.3}}}
-inference: {method: iterative_bayesian_filter, samples: 6, max_iterations: 2}
-seed: 7
-)";
+    std::ofstream(folder_ + "/sand.yaml")
+        << SixtyFourGrains("{q_over_p: {noise: {absolute: 0.3}}}", 6, 2);
   }
   ~SimulationKilled() override { std::filesystem::remove_all(folder_); }
 

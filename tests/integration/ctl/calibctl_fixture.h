@@ -8,9 +8,10 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "tests/support/sixty_four_grains.h"
 
 namespace calib::ctl {
 
@@ -22,10 +23,7 @@ struct Answer {
   Json json() const { return Json::parse(out, nullptr, false); }
 };
 
-inline std::string ReadAll(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+using calib::testing::ReadAll;
 
 class CalibctlFixture : public ::testing::Test {
  protected:
@@ -41,23 +39,9 @@ class CalibctlFixture : public ::testing::Test {
 
   /// A campaign on data.csv: one triaxial test, two parameters, 15 lines.
   static std::string SmallCampaign(int samples, int iterations) {
-    return R"(name: small
-model: {contact: linear, density: 2650000 kg/m^3, fixed: {poisson_ratio: 0.3}}
-parameters:
-  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e9 Pa}
-  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
-experiments:
-  - name: tx
-    test: triaxial_drained
-    confining_pressure: 100 kPa
-    packing: {generate: {particles: 64, porosity: 0.42, radii: {mean: 1 mm, spread: 0.2}, seed: 3}}
-    data: {file: data.csv, strain: logarithmic}
-    control: axial_strain
-    staging: {rate: 1 1/s, step: 0.005, damping: [0.3, 0.9], unbalanced: 5e-3}
-    observables: {q_over_p: {noise: {absolute: 0.3}}, volumetric_strain: {noise: {absolute: 0.002}}}
-inference: {method: iterative_bayesian_filter, samples: )" +
-           std::to_string(samples) + ", max_iterations: " + std::to_string(iterations) +
-           "}\nseed: 7\n";
+    return calib::testing::SixtyFourGrains(
+        "{q_over_p: {noise: {absolute: 0.3}}, volumetric_strain: {noise: {absolute: 0.002}}}",
+        samples, iterations);
   }
 
   void Write(const std::string& name, const std::string& text) const {

@@ -52,6 +52,15 @@ Scenario SmallTriaxial(const Model& model) {
   return scenario;
 }
 
+Scenario With(Scenario scenario, const std::string& effect,
+              const std::map<std::string, double>& values) {
+  scenario.model.effects.push_back(effect);
+  for (const auto& [name, value] : values) {
+    scenario.model.parameters[effect + "." + name] = value;
+  }
+  return scenario;
+}
+
 Run RunAll(const Scenario& scenario) {
   Run run;
   const auto summary =

@@ -1,6 +1,7 @@
 #pragma once
 // Scenarios and specimens that several tests of the engine start from.
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,10 @@ const Packing& SmallPacking(int particles = 60);
 
 /// Drained triaxial test on SmallPacking at 0.2 MPa to 1 % axial strain, a load step every 0.5 %.
 Scenario SmallTriaxial(const Model& model);
+
+/// The scenario with one effect more; values: its parameters without their prefix.
+Scenario With(Scenario scenario, const std::string& effect,
+              const std::map<std::string, double>& values);
 
 /// Runs and collects the states; fails the calling test when the run is an error.
 struct Run {

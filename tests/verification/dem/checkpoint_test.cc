@@ -10,16 +10,8 @@
 namespace calib::dem {
 namespace {
 
+using test::With;
 using ::testing::HasSubstr;
-
-Scenario With(Scenario scenario, const std::string& effect,
-              const std::map<std::string, double>& values) {
-  scenario.model.effects.push_back(effect);
-  for (const auto& [name, value] : values) {
-    scenario.model.parameters[effect + "." + name] = value;
-  }
-  return scenario;
-}
 
 Scenario ElementTest(const std::string& name, const std::vector<double>& controls) {
   Scenario scenario = test::SmallTriaxial(test::HertzModel());

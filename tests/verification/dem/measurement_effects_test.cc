@@ -12,19 +12,12 @@
 namespace calib::dem {
 namespace {
 
+using test::With;
+
 double Value(const State& state, const std::string& observable) {
   const auto& names = FindTest("triaxial_drained")->observables;
   return state.values[static_cast<std::size_t>(std::find(names.begin(), names.end(), observable) -
                                                names.begin())];
-}
-
-Scenario With(Scenario scenario, const std::string& effect,
-              const std::map<std::string, double>& values) {
-  scenario.model.effects.push_back(effect);
-  for (const auto& [name, value] : values) {
-    scenario.model.parameters[effect + "." + name] = value;
-  }
-  return scenario;
 }
 
 /// Loading, unloading and reloading.

@@ -7,9 +7,8 @@
 #include <numbers>
 #include <vector>
 
-#include "inference/data/data_set.h"
 #include "inference/prior/prior.h"
-#include "inference/sampling/philox.h"
+#include "tests/verification/inference/path_scatter.h"
 
 namespace calib::inference {
 
@@ -57,18 +56,13 @@ struct HyperbolicCurve {
   /// The mean curve and what a packing differs from it by: level, slope and a random walk.
   Eigen::VectorXd Run(const Eigen::VectorXd& parameters, std::uint64_t seed,
                       std::uint64_t sample) const {
-    PhiloxStream stream(
-        {.seed = seed, .purpose = StreamPurpose::kTest, .iteration = 1, .sample = sample});
+    PhiloxStream stream = StreamOfRun(seed, sample);
     Eigen::VectorXd curve = Mean(parameters);
-    for (int first : {0, kSteps}) {
-      const double level = stream.Normal();
-      const double slope = stream.Normal();
-      double walk = 0;
+    for (const int first : {0, kSteps}) {
+      PathScatter scatter(stream);
       for (int t = 0; t < kSteps; ++t) {
-        walk = 0.9 * walk + std::sqrt(1 - 0.81) * stream.Normal();
-        const double deviation = 0.6 * level + 0.6 * slope * t / kSteps + 0.5 * walk;
         const double unit = first == 0 ? curve[t] : kVolumeSd / 0.01;
-        curve[first + t] += kScatter * unit * deviation;
+        curve[first + t] += kScatter * unit * scatter.Next(static_cast<double>(t) / kSteps);
       }
     }
     return curve;
@@ -77,19 +71,12 @@ struct HyperbolicCurve {
   /// One run at the parameters, measured with independent errors: `noise` times the stress ratio,
   /// and as many hundredths of kVolumeSd.
   DataSet Measure(const Eigen::VectorXd& parameters, double noise, std::uint64_t seed) const {
-    const Eigen::VectorXd curve = Run(parameters, seed, 1u << 20);
-    PhiloxStream stream(
-        {.seed = seed, .purpose = StreamPurpose::kTest, .iteration = 2, .sample = 0});
-    DataSet data;
-    for (int t = 0; t < readings; ++t) {
-      const double sd = t < kSteps ? noise * curve[t] : noise * kVolumeSd / 0.01;
-      data.readings.push_back({.observable = t / kSteps,
-                               .load_step = t % kSteps,
-                               .control = Strain(t % kSteps),
-                               .value = curve[t] + sd * stream.Normal(),
-                               .sd = sd});
-    }
-    return data;
+    const Eigen::VectorXd curve = Run(parameters, seed, kMeasured);
+    Eigen::VectorXd sd = Eigen::VectorXd::Constant(readings, noise * kVolumeSd / 0.01);
+    sd.head(kSteps) = noise * curve.head(kSteps);
+    std::vector<double> strains;
+    for (int t = 0; t < kSteps; ++t) strains.push_back(Strain(t));
+    return WithErrors(curve, sd, strains, seed);
   }
 
  private:

@@ -7,9 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "inference/data/data_set.h"
 #include "inference/prior/prior.h"
-#include "inference/sampling/philox.h"
+#include "tests/verification/inference/path_scatter.h"
 
 namespace calib::inference {
 
@@ -51,35 +50,22 @@ struct ToyCurve {
 
   Eigen::VectorXd Run(const Eigen::VectorXd& parameters, std::uint64_t seed,
                       std::uint64_t sample) const {
-    PhiloxStream stream(
-        {.seed = seed, .purpose = StreamPurpose::kTest, .iteration = 1, .sample = sample});
+    PhiloxStream stream = StreamOfRun(seed, sample);
     Eigen::VectorXd curve = Mean(parameters);
-    const double level = stream.Normal();
-    const double slope = stream.Normal();
-    double walk = 0;
+    PathScatter deviation(stream);
     for (int t = 0; t < readings; ++t) {
       const double strain = static_cast<double>(t % (readings / 2)) / (readings / 2);
-      walk = 0.9 * walk + std::sqrt(1 - 0.81) * stream.Normal();
-      curve[t] *= 1 + scatter * (0.6 * level + 0.6 * slope * strain + 0.5 * walk);
+      curve[t] *= 1 + scatter * deviation.Next(strain);
     }
     return curve;
   }
 
   /// One run at the parameters, measured with independent errors of the relative sd `noise`.
   DataSet Measure(const Eigen::VectorXd& parameters, double noise, std::uint64_t seed) const {
-    const Eigen::VectorXd curve = Run(parameters, seed, 1u << 20);
-    PhiloxStream stream(
-        {.seed = seed, .purpose = StreamPurpose::kTest, .iteration = 2, .sample = 0});
-    DataSet data;
-    for (int t = 0; t < readings; ++t) {
-      const double sd = noise * curve[t];
-      data.readings.push_back({.observable = t < readings / 2 ? 0 : 1,
-                               .load_step = t % (readings / 2),
-                               .control = static_cast<double>(t % (readings / 2)),
-                               .value = curve[t] + sd * stream.Normal(),
-                               .sd = sd});
-    }
-    return data;
+    const Eigen::VectorXd curve = Run(parameters, seed, kMeasured);
+    std::vector<double> steps;
+    for (int t = 0; t < readings / 2; ++t) steps.push_back(t);
+    return WithErrors(curve, noise * curve, steps, seed);
   }
 };
 

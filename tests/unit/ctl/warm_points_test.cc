@@ -1,0 +1,77 @@
+#include "server/ctl/warm_points.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace calib::ctl {
+namespace {
+
+using Eigen::Index;
+
+// Two parameters in the unit square and one reading.
+campaign::Campaign Square() {
+  campaign::Experiment experiment;
+  experiment.name = "tx";
+  experiment.test = "triaxial_drained";
+  experiment.settings["confining_pressure"] = 1e5;
+  experiment.control_name = "axial_strain";
+  experiment.control = {0.01, 0.02};
+  experiment.path = {{.target = 0.01, .load_step = 0}, {.target = 0.02, .load_step = 1}};
+  experiment.segment = {"initial_loading", "initial_loading"};
+  experiment.observables.push_back({.name = "q_over_p", .values = {1, 1}, .sd = {0.1, 0.1}});
+  campaign::Campaign campaign;
+  campaign.experiments.push_back(experiment);
+  for (const char* name : {"a", "b"}) {
+    campaign.parameters.push_back(
+        {.name = name,
+         .unit = "1",
+         .prior = {.kind = inference::PriorKind::kUniform, .min = 0, .max = 1}});
+  }
+  return campaign;
+}
+
+// Runs whose first reading is predicted as 1 + a - 0.3, the second as 1 + b - 0.7: truth (0.3,
+// 0.7).
+report::RunTable Runs(int count) {
+  report::RunTable runs;
+  runs.parameters.resize(count, 2);
+  for (Index i = 0; i < count; ++i) {  // a lattice of golden ratios
+    runs.parameters(i, 0) = std::fmod(0.5 + 0.754877666 * static_cast<double>(i), 1);
+    runs.parameters(i, 1) = std::fmod(0.5 + 0.569840291 * static_cast<double>(i), 1);
+  }
+  runs.histories = 10 * (runs.parameters.rowwise() - Eigen::RowVector2d(0.3, 0.7));  // over the sd
+  return runs;
+}
+
+TEST(WarmPoints, LieAboutThePosteriorThatAnEmulatorOfTheRunsGives) {
+  const auto points = NextPoints(Square(), Runs(30), 1, 40);
+  ASSERT_TRUE(points.ok()) << points.status();
+  // The posterior's sd is 0.1; a few of forty are the defensive share of the prior.
+  const Eigen::VectorXd distance =
+      (points->rowwise() - Eigen::RowVector2d(0.3, 0.7)).rowwise().norm();
+  EXPECT_GE((distance.array() < 0.4).count(), 32);
+  EXPECT_EQ(*points, *NextPoints(Square(), Runs(30), 1, 40)) << "same bits";
+}
+
+TEST(WarmPoints, ComeFromThePriorWhereThereIsTooLittleToGoBy) {
+  const auto points = NextPoints(Square(), Runs(4), 1, 6);
+  ASSERT_TRUE(points.ok()) << points.status();
+  EXPECT_EQ(*points, *NextPoints(Square(), Runs(5), 1, 6));
+}
+
+TEST(WarmPoints, AScreensRunCountsWhereItGivesEveryParameter) {
+  const campaign::Campaign campaign = Square();
+  const Eigen::VectorXd history = Eigen::Vector2d(1, 2);
+  const auto table =
+      RunsOfScreen({{.values = {{"a", 0.1}, {"b", 0.2}, {"fixed", 5}}, .history = history},
+                    {.values = {{"a", 0.1}}, .history = history},
+                    {.values = {{"a", 0.1}, {"b", 1.2}}, .history = history}},
+                   campaign);
+  ASSERT_EQ(table.parameters.rows(), 1);
+  EXPECT_EQ(table.parameters(0, 1), 0.2);
+  EXPECT_EQ(table.histories(0, 1), 2);
+}
+
+}  // namespace
+}  // namespace calib::ctl
