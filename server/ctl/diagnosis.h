@@ -42,6 +42,9 @@ struct Diagnosis {
   std::vector<CandidateEffect> candidates;  ///< best first
   std::vector<std::pair<std::string, std::string>> not_excitable;   ///< effect, why
   std::map<std::string, std::map<std::string, double>> detectable;  ///< effect -> parameter -> SI
+  /// Named in the group although they do not explain the readings: their refits have not come to an
+  /// end, so that they cannot be excluded.
+  std::vector<std::string> unfinished{};
   std::string best_partial;  ///< with unexplained: the effect that helps most, if any does
   inference::Adequacy adequacy;
   double rms = 0;  ///< of the best fit, residual over noise sd

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -83,12 +84,16 @@ std::string InWords(const PlannedExperiment& planned) {
 std::string NextText(const NextExperiment& next) {
   std::string names;
   for (const std::string& name : next.separates) names += (names.empty() ? "" : " and ") + name;
-  std::string text = fmt::format(
-      "\nNext experiment: {}. It separates {} with a power of {} ({} sd apart); an evaluation "
-      "costs "
-      "about {} core seconds. For the campaign file:\n\n{}\nAlso tried:\n",
-      InWords(next.best), names, report::Percent(next.best.expected_power, 3),
-      Number(next.best.distance, 3), Number(next.core_seconds, 2), next.snippet);
+  std::string text =
+      "\n" +
+      Wrapped(fmt::format("Next experiment: {}. It separates {} with a power of {} ({} sd apart); "
+                          "an evaluation "
+                          "costs "
+                          "about {} core seconds. For the campaign file:",
+                          InWords(next.best), names, report::Percent(next.best.expected_power, 3),
+                          Number(next.best.distance, 3), Number(next.core_seconds, 2)),
+              "", "") +
+      "\n" + next.snippet + "\nAlso tried:\n";
   for (std::size_t k = 1; k < next.considered.size(); ++k) {
     text += fmt::format("  {}: {} sd apart\n", InWords(next.considered[k]),
                         Number(next.considered[k].distance, 3));
@@ -104,6 +109,12 @@ std::string Strength(const std::map<std::string, double>& amplitude) {
   return text;
 }
 
+std::string Listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
 std::string Sentence(const Diagnosis& d) {
   if (d.verdict == "adequate") {
     return "Adequate: noise, scatter and the emulator's error explain what is left.";
@@ -113,9 +124,21 @@ std::string Sentence(const Diagnosis& d) {
                        d.effect);
   }
   if (d.verdict == "ambiguous") {
-    std::string names = d.candidates.front().effect;
-    for (const std::string& other : d.candidates.front().confusable_with) names += " or " + other;
-    return fmt::format("Ambiguous: {}; these tests do not tell them apart.", names);
+    const CandidateEffect& first = d.candidates.front();
+    std::string alike = first.effect;
+    std::string open;
+    for (const std::string& other : first.confusable_with) {
+      const bool unfinished =
+          std::find(d.unfinished.begin(), d.unfinished.end(), other) != d.unfinished.end();
+      std::string& names = unfinished ? open : alike;
+      names += (names.empty() ? "" : " or ") + other;
+    }
+    return fmt::format(
+        "Ambiguous: {}.{}{}", open.empty() ? alike : alike + " or " + open,
+        alike == first.effect ? "" : fmt::format(" These tests do not tell {} apart.", alike),
+        open.empty()
+            ? ""
+            : fmt::format(" Not excluded, since the refit has not come to an end: {}.", open));
   }
   return "Unexplained: the model misses the data, and with no known effect does it fit" +
          (d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
@@ -147,27 +170,26 @@ std::string DiagnosisJson(const Diagnosis& d) {
                  {"emulator_error", d.emulator_error},
                  {"scatter", d.scatter}}}};
   if (d.verdict == "adequate") json["detectable"] = d.detectable;
+  if (d.verdict == "ambiguous") json["unfinished"] = d.unfinished;
   if (d.verdict == "unexplained") json["best_partial"] = OrNull(d.best_partial);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string DiagnosisText(const Diagnosis& d) {
-  std::string text = Sentence(d) + "\n";
-  text += fmt::format(
-      "Best fit: residual {} noise sd (rms); chi-squared {} for {} degrees of freedom with scatter "
-      "and emulator error (p = {}).\n",
-      Number(d.rms, 3), Number(d.adequacy.chi2, 4), Number(d.adequacy.degrees, 4),
-      Number(d.adequacy.p_value, 2));
+  std::string text = Wrapped(Sentence(d), "", "");
+  text += Wrapped(fmt::format("Best fit: residual {} noise sd (rms); chi-squared {} for {} degrees "
+                              "of freedom with scatter "
+                              "and emulator error (p = {}).",
+                              Number(d.rms, 3), Number(d.adequacy.chi2, 4),
+                              Number(d.adequacy.degrees, 4), Number(d.adequacy.p_value, 2)),
+                  "", "  ");
   if (!d.candidates.empty()) {
-    TextTable table({"<effect", "p (screen)", "explains", "rms with it", "refitted p", "left out",
-                     "<strength", "<like"});
+    TextTable table({"<effect", "p (screen)", "explains", "rms with it", "refitted p", "left out"});
     for (const CandidateEffect& c : d.candidates) {
-      std::string like;
-      for (const std::string& name : c.confusable_with) like += (like.empty() ? "" : ", ") + name;
-      table.AddRow(
-          {c.effect, Number(c.p_value, 2), report::Percent(c.explained_fraction, 2),
-           Number(c.predicted_rms_error, 3), c.refit_p_value < 0 ? "–" : Number(c.refit_p_value, 2),
-           c.left_out_error ? Number(*c.left_out_error, 3) : "–", Strength(c.amplitude), like});
+      table.AddRow({c.effect, Number(c.p_value, 2), report::Percent(c.explained_fraction, 2),
+                    Number(c.predicted_rms_error, 3),
+                    c.refit_p_value < 0 ? "–" : Number(c.refit_p_value, 2),
+                    c.left_out_error ? Number(*c.left_out_error, 3) : "–"});
     }
     text += "\n" + table.ToString();
     if (d.left_out_error) {
@@ -178,6 +200,17 @@ std::string DiagnosisText(const Diagnosis& d) {
                       Number(*d.left_out_error, 3)),
           "", "");
     }
+  }
+  for (const CandidateEffect& c : d.candidates) {
+    if (c.refit_p_value < 0) continue;
+    text +=
+        Wrapped(fmt::format("{} comes closest at {}.", c.effect, Strength(c.amplitude)), "", "  ");
+  }
+  for (const CandidateEffect& c : d.candidates) {
+    const bool named = d.verdict == "ambiguous" && &c == &d.candidates.front();
+    if (c.confusable_with.empty() || named) continue;
+    text += Wrapped(
+        fmt::format("To the screen {} is like {}.", c.effect, Listed(c.confusable_with)), "", "  ");
   }
   for (const CandidateEffect& c : d.candidates) {
     if (!c.over_base_evidence) continue;

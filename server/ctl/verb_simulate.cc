@@ -106,8 +106,9 @@ class Simulation {
       std::filesystem::create_directories(arguments_.checkpoint, error);
     }
     if (error) {
-      return absl::PermissionDeniedError(
-          absl::StrCat("a folder cannot be made: ", error.message()));
+      return absl::PermissionDeniedError(absl::StrCat(
+          "a folder for ", experiment.name, " cannot be made in ",
+          task.vtk.empty() ? arguments_.checkpoint : arguments_.vtk, ": ", error.message()));
     }
     auto started = Evaluation::Start(program, task, own.string());
     if (!started.ok()) return started.status();

@@ -99,6 +99,10 @@ void Verdict::Conclude(bool base_fits) {
   } else {
     diagnosis_.verdict = "ambiguous";
     first.confusable_with = rivals;
+    for (const CandidateEffect* other : unknown) {
+      if (std::find(rivals.begin(), rivals.end(), other->effect) == rivals.end()) continue;
+      diagnosis_.unfinished.push_back(other->effect);
+    }
   }
 }
 
