@@ -226,6 +226,12 @@ void Judge(const EmulatorOptions& options, EmulatedResult& result) {
         "the response is not "
         "smooth on the scale of the runs, run more samples near the posterior.",
         std::sqrt(result.calibration), std::sqrt(options.max_calibration));
+  } else if (result.emulator_sd > options.max_unknown) {
+    result.reason = absl::StrFormat(
+        "The emulated posterior lies where few runs are: the mean history of the model is known "
+        "there to %.1f standard deviations of the readings' noise only (limit %g), and what is not "
+        "known excuses misfit. Run more iterations, or more samples in each.",
+        result.emulator_sd, options.max_unknown);
   } else {
     result.adequate = true;
   }
@@ -251,6 +257,7 @@ absl::Status EmulatorOptions::Validate() const {
   if (!(max_error > 0)) return wrong("max_error", max_error, "above 0");
   if (!(max_uncovered > 0)) return wrong("max_uncovered", max_uncovered, "above 0");
   if (!(max_calibration > 1)) return wrong("max_calibration", max_calibration, "above 1");
+  if (!(max_unknown > 0)) return wrong("max_unknown", max_unknown, "above 0");
   return absl::OkStatus();
 }
 

@@ -30,10 +30,11 @@ struct EmulatorOptions {
   int steps = 5;           ///< Metropolis steps per stage, see TmcmcOptions
   /// Limits of an adequate emulator; README.md of this folder has the reasons. Of
   /// cross_validated_error; of the part of it that the likelihood's covariance does not contain,
-  /// sqrt(error^2 - scatter_share scatter^2); of calibration.
+  /// sqrt(error^2 - scatter_share scatter^2); of calibration; of emulator_sd.
   double max_error = 3;        ///< > 0
   double max_uncovered = 2;    ///< > 0
   double max_calibration = 2;  ///< > 1
+  double max_unknown = 1.5;    ///< > 0
   std::uint64_t seed = 0;
   absl::Status Validate() const;
 };

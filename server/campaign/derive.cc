@@ -134,6 +134,8 @@ absl::StatusOr<std::string> Derive(const std::string& parent_yaml, const Derivat
   ChangeModel(derivation, root);
   ChangeExperiments(derivation, root);
   ChangeInference(derivation, root);
+  // Strengths are tried up to where the model breaks: what diverges there is an answer, no fault.
+  YamlAt(YamlAt(root, "failure"), "pause_above") = YamlScalar("1");
   return ToYaml(root);
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 // The text of a campaign that follows from another one: the same experiments, model and settings,
 // with what is said here changed. Pure: the same parent and changes give the same text, by which it
-// is recognised when it is asked for again.
+// is recognised when it is asked for again. However many runs diverge, it is not paused.
 
 #include <map>
 #include <optional>

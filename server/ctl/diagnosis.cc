@@ -83,7 +83,7 @@ class Inquiry {
   }
 
   absl::Status JudgeBase() {
-    auto response = RespondTo(base_.view(), nuisance_);
+    auto response = RespondTo(base_, nuisance_);
     if (!response.ok()) return response.status();
     response_ = *std::move(response);
     const auto adequacy = inference::TestAdequacy(response_.model);

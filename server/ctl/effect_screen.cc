@@ -41,7 +41,7 @@ absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
   const auto view = base_.Run(derivation, "influence of the loading rate");
   if (!view.ok()) return view.status();
   evaluations_ += base_.fitted_experiments();
-  const report::RunTable runs = report::RunsOf(*view);
+  const report::RunTable runs = report::RunsOf(*view, base_.readings().of_mean);
   if (!runs.sample.empty()) {
     directions.emplace_back((runs.histories.row(0) - base_.runs().histories.row(best)).transpose());
   }
@@ -141,7 +141,7 @@ absl::StatusOr<inference::Signature> EffectScreen::SignatureOf(const dem::Effect
     const auto view = base_.Run(pair.with, pair.what);
     if (!view.ok()) return view.status();
     evaluations_ += base_.fitted_experiments();
-    const report::RunTable with = report::RunsOf(*view);
+    const report::RunTable with = report::RunsOf(*view, base_.readings().of_mean);
     if (with.sample.empty()) continue;
     signature.differences.emplace_back(
         (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());

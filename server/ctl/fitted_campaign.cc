@@ -14,7 +14,8 @@ using Eigen::Index;
 FittedCampaign::FittedCampaign(Laboratory& laboratory, const report::CampaignView& view)
     : laboratory_(laboratory),
       view_(view),
-      runs_(report::RunsOf(view)),
+      readings_(report::ReadingsWithScatter(view)),
+      runs_(report::RunsOf(view, readings_.of_mean)),
       state_(ReferenceOf(view)) {}
 
 int FittedCampaign::fitted_experiments() const {

@@ -22,6 +22,8 @@ class FittedCampaign {
   FittedCampaign(Laboratory& laboratory, const report::CampaignView& view);
 
   const report::CampaignView& view() const { return view_; }
+  /// All histories are in the sd of readings().of_mean.
+  const report::ScatteredReadings& readings() const { return readings_; }
   const report::RunTable& runs() const { return runs_; }
   const dem::ReferenceState& state() const { return state_; }
   const std::string& id() const { return view_.status.campaign(); }
@@ -44,6 +46,7 @@ class FittedCampaign {
  private:
   Laboratory& laboratory_;
   const report::CampaignView& view_;
+  report::ScatteredReadings readings_;
   report::RunTable runs_;
   dem::ReferenceState state_;
 };

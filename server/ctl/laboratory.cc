@@ -48,9 +48,11 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
                   kMilestones * status->samples_done() / std::max(1, status->samples()));
     if (status->state() == "finished") return absl::OkStatus();
     if (IsOver(status->state()) || status->state() == "paused") {
-      return absl::AbortedError(absl::StrCat("campaign ", campaign, " (", what, ") is ",
-                                             status->state(), status->reason().empty() ? "" : ": ",
-                                             status->reason()));
+      const std::string why =
+          absl::StrCat("campaign ", campaign, " (", what, ") is ", status->state(),
+                       status->reason().empty() ? "" : ": ", status->reason());
+      return status->state() == "failed" ? absl::AbortedError(why)
+                                         : absl::FailedPreconditionError(why);
     }
     if (Interrupted()) {
       return absl::CancelledError("stopped; nothing is lost, the same command goes on from here");

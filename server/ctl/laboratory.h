@@ -30,7 +30,8 @@ class Laboratory {
 
   /// Submits the text with the parent's files and waits for the end, progress on standard error.
   /// further: files by the path that the text names them by, in addition to the parent's.
-  /// ABORTED when the campaign failed or was cancelled, CANCELLED on Ctrl-C (nothing is lost).
+  /// ABORTED when the campaign failed, FAILED_PRECONDITION when somebody paused or cancelled it,
+  /// CANCELLED on Ctrl-C (nothing is lost).
   absl::StatusOr<report::CampaignView> Run(const report::CampaignView& parent,
                                            const std::string& yaml, const std::string& what,
                                            const std::map<std::string, std::string>& further = {});

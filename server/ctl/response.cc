@@ -117,22 +117,17 @@ RunTable RunsWithoutEffect(const RunTable& without, const campaign::Campaign& pa
   return table;
 }
 
-absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
-                                   const std::vector<Eigen::VectorXd>& nuisance,
-                                   const RunTable& further) {
+absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
+                                   const std::vector<Eigen::VectorXd>& nuisance) {
+  const report::CampaignView& view = base.view();
   const campaign::Campaign& campaign = view.campaign;
-  const inference::DataSet data = campaign::MakeDataSet(campaign);
+  const report::ScatteredReadings& readings = base.readings();
+  const inference::DataSet& data = readings.of_mean;
   const inference::JointPrior priors = campaign::Priors(campaign);
-  RunTable table = RunsOf(view);
-  if (further.parameters.rows() > 0) {
-    const Index own = table.parameters.rows();
-    table.parameters.conservativeResize(own + further.parameters.rows(), further.parameters.cols());
-    table.histories.conservativeResize(own + further.parameters.rows(), further.histories.cols());
-    table.parameters.bottomRows(further.parameters.rows()) = further.parameters;
-    table.histories.bottomRows(further.parameters.rows()) = further.histories;
-  }
+  const RunTable& table = base.runs();
   const auto trained = inference::TrainEmulator(
-      {.inputs = Standard(priors, table.parameters), .histories = table.histories}, data, {});
+      {.inputs = Standard(priors, table.parameters), .histories = table.histories}, data,
+      {.scatter_share = readings.measured ? 0.0 : 1.0});
   if (!trained.ok()) {
     return absl::FailedPreconditionError(
         absl::StrCat("the runs of ", view.status.campaign(),
@@ -145,10 +140,9 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
 
   Response response;
   response.emulator_error = emulator.cross_validation().rms;
-  response.scatter = emulator.cross_validation().scatter_rms;
-  response.trustworthy =
-      std::sqrt(std::max(0.0, response.emulator_error * response.emulator_error -
-                                  response.scatter * response.scatter)) <= kMostUncovered;
+  const double scatter = emulator.cross_validation().scatter_rms;
+  response.trustworthy = std::sqrt(std::max(0.0, response.emulator_error * response.emulator_error -
+                                                     scatter * scatter)) <= kMostUncovered;
   response.model.parameters = static_cast<int>(d);
   Eigen::MatrixXd points(0, d);
   Eigen::MatrixXd histories(0, t);
@@ -216,13 +210,34 @@ absl::StatusOr<Response> RespondTo(const report::CampaignView& view,
     covariance.diagonal() += components.remainder;
     return covariance;
   };
-  Eigen::MatrixXd noise = NoiseCorrelation(data);
-  for (const Eigen::VectorXd& direction : nuisance) noise += direction * direction.transpose();
-  const Eigen::VectorXd not_known =
-      (unknown.row(best).transpose().array().square() + emulator.scatter_sd().array().square())
-          .sqrt();
-  response.model.covariance = noise + covariance_of(not_known);
-  response.run_covariance = noise + 2 * covariance_of(emulator.scatter_sd());
+  Eigen::MatrixXd numerical = Eigen::MatrixXd::Zero(t, t);
+  for (const Eigen::VectorXd& direction : nuisance) {
+    numerical += direction * direction.transpose();
+  }
+  const Eigen::VectorXd not_known = unknown.row(best).transpose();
+  if (readings.measured) {
+    Eigen::VectorXd unit(t);  // sd of one run's difference over that of the mean history's
+    double square = 0;
+    const inference::DataSet plain = campaign::MakeDataSet(campaign);
+    for (Index k = 0; k < t; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      unit[k] = readings.of_run.readings[at].sd / data.readings[at].sd;
+      const double of_mean = data.readings[at].sd / plain.readings[at].sd;
+      square += (unit[k] * unit[k] - 1) * of_mean * of_mean;
+    }
+    response.scatter = std::sqrt(square / static_cast<double>(t));
+    response.model.covariance = NoiseCorrelation(data) + numerical + covariance_of(not_known);
+    response.run_covariance =
+        unit.asDiagonal() * NoiseCorrelation(readings.of_run) * unit.asDiagonal();
+    response.run_covariance += numerical;
+  } else {
+    const Eigen::VectorXd& sd = emulator.scatter_sd();
+    response.scatter = scatter;
+    const Eigen::MatrixXd noise = NoiseCorrelation(data) + numerical;
+    response.model.covariance =
+        noise + covariance_of((not_known.array().square() + sd.array().square()).sqrt());
+    response.run_covariance = noise + 2 * covariance_of(sd);
+  }
   response.model.histories = std::move(histories);
   response.points = std::move(points);
   response.parts = PartsOf(campaign, data);

@@ -108,6 +108,7 @@ absl::StatusOr<std::string> WarmFits::FirstText(const std::string& effect) const
 
 absl::Status WarmFits::Continue(const std::string& effect) {
   WarmFit& fit = fits_[effect];
+  if (fit.stalled) return absl::OkStatus();
   const std::string what = absl::StrCat("warm fit with ", effect, ", batch ", fit.iterations + 1);
   const double rms = fit.rms;
   const double chi2 = fit.adequacy.chi2;
@@ -115,10 +116,16 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     const auto text = FirstText(effect);
     if (!text.ok()) return text.status();
     auto view = base_.Run(*text, what);
+    if (absl::IsAborted(view.status())) {  // not one run of it came to an end
+      fit.stalled = true;
+      fit.iterations = 1;
+      fit.rms = std::numeric_limits<double>::infinity();
+      return absl::OkStatus();
+    }
     if (!view.ok()) return view.status();
     evaluations_ += view->status.model_evaluations();
     fit.view = *std::move(view);
-    Append(report::RunsOf(fit.view), fit.runs);
+    Append(report::RunsOf(fit.view, base_.readings().of_mean), fit.runs);
   } else {
     const auto points = PointsFor(effect);
     if (!points.ok()) return points.status();
@@ -132,7 +139,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     const auto view = base_.Run(*text, what);
     if (!view.ok()) return view.status();
     evaluations_ += view->status.model_evaluations();
-    Append(report::RunsOf(*view), fit.runs);
+    Append(report::RunsOf(*view, base_.readings().of_mean), fit.runs);
   }
   ++fit.iterations;
   if (fit.runs.histories.rows() == 0) {
@@ -158,7 +165,7 @@ report::RunTable WarmFits::RunsFor(const std::string& effect) const {
 
 absl::StatusOr<Eigen::MatrixXd> WarmFits::PointsFor(const std::string& effect) const {
   const WarmFit& fit = fits_.at(effect);
-  return NextPoints(fit.view.campaign, RunsFor(effect), fit.iterations, samples_);
+  return NextPoints(fit.view.campaign, base_.readings(), RunsFor(effect), fit.iterations, samples_);
 }
 
 void WarmFits::WeighEvidence(const std::string& effect) {
@@ -168,7 +175,8 @@ void WarmFits::WeighEvidence(const std::string& effect) {
   ScaledEvidence evidence;
   for (std::size_t s = 0; s < kStrengthScales.size(); ++s) {
     const auto emulated =
-        Emulate(WithStrengthScaled(found->second.view.campaign, effect, kStrengthScales[s]), runs);
+        Emulate(WithStrengthScaled(found->second.view.campaign, effect, kStrengthScales[s]),
+                base_.readings(), runs);
     if (!emulated.ok() || !emulated->adequate) return;
     evidence.log_evidence[s] = emulated->log_evidence;
     evidence.standard_error = std::max(evidence.standard_error, emulated->log_evidence_se);
@@ -177,7 +185,7 @@ void WarmFits::WeighEvidence(const std::string& effect) {
 }
 
 std::optional<double> WarmFits::BaseLogEvidence() const {
-  const auto emulated = Emulate(base_.view().campaign, base_.runs());
+  const auto emulated = Emulate(base_.view().campaign, base_.readings(), base_.runs());
   if (!emulated.ok() || !emulated->adequate) return std::nullopt;
   return emulated->log_evidence;
 }

@@ -58,19 +58,21 @@ report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
 }
 
 absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& campaign,
+                                                  const report::ScatteredReadings& readings,
                                                   const report::RunTable& runs) {
   const inference::JointPrior priors = campaign::Priors(campaign);
-  const inference::DataSet data = campaign::MakeDataSet(campaign);
   inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
+  if (readings.measured) options.training.scatter_share = 0;
   options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
-  const std::vector<inference::Iteration> iterations = {IterationOf(runs, data)};
-  return inference::EmulatedPosterior(priors, data, options, iterations);
+  const std::vector<inference::Iteration> iterations = {IterationOf(runs, readings.of_mean)};
+  return inference::EmulatedPosterior(priors, readings.of_mean, options, iterations);
 }
 
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
+                                           const report::ScatteredReadings& readings,
                                            const report::RunTable& runs, int batch, int count) {
   const inference::JointPrior priors = campaign::Priors(campaign);
-  const auto emulated = Emulate(campaign, runs);
+  const auto emulated = Emulate(campaign, readings, runs);
   inference::Proposal proposal;  // the prior
   if (emulated.ok() && emulated->draws.rows() > 0) {
     auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,

@@ -20,15 +20,17 @@ report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
 /// The rows of `more` behind those of `runs`.
 void Append(const report::RunTable& more, report::RunTable& runs);
 
-/// Posterior and evidence of the campaign on an emulator of the runs. Errors: those of
-/// inference::EmulatedPosterior.
+/// Posterior and evidence of the campaign on an emulator of the runs (histories in the sd of
+/// readings.of_mean). Errors: those of inference::EmulatedPosterior.
 absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& campaign,
+                                                  const report::ScatteredReadings& readings,
                                                   const report::RunTable& runs);
 
 /// `count` points, SI: draws from the posterior that an emulator of the runs gives, where it knows
 /// the model's history somewhere in the prior; else from the prior. batch: number of batches so
 /// far, decides the random numbers. Errors: those of inference::FitProposalToDraws and DrawSamples.
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
+                                           const report::ScatteredReadings& readings,
                                            const report::RunTable& runs, int batch, int count);
 
 }  // namespace calib::ctl

@@ -58,7 +58,8 @@ Json Emulator(const v1::Posterior& p) {
           {"components", e.components()},
           {"cross_validated_error", e.error()},
           {"scatter", e.scatter()},
-          {"calibration", e.calibration()}};
+          {"calibration", e.calibration()},
+          {"unknown", e.unknown()}};
 }
 
 // The posterior along the readings: means and coefficients of variation in the order of the

@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "inference/scatter/scatter.h"
+
 namespace calib::report {
 namespace {
 
@@ -44,8 +46,41 @@ void PlaceStates(const campaign::Experiment& experiment, int e, const StateHisto
 
 }  // namespace
 
-RunTable RunsOf(const CampaignView& view) {
+ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
   const inference::DataSet data = campaign::MakeDataSet(view.campaign);
+  std::vector<inference::GroupScatter> of_mean;
+  std::vector<inference::GroupScatter> of_run;
+  for (const auto& [key, readings] : inference::GroupsOf(data)) {
+    const campaign::Experiment& experiment =
+        view.campaign.experiments[static_cast<std::size_t>(key.first)];
+    const std::string& observable =
+        experiment.observables[static_cast<std::size_t>(key.second)].name;
+    for (const v1::Posterior::Scatter& scatter : view.posterior.scatter()) {
+      if (scatter.experiment() != experiment.name || scatter.observable() != observable ||
+          scatter.from() != "realizations" ||
+          scatter.sd_size() != static_cast<int>(readings.size())) {
+        continue;
+      }
+      of_run.push_back(
+          {.experiment = key.first,
+           .observable = key.second,
+           .sd = Eigen::Map<const Eigen::VectorXd>(scatter.sd().data(), scatter.sd_size()),
+           .length = scatter.correlation_length(),
+           .share = scatter.share()});
+      of_mean.push_back(of_run.back());
+      of_mean.back().share += 1.0 / scatter.runs();
+    }
+  }
+  return {.of_mean = inference::WithScatter(data, of_mean, 0),
+          .of_run = inference::WithScatter(data, of_run, 1),
+          .measured = !of_run.empty()};
+}
+
+RunTable RunsOf(const CampaignView& view) {
+  return RunsOf(view, campaign::MakeDataSet(view.campaign));
+}
+
+RunTable RunsOf(const CampaignView& view, const inference::DataSet& data) {
   const Places places = PlacesOf(data);
   const auto t = static_cast<Index>(data.readings.size());
   const auto d = static_cast<Index>(view.campaign.parameters.size());

@@ -18,5 +18,19 @@ struct RunTable {
 
 /// Samples that did not get to the last reading of every calibrated experiment are left out.
 RunTable RunsOf(const CampaignView& view);
+/// The same in the units of `data`, which has the readings of MakeDataSet with errors of its own.
+RunTable RunsOf(const CampaignView& view, const inference::DataSet& data);
+
+/// The readings of the calibrated experiments with the scatter in their errors that the campaign
+/// has measured on several packings.
+struct ScatteredReadings {
+  inference::DataSet of_mean;  ///< scatter of the measured specimen, and 1/R of it for the model's
+                               ///< mean history, which R packings know no better
+  inference::DataSet of_run;   ///< scatter of the specimen and of one run of the model
+  /// False where packings were not varied: both are MakeDataSet, and the scatter of repeats is what
+  /// an emulator of the runs says it is.
+  bool measured = false;
+};
+ScatteredReadings ReadingsWithScatter(const CampaignView& view);
 
 }  // namespace calib::report

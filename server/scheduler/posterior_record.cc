@@ -134,6 +134,7 @@ void AddEmulator(const Definition& definition, const inference::EmulatedResult& 
   out.set_error(emulated.cross_validated_error);
   out.set_scatter(emulated.scatter);
   out.set_calibration(emulated.calibration);
+  out.set_unknown(emulated.emulator_sd);
   if (emulated.adequate) {
     AddDraws(emulated.draws, message);
     AddBands(definition, emulated, message);

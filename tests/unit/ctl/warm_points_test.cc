@@ -44,20 +44,27 @@ report::RunTable Runs(int count) {
   return runs;
 }
 
+// Without scatter between packings.
+report::ScatteredReadings Readings() {
+  return {.of_mean = campaign::MakeDataSet(Square()),
+          .of_run = campaign::MakeDataSet(Square()),
+          .measured = false};
+}
+
 TEST(WarmPoints, LieAboutThePosteriorThatAnEmulatorOfTheRunsGives) {
-  const auto points = NextPoints(Square(), Runs(30), 1, 40);
+  const auto points = NextPoints(Square(), Readings(), Runs(30), 1, 40);
   ASSERT_TRUE(points.ok()) << points.status();
   // The posterior's sd is 0.1; a few of forty are the defensive share of the prior.
   const Eigen::VectorXd distance =
       (points->rowwise() - Eigen::RowVector2d(0.3, 0.7)).rowwise().norm();
   EXPECT_GE((distance.array() < 0.4).count(), 32);
-  EXPECT_EQ(*points, *NextPoints(Square(), Runs(30), 1, 40)) << "same bits";
+  EXPECT_EQ(*points, *NextPoints(Square(), Readings(), Runs(30), 1, 40)) << "same bits";
 }
 
 TEST(WarmPoints, ComeFromThePriorWhereThereIsTooLittleToGoBy) {
-  const auto points = NextPoints(Square(), Runs(4), 1, 6);
+  const auto points = NextPoints(Square(), Readings(), Runs(4), 1, 6);
   ASSERT_TRUE(points.ok()) << points.status();
-  EXPECT_EQ(*points, *NextPoints(Square(), Runs(5), 1, 6));
+  EXPECT_EQ(*points, *NextPoints(Square(), Readings(), Runs(5), 1, 6));
 }
 
 TEST(WarmPoints, AScreensRunCountsWhereItGivesEveryParameter) {

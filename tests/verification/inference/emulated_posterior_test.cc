@@ -150,6 +150,42 @@ TEST(EmulatedPosterior, RecognisesARoughFunction) {
   EXPECT_EQ(refused, 5);
 }
 
+// A model that misses the readings wherever it has been run: the posterior lies in the part of the
+// prior that the runs leave out, where the emulator does not know that it misses them too.
+TEST(EmulatedPosterior, RefusesAPosteriorWhereNoRunIs) {
+  const auto strength = [](double x, double y, int k) {
+    return 3 + std::sin(5 * x) + 0.3 * y * k / 10.0;
+  };
+  const JointPrior priors({{.kind = PriorKind::kUniform, .min = 0, .max = 1},
+                           {.kind = PriorKind::kUniform, .min = 0, .max = 1}});
+  DataSet data;
+  for (int k = 0; k < 20; ++k) {
+    data.readings.push_back({.load_step = k,
+                             .control = 0.01 * k,
+                             .value = strength(0.3, 0.5, k) + 0.5,
+                             .sd = 0.1});
+  }
+  const auto posterior = [&](double reach) {
+    Iteration runs;
+    runs.parameters = Halton(40, 2);
+    runs.parameters.col(0) *= reach;
+    runs.predictions.resize(40, 20);
+    for (Eigen::Index i = 0; i < 40; ++i) {
+      for (int k = 0; k < 20; ++k) {
+        runs.predictions(i, k) = strength(runs.parameters(i, 0), runs.parameters(i, 1), k);
+      }
+    }
+    return EmulatedPosterior(priors, data, {.draws = 500, .seed = 3}, {&runs, 1});
+  };
+  const auto everywhere = posterior(1);
+  ASSERT_TRUE(everywhere.ok()) << everywhere.status();
+  EXPECT_TRUE(everywhere->adequate) << everywhere->reason;
+  const auto partly = posterior(0.2);
+  ASSERT_TRUE(partly.ok()) << partly.status();
+  EXPECT_FALSE(partly->adequate) << partly->emulator_sd;
+  EXPECT_NE(partly->reason.find("where few runs are"), std::string::npos) << partly->reason;
+}
+
 TEST(EmulatedPosterior, RecognisesTooFewRuns) {
   const ToyCurve toy{.d = 5, .scatter = 0.001};
   Iteration runs;
