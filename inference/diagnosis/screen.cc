@@ -16,11 +16,14 @@ namespace {
 
 using Eigen::Index;
 
+constexpr Index kFewestDraws = 50;
+
 // The model in coordinates in which a measurement scatters as a standard normal.
 struct Whitened {
   Eigen::LLT<Eigen::MatrixXd> factor;
   Eigen::MatrixXd points;   // T x G
   Eigen::VectorXd squares;  // G
+  Eigen::MatrixXd draws;    // T x S, S may be 0
 };
 
 absl::StatusOr<Whitened> Whiten(const FittedModel& model) {
@@ -29,14 +32,30 @@ absl::StatusOr<Whitened> Whiten(const FittedModel& model) {
       model.covariance.cols() != t || !model.histories.allFinite()) {
     return absl::InvalidArgumentError("diagnosis: histories and covariance do not fit together");
   }
-  Whitened whitened{
-      .factor = Eigen::LLT<Eigen::MatrixXd>(model.covariance), .points = {}, .squares = {}};
+  if (model.draws.rows() > 0 &&
+      (model.draws.rows() < kFewestDraws || model.draws.cols() != t || !model.draws.allFinite())) {
+    return absl::InvalidArgumentError(
+        "diagnosis: draws of a measurement are too few or do not fit the histories");
+  }
+  Whitened whitened{.factor = Eigen::LLT<Eigen::MatrixXd>(model.covariance),
+                    .points = {},
+                    .squares = {},
+                    .draws = {}};
   if (whitened.factor.info() != Eigen::Success) {
     return absl::InvalidArgumentError("diagnosis: the covariance is not positive definite");
   }
   whitened.points = whitened.factor.matrixL().solve(model.histories.transpose());
   whitened.squares = whitened.points.colwise().squaredNorm();
+  if (model.draws.rows() > 0) {
+    whitened.draws = whitened.factor.matrixL().solve(model.draws.transpose());
+  }
   return whitened;
+}
+
+// |point + offset|^2 of every point.
+Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& offset) {
+  return (whitened.squares + 2 * (whitened.points.transpose() * offset)).array() +
+         offset.squaredNorm();
 }
 
 // A difference seen from every point.
@@ -88,15 +107,17 @@ void Holm(std::vector<Score>& scores) {
 }
 
 // Chance of a fall at least as large: counted where the simulations reach, the tail of one degree
-// of freedom per difference beyond them.
+// of freedom per difference beyond them, as wide as the simulations are on average.
 double TailOf(double gain, const std::vector<double>& simulated, std::size_t differences) {
   const auto n = static_cast<double>(simulated.size());
   const auto above = static_cast<double>(
       std::count_if(simulated.begin(), simulated.end(), [&](double s) { return s >= gain; }));
   constexpr double kEnough = 10;
   if (above >= kEnough) return (1 + above) / (1 + n);
-  const double tail =
-      static_cast<double>(differences) * boost::math::gamma_q(0.5, 0.5 * std::max(gain, 0.0));
+  const double mean = std::accumulate(simulated.begin(), simulated.end(), 0.0) / n;
+  const double width = std::max(1.0, mean / static_cast<double>(differences));
+  const double tail = static_cast<double>(differences) *
+                      boost::math::gamma_q(0.5, 0.5 * std::max(gain, 0.0) / width);
   return std::min((1 + above) / (1 + n), std::max(tail, std::numeric_limits<double>::min()));
 }
 
@@ -107,9 +128,25 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   if (!whitened.ok()) return whitened.status();
   Adequacy adequacy;
   adequacy.chi2 = whitened->squares.minCoeff(&adequacy.best);
-  adequacy.degrees = static_cast<double>(model.histories.cols() - model.parameters);
-  adequacy.p_value =
-      adequacy.degrees > 0 ? boost::math::gamma_q(0.5 * adequacy.degrees, 0.5 * adequacy.chi2) : 1;
+  if (model.draws.rows() == 0) {
+    adequacy.degrees = static_cast<double>(model.histories.cols() - model.parameters);
+    adequacy.p_value = adequacy.degrees > 0
+                           ? boost::math::gamma_q(0.5 * adequacy.degrees, 0.5 * adequacy.chi2)
+                           : 1;
+    return adequacy;
+  }
+  const Eigen::VectorXd fitted = whitened->points.col(adequacy.best);
+  const Index draws = model.draws.rows();
+  Eigen::VectorXd chi2(draws);
+  for (Index s = 0; s < draws; ++s) {
+    chi2[s] = DistancesFrom(*whitened, whitened->draws.col(s) - fitted).minCoeff();
+  }
+  adequacy.degrees = chi2.mean();
+  const double variance =
+      (chi2.array() - adequacy.degrees).square().sum() / static_cast<double>(draws - 1);
+  if (!(variance > 0)) return absl::InvalidArgumentError("diagnosis: the draws do not vary");
+  adequacy.p_value = boost::math::gamma_q(adequacy.degrees * adequacy.degrees / variance,
+                                          adequacy.chi2 * adequacy.degrees / variance);
   return adequacy;
 }
 
@@ -143,10 +180,12 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
                          .purpose = StreamPurpose::kDiagnosisNull,
                          .iteration = 0,
                          .sample = static_cast<std::uint64_t>(s)});
-    for (Index k = 0; k < t; ++k) offset[k] = stream.Normal() - fitted[k];
-    const Eigen::VectorXd distances =
-        (whitened->squares + 2 * (whitened->points.transpose() * offset)).array() +
-        offset.squaredNorm();
+    if (model.draws.rows() > 0) {
+      offset = whitened->draws.col(s % model.draws.rows()) - fitted;
+    } else {
+      for (Index k = 0; k < t; ++k) offset[k] = stream.Normal() - fitted[k];
+    }
+    const Eigen::VectorXd distances = DistancesFrom(*whitened, offset);
     const double base = distances.minCoeff();
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       simulated[c].push_back(base - BestFit(directions[c], distances, &offset,
@@ -187,8 +226,13 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
       if (rest.squaredNorm() > strongest.squaredNorm()) strongest = rest;
     }
     const double norm = strongest.norm();
-    score.detectable = norm > 0 ? reach / norm : std::numeric_limits<double>::infinity();
     visible.push_back(norm > 0 ? Eigen::VectorXd(strongest / norm) : strongest);
+    const double sd =  // of a measurement along it
+        model.draws.rows() > 0
+            ? std::sqrt((visible.back().transpose() * whitened->draws).squaredNorm() /
+                        static_cast<double>(model.draws.rows()))
+            : 1;
+    score.detectable = norm > 0 ? reach * sd / norm : std::numeric_limits<double>::infinity();
     scores.push_back(std::move(score));
   }
   const double close = std::cos(25 * std::numbers::pi / 180);

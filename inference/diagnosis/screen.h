@@ -17,6 +17,10 @@ struct FittedModel {
   Eigen::MatrixXd covariance;  ///< T x T, of a measurement about the true mean history: noise,
                                ///< scatter, error of the emulator, numerical nuisance
   int parameters = 0;
+  /// S x T: differences of measurements from the true mean history, S >= 50, as real ones would be;
+  /// with none they are normal with the covariance. A covariance that is merely cautious makes
+  /// distances too small and hides misfit; these say how large distances are of a right model.
+  Eigen::MatrixXd draws{};
 };
 
 /// How an effect would change the histories.
@@ -29,7 +33,9 @@ struct Signature {
 
 struct Adequacy {
   double chi2 = 0;  ///< smallest |W history|^2 over the points, W W^T = covariance^-1
+  /// Its expectation were the model right: T - parameters, or the mean over the model's draws.
   double degrees = 0;
+  /// Of a chi-squared as large; with draws the tail of the gamma law of their mean and variance.
   double p_value = 1;
   Eigen::Index best = 0;  ///< the point
 };

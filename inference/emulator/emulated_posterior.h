@@ -34,7 +34,7 @@ struct EmulatorOptions {
   double max_error = 3;        ///< > 0
   double max_uncovered = 2;    ///< > 0
   double max_calibration = 2;  ///< > 1
-  double max_unknown = 1.5;    ///< > 0
+  double max_unknown = 1;      ///< > 0
   std::uint64_t seed = 0;
   absl::Status Validate() const;
 };

@@ -22,6 +22,7 @@ enum class StreamPurpose : std::uint64_t {
   kDiagnosisNull = 21,
   kExpectedImprovement = 22,
   kSensitivity = 23,
+  kDiagnosisDraws = 24,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

@@ -29,7 +29,7 @@ class Inquiry {
         options_(options),
         base_(laboratory, view),
         screen_(base_),
-        fits_(base_, screen_, response_.run_covariance, response_.parts) {}
+        fits_(base_, screen_, response_) {}
 
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();

@@ -47,7 +47,9 @@ struct Diagnosis {
   std::vector<std::string> unfinished{};
   std::string best_partial;  ///< with unexplained: the effect that helps most, if any does
   inference::Adequacy adequacy;
-  double rms = 0;  ///< of the best fit, residual over noise sd
+  /// Of the best fit, residual over the sd of a measurement: noise, and scatter between packings
+  /// where it was measured.
+  double rms = 0;
   /// rms of what the model misses of an experiment (or a stage, where there is one experiment) that
   /// it was not fitted to, in sd of a measurement; none where there is nothing to leave out.
   std::optional<double> left_out_error{};

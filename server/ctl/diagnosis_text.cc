@@ -177,9 +177,8 @@ std::string DiagnosisJson(const Diagnosis& d) {
 
 std::string DiagnosisText(const Diagnosis& d) {
   std::string text = Wrapped(Sentence(d), "", "");
-  text += Wrapped(fmt::format("Best fit: residual {} noise sd (rms); chi-squared {} for {} degrees "
-                              "of freedom with scatter "
-                              "and emulator error (p = {}).",
+  text += Wrapped(fmt::format("Best fit: residual {} sd of a measurement (rms); chi-squared {}, of "
+                              "a right model {} are expected (p = {}).",
                               Number(d.rms, 3), Number(d.adequacy.chi2, 4),
                               Number(d.adequacy.degrees, 4), Number(d.adequacy.p_value, 2)),
                   "", "  ");

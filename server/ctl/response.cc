@@ -12,6 +12,7 @@
 #include "dem/catalog/catalog.h"
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
+#include "inference/sampling/philox.h"
 
 namespace calib::ctl {
 namespace {
@@ -25,6 +26,8 @@ constexpr int kRefined = 1000;  // about the best of them, in each round
 constexpr int kRounds = 4;
 // Of an emulator to judge by, noise sd: its error beyond the scatter of single runs.
 constexpr double kMostUncovered = 2;
+constexpr Index kDraws = 400;       // of measurements
+constexpr int kRunsAbout = 5;       // the best point, of a campaign or a warm fit
 constexpr double kMostUnknown = 3;  // noise sd of what the emulator may not know of a point
 
 Eigen::MatrixXd Standard(const inference::JointPrior& priors, const Eigen::MatrixXd& values) {
@@ -73,6 +76,62 @@ std::vector<int> PartsOf(const campaign::Campaign& campaign, const inference::Da
     parts[k] = stages.emplace(stage, static_cast<int>(stages.size())).first->second;
   }
   return parts;
+}
+
+// Noise, nuisance and scatter of measurements; `missed` holds what the emulator misses of single
+// runs, n x T.
+void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
+                      const std::vector<Eigen::VectorXd>& nuisance, Response& response) {
+  const campaign::Campaign& campaign = base.view().campaign;
+  const report::ScatteredReadings& readings = base.readings();
+  const inference::DataSet plain = campaign::MakeDataSet(campaign);
+  const auto t = static_cast<Index>(plain.readings.size());
+  Eigen::VectorXd unit(t);     // of the noise in the sd of histories
+  Eigen::VectorXd scatter(t);  // of the measurement, of what is missed of a run
+  for (Index k = 0; k < t; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const inference::Reading& reading = plain.readings[at];
+    unit[k] = reading.sd / readings.of_mean.readings[at].sd;
+    const campaign::Experiment& experiment =
+        campaign.experiments[static_cast<std::size_t>(reading.experiment)];
+    const auto packings = static_cast<double>(experiment.specimens.size());
+    const double share = campaign::ScatterShare(experiment);
+    // A run departs less from the mean over R packings than from that over all, a new one more.
+    scatter[k] = std::sqrt(
+        readings.measured && packings > 1 ? (share + 1 / packings) / (1 - 1 / packings) : share);
+  }
+  const Eigen::MatrixXd noise =
+      unit.asDiagonal() *
+      Eigen::MatrixXd(Eigen::LLT<Eigen::MatrixXd>(NoiseCorrelation(plain)).matrixL());
+  const Eigen::LLT<Eigen::MatrixXd> factor(response.run_covariance);
+  response.model.draws.resize(kDraws, t);
+  response.run_draws.resize(kDraws, t);
+  Eigen::VectorXd normal(t);
+  for (Index s = 0; s < kDraws; ++s) {
+    inference::PhiloxStream stream({.seed = campaign.filter.seed,
+                                    .purpose = inference::StreamPurpose::kDiagnosisDraws,
+                                    .iteration = 0,
+                                    .sample = static_cast<std::uint64_t>(s)});
+    for (Index k = 0; k < t; ++k) normal[k] = stream.Normal();
+    Eigen::VectorXd draw = noise * normal;
+    for (const Eigen::VectorXd& direction : nuisance) draw += stream.Normal() * direction;
+    const Index own = s % missed.rows();
+    const double sign = stream.Normal() < 0 ? -1 : 1;
+    draw += sign * scatter.cwiseProduct(missed.row(own).transpose());
+    response.model.draws.row(s) = draw;
+    // The fits take the closest of the runs about the right point.
+    double closest = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < kRunsAbout; ++k) {
+      const auto other =
+          std::min(static_cast<Index>(stream.Uniform() * static_cast<double>(missed.rows())),
+                   missed.rows() - 1);
+      const Eigen::VectorXd difference = draw - missed.row(other).transpose();
+      const double distance = factor.matrixL().solve(difference).squaredNorm();
+      if (distance >= closest) continue;
+      closest = distance;
+      response.run_draws.row(s) = difference;
+    }
+  }
 }
 
 }  // namespace
@@ -238,6 +297,14 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
         noise + covariance_of((not_known.array().square() + sd.array().square()).sqrt());
     response.run_covariance = noise + 2 * covariance_of(sd);
   }
+  // As large near the best point as elsewhere: far out the emulator knows less, which is no
+  // scatter.
+  const Eigen::VectorXd missed =
+      covariance_of((not_known.array().square() + emulator.scatter_sd().array().square()).sqrt())
+          .diagonal()
+          .cwiseSqrt();
+  DrawMeasurements(base, emulator.cross_validation().standardised * missed.asDiagonal(), nuisance,
+                   response);
   response.model.histories = std::move(histories);
   response.points = std::move(points);
   response.parts = PartsOf(campaign, data);

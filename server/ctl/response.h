@@ -26,6 +26,9 @@ struct Response {
   /// T x T, of the difference between a measurement and one run of the model at the right point:
   /// noise, nuisance, and the scatter of both.
   Eigen::MatrixXd run_covariance{};
+  /// S x T, such differences, drawn; those of the mean history are model.draws. Scatter is
+  /// resampled from what an emulator of the other runs misses of each.
+  Eigen::MatrixXd run_draws{};
   /// Of each reading: its experiment, or its stage of loading where only one experiment is fitted.
   std::vector<int> parts{};
 };

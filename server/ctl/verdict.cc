@@ -8,6 +8,8 @@ namespace calib::ctl {
 namespace {
 
 constexpr double kClearlyCloser = 0.64;  // of the base model's chi-squared
+constexpr double kPromising = 0.5;       // of the misfit explained, to the screen
+constexpr double kFarOff = 4;            // times the chi-squared of the best: twice its rms
 constexpr std::size_t kMostNames = 3;
 
 bool ClearlyBetter(const WarmFit& a, const WarmFit& b) {
@@ -49,12 +51,20 @@ void Verdict::WeighEvidence() {
   }
 }
 
+// What the screen promised little of, and what is still far off after as many batches as the best,
+// or one less.
+bool Verdict::IsFarOff(const CandidateEffect& other, const WarmFit& best) const {
+  const WarmFit& fit = *fits_.Find(other.effect);
+  return other.explained_fraction < kPromising && fit.iterations + 1 >= best.iterations &&
+         fit.adequacy.chi2 > kFarOff * std::max(best.adequacy.chi2, best.adequacy.degrees);
+}
+
 // Beaten, at its end or with the evidence against it. A fit that was made without runs has no
 // evidence and needs none: all its points are known.
 bool Verdict::Excluded(const CandidateEffect& other, const WarmFit& best) const {
   const WarmFit& fit = *fits_.Find(other.effect);
   const bool outweighed = EvidenceFavours(best.evidence, fit.evidence);
-  if (!Explains(other)) return fit.stalled || outweighed;
+  if (!Explains(other)) return fit.stalled || outweighed || IsFarOff(other, best);
   return ClearlyBetter(best, fit) && (outweighed || fit.runs.histories.rows() == 0);
 }
 

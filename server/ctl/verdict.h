@@ -30,6 +30,7 @@ class Verdict {
 
  private:
   bool Excluded(const CandidateEffect& other, const WarmFit& best) const;
+  bool IsFarOff(const CandidateEffect& other, const WarmFit& best) const;
   std::string Closest() const;
 
   Diagnosis& diagnosis_;

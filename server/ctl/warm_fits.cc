@@ -6,7 +6,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/ctl/extension.h"
-#include "server/ctl/response.h"
 #include "server/ctl/warm_points.h"
 
 namespace calib::ctl {
@@ -92,11 +91,14 @@ const WarmFit* WarmFits::Find(const std::string& effect) const {
   return found == fits_.end() ? nullptr : &found->second;
 }
 
-inference::FittedModel WarmFits::BaseByRuns() const {
-  return {.histories = base_.runs().histories,
-          .covariance = covariance_,
-          .parameters = static_cast<int>(base_.runs().parameters.cols())};
+inference::FittedModel WarmFits::ByRuns(const report::RunTable& runs) const {
+  return {.histories = runs.histories,
+          .covariance = response_.run_covariance,
+          .parameters = static_cast<int>(runs.parameters.cols()),
+          .draws = response_.run_draws};
 }
+
+inference::FittedModel WarmFits::BaseByRuns() const { return ByRuns(base_.runs()); }
 
 absl::StatusOr<std::string> WarmFits::FirstText(const std::string& effect) const {
   return ExtensionText(base_.view(), {.effects = {effect},
@@ -191,9 +193,7 @@ std::optional<double> WarmFits::BaseLogEvidence() const {
 }
 
 void WarmFits::Judge(WarmFit& fit) const {
-  fit.model = {.histories = fit.runs.histories,
-               .covariance = covariance_,
-               .parameters = static_cast<int>(fit.runs.parameters.cols())};
+  fit.model = ByRuns(fit.runs);
   const auto adequacy = inference::TestAdequacy(fit.model);
   const auto advantage = inference::Compare(fit.model, BaseByRuns());
   if (!adequacy.ok() || !advantage.ok()) return;
@@ -202,7 +202,7 @@ void WarmFits::Judge(WarmFit& fit) const {
   fit.best = PointOf(fit.view, fit.runs.parameters, adequacy->best);
   fit.rms = std::sqrt(fit.runs.histories.rowwise().squaredNorm().minCoeff() /
                       static_cast<double>(fit.runs.histories.cols()));
-  if (const auto error = inference::LeftOutError(fit.model, parts_); error.ok()) {
+  if (const auto error = inference::LeftOutError(fit.model, response_.parts); error.ok()) {
     fit.left_out_error = *error;
   }
 }

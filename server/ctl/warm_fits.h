@@ -16,6 +16,7 @@
 #include "inference/diagnosis/screen.h"
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/fitted_campaign.h"
+#include "server/ctl/response.h"
 #include "server/ctl/strength_scale.h"
 
 namespace calib::ctl {
@@ -47,11 +48,10 @@ struct WarmFit {
 
 class WarmFits {
  public:
-  /// screen: its runs teach the emulators too. covariance: of the difference between a measurement
-  /// and one run, in units of the noise sd. parts: see Response. All must outlive it.
-  WarmFits(const FittedCampaign& base, const EffectScreen& screen,
-           const Eigen::MatrixXd& covariance, const std::vector<int>& parts)
-      : base_(base), screen_(screen), covariance_(covariance), parts_(parts) {}
+  /// screen: its runs teach the emulators too. response: of the base model, made before Fit. All
+  /// must outlive it.
+  WarmFits(const FittedCampaign& base, const EffectScreen& screen, const Response& response)
+      : base_(base), screen_(screen), response_(response) {}
 
   /// Fits all of them and continues, the most promising first, until each has stalled or as many
   /// samples have been run as the campaign has. Errors: those of the
@@ -82,11 +82,11 @@ class WarmFits {
   absl::StatusOr<Eigen::MatrixXd> PointsFor(const std::string& effect) const;
   report::RunTable RunsFor(const std::string& effect) const;
   void Judge(WarmFit& fit) const;
+  inference::FittedModel ByRuns(const report::RunTable& runs) const;
 
   const FittedCampaign& base_;
   const EffectScreen& screen_;
-  const Eigen::MatrixXd& covariance_;
-  const std::vector<int>& parts_;
+  const Response& response_;
   int samples_ = 0;  // of a batch
   std::int64_t evaluations_ = 0;
   std::map<std::string, WarmFit> fits_;

@@ -1,6 +1,7 @@
 #include "server/report/run_table.h"
 
 #include <algorithm>
+#include <cassert>
 #include <limits>
 #include <map>
 #include <utility>
@@ -80,7 +81,9 @@ RunTable RunsOf(const CampaignView& view) {
   return RunsOf(view, campaign::MakeDataSet(view.campaign));
 }
 
-RunTable RunsOf(const CampaignView& view, const inference::DataSet& data) {
+RunTable RunsOf(const CampaignView& view, const inference::DataSet& units) {
+  const inference::DataSet data = campaign::MakeDataSet(view.campaign);
+  assert(units.readings.size() == data.readings.size());
   const Places places = PlacesOf(data);
   const auto t = static_cast<Index>(data.readings.size());
   const auto d = static_cast<Index>(view.campaign.parameters.size());
@@ -88,7 +91,7 @@ RunTable RunsOf(const CampaignView& view, const inference::DataSet& data) {
   Eigen::RowVectorXd sd(t);
   for (Index k = 0; k < t; ++k) {
     value[k] = data.readings[static_cast<std::size_t>(k)].value;
-    sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+    sd[k] = units.readings[static_cast<std::size_t>(k)].sd;
   }
   RunTable table;
   std::vector<Eigen::RowVectorXd> parameters;

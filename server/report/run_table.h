@@ -18,8 +18,9 @@ struct RunTable {
 
 /// Samples that did not get to the last reading of every calibrated experiment are left out.
 RunTable RunsOf(const CampaignView& view);
-/// The same in the units of `data`, which has the readings of MakeDataSet with errors of its own.
-RunTable RunsOf(const CampaignView& view, const inference::DataSet& data);
+/// The same in the sd of `units`: the same readings in the same order with errors of their own. Its
+/// numbers of experiments may differ, as they do where a derived campaign leaves held-out ones out.
+RunTable RunsOf(const CampaignView& view, const inference::DataSet& units);
 
 /// The readings of the calibrated experiments with the scatter in their errors that the campaign
 /// has measured on several packings.

@@ -80,9 +80,9 @@ DataSet ReadMeasurement() {
 void Print(const std::string& name, const EmulatedResult& result) {
   std::cout << name << ": cross-validated error " << result.cross_validated_error
             << " noise sd (scatter " << result.scatter << ", calibration " << result.calibration
-            << "), " << result.components << " components, " << result.runs << " runs, "
-            << (result.local ? "local" : "broad") << ", log evidence " << result.log_evidence
-            << " +- " << result.log_evidence_se
+            << "), unknown over the posterior " << result.emulator_sd << ", " << result.components
+            << " components, " << result.runs << " runs, " << (result.local ? "local" : "broad")
+            << ", log evidence " << result.log_evidence << " +- " << result.log_evidence_se
             << (result.adequate ? "" : ", NOT adequate: " + result.reason) << '\n';
   for (const ParameterSummary& p : result.parameters)
     std::cout << "    " << p.mean << " +- " << p.sd << '\n';
@@ -100,10 +100,13 @@ TEST(EmulatorGlassBeads, ErrorsAreAsLargeAsClaimedAndIterationsAgree) {
   Print("iteration 0", *first);
   Print("iterations 0-3", *all);
   std::cout << "400 runs, 303 readings: " << seconds << " s of one core\n";
-  for (const EmulatedResult* result : {&*first, &*all}) {
-    EXPECT_TRUE(result->adequate) << result->reason;
-    EXPECT_LT(result->calibration, 2);
-  }
+  EXPECT_LT(first->calibration, 2);
+  EXPECT_LT(all->calibration, 2);
+  EXPECT_TRUE(first->adequate) << first->reason;
+  // Four iterations that are not quite one model (README.md of the data) leave a posterior only
+  // where no run is.
+  EXPECT_FALSE(all->adequate);
+  EXPECT_NE(all->reason.find("where few runs are"), std::string::npos) << all->reason;
   for (std::size_t j = 0; j < 4; ++j) {
     const ParameterSummary& a = first->parameters[j];
     const ParameterSummary& b = all->parameters[j];

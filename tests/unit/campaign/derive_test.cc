@@ -46,7 +46,8 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
       "lineage: {parent: c1, purpose: warm_fit}\n"
       "inference:\n"
       "  samples: 12\n"
-      "  first_proposal: {prior_share: 0.5, young_modulus: {center: 1e+09, sd: 1e+07}}\n")
+      "  first_proposal: {prior_share: 0.5, young_modulus: {center: 1e+09, sd: 1e+07}}\n"
+      "failure: {pause_above: 1}\n")
       << *text;
 }
 

@@ -57,6 +57,48 @@ TEST(Diagnosis, NothingMissingIsAdequateAtTheStatedRate) {
   EXPECT_LE(flagged, 12);
 }
 
+// The errors of the measurements have standard deviation `sd`, the covariance says one.
+FittedModel LineWithDraws(const Eigen::VectorXd& measured, double sd) {
+  FittedModel model = Line(measured);
+  model.draws.resize(400, kReadings);
+  for (int s = 0; s < 400; ++s) model.draws.row(s) = sd * Noise(1000 + s);
+  return model;
+}
+
+TEST(Diagnosis, DrawsOfAMeasurementSayHowLargeDistancesAre) {
+  constexpr double kCautious = 0.5;
+  constexpr double kBold = 2;
+  for (const double sd : {kCautious, kBold}) {
+    int adequate = 0;
+    int flagged = 0;
+    double sum = 0;
+    for (int seed = 0; seed < 100; ++seed) {
+      const FittedModel model = LineWithDraws(12 * Curve(0) + sd * Noise(seed), sd);
+      const auto adequacy = TestAdequacy(model);
+      adequate += adequacy->p_value >= 0.01 ? 1 : 0;
+      sum += adequacy->p_value;
+      EXPECT_NEAR(adequacy->degrees / (sd * sd * (kReadings - 1)), 1, 0.05);
+      flagged += Screen(model, kCandidates, {.simulations = 200})->front().adjusted < 0.05 ? 1 : 0;
+    }
+    EXPECT_GE(adequate, 96) << sd;
+    EXPECT_NEAR(sum / 100, 0.5, 4 * std::sqrt(1.0 / 12 / 100)) << sd;  // uniform, 100 of them
+    EXPECT_LE(flagged, 12) << sd;
+  }
+  // A misfit that a cautious covariance alone would hide.
+  const Eigen::VectorXd measured = 12 * Curve(0) + 0.8 * Curve(2) + kCautious * Noise(1);
+  EXPECT_GT(TestAdequacy(Line(measured))->p_value, 0.5);
+  EXPECT_LT(TestAdequacy(LineWithDraws(measured, kCautious))->p_value, 0.01);
+  // And one that is found as far away as it is in units of the errors, not of the covariance.
+  const auto narrow = Screen(LineWithDraws(12 * Curve(0), kCautious), kCandidates);
+  const auto plain = Screen(Line(12 * Curve(0)), kCandidates);
+  for (const Score& score : *narrow) {
+    for (const Score& other : *plain) {
+      if (score.name != other.name || !std::isfinite(other.detectable)) continue;
+      EXPECT_NEAR(score.detectable / other.detectable, kCautious, 0.1) << score.name;
+    }
+  }
+}
+
 TEST(Diagnosis, PresentEffectComesFirstWithItsAmplitude) {
   const FittedModel model = Line(12 * Curve(0) + 30 * Curve(2) + Noise(1));
   EXPECT_LT(TestAdequacy(model)->p_value, 1e-6);
@@ -120,6 +162,13 @@ TEST(Diagnosis, LeftOutReadingsAreMissedByAWrongModel) {
 }
 
 TEST(Diagnosis, ShapesThatDoNotFitAreRefused) {
+  FittedModel few = Line(Curve(0));
+  few.draws = Eigen::MatrixXd::Zero(49, kReadings);
+  EXPECT_FALSE(TestAdequacy(few).ok());
+  few.draws = Eigen::MatrixXd::Zero(60, kReadings - 1);
+  EXPECT_FALSE(TestAdequacy(few).ok());
+  few.draws = Eigen::MatrixXd::Zero(60, kReadings);
+  EXPECT_FALSE(TestAdequacy(few).ok()) << "they do not vary";
   FittedModel model = Line(Curve(0));
   EXPECT_FALSE(Screen(model, {{"short", {Eigen::VectorXd::Ones(3)}, false}}).ok());
   model.covariance.setZero();

@@ -53,6 +53,18 @@ TEST(RunTable, ScatterBetweenPackingsWidensTheErrorsOnce) {
               0.75 * kScatter * kScatter * std::exp(-distance / kLength), 1e-9);
 }
 
+TEST(RunTable, UnitsMayComeFromACampaignWithHeldOutExperiments) {
+  CampaignView view = testing::ExampleView("held out first");
+  std::swap(view.campaign.experiments[0], view.campaign.experiments[1]);
+  const ScatteredReadings readings = ReadingsWithScatter(view);
+  EXPECT_EQ(readings.of_mean.readings.front().experiment, 1);
+  CampaignView derived = view;
+  derived.campaign.experiments.erase(derived.campaign.experiments.begin());
+  const RunTable runs = RunsOf(derived, readings.of_mean);
+  ASSERT_GT(runs.sample.size(), 0U);
+  EXPECT_EQ(runs.histories, RunsOf(view).histories);
+}
+
 TEST(RunTable, ScatterOfRepeatsIsLeftToTheEmulator) {
   CampaignView view = testing::ExampleView("repeated");
   AddScatter(view, "emulator");

@@ -154,7 +154,7 @@ TEST(EmulatedPosterior, RecognisesARoughFunction) {
 // prior that the runs leave out, where the emulator does not know that it misses them too.
 TEST(EmulatedPosterior, RefusesAPosteriorWhereNoRunIs) {
   const auto strength = [](double x, double y, int k) {
-    return 3 + std::sin(5 * x) + 0.3 * y * k / 10.0;
+    return 3 + std::sin(12 * x) + 0.3 * y * k / 10.0;
   };
   const JointPrior priors({{.kind = PriorKind::kUniform, .min = 0, .max = 1},
                            {.kind = PriorKind::kUniform, .min = 0, .max = 1}});
@@ -162,7 +162,7 @@ TEST(EmulatedPosterior, RefusesAPosteriorWhereNoRunIs) {
   for (int k = 0; k < 20; ++k) {
     data.readings.push_back({.load_step = k,
                              .control = 0.01 * k,
-                             .value = strength(0.3, 0.5, k) + 0.5,
+                             .value = strength(0.13, 0.5, k) + 0.5,
                              .sd = 0.1});
   }
   const auto posterior = [&](double reach) {
@@ -180,7 +180,7 @@ TEST(EmulatedPosterior, RefusesAPosteriorWhereNoRunIs) {
   const auto everywhere = posterior(1);
   ASSERT_TRUE(everywhere.ok()) << everywhere.status();
   EXPECT_TRUE(everywhere->adequate) << everywhere->reason;
-  const auto partly = posterior(0.2);
+  const auto partly = posterior(0.4);
   ASSERT_TRUE(partly.ok()) << partly.status();
   EXPECT_FALSE(partly->adequate) << partly->emulator_sd;
   EXPECT_NE(partly->reason.find("where few runs are"), std::string::npos) << partly->reason;
