@@ -8,7 +8,7 @@ namespace calib::ctl {
 namespace {
 
 constexpr double kClearlyCloser = 0.64;  // of the base model's chi-squared
-constexpr double kPromising = 0.5;       // of the misfit explained, to the screen
+constexpr double kClearlyLess = 0.25;    // of the misfit explained, to the screen
 constexpr double kFarOff = 4;            // times the chi-squared of the best: twice its rms
 constexpr std::size_t kMostNames = 3;
 
@@ -51,20 +51,23 @@ void Verdict::WeighEvidence() {
   }
 }
 
-// What the screen promised little of, and what is still far off after as many batches as the best,
-// or one less.
-bool Verdict::IsFarOff(const CandidateEffect& other, const WarmFit& best) const {
+// What the screen promised clearly less of than of the best, and what is still far off after as
+// many batches, or one less.
+bool Verdict::IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const {
   const WarmFit& fit = *fits_.Find(other.effect);
-  return other.explained_fraction < kPromising && fit.iterations + 1 >= best.iterations &&
+  const WarmFit& best = *fits_.Find(first.effect);
+  return other.explained_fraction < first.explained_fraction - kClearlyLess &&
+         fit.iterations + 1 >= best.iterations &&
          fit.adequacy.chi2 > kFarOff * std::max(best.adequacy.chi2, best.adequacy.degrees);
 }
 
 // Beaten, at its end or with the evidence against it. A fit that was made without runs has no
 // evidence and needs none: all its points are known.
-bool Verdict::Excluded(const CandidateEffect& other, const WarmFit& best) const {
+bool Verdict::Excluded(const CandidateEffect& other, const CandidateEffect& first) const {
+  const WarmFit& best = *fits_.Find(first.effect);
   const WarmFit& fit = *fits_.Find(other.effect);
   const bool outweighed = EvidenceFavours(best.evidence, fit.evidence);
-  if (!Explains(other)) return fit.stalled || outweighed || IsFarOff(other, best);
+  if (!Explains(other)) return fit.stalled || outweighed || IsFarOff(other, first);
   return ClearlyBetter(best, fit) && (outweighed || fit.runs.histories.rows() == 0);
 }
 
@@ -87,7 +90,7 @@ void Verdict::Conclude(bool base_fits) {
   std::vector<const CandidateEffect*> unknown;
   for (const CandidateEffect& other : diagnosis_.candidates) {
     const WarmFit* fit = fits_.Find(other.effect);
-    if (fit == nullptr || fit == &best || Excluded(other, best)) continue;
+    if (fit == nullptr || fit == &best || Excluded(other, first)) continue;
     if (Explains(other)) {
       as_good.push_back(other.effect);
     } else {

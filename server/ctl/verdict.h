@@ -29,8 +29,8 @@ class Verdict {
   void Conclude(bool base_fits);
 
  private:
-  bool Excluded(const CandidateEffect& other, const WarmFit& best) const;
-  bool IsFarOff(const CandidateEffect& other, const WarmFit& best) const;
+  bool Excluded(const CandidateEffect& other, const CandidateEffect& first) const;
+  bool IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const;
   std::string Closest() const;
 
   Diagnosis& diagnosis_;
