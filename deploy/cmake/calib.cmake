@@ -75,6 +75,16 @@ function(calib_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_test_main calib_flags)
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+  if(CALIB_THREAD_SANITIZER)
+    if(NOT TARGET tsan_mutex)
+      add_library(tsan_mutex SHARED ${CMAKE_SOURCE_DIR}/tests/support/tsan_mutex.cc)
+      target_compile_options(tsan_mutex PRIVATE -fno-sanitize=thread)
+      target_link_libraries(tsan_mutex PRIVATE ${CMAKE_DL_LIBS} calib_flags)
+    endif()
+    add_dependencies(${name} tsan_mutex)
+    set_tests_properties(${name} PROPERTIES ENVIRONMENT
+      "LD_PRELOAD=$<TARGET_FILE:tsan_mutex>;TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/tsan.supp")
+  endif()
 endfunction()
 
 # calib_bench(NAME SOURCES ... LINKS ... [TINY filter]): a Google Benchmark binary; ctest runs TINY once so that it cannot rot.
