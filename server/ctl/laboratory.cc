@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iostream>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -37,15 +38,19 @@ absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& cam
 }
 
 absl::Status Laboratory::Wait(const std::string& campaign, const std::string& what) {
-  std::cerr << what << ": campaign " << campaign << "\n";
-  ProgressLine line;
+  std::optional<ProgressLine> line;  // nothing is said of what is done already
   for (;;) {
     const auto status = session_.client().Show(campaign);
     if (!status.ok()) return status.status();
+    if (!line && status->state() == "finished") return absl::OkStatus();
+    if (!line) {
+      std::cerr << what << ": campaign " << campaign << "\n";
+      line.emplace();
+    }
     constexpr int kMilestones = 5;
-    line.Show(ProgressText(*status),
-              kMilestones * 2 * status->iteration() +
-                  kMilestones * status->samples_done() / std::max(1, status->samples()));
+    line->Show(ProgressText(*status),
+               kMilestones * 2 * status->iteration() +
+                   kMilestones * status->samples_done() / std::max(1, status->samples()));
     if (status->state() == "finished") return absl::OkStatus();
     if (IsOver(status->state()) || status->state() == "paused") {
       const std::string why =
