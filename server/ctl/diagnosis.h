@@ -21,7 +21,7 @@ struct CandidateEffect {
   double p_value = 1;             ///< of the screen, adjusted for the number of candidates
   double explained_fraction = 0;  ///< of the misfit beyond noise and scatter
   std::map<std::string, double> amplitude{};  ///< parameter -> strength that explains it best [SI]
-  double predicted_rms_error = 0;             ///< residual over noise sd with the effect
+  double predicted_rms_error = 0;             ///< with the effect, as Diagnosis::rms
   std::vector<std::string> confusable_with{};
   // Of the warm fit, where there was one.
   std::string campaign{};                   ///< id

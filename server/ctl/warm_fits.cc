@@ -93,9 +93,9 @@ const WarmFit* WarmFits::Find(const std::string& effect) const {
 
 inference::FittedModel WarmFits::ByRuns(const report::RunTable& runs) const {
   return {.histories = runs.histories,
-          .covariance = response_.run_covariance,
+          .covariance = response_.of_run.covariance,
           .parameters = static_cast<int>(runs.parameters.cols()),
-          .draws = response_.run_draws};
+          .draws = response_.of_run.draws};
 }
 
 inference::FittedModel WarmFits::BaseByRuns() const { return ByRuns(base_.runs()); }

@@ -1,6 +1,10 @@
 #include "server/ctl/warm_points.h"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "dem/catalog/catalog.h"
 
 namespace calib::ctl {
 namespace {
@@ -53,6 +57,47 @@ report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
     one.parameters = point;
     one.histories = run.history.transpose();
     Append(one, table);
+  }
+  return table;
+}
+
+report::RunTable RunsWithoutEffect(const report::RunTable& without,
+                                   const campaign::Campaign& parent,
+                                   const campaign::Campaign& extended) {
+  const auto d = static_cast<Index>(extended.parameters.size());
+  std::vector<Index> from(static_cast<std::size_t>(d), -1);  // column of the parent
+  std::vector<std::pair<Index, double>> nulls;
+  for (Index j = 0; j < d; ++j) {
+    const campaign::CalibratedParameter& own = extended.parameters[static_cast<std::size_t>(j)];
+    for (std::size_t k = 0; k < parent.parameters.size(); ++k) {
+      if (parent.parameters[k].name == own.name) {
+        from[static_cast<std::size_t>(j)] = static_cast<Index>(k);
+      }
+    }
+    if (from[static_cast<std::size_t>(j)] >= 0) continue;
+    const dem::ParameterInfo* info = dem::FindParameter(
+        extended.model.user_effects, extended.model.contact, extended.model.effects, own.name);
+    const auto null =
+        info == nullptr ? std::nullopt : dem::NullValueOf(*info, extended.model.contact);
+    // A prior over orders of magnitude ends where the effect no longer matters.
+    if (null) nulls.emplace_back(j, std::clamp(*null, own.prior.min, own.prior.max));
+  }
+  report::RunTable table;
+  if (nulls.empty()) return table;
+  const auto spread =
+      inference::DrawSamples(inference::Proposal{}, campaign::Priors(extended), extended.filter, 0,
+                             static_cast<int>(without.parameters.rows()));
+  if (!spread.ok()) return table;
+  table.parameters = *spread;
+  table.histories = without.histories;
+  table.sample = without.sample;
+  for (Index i = 0; i < table.parameters.rows(); ++i) {
+    for (Index j = 0; j < d; ++j) {
+      const Index k = from[static_cast<std::size_t>(j)];
+      if (k >= 0) table.parameters(i, j) = without.parameters(i, k);
+    }
+    const auto& [j, null] = nulls[static_cast<std::size_t>(i) % nulls.size()];
+    table.parameters(i, j) = null;
   }
   return table;
 }

@@ -17,6 +17,13 @@ namespace calib::ctl {
 report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
                               const campaign::Campaign& extended);
 
+/// Runs of the model without the effects that `extended` has on top, as runs of `extended`: where a
+/// parameter of an effect has its null value the others do not matter, so that they are spread over
+/// their priors. Runs that cannot be expressed so are left out.
+report::RunTable RunsWithoutEffect(const report::RunTable& without,
+                                   const campaign::Campaign& parent,
+                                   const campaign::Campaign& extended);
+
 /// The rows of `more` behind those of `runs`.
 void Append(const report::RunTable& more, report::RunTable& runs);
 

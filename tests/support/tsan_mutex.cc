@@ -22,19 +22,24 @@ Function Real(const char* symbol) {
   return reinterpret_cast<Function>(dlsym(RTLD_NEXT, symbol));
 }
 
-// Conditions of other threads are looked at with the mutex held, but inside of what orders.
+// Inside of the real function, which looks at conditions of other threads with the mutex held but
+// before or after what orders it; `taken` is the mutex that is held at its end.
 class Inside {
  public:
-  Inside() {
+  explicit Inside(void* taken = nullptr) : taken_(taken) {
     AnnotateIgnoreReadsBegin(__FILE__, __LINE__);
     AnnotateIgnoreWritesBegin(__FILE__, __LINE__);
   }
   ~Inside() {
     AnnotateIgnoreWritesEnd(__FILE__, __LINE__);
     AnnotateIgnoreReadsEnd(__FILE__, __LINE__);
+    if (taken_ != nullptr) __tsan_acquire(taken_);
   }
   Inside(const Inside&) = delete;
   Inside& operator=(const Inside&) = delete;
+
+ private:
+  void* taken_;
 };
 
 }  // namespace
@@ -46,11 +51,8 @@ ABSL_NAMESPACE_BEGIN
 
 void Mutex::Lock() {
   static const auto real = Real<void (*)(Mutex*)>(CALIB_SYMBOL("5Mutex4LockEv"));
-  {
-    const Inside inside;
-    real(this);
-  }
-  __tsan_acquire(this);
+  const Inside inside(this);
+  real(this);
 }
 
 bool Mutex::TryLock() {
@@ -70,59 +72,40 @@ void Mutex::Unlock() {
 void Mutex::LockWhen(const Condition& condition) {
   static const auto real =
       Real<void (*)(Mutex*, const Condition&)>(CALIB_SYMBOL("5Mutex8LockWhenERKNS0_9ConditionE"));
-  {
-    const Inside inside;
-    real(this, condition);
-  }
-  __tsan_acquire(this);
+  const Inside inside(this);
+  real(this, condition);
 }
 
 void Mutex::Await(const Condition& condition) {
   static const auto real =
       Real<void (*)(Mutex*, const Condition&)>(CALIB_SYMBOL("5Mutex5AwaitERKNS0_9ConditionE"));
   __tsan_release(this);
-  {
-    const Inside inside;
-    real(this, condition);
-  }
-  __tsan_acquire(this);
+  const Inside inside(this);
+  real(this, condition);
 }
 
 bool Mutex::AwaitWithTimeout(const Condition& condition, Duration timeout) {
   static const auto real = Real<bool (*)(Mutex*, const Condition&, Duration)>(
       CALIB_SYMBOL("5Mutex16AwaitWithTimeoutERKNS0_9ConditionENS0_8DurationE"));
   __tsan_release(this);
-  bool met = false;
-  {
-    const Inside inside;
-    met = real(this, condition, timeout);
-  }
-  __tsan_acquire(this);
-  return met;
+  const Inside inside(this);
+  return real(this, condition, timeout);
 }
 
 void CondVar::Wait(Mutex* mutex) {
   static const auto real =
       Real<void (*)(CondVar*, Mutex*)>(CALIB_SYMBOL("7CondVar4WaitEPNS0_5MutexE"));
   __tsan_release(mutex);
-  {
-    const Inside inside;
-    real(this, mutex);
-  }
-  __tsan_acquire(mutex);
+  const Inside inside(mutex);
+  real(this, mutex);
 }
 
 bool CondVar::WaitWithTimeout(Mutex* mutex, Duration timeout) {
   static const auto real = Real<bool (*)(CondVar*, Mutex*, Duration)>(
       CALIB_SYMBOL("7CondVar15WaitWithTimeoutEPNS0_5MutexENS0_8DurationE"));
   __tsan_release(mutex);
-  bool late = false;
-  {
-    const Inside inside;
-    late = real(this, mutex, timeout);
-  }
-  __tsan_acquire(mutex);
-  return late;
+  const Inside inside(mutex);
+  return real(this, mutex, timeout);
 }
 
 ABSL_NAMESPACE_END

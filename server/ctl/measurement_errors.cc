@@ -1,0 +1,142 @@
+#include "server/ctl/measurement_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "inference/sampling/philox.h"
+
+namespace calib::ctl {
+namespace {
+
+using Eigen::Index;
+
+constexpr Index kDraws = 400;  // of measurements
+constexpr int kRunsAbout = 5;  // runs of a campaign or a warm fit about its best point
+
+// Correlated errors of the readings, one as variance.
+Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
+  const auto t = static_cast<Index>(data.readings.size());
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(t, t);
+  for (const auto& [key, readings] : inference::GroupsOf(data)) {
+    const Eigen::MatrixXd of_group = inference::ErrorCorrelation(data, key, readings);
+    for (Index i = 0; i < of_group.rows(); ++i) {
+      for (Index j = 0; j < of_group.cols(); ++j) {
+        correlation(readings[static_cast<std::size_t>(i)], readings[static_cast<std::size_t>(j)]) =
+            of_group(i, j);
+      }
+    }
+  }
+  return correlation;
+}
+
+// Noise, nuisance and scatter of measurements; `missed` holds what the emulator misses of single
+// runs, n x T.
+void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
+                      const std::vector<Eigen::VectorXd>& nuisance, MeasurementErrors& errors) {
+  const campaign::Campaign& campaign = base.view().campaign;
+  const report::ScatteredReadings& readings = base.readings();
+  const inference::DataSet plain = campaign::MakeDataSet(campaign);
+  const auto t = static_cast<Index>(plain.readings.size());
+  Eigen::VectorXd unit(t);     // of the noise in the sd of histories
+  Eigen::VectorXd scatter(t);  // of the measurement, of what is missed of a run
+  for (Index k = 0; k < t; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const inference::Reading& reading = plain.readings[at];
+    unit[k] = reading.sd / readings.of_mean.readings[at].sd;
+    const campaign::Experiment& experiment =
+        campaign.experiments[static_cast<std::size_t>(reading.experiment)];
+    const auto packings = static_cast<double>(experiment.specimens.size());
+    const double share = campaign::ScatterShare(experiment);
+    // A run departs less from the mean over R packings than from that over all, a new one more.
+    scatter[k] = std::sqrt(
+        readings.measured && packings > 1 ? (share + 1 / packings) / (1 - 1 / packings) : share);
+  }
+  const Eigen::MatrixXd noise =
+      unit.asDiagonal() *
+      Eigen::MatrixXd(Eigen::LLT<Eigen::MatrixXd>(NoiseCorrelation(plain)).matrixL());
+  const Eigen::LLT<Eigen::MatrixXd> factor(errors.of_run.covariance);
+  errors.of_mean.draws.resize(kDraws, t);
+  errors.of_run.draws.resize(kDraws, t);
+  Eigen::VectorXd normal(t);
+  for (Index s = 0; s < kDraws; ++s) {
+    inference::PhiloxStream stream({.seed = campaign.filter.seed,
+                                    .purpose = inference::StreamPurpose::kDiagnosisDraws,
+                                    .iteration = 0,
+                                    .sample = static_cast<std::uint64_t>(s)});
+    for (Index k = 0; k < t; ++k) normal[k] = stream.Normal();
+    Eigen::VectorXd draw = noise * normal;
+    for (const Eigen::VectorXd& direction : nuisance) draw += stream.Normal() * direction;
+    const Index own = s % missed.rows();
+    const double sign = stream.Normal() < 0 ? -1 : 1;
+    draw += sign * scatter.cwiseProduct(missed.row(own).transpose());
+    errors.of_mean.draws.row(s) = draw;
+    // The fits take the closest of the runs about the right point.
+    double closest = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < kRunsAbout; ++k) {
+      const auto other =
+          std::min(static_cast<Index>(stream.Uniform() * static_cast<double>(missed.rows())),
+                   missed.rows() - 1);
+      const Eigen::VectorXd difference = draw - missed.row(other).transpose();
+      const double distance = factor.matrixL().solve(difference).squaredNorm();
+      if (distance >= closest) continue;
+      closest = distance;
+      errors.of_run.draws.row(s) = difference;
+    }
+  }
+}
+
+}  // namespace
+
+MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
+                                       const inference::StateEmulator& emulator,
+                                       const Eigen::VectorXd& not_known,
+                                       const std::vector<Eigen::VectorXd>& nuisance) {
+  const report::ScatteredReadings& readings = base.readings();
+  const inference::DataSet& data = readings.of_mean;
+  const auto t = static_cast<Index>(data.readings.size());
+  const inference::PrincipalComponents& components = emulator.components();
+  // Of a history, from standard deviations of its scores.
+  const auto covariance_of = [&](const Eigen::VectorXd& sd) -> Eigen::MatrixXd {
+    const Eigen::MatrixXd factor = components.basis * sd.asDiagonal();
+    Eigen::MatrixXd covariance = factor * emulator.correlation() * factor.transpose();
+    covariance.diagonal() += components.remainder;
+    return covariance;
+  };
+  Eigen::MatrixXd numerical = Eigen::MatrixXd::Zero(t, t);
+  for (const Eigen::VectorXd& direction : nuisance) {
+    numerical += direction * direction.transpose();
+  }
+  const Eigen::VectorXd& sd = emulator.scatter_sd();
+  const Eigen::MatrixXd missed =
+      covariance_of((not_known.array().square() + sd.array().square()).sqrt());
+  MeasurementErrors errors;
+  if (readings.measured) {
+    Eigen::VectorXd unit(t);  // sd of one run's difference over that of the mean history's
+    double square = 0;
+    const inference::DataSet plain = campaign::MakeDataSet(base.view().campaign);
+    for (Index k = 0; k < t; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      unit[k] = readings.of_run.readings[at].sd / data.readings[at].sd;
+      const double of_mean = data.readings[at].sd / plain.readings[at].sd;
+      square += (unit[k] * unit[k] - 1) * of_mean * of_mean;
+    }
+    errors.scatter = std::sqrt(square / static_cast<double>(t));
+    errors.of_mean.covariance = NoiseCorrelation(data) + numerical + covariance_of(not_known);
+    errors.of_run.covariance =
+        unit.asDiagonal() * NoiseCorrelation(readings.of_run) * unit.asDiagonal();
+    errors.of_run.covariance += numerical;
+  } else {
+    const Eigen::MatrixXd noise = NoiseCorrelation(data) + numerical;
+    errors.scatter = emulator.cross_validation().scatter_rms;
+    errors.of_mean.covariance = noise + missed;
+    errors.of_run.covariance = noise + 2 * covariance_of(sd);
+  }
+  // As large as near the best point: far out the emulator knows less, which is no scatter.
+  const Eigen::VectorXd size = missed.diagonal().cwiseSqrt();
+  DrawMeasurements(base, emulator.cross_validation().standardised * size.asDiagonal(), nuisance,
+                   errors);
+  return errors;
+}
+
+}  // namespace calib::ctl
