@@ -60,10 +60,11 @@ void AddBranch(const std::vector<Relative>& family, const std::string& parent,
     const std::string name = Escape(r.campaign + ": " + InWords(r.effects));
     html += fmt::format("<li>{}{}{}{}</li>\n", r.campaign == shown ? "<strong>" : "", name,
                         r.campaign == shown ? "</strong>" : "",
-                        (r.purpose == "warm_fit" ? " (tried)" : "") +
-                            (std::isfinite(r.log_evidence)
-                                 ? fmt::format(", log evidence {}", Number(r.log_evidence, 5))
-                                 : std::string()));
+                        // Evidence of a first batch of a refit says nothing of the model.
+                        r.purpose == "warm_fit" ? " (tried)"
+                        : std::isfinite(r.log_evidence)
+                            ? fmt::format(", log evidence {}", Number(r.log_evidence, 5))
+                            : std::string());
     const bool has_children =
         std::any_of(family.begin(), family.end(),
                     [&r](const Relative& other) { return other.parent == r.campaign; });
@@ -76,8 +77,7 @@ std::string Tree(const ReportData& data) {
   if (data.story.family.size() < 2) return "";
   std::string html =
       "<h3>Models tried</h3>\n<p class=\"sub\">Each one is the one above with effects added; "
-      "evidence "
-      "of those that were only tried is of the fitted experiments alone.</p>\n";
+      "those that were only tried were refitted in small batches.</p>\n";
   AddBranch(data.story.family, data.story.family.front().parent, data.view.status.campaign(), html);
   return html;
 }
