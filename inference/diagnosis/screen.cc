@@ -58,6 +58,21 @@ Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& o
          offset.squaredNorm();
 }
 
+// Smallest |point + offset|^2 for each column of offsets, T x S.
+Eigen::VectorXd SmallestFrom(const Whitened& whitened, const Eigen::MatrixXd& offsets) {
+  constexpr Index kAtOnce = 32;  // the products stay in the cache
+  Eigen::VectorXd smallest(offsets.cols());
+  for (Index s = 0; s < offsets.cols(); s += kAtOnce) {
+    const auto some = offsets.middleCols(s, std::min(kAtOnce, offsets.cols() - s));
+    const Eigen::MatrixXd along = whitened.points.transpose() * some;
+    for (Index k = 0; k < some.cols(); ++k) {
+      smallest[s + k] =
+          (whitened.squares + 2 * along.col(k)).minCoeff() + some.col(k).squaredNorm();
+    }
+  }
+  return smallest;
+}
+
 // A difference seen from every point.
 struct Direction {
   Eigen::VectorXd whitened;  // T
@@ -135,12 +150,9 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
                            : 1;
     return adequacy;
   }
-  const Eigen::VectorXd fitted = whitened->points.col(adequacy.best);
   const Index draws = model.draws.rows();
-  Eigen::VectorXd chi2(draws);
-  for (Index s = 0; s < draws; ++s) {
-    chi2[s] = DistancesFrom(*whitened, whitened->draws.col(s) - fitted).minCoeff();
-  }
+  const Eigen::VectorXd chi2 =
+      SmallestFrom(*whitened, whitened->draws.colwise() - whitened->points.col(adequacy.best));
   adequacy.degrees = chi2.mean();
   const double variance =
       (chi2.array() - adequacy.degrees).square().sum() / static_cast<double>(draws - 1);
@@ -250,6 +262,27 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   });
   Holm(scores);
   return scores;
+}
+
+absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedModel& extended) {
+  const auto whitened = Whiten(base);
+  if (!whitened.ok()) return whitened.status();
+  if (base.draws.rows() == 0 || extended.parameters <= base.parameters ||
+      extended.histories.cols() != base.histories.cols() || extended.histories.rows() < 1 ||
+      !extended.histories.allFinite()) {
+    return absl::InvalidArgumentError(
+        "diagnosis: a gain needs draws of the base model and an extension of it");
+  }
+  Whitened larger = *whitened;  // in the same coordinates
+  larger.points = whitened->factor.matrixL().solve(extended.histories.transpose());
+  larger.squares = larger.points.colwise().squaredNorm();
+  Index best = 0;
+  const double chi2 = whitened->squares.minCoeff(&best);
+  const Eigen::MatrixXd offsets = whitened->draws.colwise() - whitened->points.col(best);
+  const Eigen::VectorXd gains =
+      (SmallestFrom(*whitened, offsets) - SmallestFrom(larger, offsets)).cwiseMax(0);
+  return TailOf(std::max(0.0, chi2 - larger.squares.minCoeff()), {gains.begin(), gains.end()},
+                static_cast<std::size_t>(extended.parameters - base.parameters));
 }
 
 absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, int block) {

@@ -71,6 +71,13 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
                                           const std::vector<Signature>& candidates,
                                           const ScreenOptions& options = {});
 
+/// Chance that an extension of the base model fits as much better than it as it does here, were the
+/// base model right: fall of the smallest chi2 against its simulated null. extended: has more
+/// parameters; its points and the base model's together are what it can do. base: with draws.
+/// Errors: INVALID_ARGUMENT as above, without draws, or for an extension without parameters of its
+/// own.
+absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedModel& extended);
+
 /// How much better model `a` describes the readings than `b`, in nats of its best log density, and
 /// the standard deviation of that by resampling blocks of readings.
 struct Advantage {

@@ -53,9 +53,10 @@ class Inquiry {
       diagnosis_.verdict = "adequate";
       return diagnosis_;
     }
-    diagnosis_.left_out_error = LeftOut(elsewhere ? response_.model : fits_.BaseByRuns());
-    if (auto status = FitWarm(); !status.ok()) return status;
-    Verdict(diagnosis_, fits_, options_.level).Conclude(fits);
+    const inference::FittedModel base = elsewhere ? response_.model : fits_.Base();
+    diagnosis_.left_out_error = LeftOut(base);
+    if (auto status = FitWarm(base); !status.ok()) return status;
+    Verdict(diagnosis_, fits_.all(), base, options_.level).Conclude(fits);
     if (options_.next_experiment && !elsewhere && diagnosis_.verdict != "adequate") {
       if (auto status = PlanNext(); !status.ok()) return status;
     }
@@ -206,6 +207,7 @@ class Inquiry {
          .refit_p_value = -1,
          .refit_chi2 = 0,
          .over_base = {},
+         .gain_p_value = {},
          .left_out_error = {},
          .over_base_evidence = {}});
     if (std::isfinite(score.detectable)) {
@@ -227,14 +229,14 @@ class Inquiry {
     return effects;
   }
 
-  absl::Status FitWarm() {
+  absl::Status FitWarm(const inference::FittedModel& base) {
     if (!base_.view().campaign.precomputed) {
       if (auto status = fits_.Fit(WorthARefit()); !status.ok()) return status;
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (CandidateEffect& candidate : diagnosis_.candidates) Describe(candidate);
-    Verdict verdict(diagnosis_, fits_, options_.level);
-    verdict.WeighEvidence();
+    const Verdict verdict(diagnosis_, fits_.all(), base, options_.level);
+    WeighEvidence(verdict);
     // Those that explain the readings, by how well; then the other fits, by how close they come.
     const auto rank = [&verdict](const CandidateEffect& c) {
       return verdict.Explains(c) ? 0 : (c.campaign.empty() ? 2 : 1);
@@ -246,6 +248,22 @@ class Inquiry {
                        return rank(a) == 1 && a.refit_chi2 < b.refit_chi2;
                      });
     return absl::OkStatus();
+  }
+
+  // Looked at where one of the fits explains the readings.
+  void WeighEvidence(const Verdict& verdict) {
+    if (std::none_of(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
+                     [&verdict](const CandidateEffect& c) { return verdict.Explains(c); })) {
+      return;
+    }
+    fits_.WeighEvidence();
+    const std::optional<double> base = fits_.BaseLogEvidence();
+    for (CandidateEffect& candidate : diagnosis_.candidates) {
+      const WarmFit* fit = fits_.Find(candidate.effect);
+      if (fit == nullptr || !base || !fit->evidence) continue;
+      candidate.over_base_evidence = fit->evidence;
+      for (double& value : candidate.over_base_evidence->log_evidence) value -= *base;
+    }
   }
 
   // What the warm fit of a candidate says.
@@ -261,6 +279,7 @@ class Inquiry {
     candidate.refit_p_value = fit.adequacy.p_value;
     candidate.refit_chi2 = fit.adequacy.chi2;
     candidate.over_base = fit.over_base;
+    candidate.gain_p_value = fit.gain_p_value;
     candidate.left_out_error = fit.left_out_error;
     candidate.explained_fraction =
         std::clamp((diagnosis_.adequacy.chi2 - fit.adequacy.chi2) /

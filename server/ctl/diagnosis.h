@@ -29,6 +29,7 @@ struct CandidateEffect {
   double refit_p_value = -1;                ///< adequacy of the extended model
   double refit_chi2 = 0;
   inference::Advantage over_base{};
+  std::optional<double> gain_p_value{};    ///< as in WarmFit
   std::optional<double> left_out_error{};  ///< see Diagnosis
   /// ln of the Bayes factor over the base model where the strength's prior is kStrengthScales times
   /// as wide; of those that explain the readings and are known well enough by an emulator.

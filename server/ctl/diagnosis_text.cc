@@ -40,6 +40,7 @@ Json CandidateJson(const CandidateEffect& c) {
                         {"left_out_error", OrNull(c.left_out_error)},
                         {"advantage_nats", c.over_base.nats},
                         {"advantage_sd", c.over_base.sd},
+                        {"gain_p_value", OrNull(c.gain_p_value)},
                         {"evidence", EvidenceJson(c.over_base_evidence)}};
   }
   return json;

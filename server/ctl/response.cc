@@ -21,7 +21,6 @@ constexpr int kRefined = 1000;  // about the best of them, in each round
 constexpr int kRounds = 4;
 // Of an emulator to judge by, noise sd: its error beyond the scatter of single runs.
 constexpr double kMostUncovered = 2;
-constexpr double kMostUnknown = 3;  // noise sd of what the emulator may not know of a point
 
 Eigen::MatrixXd Standard(const inference::JointPrior& priors, const Eigen::MatrixXd& values) {
   Eigen::MatrixXd standard(values.rows(), values.cols());
@@ -59,19 +58,30 @@ std::vector<int> PartsOf(const campaign::Campaign& campaign, const inference::Da
 
 absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
                                    const std::vector<Eigen::VectorXd>& nuisance) {
-  const report::CampaignView& view = base.view();
-  const campaign::Campaign& campaign = view.campaign;
+  const v1::Posterior& posterior = base.view().posterior;
+  const auto d = static_cast<Index>(base.view().campaign.parameters.size());
+  const Index n = posterior.draws_size() / std::max<Index>(1, d);
+  Eigen::MatrixXd draws(n, d);
+  for (Index i = 0; i < n; ++i) {
+    for (Index j = 0; j < d; ++j) draws(i, j) = posterior.draws(static_cast<int>(i * d + j));
+  }
+  return RespondTo(base, {.campaign = base.view().campaign, .runs = base.runs(), .draws = draws},
+                   nuisance);
+}
+
+absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedModel& model,
+                                   const std::vector<Eigen::VectorXd>& nuisance) {
+  const campaign::Campaign& campaign = model.campaign;
   const report::ScatteredReadings& readings = base.readings();
   const inference::DataSet& data = readings.of_mean;
   const inference::JointPrior priors = campaign::Priors(campaign);
-  const RunTable& table = base.runs();
+  const RunTable& table = model.runs;
   const auto trained = inference::TrainEmulator(
       {.inputs = Standard(priors, table.parameters), .histories = table.histories}, data,
       {.scatter_share = readings.measured ? 0.0 : 1.0});
   if (!trained.ok()) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("the runs of ", view.status.campaign(),
-                     " cannot be emulated: ", trained.status().message()));
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the runs of ", base.id(), " cannot be emulated: ", trained.status().message()));
   }
   const inference::StateEmulator& emulator = trained->emulator;
   const inference::PrincipalComponents& components = emulator.components();
@@ -92,7 +102,7 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
     std::vector<Index> known;
     for (Index i = 0; i < values.rows(); ++i) {
       if (prediction.sd.row(i).squaredNorm() <=
-          kMostUnknown * kMostUnknown * static_cast<double>(t)) {
+          model.most_unknown * model.most_unknown * static_cast<double>(t)) {
         known.push_back(i);
       }
     }
@@ -114,13 +124,7 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
   if (!spread.ok()) return spread.status();
   add(*spread);
   add(table.parameters);
-  if (const int n = view.posterior.draws_size() / std::max<int>(1, static_cast<int>(d)); n > 0) {
-    Eigen::MatrixXd draws(n, d);
-    for (Index i = 0; i < n; ++i) {
-      for (Index j = 0; j < d; ++j) draws(i, j) = view.posterior.draws(static_cast<int>(i * d + j));
-    }
-    add(draws);
-  }
+  if (model.draws.rows() > 0) add(model.draws);
   // Ever closer about the best point so far, so that the smallest misfit is met.
   double width = 0.2;
   for (int round = 0; round < kRounds && points.rows() > 0; ++round, width *= 0.4) {
@@ -149,7 +153,8 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
   response.of_run = std::move(errors.of_run);
   response.model.histories = std::move(histories);
   response.points = std::move(points);
-  response.parts = PartsOf(campaign, data);
+  response.parts = PartsOf(base.view().campaign, data);
+  response.nuisance = nuisance;
   return response;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// A finished campaign as the statistics of the diagnosis see it: an emulator of its runs, spread
-// out over the prior and the posterior.
+// A model as the statistics of the diagnosis see it: an emulator of its runs, spread out over the
+// prior and the posterior.
 
 #include <vector>
 
@@ -23,10 +23,25 @@ struct Response {
   DrawnErrors of_run{};  ///< of a measurement from one run at the right point
   /// Of each reading: its experiment, or its stage of loading where only one experiment is fitted.
   std::vector<int> parts{};
+  std::vector<Eigen::VectorXd> nuisance{};  ///< as given
+};
+
+/// A model to be emulated: that of the fitted campaign, or one that has effects more.
+struct EmulatedModel {
+  const campaign::Campaign& campaign;
+  const report::RunTable& runs;  ///< histories in the units of the fitted campaign's
+  Eigen::MatrixXd draws{};       ///< n x d, SI: of a posterior, n may be 0
+  /// Points that the emulator knows less of are left out: sd of the mean history there, root mean
+  /// square over the readings, in their sd.
+  double most_unknown = 3;
 };
 
 /// nuisance: see ErrorsOfMeasurements. Errors: FAILED_PRECONDITION when the runs cannot be
-/// emulated.
+/// emulated, or are nowhere known well enough.
+absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedModel& model,
+                                   const std::vector<Eigen::VectorXd>& nuisance);
+
+/// The model of the fitted campaign itself.
 absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
                                    const std::vector<Eigen::VectorXd>& nuisance);
 

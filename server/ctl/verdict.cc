@@ -28,34 +28,23 @@ bool EvidenceFavours(const std::optional<ScaledEvidence>& a,
 
 }  // namespace
 
-bool Verdict::Explains(const CandidateEffect& candidate) const {
-  const WarmFit* fit = fits_.Find(candidate.effect);
-  return fit != nullptr && fit->Explains(level_) &&
-         !(fit->left_out_error && diagnosis_.left_out_error &&
-           *fit->left_out_error > *diagnosis_.left_out_error);
+const WarmFit* Verdict::Find(const std::string& effect) const {
+  const auto found = fits_.find(effect);
+  return found == fits_.end() ? nullptr : &found->second;
 }
 
-void Verdict::WeighEvidence() {
-  if (std::none_of(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
-                   [this](const CandidateEffect& c) { return Explains(c); })) {
-    return;
-  }
-  const std::optional<double> base = fits_.BaseLogEvidence();
-  for (CandidateEffect& candidate : diagnosis_.candidates) {
-    if (fits_.Find(candidate.effect) == nullptr) continue;
-    fits_.WeighEvidence(candidate.effect);
-    if (!base) continue;
-    candidate.over_base_evidence = fits_.Find(candidate.effect)->evidence;
-    if (!candidate.over_base_evidence) continue;
-    for (double& value : candidate.over_base_evidence->log_evidence) value -= *base;
-  }
+bool Verdict::Explains(const CandidateEffect& candidate) const {
+  const WarmFit* fit = Find(candidate.effect);
+  return fit != nullptr && fit->Explains(level_, fits_.size()) &&
+         !(fit->left_out_error && diagnosis_.left_out_error &&
+           *fit->left_out_error > *diagnosis_.left_out_error);
 }
 
 // What the screen promised clearly less of than of the best, and what is still far off after as
 // many batches, or one less.
 bool Verdict::IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const {
-  const WarmFit& fit = *fits_.Find(other.effect);
-  const WarmFit& best = *fits_.Find(first.effect);
+  const WarmFit& fit = *Find(other.effect);
+  const WarmFit& best = *Find(first.effect);
   return other.explained_fraction < first.explained_fraction - kClearlyLess &&
          fit.iterations + 1 >= best.iterations &&
          fit.adequacy.chi2 > kFarOff * std::max(best.adequacy.chi2, best.adequacy.degrees);
@@ -64,8 +53,8 @@ bool Verdict::IsFarOff(const CandidateEffect& other, const CandidateEffect& firs
 // Beaten, at its end or with the evidence against it. A fit that was made without runs has no
 // evidence and needs none: all its points are known.
 bool Verdict::Excluded(const CandidateEffect& other, const CandidateEffect& first) const {
-  const WarmFit& best = *fits_.Find(first.effect);
-  const WarmFit& fit = *fits_.Find(other.effect);
+  const WarmFit& best = *Find(first.effect);
+  const WarmFit& fit = *Find(other.effect);
   const bool outweighed = EvidenceFavours(best.evidence, fit.evidence);
   if (!Explains(other)) return fit.stalled || outweighed || IsFarOff(other, first);
   return ClearlyBetter(best, fit) && (outweighed || fit.runs.histories.rows() == 0);
@@ -78,7 +67,7 @@ void Verdict::Conclude(bool base_fits) {
     return;
   }
   CandidateEffect& first = diagnosis_.candidates.front();
-  const WarmFit& best = *fits_.Find(first.effect);
+  const WarmFit& best = *Find(first.effect);
   if (base_fits && first.over_base_evidence &&
       !EvidenceFavours(first.over_base_evidence, ScaledEvidence{})) {
     diagnosis_.verdict = "adequate";  // a hint that depends on the prior of its strength
@@ -89,7 +78,7 @@ void Verdict::Conclude(bool base_fits) {
   std::vector<std::string> as_good;
   std::vector<const CandidateEffect*> unknown;
   for (const CandidateEffect& other : diagnosis_.candidates) {
-    const WarmFit* fit = fits_.Find(other.effect);
+    const WarmFit* fit = Find(other.effect);
     if (fit == nullptr || fit == &best || Excluded(other, first)) continue;
     if (Explains(other)) {
       as_good.push_back(other.effect);
@@ -103,7 +92,7 @@ void Verdict::Conclude(bool base_fits) {
   std::vector<std::string> rivals = as_good;
   std::copy_if(first.confusable_with.begin(), first.confusable_with.end(),
                std::back_inserter(rivals),
-               [this](const std::string& other) { return fits_.Find(other) == nullptr; });
+               [this](const std::string& other) { return Find(other) == nullptr; });
   for (const CandidateEffect* other : unknown) rivals.push_back(other->effect);
   rivals.resize(std::min(rivals.size(), kMostNames - 1));
   if (rivals.empty()) {
@@ -122,7 +111,7 @@ void Verdict::Conclude(bool base_fits) {
 // Judged or not: the fit that comes closest, if it comes clearly closer than the base model.
 std::string Verdict::Closest() const {
   std::string name;
-  const auto base = inference::TestAdequacy(fits_.BaseByRuns());
+  const auto base = inference::TestAdequacy(base_);
   if (!base.ok()) return name;
   double lowest = kClearlyCloser * base->chi2;
   for (const CandidateEffect& candidate : diagnosis_.candidates) {

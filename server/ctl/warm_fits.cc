@@ -19,6 +19,8 @@ constexpr double kPatience = 1.5;  // a batch more must bring a fit this much cl
 constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
 constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
 constexpr int kMostIdle = 3;       // batches in a row that were not
+// Of the mean history at the point that a fit is judged by, sd of the readings.
+constexpr double kMostUnknown = 1;
 }  // namespace
 
 std::map<std::string, double> PointOf(const report::CampaignView& view,
@@ -67,7 +69,7 @@ const std::string* WarmFits::Next(const std::vector<std::string>& effects) const
       effects.begin(), effects.end(),
       [&chi2](const std::string& a, const std::string& b) { return chi2(a) < chi2(b); });
   // Without the effect it is the base model: a fit that is further off has merely not been found.
-  const auto adequacy = inference::TestAdequacy(BaseByRuns());
+  const auto adequacy = inference::TestAdequacy(Base());
   const double base = adequacy.ok() ? adequacy->chi2 : std::numeric_limits<double>::infinity();
   const std::string* next = nullptr;
   double lowest = 0;
@@ -98,7 +100,9 @@ inference::FittedModel WarmFits::ByRuns(const report::RunTable& runs) const {
           .draws = response_.of_run.draws};
 }
 
-inference::FittedModel WarmFits::BaseByRuns() const { return ByRuns(base_.runs()); }
+inference::FittedModel WarmFits::Base() const {
+  return ByMean() ? response_.model : ByRuns(base_.runs());
+}
 
 absl::StatusOr<std::string> WarmFits::FirstText(const std::string& effect) const {
   return ExtensionText(base_.view(), {.effects = {effect},
@@ -148,7 +152,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     fit.rms = std::numeric_limits<double>::infinity();
     return absl::OkStatus();
   }
-  Judge(fit);
+  Judge(effect);
   const bool closer = fit.rms < kCloser * rms || fit.adequacy.chi2 < kCloser * chi2;
   fit.idle = fit.iterations == 1 || closer ? 0 : fit.idle + 1;
   fit.stalled = fit.idle >= kMostIdle;
@@ -170,20 +174,24 @@ absl::StatusOr<Eigen::MatrixXd> WarmFits::PointsFor(const std::string& effect) c
   return NextPoints(fit.view.campaign, base_.readings(), RunsFor(effect), fit.iterations, samples_);
 }
 
-void WarmFits::WeighEvidence(const std::string& effect) {
-  const auto found = fits_.find(effect);
-  if (found == fits_.end() || found->second.runs.histories.rows() == 0) return;
-  const report::RunTable runs = RunsFor(effect);
-  ScaledEvidence evidence;
-  for (std::size_t s = 0; s < kStrengthScales.size(); ++s) {
-    const auto emulated =
-        Emulate(WithStrengthScaled(found->second.view.campaign, effect, kStrengthScales[s]),
-                base_.readings(), runs);
-    if (!emulated.ok() || !emulated->adequate) return;
-    evidence.log_evidence[s] = emulated->log_evidence;
-    evidence.standard_error = std::max(evidence.standard_error, emulated->log_evidence_se);
+void WarmFits::WeighEvidence() {
+  for (auto& [effect, fit] : fits_) {
+    if (fit.runs.histories.rows() == 0) continue;
+    const report::RunTable runs = RunsFor(effect);
+    std::optional<ScaledEvidence> evidence = ScaledEvidence{};
+    for (std::size_t s = 0; evidence && s < kStrengthScales.size(); ++s) {
+      const auto emulated =
+          Emulate(WithStrengthScaled(fit.view.campaign, effect, kStrengthScales[s]),
+                  base_.readings(), runs);
+      if (!emulated.ok() || !emulated->adequate) {
+        evidence.reset();
+      } else {
+        evidence->log_evidence[s] = emulated->log_evidence;
+        evidence->standard_error = std::max(evidence->standard_error, emulated->log_evidence_se);
+      }
+    }
+    fit.evidence = evidence;
   }
-  found->second.evidence = evidence;
 }
 
 std::optional<double> WarmFits::BaseLogEvidence() const {
@@ -192,16 +200,39 @@ std::optional<double> WarmFits::BaseLogEvidence() const {
   return emulated->log_evidence;
 }
 
-void WarmFits::Judge(WarmFit& fit) const {
+void WarmFits::Judge(const std::string& effect) {
+  WarmFit& fit = fits_.at(effect);
   fit.model = ByRuns(fit.runs);
+  Eigen::MatrixXd points = fit.runs.parameters;
+  if (ByMean()) {
+    auto response = RespondTo(base_,
+                              {.campaign = fit.view.campaign,
+                               .runs = RunsFor(effect),
+                               .draws = fit.runs.parameters,
+                               .most_unknown = kMostUnknown},
+                              response_.nuisance);
+    if (!response.ok()) {  // not known yet, or no more than before
+      if (fit.iterations == 1) {
+        fit.adequacy.chi2 = std::numeric_limits<double>::infinity();
+        fit.adequacy.p_value = 0;
+      }
+      return;
+    }
+    fit.model = std::move(response->model);
+    points = std::move(response->points);
+  }
   const auto adequacy = inference::TestAdequacy(fit.model);
-  const auto advantage = inference::Compare(fit.model, BaseByRuns());
+  const auto advantage = inference::Compare(fit.model, Base());
   if (!adequacy.ok() || !advantage.ok()) return;
   fit.adequacy = *adequacy;
   fit.over_base = *advantage;
-  fit.best = PointOf(fit.view, fit.runs.parameters, adequacy->best);
-  fit.rms = std::sqrt(fit.runs.histories.rowwise().squaredNorm().minCoeff() /
-                      static_cast<double>(fit.runs.histories.cols()));
+  if (ByMean()) {
+    const auto p_value = inference::SignificanceOfGain(response_.model, fit.model);
+    fit.gain_p_value = p_value.ok() ? *p_value : 1;
+  }
+  fit.best = PointOf(fit.view, points, adequacy->best);
+  fit.rms = std::sqrt(fit.model.histories.rowwise().squaredNorm().minCoeff() /
+                      static_cast<double>(fit.model.histories.cols()));
   if (const auto error = inference::LeftOutError(fit.model, response_.parts); error.ok()) {
     fit.left_out_error = *error;
   }

@@ -1,8 +1,10 @@
 #pragma once
 // The model refitted with one effect more, for the few effects that a screen ranks first: small
 // batches of runs at points that all that has been run suggests (warm_points.h), until the fit is
-// adequate or comes no closer, continued where that promises most. Judged by runs, not by the
-// emulator: what an emulator does not know would excuse any misfit.
+// adequate or comes no closer, continued where that promises most. Where the scatter between
+// packings has been measured, a fit is judged by its mean history where an emulator knows that
+// well; single runs, each on one of few packings, would make it a lottery. Where it has not, by
+// runs: what an emulator does not know would excuse any misfit.
 
 #include <Eigen/Dense>
 #include <cstdint>
@@ -17,34 +19,9 @@
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/response.h"
-#include "server/ctl/strength_scale.h"
+#include "server/ctl/warm_fit.h"
 
 namespace calib::ctl {
-
-struct WarmFit {
-  report::CampaignView view{};  ///< its first batch, a campaign of the extended model
-  report::RunTable runs{};      ///< of all batches
-  int iterations = 0;
-  int idle = 0;                          ///< batches since one came clearly closer
-  bool stalled = false;                  ///< several batches have come no closer
-  std::map<std::string, double> best{};  ///< parameters of the run with the smallest chi2, SI
-  double rms = 0;                        ///< smallest of a run, residual over noise sd
-  inference::FittedModel model{};        ///< the runs as points
-  inference::Adequacy adequacy{};
-  inference::Advantage over_base{};
-  /// Of a part of the data that it was not fitted to; none where there is one part.
-  std::optional<double> left_out_error{};
-  /// None before WeighEvidence, or where the emulator does not know the runs well enough.
-  std::optional<ScaledEvidence> evidence{};
-
-  /// As close as noise and scatter allow: more runs are better spent on its rivals.
-  bool Satisfied() const { return adequacy.degrees > 0 && adequacy.chi2 <= adequacy.degrees; }
-
-  /// Adequate, and clearly better than the base model.
-  bool Explains(double level) const {
-    return adequacy.p_value >= level && over_base.nats > 2 * over_base.sd;
-  }
-};
 
 class WarmFits {
  public:
@@ -64,14 +41,15 @@ class WarmFits {
   }
 
   const WarmFit* Find(const std::string& effect) const;
+  const std::map<std::string, WarmFit>& all() const { return fits_; }
   std::int64_t evaluations() const { return evaluations_; }
 
-  /// The base model judged in the same way, by its runs.
-  inference::FittedModel BaseByRuns() const;
+  /// The base model judged in the same way.
+  inference::FittedModel Base() const;
 
-  /// The evidence of a fit that has runs; and that of the base model on an emulator of its own runs
-  /// (no effect, hence one figure; none as in WarmFit).
-  void WeighEvidence(const std::string& effect);
+  /// The evidence of the fits that have runs, and that of the base model on an emulator of its own
+  /// runs (no effect, hence one figure; none as in WarmFit).
+  void WeighEvidence();
   std::optional<double> BaseLogEvidence() const;
 
  private:
@@ -81,8 +59,9 @@ class WarmFits {
   const std::string* Next(const std::vector<std::string>& effects) const;
   absl::StatusOr<Eigen::MatrixXd> PointsFor(const std::string& effect) const;
   report::RunTable RunsFor(const std::string& effect) const;
-  void Judge(WarmFit& fit) const;
+  void Judge(const std::string& effect);
   inference::FittedModel ByRuns(const report::RunTable& runs) const;
+  bool ByMean() const { return base_.readings().measured; }
 
   const FittedCampaign& base_;
   const EffectScreen& screen_;

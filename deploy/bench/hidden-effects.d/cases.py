@@ -1,8 +1,8 @@
 """The matrix: what is hidden in each measurement, how strongly, and how the measurement was made.
 
-Strengths are set by detectability: lambda is the squared distance, in standard deviations of a measurement, between the
-model with the effect and what the model without it can imitate. Its scale comes from a diagnosis of a campaign without a
-hidden effect, which says from which strength on an effect would have been found with 90 % power (see laboratory.py).
+Strengths are set by what is visible: lambda is the squared distance, in standard deviations of a measurement, between the
+model with the effect and what the model without it can imitate, as simulated (see strengths.py). Where an effect does not
+reach a lambda within its range there is no such case.
 """
 import dataclasses, random
 
@@ -32,15 +32,16 @@ def matrix(strengths, repeats, controls):
         cases += [Case(f'control-{staging}-r{r + 1}', 'no hidden effect, other staging', 2000 + 100 * len(staging) + r,
                        staging=staging) for r in range(max(1, repeats))]
     for number, (effect, by_lambda) in enumerate(sorted(strengths.items())):
-        for strength in LAMBDAS:
+        for strength in sorted(by_lambda):
             row = 'measurement-side effect' if effect in MEASUREMENT_SIDE and strength > 10 else f'lambda = {strength}'
             cases += [Case(f'{effect}-l{strength}-r{r + 1}', row, 10000 + 1000 * number + strength + r, (effect,),
                            tuple(sorted(by_lambda[strength].items())),
                            verb='improve' if strength == 60 else 'diagnose') for r in range(repeats)]
-        cases.append(Case(f'removed-{effect}-r1', 'true effect removed', 10000 + 1000 * number + 500, (effect,),
-                          tuple(sorted(by_lambda[60].items())), removed=effect))
+        if 60 in by_lambda:
+            cases.append(Case(f'removed-{effect}-r1', 'true effect removed', 10000 + 1000 * number + 500, (effect,),
+                              tuple(sorted(by_lambda[60].items())), removed=effect))
     for number, pair in enumerate(PAIRS):
-        if not set(pair) <= set(strengths):
+        if not all(400 in strengths.get(effect, {}) for effect in pair):
             continue
         values = {k: v for effect in pair for k, v in strengths[effect][400].items()}
         cases += [Case(f'{pair[0]}+{pair[1]}-r{r + 1}', 'two effects at once', 40000 + 100 * number + r, pair,

@@ -1,16 +1,19 @@
 """Makes the measurements, runs the campaigns and keeps what came out; knows calibctl and files only."""
-import csv, hashlib, json, math, os, random, statistics, subprocess, threading
+import csv, hashlib, json, math, os, random, subprocess, sys
 
 YOUNG, FRICTION = (0.6e9, 1.2e9), (0.3, 0.6)     # where the truth is drawn from, well inside the priors
 NOISE = {'q_over_p': (0.015, 0.01), 'volumetric_strain': (0.0, 3e-4)}   # relative, absolute
 READINGS, STRAIN = 24, 0.08
 PRESSURES = {'low': ('0.1 MPa', 'calibrate'), 'high': ('0.4 MPa', 'calibrate'), 'held': ('0.2 MPa', 'validate')}
 STAGING = {'rate': 0.1, 'step': 0.004, 'grains': 300}
-LEVEL, POWER = 0.01, 0.9                          # of calibctl diagnose: `detectable`
 
 
 class Failed(Exception):
     pass
+
+
+def digest(text):
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def axial_strains():
@@ -62,7 +65,7 @@ class Laboratory:
         os.replace(path + '.new', path)
 
     # ---- measurements -------------------------------------------------------------------------------------------------
-    def campaign(self, seed, particles, staging, effects, parameters, realizations):
+    def campaign(self, seed, particles, staging, effects, parameters, realizations, tests=tuple(PRESSURES)):
         fixed = ''.join(f', {name}: {value!r}' for name, value in parameters)
         text = f"""name: hidden
 model: {{contact: hertz_mindlin, effects: [{', '.join(effects)}], density: 2650000 kg/m^3, fixed: {{poisson_ratio: 0.2{fixed}}}}}
@@ -71,7 +74,8 @@ parameters:
   friction_coefficient: {{prior: uniform, min: 0.1, max: 1.0}}
 """
         text += 'experiments:\n'
-        for name, (pressure, role) in PRESSURES.items():
+        for name in tests:
+            pressure, role = PRESSURES[name]
             text += f"""  - name: {name}
     test: triaxial_drained
     confining_pressure: {pressure}
@@ -121,7 +125,7 @@ parameters:
             self.write(self.path(case, name + '.csv'), text)
         sealed = json.dumps({'effects': case.effects, 'parameters': {**truth, **dict(case.parameters)}, 'staging': case.staging}, indent=1)
         self.write(os.path.join(self.folder, 'sealed', case.name + '.json'), sealed)
-        self.write(self.path(case, 'truth.sha256'), hashlib.sha256(sealed.encode()).hexdigest() + '\n')
+        self.write(self.path(case, 'truth.sha256'), digest(sealed) + '\n')
         for entry in os.listdir(work):
             os.remove(os.path.join(work, entry))
         os.rmdir(work)
@@ -132,7 +136,7 @@ parameters:
         """Verdict first, then the truth: its digest must be the one written down when the measurement was made."""
         verdict = json.load(open(self.path(case, 'verdict.json')))
         sealed = open(os.path.join(self.folder, 'sealed', case.name + '.json')).read()
-        if hashlib.sha256(sealed.encode()).hexdigest() != open(self.path(case, 'truth.sha256')).read().strip():
+        if digest(sealed) != open(self.path(case, 'truth.sha256')).read().strip():
             raise Failed(f'{case.name}: the sealed truth has been changed')
         return {'case': case, 'verdict': verdict, 'truth': json.loads(sealed)}
 
@@ -158,24 +162,23 @@ parameters:
                 return
         raise Failed('none of five measurements without a hidden effect was judged adequate')
 
-    def strengths(self):
-        """{effect: {lambda: {dotted parameter: value}}}: the detectable distance scaled from the null value."""
-        path = os.path.join(self.folder, 'detectable.json')
+    def strengths(self, jobs=0):
+        """{effect: {lambda: {dotted parameter: value}}}; measured once, with jobs > 0, and kept."""
+        import cases, strengths
+        path = os.path.join(self.folder, 'strengths.json')
         if not os.path.exists(path):
-            return {}
-        found = json.load(open(path))
-        normal = statistics.NormalDist()
-        reach = normal.inv_cdf(1 - LEVEL / found['candidates']) + normal.inv_cdf(POWER)
-        strengths = {}
-        for effect, values in found['detectable'].items():
-            infos = {f"{effect}.{p['name']}": p for p in self.catalogue()[effect]['parameters']}
-            for strength in (10, 60, 400):
-                own = {}
-                for name, value in values.items():
-                    null = infos[name]['null_value']
-                    null = infos[name].get('null_by_contact', {}).get('hertz_mindlin', null)
-                    # Parameters without a null shape the effect, they are held.
-                    moved = value if null is None else null + (value - null) * math.sqrt(strength) / reach
-                    own[name] = min(max(moved, infos[name]['min'] or -math.inf), infos[name]['max'] or math.inf)
-                strengths.setdefault(effect, {})[strength] = own
-        return strengths
+            if jobs == 0:
+                return {}
+            found = json.load(open(os.path.join(self.folder, 'detectable.json')))['detectable']
+            visible = strengths.Strengths(self, jobs)
+            visible.prepare()
+            document = {}
+            for effect, values in sorted(found.items()):
+                infos = {f"{effect}.{p['name']}": p for p in self.catalogue()[effect]['parameters']}
+                of_effect, measured = visible.of(effect, values, infos, cases.LAMBDAS)
+                document[effect] = {'strengths': of_effect, 'measured': measured}
+                print(f'{effect}: lambda ' + ', '.join(f'{value:.0f} +- {error:.0f} at {multiple:g}x' for multiple, value, error in measured),
+                      file=sys.stderr, flush=True)
+            self.write(path, json.dumps(document, indent=1))
+        document = json.load(open(path))
+        return {effect: {int(k): v for k, v in of['strengths'].items()} for effect, of in document.items()}

@@ -40,7 +40,7 @@ def run(case):
 
 if not arguments.table and not arguments.list:
     lab.measure_detectability()
-matrix = [c for c in cases.matrix(lab.strengths(), arguments.repeats, arguments.controls) if wanted(c.name)]
+matrix = [c for c in cases.matrix(lab.strengths(0 if arguments.table or arguments.list else arguments.jobs), arguments.repeats, arguments.controls) if wanted(c.name)]
 if arguments.list:
     print('\n'.join(c.name for c in matrix))
     sys.exit(0)

@@ -146,6 +146,42 @@ TEST(Diagnosis, BetterModelHasTheAdvantage) {
 
 // Two halves of a straight line predict each other; a line through the origin fitted to one half of
 // a parabola misses the other, and a model of many bumps that can follow each half alone does too.
+// The line with a sine of any amplitude.
+FittedModel LineAndSine(const Eigen::VectorXd& measured) {
+  FittedModel model = Line(measured);
+  const Eigen::MatrixXd line = model.histories;
+  constexpr int kSlopes = 61;  // from 5 to 20
+  constexpr int kAmplitudes = 41;
+  model.histories.resize(kSlopes * kAmplitudes, kReadings);
+  for (int g = 0; g < kSlopes; ++g) {
+    for (int a = 0; a < kAmplitudes; ++a) {
+      model.histories.row(g * kAmplitudes + a) =
+          line.row(1100 + 5 * g) + 0.2 * (a - kAmplitudes / 2) * Curve(2).transpose();
+    }
+  }
+  model.parameters = 2;
+  return model;
+}
+
+TEST(Diagnosis, GainOfAnExtensionIsAsRareAsItsPValueSays) {
+  int rare = 0;
+  double sum = 0;
+  constexpr int kDraws = 100;
+  for (int seed = 0; seed < kDraws; ++seed) {
+    const Eigen::VectorXd measured = 12 * Curve(0) + 2 * Noise(seed);
+    const auto p_value = SignificanceOfGain(LineWithDraws(measured, 2), LineAndSine(measured));
+    ASSERT_TRUE(p_value.ok());
+    rare += *p_value < 0.05 ? 1 : 0;
+    sum += *p_value;
+  }
+  EXPECT_LE(rare, 12);
+  EXPECT_NEAR(sum / kDraws, 0.5, 0.12);
+  const Eigen::VectorXd measured = 12 * Curve(0) + 3 * Curve(2) + 2 * Noise(1);
+  EXPECT_LT(*SignificanceOfGain(LineWithDraws(measured, 2), LineAndSine(measured)), 1e-4);
+  EXPECT_FALSE(SignificanceOfGain(Line(measured), LineAndSine(measured)).ok());  // no draws
+  EXPECT_FALSE(SignificanceOfGain(LineWithDraws(measured, 2), Line(measured)).ok());
+}
+
 TEST(Diagnosis, LeftOutReadingsAreMissedByAWrongModel) {
   std::vector<int> halves(kReadings, 0);
   std::fill(halves.begin() + kReadings / 2, halves.end(), 1);

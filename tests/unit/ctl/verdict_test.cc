@@ -1,0 +1,159 @@
+#include "server/ctl/verdict.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <string>
+
+namespace calib::ctl {
+namespace {
+
+constexpr int kReadings = 40;
+constexpr double kLevel = 0.01;
+constexpr double kAway = 400;  // chi2 of a model that is plainly wrong
+constexpr double kClose = 40;  // of one that is right
+
+// A model that can do one thing, with residuals of one size.
+inference::FittedModel Model(double chi2) {
+  inference::FittedModel model;
+  model.histories =
+      Eigen::MatrixXd::Constant(1, kReadings, std::sqrt(chi2 / static_cast<double>(kReadings)));
+  model.covariance.setIdentity(kReadings, kReadings);
+  model.parameters = 2;
+  return model;
+}
+
+class VerdictTest : public testing::Test {
+ protected:
+  VerdictTest() { diagnosis_.left_out_error = 3; }
+
+  // A refit, at its end unless told otherwise.
+  WarmFit& Refit(const std::string& effect, double chi2, double explained = 0.9) {
+    WarmFit fit;
+    fit.stalled = true;
+    fit.iterations = 4;
+    fit.runs.histories = Eigen::MatrixXd::Zero(1, kReadings);
+    fit.model = Model(chi2);
+    fit.adequacy = *inference::TestAdequacy(fit.model);
+    fit.over_base = *inference::Compare(fit.model, base_);
+    fit.left_out_error = 1;
+    CandidateEffect& candidate = diagnosis_.candidates.emplace_back();
+    candidate.effect = effect;
+    candidate.campaign = "c" + effect;
+    candidate.refit_chi2 = chi2;
+    candidate.explained_fraction = explained;
+    return fits_[effect] = fit;
+  }
+
+  const std::string& Concluded(bool base_fits = false) {
+    Verdict(diagnosis_, fits_, base_, kLevel).Conclude(base_fits);
+    return diagnosis_.verdict;
+  }
+
+  using Names = std::vector<std::string>;
+  const Names& Group() const { return diagnosis_.candidates.front().confusable_with; }
+
+  inference::FittedModel base_ = Model(kAway);
+  std::map<std::string, WarmFit> fits_;
+  Diagnosis diagnosis_;
+};
+
+TEST_F(VerdictTest, NothingToAddToAModelThatFits) { EXPECT_EQ(Concluded(true), "adequate"); }
+
+TEST_F(VerdictTest, NothingThatExplainsAModelThatDoesNotFit) {
+  Refit("rolling", 0.9 * kAway);
+  EXPECT_EQ(Concluded(), "unexplained");
+  EXPECT_EQ(diagnosis_.best_partial, "");  // no clear step
+  EXPECT_EQ(diagnosis_.effect, "");
+}
+
+TEST_F(VerdictTest, PartOfAMisfitIsSaid) {
+  Refit("rolling", 0.5 * kAway);
+  Refit("twisting", 0.4 * kAway);
+  EXPECT_EQ(Concluded(), "unexplained");
+  EXPECT_EQ(diagnosis_.best_partial, "twisting");
+}
+
+TEST_F(VerdictTest, TheOnlyOneThatExplainsIsNamed) {
+  Refit("rolling", kClose);
+  Refit("twisting", 0.5 * kAway);
+  EXPECT_EQ(Concluded(), "missing_effect");
+  EXPECT_EQ(diagnosis_.effect, "rolling");
+}
+
+TEST_F(VerdictTest, TwoThatDoAsWellAreNamedTogether) {
+  Refit("rolling", kClose);
+  Refit("twisting", 1.05 * kClose);
+  EXPECT_EQ(Concluded(), "ambiguous");
+  EXPECT_EQ(diagnosis_.effect, "");
+  EXPECT_EQ(Group(), Names{"twisting"});
+}
+
+TEST_F(VerdictTest, NoMoreThanThreeAreNamed) {
+  for (const char* name : {"a", "b", "c", "d"}) Refit(name, kClose);
+  EXPECT_EQ(Concluded(), "ambiguous");
+  EXPECT_EQ(Group(), (Names{"b", "c"}));
+}
+
+TEST_F(VerdictTest, ARefitThatHasNotEndedIsNotExcluded) {
+  Refit("rolling", kClose);
+  Refit("twisting", 3 * kClose, 0.8).stalled = false;
+  EXPECT_EQ(Concluded(), "ambiguous");
+  EXPECT_EQ(Group(), Names{"twisting"});
+  EXPECT_EQ(diagnosis_.unfinished, Names{"twisting"});
+}
+
+TEST_F(VerdictTest, ARefitThatIsFarOffAndPromisedLessIsExcluded) {
+  Refit("rolling", kClose);
+  Refit("twisting", 5 * kClose, 0.5).stalled = false;
+  EXPECT_EQ(Concluded(), "missing_effect");
+}
+
+TEST_F(VerdictTest, WhatTheScreenCannotTellFromItIsNamedUnlessItWasFitted) {
+  Refit("rolling", kClose);
+  Refit("twisting", 0.5 * kAway);
+  diagnosis_.candidates.front().confusable_with = {"twisting", "membrane"};
+  EXPECT_EQ(Concluded(), "ambiguous");
+  EXPECT_EQ(Group(), Names{"membrane"});
+}
+
+TEST_F(VerdictTest, AFitThatPredictsOtherReadingsWorseExplainsNothing) {
+  Refit("rolling", kClose).left_out_error = 4;
+  EXPECT_EQ(Concluded(), "unexplained");
+}
+
+TEST_F(VerdictTest, AGainThatChanceGivesExplainsNothing) {
+  Refit("rolling", kClose).gain_p_value = 0.6 * kLevel;
+  EXPECT_EQ(Concluded(), "missing_effect");
+  Refit("twisting", 0.9 * kAway);  // one of two refits
+  EXPECT_EQ(Concluded(), "unexplained");
+}
+
+TEST_F(VerdictTest, AHintThatHangsOnThePriorOfItsStrengthIsNone) {
+  base_ = Model(55);
+  Refit("rolling", kClose).over_base = {.nats = 8, .sd = 1};
+  diagnosis_.candidates.front().over_base_evidence =
+      ScaledEvidence{.log_evidence = {2, 1, -1}, .standard_error = 0};
+  EXPECT_EQ(Concluded(true), "adequate");
+  diagnosis_.candidates.front().over_base_evidence->log_evidence = {3, 2, 1};
+  EXPECT_EQ(Concluded(true), "missing_effect");
+}
+
+TEST_F(VerdictTest, AWorseFitThatEvidenceDoesNotOutweighStaysInTheGroup) {
+  WarmFit& rolling = Refit("rolling", 20);
+  Refit("twisting", 50);  // adequate, clearly worse
+  ScaledEvidence evidence{.log_evidence = {9, 9, 9}, .standard_error = 0};
+  rolling.evidence = evidence;
+  EXPECT_EQ(Concluded(), "ambiguous");  // twisting's is not known
+  diagnosis_.candidates.front().confusable_with.clear();
+  evidence.log_evidence = {1, 1, 9};
+  fits_["twisting"].evidence = evidence;
+  EXPECT_EQ(Concluded(), "ambiguous");  // not for every width
+  diagnosis_.candidates.front().confusable_with.clear();
+  fits_["twisting"].evidence->log_evidence = {1, 1, 1};
+  EXPECT_EQ(Concluded(), "missing_effect");
+}
+
+}  // namespace
+}  // namespace calib::ctl
