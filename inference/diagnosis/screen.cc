@@ -136,6 +136,21 @@ double TailOf(double gain, const std::vector<double>& simulated, std::size_t dif
   return std::min((1 + above) / (1 + n), std::max(tail, std::numeric_limits<double>::min()));
 }
 
+// Square of what an effect changes, without what chance adds to differences of single runs: from
+// products of different ones, each taken to the last strength. Of a single one its own square.
+double SquareOfEffect(const std::vector<Eigen::VectorXd>& differences,
+                      const std::vector<double>& strengths, double length) {
+  if (strengths.size() < 2 || strengths.size() != differences.size()) return length * length;
+  double sum = 0;
+  int pairs = 0;
+  for (std::size_t a = 0; a < differences.size(); ++a) {
+    for (std::size_t b = 0; b < a; ++b, ++pairs) {
+      sum += differences[a].dot(differences[b]) / (strengths[a] * strengths[b]);
+    }
+  }
+  return sum / pairs * strengths.back() * strengths.back();
+}
+
 }  // namespace
 
 absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
@@ -228,23 +243,28 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
       score.rms = std::sqrt(left.squaredNorm() / static_cast<double>(t));
     }
     score.p_value = TailOf(score.gain, simulated[c], candidates[c].differences.size());
-    Eigen::VectorXd strongest = Eigen::VectorXd::Zero(t);
+    std::vector<Eigen::VectorXd> rests;  // that the parameters do not imitate
     for (const Direction& direction : directions[c]) {
       // The point that imitates the effect best, seen from the fitted one.
       Index imitation = 0;
       (whitened->squares - 2 * (whitened->points.transpose() * (fitted + direction.whitened)))
           .minCoeff(&imitation);
-      const Eigen::VectorXd rest = fitted + direction.whitened - whitened->points.col(imitation);
-      if (rest.squaredNorm() > strongest.squaredNorm()) strongest = rest;
+      rests.emplace_back(fitted + direction.whitened - whitened->points.col(imitation));
     }
-    const double norm = strongest.norm();
-    visible.push_back(norm > 0 ? Eigen::VectorXd(strongest / norm) : strongest);
+    const auto longest = std::max_element(
+        rests.begin(), rests.end(),
+        [](const auto& x, const auto& y) { return x.squaredNorm() < y.squaredNorm(); });
+    const Eigen::VectorXd strongest = rests.empty() ? Eigen::VectorXd::Zero(t) : *longest;
+    const double length = strongest.norm();
+    visible.push_back(length > 0 ? Eigen::VectorXd(strongest / length) : strongest);
     const double sd =  // of a measurement along it
         model.draws.rows() > 0
             ? std::sqrt((visible.back().transpose() * whitened->draws).squaredNorm() /
                         static_cast<double>(model.draws.rows()))
             : 1;
-    score.detectable = norm > 0 ? reach * sd / norm : std::numeric_limits<double>::infinity();
+    const double square = SquareOfEffect(rests, candidates[c].strengths, length);
+    score.detectable =
+        square > 0 ? reach * sd / std::sqrt(square) : std::numeric_limits<double>::infinity();
     scores.push_back(std::move(score));
   }
   const double close = std::cos(25 * std::numbers::pi / 180);

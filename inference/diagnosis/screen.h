@@ -29,6 +29,9 @@ struct Signature {
   std::vector<Eigen::VectorXd> differences{};  ///< T each: with minus without the effect, one per
                                                ///< ray and strength tried
   bool two_sided = false;
+  /// Of each difference where all lie on one ray, else empty: ascending, > 0, in any unit. What
+  /// differences of single runs share is the effect, what they do not is chance.
+  std::vector<double> strengths{};
 };
 
 struct Adequacy {
@@ -50,8 +53,9 @@ struct Score {
   double amplitude = 0;  ///< in units of the difference that fits best
   int difference = 0;    ///< which one that is
   double rms = 0;        ///< of the history left, in noise sd
-  /// Smallest amplitude of the strongest difference found with 90 % power at this test's level;
-  /// infinite when the parameters imitate the effect completely.
+  /// Smallest amplitude of the strongest (the last where strengths are given) difference found with
+  /// 90 % power at this test's level; infinite when the parameters imitate the effect completely,
+  /// or differences at two strengths or more have nothing in common.
   double detectable = 0;
   std::vector<std::string> confusable_with{};  ///< signatures less than 25 degrees away
 };

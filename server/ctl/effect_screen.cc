@@ -134,7 +134,7 @@ absl::StatusOr<inference::Signature> EffectScreen::SignatureOf(const dem::Effect
                                                                const std::vector<Index>& runs,
                                                                std::size_t rows) {
   inference::Signature signature{
-      .name = effect.name, .differences = {}, .two_sided = effect.two_sided};
+      .name = effect.name, .differences = {}, .two_sided = effect.two_sided, .strengths = {}};
   std::vector<Step>& tried = tried_[effect.name];
   for (std::size_t k = 0; k < StepsOf(effect, rows).size(); ++k) {
     const Pair pair = PairOf(effect, k, runs, rows);
@@ -146,6 +146,7 @@ absl::StatusOr<inference::Signature> EffectScreen::SignatureOf(const dem::Effect
     signature.differences.emplace_back(
         (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
     tried.push_back(pair.step);
+    if (effect.rays.size() == 1) signature.strengths.push_back(pair.step.step);
     EffectRun run{.values = pair.with.rows.front().values, .history = with.histories.row(0)};
     run.values.insert(pair.with.fixed.begin(), pair.with.fixed.end());
     runs_with_[effect.name].push_back(std::move(run));

@@ -41,9 +41,9 @@ def matrix(strengths, repeats, controls):
             cases.append(Case(f'removed-{effect}-r1', 'true effect removed', 10000 + 1000 * number + 500, (effect,),
                               tuple(sorted(by_lambda[60].items())), removed=effect))
     for number, pair in enumerate(PAIRS):
-        if not all(400 in strengths.get(effect, {}) for effect in pair):
+        if not all(60 in strengths.get(effect, {}) for effect in pair):
             continue
-        values = {k: v for effect in pair for k, v in strengths[effect][400].items()}
+        values = {k: v for effect in pair for k, v in strengths[effect][max(strengths[effect])].items()}
         cases += [Case(f'{pair[0]}+{pair[1]}-r{r + 1}', 'two effects at once', 40000 + 100 * number + r, pair,
                        tuple(sorted(values.items())), verb='improve') for r in range(repeats)]
     # Interrupted runs are then a fair sample of the rows rather than the first few of them.

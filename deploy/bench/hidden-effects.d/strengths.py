@@ -105,15 +105,17 @@ class Strengths:
 
     def of(self, effect, detectable, infos, wanted):
         """{lambda: values} and what was measured: strengths by interpolation in logarithms; a lambda that no strength
-        within the effect's range reaches is left out."""
+        within the effect's default prior reaches is left out."""
         def at(multiple):
             own = {}
             for name, value in detectable.items():
                 null = infos[name]['null_value']
                 null = infos[name].get('null_by_contact', {}).get('hertz_mindlin', null)
                 moved = value if null is None else null + (value - null) * multiple  # what only shapes the effect is held
-                own[name] = min(max(moved, infos[name]['min'] if infos[name]['min'] is not None else -math.inf),
-                                infos[name]['max'] if infos[name]['max'] is not None else math.inf)
+                # Default priors of dimensionless parameters are taken as they are; others are scaled to the grains.
+                limits = infos[name]['default_prior'] if infos[name]['unit'] == '1' else infos[name]
+                low, high = limits.get('min'), limits.get('max')
+                own[name] = min(max(moved, -math.inf if low is None else low), math.inf if high is None else high)
             return own
         measured = []
         for multiple in MULTIPLES:
@@ -121,8 +123,8 @@ class Strengths:
             if found is None:
                 break
             measured.append((multiple, *found))
-            if found[0] > 2 * max(wanted):
-                break
+            if found[0] > 2 * max(wanted) or multiple >= 1 and found[0] <= 2 * found[1]:
+                break  # enough, or nothing to be seen
         strengths, highest = {}, 0
         rising = []
         for multiple, value, error in measured:  # beyond the chance of zero, and rising

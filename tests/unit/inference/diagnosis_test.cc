@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "inference/diagnosis/screen.h"
@@ -133,6 +134,32 @@ TEST(Diagnosis, SignatureThatTheParametersImitateIsNotDetectable) {
   EXPECT_GT(scores->front().detectable, 10);
   const auto sine = Screen(Line(12 * Curve(0) + Noise(4)), {{"sine", {2 * Curve(2)}, true}});
   EXPECT_LT(sine->front().detectable, 1);
+}
+
+// Differences of single runs: an effect, as strong as said, and chance that has nothing to do with
+// it.
+TEST(Diagnosis, ChanceInDifferencesOfRunsIsNotTakenForAnEffect) {
+  const FittedModel model = Line(12 * Curve(0));
+  std::vector<double> of_effect;
+  int unseen = 0;
+  constexpr int kDraws = 40;
+  for (int seed = 0; seed < kDraws; ++seed) {
+    const Eigen::VectorXd first = 2 * Noise(100 + 2 * seed);
+    const Eigen::VectorXd second = 2 * Noise(101 + 2 * seed);
+    const auto scores = Screen(model,
+                               {{"sine", {Curve(2) + first, 3 * Curve(2) + second}, true, {1, 3}},
+                                {"nothing", {first, second}, true, {1, 3}}},
+                               {.simulations = 50});
+    for (const Score& score : *scores) {
+      if (score.name == "sine") of_effect.push_back(score.detectable);
+      if (score.name == "nothing") unseen += std::isinf(score.detectable) ? 1 : 0;
+    }
+  }
+  const auto exact = Screen(model, {{"sine", {3 * Curve(2)}, true, {}}}, {.simulations = 50});
+  std::sort(of_effect.begin(), of_effect.end());
+  // Two candidates instead of one raise the level that must be reached a little.
+  EXPECT_NEAR(of_effect[kDraws / 2] / exact->front().detectable, 1.05, 0.15);
+  EXPECT_NEAR(unseen, kDraws / 2, 12);  // a product of chance is as often positive
 }
 
 TEST(Diagnosis, BetterModelHasTheAdvantage) {
