@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "server/ctl/laboratory.h"
+#include "server/ctl/test_plans.h"
 #include "server/report/campaign_view.h"
 
 namespace calib::ctl {
@@ -18,15 +19,6 @@ struct Rival {
   std::string name;  ///< of the effect; "base": the campaign's own model
   const report::CampaignView* view = nullptr;
   std::map<std::string, double> values;  ///< calibrated parameters, SI
-};
-
-struct PlannedExperiment {
-  std::string test;
-  std::map<std::string, double> settings;  ///< SI
-  bool unloading = false;                  ///< once, half-way of the loading
-  /// Chance to tell the two closest of the rivals apart at the 1 % level.
-  double expected_power = 0;
-  double distance = 0;  ///< between these two, in sd of a measurement
 };
 
 struct NextExperiment {

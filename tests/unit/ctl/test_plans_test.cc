@@ -1,0 +1,131 @@
+#include "server/ctl/test_plans.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "server/campaign/yaml_text.h"
+
+namespace calib::ctl {
+namespace {
+
+campaign::Experiment Triaxial(double pressure) {
+  campaign::Experiment experiment;
+  experiment.name = "dense";
+  experiment.test = "triaxial_drained";
+  experiment.settings["confining_pressure"] = pressure;
+  experiment.control_name = "axial_strain";
+  experiment.control = {0, 0.05, 0.1};
+  experiment.observables.push_back(
+      {.name = "q_over_p", .values = {0, 1, 1}, .sd = {0.1, 0.1, 0.3}});
+  dem::PackingRecipe recipe;
+  recipe.porosity = 0.4;
+  experiment.specimens = {recipe, recipe};
+  return experiment;
+}
+
+campaign::Campaign Measured() {
+  campaign::Campaign campaign;
+  campaign.experiments = {Triaxial(1e5), Triaxial(4e5)};
+  return campaign;
+}
+
+std::vector<double> StrainsOf(const TestPlan& plan) {
+  std::istringstream text(plan.data);
+  std::string line;
+  std::getline(text, line);
+  EXPECT_EQ(line, "axial_strain,q_over_p");
+  std::vector<double> strains;
+  while (std::getline(text, line)) strains.push_back(std::stod(line));
+  return strains;
+}
+
+int Count(const std::vector<TestPlan>& plans, const auto& condition) {
+  return static_cast<int>(std::count_if(plans.begin(), plans.end(), condition));
+}
+
+TEST(TestPlans, GridOfPressureDensityAndUnloading) {
+  const std::vector<TestPlan> plans = PlansFor(Measured());
+  const auto at = [](double pressure) {
+    return [pressure](const TestPlan& plan) {
+      return plan.experiment.test == "triaxial_drained" &&
+             std::abs(plan.experiment.settings.at("confining_pressure") / pressure - 1) < 1e-9;
+    };
+  };
+  EXPECT_EQ(Count(plans, at(1e5 / 4)), 1);
+  EXPECT_EQ(Count(plans, at(4 * 4e5)), 1);
+  EXPECT_EQ(Count(plans, at(2e5)), 3);  // looser, denser, with an unloading
+  for (const double porosity : {0.38, 0.42}) {
+    EXPECT_EQ(Count(plans,
+                    [porosity](const TestPlan& plan) {
+                      const auto& settings = plan.experiment.settings;
+                      return settings.contains("porosity") &&
+                             std::abs(settings.at("porosity") - porosity) < 1e-9;
+                    }),
+              1);
+  }
+  EXPECT_GE(Count(plans, [](const TestPlan& p) { return p.experiment.test != "triaxial_drained"; }),
+            1);
+  for (const TestPlan& plan : plans) {
+    const std::vector<double> strains = StrainsOf(plan);
+    EXPECT_GE(strains.size(), 40U);
+    EXPECT_EQ(std::is_sorted(strains.begin(), strains.end()), !plan.experiment.unloading);
+    EXPECT_NEAR(strains.back(), plan.experiment.test == "oedometric" ? 0.03 : 0.1, 1e-9);
+  }
+}
+
+TEST(TestPlans, SpecimensFromAFileKeepTheirDensity) {
+  campaign::Campaign campaign = Measured();
+  for (auto& experiment : campaign.experiments) experiment.specimens = {campaign::PackingFile{}};
+  const std::vector<TestPlan> plans = PlansFor(campaign);
+  EXPECT_FALSE(plans.empty());
+  EXPECT_EQ(
+      Count(plans, [](const TestPlan& p) { return p.experiment.settings.contains("porosity"); }),
+      0);
+}
+
+TEST(TestPlans, NoneWhereTheControlIsNotAnAxialStrainUnderAPressure) {
+  campaign::Campaign campaign = Measured();
+  campaign.experiments[0].loading_rate = 1;
+  EXPECT_TRUE(PlansFor(campaign).empty());
+  campaign = Measured();
+  campaign.experiments[0].control_name = "mean_stress";
+  EXPECT_TRUE(PlansFor(campaign).empty());
+  campaign = Measured();
+  for (auto& experiment : campaign.experiments) experiment.settings.clear();
+  EXPECT_TRUE(PlansFor(campaign).empty());
+}
+
+TEST(TestPlans, EntryKeepsWhatThePlanDoesNotChange) {
+  const auto original = campaign::ParseYaml(R"(name: dense
+test: triaxial_drained
+confining_pressure: 0.1 MPa
+role: validate
+packing: {generate: {particles: 300, void_ratio: 0.66, seed: 3}}
+data: {file: old.csv}
+observables:
+  q_over_p: {noise: {column: q_sd}}
+)");
+  ASSERT_TRUE(original.root);
+  const campaign::Campaign campaign = Measured();
+  const std::vector<TestPlan> plans = PlansFor(campaign);
+  const auto denser = std::find_if(plans.begin(), plans.end(), [](const TestPlan& plan) {
+    return plan.experiment.settings.contains("porosity");
+  });
+  ASSERT_NE(denser, plans.end());
+  const std::string text = campaign::ToYaml(EntryFor(*denser, PatternOf(campaign), *original.root));
+  for (const char* kept :
+       {"particles: 300", "seed: 3", "porosity: 0.42", "confining_pressure: 2"}) {
+    EXPECT_NE(text.find(kept), std::string::npos) << kept << " in\n" << text;
+  }
+  for (const char* gone : {"void_ratio", "role", "old.csv", "q_sd"}) {
+    EXPECT_EQ(text.find(gone), std::string::npos) << gone << " in\n" << text;
+  }
+  // The mean of the old readings' errors.
+  EXPECT_NE(text.find("absolute: 0.1666"), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace calib::ctl
