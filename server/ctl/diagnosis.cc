@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/ctl/effect_screen.h"
+#include "server/ctl/extension.h"
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
@@ -67,6 +68,11 @@ class Inquiry {
   absl::Status CheckPossible() const {
     const report::CampaignView& view = base_.view();
     const std::string& id = base_.id();
+    for (const std::string& effect : options_.without) {
+      if (std::string why = WhyUnknown(view.campaign, effect); !why.empty()) {
+        return absl::InvalidArgumentError(why);
+      }
+    }
     if (view.posterior.posterior_from().empty()) {
       return absl::FailedPreconditionError(absl::StrCat(
           "no iteration of ", id, " is complete, so nothing can be said about its model"));
@@ -123,6 +129,11 @@ class Inquiry {
     return absl::OkStatus();
   }
 
+  bool LeftOutAsAskedFor(const std::string& effect) const {
+    return std::find(options_.without.begin(), options_.without.end(), effect) !=
+           options_.without.end();
+  }
+
   // Runs that were made elsewhere cannot be repeated with an effect; what happens to their readings
   // can be calculated.
   absl::Status ScreenReadings() {
@@ -131,6 +142,7 @@ class Inquiry {
         EffectsOnReadings(campaign, response_.model.histories, diagnosis_.not_excitable);
     std::vector<inference::Signature> signatures;
     for (const ReadingEffect& effect : effects) {
+      if (LeftOutAsAskedFor(effect.effect)) continue;
       if (signatures.empty() || signatures.back().name != effect.effect) {
         signatures.push_back({.name = effect.effect,
                               .differences = {},
@@ -148,7 +160,9 @@ class Inquiry {
         continue;
       }
       diagnosis_.not_excitable.emplace_back(
-          effect.name, "the runs were made elsewhere, none can be made with it");
+          effect.name, LeftOutAsAskedFor(effect.name)
+                           ? "left out as asked for"
+                           : "the runs were made elsewhere, none can be made with it");
     }
     const auto scores = inference::Screen(
         response_.model, signatures,

@@ -38,6 +38,21 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
   EXPECT_EQ(Call("diagnose c1 --state s --workers 2 --json").out, first.out);
   EXPECT_EQ(Evaluations(), evaluations);
 
+  // Fewer candidates, no run more.
+  const std::string left_out = json["candidates"][0]["effect"];
+  const Answer without = Call("diagnose c1 --state s --workers 2 --json --without " + left_out);
+  ASSERT_EQ(without.code, 0) << without.err;
+  const Json others = without.json();
+  EXPECT_EQ(others["candidates"].size(), json["candidates"].size() - 1);
+  for (const Json& candidate : others["candidates"]) EXPECT_NE(candidate["effect"], left_out);
+  bool said = false;
+  for (const Json& effect : others["not_excitable"]) said = said || effect["effect"] == left_out;
+  EXPECT_TRUE(said) << without.out;
+  EXPECT_EQ(Evaluations(), evaluations);
+  const Answer magic = Call("diagnose c1 --state s --without magic");
+  EXPECT_EQ(magic.code, 2);
+  EXPECT_NE(magic.err.find("there is no effect magic"), std::string::npos) << magic.err;
+
   const Json improved = Call("improve c1 --state s --workers 2 --json").json();
   ASSERT_EQ(improved["steps"].size(), 1U) << improved;
   EXPECT_EQ(improved["steps"][0]["campaign"], "c1");
