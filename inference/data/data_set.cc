@@ -200,6 +200,21 @@ Eigen::MatrixXd ErrorCorrelation(const DataSet& data, std::pair<int, int> group,
   return correlation;
 }
 
+Eigen::MatrixXd ErrorCovariance(const DataSet& data) {
+  const auto t = static_cast<Eigen::Index>(data.readings.size());
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(t, t);
+  for (const auto& [key, readings] : GroupsOf(data)) {
+    const Eigen::MatrixXd correlation = ErrorCorrelation(data, key, readings);
+    for (Eigen::Index i = 0; i < correlation.rows(); ++i) {
+      for (Eigen::Index j = 0; j < correlation.cols(); ++j) {
+        covariance(readings[i], readings[j]) =
+            data.readings[readings[i]].sd * correlation(i, j) * data.readings[readings[j]].sd;
+      }
+    }
+  }
+  return covariance;
+}
+
 absl::Status ValidateData(const DataSet& data, NoiseMode noise) {
   if (data.readings.empty()) return absl::InvalidArgumentError("there are no readings.");
   for (const Reading& reading : data.readings) {

@@ -95,6 +95,9 @@ std::vector<NoiseGroup> NoiseGroupsOf(const DataSet& data);
 /// True where the errors of a group are correlated.
 bool IsCorrelated(const DataSet& data, std::pair<int, int> group);
 
+/// Covariance matrix of the errors of all readings, T x T, in the square of their units.
+Eigen::MatrixXd ErrorCovariance(const DataSet& data);
+
 /// Correlation matrix of the errors of a group's readings: the identity, exp(-distance / length) or
 /// that of its covariance.
 Eigen::MatrixXd ErrorCorrelation(const DataSet& data, std::pair<int, int> group,

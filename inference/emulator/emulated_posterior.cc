@@ -170,6 +170,54 @@ void AddScatter(const DataSet& data, const StateEmulator& emulator, EmulatedResu
   result.scatter_white = sd.array().square() * emulator.components().remainder.array();
 }
 
+// Draws of the posterior under errors whose scatter is that of refits [refit_spread.h]. prediction:
+// at the draws.
+void Widen(const JointPrior& priors, const DataSet& data, const EmulatorOptions& options,
+           const StateEmulator& emulator, const ScorePrediction& prediction, const Held& held,
+           EmulatedResult& result) {
+  const Index n = result.draws.rows();
+  const auto free = static_cast<Index>(held.free.size());
+  Eigen::VectorXd sd(static_cast<Index>(data.readings.size()));
+  for (Index k = 0; k < sd.size(); ++k) sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+  const Eigen::MatrixXd histories =
+      prediction.mean * emulator.components().basis.transpose() * sd.asDiagonal();
+  const Eigen::MatrixXd standard = ToStandard(priors, result.draws)(Eigen::all, held.free);
+  const Eigen::MatrixXd spread =
+      SpreadOfRefits(standard, histories, ErrorCovariance(data), *options.replicates);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(spread);
+  const Eigen::MatrixXd root =
+      parts.eigenvectors() * parts.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  constexpr int kAttempts = 100;  // then the draw stays: it lies in a corner of the prior
+  Eigen::VectorXd normal(free);
+  for (Index i = 0; i < n; ++i) {
+    PhiloxStream stream({.seed = options.seed,
+                         .purpose = StreamPurpose::kRefitSpread,
+                         .iteration = 0,
+                         .sample = static_cast<std::uint64_t>(i)});
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+      for (double& value : normal) value = stream.Normal();
+      const Eigen::VectorXd moved = standard.row(i).transpose() + root * normal;
+      Eigen::VectorXd point = result.draws.row(i);
+      for (Index k = 0; k < free; ++k) {
+        const auto j = static_cast<std::size_t>(held.free[static_cast<std::size_t>(k)]);
+        point[held.free[static_cast<std::size_t>(k)]] = priors[j].FromStandard(moved[k]);
+      }
+      if (!priors.InSupport(point)) continue;
+      result.draws.row(i) = point;
+      break;
+    }
+  }
+  const Eigen::MatrixXd after = ToStandard(priors, result.draws)(Eigen::all, held.free);
+  for (Index k = 0; k < free; ++k) {
+    const auto deviation = [k](const Eigen::MatrixXd& points) {
+      return (points.col(k).array() - points.col(k).mean()).matrix().norm();
+    };
+    if (deviation(standard) > 0) {
+      result.widened = std::max(result.widened, deviation(after) / deviation(standard));
+    }
+  }
+}
+
 // The errors in units of the noise sd, the inferred one with kInferred.
 void StateErrors(const TrainedEmulator& trained, double noise_variance, EmulatedResult& result) {
   const CrossValidation& check = trained.emulator.cross_validation();
@@ -251,6 +299,9 @@ absl::Status EmulatorOptions::Validate() const {
         "give the noise or let it be inferred.");
   }
   if (auto valid = training.Validate(); !valid.ok()) return valid;
+  if (replicates && replicates->departures.rows() < 2) {
+    return wrong("replicates", static_cast<double>(replicates->departures.rows()), "2 or more");
+  }
   if (draws < 100 || draws > 100000) return wrong("draws", draws, "100 to 1e5");
   if (!(target_cv > 0 && target_cv <= 2)) return wrong("target_cv", target_cv, "above 0 up to 2");
   if (steps < 1) return wrong("steps", steps, "1 or more");
@@ -326,6 +377,12 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   result.draws = held.Complete(state->samples);
   result.log_evidence = state->log_evidence;
   result.log_evidence_se = state->LogEvidenceStandardError();
+  ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, result.draws));
+  const double unknown = prediction.sd.squaredNorm();
+  if (options.replicates && options.noise == NoiseMode::kGiven) {
+    Widen(priors, data, options, trained->emulator, prediction, held, result);
+    prediction = trained->emulator.Predict(ToStandard(priors, result.draws));
+  }
   const Index n = result.draws.rows();
   const Eigen::VectorXd log_weights =
       Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
@@ -357,10 +414,8 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
     noise_variance = result.variance_factors.mean();
   }
   StateErrors(*trained, noise_variance, result);
-  const ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, result.draws));
   result.emulator_sd =
-      std::sqrt(prediction.sd.squaredNorm() /
-                (static_cast<double>(n) * static_cast<double>(data.readings.size()))) /
+      std::sqrt(unknown / (static_cast<double>(n) * static_cast<double>(data.readings.size()))) /
       std::sqrt(noise_variance);
   AddScatter(data, trained->emulator, result);
   AddPredictive(data, trained->emulator, prediction, options.seed, result);

@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -17,6 +18,7 @@
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/joint_prior.h"
+#include "inference/scatter/refit_spread.h"
 
 namespace calib::inference {
 
@@ -35,6 +37,8 @@ struct EmulatorOptions {
   double max_uncovered = 2;    ///< > 0
   double max_calibration = 2;  ///< > 1
   double max_unknown = 1;      ///< > 0
+  /// The posterior is widened until it covers refits of these, where there are any (kGiven).
+  std::optional<Replicates> replicates = {};
   std::uint64_t seed = 0;
   absl::Status Validate() const;
 };
@@ -63,6 +67,9 @@ struct EmulatedResult {
   double scatter = 0;
   double emulator_sd = 0;
   double calibration = 0;  ///< see CrossValidation
+  /// Factor by which refits of the replicates widened the posterior, the largest of a parameter's
+  /// sd.
+  double widened = 1;
 
   /// Scatter of a single run about the mean history, in units of the readings: covariance
   /// scatter_factor scatter_factor^T + diag(scatter_white).

@@ -23,6 +23,7 @@ enum class StreamPurpose : std::uint64_t {
   kExpectedImprovement = 22,
   kSensitivity = 23,
   kDiagnosisDraws = 24,
+  kRefitSpread = 25,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

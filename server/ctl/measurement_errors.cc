@@ -16,18 +16,9 @@ constexpr int kRunsAbout = 5;  // runs of a campaign or a warm fit about its bes
 
 // Correlated errors of the readings, one as variance.
 Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
-  const auto t = static_cast<Index>(data.readings.size());
-  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(t, t);
-  for (const auto& [key, readings] : inference::GroupsOf(data)) {
-    const Eigen::MatrixXd of_group = inference::ErrorCorrelation(data, key, readings);
-    for (Index i = 0; i < of_group.rows(); ++i) {
-      for (Index j = 0; j < of_group.cols(); ++j) {
-        correlation(readings[static_cast<std::size_t>(i)], readings[static_cast<std::size_t>(j)]) =
-            of_group(i, j);
-      }
-    }
-  }
-  return correlation;
+  const Eigen::MatrixXd covariance = inference::ErrorCovariance(data);
+  const Eigen::VectorXd inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  return inverse.asDiagonal() * covariance * inverse.asDiagonal();
 }
 
 // Noise, nuisance and scatter of measurements; `missed` holds what the emulator misses of single

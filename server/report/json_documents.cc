@@ -59,7 +59,8 @@ Json Emulator(const v1::Posterior& p) {
           {"cross_validated_error", e.error()},
           {"scatter", e.scatter()},
           {"calibration", e.calibration()},
-          {"unknown", e.unknown()}};
+          {"unknown", e.unknown()},
+          {"widened", e.widened()}};
 }
 
 // The posterior along the readings: means and coefficients of variation in the order of the

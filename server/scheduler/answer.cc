@@ -51,6 +51,7 @@ void AskEmulator(const Definition& definition, std::span<const inference::Iterat
   inference::EmulatorOptions options{.noise = filter.noise, .training = {}, .seed = filter.seed};
   options.training.scatter_share =
       definition.mean_data ? 0 : LargestScatterShare(definition.campaign);
+  options.replicates = definition.replicates;
   auto emulated = inference::EmulatedPosterior(
       definition.priors, definition.mean_data.value_or(definition.data), options, iterations);
   if (emulated.ok()) {

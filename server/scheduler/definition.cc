@@ -100,6 +100,7 @@ std::shared_ptr<const Definition> MakeDefinition(campaign::Campaign campaign) {
   return std::make_shared<const Definition>(Definition{.campaign = std::move(campaign),
                                                        .data = std::move(data),
                                                        .mean_data = std::nullopt,
+                                                       .replicates = std::nullopt,
                                                        .priors = std::move(priors),
                                                        .readings = std::move(readings)});
 }

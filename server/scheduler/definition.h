@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "inference/scatter/refit_spread.h"
 #include "server/campaign/campaign.h"
 #include "server/campaign/campaign_file.h"
 #include "server/store/reader.h"
@@ -40,6 +41,8 @@ struct Definition {
   inference::DataSet data;  ///< errors of a reading about a run
   /// Errors of a reading about the mean history, where the scatter of runs is part of `data`.
   std::optional<inference::DataSet> mean_data{};
+  /// Where the scatter has been measured on several packings.
+  std::optional<inference::Replicates> replicates{};
   inference::JointPrior priors;
   ReadingIndex readings;
 

@@ -417,7 +417,7 @@ absl::StatusOr<Plan> PlanNext(const Definition& definition, const store::Campaig
     return scatter.status();
   }
   const Definition with = DefinitionWith(definition, *scatter);
-  return Planner(with, campaign, reader, true, *std::move(scatter)).Next();
+  return Planner(with, campaign, reader, true, std::move(scatter->observables)).Next();
 }
 
 void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgress& progress,

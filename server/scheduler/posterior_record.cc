@@ -135,6 +135,7 @@ void AddEmulator(const Definition& definition, const inference::EmulatedResult& 
   out.set_scatter(emulated.scatter);
   out.set_calibration(emulated.calibration);
   out.set_unknown(emulated.emulator_sd);
+  out.set_widened(emulated.widened);
   if (emulated.adequate) {
     AddDraws(emulated.draws, message);
     AddBands(definition, emulated, message);

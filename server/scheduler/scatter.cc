@@ -1,6 +1,7 @@
 #include "server/scheduler/scatter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <utility>
@@ -72,6 +73,33 @@ absl::StatusOr<Eigen::MatrixXd> ReplicateRuns(const campaign::Campaign& campaign
   return runs;
 }
 
+Eigen::MatrixXd Departures(const campaign::Campaign& campaign, const inference::DataSet& data,
+                           const Eigen::MatrixXd& runs) {
+  auto packings = static_cast<std::size_t>(runs.rows());
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    if (experiment.role == Role::kCalibrate && experiment.specimens.size() > 1) {
+      packings = std::min(packings, experiment.specimens.size());
+    }
+  }
+  Eigen::MatrixXd finished(static_cast<Index>(packings), runs.cols());
+  Index count = 0;
+  for (Index r = 0; r < finished.rows(); ++r) {
+    if (runs.row(r).allFinite()) finished.row(count++) = runs.row(r);
+  }
+  if (count < 2) return Eigen::MatrixXd(0, runs.cols());
+  finished.conservativeResize(count, Eigen::NoChange);
+  Eigen::MatrixXd departures = finished.rowwise() - finished.colwise().mean();
+  for (Index k = 0; k < departures.cols(); ++k) {
+    const campaign::Experiment& experiment = campaign.experiments[static_cast<std::size_t>(
+        data.readings[static_cast<std::size_t>(k)].experiment)];
+    departures.col(k) *=
+        experiment.specimens.size() < 2
+            ? 0
+            : std::sqrt(campaign::ScatterShare(experiment) + 1 / static_cast<double>(count));
+  }
+  return departures;
+}
+
 }  // namespace
 
 int ReplicatesOf(const campaign::Campaign& campaign) {
@@ -95,9 +123,8 @@ double LargestScatterShare(const campaign::Campaign& campaign) {
   return largest;
 }
 
-absl::StatusOr<std::vector<ObservableScatter>> MeasureScatter(const Definition& definition,
-                                                              std::int64_t campaign,
-                                                              store::Reader& reader) {
+absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std::int64_t campaign,
+                                               store::Reader& reader) {
   const auto iterations = reader.Iterations(campaign);
   const auto all = reader.Samples(campaign);
   for (const absl::Status& status : {iterations.status(), all.status()}) {
@@ -113,12 +140,15 @@ absl::StatusOr<std::vector<ObservableScatter>> MeasureScatter(const Definition& 
       }
     }
   }
-  std::vector<ObservableScatter> result;
+  MeasuredScatter result;
   for (const Role role : {Role::kCalibrate, Role::kValidate}) {
     const inference::DataSet data = campaign::MakeDataSet(definition.campaign, role);
     const auto runs = ReplicateRuns(definition.campaign, data, campaign, samples, reader);
     if (!runs.ok()) {
       return runs.status();
+    }
+    if (role == Role::kCalibrate) {
+      result.departures = Departures(definition.campaign, data, *runs);
     }
     for (const auto& group : inference::GroupsOf(data)) {
       // Beyond its own packings an experiment's replicates are repetitions.
@@ -136,10 +166,10 @@ absl::StatusOr<std::vector<ObservableScatter>> MeasureScatter(const Definition& 
       if (count < 2) {
         continue;
       }
-      result.push_back(Fit(definition.campaign, data, group,
-                           inference::MomentsOfReplicates(finished.topRows(count))));
-      result.back().from = "realizations";
-      result.back().runs = static_cast<int>(count);
+      result.observables.push_back(Fit(definition.campaign, data, group,
+                                       inference::MomentsOfReplicates(finished.topRows(count))));
+      result.observables.back().from = "realizations";
+      result.observables.back().runs = static_cast<int>(count);
     }
   }
   return result;
@@ -168,8 +198,7 @@ std::vector<ObservableScatter> ScatterOfEmulator(const Definition& definition,
   return result;
 }
 
-Definition DefinitionWith(const Definition& definition,
-                          const std::vector<ObservableScatter>& scatter) {
+Definition DefinitionWith(const Definition& definition, const MeasuredScatter& scatter) {
   Definition with = definition;
   if (!campaign::IsFilter(definition.campaign.method) ||
       definition.campaign.filter.noise != inference::NoiseMode::kGiven) {
@@ -177,7 +206,7 @@ Definition DefinitionWith(const Definition& definition,
   }
   std::vector<inference::GroupScatter> groups;
   std::vector<inference::GroupScatter> of_mean;
-  for (const ObservableScatter& one : scatter) {
+  for (const ObservableScatter& one : scatter.observables) {
     const auto& experiment =
         definition.campaign.experiments[static_cast<std::size_t>(one.group.experiment)];
     if (experiment.role == Role::kCalibrate) {
@@ -190,6 +219,11 @@ Definition DefinitionWith(const Definition& definition,
   if (!groups.empty()) {
     with.data = inference::WithScatter(definition.data, groups, 1);
     with.mean_data = inference::WithScatter(definition.data, of_mean, 0);
+    if (scatter.departures.rows() > 0) {
+      with.replicates = {.departures = scatter.departures,
+                         .scatter = inference::ErrorCovariance(*with.mean_data) -
+                                    inference::ErrorCovariance(definition.data)};
+    }
   }
   return with;
 }

@@ -28,11 +28,18 @@ int ReplicatesOf(const campaign::Campaign& campaign);
 /// campaign::ScatterShare, the largest of the calibrated experiments.
 double LargestScatterShare(const campaign::Campaign& campaign);
 
+struct MeasuredScatter {
+  std::vector<ObservableScatter> observables{};
+  /// R x T, departures of the replicates that came to an end on as many packings as every
+  /// calibrated experiment with several has; of experiments with one packing zero. R is 0 or at
+  /// least 2.
+  Eigen::MatrixXd departures{};
+};
+
 /// Scatter of every observable of every experiment (held-out ones too) that has two or more
 /// finished replicates on different packings. Errors: those of the store.
-absl::StatusOr<std::vector<ObservableScatter>> MeasureScatter(const Definition& definition,
-                                                              std::int64_t campaign,
-                                                              store::Reader& reader);
+absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std::int64_t campaign,
+                                               store::Reader& reader);
 
 /// Of every calibrated observable, from what the emulator does not explain of single runs.
 std::vector<ObservableScatter> ScatterOfEmulator(const Definition& definition,
@@ -40,7 +47,6 @@ std::vector<ObservableScatter> ScatterOfEmulator(const Definition& definition,
 
 /// The definition with scatter in the errors of its readings, where that changes the posterior:
 /// filters with given noise. tmcmc and surrogate_msrs have decided by other errors.
-Definition DefinitionWith(const Definition& definition,
-                          const std::vector<ObservableScatter>& scatter);
+Definition DefinitionWith(const Definition& definition, const MeasuredScatter& scatter);
 
 }  // namespace calib::scheduler

@@ -1,0 +1,41 @@
+#include "inference/scatter/refit_spread.h"
+
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cassert>
+
+namespace calib::inference {
+
+using Eigen::Index;
+
+Eigen::MatrixXd SpreadOfRefits(const Eigen::MatrixXd& draws, const Eigen::MatrixXd& histories,
+                               const Eigen::MatrixXd& covariance, const Replicates& replicates) {
+  const Index count = replicates.departures.rows();
+  assert(count >= 2 && draws.rows() == histories.rows());
+  const Eigen::MatrixXd z = draws.rowwise() - draws.colwise().mean();
+  const Eigen::MatrixXd h = histories.rowwise() - histories.colwise().mean();
+  const auto n = static_cast<double>(draws.rows() - 1);
+  const Eigen::MatrixXd posterior = z.transpose() * z / n;
+  // The estimate moves by gain * difference of a measurement: C J^T K^-1, C J^T from the draws.
+  const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+  const Eigen::MatrixXd gain = factor.solve(h.transpose() * z / n).transpose();  // d x T
+  const Eigen::MatrixXd shifts = gain * replicates.departures.transpose();       // d x R
+  const auto freedom = static_cast<double>(count - 1);
+  constexpr double kQuantile = 0.95;
+  const double ratio = boost::math::quantile(boost::math::students_t(freedom), kQuantile) /
+                       boost::math::quantile(boost::math::normal(), kQuantile);
+  const Eigen::MatrixXd beyond = ratio * ratio / freedom * (shifts * shifts.transpose()) -
+                                 gain * replicates.scatter * gain.transpose();
+  // Its positive part, in coordinates in which the posterior is a unit sphere.
+  const Eigen::LLT<Eigen::MatrixXd> sphere(posterior);
+  if (factor.info() != Eigen::Success || sphere.info() != Eigen::Success) {
+    return Eigen::MatrixXd::Zero(draws.cols(), draws.cols());
+  }
+  const Eigen::MatrixXd half = sphere.matrixL().solve(beyond);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(
+      sphere.matrixL().solve(half.transpose()));
+  const Eigen::MatrixXd axes = sphere.matrixL() * parts.eigenvectors();
+  return axes * parts.eigenvalues().cwiseMax(0).asDiagonal() * axes.transpose();
+}
+
+}  // namespace calib::inference

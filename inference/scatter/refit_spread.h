@@ -1,0 +1,34 @@
+#pragma once
+// How far apart the parameters come out that are fitted to one packing or another. A likelihood
+// whose covariance of the scatter has a wrong form (here: one correlation length per observable,
+// none between observables) may be far too sure of them; replicates on several packings, each
+// fitted as if it were the measurement, show it without any assumption on that form.
+
+#include <Eigen/Dense>
+
+namespace calib::inference {
+
+/// Runs of one parameter vector on R >= 2 packings.
+struct Replicates {
+  /// R x T, what each departs from their mean, scaled to the variance that a measurement has about
+  /// the mean history: by sqrt(share + 1/R), see GroupScatter. Units of the readings.
+  Eigen::MatrixXd departures;
+  /// T x T, the part of the covariance of the readings' errors that stands for the same.
+  Eigen::MatrixXd scatter;
+};
+
+/// What must be added to the posterior's covariance of the parameters so that they scatter as
+/// refits of the replicates do: for a linear model, likelihood-dominated, the posterior under the
+/// covariance scatter + J Spread J^T, J the sensitivity of the histories. That covariance moves in
+/// directions only that the parameters absorb: neither misfit nor evidence changes by it. In a
+/// known direction refits vary with R - 1 degrees of freedom; their variance is taken times the
+/// square of Student's over the normal 95 % quantile (R = 4: 2.0, 10: 1.2). Never negative. in:
+/// draws S x d and histories S x T, of the posterior and the model's mean histories there;
+///     covariance T x T of the readings' errors, replicates.scatter included. Any unit of the
+///     parameters.
+/// out: d x d, positive semi-definite. For four packings intervals are then too long for some
+///     measurements and too short for others, right on average (README.md).
+Eigen::MatrixXd SpreadOfRefits(const Eigen::MatrixXd& draws, const Eigen::MatrixXd& histories,
+                               const Eigen::MatrixXd& covariance, const Replicates& replicates);
+
+}  // namespace calib::inference
