@@ -64,6 +64,9 @@ int main(int argc, char** argv) {
   auto* spec =
       app.add_option("--once", once.spec, "run this AttemptSpec (JSON or binary) and leave");
   app.add_option("--packing", once.packing, "packing file of --once")->needs(spec);
+  app.add_option("--mesh", once.meshes, "STL file of --once; may be repeated")
+      ->needs(spec)
+      ->allow_extra_args(false);
   app.add_option("-o,--output", once.output, "CSV file of --once [standard output]")->needs(spec);
   app.add_option("--vtk", once.vtk, "folder for the grains after each load step of --once")
       ->needs(spec);

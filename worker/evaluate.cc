@@ -40,12 +40,13 @@ v1::Finished Ended(v1::Finished::Outcome outcome, const absl::Status& status) {
 v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const dem::StateSink& sink,
                       std::stop_token stop, const dem::Recording& recording) {
   const auto start = std::chrono::steady_clock::now();
-  const auto packing = specimens.Get(spec, stop);
-  if (!packing.ok()) {
-    return Ended(v1::Finished::OUTCOME_FAILED, packing.status());
+  const auto specimen = specimens.Get(spec, stop);
+  if (!specimen.ok()) {
+    return Ended(v1::Finished::OUTCOME_FAILED, specimen.status());
   }
   dem::Scenario scenario = ScenarioFromSpec(spec);
-  scenario.packing = **packing;
+  scenario.packing = (*specimen)->packing;
+  scenario.meshes = (*specimen)->meshes;
   std::int64_t states = 0;
   const dem::StateSink counted = [&](const dem::State& state) {
     ++states;

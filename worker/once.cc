@@ -9,6 +9,8 @@
 #include <iterator>
 #include <optional>
 #include <ostream>
+#include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
@@ -47,21 +49,30 @@ absl::StatusOr<v1::AttemptSpec> ReadSpec(const std::string& path) {
   return spec;
 }
 
-/// The one packing file a single evaluation needs.
-Fetch FromFile(const std::string& path) {
-  return [path](const std::string& digest, std::stop_token) -> absl::StatusOr<std::string> {
-    if (path.empty()) {
-      return absl::InvalidArgumentError("the spec names a packing file: give it with --packing");
+/// The packing file and the meshes that a single evaluation needs, told apart by their digests.
+Fetch FromFiles(const v1::AttemptSpec& spec, const OnceOptions& options) {
+  const std::string packing = spec.packing_digest();
+  return [packing, options](const std::string& digest,
+                            std::stop_token) -> absl::StatusOr<std::string> {
+    const bool mesh = digest != packing;
+    const std::vector<std::string> paths = mesh ? options.meshes
+                                           : options.packing.empty()
+                                               ? std::vector<std::string>{}
+                                               : std::vector<std::string>{options.packing};
+    std::string found = mesh ? "the spec names a mesh: give its file with --mesh"
+                             : "the spec names a packing file: give it with --packing";
+    for (const std::string& path : paths) {
+      auto content = ReadFile(path);
+      if (!content.has_value()) {
+        return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
+      }
+      const std::string has = rpc::Sha256Hex(*content);
+      if (has == digest) {
+        return *std::move(content);
+      }
+      found = absl::StrCat(path, ": has SHA-256 ", has, ", the spec wants ", digest);
     }
-    auto content = ReadFile(path);
-    if (!content.has_value()) {
-      return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be read"));
-    }
-    if (const std::string found = rpc::Sha256Hex(*content); found != digest) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(path, ": has SHA-256 ", found, ", the spec wants ", digest));
-    }
-    return *std::move(content);
+    return absl::InvalidArgumentError(found);
   };
 }
 
@@ -69,12 +80,13 @@ Fetch FromFile(const std::string& path) {
 /// itself.
 std::string ProblemWith(const std::string& checkpoint, const v1::AttemptSpec& spec,
                         Specimens& specimens) {
-  const auto packing = specimens.Get(spec, {});
-  if (!packing.ok()) {
+  const auto specimen = specimens.Get(spec, {});
+  if (!specimen.ok()) {
     return "";
   }
   dem::Scenario scenario = ScenarioFromSpec(spec);
-  scenario.packing = **packing;
+  scenario.packing = (*specimen)->packing;
+  scenario.meshes = (*specimen)->meshes;
   return dem::CheckpointProblem(scenario, checkpoint);
 }
 
@@ -91,7 +103,7 @@ int RunOnce(const OnceOptions& options, std::ostream& errors) {
     errors << options.spec << ": there is no test \"" << spec->test() << "\"\n";
     return kBadSpec;
   }
-  Specimens specimens(FromFile(options.packing));
+  Specimens specimens(FromFiles(*spec, options));
   dem::Recording recording{.vtk_directory = options.vtk};
   if (!options.checkpoint.empty()) {
     recording.resume_from = ReadFile(options.checkpoint).value_or("");

@@ -3,6 +3,7 @@
 
 #include <iosfwd>
 #include <string>
+#include <vector>
 
 namespace calib::worker {
 
@@ -10,8 +11,9 @@ struct OnceOptions {
   std::string spec{};  ///< file with an AttemptSpec, JSON or binary protobuf
   std::string
       packing{};  ///< file whose text has the spec's packing_digest; empty: the spec has a recipe
-  std::string output{};  ///< CSV file; empty: standard output
-  std::string vtk{};     ///< folder for grains; empty: none
+  std::vector<std::string> meshes{};  ///< files that have the digests of the spec's meshes
+  std::string output{};               ///< CSV file; empty: standard output
+  std::string vtk{};                  ///< folder for grains; empty: none
   /// File that is replaced after each load step by what the run goes on from; when it is there, the
   /// run begins behind it. Empty: none.
   std::string checkpoint{};

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "dem/geometry/stl_file.h"
 #include "worker/scenario_from_spec.h"
 
 namespace calib::worker {
@@ -13,8 +14,12 @@ namespace {
 std::string KeyOf(const v1::AttemptSpec& spec) {
   const dem::TestInfo* test = dem::FindTest(spec.test());
   const char* kind = test != nullptr && test->poured ? "sizes " : "recipe ";
-  return spec.has_recipe() ? absl::StrCat(kind, spec.recipe().SerializeAsString())
-                           : spec.packing_digest();
+  std::string key = spec.has_recipe() ? absl::StrCat(kind, spec.recipe().SerializeAsString())
+                                      : spec.packing_digest();
+  for (const v1::Mesh& mesh : spec.meshes()) {
+    absl::StrAppend(&key, " mesh ", mesh.SerializeAsString());
+  }
+  return key;
 }
 
 }  // namespace
@@ -31,8 +36,8 @@ Specimens::~Specimens() {
   entries.clear();  // joins
 }
 
-absl::StatusOr<std::shared_ptr<const dem::Packing>> Specimens::Get(const v1::AttemptSpec& spec,
-                                                                   std::stop_token stop) {
+absl::StatusOr<std::shared_ptr<const Specimen>> Specimens::Get(const v1::AttemptSpec& spec,
+                                                               std::stop_token stop) {
   const std::stop_callback wake(stop, [this] {
     absl::MutexLock lock(&mutex_);
     changed_.SignalAll();
@@ -74,7 +79,20 @@ Specimens::Result Specimens::Make(const v1::AttemptSpec& spec, std::stop_token s
   if (!packing.ok()) {
     return packing.status();
   }
-  return std::make_shared<const dem::Packing>(*std::move(packing));
+  Specimen specimen{.packing = *std::move(packing), .meshes = {}};
+  for (const v1::Mesh& named : spec.meshes()) {
+    const auto content = fetch_(named.digest(), stop);
+    if (!content.ok()) {
+      return content.status();
+    }
+    auto mesh = ReadMesh(*content, named.scale());
+    if (!mesh.ok()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("mesh ", named.name(), ": ", mesh.status().message()));
+    }
+    specimen.meshes.emplace(named.name(), *std::move(mesh));
+  }
+  return std::make_shared<const Specimen>(std::move(specimen));
 }
 
 absl::StatusOr<dem::Packing> ReadPacking(const std::string& text) {
@@ -85,6 +103,16 @@ absl::StatusOr<dem::Packing> ReadPacking(const std::string& text) {
         absl::StrCat("packing file, line ", problems.front().line, ": ", problems.front().message));
   }
   return packing;
+}
+
+absl::StatusOr<dem::TriangleMesh> ReadMesh(const std::string& content, double scale) {
+  std::vector<dem::StlProblem> problems;
+  dem::TriangleMesh mesh = dem::ParseStl(content, scale, false, problems);
+  if (!problems.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("STL file, line ", problems.front().line, ": ", problems.front().message));
+  }
+  return mesh;
 }
 
 }  // namespace calib::worker

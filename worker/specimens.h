@@ -1,5 +1,5 @@
 #pragma once
-// The packings this process has fetched or generated, shared by its slots.
+// The packings and meshes this process has fetched or generated, shared by its slots.
 
 #include <functional>
 #include <map>
@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 #include "calib/v1/worker.pb.h"
+#include "dem/geometry/triangle_mesh.h"
 #include "dem/particles/packing.h"
 
 namespace calib::worker {
@@ -19,6 +20,12 @@ namespace calib::worker {
 /// Content by digest. Called on a thread of its own; should end soon after a stop is asked for.
 using Fetch =
     std::function<absl::StatusOr<std::string>(const std::string& digest, std::stop_token)>;
+
+/// What a run needs beside its spec.
+struct Specimen {
+  dem::Packing packing;
+  std::map<std::string, dem::TriangleMesh> meshes;  ///< by name of the piece they replace
+};
 
 /// Thread-safe. Slots that ask for the same specimen at the same time share one making of it; a
 /// slot that is stopped leaves without ending the making, which others may be waiting for.
@@ -30,13 +37,13 @@ class Specimens {
   Specimens(const Specimens&) = delete;
   Specimens& operator=(const Specimens&) = delete;
 
-  /// The packing a spec names. Errors: CANCELLED (stop), INVALID_ARGUMENT (unreadable content),
-  /// those of the fetch, and OUT_OF_RANGE of dem::GeneratePacking. Failures are not remembered.
-  absl::StatusOr<std::shared_ptr<const dem::Packing>> Get(const v1::AttemptSpec& spec,
-                                                          std::stop_token stop);
+  /// What a spec names. Errors: CANCELLED (stop), INVALID_ARGUMENT (unreadable content), those of
+  /// the fetch, and OUT_OF_RANGE of dem::GeneratePacking. Failures are not remembered.
+  absl::StatusOr<std::shared_ptr<const Specimen>> Get(const v1::AttemptSpec& spec,
+                                                      std::stop_token stop);
 
  private:
-  using Result = absl::StatusOr<std::shared_ptr<const dem::Packing>>;
+  using Result = absl::StatusOr<std::shared_ptr<const Specimen>>;
   struct Entry {
     bool ready = false;
     Result result = absl::UnavailableError("being made");
@@ -53,5 +60,8 @@ class Specimens {
 
 /// Parses the text of a packing file; INVALID_ARGUMENT names the first problem.
 absl::StatusOr<dem::Packing> ReadPacking(const std::string& text);
+
+/// Reads an STL file whose unit is `scale` [m]; INVALID_ARGUMENT names the first problem.
+absl::StatusOr<dem::TriangleMesh> ReadMesh(const std::string& content, double scale);
 
 }  // namespace calib::worker

@@ -282,6 +282,9 @@ std::string CatalogText() {
     for (const ParameterInfo& p : t.settings) {
       Append(text, p);
     }
+    for (const MeshInfo& m : t.meshes) {
+      absl::StrAppend(&text, "mesh ", m.name, ": ", m.description, "\n");
+    }
   }
   for (const auto& quantities :
        {ContactQuantities(), StageQuantities(), ContactTargets(), ReadingTargets()}) {

@@ -107,6 +107,12 @@ struct ControlRange {
   double max = 0;
 };
 
+/// A piece of a test's boundary that a mesh of the user's may replace.
+struct MeshInfo {
+  std::string name;
+  std::string description;  ///< what it replaces, its origin and axes
+};
+
 struct TestInfo {
   std::string name;
   std::string description;               ///< geometry, control, stages, what makes it fail
@@ -122,6 +128,7 @@ struct TestInfo {
                         ///< consolidation, no staging
   bool separate_points = false;  ///< every value of the control is a run of its own, in any order
   std::optional<ControlRange> control_range = {};  ///< empty: strains below 1, stresses above 0
+  std::vector<MeshInfo> meshes = {};
 };
 
 std::span<const ContactInfo> Contacts();

@@ -34,7 +34,7 @@ CALIB_DEM_CLONES void ClearExtras(ContactBlock& b) {
 }  // namespace
 
 ContactModel::ContactModel(const Model& model)
-    : sliding_friction_(SlidingFriction(model.parameters)) {
+    : common_(CommonChainOf(model)), sliding_friction_(SlidingFriction(model.parameters)) {
   std::vector<std::pair<ContactStage, std::shared_ptr<const ContactKernel>>> kernels;
   const ContactEntry& law = LawNamed(model.contact);
   const ParameterSet law_parameters = ResolveParameters(law.info.parameters, "", model.parameters);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "dem/contact/common_chain.h"
 #include "dem/contact/contact_kernel.h"
 #include "dem/formula/formula_kernel.h"
 #include "dem/simulation/scenario.h"
@@ -33,6 +34,9 @@ class ContactModel {
   /// set; its history is read and updated.
   void Evaluate(ContactBlock& block) const;
 
+  /// What EvaluateCommonChain() does in its place, where the chain is one of those.
+  [[nodiscard]] const std::optional<CommonChain>& common() const { return common_; }
+
   /// Where a user's formula has given no finite number since the model was made.
   [[nodiscard]] std::optional<ContactFault> Fault() const;
 
@@ -46,6 +50,7 @@ class ContactModel {
     int first_history = 0;
   };
   std::vector<Link> chain_;
+  std::optional<CommonChain> common_;
   std::vector<std::shared_ptr<const FormulaKernel>> formulas_;
   std::shared_ptr<StageState> stage_;
   int history_size_ = 0;

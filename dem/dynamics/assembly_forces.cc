@@ -139,10 +139,14 @@ void Assembly::EvaluateChunk(int chunk) {
       block.history = &history_[ColumnsOf(static_cast<std::size_t>(b))].lane;
     }
     block.count = std::min(kBlock, list_.size() - b * kBlock);
-    for (int k = 0; k < block.count; ++k) block.pair[k] = b * kBlock + k;
-    model_.Evaluate(block);
-    sums.contacts += CloseBlock(block.count, reach_, model_.history_size(), block,
-                                touching_.data() + static_cast<std::ptrdiff_t>(b) * kBlock);
+    std::uint8_t* const touching = touching_.data() + static_cast<std::ptrdiff_t>(b) * kBlock;
+    if (model_.common()) {
+      sums.contacts += EvaluateCommonChain(*model_.common(), block, touching);
+    } else {
+      for (int k = 0; k < block.count; ++k) block.pair[k] = b * kBlock + k;
+      model_.Evaluate(block);
+      sums.contacts += CloseBlock(block.count, reach_, model_.history_size(), block, touching);
+    }
     StoreLoads(lanes_, b, block, loads_.data(), sums.lanes);
   }
   sums_[static_cast<std::size_t>(chunk)] = sums;

@@ -48,6 +48,24 @@ Vec3 NearestPoint(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   return a + (vb * scale) * ab + (vc * scale) * ac;
 }
 
+Bounds BoundsOf(const TriangleMesh& mesh) {
+  Bounds bounds{.low = mesh.vertex.front(), .high = mesh.vertex.front()};
+  for (const Vec3& v : mesh.vertex) {
+    bounds.low = {std::min(bounds.low.x, v.x), std::min(bounds.low.y, v.y),
+                  std::min(bounds.low.z, v.z)};
+    bounds.high = {std::max(bounds.high.x, v.x), std::max(bounds.high.y, v.y),
+                   std::max(bounds.high.z, v.z)};
+  }
+  return bounds;
+}
+
+TriangleMesh Shifted(TriangleMesh mesh, const Vec3& by) {
+  for (Vec3& v : mesh.vertex) {
+    v = v + by;
+  }
+  return mesh;
+}
+
 namespace {
 
 int AddVertex(const Vec3& v, TriangleMesh& mesh) {

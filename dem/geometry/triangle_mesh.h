@@ -20,6 +20,16 @@ struct TriangleMesh {
 /// [Ericson 2005, Real-Time Collision Detection, sec. 5.1.5: regions of the Voronoi diagram]
 Vec3 NearestPoint(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c);
 
+/// Corners of the smallest box along the axes that holds all vertices [m]. Precondition: there is
+/// one.
+struct Bounds {
+  Vec3 low, high;
+};
+Bounds BoundsOf(const TriangleMesh& mesh);
+
+/// The mesh moved by a vector [m].
+TriangleMesh Shifted(TriangleMesh mesh, const Vec3& by);
+
 /// Two triangles a b c, a c d. Preconditions: the corners lie in a plane, in order around it.
 void AddQuad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, TriangleMesh& mesh);
 

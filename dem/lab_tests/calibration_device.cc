@@ -33,7 +33,13 @@ GravityTestEntry CalibrationDevice() {
           .reference = "Samuelsson 2023, sec. 4.1",
           .poured = true,
           .separate_points = true,
-          .control_range = ControlRange{.min = 0, .max = 1e6}}};
+          .control_range = ControlRange{.min = 0, .max = 1e6},
+          .meshes = {{.name = "slide",
+                      .description =
+                          "replaces the plate. Origin: the middle of the plate's lower end as "
+                          "slide_angle and slide_length place it, which place the hopper too; x "
+                          "towards the hopper, z upwards, y across the slice, beyond both faces of "
+                          "which it has to reach by a largest grain diameter"}}}};
 }
 
 }  // namespace calib::dem

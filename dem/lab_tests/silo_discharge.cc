@@ -38,7 +38,13 @@ GravityTestEntry SiloDischarge() {
               "Hadjidoukas et al. 2014, sec. 5.3; Beverloo et al., Chem. Eng. Sci. 15 (1961) 260",
           .poured = true,
           .separate_points = true,
-          .control_range = ControlRange{.min = 0, .max = 1000}}};
+          .control_range = ControlRange{.min = 0, .max = 1000},
+          .meshes = {{.name = "silo",
+                      .description =
+                          "replaces the cylinder (not with flat, nor with silo_width): a vessel "
+                          "open at the top, whose cross-sections are such that every place within "
+                          "sees wall along x and y in both directions. Origin: the middle of the "
+                          "outlet in the level floor, on which it stands; z upwards"}}}};
 }
 
 }  // namespace calib::dem

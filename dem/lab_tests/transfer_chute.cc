@@ -32,7 +32,13 @@ GravityTestEntry TransferChute() {
                    .reference = "Samuelsson 2023, sec. 4.3",
                    .poured = true,
                    .separate_points = true,
-                   .control_range = ControlRange{.min = 0, .max = 100}}};
+                   .control_range = ControlRange{.min = 0, .max = 100},
+                   .meshes = {{.name = "funnel",
+                               .description =
+                                   "replaces the funnel, and the belt runs three largest grain "
+                                   "diameters above its highest point. Origin: the middle of the "
+                                   "lower opening, below which nothing reaches; x along the belt, "
+                                   "z upwards; the settings shift and turn it"}}}};
 }
 
 }  // namespace calib::dem

@@ -39,33 +39,42 @@ CellGrid::CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, do
   }
 }
 
-std::vector<GridNeighbor> CellGrid::Around(int cell) const {
+void CellGrid::RunsAround(int cell, std::vector<GridRun>& runs) const {
   const int cx = cell % count_[0];
   const int cy = cell / count_[0] % count_[1];
   const int cz = cell / count_[0] / count_[1];
-  std::vector<GridNeighbor> around;
-  around.reserve(27);
+  runs.clear();
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
+      int last = -1;  // where the run at hand ends
       for (int dx = -1; dx <= 1; ++dx) {
         const int raw[3] = {cx + dx, cy + dy, cz + dz};
-        GridNeighbor neighbor;
+        GridRun run;
         int wrapped[3];
         bool outside = false;
         for (int a = 0; a < 3; ++a) {
           const int count = count_[static_cast<std::size_t>(a)];
-          neighbor.shift[a] = raw[a] < 0 ? -1 : (raw[a] >= count ? 1 : 0);
-          outside = outside || (neighbor.shift[a] != 0 && open_[static_cast<std::size_t>(a)]);
-          wrapped[a] = raw[a] - neighbor.shift[a] * count;
+          run.shift[a] = raw[a] < 0 ? -1 : (raw[a] >= count ? 1 : 0);
+          outside = outside || (run.shift[a] != 0 && open_[static_cast<std::size_t>(a)]);
+          wrapped[a] = raw[a] - run.shift[a] * count;
         }
-        neighbor.cell = wrapped[0] + count_[0] * (wrapped[1] + count_[1] * wrapped[2]);
-        if (!outside) {
-          around.push_back(neighbor);
+        const int c = wrapped[0] + count_[0] * (wrapped[1] + count_[1] * wrapped[2]);
+        run.begin = begin(c);
+        run.end = begin(c + 1);
+        if (outside || run.begin == run.end) {
+          continue;
         }
+        run.largest = grains_[static_cast<std::size_t>(run.end) - 1];
+        if (last == run.begin && runs.back().shift[0] == run.shift[0]) {
+          runs.back().end = run.end;
+          runs.back().largest = std::max(runs.back().largest, run.largest);
+        } else {
+          runs.push_back(run);
+        }
+        last = run.end;
       }
     }
   }
-  return around;
 }
 
 }  // namespace calib::dem

@@ -9,10 +9,12 @@
 
 namespace calib::dem {
 
-/// A neighbouring grid cell and the shift of the periodic image it is seen in.
-struct GridNeighbor {
-  int cell = 0;
+/// Grains [begin, end) of grains() that lie in neighbouring grid cells beside each other along x,
+/// and the shift of the periodic image they are seen in.
+struct GridRun {
+  int begin = 0, end = 0;
   int shift[3] = {0, 0, 0};
+  int largest = -1;  ///< index of a grain among them; -1: there is none
 };
 
 class CellGrid {
@@ -27,9 +29,10 @@ class CellGrid {
   [[nodiscard]] const std::vector<int>& grains() const { return grains_; }
   [[nodiscard]] int cell_of(int grain) const { return cell_of_[static_cast<std::size_t>(grain)]; }
 
-  /// Up to 27 cells around and including `cell`. With fewer than three cells along an axis a cell
-  /// may appear in several images; the caller keeps the image that is within its range.
-  [[nodiscard]] std::vector<GridNeighbor> Around(int cell) const;
+  /// The grains of up to 27 cells around and including `cell`, as runs. With fewer than three cells
+  /// along an axis a cell may appear in several images; the caller keeps the image that is within
+  /// its range.
+  void RunsAround(int cell, std::vector<GridRun>& runs) const;
 
  private:
   std::array<int, 3> count_ = {1, 1, 1};

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+#include <cstdint>
+#include <span>
 
 #include "absl/strings/str_cat.h"
 #include "dem/neighbor/cell_grid.h"
@@ -63,6 +64,47 @@ void AssignPlaces(int grains, NeighborList& list) {
   }
 }
 
+/// A grain as the search reads it, in the order of the grid.
+struct GridGrain {
+  double x, y, z, radius;
+  int index;
+};
+
+std::vector<GridGrain> InGridOrder(const CellGrid& grid, const ParticleArrays& p) {
+  std::vector<GridGrain> grains;
+  grains.reserve(p.x.size());
+  for (const int g : grid.grains()) {
+    const auto q = static_cast<std::size_t>(g);
+    grains.push_back({.x = p.x[q], .y = p.y[q], .z = p.z[q], .radius = p.radius[q], .index = g});
+  }
+  return grains;
+}
+
+/// Grain j and the image it is seen in, in one number that sorts by j.
+using Neighbor = std::uint64_t;
+constexpr int kImageBits = 8;
+constexpr Neighbor kImageMask = (Neighbor{1} << kImageBits) - 1;
+
+/// Appends those grains of a run that are listed with `self`: written always, counted where near,
+/// since which they are cannot be foreseen.
+Neighbor* KeepNear(const GridGrain& self, double skin, const double (&shift)[3], int code,
+                   std::span<const GridGrain> run, Neighbor* end) {
+  const double sx = shift[0] - self.x;
+  const double sy = shift[1] - self.y;
+  const double sz = shift[2] - self.z;
+  const double reach = self.radius + skin;
+  for (const GridGrain& other : run) {
+    const double dx = other.x + sx;
+    const double dy = other.y + sy;
+    const double dz = other.z + sz;
+    const double limit = reach + other.radius;
+    *end = static_cast<Neighbor>(other.index) << kImageBits | static_cast<Neighbor>(code);
+    end += static_cast<int>(other.index > self.index) &
+           static_cast<int>(dx * dx + dy * dy + dz * dz < limit * limit);
+  }
+  return end;
+}
+
 }  // namespace
 
 absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleArrays& p,
@@ -85,40 +127,45 @@ absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleAr
   list.first.clear();
   list.second.clear();
   list.image.clear();
-  std::vector<std::pair<int, std::uint8_t>> found;  // neighbour j > i, image
+  const std::vector<GridGrain> grains = InGridOrder(grid, p);
+  std::vector<Neighbor> found(grains.size() + 1);
   const double tilt = cell.Tilt();
   int grid_cell = -1;
-  std::vector<GridNeighbor> around;
+  std::vector<GridRun> around;
   for (int i = 0; i < p.size(); ++i) {
     if (grid.cell_of(i) != grid_cell) {
       grid_cell = grid.cell_of(i);
-      around = grid.Around(grid_cell);
+      grid.RunsAround(grid_cell, around);
     }
-    found.clear();
-    for (const GridNeighbor& neighbor : around) {
-      const double sx = neighbor.shift[0] * cell.length[0] + neighbor.shift[2] * tilt - p.x[i];
-      const double sy = neighbor.shift[1] * cell.length[1] - p.y[i];
-      const double sz = neighbor.shift[2] * cell.length[2] - p.z[i];
-      const double reach = p.radius[i] + skin;
-      const int end = grid.begin(neighbor.cell + 1);
-      for (int g = grid.begin(neighbor.cell); g < end; ++g) {
-        const int j = grid.grains()[static_cast<std::size_t>(g)];
-        const double dx = p.x[j] + sx;
-        const double dy = p.y[j] + sy;
-        const double dz = p.z[j] + sz;
-        const double limit = reach + p.radius[j];
-        if (j > i && dx * dx + dy * dy + dz * dz < limit * limit &&
-            !OfOneBody(p, static_cast<std::size_t>(i), static_cast<std::size_t>(j))) {
-          found.emplace_back(j, static_cast<std::uint8_t>(ImageCode(
-                                    neighbor.shift[0], neighbor.shift[1], neighbor.shift[2])));
+    const GridGrain self{.x = p.x[i], .y = p.y[i], .z = p.z[i], .radius = p.radius[i], .index = i};
+    Neighbor* end = found.data();
+    for (const GridRun& run : around) {
+      if (run.largest > i) {
+        const double shift[3] = {run.shift[0] * cell.length[0] + run.shift[2] * tilt,
+                                 run.shift[1] * cell.length[1], run.shift[2] * cell.length[2]};
+        const int code = ImageCode(run.shift[0], run.shift[1], run.shift[2]);
+        // With few cells along an axis a grain may be met in several images.
+        const auto room = static_cast<std::size_t>(end - found.data()) +
+                          static_cast<std::size_t>(run.end - run.begin);
+        if (room >= found.size()) {
+          const auto size = end - found.data();
+          found.resize(2 * room);
+          end = found.data() + size;
         }
+        end = KeepNear(self, skin, shift, code,
+                       {&grains[static_cast<std::size_t>(run.begin)],
+                        static_cast<std::size_t>(run.end - run.begin)},
+                       end);
       }
     }
-    std::sort(found.begin(), found.end());
-    for (const auto& [j, image] : found) {
-      list.first.push_back(i);
-      list.second.push_back(j);
-      list.image.push_back(image);
+    std::sort(found.data(), end);
+    for (const Neighbor* n = found.data(); n != end; ++n) {
+      const auto j = static_cast<int>(*n >> kImageBits);
+      if (!OfOneBody(p, static_cast<std::size_t>(i), static_cast<std::size_t>(j))) {
+        list.first.push_back(i);
+        list.second.push_back(j);
+        list.image.push_back(static_cast<std::uint8_t>(*n & kImageMask));
+      }
     }
     list.row.push_back(list.size());
   }

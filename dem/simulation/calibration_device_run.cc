@@ -176,7 +176,11 @@ StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point
   AddPlate(shift - 0.5 * device.opening, device.outlet, shift + 0.5 * device.opening, device.outlet,
            device.depth, d, trapdoor);
   TriangleMesh slide;
-  AddPlate(here.upper_x, here.upper_z, here.lower_x, here.lower_z, device.depth, d, slide);
+  if (const TriangleMesh* own = run.Mesh("slide"); own != nullptr) {
+    slide = Shifted(*own, {here.lower_x, 0.5 * device.depth, here.lower_z});
+  } else {
+    AddPlate(here.upper_x, here.upper_z, here.lower_x, here.lower_z, device.depth, d, slide);
+  }
   AddPlate(here.upper_x, here.upper_z, here.upper_x, device.outlet, device.depth, d, slide);
   Assembly assembly = run.Make(
       grains, {.open = {true, false, true},
@@ -199,6 +203,16 @@ StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point
 
 StageEnd RunCalibrationDevice(GravityRun& run) {
   const Device device = Plan(run);
+  if (const TriangleMesh* slide = run.Mesh("slide"); slide != nullptr) {
+    const Bounds bounds = BoundsOf(*slide);
+    const double reach = 0.5 * device.depth + run.largest_diameter();
+    const double found = std::min(-bounds.low.y, bounds.high.y);
+    if (!(found >= (1 - 1e-6) * reach)) {
+      return run.Fail(absl::StrCat("mesh slide reaches to ", found, " m from its middle along y, ",
+                                   "the slice and a grain beyond it take ", reach,
+                                   " m: widen it, or set a smaller depth"));
+    }
+  }
   return run.Walk([&](const ControlPoint& point) { return Repeat(run, device, point); });
 }
 

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "dem/simulation/test_meshes.h"
 
 namespace calib::dem {
 
@@ -71,6 +72,11 @@ double GravityRun::Setting(const std::string& name) const {
 double GravityRun::SettingOr(const std::string& name, double chosen) const {
   const double given = Setting(name);
   return given > 0 ? given : chosen;
+}
+
+const TriangleMesh* GravityRun::Mesh(const std::string& name) const {
+  const auto it = scenario_.meshes.find(name);
+  return it == scenario_.meshes.end() ? nullptr : &it->second;
 }
 
 double GravityRun::fall_time() const { return std::sqrt(mean_diameter_ / gravity()); }
@@ -155,6 +161,9 @@ absl::StatusOr<Summary> RunGravityTest(const Scenario& scenario, RunRecord& reco
       {"rotating_drum", &RunRotatingDrum},    {"calibration_device", &RunCalibrationDevice},
       {"transfer_chute", &RunTransferChute},  {"shaken_box", &RunShakenBox}};
   GravityRun run(scenario, record, std::move(stop));
+  if (auto problem = MeshSizeProblem(scenario, run.largest_diameter()); !problem.empty()) {
+    return run.Finish(run.Fail(std::move(problem)));
+  }
   return run.Finish(procedures.at(scenario.test)(run));
 }
 

@@ -57,6 +57,9 @@ class GravityRun {
   /// The setting, or `chosen` where it is 0.
   [[nodiscard]] double SettingOr(const std::string& name, double chosen) const;
 
+  /// The mesh that replaces a piece of the test's boundary, or nullptr.
+  [[nodiscard]] const TriangleMesh* Mesh(const std::string& name) const;
+
   [[nodiscard]] const std::vector<double>& radii() const { return scenario_.packing.radius; }
   [[nodiscard]] double mean_diameter() const { return mean_diameter_; }
   [[nodiscard]] double largest_diameter() const { return largest_diameter_; }

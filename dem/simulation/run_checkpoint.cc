@@ -105,6 +105,15 @@ std::string PathBytes(const std::vector<ControlPoint>& path) {
   return std::move(archive.bytes());
 }
 
+std::string MeshBytes(const std::map<std::string, TriangleMesh>& meshes) {
+  SaveArchive archive;
+  for (auto [name, mesh] : meshes) {
+    std::string key = name;
+    archive(key, mesh.vertex, mesh.triangle);
+  }
+  return std::move(archive.bytes());
+}
+
 std::vector<Part> PartsOf(const Scenario& s) {
   std::optional<double> axial;
   std::optional<double> lateral;
@@ -128,7 +137,8 @@ std::vector<Part> PartsOf(const Scenario& s) {
           {"staging", OptionalBytes({s.staging.rate, s.staging.step, s.staging.damping_loading,
                                      s.staging.damping_settling, s.staging.unbalanced})},
           {"control path", PathBytes(s.path)},
-          {"seed", Bytes(s.seed)}};
+          {"seed", Bytes(s.seed)},
+          {"meshes", MeshBytes(s.meshes)}};
 }
 
 std::vector<std::string> Differences(const std::vector<Part>& found,

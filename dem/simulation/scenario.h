@@ -13,6 +13,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "dem/formula/user_effect.h"
+#include "dem/geometry/triangle_mesh.h"
 #include "dem/particles/packing.h"
 
 namespace calib::dem {
@@ -67,6 +68,8 @@ struct Scenario {
   std::map<std::string, double>
       settings;  ///< the test's settings by name, e.g. confining_pressure [Pa]
   Packing packing;
+  std::map<std::string, TriangleMesh> meshes = {};  ///< by name of TestInfo::meshes, with the
+                                                    ///< origin and axes that stand there [m]
   Consolidation consolidation;
   std::optional<InitialStress> initial_stress;
   std::optional<double> loading_rate;  ///< [1/s]: real-rate loading instead of staged quasi-static

@@ -10,6 +10,7 @@
 #include "dem/lab_tests/collision.h"
 #include "dem/simulation/collision_run.h"
 #include "dem/simulation/scenario.h"
+#include "dem/simulation/test_meshes.h"
 
 namespace calib::dem {
 namespace {
@@ -352,6 +353,9 @@ std::vector<std::string> ScenarioProblems(const Scenario& scenario) {
     CheckShapes(scenario, poured, problems);
   }
   CheckTest(scenario, problems);
+  if (test != nullptr) {
+    CheckMeshes(scenario, *test, problems);
+  }
   CheckFormulas(scenario, problems);
   CheckPreparation(scenario, problems);
   return problems;

@@ -2,9 +2,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "dem/geometry/mesh_interior.h"
 #include "dem/simulation/gravity_run.h"
 
 namespace calib::dem {
@@ -166,6 +168,12 @@ StageEnd RunSiloDischarge(GravityRun& run) {
   const double d = run.largest_diameter();
   Silo silo{.flat = run.Setting("flat") >= 0.5};
   silo.width = run.SettingOr("silo_width", (silo.flat ? 40 : 12) * run.mean_diameter());
+  TriangleMesh vessel;  // the user's, about the outlet
+  if (run.Mesh("silo") != nullptr) {
+    vessel = *run.Mesh("silo");
+    const Bounds bounds = BoundsOf(vessel);
+    silo.width = 2 * std::max({-bounds.low.x, bounds.high.x, -bounds.low.y, bounds.high.y});
+  }
   silo.middle = 0.5 * silo.width + d;
   for (const ControlPoint& point : run.path()) {
     if (!(point.target < silo.width)) {
@@ -175,17 +183,28 @@ StageEnd RunSiloDischarge(GravityRun& run) {
   }
   const double m = silo.middle;
   const double inner = 0.5 * silo.width * std::cos(std::numbers::pi / kSides);
+  vessel = Shifted(std::move(vessel), {m, m, 0});
+  const bool own = vessel.size() > 0;
+  const MeshInterior interior(vessel);
   Packing grains =
       LooseFill(run.radii(),
                 {.low = {m - 0.5 * silo.width, silo.flat ? m : m - 0.5 * silo.width, 0},
                  .width = silo.width,
                  .depth = silo.flat ? 0 : silo.width,
+                 .height = own ? BoundsOf(vessel).high.z : 0,
                  .holds =
                      [&](const Vec3& c, double r) {
+                       if (own) {
+                         return interior.Holds(c, r);
+                       }
                        return silo.flat ? std::abs(c.x - m) + r < 0.5 * silo.width
                                         : std::hypot(c.x - m, c.y - m) + r < inner;
                      }},
                 run.seed());
+  if (own && grains.x.size() < run.radii().size()) {
+    return run.Fail(absl::StrCat("mesh silo is too small: of ", run.radii().size(), " grains ",
+                                 grains.x.size(), " find room, poured loosely"));
+  }
   if (grains.x.size() < run.radii().size()) {
     return run.Fail("silo_width is too small: no grain fits into the silo");
   }
@@ -197,6 +216,8 @@ StageEnd RunSiloDischarge(GravityRun& run) {
   if (silo.flat) {
     walls.walls.push_back(MakePlane("left", {m - 0.5 * silo.width, m, 0}, {1, 0, 0}));
     walls.walls.push_back(MakePlane("right", {m + 0.5 * silo.width, m, 0}, {-1, 0, 0}));
+  } else if (own) {
+    walls.walls.push_back(MakeMeshWall("silo", vessel));
   } else {
     TriangleMesh side;
     AddFrustum({.centre = {m, m, -d},

@@ -52,7 +52,9 @@ Chute Build(const GravityRun& run, double speed) {
   const double m = chute.middle;
   const double shift_z = run.Setting("funnel_shift_z");
   chute.belt_end = kBeltLength * d;
-  chute.belt_z = (kRidge + kGap + kFunnelHeight + 3) * d;
+  const TriangleMesh* own = run.Mesh("funnel");
+  const double height = own != nullptr ? BoundsOf(*own).high.z / d : kFunnelHeight;
+  chute.belt_z = (kRidge + kGap + height + 3) * d;
   const double half = 0.5 * kBeltWidth * d;
 
   TriangleMesh belt;
@@ -80,13 +82,17 @@ Chute Build(const GravityRun& run, double speed) {
   const Vec3 foot{plate_x - 0.5 * kPlate * d, m + run.Setting("funnel_shift_y"),
                   (kRidge + kGap) * d + shift_z};
   TriangleMesh funnel;
-  AddFrustum({.centre = foot,
-              .height = kFunnelHeight * d,
-              .lower_radius = kFunnelBottom * d,
-              .upper_radius = kFunnelTop * d,
-              .sides = 16},
-             funnel);
-  TurnAboutX(run.Setting("funnel_angle"), {foot.x, foot.y, foot.z + kFunnelHeight * d}, funnel);
+  if (own != nullptr) {
+    funnel = Shifted(*own, foot);
+  } else {
+    AddFrustum({.centre = foot,
+                .height = height * d,
+                .lower_radius = kFunnelBottom * d,
+                .upper_radius = kFunnelTop * d,
+                .sides = 16},
+               funnel);
+  }
+  TurnAboutX(run.Setting("funnel_angle"), {foot.x, foot.y, foot.z + height * d}, funnel);
   chute.walls.push_back(MakeMeshWall("funnel", funnel));
 
   TriangleMesh ridge;

@@ -174,6 +174,7 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
       scenario.packing = file->packing;
     }
   }
+  for (const auto& [name, file] : experiment.meshes) scenario.meshes[name] = file.mesh;
   scenario.consolidation = experiment.consolidation;
   scenario.initial_stress = experiment.initial_stress;
   scenario.loading_rate = experiment.loading_rate;

@@ -60,6 +60,14 @@ struct NoPacking {};
 
 using Specimen = std::variant<PackingFile, dem::PackingRecipe, NoPacking>;
 
+/// An STL file in place of a piece of the test's boundary.
+struct MeshFile {
+  std::string path;        ///< as written
+  std::string digest;      ///< SHA-256 of the content
+  double scale = 1;        ///< m per unit of the file
+  dem::TriangleMesh mesh;  ///< [m]
+};
+
 struct Experiment {
   std::string name;
   std::string test;  ///< may be empty when precomputed
@@ -69,6 +77,7 @@ struct Experiment {
   std::vector<Specimen> specimens;
   /// Of the specimen that was measured; empty: unknown, taken for as few as the model's.
   std::optional<double> specimen_grains;
+  std::map<std::string, MeshFile> meshes;  ///< by name of dem::TestInfo::meshes
   dem::Consolidation consolidation;
   std::optional<dem::InitialStress> initial_stress;
   std::optional<double> loading_rate;

@@ -1,5 +1,5 @@
 #pragma once
-// The campaign file (YAML) and the data, packing and table files it names -> Campaign, or
+// The campaign file (YAML) and the data, packing, mesh and table files it names -> Campaign, or
 // everything that is wrong.
 
 #include <functional>

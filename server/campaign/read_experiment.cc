@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
 #include "server/campaign/read_measurements.h"
+#include "server/campaign/read_meshes.h"
 #include "server/campaign/read_specimen.h"
 #include "server/campaign/suggestion.h"
 
@@ -150,9 +151,9 @@ const dem::TestInfo* ReadTest(MapReader& map, const Campaign& campaign, Experime
   return dem::FindTest(experiment.test);
 }
 
-constexpr std::array<const char*, 7> kSpecimenKeys = {
+constexpr std::array<const char*, 8> kSpecimenKeys = {
     "packing",        "realizations", "specimen_grains", "consolidation",
-    "initial_stress", "loading_rate", "staging"};
+    "initial_stress", "loading_rate", "staging",         "meshes"};
 
 // Keys that only a specimen of grains needs: all problems with them at once.
 void RefuseKeys(MapReader& map, const std::string& why) {
@@ -194,6 +195,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
     } else {
       experiment.specimens = ReadSpecimens(map, poured, context);
       experiment.specimen_grains = map.Quantity("specimen_grains", "1", {.min = 1});
+      if (test != nullptr) experiment.meshes = ReadMeshes(map, *test, context);
     }
     if (poured) {
       RefusePreparationKeys(map, *test);

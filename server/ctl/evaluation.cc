@@ -42,6 +42,11 @@ absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const T
     }
     arguments.insert(arguments.end(), {"--packing", folder + "/packing.txt"});
   }
+  for (std::size_t m = 0; m < task.meshes.size(); ++m) {
+    const std::string path = absl::StrCat(folder, "/mesh", m, ".stl");
+    if (auto written = WriteFile(path, task.meshes[m]); !written.ok()) return written;
+    arguments.insert(arguments.end(), {"--mesh", path});
+  }
   if (!task.checkpoint.empty()) {
     arguments.insert(arguments.end(), {"--checkpoint", task.checkpoint});
   }

@@ -15,9 +15,10 @@ class Evaluation {
  public:
   struct Task {
     v1::AttemptSpec spec;
-    std::string packing;     ///< text of the packing file; empty with a recipe
-    std::string vtk;         ///< folder for grains; empty: none
-    std::string checkpoint;  ///< file to go on from and to renew; empty: none
+    std::string packing;              ///< text of the packing file; empty with a recipe
+    std::vector<std::string> meshes;  ///< contents of the STL files
+    std::string vtk;                  ///< folder for grains; empty: none
+    std::string checkpoint;           ///< file to go on from and to renew; empty: none
   };
   /// folder: an existing folder for the files in between.
   static absl::StatusOr<Evaluation> Start(const std::string& program, const Task& task,

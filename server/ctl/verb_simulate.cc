@@ -31,6 +31,14 @@ std::string PackingText(const campaign::Experiment& experiment, const SourceFile
   return file != nullptr ? source.contents.at(file->path) : "";
 }
 
+std::vector<std::string> MeshContents(const campaign::Experiment& experiment,
+                                      const SourceFiles& source) {
+  std::vector<std::string> contents;
+  for (const auto& [name, file] : experiment.meshes)
+    contents.push_back(source.contents.at(file.path));
+  return contents;
+}
+
 // Path of a name in a folder; empty without a folder.
 std::string Below(const std::string& folder, const std::string& name) {
   return folder.empty() ? "" : (std::filesystem::path(folder) / name).string();
@@ -97,6 +105,7 @@ class Simulation {
     Evaluation::Task task{
         .spec = scheduler::SpecOf(campaign_, static_cast<int>(e), values_, 0),
         .packing = PackingText(experiment, source_),
+        .meshes = MeshContents(experiment, source_),
         .vtk = Below(arguments_.vtk, experiment.name),
         .checkpoint = Below(arguments_.checkpoint, experiment.name + ".checkpoint")};
     std::error_code error;

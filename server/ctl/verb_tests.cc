@@ -17,7 +17,11 @@ int Tests(const Arguments& arguments) {
               << (test.may_reverse ? "" : ", one way only") << ")\n  " << test.description
               << "\n  observables:";
     for (const std::string& observable : test.observables) std::cout << " " << observable;
-    std::cout << "\n" << ParameterTable(test.settings) << "\n";
+    std::cout << "\n";
+    for (const dem::MeshInfo& mesh : test.meshes) {
+      std::cout << "  mesh " << mesh.name << ": " << mesh.description << "\n";
+    }
+    std::cout << ParameterTable(test.settings) << "\n";
   }
   return kDone;
 }

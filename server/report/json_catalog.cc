@@ -64,9 +64,14 @@ std::string EffectsJson(std::span<const dem::UserEffect> declared) {
 std::string TestsJson() {
   Json list = Json::array();
   for (const dem::TestInfo& t : dem::Tests()) {
+    Json meshes = Json::array();
+    for (const dem::MeshInfo& m : t.meshes) {
+      meshes.push_back({{"name", m.name}, {"description", m.description}});
+    }
     list.push_back({{"name", t.name},
                     {"description", t.description},
                     {"parameters", Parameters(t.settings)},
+                    {"meshes", meshes},
                     {"observables", t.observables},
                     {"control", t.control},
                     {"may_reverse", t.may_reverse},

@@ -116,8 +116,15 @@ v1::AttemptSpec SpecOf(const campaign::Campaign& campaign, int experiment,
   const campaign::Experiment& measured = campaign.experiments[static_cast<std::size_t>(experiment)];
   const auto specimen =
       static_cast<std::size_t>(campaign::StreamOf(campaign, sample)) % measured.specimens.size();
-  return ToSpec(campaign::MakeScenario(campaign, measured, values, sample),
-                measured.specimens[specimen], measured.name);
+  v1::AttemptSpec spec = ToSpec(campaign::MakeScenario(campaign, measured, values, sample),
+                                measured.specimens[specimen], measured.name);
+  for (const auto& [name, file] : measured.meshes) {
+    v1::Mesh& message = *spec.add_meshes();
+    message.set_name(name);
+    message.set_digest(file.digest);
+    message.set_scale(file.scale);
+  }
+  return spec;
 }
 
 std::string SpecDigest(v1::AttemptSpec spec) {

@@ -11,7 +11,7 @@
 namespace calib::scheduler {
 
 /// The message for a scenario whose specimen is named by `specimen` (the scenario's own packing is
-/// not sent).
+/// not sent, nor its meshes, which SpecOf() names).
 v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& specimen,
                        const std::string& experiment);
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "absl/strings/str_replace.h"
+#include "tests/support/stl_text.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -64,6 +65,60 @@ TEST(PouredCampaign, RefusesWhatHasNoMeaningThere) {
   auto files = Files();
   files["silo.csv"] = "opening,mass_flow_rate\n40,0.9\n-20,0.2\n";
   EXPECT_THAT(ProblemsOf(Yaml(), files), HasSubstr("silo.csv:3: opening: is -0.02"));
+}
+
+std::string WithMesh(const std::string& meshes) {
+  return absl::StrReplaceAll(Yaml(), {{"    silo_width: 10 cm\n", "    meshes: " + meshes + "\n"}});
+}
+
+TEST(PouredCampaign, AMeshIsReadInItsUnit) {
+  auto files = Files();
+  files["silo.stl"] =
+      calib::testing::TextStl(calib::testing::FourSides({.lower = 20, .upper = 40, .height = 300}));
+  const ReadOutcome outcome =
+      ReadCampaign(WithMesh("{silo: {file: silo.stl, unit: mm}}"), "c.yaml", ReaderOf(files));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
+  const MeshFile& mesh = outcome.campaign.experiments[0].meshes.at("silo");
+  EXPECT_EQ(mesh.mesh.size(), 8);
+  EXPECT_DOUBLE_EQ(mesh.scale, 1e-3);
+  EXPECT_DOUBLE_EQ(dem::BoundsOf(mesh.mesh).high.z, 0.3);
+  EXPECT_EQ(outcome.files, (std::vector<std::string>{"silo.stl", "silo.csv"}));
+  const dem::Scenario scenario =
+      MakeScenario(outcome.campaign, outcome.campaign.experiments[0], {0.5, 0.5}, 0);
+  EXPECT_EQ(scenario.meshes.at("silo").size(), 8);
+}
+
+TEST(PouredCampaign, WhatIsWrongWithAMeshIsSaidInOneLine) {
+  auto files = Files();
+  auto sides = calib::testing::FourSides({.lower = 20, .upper = 40, .height = 300});
+  files["silo.stl"] = calib::testing::TextStl(sides);
+  const auto problems = [&](const std::string& meshes) {
+    return ProblemsOf(WithMesh(meshes), files);
+  };
+  EXPECT_EQ(problems("{silo: {file: silo.stl}}"),
+            "c.yaml:13: experiments[1].meshes.silo.unit: is missing; an STL file does not say its "
+            "unit, e.g. mm\n");
+  EXPECT_THAT(problems("{silo: {file: silo.stl, unit: kPa}}"),
+              HasSubstr("c.yaml:13: experiments[1].meshes.silo.unit: kPa is a pressure"));
+  EXPECT_EQ(problems("{funnel: {file: silo.stl, unit: mm}}"),
+            "c.yaml:13: experiments[1].meshes.funnel: is no piece of silo_discharge that a mesh "
+            "can replace; there is silo\n");
+  EXPECT_THAT(problems("{silo: {file: none.stl, unit: mm}}"),
+              HasSubstr("c.yaml:13: experiments[1].meshes.silo.file: "));
+  EXPECT_EQ(problems("{silo: {file: silo.stl, unit: mm}}\n    flat: 1"),
+            "c.yaml:10: experiments: outlet: mesh silo says how wide the silo is: flat has no "
+            "meaning with it, remove it\n");
+  sides[1] = sides[0];
+  files["silo.stl"] = calib::testing::TextStl({sides[0], sides[0], sides[0]});
+  EXPECT_THAT(problems("{silo: {file: silo.stl, unit: mm}}"), HasSubstr("silo.stl: "));
+  EXPECT_EQ(ProblemsOf(absl::StrReplaceAll(WithMesh("{silo: {file: silo.stl, unit: mm}}"),
+                                           {{"test: silo_discharge", "test: shaken_box"},
+                                            {"control: opening", "control: time"},
+                                            {"mass_flow_rate:", "exit_time:"}}),
+                       {{"silo.csv", "time,exit_time\n1,0.9\n"}, {"silo.stl", ""}}),
+            "c.yaml:13: experiments[1].meshes: shaken_box has no piece that a mesh can replace; "
+            "remove it\n");
 }
 
 }  // namespace

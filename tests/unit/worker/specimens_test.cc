@@ -5,6 +5,8 @@
 #include <atomic>
 #include <thread>
 
+#include "tests/support/stl_text.h"
+
 namespace calib::worker {
 namespace {
 
@@ -22,16 +24,36 @@ TEST(Specimens, SlotsShareOneFetch) {
     ++fetches;
     return kText;
   });
-  std::vector<std::shared_ptr<const dem::Packing>> found(4);
+  std::vector<std::shared_ptr<const Specimen>> found(4);
   {
     std::vector<std::jthread> slots;
-    for (auto& packing : found) {
-      slots.emplace_back([&] { packing = *specimens.Get(Named("a"), {}); });
+    for (auto& specimen : found) {
+      slots.emplace_back([&] { specimen = *specimens.Get(Named("a"), {}); });
     }
   }
   EXPECT_EQ(fetches, 1);
-  EXPECT_EQ(found[0]->x.size(), 2U);
+  EXPECT_EQ(found[0]->packing.x.size(), 2U);
   EXPECT_EQ(found[3], found[0]);
+}
+
+TEST(Specimens, OnePackingWithTwoMeshesIsTwoSpecimens) {
+  const std::string stl =
+      testing::TextStl(testing::FourSides({.lower = 1, .upper = 2, .height = 3}));
+  Specimens specimens(
+      [&](const std::string& digest, std::stop_token) -> absl::StatusOr<std::string> {
+        return digest == "a" ? kText : stl;
+      });
+  v1::AttemptSpec spec = Named("a");
+  v1::Mesh& mesh = *spec.add_meshes();
+  mesh.set_name("funnel");
+  mesh.set_digest("m");
+  mesh.set_scale(0.1);
+  EXPECT_NEAR(dem::BoundsOf((*specimens.Get(spec, {}))->meshes.at("funnel")).high.z, 0.3, 1e-15);
+  mesh.set_scale(0.01);
+  EXPECT_NEAR(dem::BoundsOf((*specimens.Get(spec, {}))->meshes.at("funnel")).high.z, 0.03, 1e-15);
+  EXPECT_TRUE((*specimens.Get(Named("a"), {}))->meshes.empty());
+  mesh.set_digest("a");  // a packing is no mesh
+  EXPECT_EQ(specimens.Get(spec, {}).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 TEST(Specimens, FailureIsNotRemembered) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "dem/dynamics/archive.h"
+#include "dem/geometry/triangle_mesh.h"
 #include "dem/simulation/run_checkpoint.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"
@@ -140,6 +141,25 @@ TEST(RunCheckpoint, TestsUnderGravityGoOnBitForBit) {
   Scenario silo = Pour("silo_discharge", 100, {0.02, 0.028});
   silo.settings = {{"flat", 1}, {"silo_width", 0.056}, {"duration", 0.2}};
   ExpectToGoOn(silo);
+}
+
+TEST(RunCheckpoint, DevicesAndChutesGoOnBitForBit) {
+  Scenario device = Pour("calibration_device", 80, {1, 2});
+  device.settings = {{"duration", 0.4}};
+  ExpectToGoOn(device);
+  Scenario chute = Pour("transfer_chute", 40, {0.8, 1.2});
+  chute.settings = {{"funnel_angle", 0.1}};
+  ExpectToGoOn(chute);
+  TriangleMesh funnel;
+  AddFrustum({.height = 0.03, .lower_radius = 0.013, .upper_radius = 0.03, .sides = 12}, funnel);
+  chute.settings = {};
+  chute.meshes = {{"funnel", funnel}};
+  ExpectToGoOn(chute);
+  const std::string bytes = Record(chute).checkpoints.front();
+  EXPECT_EQ(CheckpointProblem(chute, bytes), "");
+  chute.meshes["funnel"].vertex[5].z += 1e-12;
+  EXPECT_EQ(CheckpointProblem(chute, bytes),
+            "the checkpoint belongs to another run; what differs: meshes");
 }
 
 TEST(RunCheckpoint, RepetitionsAreNotMadeAgain) {

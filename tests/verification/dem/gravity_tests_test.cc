@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "dem/catalog/catalog.h"
+#include "dem/geometry/triangle_mesh.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -133,6 +134,116 @@ TEST(TransferChute, AFunnelShiftedToTheRightFeedsTheRight) {
   std::printf("chute: left %.4f, right %.4f kg/s\n", left, right);
   EXPECT_GT(right, 2 * left);
   EXPECT_DOUBLE_EQ(Value(run, "transfer_chute", "mass_flow_difference", 0), std::abs(left - right));
+}
+
+TEST(TransferChute, AMeshLikeItsFunnelActsLikeIt) {
+  Scenario chute = Pour("transfer_chute", 250, {1.0});
+  chute.settings = {{"funnel_shift_y", 2 * kDiameter}};
+  const test::Run built_in = test::RunAll(chute);
+  double d = 0;
+  for (const double r : chute.packing.radius) {
+    d = std::max(d, 2 * r);
+  }
+  TriangleMesh funnel;
+  AddFrustum({.height = 7 * d, .lower_radius = 3 * d, .upper_radius = 7 * d, .sides = 16}, funnel);
+  chute.meshes = {{"funnel", funnel}};
+  const test::Run same = test::RunAll(chute);
+  chute.meshes = {{"funnel", Shifted(funnel, {0, -4 * kDiameter, 0})}};
+  const test::Run other = test::RunAll(chute);
+  const auto value = [](const test::Run& run, const char* name) {
+    return Value(run, "transfer_chute", name, 0);
+  };
+  std::printf(
+      "chute: left, right %.4f %.4f, as a mesh %.4f %.4f, mesh to the left %.4f %.4f kg/s\n",
+      value(built_in, "mass_flow_left"), value(built_in, "mass_flow_right"),
+      value(same, "mass_flow_left"), value(same, "mass_flow_right"), value(other, "mass_flow_left"),
+      value(other, "mass_flow_right"));
+  EXPECT_NEAR(value(same, "mass_flow_right"), value(built_in, "mass_flow_right"),
+              0.2 * value(built_in, "mass_flow_right"));  // places differ by rounding
+  EXPECT_GT(value(other, "mass_flow_left"), 2 * value(other, "mass_flow_right"));
+}
+
+TEST(SiloDischarge, AMeshLikeItsCylinderFlowsLikeIt) {
+  Scenario silo = Pour("silo_discharge", 400, {6 * kDiameter});
+  const double built_in = Value(test::RunAll(silo), "silo_discharge", "mass_flow_rate", 0);
+  double mean = 0;
+  for (const double r : silo.packing.radius) {
+    mean += 2 * r / static_cast<double>(silo.packing.radius.size());
+  }
+  TriangleMesh cylinder;
+  AddFrustum({.height = 0.2, .lower_radius = 6 * mean, .upper_radius = 6 * mean, .sides = 32},
+             cylinder);
+  silo.meshes = {{"silo", cylinder}};
+  const test::Run run = test::RunAll(silo);
+  const double as_mesh = Value(run, "silo_discharge", "mass_flow_rate", 0);
+  std::printf("silo: %.4f kg/s, as a mesh %.4f kg/s\n", built_in, as_mesh);
+  EXPECT_NEAR(as_mesh, built_in, 0.1 * built_in);
+
+  TriangleMesh hopper;  // half as steep below as a cylinder's wall, its own outlet
+  AddFrustum({.height = 0.04, .lower_radius = 0.0115, .upper_radius = 0.024, .sides = 24}, hopper);
+  AddFrustum({.centre = {0, 0, 0.04},
+              .height = 0.12,
+              .lower_radius = 0.024,
+              .upper_radius = 0.024,
+              .sides = 24},
+             hopper);
+  silo.meshes = {{"silo", hopper}};
+  const test::Run flowed = test::RunAll(silo);
+  const double mass = Value(flowed, "silo_discharge", "discharged_mass", 0);
+  double all = 0;
+  for (const double r : silo.packing.radius) {
+    all += 2500 * 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  }
+  std::printf("mesh hopper: %.4f kg/s, %.1f %% of the grains left\n",
+              Value(flowed, "silo_discharge", "mass_flow_rate", 0), 100 * mass / all);
+  EXPECT_GT(mass, 0.98 * all);  // no corner keeps any, as a level floor does
+}
+
+TEST(CalibrationDevice, ASlideOfAMeshIsTheSlide) {
+  Scenario device = Pour("calibration_device", 200, {1});
+  device.settings = {{"slide_length", 16 * kDiameter}, {"slide_angle", 0.8}};
+  const double length = 16 * kDiameter;
+  const Vec3 top{length * std::cos(0.8), 0, length * std::sin(0.8)};
+  const double half = 0.02;
+  TriangleMesh plate;
+  AddQuad({0, -half, 0}, {top.x, -half, top.z}, {top.x, half, top.z}, {0, half, 0}, plate);
+  const test::Run built_in = test::RunAll(device);
+  device.meshes = {{"slide", plate}};
+  const test::Run run = test::RunAll(device);
+  const auto value = [](const test::Run& of, const char* name) {
+    return Value(of, "calibration_device", name, 0);
+  };
+  std::printf("device: rate %.4f, as a mesh %.4f kg/s, slide %.3f, %.3f s\n",
+              value(built_in, "mass_flow_rate"), value(run, "mass_flow_rate"),
+              value(built_in, "slide_time"), value(run, "slide_time"));
+  EXPECT_NEAR(value(run, "slide_time"), value(built_in, "slide_time"),
+              0.25 * value(built_in, "slide_time"));
+  device.meshes["slide"].vertex[2].y = 0.01;
+  device.meshes["slide"].vertex[3].y = 0.01;
+  EXPECT_THAT(test::RunAll(device).summary.reason,
+              ::testing::HasSubstr("mesh slide reaches to 0.01 m from its middle along y"));
+}
+
+TEST(GravityTests, MeshesThatDoNotFitAreRefused) {
+  Scenario silo = Pour("silo_discharge", 400, {6 * kDiameter});
+  TriangleMesh cylinder;
+  AddFrustum({.height = 0.02, .lower_radius = 0.024, .upper_radius = 0.024}, cylinder);
+  silo.meshes = {{"silo", cylinder}};
+  EXPECT_THAT(test::RunAll(silo).summary.reason,
+              ::testing::HasSubstr("mesh silo is too small: of 400 grains "));
+  silo.meshes = {{"silo", TriangleMesh{.vertex = {{0, 0, 0}, {1e-3, 0, 0}, {0, 0, 1e-3}},
+                                       .triangle = {{0, 1, 2}}}}};
+  EXPECT_THAT(test::RunAll(silo).summary.reason, ::testing::HasSubstr("is the mesh's unit right?"));
+  silo.meshes = {{"funnel", cylinder}};
+  EXPECT_THAT(
+      ScenarioProblems(silo),
+      ::testing::ElementsAre("no piece \"funnel\" in test silo_discharge, which lets a mesh "
+                             "replace: silo"));
+  silo.meshes = {{"silo", Shifted(cylinder, {0, 0, -0.001})}};
+  silo.settings = {{"silo_width", 0.05}};
+  EXPECT_THAT(ScenarioProblems(silo),
+              ::testing::ElementsAre(::testing::HasSubstr("mesh silo reaches down to z = -0.001 m"),
+                                     ::testing::HasSubstr("silo_width has no meaning with it")));
 }
 
 TEST(ShakenBox, TheIntruderRises) {

@@ -1,0 +1,31 @@
+#pragma once
+// The commonest chains of kernels in one pass over the lanes of a block, so that what one kernel
+// leaves for the next stays in registers: `hertz_mindlin` or `linear` with Coulomb's limit and the
+// shear spring, alone, with rolling_resistance, or with rolling_resistance and twisting_resistance.
+
+#include <cstdint>
+#include <optional>
+
+#include "dem/contact/contact_block.h"
+#include "dem/effects/moment_stiffness.h"
+#include "dem/simulation/scenario.h"
+
+namespace calib::dem {
+
+struct CommonChain {
+  bool hertz = true;      ///< hertz_mindlin; false: linear
+  double normal = 0;      ///< kn = normal sqrt(r* u), of linear normal r* [Pa]
+  double tangential = 0;  ///< ks = tangential sqrt(r* u) [Pa], of linear tangential kn [-]
+  std::optional<MomentLaw> rolling, twisting;  ///< twisting only beside rolling
+};
+
+/// The chain of a model, where it is one of these; else empty.
+std::optional<CommonChain> CommonChainOf(const Model& model);
+
+/// What ContactModel::Evaluate() and CloseBlock() do together, with the same bits: overlap, forces,
+/// torques and memory of all lanes; zero where the lane does not overlap or is not in use. Columns
+/// of memory: shear force, rolling moment, twisting moment. Sets touching (kBlock of them) and
+/// returns how many lanes overlap. Stiffnesses are not set.
+int EvaluateCommonChain(const CommonChain& chain, ContactBlock& block, std::uint8_t* touching);
+
+}  // namespace calib::dem
