@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <iostream>
 #include <thread>
@@ -36,6 +37,16 @@ std::string DefaultName() {
   return std::string(host.data()) + "-" + std::to_string(getpid());
 }
 
+/// Empty where the user has no home.
+std::string DefaultCheckpoints() {
+  const auto from = [](const char* variable, const char* rest) {
+    const char* const value = std::getenv(variable);
+    return value != nullptr && *value != '\0' ? std::string(value) + rest : std::string();
+  };
+  const std::string cache = from("XDG_CACHE_HOME", "/calib/checkpoints");
+  return cache.empty() ? from("HOME", "/.cache/calib/checkpoints") : cache;
+}
+
 /// The kernel ends this process with SIGTERM when its parent dies; false if the parent is dead
 /// already.
 bool ExitWithParent(int parent) {
@@ -51,6 +62,7 @@ int main(int argc, char** argv) {
   calib::worker::WorkerOptions options;
   calib::worker::OnceOptions once;
   int parent = -1;
+  double checkpoints_gib = 4;
   options.slots = 0;
   auto* server = app.add_option("--server", options.server, "the server, HOST:PORT");
   app.add_option("--slots", options.slots, "evaluations at a time [cores / threads per slot]")
@@ -59,6 +71,12 @@ int main(int argc, char** argv) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--name", options.name, "unique name [host name and process id]");
+  app.add_option("--checkpoints", options.checkpoints,
+                 "folder for runs that rest in breadth-first campaigns, shared by the workers of a "
+                 "machine [calib/checkpoints in $XDG_CACHE_HOME or ~/.cache]");
+  app.add_option("--checkpoints-gib", checkpoints_gib, "its size at most")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("--exit-with-parent", parent,
                  "end when the parent process, of this id (0: whichever), ends");
   auto* spec =
@@ -98,6 +116,10 @@ int main(int argc, char** argv) {
   if (options.name.empty()) {
     options.name = DefaultName();
   }
+  if (options.checkpoints.empty()) {
+    options.checkpoints = DefaultCheckpoints();
+  }
+  options.most_checkpoint_bytes = static_cast<std::int64_t>(checkpoints_gib * (1 << 30));
   options.cpu = CpuModel();
   options.contact_updates_per_second = calib::worker::MeasureThroughput(kBenchmark);
   spdlog::info("worker name={} slots={} threads_per_slot={} contact_updates_per_second={:.4g}",

@@ -12,11 +12,23 @@ constexpr std::int64_t kStatesPerBatch = 1000;
 
 }  // namespace
 
-void HeldAttempt::Run(Specimens& specimens, std::function<void(const dem::State&)> on_state,
+HeldAttempt::HeldAttempt(const v1::Lease& lease) : HeldAttempt(lease.attempt(), lease.spec()) {
+  if (!lease.run().empty()) {
+    resting_ =
+        RestingRun{.run = lease.run(),
+                   .rest_after = lease.has_rest_after() ? std::optional<int>(lease.rest_after())
+                                                        : std::nullopt};
+  }
+}
+
+void HeldAttempt::Run(Specimens& specimens, const Checkpoints* checkpoints,
+                      std::function<void(const dem::State&)> on_state,
                       std::function<void(v1::Finished)> on_end) {
-  thread_ = std::jthread([this, &specimens, on_state = std::move(on_state),
+  thread_ = std::jthread([this, &specimens, checkpoints, on_state = std::move(on_state),
                           on_end = std::move(on_end)](std::stop_token stop) {
-    v1::Finished finished = Evaluate(spec_, specimens, on_state, stop);
+    v1::Finished finished = resting_.has_value() ? EvaluateToRung(spec_, *resting_, checkpoints,
+                                                                  specimens, on_state, stop)
+                                                 : Evaluate(spec_, specimens, on_state, stop);
     finished.set_attempt(id_);
     on_end(std::move(finished));
   });

@@ -11,6 +11,7 @@
 
 #include "calib/v1/worker.pb.h"
 #include "dem/simulation/scenario.h"
+#include "worker/resting_run.h"
 #include "worker/specimens.h"
 
 namespace calib::worker {
@@ -20,9 +21,12 @@ namespace calib::worker {
 class HeldAttempt {
  public:
   HeldAttempt(std::int64_t id, v1::AttemptSpec spec) : id_(id), spec_(std::move(spec)) {}
+  explicit HeldAttempt(const v1::Lease& lease);
 
-  /// Starts the simulation. on_state and on_end are called on its thread.
-  void Run(Specimens& specimens, std::function<void(const dem::State&)> on_state,
+  /// Starts the simulation. on_state and on_end are called on its thread. checkpoints: outlive it;
+  /// nullptr: none are kept.
+  void Run(Specimens& specimens, const Checkpoints* checkpoints,
+           std::function<void(const dem::State&)> on_state,
            std::function<void(v1::Finished)> on_end);
   bool started() const { return thread_.joinable(); }
   /// True from Run() until the end has been handed to AddEnd().
@@ -44,6 +48,7 @@ class HeldAttempt {
  private:
   std::int64_t id_;
   v1::AttemptSpec spec_;
+  std::optional<RestingRun> resting_;
   std::deque<v1::State> kept_;  // not acknowledged; kept_[0] has position first_
   std::int64_t first_ = 0;
   std::int64_t next_ = 0;  // position of the first state not yet sent

@@ -8,11 +8,13 @@
 #include <boost/asio/steady_timer.hpp>
 #include <csignal>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "dem/catalog/catalog.h"
 #include "proto/rpc/digest.h"
 #include "proto/rpc/retry.h"
+#include "worker/checkpoints.h"
 #include "worker/held_attempt.h"
 #include "worker/server_link.h"
 #include "worker/specimens.h"
@@ -58,6 +60,14 @@ class Worker::Impl {
         Stop();
       }
     });
+    if (!options_.checkpoints.empty()) {
+      auto opened = Checkpoints::Open(options_.checkpoints, options_.most_checkpoint_bytes);
+      if (opened.ok()) {
+        checkpoints_ = *std::move(opened);
+      } else {
+        spdlog::warn("no_checkpoints reason=\"{}\"", std::string(opened.status().message()));
+      }
+    }
     Connect();
     io_.run();
     return result_;
@@ -75,6 +85,7 @@ class Worker::Impl {
     hello.set_engine_version(dem::EngineVersion());
     hello.set_catalog_digest(rpc::Sha256Hex(dem::CatalogText()));
     hello.set_cpu(options_.cpu);
+    hello.set_checkpoints(checkpoints_.has_value() ? checkpoints_->identity() : "");
     for (auto& [id, attempt] : held_) {
       hello.add_attempts(id);
       attempt.StreamLost();
@@ -92,7 +103,8 @@ class Worker::Impl {
       return;
     }
     if (IsFinal(status)) {
-      spdlog::error("refused server={} reason=\"{}\"", options_.server, std::string(status.message()));
+      spdlog::error("refused server={} reason=\"{}\"", options_.server,
+                    std::string(status.message()));
       result_ = status;
       stopping_ = true;
       Quit();
@@ -172,7 +184,7 @@ class Worker::Impl {
 
   void Take(const v1::Lease& lease) {
     const std::int64_t id = lease.attempt();
-    auto [it, added] = held_.try_emplace(id, id, lease.spec());
+    auto [it, added] = held_.try_emplace(id, lease);
     if (!added) {
       return;
     }
@@ -203,7 +215,7 @@ class Worker::Impl {
         ++running;
         spdlog::info("start attempt={}", id);
         attempt.Run(
-            specimens_,
+            specimens_, checkpoints_.has_value() ? &*checkpoints_ : nullptr,
             [this, id = id](const dem::State& state) {
               asio::post(io_, [this, id, state] { Reached(id, state); });
             },
@@ -343,6 +355,7 @@ class Worker::Impl {
   // Destroyed from the last to the first: simulations end before what they use.
   ServerLink link_;
   Specimens specimens_;
+  std::optional<Checkpoints> checkpoints_;
   std::map<std::int64_t, HeldAttempt> ending_;  // dropped, thread on its way out
   std::map<std::int64_t, HeldAttempt> held_;
 };

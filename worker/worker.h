@@ -3,6 +3,7 @@
 // comes out.
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -17,6 +18,8 @@ struct WorkerOptions {
   int threads_per_slot = 1;               ///< > 0
   double contact_updates_per_second = 0;  ///< of one thread, as measured
   std::string cpu{};                      ///< model name, recorded with every attempt
+  std::string checkpoints{};              ///< folder for runs that rest; empty: none are kept
+  std::int64_t most_checkpoint_bytes = std::int64_t{4} << 30;
   std::chrono::milliseconds farewell{
       3000};  ///< longest wait for the last acknowledgement after a stop
 };

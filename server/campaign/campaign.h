@@ -152,6 +152,9 @@ enum class SurrogateModel { kCubicRbf, kGaussianProcess };
 
 struct EarlyStopping {
   double discard_at_most = 1e-3;
+  /// Shares of an experiment's load steps, increasing, within (0, 1): all samples come to the first
+  /// rung, those that can still count go on to the next. Empty: every run goes to its end at once.
+  std::vector<double> rungs{};
 };
 struct Failure {
   int attempts = 5;

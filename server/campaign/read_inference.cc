@@ -163,6 +163,28 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
     campaign.max_iterations = 1;
 }
 
+/// Numbers within (0, 1), increasing; empty after a problem.
+std::vector<double> ReadRungs(MapReader& map) {
+  const YamlNode* node = map.Find("rungs");
+  if (node == nullptr) return {};
+  if (node->kind != YamlNode::Kind::kSequence || node->items.empty()) {
+    map.Problem("rungs", "has to be a list of shares of the load steps, e.g. [0.25, 0.5]");
+    return {};
+  }
+  std::vector<double> rungs;
+  for (const YamlNode& item : node->items) {
+    const auto rung = ReadQuantity(item, map.PathOf("rungs"), "1", kFraction, map.problems());
+    if (!rung.has_value()) return {};
+    if (!rungs.empty() && *rung <= rungs.back()) {
+      map.Problem("rungs", absl::StrCat("has ", *rung, " after ", rungs.back(),
+                                        "; each rung has to be above the one before"));
+      return {};
+    }
+    rungs.push_back(*rung);
+  }
+  return rungs;
+}
+
 void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
   const YamlNode* node = campaign_map.Find("early_stopping");
   if (node == nullptr) return;
@@ -176,6 +198,12 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
   map->Require("discard_at_most", "the posterior mass that stopping early may lose, e.g. 1e-3");
   stopping.discard_at_most =
       map->Quantity("discard_at_most", "1", kFraction).value_or(stopping.discard_at_most);
+  stopping.rungs = ReadRungs(*map);
+  if (!stopping.rungs.empty() && !IsFilter(campaign.method)) {
+    map->Problem("rungs",
+                 "is for sqmc and iterative_bayesian_filter; chains and optimisers judge each run "
+                 "on its own");
+  }
   map->Finish();
   // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing
   // to stop; the surrogate would take a bound for a value.

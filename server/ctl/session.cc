@@ -88,6 +88,7 @@ absl::Status Session::StartWorkers(int count) {
     auto worker = ChildProcess::Start(
         *program,
         {"--server", address_, "--slots", "1", "--name", absl::StrCat("local-", getpid(), "-", i),
+         "--checkpoints", (std::filesystem::path(state_) / "checkpoints").string(),
          "--exit-with-parent", absl::StrCat(getpid())},
         log);
     if (!worker.ok()) return worker.status();

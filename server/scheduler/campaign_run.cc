@@ -61,7 +61,10 @@ absl::Status CampaignRun::Reload(store::Reader& reader) {
   evaluations_.clear();
   for (const store::EvaluationRecord& evaluation : *evaluations) {
     const auto steps = definition_->LoadSteps(evaluation.key.experiment);
-    evaluations_[evaluation.key].missing = {steps.begin(), steps.end()};
+    evaluations_[evaluation.key] = {.missing = {steps.begin(), steps.end()},
+                                    .rest_after = evaluation.rest_after,
+                                    .held_in = evaluation.held_in,
+                                    .digest = evaluation.digest};
     SetStatus(evaluation.key, evaluation.status, evaluation.failures);
   }
   for (const store::StateRecord& stored : *states) {
@@ -104,8 +107,14 @@ bool CampaignRun::AllTerminal() const {
 std::string CampaignRun::Refusal(const EvaluationKey& key, int load_step,
                                  std::span<const double> observables) const {
   const auto steps = definition_->LoadSteps(key.experiment);
-  if (std::find(steps.begin(), steps.end(), load_step) == steps.end()) {
+  const auto found = std::find(steps.begin(), steps.end(), load_step);
+  if (found == steps.end()) {
     return absl::StrCat("load step ", load_step, " is not on the path");
+  }
+  if (const auto& rest = evaluations_.at(key).rest_after;
+      rest.has_value() && found > std::find(steps.begin(), steps.end(), *rest)) {
+    return absl::StrCat("load step ", load_step, " is behind load step ", *rest,
+                        ", where the run was to rest");
   }
   if (observables.size() != definition_->StateSize(key.experiment)) {
     return absl::StrCat("a state of ", observables.size(), " values, expected ",
@@ -116,6 +125,22 @@ std::string CampaignRun::Refusal(const EvaluationKey& key, int load_step,
     return absl::StrCat("a value that is not finite at load step ", load_step);
   }
   return "";
+}
+
+bool CampaignRun::HasArrived(const EvaluationKey& key) const {
+  const Evaluation& evaluation = evaluations_.at(key);
+  if (!evaluation.rest_after.has_value()) {
+    return evaluation.missing.empty();
+  }
+  for (const int step : definition_->LoadSteps(key.experiment)) {
+    if (evaluation.missing.count(step) > 0) {
+      return false;
+    }
+    if (step == *evaluation.rest_after) {
+      break;
+    }
+  }
+  return true;
 }
 
 Eigen::Index CampaignRun::Position(int sample) const {

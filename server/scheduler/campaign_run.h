@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -32,6 +33,9 @@ class CampaignRun {
     store::EvaluationStatus status = store::EvaluationStatus::kWaiting;
     int failures = 0;
     std::set<int> missing{};  ///< load steps not yet there
+    std::optional<int> rest_after{};
+    std::string held_in{};  ///< see store::EvaluationRecord
+    std::string digest{};
   };
 
   static absl::StatusOr<std::unique_ptr<CampaignRun>> Load(store::Reader& reader, std::int64_t id);
@@ -57,6 +61,8 @@ class CampaignRun {
   /// Everything wrong with a state that a worker sent, in a sentence; empty: acceptable.
   std::string Refusal(const store::EvaluationKey& key, int load_step,
                       std::span<const double> observables) const;
+  /// True when every load step up to the one where it rests (or the end) is there.
+  bool HasArrived(const store::EvaluationKey& key) const;
   void AddState(const store::EvaluationKey& key, int load_step,
                 std::span<const double> observables);
   void SetStatus(const store::EvaluationKey& key, store::EvaluationStatus status, int failures);

@@ -122,6 +122,12 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     }
   }
   history.stopped_keys = {stopped.begin(), stopped.end()};
+  for (const store::EvaluationRecord& evaluation : *evaluations) {
+    if (evaluation.status == store::EvaluationStatus::kStoppedEarly &&
+        evaluation.rest_after.has_value()) {
+      history.resting[evaluation.key] = *evaluation.rest_after;
+    }
+  }
   history.stopped_early = static_cast<int>(begun.size());
   for (const inference::Iteration& iteration : history.iterations) {
     std::vector<char>& diverged = history.diverged.emplace_back();

@@ -1,6 +1,7 @@
 #pragma once
 // All that a campaign has computed so far, as inference takes it.
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,7 +20,9 @@ struct History {
   std::vector<std::string> proposals;  ///< JSON of each, as its method wrote it
   /// Rows of samples stopped early as far as they came, NaN beyond; other rows are NaN altogether.
   std::vector<Eigen::MatrixXd> stopped;
-  std::vector<store::EvaluationKey> stopped_keys;  ///< evaluations stopped early
+  std::vector<store::EvaluationKey> stopped_keys;  ///< evaluations stopped early or resting
+  std::map<store::EvaluationKey, int> resting;     ///< those with a rung: they came no
+                                                   ///< further than this load step
   std::vector<std::vector<char>> diverged;   ///< [iteration][position]: it has no finite prediction
   std::vector<store::SampleRecord> samples;  ///< of all iterations
   std::optional<std::string> last_posterior;      ///< JSON, of the last iteration that has one

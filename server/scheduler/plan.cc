@@ -14,6 +14,7 @@
 #include "server/scheduler/history.h"
 #include "server/scheduler/method.h"
 #include "server/scheduler/posterior_record.h"
+#include "server/scheduler/rungs.h"
 #include "server/scheduler/scatter.h"
 
 namespace calib::scheduler {
@@ -83,15 +84,28 @@ class Planner {
   /// Posterior of the iteration that has just ended, then whatever follows from it.
   absl::Status Conclude() {
     if (campaign::IsFilter(campaign_.method)) {
+      if (const auto scouts = Scouts(definition_, history_); !scouts.empty()) {
+        for (const store::EvaluationKey& key : scouts) {
+          plan_.resumed.push_back({.key = key, .rest_after = std::nullopt});
+        }
+        plan_.log.push_back(absl::StrCat(scouts.size(),
+                                         " evaluations go on to their ends: those that fit best up "
+                                         "to the rung"));
+        return absl::OkStatus();
+      }
       const auto loss = StatedLoss(definition_, history_);
       if (!loss.ok()) {
         return Fail(loss.status());
       }
       if (!loss->resume.empty()) {
-        plan_.resumed = loss->resume;
+        for (const store::EvaluationKey& key : loss->resume) {
+          plan_.resumed.push_back({.key = key, .rest_after = NextRung(definition_, history_, key)});
+        }
         plan_.log.push_back(absl::StrCat(loss->resume.size(),
-                                         " evaluations stopped early are resumed: with the weights "
-                                         "as they are now they could matter"));
+                                         RestsAtRungs(definition_)
+                                             ? " resting or stopped evaluations go on"
+                                             : " evaluations stopped early are resumed",
+                                         ": with the weights as they are now they could matter"));
         return absl::OkStatus();
       }
       stated_loss_ = loss->stated;
@@ -260,7 +274,13 @@ class Planner {
       return TakeFromTables(sample);
     }
     if (!refused) {
-      return Ask(sample, definition_.ExperimentsOf(Role::kCalibrate));
+      const std::size_t first = plan_.evaluations.size();
+      absl::Status status = Ask(sample, definition_.ExperimentsOf(Role::kCalibrate));
+      for (std::size_t i = first; i < plan_.evaluations.size(); ++i) {
+        plan_.evaluations[i].rest_after =
+            FirstRung(definition_, plan_.evaluations[i].key.experiment);
+      }
+      return status;
     }
     for (const int experiment : definition_.ExperimentsOf(Role::kCalibrate)) {
       plan_.evaluations.push_back({.key = {record_.submitted.id, sample.sample, experiment},
@@ -444,9 +464,10 @@ void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgres
   for (const auto& [from, to] : plan.reused) {
     transaction.ReuseEvaluation(from, to);
   }
-  for (const store::EvaluationKey& key : plan.resumed) {
-    transaction.NeverStop(campaign, key.sample);
-    transaction.SetEvaluation(key, EvaluationStatus::kWaiting, "", 0);
+  for (const Plan::Resumed& resumed : plan.resumed) {
+    transaction.NeverStop(campaign, resumed.key.sample);
+    transaction.SetEvaluation(resumed.key, EvaluationStatus::kWaiting, "", 0);
+    transaction.SetRest(resumed.key, resumed.rest_after);
   }
   for (const store::StateRecord& state : plan.states) {
     transaction.PutState(state, unix_ms);

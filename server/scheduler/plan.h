@@ -40,10 +40,15 @@ struct Plan {
   std::optional<Start> draws;  ///< from the posterior, for held-out experiments
   std::vector<store::EvaluationRecord> evaluations;  ///< new ones
   std::vector<std::pair<store::EvaluationKey, store::EvaluationKey>>
-      reused;                                 ///< (done before, the same now)
-  std::vector<store::EvaluationKey> resumed;  ///< stopped early, to be run to their ends after all
-  std::vector<store::StateRecord> states;     ///< of runs made elsewhere
-  std::string phase;                          ///< afterwards
+      reused;  ///< (done before, the same now)
+  /// Stopped early or resting, to be run on after all.
+  struct Resumed {
+    store::EvaluationKey key;
+    std::optional<int> rest_after;  ///< its next rung; empty: to its end
+  };
+  std::vector<Resumed> resumed;
+  std::vector<store::StateRecord> states;  ///< of runs made elsewhere
+  std::string phase;                       ///< afterwards
   bool converged = false;
   std::optional<CampaignEvent> event;  ///< start, finish or fail
   std::string reason;                  ///< of a failure

@@ -92,6 +92,9 @@ class Scheduler {
 
   // Work (scheduler_workers.cc)
   void Dispatch();
+  /// The first waiting evaluation that this worker should take: not one that rests where another
+  /// worker, which is there, can go on with it.
+  std::optional<store::EvaluationKey> NextFor(const WorkerEntry& worker);
   void Grant(const WorkerEntry& worker, const store::EvaluationKey& key);
   void SendDrain(std::int64_t session);
   void Refuse(std::int64_t session, std::int64_t attempt);
@@ -99,8 +102,12 @@ class Scheduler {
   /// failed too often.
   void GiveBack(const LeaseEntry& lease, const v1::Finished& how, const std::string& outcome,
                 bool counts_as_failure);
+  /// held_in: see store::EvaluationRecord.
   void End(std::int64_t session, const LeaseEntry& lease, store::EvaluationStatus status,
-           const v1::Finished& finished);
+           const v1::Finished& finished, const std::string& held_in = "");
+  /// It has come to its rung.
+  void Rest(std::int64_t session, const LeaseEntry& lease, const v1::Finished& finished,
+            const std::string& held_in);
   /// The sample cannot count any more: stores what decided it and lets the worker stop.
   void StopEarly(std::int64_t session, const LeaseEntry& lease,
                  std::vector<store::StateRecord> records);

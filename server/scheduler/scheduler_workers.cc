@@ -200,10 +200,13 @@ void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
   seconds += std::chrono::duration<double>(ports_.Now() - lease.started).count();
   ++ended;
   switch (finished.outcome()) {
-    case v1::Finished::OUTCOME_COMPLETED: {
+    case v1::Finished::OUTCOME_COMPLETED:
+    case v1::Finished::OUTCOME_RESTING: {
       const auto missing = run.Find(lease.key)->missing.size();
       if (missing == 0) {
         End(session, lease, EvaluationStatus::kFinished, finished);
+      } else if (finished.outcome() == v1::Finished::OUTCOME_RESTING && run.HasArrived(lease.key)) {
+        Rest(session, lease, finished, worker->hello.checkpoints());
       } else {
         GiveBack(lease,
                  Because(lease.attempt, absl::StrCat("said to be complete, but ", missing,
@@ -271,20 +274,35 @@ store::AttemptEnd Scheduler::ToRecord(const v1::Finished& finished, const std::s
           .staging = finished.staging()};
 }
 
+void Scheduler::Rest(std::int64_t session, const LeaseEntry& lease, const v1::Finished& finished,
+                     const std::string& held_in) {
+  CampaignRun::Evaluation& evaluation = *FindRun(lease.key.campaign)->Find(lease.key);
+  evaluation.held_in = held_in;
+  v1::Finished resting = finished;
+  resting.set_reason(absl::StrCat("rests after load step ", evaluation.rest_after.value_or(-1)));
+  End(session, lease, EvaluationStatus::kStoppedEarly, resting, held_in);
+}
+
 void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationStatus status,
-                    const v1::Finished& finished) {
+                    const v1::Finished& finished, const std::string& held_in) {
   CampaignRun& run = *FindRun(lease.key.campaign);
   const int failures = run.Find(lease.key)->failures;
   run.SetStatus(lease.key, status, failures);
   ++version_;
   const bool diverged = status == EvaluationStatus::kDiverged;
+  const bool resting = status == EvaluationStatus::kStoppedEarly;
   ending_.insert(lease.attempt);
   ports_.Write(
-      [key = lease.key, status, failures, diverged, now = ports_.UnixMs(),
+      [key = lease.key, status, failures, diverged, resting, held_in, now = ports_.UnixMs(),
        name = NameOf(run, lease.key),
-       end = ToRecord(finished, diverged ? "diverged" : "completed")](Transaction& t) {
+       end = ToRecord(finished, diverged  ? "diverged"
+                                : resting ? "resting"
+                                          : "completed")](Transaction& t) {
         t.EndAttempt(end);
         t.SetEvaluation(key, status, end.reason, failures);
+        if (resting) {
+          t.SetHeldIn(key, held_in);
+        }
         if (diverged) {
           t.Log(key.campaign, now, absl::StrCat(name, " diverged: ", end.reason));
         }
@@ -340,15 +358,30 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how,
 }
 
 void Scheduler::Dispatch() {
-  while (!queue_.empty()) {
-    const WorkerEntry* worker = workers_.MostFree(leases_, ports_.Now() - options_.lease);
-    if (worker == nullptr) {
-      return;
+  bool granted = true;
+  while (granted && !queue_.empty()) {
+    granted = false;
+    for (const WorkerEntry* worker : workers_.Free(leases_, ports_.Now() - options_.lease)) {
+      if (const auto key = NextFor(*worker); key.has_value()) {
+        queue_.erase(*key);
+        Grant(*worker, *key);
+        granted = true;
+        break;
+      }
     }
-    const EvaluationKey key = *queue_.begin();
-    queue_.erase(queue_.begin());
-    Grant(*worker, key);
   }
+}
+
+std::optional<EvaluationKey> Scheduler::NextFor(const WorkerEntry& worker) {
+  const Clock::time_point heard_since = ports_.Now() - options_.lease;
+  for (const EvaluationKey& key : queue_) {
+    const std::string& held_in = FindRun(key.campaign)->Find(key)->held_in;
+    if (held_in.empty() || held_in == worker.hello.checkpoints() ||
+        !workers_.IsThere(held_in, heard_since)) {
+      return key;
+    }
+  }
+  return std::nullopt;
 }
 
 void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
@@ -366,6 +399,13 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
   *message.mutable_lease()->mutable_spec() =
       SpecOf(run.definition().campaign, key.experiment, run.Parameters(key.sample), key.sample);
   message.mutable_lease()->mutable_spec()->set_threads(worker.hello.threads_per_slot());
+  const CampaignRun::Evaluation& evaluation = *run.Find(key);
+  if (evaluation.rest_after.has_value() || !evaluation.held_in.empty()) {
+    message.mutable_lease()->set_run(evaluation.digest);
+  }
+  if (evaluation.rest_after.has_value()) {
+    message.mutable_lease()->set_rest_after(*evaluation.rest_after);
+  }
   ports_.Write(
       [key, failures,
        record = store::NewAttempt{.id = attempt,

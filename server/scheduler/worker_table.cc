@@ -1,6 +1,16 @@
 #include "server/scheduler/worker_table.h"
 
+#include <algorithm>
+#include <utility>
+
 namespace calib::scheduler {
+namespace {
+
+bool TakesWork(const WorkerEntry& entry, Clock::time_point heard_since) {
+  return entry.session != 0 && !entry.draining && !entry.leaving && entry.heard >= heard_since;
+}
+
+}  // namespace
 
 std::int64_t WorkerTable::Connect(const v1::Hello& hello, std::int64_t session,
                                   Clock::time_point now) {
@@ -41,19 +51,34 @@ void WorkerTable::ForgetGone(Clock::time_point heard_since) {
   });
 }
 
-const WorkerEntry* WorkerTable::MostFree(const LeaseTable& leases,
-                                         Clock::time_point heard_since) const {
-  const WorkerEntry* best = nullptr;
-  int most = 0;
+std::vector<const WorkerEntry*> WorkerTable::Free(const LeaseTable& leases,
+                                                  Clock::time_point heard_since) const {
+  std::vector<std::pair<int, const WorkerEntry*>> free;
   for (const auto& [name, entry] : workers_) {
-    const int free = entry.hello.slots() - leases.Busy(name);
-    if (entry.session != 0 && !entry.draining && !entry.leaving && entry.heard >= heard_since &&
-        free > most) {
-      best = &entry;
-      most = free;
+    const int slots = entry.hello.slots() - leases.Busy(name);
+    if (TakesWork(entry, heard_since) && slots > 0) {
+      free.emplace_back(slots, &entry);
     }
   }
-  return best;
+  std::stable_sort(free.begin(), free.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<const WorkerEntry*> workers;
+  for (const auto& [slots, entry] : free) {
+    workers.push_back(entry);
+  }
+  return workers;
+}
+
+const WorkerEntry* WorkerTable::MostFree(const LeaseTable& leases,
+                                         Clock::time_point heard_since) const {
+  const auto free = Free(leases, heard_since);
+  return free.empty() ? nullptr : free.front();
+}
+
+bool WorkerTable::IsThere(const std::string& checkpoints, Clock::time_point heard_since) const {
+  return std::any_of(workers_.begin(), workers_.end(), [&](const auto& item) {
+    return TakesWork(item.second, heard_since) && item.second.hello.checkpoints() == checkpoints;
+  });
 }
 
 int WorkerTable::Slots() const {

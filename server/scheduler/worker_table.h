@@ -36,6 +36,11 @@ class WorkerTable {
   /// draining and were heard since `heard_since` (a frozen machine keeps its connection), or
   /// nullptr when none is free.
   const WorkerEntry* MostFree(const LeaseTable& leases, Clock::time_point heard_since) const;
+  /// All that MostFree() chooses from, in its order.
+  std::vector<const WorkerEntry*> Free(const LeaseTable& leases,
+                                       Clock::time_point heard_since) const;
+  /// Whether a worker with this checkpoint folder is there and takes work, be it busy now.
+  bool IsThere(const std::string& checkpoints, Clock::time_point heard_since) const;
   const std::map<std::string, WorkerEntry>& all() const { return workers_; }
   int Slots() const;  ///< of all that are connected
 

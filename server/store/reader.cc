@@ -201,8 +201,8 @@ absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t c
   return Guard([&] {
     std::vector<EvaluationRecord> records;
     SQLite::Statement& row = connection_->Bind(
-        "SELECT sample, experiment, status, reason, failures, digest, reused FROM evaluation "
-        "WHERE campaign = ? ORDER BY sample, experiment",
+        "SELECT sample, experiment, status, reason, failures, digest, reused, rest_after, held_in "
+        "FROM evaluation WHERE campaign = ? ORDER BY sample, experiment",
         campaign);
     while (row.executeStep()) {
       records.push_back({.key = {.campaign = campaign,
@@ -212,7 +212,11 @@ absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t c
                          .reason = row.getColumn(3).getString(),
                          .failures = row.getColumn(4).getInt(),
                          .digest = row.getColumn(5).getString(),
-                         .reused = row.getColumn(6).getInt() != 0});
+                         .reused = row.getColumn(6).getInt() != 0,
+                         .rest_after = row.getColumn(7).isNull()
+                                           ? std::nullopt
+                                           : std::optional<int>(row.getColumn(7).getInt()),
+                         .held_in = row.getColumn(8).getString()});
     }
     return records;
   });

@@ -79,6 +79,8 @@ struct EvaluationRecord {
   int failures = 0;
   std::string digest{};
   bool reused = false;
+  std::optional<int> rest_after{};  ///< load step at which it rests; empty: it runs to its end
+  std::string held_in{};            ///< checkpoint folder that can go on with it; empty: none
 };
 
 /// An attempt that a worker holds.
@@ -99,7 +101,8 @@ struct NewAttempt {
 
 struct AttemptEnd {
   std::int64_t id = 0;
-  std::string outcome{};  ///< completed stopped diverged failed lost cancelled
+  std::string
+      outcome{};  ///< completed resting stopped_early stopped diverged failed lost cancelled
   std::string reason{};
   std::int64_t ended_unix_ms = 0;
   std::int64_t steps = 0;

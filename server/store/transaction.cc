@@ -122,6 +122,25 @@ void Transaction::InsertEvaluation(const EvaluationRecord& evaluation) {
         ToString(evaluation.status), evaluation.reason, evaluation.failures, evaluation.digest,
         evaluation.reused);
   });
+  if (evaluation.rest_after.has_value()) {
+    SetRest(evaluation.key, evaluation.rest_after);
+  }
+}
+
+void Transaction::SetRest(const EvaluationKey& key, std::optional<int> rest_after) {
+  Guard([&] {
+    connection_.Run(
+        "UPDATE evaluation SET rest_after = ? WHERE campaign = ? AND sample = ? AND experiment = ?",
+        std::optional<std::int64_t>(rest_after), key.campaign, key.sample, key.experiment);
+  });
+}
+
+void Transaction::SetHeldIn(const EvaluationKey& key, const std::string& folder) {
+  Guard([&] {
+    connection_.Run(
+        "UPDATE evaluation SET held_in = ? WHERE campaign = ? AND sample = ? AND experiment = ?",
+        folder, key.campaign, key.sample, key.experiment);
+  });
 }
 
 void Transaction::SetEvaluation(const EvaluationKey& key, EvaluationStatus status,

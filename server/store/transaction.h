@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,10 @@ class Transaction {
   void InsertEvaluation(const EvaluationRecord& evaluation);
   void SetEvaluation(const EvaluationKey& key, EvaluationStatus status, const std::string& reason,
                      int failures);
+  /// The next attempt of it rests after this load step; empty: it runs to the end.
+  void SetRest(const EvaluationKey& key, std::optional<int> rest_after);
+  /// It rests, and workers with this checkpoint folder can go on with it.
+  void SetHeldIn(const EvaluationKey& key, const std::string& folder);
   /// Ends `to` as `from` ended and gives it the same states; counted as reused.
   void ReuseEvaluation(const EvaluationKey& from, const EvaluationKey& to);
 

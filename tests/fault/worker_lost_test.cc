@@ -72,5 +72,62 @@ TEST(WorkerLost, FrozenPastItsLeaseAndWoken) {
   EXPECT_GE(lost, 3U) << "the freezes must have been noticed";
 }
 
+/// So little may be lost that every sample goes on from its rungs: the result is that of runs which
+/// go to their ends at once.
+SmallCampaign BreadthFirst(const std::string& rungs) {
+  return MakeSmallCampaign({.samples = 16,
+                            .max_iterations = 1,
+                            .load_steps = 6,
+                            .failure_attempts = 100,
+                            .relative_noise = 0.3,
+                            .method = "sqmc",
+                            .extra = "early_stopping: {discard_at_most: 1e-300" + rungs + "}\n"});
+}
+
+TEST(WorkerLost, KilledWhileItsSamplesRest) {
+  const auto submit = [](Client& client, const std::string& rungs) {
+    const SmallCampaign campaign = BreadthFirst(rungs);
+    const auto id = client.SubmitCampaign(campaign.yaml, campaign.files, "r");
+    ASSERT_TRUE(id.ok()) << id.status();
+  };
+  Deployment depth({.name = "depth-first"});
+  ASSERT_TRUE(depth.StartServer()) << depth.Logs();
+  depth.StartWorker(2);
+  Client depth_client = depth.client();
+  submit(depth_client, "");
+  ASSERT_TRUE(WaitFinished(depth)) << depth.Logs();
+  const auto expected = Fingerprint(depth_client, "c1");
+  ASSERT_TRUE(expected.ok()) << expected.status();
+
+  Deployment breadth({.name = "breadth-first", .lease_ms = 500});
+  ASSERT_TRUE(breadth.StartServer()) << breadth.Logs();
+  Client client = breadth.client();
+  submit(client, ", rungs: [0.3, 0.7]");
+  const auto resting = [&](int count) {
+    return Eventually(kLong, [&, count] {
+      const auto status = client.Show("c1");
+      return status.ok() &&
+             (status->samples_stopped_early() >= count || status->state() == "finished");
+    });
+  };
+  // The first worker holds samples that rest and is gone for good; so is the server, for a moment.
+  breadth.StartWorker(1);
+  ASSERT_TRUE(resting(5)) << breadth.Logs();
+  breadth.workers()[0].Kill();
+  breadth.StartWorker(1);
+  ASSERT_TRUE(resting(10)) << breadth.Logs();
+  breadth.server().Kill();
+  ASSERT_TRUE(breadth.StartServer()) << breadth.Logs();
+  ASSERT_TRUE(WaitFinished(breadth)) << breadth.Logs();
+  const auto found = Fingerprint(client, "c1");
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_TRUE(*found == *expected) << "other bits than depth first";
+  const auto log = client.Log("c1");
+  ASSERT_TRUE(log.ok()) << log.status();
+  for (const v1::LogEntry& entry : *log) {
+    EXPECT_EQ(entry.what().find("nondeterminism"), std::string::npos) << entry.what();
+  }
+}
+
 }  // namespace
 }  // namespace calib::testing

@@ -35,7 +35,8 @@ bool Deployment::StartServer() {
 void Deployment::StartWorker(int slots) {
   const std::string name = "w" + std::to_string(++started_workers_);
   workers_.emplace_back(std::vector<std::string>{Program("calib-worker"), "--server", address_,
-                                                 "--slots", std::to_string(slots), "--name", name},
+                                                 "--slots", std::to_string(slots), "--name", name,
+                                                 "--checkpoints", folder_ + "/checkpoints-" + name},
                         folder_ + "/" + name + ".log");
 }
 

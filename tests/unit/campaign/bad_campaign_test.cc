@@ -261,6 +261,15 @@ INSTANTIATE_TEST_SUITE_P(
                 "c.yaml:37: early_stopping.discard_at_most: '2' is outside what is allowed: "
                 "between 0 (excluded) and 1 "
                 "(excluded)"},
+        Mistake{"FallingRungs", "discard_at_most: 1e-3", "discard_at_most: 1e-3, rungs: [0.5, 0.5]",
+                "c.yaml:37: early_stopping.rungs: has 0.5 after 0.5; each rung has to be above the "
+                "one before"},
+        Mistake{"RungAtTheEnd", "discard_at_most: 1e-3", "discard_at_most: 1e-3, rungs: [0.5, 1]",
+                "c.yaml:37: early_stopping.rungs: '1' is outside what is allowed: between 0 "
+                "(excluded) and 1 (excluded)"},
+        Mistake{"OneRung", "discard_at_most: 1e-3", "discard_at_most: 1e-3, rungs: 0.5",
+                "c.yaml:37: early_stopping.rungs: has to be a list of shares of the load steps, "
+                "e.g. [0.25, 0.5]"},
         Mistake{"NegativeSeed", "seed: 7", "seed: -7",
                 "c.yaml:40: seed: '-7' is not a whole number of at least 0"},
         Mistake{"ListForAMap", "failure: {attempts: 5, pause_above: 0.25}", "failure: [5, 0.25]",

@@ -116,6 +116,7 @@ std::string SimulatedService::Submit(const testing::SmallCampaign& campaign) {
 std::int64_t SimulatedService::Connect(const std::string& worker, int slots,
                                        const std::vector<std::int64_t>& held) {
   v1::Hello hello = testing::MatchingHello(worker, slots);
+  hello.set_checkpoints("folder of " + worker);
   hello.mutable_attempts()->Add(held.begin(), held.end());
   const absl::Status status = scheduler_->Connected(++last_session_, hello);
   EXPECT_TRUE(status.ok()) << status;
@@ -197,10 +198,19 @@ void SimulatedService::Step(Simulated& worker, std::mt19937& random) {
       static_cast<int>(std::count_if(path.begin(), path.end(), [](const v1::ControlPoint& point) {
         return point.load_step() >= 0;
       }));
-  if (busy.sent < all) {
-    const int count = 1 + static_cast<int>(random() % static_cast<unsigned>(all - busy.sent));
+  // Load steps are numbered from 0 here.
+  const int until = busy.lease.has_rest_after() ? busy.lease.rest_after() + 1 : all;
+  if (busy.sent < until) {
+    const int count = 1 + static_cast<int>(random() % static_cast<unsigned>(until - busy.sent));
     SendStates(worker.session, busy.lease, busy.sent, count);
     busy.sent += count;
+    return;
+  }
+  const int begun = busy.lease.run().empty() ? 0 : worker.resting[busy.lease.run()];
+  computed += busy.sent - begun;
+  if (busy.lease.has_rest_after()) {
+    worker.resting[busy.lease.run()] = until;
+    SendEnd(worker.session, busy.lease.attempt(), v1::Finished::OUTCOME_RESTING);
   } else {
     SendEnd(worker.session, busy.lease.attempt(), v1::Finished::OUTCOME_COMPLETED);
   }
@@ -226,6 +236,7 @@ void SimulatedService::RunToEnd(unsigned seed, bool calm) {
     const unsigned trouble = calm ? 1000 : random() % 100;
     if (trouble == 0) {  // killed and started again
       workers[i].busy.clear();
+      if (random() % 2 == 0) workers[i].resting.clear();  // and its folder with it
       scheduler_->Disconnected(workers[i].session);
       connect(i);
     } else if (trouble == 1) {  // the stream is cut

@@ -76,6 +76,8 @@ class SimulatedService {
 
   /// Relative change of a curve from one packing to another, a number of order one times this.
   double packing_scatter = 0;
+  /// Load steps that workers of RunToEnd() had to compute: without those of a checkpoint.
+  int computed = 0;
 
   SimulatedPorts& ports() { return *ports_; }
   Scheduler& scheduler() { return *scheduler_; }
@@ -89,6 +91,7 @@ class SimulatedService {
   struct Simulated {
     std::int64_t session = 0;
     std::map<std::int64_t, Busy> busy;
+    std::map<std::string, int> resting;  // load steps behind it, by run
   };
   void Absorb(Simulated& worker);
   void Step(Simulated& worker, std::mt19937& random);

@@ -1,0 +1,29 @@
+#pragma once
+// An attempt that goes on from where its run rests and rests again at its rung.
+
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "calib/v1/worker.pb.h"
+#include "dem/simulation/scenario.h"
+#include "worker/checkpoints.h"
+#include "worker/specimens.h"
+
+namespace calib::worker {
+
+struct RestingRun {
+  std::string run{};                ///< digest under which it is kept
+  std::optional<int> rest_after{};  ///< load step; empty: it goes to its end
+};
+
+/// Evaluate() (evaluate.h) from the checkpoint of this run, if there is one, until its rung: then
+/// OUTCOME_RESTING. sink gets the states from the first one on again, none behind the rung. A
+/// checkpoint is kept when the run rests and removed when it has ended; checkpoints may be nullptr:
+/// none are. steps and contact_updates of the answer are those of this attempt alone. The states
+/// have the same bits with and without a checkpoint.
+v1::Finished EvaluateToRung(const v1::AttemptSpec& spec, const RestingRun& resting,
+                            const Checkpoints* checkpoints, Specimens& specimens,
+                            const dem::StateSink& sink, std::stop_token stop);
+
+}  // namespace calib::worker
