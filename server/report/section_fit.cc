@@ -12,6 +12,7 @@ namespace calib::report {
 namespace {
 
 constexpr double kNinety = 1.645;  // sd, to 5 and 95 %
+constexpr double kSignificant = 0.01;
 
 std::vector<double> Scaled(std::vector<double> values, double factor) {
   for (double& value : values) value *= factor;
@@ -154,6 +155,81 @@ std::string ExperimentFigures(const ReportData& data, std::size_t e) {
   return html + "</div>\n";
 }
 
+/// Root mean square of the errors stated for an observable [SI].
+double RmsNoise(const CampaignView& view, const std::string& experiment,
+                const std::string& observable) {
+  double squares = 0;
+  int readings = 0;
+  for (const campaign::Experiment& e : view.campaign.experiments) {
+    for (const campaign::MeasuredObservable& o : e.observables) {
+      if (e.name != experiment || o.name != observable) continue;
+      for (std::size_t i = 0; i < o.values.size(); ++i) {
+        squares += std::pow(ErrorOf(view, o, i), 2);
+        ++readings;
+      }
+    }
+  }
+  return std::sqrt(squares / readings);
+}
+
+const v1::Posterior::Scatter* FindScatter(const v1::Posterior& posterior,
+                                          const ObservableMisfit& misfit) {
+  for (const v1::Posterior::Scatter& scatter : posterior.scatter()) {
+    if (scatter.experiment() == misfit.experiment && scatter.observable() == misfit.observable &&
+        scatter.sd_size() > 0) {
+      return &scatter;
+    }
+  }
+  return nullptr;
+}
+
+/// Root mean square of what runs of the model differ by [SI].
+double RmsScatter(const v1::Posterior::Scatter& scatter) {
+  double squares = 0;
+  for (const double sd : scatter.sd()) squares += sd * sd;
+  return std::sqrt(squares / scatter.sd_size());
+}
+
+std::string ScatterOrigin(const v1::Posterior::Scatter& scatter) {
+  return scatter.from() == "realizations"
+             ? fmt::format("{} packings", scatter.runs())
+             : fmt::format("what an emulator of {} runs leaves", scatter.runs());
+}
+
+std::string ObservableTable(const ReportData& data) {
+  if (data.comparison.by_observable.empty() || !ErrorsAreKnown(data.view)) return "";
+  std::string html =
+      "<h3>Misfit by observable</h3>\n<p class=\"sub\">Noise is the error stated for the "
+      "measurement, scatter what runs of the model differ by among themselves: root mean squares "
+      "of "
+      "their standard deviations. Both are part of sd in rms / sd and p, the scatter as far as the "
+      "specimen has it too.</p>\n"
+      "<div class=\"scroll\"><table><tr><th>experiment</th><th class=\"l\">observable</th>"
+      "<th>readings</th><th>noise</th><th>model scatter</th><th>scatter / noise</th>"
+      "<th class=\"l\">from</th><th>rms residual</th><th>rms / sd</th><th>p</th></tr>\n";
+  for (const ObservableMisfit& misfit : data.comparison.by_observable) {
+    const dem::ObservableInfo* info = dem::FindObservable(misfit.observable);
+    const auto with_unit = [&](double value) {
+      return Escape(
+          NumberWithUnit(value, misfit.observable, info != nullptr ? info->unit : "1", 2));
+    };
+    const v1::Posterior::Scatter* const scatter = FindScatter(data.view.posterior, misfit);
+    const double own = scatter == nullptr ? 0 : RmsScatter(*scatter);
+    const double noise = RmsNoise(data.view, misfit.experiment, misfit.observable);
+    html += fmt::format(
+        "<tr><td>{}{}</td><td class=\"l\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
+        "<td class=\"l\">{}</td><td>{}</td><td>{}</td><td class=\"{}\">{}</td></tr>\n",
+        Escape(misfit.experiment), misfit.heldout ? " (held out)" : "",
+        Escape(NameForPeople(misfit.observable)), misfit.readings, with_unit(noise),
+        scatter == nullptr ? "–" : with_unit(own),
+        scatter == nullptr ? "–" : Number(own / noise, 2),
+        scatter == nullptr ? "not known" : ScatterOrigin(*scatter), with_unit(misfit.rms_residual),
+        Number(misfit.rms_error, 3), misfit.p_value && *misfit.p_value < kSignificant ? "bad" : "",
+        misfit.p_value ? Number(*misfit.p_value, 2) : "–");
+  }
+  return html + "</table></div>\n";
+}
+
 std::string SegmentTable(const ReportData& data) {
   if (data.comparison.by_segment.empty()) return "";
   std::string html =
@@ -202,7 +278,7 @@ std::string FitSection(const ReportData& data) {
   for (std::size_t e = 0; e < data.view.campaign.experiments.size(); ++e) {
     html += ExperimentFigures(data, e);
   }
-  return html + SegmentTable(data);
+  return html + ObservableTable(data) + SegmentTable(data);
 }
 
 }  // namespace calib::report

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <regex>
 
+#include "server/report/comparison.h"
 #include "server/report/html.h"
 #include "tests/unit/report/example_view.h"
 
@@ -49,6 +50,26 @@ TEST(Report, AHostileNameStaysText) {
   EXPECT_THAT(html, Not(HasSubstr("<script")));
   EXPECT_THAT(html, Not(HasSubstr("<img")));
   EXPECT_THAT(html, HasSubstr("&lt;script&gt;"));
+}
+
+TEST(Report, ShowsTheScatterOfTheModelBesideTheNoise) {
+  CampaignView view = testing::ExampleView("scattered");
+  EXPECT_THAT(RenderReport(view), HasSubstr("<th>model scatter</th>"));
+  EXPECT_THAT(RenderReport(view), HasSubstr(">not known<"));
+  const campaign::Experiment& experiment = view.campaign.experiments[0];
+  v1::Posterior::Scatter& scatter = *view.posterior.add_scatter();
+  scatter.set_experiment(experiment.name);
+  scatter.set_observable(experiment.observables[0].name);
+  for (std::size_t i = 0; i < experiment.control.size(); ++i) {
+    scatter.add_load_step(static_cast<int>(i));
+    scatter.add_sd(0.5 * ErrorOf(view, experiment.observables[0], i));
+  }
+  scatter.set_from("realizations");
+  scatter.set_runs(4);
+  scatter.set_share(1);
+  const std::string html = RenderReport(view);
+  EXPECT_THAT(html, HasSubstr("<td>0.5</td><td class=\"l\">4 packings</td>"));
+  EXPECT_THAT(html, Not(HasSubstr("nan")));
 }
 
 TEST(Report, TellsTheStoryOfAnAddedEffect) {
