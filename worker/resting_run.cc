@@ -16,10 +16,11 @@ std::optional<HeldRun> FindUsable(const v1::AttemptSpec& spec, const std::string
                                   const std::stop_token& stop) {
   auto held = checkpoints == nullptr ? std::nullopt : checkpoints->Find(run);
   if (!held.has_value()) return std::nullopt;
-  const auto packing = specimens.Get(spec, stop);
-  if (!packing.ok()) return std::nullopt;  // Evaluate() says why
+  const auto specimen = specimens.Get(spec, stop);
+  if (!specimen.ok()) return std::nullopt;  // Evaluate() says why
   dem::Scenario scenario = ScenarioFromSpec(spec);
-  scenario.packing = **packing;
+  scenario.packing = (*specimen)->packing;
+  scenario.meshes = (*specimen)->meshes;
   if (const auto problem = dem::CheckpointProblem(scenario, held->checkpoint); !problem.empty()) {
     spdlog::warn("checkpoint run={} refused=\"{}\"", run, problem);
     checkpoints->Remove(run);
