@@ -69,12 +69,6 @@ std::vector<const WorkerEntry*> WorkerTable::Free(const LeaseTable& leases,
   return workers;
 }
 
-const WorkerEntry* WorkerTable::MostFree(const LeaseTable& leases,
-                                         Clock::time_point heard_since) const {
-  const auto free = Free(leases, heard_since);
-  return free.empty() ? nullptr : free.front();
-}
-
 bool WorkerTable::IsThere(const std::string& checkpoints, Clock::time_point heard_since) const {
   return std::any_of(workers_.begin(), workers_.end(), [&](const auto& item) {
     return TakesWork(item.second, heard_since) && item.second.hello.checkpoints() == checkpoints;

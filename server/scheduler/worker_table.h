@@ -32,11 +32,8 @@ class WorkerTable {
   WorkerEntry* Find(const std::string& name);
   /// By its stream, or nullptr when that has been replaced.
   WorkerEntry* OfSession(std::int64_t session);
-  /// The worker with the most free slots (ties: by name) among those that are connected, not
-  /// draining and were heard since `heard_since` (a frozen machine keeps its connection), or
-  /// nullptr when none is free.
-  const WorkerEntry* MostFree(const LeaseTable& leases, Clock::time_point heard_since) const;
-  /// All that MostFree() chooses from, in its order.
+  /// Workers with free slots, the most first (ties: by name), among those that are connected, not
+  /// draining and were heard since `heard_since` (a frozen machine keeps its connection).
   std::vector<const WorkerEntry*> Free(const LeaseTable& leases,
                                        Clock::time_point heard_since) const;
   /// Whether a worker with this checkpoint folder is there and takes work, be it busy now.

@@ -19,15 +19,15 @@ v1::Hello Hello(const std::string& name, int slots) {
 TEST(WorkerTable, WorkGoesToTheWorkerWithMostFreeSlots) {
   WorkerTable workers;
   LeaseTable leases(seconds(10));
-  EXPECT_EQ(workers.MostFree(leases, kStart), nullptr);
+  EXPECT_TRUE(workers.Free(leases, kStart).empty());
   workers.Connect(Hello("a", 1), 1, kStart);
   workers.Connect(Hello("b", 2), 2, kStart);
-  EXPECT_EQ(workers.MostFree(leases, kStart)->hello.name(), "b");
+  EXPECT_EQ(workers.Free(leases, kStart).front()->hello.name(), "b");
   leases.Grant(1, {.campaign = 1, .sample = 0, .experiment = 0}, "b", kStart);
-  EXPECT_EQ(workers.MostFree(leases, kStart)->hello.name(), "a") << "ties go by name";
+  EXPECT_EQ(workers.Free(leases, kStart).front()->hello.name(), "a") << "ties go by name";
   leases.Grant(2, {.campaign = 1, .sample = 1, .experiment = 0}, "a", kStart);
   leases.Grant(3, {.campaign = 1, .sample = 2, .experiment = 0}, "b", kStart);
-  EXPECT_EQ(workers.MostFree(leases, kStart), nullptr);
+  EXPECT_TRUE(workers.Free(leases, kStart).empty());
   EXPECT_EQ(workers.Slots(), 3);
 }
 
@@ -35,12 +35,12 @@ TEST(WorkerTable, SilentDrainingAndGoneWorkersGetNothing) {
   WorkerTable workers;
   const LeaseTable leases(seconds(10));
   workers.Connect(Hello("a", 1), 1, kStart);
-  EXPECT_EQ(workers.MostFree(leases, kStart + seconds(1)), nullptr) << "silent";
+  EXPECT_TRUE(workers.Free(leases, kStart + seconds(1)).empty()) << "silent";
   workers.Find("a")->draining = true;
-  EXPECT_EQ(workers.MostFree(leases, kStart), nullptr);
+  EXPECT_TRUE(workers.Free(leases, kStart).empty());
   workers.Find("a")->draining = false;
   workers.Disconnect(1);
-  EXPECT_EQ(workers.MostFree(leases, kStart), nullptr);
+  EXPECT_TRUE(workers.Free(leases, kStart).empty());
 }
 
 TEST(WorkerTable, NewStreamReplacesTheOldOne) {
