@@ -9,7 +9,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/ctl/effect_screen.h"
-#include "server/ctl/extension.h"
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
@@ -68,11 +67,6 @@ class Inquiry {
   absl::Status CheckPossible() const {
     const report::CampaignView& view = base_.view();
     const std::string& id = base_.id();
-    for (const std::string& effect : options_.without) {
-      if (std::string why = WhyUnknown(view.campaign, effect); !why.empty()) {
-        return absl::InvalidArgumentError(why);
-      }
-    }
     if (view.posterior.posterior_from().empty()) {
       return absl::FailedPreconditionError(absl::StrCat(
           "no iteration of ", id, " is complete, so nothing can be said about its model"));

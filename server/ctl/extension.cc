@@ -86,17 +86,15 @@ dem::ReferenceState ReferenceOf(const report::CampaignView& view) {
   return state;
 }
 
-std::string WhyUnknown(const campaign::Campaign& campaign, const std::string& name) {
-  const auto& declared = campaign.model.user_effects;
-  if (dem::FindEffect(declared, name) != nullptr) return "";
-  std::vector<std::string> names;
-  for (const dem::EffectInfo* info : dem::AllEffects(declared)) names.push_back(info->name);
-  return absl::StrCat("there is no effect ", name, "; this build has ", absl::StrJoin(names, ", "));
-}
-
 std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& name) {
-  if (std::string why = WhyUnknown(campaign, name); !why.empty()) return why;
-  const dem::EffectInfo* effect = dem::FindEffect(campaign.model.user_effects, name);
+  const auto& declared = campaign.model.user_effects;
+  const dem::EffectInfo* effect = dem::FindEffect(declared, name);
+  if (effect == nullptr) {
+    std::vector<std::string> names;
+    for (const dem::EffectInfo* info : dem::AllEffects(declared)) names.push_back(info->name);
+    return absl::StrCat("there is no effect ", name, "; this build has ",
+                        absl::StrJoin(names, ", "));
+  }
   if (campaign.precomputed) return "runs that were made elsewhere cannot be joined by an effect";
   const auto& has = campaign.model.effects;
   if (std::find(has.begin(), has.end(), name) != has.end()) {

@@ -15,9 +15,6 @@ namespace calib::ctl {
 /// Pressure, grain size and stiffness that make strengths of effects comparable.
 dem::ReferenceState ReferenceOf(const report::CampaignView& view);
 
-/// Neither this build nor the campaign file has such an effect, in a sentence; empty: one has.
-std::string WhyUnknown(const campaign::Campaign& campaign, const std::string& effect);
-
 /// Why an effect cannot join the model of a campaign, in a sentence; empty: it can.
 std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& effect);
 

@@ -23,6 +23,7 @@ class Case:
     staging: str = 'base'       # how the measurement was made: base | rate | step | grains
     verb: str = 'diagnose'      # or improve
     removed: str = ''           # effect that the diagnosis may not know
+    strength: int = 0           # lambda of a single hidden effect
 
 
 def matrix(strengths, repeats, controls):
@@ -36,7 +37,7 @@ def matrix(strengths, repeats, controls):
             row = 'measurement-side effect' if effect in MEASUREMENT_SIDE and strength > 10 else f'lambda = {strength}'
             cases += [Case(f'{effect}-l{strength}-r{r + 1}', row, 10000 + 1000 * number + strength + r, (effect,),
                            tuple(sorted(by_lambda[strength].items())),
-                           verb='improve' if strength == 60 else 'diagnose') for r in range(repeats)]
+                           verb='improve' if strength == 60 else 'diagnose', strength=strength) for r in range(repeats)]
         if 60 in by_lambda:
             cases.append(Case(f'removed-{effect}-r1', 'true effect removed', 10000 + 1000 * number + 500, (effect,),
                               tuple(sorted(by_lambda[60].items())), removed=effect))

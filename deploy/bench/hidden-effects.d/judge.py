@@ -27,18 +27,23 @@ def names(diagnosis):
     return {first['effect'], *(first['confusable_with'] if diagnosis['verdict'] == 'ambiguous' else [])}
 
 
-def good(outcome):
+def rows_of(case):
+    """A measurement-side effect is one of its lambda, too: to be named, not merely not mistaken."""
+    return {case.row, f'lambda = {case.strength}'} if case.strength else {case.row}
+
+
+def good(outcome, row):
     case, diagnosis, truth = outcome['case'], outcome['verdict']['diagnose'], set(outcome['truth']['effects'])
     named = names(diagnosis)
     if not truth:
         return diagnosis['verdict'] == 'adequate'
-    if case.row == 'lambda = 10':
+    if row == 'lambda = 10':
         return diagnosis['verdict'] != 'missing_effect' or diagnosis['effect'] in truth
-    if case.row == 'true effect removed':
+    if row == 'true effect removed':
         return diagnosis['verdict'] in ('unexplained', 'ambiguous')
-    if case.row == 'two effects at once':
+    if row == 'two effects at once':
         return truth <= set(outcome['verdict']['improve']['steps'][-1]['effects'])
-    if case.row == 'measurement-side effect':
+    if row == 'measurement-side effect':
         return diagnosis['verdict'] != 'missing_effect' or diagnosis['effect'] in MEASUREMENT_SIDE
     return bool(truth & named)
 
@@ -52,9 +57,9 @@ def table(outcomes, planned):
     lines = [f'{len(outcomes)} of {planned} cases finished.', '',
              '| case | what counts | hits | 95 % interval | required |', '|---|---|---|---|---|']
     for row, (what, required) in REQUIRED.items():
-        own = [o for o in outcomes if o['case'].row == row]
+        own = [o for o in outcomes if row in rows_of(o['case'])]
         if own:
-            lines.append(line(row, sum(map(good, own)), len(own), what, required))
+            lines.append(line(row, sum(good(o, row) for o in own), len(own), what, required))
     improved = [o for o in outcomes if o['verdict'].get('improve', {}).get('steps')]
     held = [o['verdict']['improve']['steps'][-1].get('heldout_rms_error') for o in improved]
     held = [h for h in held if h is not None]
