@@ -191,22 +191,21 @@ double RmsScatter(const v1::Posterior::Scatter& scatter) {
 }
 
 std::string ScatterOrigin(const v1::Posterior::Scatter& scatter) {
-  return scatter.from() == "realizations"
-             ? fmt::format("{} packings", scatter.runs())
-             : fmt::format("what an emulator of {} runs leaves", scatter.runs());
+  return scatter.from() == "realizations" ? fmt::format("{} packings", scatter.runs())
+                                          : fmt::format("emulator, {} runs", scatter.runs());
 }
 
 std::string ObservableTable(const ReportData& data) {
   if (data.comparison.by_observable.empty() || !ErrorsAreKnown(data.view)) return "";
   std::string html =
       "<h3>Misfit by observable</h3>\n<p class=\"sub\">Noise is the error stated for the "
-      "measurement, scatter what runs of the model differ by among themselves: root mean squares "
-      "of "
-      "their standard deviations. Both are part of sd in rms / sd and p, the scatter as far as the "
+      "measurement, scatter what runs of the model differ by among themselves, on other "
+      "packings or as an emulator of them leaves it: root mean squares of their standard "
+      "deviations. Both are part of sd in rms / sd and p, the scatter as far as the "
       "specimen has it too.</p>\n"
       "<div class=\"scroll\"><table><tr><th>experiment</th><th class=\"l\">observable</th>"
-      "<th>readings</th><th>noise</th><th>model scatter</th><th>scatter / noise</th>"
-      "<th class=\"l\">from</th><th>rms residual</th><th>rms / sd</th><th>p</th></tr>\n";
+      "<th>readings</th><th>noise</th><th>scatter</th><th>scatter / noise</th>"
+      "<th class=\"l\">from</th><th>residual</th><th>rms / sd</th><th>p</th></tr>\n";
   for (const ObservableMisfit& misfit : data.comparison.by_observable) {
     const dem::ObservableInfo* info = dem::FindObservable(misfit.observable);
     const auto with_unit = [&](double value) {

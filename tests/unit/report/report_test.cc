@@ -54,7 +54,7 @@ TEST(Report, AHostileNameStaysText) {
 
 TEST(Report, ShowsTheScatterOfTheModelBesideTheNoise) {
   CampaignView view = testing::ExampleView("scattered");
-  EXPECT_THAT(RenderReport(view), HasSubstr("<th>model scatter</th>"));
+  EXPECT_THAT(RenderReport(view), HasSubstr("<th>scatter</th>"));
   EXPECT_THAT(RenderReport(view), HasSubstr(">not known<"));
   const campaign::Experiment& experiment = view.campaign.experiments[0];
   v1::Posterior::Scatter& scatter = *view.posterior.add_scatter();
