@@ -1,7 +1,6 @@
 #include "server/service/state_folder.h"
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -34,6 +33,15 @@ std::optional<Announcement> ReadAnnouncement(const std::string& directory) {
   return Announcement{.address = json["address"].get<std::string>(), .pid = json["pid"].get<int>()};
 }
 
+/// The whole file, for the open file description (not the process: threads of one process exclude
+/// each other too).
+struct flock WholeFile(short type) {
+  struct flock lock = {};
+  lock.l_type = type;
+  lock.l_whence = SEEK_SET;
+  return lock;
+}
+
 absl::Status CannotWrite(const std::string& what, int error) {
   return absl::ResourceExhaustedError(
       absl::StrCat(what, " cannot be written: ", std::generic_category().message(error)));
@@ -51,7 +59,8 @@ absl::StatusOr<std::unique_ptr<StateFolder>> StateFolder::Open(const std::string
   if (lock < 0) {
     return CannotWrite(LockPath(directory), errno);
   }
-  if (flock(lock, LOCK_EX | LOCK_NB) != 0) {
+  struct flock exclusive = WholeFile(F_WRLCK);
+  if (fcntl(lock, F_OFD_SETLK, &exclusive) != 0) {
     close(lock);
     const auto other = ReadAnnouncement(directory);
     return absl::AlreadyExistsError(
@@ -90,7 +99,9 @@ absl::StatusOr<std::string> ServingAddress(const std::string& directory) {
   if (lock < 0) {
     return absl::NotFoundError(absl::StrCat("nobody serves ", directory));
   }
-  const bool is_free = flock(lock, LOCK_SH | LOCK_NB) == 0;
+  // Asks without taking: whoever looks never stands in the way of a server that starts.
+  struct flock query = WholeFile(F_RDLCK);
+  const bool is_free = fcntl(lock, F_OFD_GETLK, &query) == 0 && query.l_type == F_UNLCK;
   close(lock);
   if (is_free) {
     return absl::NotFoundError(absl::StrCat("nobody serves ", directory));

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <filesystem>
+#include <thread>
 
 #include "tests/support/process.h"
 
@@ -25,6 +27,23 @@ TEST(StateFolder, BelongsToOneServerAtATimeAndSaysWhere) {
   }
   EXPECT_EQ(ServingAddress(folder).status().code(), absl::StatusCode::kNotFound);
   EXPECT_TRUE(StateFolder::Open(folder).ok());
+}
+
+TEST(StateFolder, WhoLooksNeverKeepsAServerFromStarting) {
+  const std::string folder = testing::FreshFolder("state-folder-looked-at");
+  ASSERT_TRUE(StateFolder::Open(folder).ok());
+  std::atomic<bool> stop = false;
+  std::thread onlooker([&] {
+    while (!stop) {
+      (void)ServingAddress(folder);
+    }
+  });
+  for (int start = 0; start < 2000; ++start) {
+    const auto owner = StateFolder::Open(folder);
+    EXPECT_TRUE(owner.ok()) << "start " << start << ": " << owner.status();
+  }
+  stop = true;
+  onlooker.join();
 }
 
 TEST(StateFolder, FolderThatCannotBeMadeIsNamed) {
