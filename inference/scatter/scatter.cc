@@ -1,6 +1,7 @@
 #include "inference/scatter/scatter.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -12,33 +13,55 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int kLengths = 200;
+constexpr int kLengths = 100;
+constexpr std::array kAtStart{1e-4, 1e-3, 1e-2, 1e-1, 1.0};
+constexpr std::array kPowers{1, 2, 3};
+// Readings that scatter by less than this part of the largest sd, as at the start itself, count as
+// if they scattered by so much.
+constexpr double kNegligible = 1e-3;
+// Of neighbours that are as good as independent.
+constexpr double kFarApart = 1e3;
 
-Eigen::VectorXd StageDeviations(const ScatterMoments& moments, const std::vector<int>& stage) {
-  std::map<int, std::pair<double, int>> sums;
-  for (Index i = 0; i < moments.variance.size(); ++i) {
-    auto& [sum, count] = sums[stage[static_cast<std::size_t>(i)]];
-    sum += moments.variance[i];
-    ++count;
-  }
-  Eigen::VectorXd sd(moments.variance.size());
-  for (Index i = 0; i < sd.size(); ++i) {
-    const auto& [sum, count] = sums[stage[static_cast<std::size_t>(i)]];
-    sd[i] = std::sqrt(std::max(0.0, sum / count));
-  }
-  return sd;
+// The shape of a process that starts with the part `at_start` of its final variance.
+struct Shape {
+  Eigen::VectorXd variance;  // up to the stages' scales
+  Eigen::VectorXd clock;
+};
+
+Shape ShapeOf(const Eigen::VectorXd& control, double length, double at_start, int power) {
+  const Eigen::ArrayXd open = 1 - (1 - at_start) * (-2 / length * control.array()).exp();
+  return {.variance = open.pow(power), .clock = control.array() / length + 0.5 * open.log()};
 }
 
-// Expected log likelihood of u_1 ... u_n, u_i+1 | u_i ~ N(rho u_i, 1 - rho^2), given their moments.
-double MarkovLikelihood(const ScatterMoments& scaled, const Eigen::VectorXd& distance,
-                        double length) {
-  double sum = 0;
-  for (Index i = 0; i < distance.size(); ++i) {
-    const double rho = std::exp(-distance[i] / length);
-    const double open = -std::expm1(-2 * distance[i] / length);  // 1 - rho^2
-    const double square =
-        scaled.variance[i + 1] - 2 * rho * scaled.neighbour[i] + rho * rho * scaled.variance[i];
-    sum -= 0.5 * (std::log(open) + square / open);
+// Variances of unit `unit` scaled to the moments, stage by stage.
+Eigen::VectorXd ScaledToStages(const Eigen::VectorXd& unit, const ScatterMoments& moments,
+                               const std::vector<int>& stage) {
+  std::map<int, std::pair<double, int>> sums;
+  for (Index i = 0; i < unit.size(); ++i) {
+    auto& [sum, count] = sums[stage[static_cast<std::size_t>(i)]];
+    sum += moments.variance[i] / unit[i];
+    ++count;
+  }
+  Eigen::VectorXd variance(unit.size());
+  for (Index i = 0; i < unit.size(); ++i) {
+    const auto& [sum, count] = sums[stage[static_cast<std::size_t>(i)]];
+    variance[i] = std::max(0.0, unit[i] * sum / count);
+  }
+  return variance;
+}
+
+// Expected log likelihood of the chain.
+double MarkovLikelihood(const ScatterMoments& moments, const Eigen::VectorXd& variance,
+                        const Eigen::VectorXd& clock) {
+  double sum = -0.5 * (std::log(variance[0]) + moments.variance[0] / variance[0]);
+  for (Index i = 0; i + 1 < variance.size(); ++i) {
+    const double rho = std::exp(clock[i] - clock[i + 1]);
+    const double open = std::max(1e-9, 1 - rho * rho);
+    const double here = moments.variance[i] / variance[i];
+    const double next = moments.variance[i + 1] / variance[i + 1];
+    const double both = moments.neighbour[i] / std::sqrt(variance[i] * variance[i + 1]);
+    const double square = next - 2 * rho * both + rho * rho * here;
+    sum -= 0.5 * (std::log(variance[i + 1]) + std::log(open) + square / open);
   }
   return sum;
 }
@@ -62,37 +85,45 @@ GroupScatter FitScatter(const ScatterMoments& moments, const std::vector<int>& s
                         const Eigen::VectorXd& control) {
   const Index n = moments.variance.size();
   GroupScatter scatter;
-  scatter.sd = StageDeviations(moments, stage);
+  scatter.sd = ScaledToStages(Eigen::VectorXd::Ones(n), moments, stage).cwiseSqrt();
+  scatter.clock = kFarApart * Eigen::VectorXd::LinSpaced(n, 0, static_cast<double>(n - 1));
   if (n < 3 || !(scatter.sd.minCoeff() > 0)) return scatter;
   const double whole = control[n - 1] - control[0];
   if (!(whole > 0)) return scatter;
-  Eigen::VectorXd distance = control.tail(n - 1) - control.head(n - 1);
-  distance = distance.cwiseMax(1e-6 * whole);
-  ScatterMoments scaled = moments;
-  scaled.variance.array() /= scatter.sd.array().square();
-  scaled.neighbour.array() /= scatter.sd.head(n - 1).array() * scatter.sd.tail(n - 1).array();
-  const double first = 0.1 * distance.minCoeff();
-  const double ratio = std::log(100 * whole / first) / (kLengths - 1);
+  ScatterMoments floored = moments;
+  floored.variance =
+      moments.variance.cwiseMax(kNegligible * kNegligible * moments.variance.maxCoeff());
+  const Eigen::VectorXd distance = control.tail(n - 1) - control.head(n - 1);
+  const double shortest = 0.1 * std::max(distance.minCoeff(), 1e-6 * whole);
+  const double ratio = std::log(100 * whole / shortest) / (kLengths - 1);
   double best = -std::numeric_limits<double>::infinity();
   for (int k = 0; k < kLengths; ++k) {
-    const double length = first * std::exp(ratio * k);
-    const double value = MarkovLikelihood(scaled, distance, length);
-    if (value > best) {
-      best = value;
-      scatter.length = k == 0 ? 0 : length;
+    const double length = shortest * std::exp(ratio * k);
+    for (const double at_start : kAtStart) {
+      for (const int power : kPowers) {
+        if (at_start == 1 && power > 1) continue;  // stationary whatever the power
+        const Shape shape = ShapeOf(control, length, at_start, power);
+        const Eigen::VectorXd variance = ScaledToStages(shape.variance, floored, stage);
+        const double value = MarkovLikelihood(floored, variance, shape.clock);
+        if (value > best) {
+          best = value;
+          scatter.sd = variance.cwiseSqrt();
+          scatter.clock = shape.clock;
+          scatter.length = length;
+        }
+      }
     }
   }
   return scatter;
 }
 
-Eigen::MatrixXd ScatterCovariance(const GroupScatter& scatter, const Eigen::VectorXd& control) {
+Eigen::MatrixXd ScatterCovariance(const GroupScatter& scatter) {
   const Index n = scatter.sd.size();
   Eigen::MatrixXd covariance = scatter.sd.cwiseAbs2().asDiagonal();
-  for (Index i = 0; scatter.length > 0 && i < n; ++i) {
+  for (Index i = 0; i < n; ++i) {
     for (Index j = 0; j < i; ++j) {
       covariance(i, j) = covariance(j, i) =
-          scatter.sd[i] * scatter.sd[j] *
-          std::exp(-std::abs(control[i] - control[j]) / scatter.length);
+          scatter.sd[i] * scatter.sd[j] * std::exp(scatter.clock[j] - scatter.clock[i]);
     }
   }
   return covariance;
@@ -109,14 +140,10 @@ DataSet WithScatter(const DataSet& data, const std::vector<GroupScatter>& scatte
     const auto n = static_cast<Index>(members.size());
     assert(one.sd.size() == n);
     Eigen::VectorXd sd(n);
-    Eigen::VectorXd control(n);
-    for (Index i = 0; i < n; ++i) {
-      sd[i] = data.readings[members[i]].sd;
-      control[i] = data.readings[members[i]].control;
-    }
+    for (Index i = 0; i < n; ++i) sd[i] = data.readings[members[i]].sd;
     Eigen::MatrixXd total =
         sd.asDiagonal() * ErrorCorrelation(data, key, members) * sd.asDiagonal();
-    total += (runs + one.share) * ScatterCovariance(one, control);
+    total += (runs + one.share) * ScatterCovariance(one);
     for (Index i = 0; i < n; ++i) result.readings[members[i]].sd = std::sqrt(total(i, i));
     const auto is_same = [&key](const auto& entry) {
       return std::pair(entry.experiment, entry.observable) == key;

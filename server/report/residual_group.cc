@@ -4,6 +4,7 @@
 
 #include "inference/scatter/scatter.h"
 #include "server/report/comparison.h"
+#include "server/report/scatter_record.h"
 
 namespace calib::report {
 namespace {
@@ -21,32 +22,24 @@ Eigen::MatrixXd NoiseCovariance(const Eigen::VectorXd& sd, const Eigen::VectorXd
   return covariance;
 }
 
-const v1::Posterior::Scatter* FindScatter(const v1::Posterior& posterior,
-                                          const std::string& experiment,
-                                          const std::string& observable) {
-  for (const v1::Posterior::Scatter& scatter : posterior.scatter()) {
-    if (scatter.experiment() == experiment && scatter.observable() == observable) return &scatter;
-  }
-  return nullptr;
-}
-
 // The measured specimen is one packing of many; so is the model's where no mean over several runs
 // can be given.
-void AddScatter(const CampaignView& view, const Eigen::VectorXd& travelled, ResidualGroup& group) {
-  const v1::Posterior::Scatter* scatter =
+// in: travelled, of every reading of the experiment.
+void AddScatter(const CampaignView& view, const std::vector<double>& travelled,
+                ResidualGroup& group) {
+  const v1::Posterior::Scatter* record =
       FindScatter(view.posterior, group.experiment->name, group.observable->name);
-  if (scatter == nullptr) return;
-  inference::GroupScatter found{.sd = Eigen::VectorXd(travelled.size()),
-                                .length = scatter->correlation_length()};
-  for (Eigen::Index i = 0; i < travelled.size(); ++i) {
-    const auto reading = static_cast<int>(group.readings[static_cast<std::size_t>(i)]);
-    found.sd[i] = reading < scatter->sd_size() ? scatter->sd(reading) : 0;
-  }
-  const double times = scatter->share() + (view.posterior.posterior_from() == "none" ? 1 : 0);
-  const Eigen::MatrixXd covariance = times * inference::ScatterCovariance(found, travelled);
+  if (record == nullptr) return;
+  const inference::GroupScatter scatter =
+      GroupScatterOf(*record, Eigen::Map<const Eigen::VectorXd>(
+                                  travelled.data(), static_cast<Eigen::Index>(travelled.size())));
+  std::vector<Eigen::Index> kept;
+  for (const std::size_t i : group.readings) kept.push_back(static_cast<Eigen::Index>(i));
+  const double times = scatter.share + (view.posterior.posterior_from() == "none" ? 1 : 0);
+  const Eigen::MatrixXd covariance = times * inference::ScatterCovariance(scatter)(kept, kept);
   const Eigen::VectorXd ratio = covariance.diagonal().cwiseQuotient(group.covariance.diagonal());
   group.scatter = std::sqrt(ratio.mean());
-  group.scatter_from = scatter->from();
+  group.scatter_from = record->from();
   group.covariance += covariance;
 }
 
@@ -85,7 +78,7 @@ ResidualGroup MakeResidualGroup(const CampaignView& view, const campaign::Experi
     group.covariance = NoiseCovariance(Eigen::Map<const Eigen::VectorXd>(sd.data(), size), path,
                                        group.observable->correlation_length);
   }
-  if (size > 0) AddScatter(view, path, group);
+  if (size > 0) AddScatter(view, distance, group);
   group.model = Eigen::Map<const Eigen::VectorXd>(model.data(), size);
   return group;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "inference/scatter/scatter.h"
+#include "server/report/scatter_record.h"
 
 namespace calib::report {
 namespace {
@@ -56,21 +57,21 @@ ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
         view.campaign.experiments[static_cast<std::size_t>(key.first)];
     const std::string& observable =
         experiment.observables[static_cast<std::size_t>(key.second)].name;
-    for (const v1::Posterior::Scatter& scatter : view.posterior.scatter()) {
-      if (scatter.experiment() != experiment.name || scatter.observable() != observable ||
-          scatter.from() != "realizations" ||
-          scatter.sd_size() != static_cast<int>(readings.size())) {
-        continue;
-      }
-      of_run.push_back(
-          {.experiment = key.first,
-           .observable = key.second,
-           .sd = Eigen::Map<const Eigen::VectorXd>(scatter.sd().data(), scatter.sd_size()),
-           .length = scatter.correlation_length(),
-           .share = scatter.share()});
-      of_mean.push_back(of_run.back());
-      of_mean.back().share += 1.0 / scatter.runs();
+    const v1::Posterior::Scatter* record = FindScatter(view.posterior, experiment.name, observable);
+    if (record == nullptr || record->from() != "realizations" ||
+        record->sd_size() != static_cast<int>(readings.size())) {
+      continue;
     }
+    Eigen::VectorXd travelled(static_cast<Index>(readings.size()));
+    for (Index i = 0; i < travelled.size(); ++i) {
+      travelled[i] =
+          data.readings[static_cast<std::size_t>(readings[static_cast<std::size_t>(i)])].control;
+    }
+    of_run.push_back(GroupScatterOf(*record, travelled));
+    of_run.back().experiment = key.first;
+    of_run.back().observable = key.second;
+    of_mean.push_back(of_run.back());
+    of_mean.back().share += 1.0 / record->runs();
   }
   return {.of_mean = inference::WithScatter(data, of_mean, 0),
           .of_run = inference::WithScatter(data, of_run, 1),

@@ -153,6 +153,7 @@ void AddScatter(const Definition& definition, const Answer& answer, v1::Posterio
     for (Eigen::Index i = 0; i < scatter.group.sd.size(); ++i) {
       out.add_load_step(static_cast<int>(i));
       out.add_sd(scatter.group.sd[i]);
+      out.add_clock(scatter.group.clock[i]);
     }
     out.set_correlation_length(scatter.group.length);
     out.set_share(scatter.group.share);

@@ -43,8 +43,54 @@ TEST(Scatter, FindsSdOfEachStageAndLength) {
                                   Eigen::VectorXd::LinSpaced(n, 1, n));
   EXPECT_NEAR(scatter.sd[0], 0.1, 4 * 0.1 * 0.02);
   EXPECT_NEAR(scatter.sd[n - 1], 0.2, 4 * 0.2 * 0.02);
-  EXPECT_EQ(scatter.sd[0], scatter.sd[n / 2 - 1]);
+  EXPECT_EQ(scatter.sd[0], scatter.sd[n / 2 - 1]) << "stationary, as these chains are";
   EXPECT_NEAR(scatter.length, 5, 0.5);
+  EXPECT_NEAR(ScatterCovariance(scatter)(3, 6), 0.01 * std::exp(-3.0 / 5), 0.01 * 0.05);
+}
+
+// Packings in one state of stress that drift apart: a Wiener process W, Var W(x) = x, or x W.
+Eigen::MatrixXd FromOneStart(Index runs, Index n, bool slowly, std::uint64_t seed) {
+  Eigen::MatrixXd result(runs, n);
+  for (Index r = 0; r < runs; ++r) {
+    PhiloxStream stream({.seed = seed,
+                         .purpose = StreamPurpose::kTest,
+                         .iteration = 1,
+                         .sample = static_cast<std::uint64_t>(r)});
+    double walk = 0;
+    for (Index i = 0; i < n; ++i) {
+      walk += stream.Normal();
+      result(r, i) = slowly ? static_cast<double>(i + 1) * walk : walk;
+    }
+  }
+  return result;
+}
+
+TEST(Scatter, PackingsThatStartAlikeDriftApart) {
+  const Index n = 30;
+  const Eigen::VectorXd control = Eigen::VectorXd::LinSpaced(n, 1, n);
+  const std::vector<int> one_stage(n, 0);
+  for (const bool slowly : {false, true}) {
+    const auto scatter =
+        FitScatter(MomentsOfReplicates(FromOneStart(400, n, slowly, 3)), one_stage, control);
+    for (const Index i : {0, 4, 14, 29}) {
+      EXPECT_NEAR(scatter.sd[i] / std::pow(control[i], slowly ? 1.5 : 0.5), 1, 0.15)
+          << i << ' ' << slowly;
+    }
+    // Increments of a Wiener process do not know the past.
+    const Eigen::MatrixXd covariance = ScatterCovariance(scatter);
+    EXPECT_NEAR(covariance(29, 9) / covariance(9, 9), slowly ? 3 : 1, slowly ? 0.3 : 0.1);
+  }
+}
+
+TEST(Scatter, ReadingAtTheStartItselfHasNone) {
+  const Index n = 20;
+  Eigen::MatrixXd runs(6, n + 1);
+  runs << Eigen::VectorXd::Constant(6, 1.0), FromOneStart(6, n, false, 5);
+  const auto scatter = FitScatter(MomentsOfReplicates(runs), std::vector<int>(n + 1, 0),
+                                  Eigen::VectorXd::LinSpaced(n + 1, 0, n));
+  EXPECT_LT(scatter.sd[0], 0.05 * scatter.sd[n]);
+  EXPECT_GT(scatter.sd[1], 0.05 * scatter.sd[n]);
+  EXPECT_TRUE(ScatterCovariance(scatter).allFinite());
 }
 
 TEST(Scatter, FourPackingsAreUnbiasedOnAverage) {
@@ -85,7 +131,10 @@ DataSet ThreeReadings() {
 }
 
 TEST(Scatter, JoinsTheErrorsOnceForTheRunAndOnceForTheSpecimen) {
-  const GroupScatter scatter{.sd = Eigen::Vector3d(0.4, 0.4, 0.8), .length = 2, .share = 0.25};
+  const GroupScatter scatter{.sd = Eigen::Vector3d(0.4, 0.4, 0.8),
+                             .clock = Eigen::Vector3d(0, 0.5, 1),
+                             .length = 2,
+                             .share = 0.25};
   const DataSet with = WithScatter(ThreeReadings(), {scatter}, 1);
   ASSERT_EQ(with.covariances.size(), 1U);
   EXPECT_NEAR(with.readings[0].sd, std::sqrt(0.09 + 1.25 * 0.16), 1e-12);
