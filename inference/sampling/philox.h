@@ -24,6 +24,7 @@ enum class StreamPurpose : std::uint64_t {
   kSensitivity = 23,
   kDiagnosisDraws = 24,
   kRefitSpread = 25,
+  kAudit = 26,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

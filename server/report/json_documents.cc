@@ -157,6 +157,9 @@ std::string PosteriorJson(const v1::Posterior& p) {
                {"reversed_path", Path(p.reversed_path())},
                {"model_evaluations", p.model_evaluations()},
                {"stopped_early", p.stopped_early()},
+               {"stated_loss", p.stated_loss()},
+               {"audited", p.audited()},
+               {"measured_loss", p.has_measured_loss() ? Json(p.measured_loss()) : Json(nullptr)},
                {"core_hours", p.core_hours()},
                {"warnings", warnings}});
 }

@@ -52,6 +52,18 @@ std::string SpecimenSentence(const campaign::Experiment& experiment) {
   return "bodies by the test's settings";
 }
 
+// What early stopping saved is in the effort; this says what it may have lost.
+std::string StoppingSentence(const v1::Posterior& posterior) {
+  if (posterior.stopped_early() == 0) return "none";
+  std::string text = fmt::format("{} samples; they may have lost {} of the posterior mass together",
+                                 posterior.stopped_early(), Number(posterior.stated_loss(), 2));
+  if (posterior.has_measured_loss()) {
+    text += fmt::format("; {} of the stopped were run to their ends all the same: measured loss {}",
+                        posterior.audited(), Number(posterior.measured_loss(), 2));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string RecordSection(const ReportData& data) {
@@ -66,7 +78,7 @@ std::string RecordSection(const ReportData& data) {
       Entry("noise", NoiseSentence(campaign)) +
       Entry("samples", fmt::format("{} per iteration, at most {} iterations", campaign.samples,
                                    campaign.max_iterations)) +
-      Entry("stopped early", std::to_string(view.posterior.stopped_early())) +
+      Entry("stopped early", StoppingSentence(view.posterior)) +
       Entry("effort",
             fmt::format("{} model evaluations, {} core hours", view.posterior.model_evaluations(),
                         Number(view.posterior.core_hours(), 3)));

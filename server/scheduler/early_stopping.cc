@@ -4,6 +4,10 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
+#include <utility>
+
+#include "inference/sampling/philox.h"
 
 namespace calib::scheduler {
 namespace {
@@ -25,9 +29,12 @@ double LogSumExp(const std::vector<double>& terms) {
   return largest + std::log(sum);
 }
 
+constexpr double kAudited = 0.02;  // of the stopped samples
+
 struct Finished {
-  double exponent = 1;  // of the likelihood in all weights
-  double log_mass = 0;  // ln of the summed weight of the finished samples
+  double exponent = 1;                // of the likelihood in all weights
+  double log_mass = 0;                // ln of the summed weight of the finished samples
+  std::vector<double> log_weights{};  // of all samples in order; -inf: not finished
 };
 
 /// importance: of all samples, in order.
@@ -55,7 +62,8 @@ absl::StatusOr<Finished> FinishedMass(const Definition& definition, const Histor
       ++at;
     }
   }
-  return Finished{.exponent = *exponent, .log_mass = LogSumExp(weights)};
+  const double log_mass = LogSumExp(weights);
+  return Finished{.exponent = *exponent, .log_mass = log_mass, .log_weights = std::move(weights)};
 }
 
 }  // namespace
@@ -143,6 +151,63 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
   }
   std::sort(loss.resume.begin(), loss.resume.end());
   return loss;
+}
+
+std::vector<store::EvaluationKey> ToAudit(const Definition& definition, const History& history) {
+  std::map<int, std::vector<store::EvaluationKey>> stopped;
+  for (const store::EvaluationKey& key : history.stopped_keys) {
+    stopped[key.sample].push_back(key);
+  }
+  std::size_t audited = 0;
+  std::vector<std::pair<double, int>> order;
+  for (const store::SampleRecord& sample : history.samples) {
+    if (sample.audited) {
+      ++audited;
+    } else if (stopped.count(sample.sample) > 0) {
+      inference::PhiloxStream stream({.seed = definition.campaign.seed,
+                                      .purpose = inference::StreamPurpose::kAudit,
+                                      .iteration = static_cast<std::uint64_t>(sample.iteration),
+                                      .sample = static_cast<std::uint64_t>(sample.sample)});
+      order.emplace_back(stream.Uniform(), sample.sample);
+    }
+  }
+  const auto wanted =
+      static_cast<std::size_t>(std::ceil(kAudited * static_cast<double>(order.size() + audited)));
+  std::sort(order.begin(), order.end());
+  std::vector<store::EvaluationKey> keys;
+  for (std::size_t i = 0; i + audited < wanted && i < order.size(); ++i) {
+    const auto& of_sample = stopped[order[i].second];
+    keys.insert(keys.end(), of_sample.begin(), of_sample.end());
+  }
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+absl::StatusOr<std::optional<double>> MeasuredLoss(const Definition& definition,
+                                                   const History& history) {
+  std::set<int> stopped;
+  for (const store::EvaluationKey& key : history.stopped_keys) {
+    stopped.insert(key.sample);
+  }
+  const auto audited =
+      std::count_if(history.samples.begin(), history.samples.end(),
+                    [](const store::SampleRecord& sample) { return sample.audited; });
+  if (audited == 0) {
+    return std::nullopt;
+  }
+  const auto finished = FinishedMass(
+      definition, history, inference::LogImportance(definition.priors, history.iterations));
+  if (!finished.ok()) {
+    return finished.status();
+  }
+  double share = 0;
+  for (std::size_t i = 0; i < finished->log_weights.size(); ++i) {
+    if (history.samples[i].audited) {
+      share += std::exp(finished->log_weights[i] - finished->log_mass);
+    }
+  }
+  const auto all = static_cast<double>(stopped.size()) + static_cast<double>(audited);
+  return share * all / static_cast<double>(audited);
 }
 
 double BestPossible(const Definition& definition, const Eigen::RowVectorXd& predictions) {

@@ -11,8 +11,10 @@
 //
 // When an iteration ends the bounds are taken again with the weights as they are then, and samples
 // are resumed, largest bound first, until what the others may lose together is within
-// `discard_at_most` of the finished mass.
+// `discard_at_most` of the finished mass. Of those that stay stopped a fiftieth is run to the end
+// all the same: the audit.
 
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -39,6 +41,16 @@ struct Loss {
 
 /// What the samples stopped in all iterations may have lost.
 absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& history);
+
+/// Evaluations to be run to their ends to see what stopping them would have lost, in order: of the
+/// stopped samples those that the seed chooses, until a fiftieth of all that were ever stopped (at
+/// least one) is audited. Empty: enough are.
+std::vector<store::EvaluationKey> ToAudit(const Definition& definition, const History& history);
+
+/// What all stopped samples would have lost, estimated from the audited ones: their weight relative
+/// to the finished mass, times stopped over audited. Empty: none is audited.
+absl::StatusOr<std::optional<double>> MeasuredLoss(const Definition& definition,
+                                                   const History& history);
 
 /// The largest log likelihood that a sample can still reach judged by one evaluation: `predictions`
 /// holds the readings of its experiment so far, NaN everywhere else.

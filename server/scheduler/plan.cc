@@ -109,6 +109,21 @@ class Planner {
         return absl::OkStatus();
       }
       stated_loss_ = loss->stated;
+      if (const auto audit = ToAudit(definition_, history_); !audit.empty()) {
+        for (const store::EvaluationKey& key : audit) {
+          plan_.resumed.push_back({.key = key, .rest_after = std::nullopt});
+          plan_.audited.push_back(key.sample);
+        }
+        plan_.log.push_back(absl::StrCat(
+            audit.size(),
+            " evaluations stopped early go on to their ends to see what stopping loses"));
+        return absl::OkStatus();
+      }
+      const auto measured = MeasuredLoss(definition_, history_);
+      if (!measured.ok()) {
+        return Fail(measured.status());
+      }
+      measured_loss_ = *measured;
     }
     if (replicating_) {
       history_.last_posterior = history_.previous_posterior;  // the same iteration once more
@@ -151,6 +166,12 @@ class Planner {
     conclusion.posterior.set_model_evaluations(history_.effort.model_evaluations);
     conclusion.posterior.set_stopped_early(history_.stopped_early);
     conclusion.posterior.set_stated_loss(stated_loss_);
+    conclusion.posterior.set_audited(static_cast<int>(
+        std::count_if(history_.samples.begin(), history_.samples.end(),
+                      [](const store::SampleRecord& sample) { return sample.audited; })));
+    if (measured_loss_.has_value()) {
+      conclusion.posterior.set_measured_loss(*measured_loss_);
+    }
     const auto view =
         inference::ViewOnline(definition_.data, campaign_.filter,
                               history_.iterations.back().predictions, history_.diverged.back());
@@ -413,6 +434,7 @@ class Planner {
   const bool replicating_;  // their runs have ended
   History history_;
   double stated_loss_ = 0;
+  std::optional<double> measured_loss_;
   Plan plan_;
 };
 
@@ -468,6 +490,9 @@ void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgres
     transaction.NeverStop(campaign, resumed.key.sample);
     transaction.SetEvaluation(resumed.key, EvaluationStatus::kWaiting, "", 0);
     transaction.SetRest(resumed.key, resumed.rest_after);
+  }
+  for (const int sample : plan.audited) {
+    transaction.Audit(campaign, sample);
   }
   for (const store::StateRecord& state : plan.states) {
     transaction.PutState(state, unix_ms);

@@ -182,7 +182,8 @@ absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign)
   return Guard([&] {
     std::vector<SampleRecord> records;
     SQLite::Statement& row = connection_->Bind(
-        "SELECT sample, iteration, parameters, log_weight, log_likelihood, stop_below FROM sample "
+        "SELECT sample, iteration, parameters, log_weight, log_likelihood, stop_below, audited "
+        "FROM sample "
         "WHERE campaign = ? ORDER BY sample",
         campaign);
     while (row.executeStep()) {
@@ -191,7 +192,8 @@ absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign)
                          .parameters = ToDoubles(row.getColumn(2)),
                          .log_weight = ToDouble(row.getColumn(3)),
                          .log_likelihood = ToDouble(row.getColumn(4)),
-                         .stop_below = ToDouble(row.getColumn(5))});
+                         .stop_below = ToDouble(row.getColumn(5)),
+                         .audited = row.getColumn(6).getInt() != 0});
     }
     return records;
   });

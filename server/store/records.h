@@ -55,7 +55,8 @@ struct SampleRecord {
   double log_weight = kUnknown;
   double log_likelihood = kUnknown;
   double stop_below =
-      kUnknown;  ///< of its largest log likelihood still possible; unknown: never stopped
+      kUnknown;          ///< of its largest log likelihood still possible; unknown: never stopped
+  bool audited = false;  ///< was stopped, and is run to its end to see what that would have lost
 };
 
 /// Names one model evaluation; its order is the order in which work is handed out.

@@ -113,6 +113,13 @@ void Transaction::NeverStop(std::int64_t campaign, int sample) {
   });
 }
 
+void Transaction::Audit(std::int64_t campaign, int sample) {
+  Guard([&] {
+    connection_.Run("UPDATE sample SET audited = 1 WHERE campaign = ? AND sample = ?", campaign,
+                    sample);
+  });
+}
+
 void Transaction::InsertEvaluation(const EvaluationRecord& evaluation) {
   Guard([&] {
     connection_.Run(

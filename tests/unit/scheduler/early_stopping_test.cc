@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "server/scheduler/history.h"
@@ -38,6 +39,16 @@ TEST(EarlyStopping, SavesStatesAndLosesNoMoreThanItStates) {
   const v1::Posterior with = LastPosterior(stopping);
   EXPECT_GT(with.stopped_early(), 0);
   EXPECT_LE(with.stated_loss(), kAllowed);
+  // The audit: one of at most fifty stopped samples went on to its end.
+  EXPECT_EQ(with.audited(), 1);
+  EXPECT_LE(with.measured_loss(), kAllowed);
+  int audited = 0;
+  for (const store::SampleRecord& sample : Value(stopping.Read().Samples(1))) {
+    audited += sample.audited ? 1 : 0;
+    if (!sample.audited) continue;
+    EXPECT_TRUE(std::isfinite(sample.log_weight)) << "it counts for what it is";
+  }
+  EXPECT_EQ(audited, with.audited());
   EXPECT_LT(stopping.Read().States(1)->size(), full.Read().States(1)->size());
   // The first iteration has nothing to compare with, so none of its samples is stopped.
   for (const store::EvaluationRecord& evaluation : Value(stopping.Read().Evaluations(1))) {
@@ -124,6 +135,45 @@ TEST(EarlyStopping, TotalVariationIsWithinTheStatedLoss) {
   const double variation = 0.5 * (with - without).cwiseAbs().sum();
   EXPECT_GT(variation, 0);
   EXPECT_LE(variation, loss.stated);
+}
+
+TEST(EarlyStopping, AuditTakesAFiftiethOfTheStoppedChosenByTheSeed) {
+  const auto definition = MakeDefinition(campaign::Campaign{});
+  History history;
+  EXPECT_TRUE(ToAudit(*definition, history).empty());
+  for (int i = 0; i < 101; ++i) {
+    history.samples.push_back({.sample = i, .iteration = 0});
+    history.stopped_keys.push_back({1, i, 0});
+    history.stopped_keys.push_back({1, i, 1});
+  }
+  const auto first = ToAudit(*definition, history);
+  ASSERT_EQ(first.size(), 6U) << "both evaluations of three samples";
+  std::reverse(history.stopped_keys.begin(), history.stopped_keys.end());
+  EXPECT_EQ(ToAudit(*definition, history), first);
+  for (const store::EvaluationKey& key : first) {
+    history.samples[static_cast<std::size_t>(key.sample)].audited = true;
+  }
+  std::erase_if(history.stopped_keys, [&history](const store::EvaluationKey& key) {
+    return history.samples[static_cast<std::size_t>(key.sample)].audited;
+  });
+  EXPECT_TRUE(ToAudit(*definition, history).empty()) << "three of 101 are enough";
+}
+
+TEST(EarlyStopping, MeasuredLossIsTheWeightOfTheAuditedForAllTheStopped) {
+  SimulatedService full("measured_loss");
+  full.Submit(Campaign("", 0.2));
+  full.RunToEnd(1, true);
+  store::Reader reader = full.Read();
+  const auto definition = *LoadDefinition(reader, Value(reader.Campaign(1)).submitted);
+  History history = *LoadHistory(*definition, 1, reader);
+  EXPECT_FALSE(MeasuredLoss(*definition, history)->has_value());
+  const double exponent = *inference::GuidingExponent(
+      definition->priors, definition->data, definition->campaign.filter, history.iterations);
+  const Eigen::VectorXd weights = GuidingWeights(*definition, history, exponent);
+  history.samples[3].audited = true;
+  history.samples[8].audited = true;
+  for (int i = 0; i < 6; ++i) history.stopped_keys.push_back({1, 20 + i, 0});
+  EXPECT_NEAR(**MeasuredLoss(*definition, history), (weights[3] + weights[8]) * (2 + 6) / 2, 1e-12);
 }
 
 TEST(EarlyStopping, SameBitsWhateverGoesWrong) {
