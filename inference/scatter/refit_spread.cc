@@ -3,10 +3,26 @@
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cassert>
+#include <cmath>
 
 namespace calib::inference {
 
 using Eigen::Index;
+
+Eigen::MatrixXd ScaledDepartures(const Eigen::MatrixXd& runs, const Eigen::VectorXd& share) {
+  Eigen::MatrixXd finished(runs.rows(), runs.cols());
+  Index count = 0;
+  for (Index r = 0; r < runs.rows(); ++r) {
+    if (runs.row(r).allFinite()) finished.row(count++) = runs.row(r);
+  }
+  if (count < 2) return Eigen::MatrixXd(0, runs.cols());
+  finished.conservativeResize(count, Eigen::NoChange);
+  Eigen::MatrixXd departures = finished.rowwise() - finished.colwise().mean();
+  for (Index k = 0; k < departures.cols(); ++k) {
+    departures.col(k) *= share[k] < 0 ? 0 : std::sqrt(share[k] + 1 / static_cast<double>(count));
+  }
+  return departures;
+}
 
 Eigen::MatrixXd SpreadOfRefits(const Eigen::MatrixXd& draws, const Eigen::MatrixXd& histories,
                                const Eigen::MatrixXd& covariance, const Replicates& replicates) {

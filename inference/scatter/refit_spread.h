@@ -17,6 +17,12 @@ struct Replicates {
   Eigen::MatrixXd scatter;
 };
 
+/// What R runs (R x T, units of the readings; rows that are not finite are left out) depart from
+/// their mean, scaled as Replicates asks for. in: share, T, see GroupScatter; negative: the packing
+/// of the experiment was not varied, no departure. out: (finite rows) x T, none with fewer than
+/// two.
+Eigen::MatrixXd ScaledDepartures(const Eigen::MatrixXd& runs, const Eigen::VectorXd& share);
+
 /// What must be added to the posterior's covariance of the parameters so that they scatter as
 /// refits of the replicates do: for a linear model, likelihood-dominated, the posterior under the
 /// covariance scatter + J Spread J^T, J the sensitivity of the histories. That covariance moves in

@@ -77,6 +77,27 @@ double ScatterShare(const Experiment& experiment) {
   return std::min(1.0, grains / *experiment.specimen_grains);
 }
 
+std::size_t PackingsOfAll(const Campaign& campaign) {
+  std::size_t fewest = 0;
+  for (const Experiment& experiment : campaign.experiments) {
+    const std::size_t packings = experiment.specimens.size();
+    if (experiment.role == Role::kCalibrate && packings > 1) {
+      fewest = fewest == 0 ? packings : std::min(fewest, packings);
+    }
+  }
+  return fewest;
+}
+
+Eigen::VectorXd ScatterShares(const Campaign& campaign, const inference::DataSet& data) {
+  Eigen::VectorXd shares(static_cast<Eigen::Index>(data.readings.size()));
+  for (Eigen::Index k = 0; k < shares.size(); ++k) {
+    const Experiment& experiment = campaign.experiments[static_cast<std::size_t>(
+        data.readings[static_cast<std::size_t>(k)].experiment)];
+    shares[k] = experiment.specimens.size() < 2 ? -1 : ScatterShare(experiment);
+  }
+  return shares;
+}
+
 inference::DataSet MakeDataSet(const Campaign& campaign, Role role) {
   inference::DataSet data;
   for (std::size_t e = 0; e < campaign.experiments.size(); ++e) {

@@ -209,6 +209,12 @@ std::vector<double> TravelledControl(const Experiment& experiment, double correl
 /// grains of the measured specimen, at most 1; 1 where that is unknown.
 double ScatterShare(const Experiment& experiment);
 
+/// The fewest packings of a calibrated experiment that varies them; 0: none does.
+std::size_t PackingsOfAll(const Campaign& campaign);
+
+/// The share of each reading of MakeDataSet; -1 where the experiment has one packing only.
+Eigen::VectorXd ScatterShares(const Campaign& campaign, const inference::DataSet& data);
+
 /// Readings of the experiments of a role, flat, in processing order; experiment = index in
 /// campaign.experiments.
 inference::DataSet MakeDataSet(const Campaign& campaign, Role role = Role::kCalibrate);

@@ -20,7 +20,7 @@ constexpr int kDraws = 500;
 struct Part {
   int experiment = 0;
   std::string segment;
-  std::vector<Index> readings;
+  std::vector<int> readings;  // ascending
 };
 
 std::vector<Part> PartsOf(const campaign::Campaign& campaign, const inference::DataSet& data) {
@@ -38,7 +38,7 @@ std::vector<Part> PartsOf(const campaign::Campaign& campaign, const inference::D
         at = parts.insert(parts.end(),
                           Part{.experiment = reading.experiment, .segment = name, .readings = {}});
       }
-      at->readings.push_back(static_cast<Index>(k));
+      at->readings.push_back(static_cast<int>(k));
     };
     add(experiments, "");
     add(segments, segment);
@@ -141,7 +141,13 @@ absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& 
   }
   const inference::DataSet data = campaign::MakeDataSet(view.campaign);
   const inference::JointPrior priors = campaign::Priors(view.campaign);
+  const ScatteredReadings readings = ReadingsWithScatter(view);
   const RunTable runs = RunsOf(view);
+  Eigen::MatrixXd predictions = runs.histories;
+  for (Index k = 0; k < predictions.cols(); ++k) {
+    const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
+    predictions.col(k) = (reading.value + reading.sd * predictions.col(k).array()).matrix();
+  }
   const std::vector<Part> parts = PartsOf(view.campaign, data);
   const auto d = static_cast<Index>(priors.size());
 
@@ -149,28 +155,22 @@ absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& 
   std::vector<std::vector<Estimate>> experiments(priors.size());
   std::vector<std::vector<Estimate>> segments(priors.size());
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    inference::DataSet own;
-    own.correlations = data.correlations;
+    const inference::DataSet own = inference::Restricted(readings.of_mean, parts[p].readings);
     inference::Iteration iteration;
     iteration.parameters = runs.parameters;
-    iteration.predictions.resize(runs.parameters.rows(),
-                                 static_cast<Index>(parts[p].readings.size()));
-    for (std::size_t k = 0; k < parts[p].readings.size(); ++k) {
-      const Index from = parts[p].readings[k];
-      const inference::Reading& reading = data.readings[static_cast<std::size_t>(from)];
-      own.readings.push_back(reading);
-      iteration.predictions.col(static_cast<Index>(k)) =
-          (reading.value + reading.sd * runs.histories.col(from).array()).matrix();
-    }
-    const auto there = [&own](const inference::Correlation& c) {
-      return std::any_of(own.readings.begin(), own.readings.end(), [&c](const auto& r) {
-        return r.experiment == c.experiment && r.observable == c.observable;
-      });
-    };
-    std::erase_if(own.correlations, [&there](const auto& c) { return !there(c); });
+    iteration.predictions = predictions(Eigen::all, parts[p].readings);
     inference::EmulatorOptions options;
     options.draws = kDraws;
     options.seed = view.campaign.filter.seed;
+    if (readings.measured) {
+      options.training.scatter_share = 0;  // it is in the errors
+      if (readings.departures.rows() > 0) {
+        options.replicates = {
+            .departures = readings.departures(Eigen::all, parts[p].readings),
+            .scatter = inference::ErrorCovariance(own) -
+                       inference::ErrorCovariance(inference::Restricted(data, parts[p].readings))};
+      }
+    }
     const std::vector<inference::Iteration> iterations = {iteration};
     const auto fit = inference::EmulatedPosterior(priors, own, options, iterations);
     if (!fit.ok()) return fit.status();

@@ -36,7 +36,8 @@ struct ParameterDrift {
 };
 
 /// The runs of the campaign are emulated and the parameters fitted to each part of the readings;
-/// the scatter of single runs and the emulator's error are in the widths. Parts by which a
+/// scatter and the emulator's error are in the widths: the scatter of packings and what refits of
+/// them show where it was measured, that of single runs otherwise. Parts by which a
 /// parameter stays as wide as its prior (sd above 0.8 of it) say nothing and are left out, and so
 /// are parts with fewer than `kLeastReadings` readings. Deterministic. About a second for each
 /// part. Errors: FAILED_PRECONDITION without a known size of the errors or with too few runs to

@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "inference/scatter/refit_spread.h"
 #include "inference/scatter/scatter.h"
 #include "server/report/scatter_record.h"
 
@@ -46,6 +47,34 @@ void PlaceStates(const campaign::Experiment& experiment, int e, const StateHisto
   }
 }
 
+// Predictions of a sample, NaN where it did not come.
+Eigen::RowVectorXd HistoryOf(const CampaignView& view, int sample, const inference::DataSet& data,
+                             const Places& places) {
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Constant(static_cast<Index>(data.readings.size()),
+                                                        std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t e = 0; e < view.campaign.experiments.size(); ++e) {
+    const auto found = view.states.find({view.campaign.experiments[e].name, sample});
+    if (found == view.states.end()) continue;
+    PlaceStates(view.campaign.experiments[e], static_cast<int>(e), found->second, data, places,
+                row);
+  }
+  return row;
+}
+
+// Of the first replicates, as many as every experiment has packings.
+Eigen::MatrixXd DeparturesOfReplicates(const CampaignView& view, const inference::DataSet& data) {
+  const Places places = PlacesOf(data);
+  const std::size_t packings = campaign::PackingsOfAll(view.campaign);
+  std::vector<Eigen::RowVectorXd> rows;
+  for (const v1::Sample& sample : view.samples) {
+    if (sample.purpose() != "replicate" || rows.size() == packings) continue;
+    rows.push_back(HistoryOf(view, sample.index(), data, places));
+  }
+  Eigen::MatrixXd runs(static_cast<Index>(rows.size()), static_cast<Index>(data.readings.size()));
+  for (std::size_t r = 0; r < rows.size(); ++r) runs.row(static_cast<Index>(r)) = rows[r];
+  return inference::ScaledDepartures(runs, campaign::ScatterShares(view.campaign, data));
+}
+
 }  // namespace
 
 ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
@@ -75,6 +104,7 @@ ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
   }
   return {.of_mean = inference::WithScatter(data, of_mean, 0),
           .of_run = inference::WithScatter(data, of_run, 1),
+          .departures = DeparturesOfReplicates(view, data),
           .measured = !of_run.empty()};
 }
 
@@ -99,14 +129,7 @@ RunTable RunsOf(const CampaignView& view, const inference::DataSet& units) {
   std::vector<Eigen::RowVectorXd> histories;
   for (const v1::Sample& sample : view.samples) {
     if (sample.parameters_size() != d) continue;
-    Eigen::RowVectorXd row =
-        Eigen::RowVectorXd::Constant(t, std::numeric_limits<double>::quiet_NaN());
-    for (std::size_t e = 0; e < view.campaign.experiments.size(); ++e) {
-      const auto found = view.states.find({view.campaign.experiments[e].name, sample.index()});
-      if (found == view.states.end()) continue;
-      PlaceStates(view.campaign.experiments[e], static_cast<int>(e), found->second, data, places,
-                  row);
-    }
+    const Eigen::RowVectorXd row = HistoryOf(view, sample.index(), data, places);
     if (!row.allFinite()) continue;
     table.sample.push_back(sample.index());
     histories.emplace_back((row - value).cwiseQuotient(sd));

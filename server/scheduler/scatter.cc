@@ -73,33 +73,6 @@ absl::StatusOr<Eigen::MatrixXd> ReplicateRuns(const campaign::Campaign& campaign
   return runs;
 }
 
-Eigen::MatrixXd Departures(const campaign::Campaign& campaign, const inference::DataSet& data,
-                           const Eigen::MatrixXd& runs) {
-  auto packings = static_cast<std::size_t>(runs.rows());
-  for (const campaign::Experiment& experiment : campaign.experiments) {
-    if (experiment.role == Role::kCalibrate && experiment.specimens.size() > 1) {
-      packings = std::min(packings, experiment.specimens.size());
-    }
-  }
-  Eigen::MatrixXd finished(static_cast<Index>(packings), runs.cols());
-  Index count = 0;
-  for (Index r = 0; r < finished.rows(); ++r) {
-    if (runs.row(r).allFinite()) finished.row(count++) = runs.row(r);
-  }
-  if (count < 2) return Eigen::MatrixXd(0, runs.cols());
-  finished.conservativeResize(count, Eigen::NoChange);
-  Eigen::MatrixXd departures = finished.rowwise() - finished.colwise().mean();
-  for (Index k = 0; k < departures.cols(); ++k) {
-    const campaign::Experiment& experiment = campaign.experiments[static_cast<std::size_t>(
-        data.readings[static_cast<std::size_t>(k)].experiment)];
-    departures.col(k) *=
-        experiment.specimens.size() < 2
-            ? 0
-            : std::sqrt(campaign::ScatterShare(experiment) + 1 / static_cast<double>(count));
-  }
-  return departures;
-}
-
 }  // namespace
 
 int ReplicatesOf(const campaign::Campaign& campaign) {
@@ -148,7 +121,10 @@ absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std
       return runs.status();
     }
     if (role == Role::kCalibrate) {
-      result.departures = Departures(definition.campaign, data, *runs);
+      const auto packings = static_cast<Index>(campaign::PackingsOfAll(definition.campaign));
+      result.departures =
+          inference::ScaledDepartures(runs->topRows(std::min(packings, runs->rows())),
+                                      campaign::ScatterShares(definition.campaign, data));
     }
     for (const auto& group : inference::GroupsOf(data)) {
       // Beyond its own packings an experiment's replicates are repetitions.

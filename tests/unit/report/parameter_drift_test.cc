@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "inference/sampling/philox.h"
+#include "server/report/run_table.h"
 
 namespace calib::report {
 namespace {
@@ -86,6 +87,54 @@ TEST(ParameterDrift, FrictionThatFallsWithPressureIsSeenWithItsTrend) {
   EXPECT_NEAR(friction.trend, -0.1, 0.02);  // per factor ten
   const ParameterDrift& stiffness = drifts->back();
   EXPECT_GT(*stiffness.p_experiments, 1e-3);
+}
+
+// Packings whose strength differs by a tenth: what 0.4 at the higher pressure may well be.
+TEST(ParameterDrift, ScatterOfPackingsIsNoDrift) {
+  CampaignView view = TwoPressures(0.4);
+  inference::PhiloxStream random({.seed = 5,
+                                  .purpose = inference::StreamPurpose::kDiagnosisNull,
+                                  .iteration = 1,
+                                  .sample = 0});
+  constexpr double kScatter = 0.1;
+  constexpr int kPackings = 8;
+  for (campaign::Experiment& e : view.campaign.experiments) {
+    e.specimens.resize(kPackings);
+    v1::Posterior::Scatter& scatter = *view.posterior.add_scatter();
+    scatter.set_experiment(e.name);
+    scatter.set_observable("q_over_p");
+    for (const double value : e.observables[0].values) {
+      scatter.add_sd(kScatter * value);
+      scatter.add_clock(0.01 * scatter.sd_size());
+    }
+    scatter.set_share(1);
+    scatter.set_runs(kPackings);
+    scatter.set_from("realizations");
+  }
+  for (int r = 0; r < kPackings; ++r) {
+    v1::Sample replicate = view.samples.front();
+    replicate.set_index(1000 + r);
+    replicate.set_purpose("replicate");
+    for (const campaign::Experiment& e : view.campaign.experiments) {
+      StateHistory history = view.states[{e.name, 0}];
+      const double factor = 1 + kScatter * random.Normal();
+      for (v1::State& state : history.states) {
+        state.set_values(0, factor * state.values(0));
+      }
+      view.states[{e.name, replicate.index()}] = history;
+    }
+    view.samples.push_back(replicate);
+  }
+  const ScatteredReadings readings = ReadingsWithScatter(view);
+  ASSERT_TRUE(readings.measured);
+  EXPECT_EQ(readings.departures.rows(), kPackings);
+  const auto drifts = ParameterDrifts(view);
+  ASSERT_TRUE(drifts.ok()) << drifts.status();
+  const ParameterDrift& friction = drifts->front();
+  ASSERT_TRUE(friction.p_experiments.has_value());
+  EXPECT_GT(*friction.p_experiments, 0.01);
+  EXPECT_TRUE(friction.trend_with.empty());
+  EXPECT_GT(friction.fits.front().sd, 0.03) << "a tenth of 0.5, twice its square and a little";
 }
 
 TEST(ParameterDrift, NeedsAKnownSizeOfTheErrorsAndRuns) {
