@@ -1,6 +1,7 @@
 // Speed of the step loop on dense packings: contact updates/s and particle-steps/s by law, grains
 // and threads.
 #include <benchmark/benchmark.h>
+#include <malloc.h>
 
 #include <array>
 #include <cmath>
@@ -227,4 +228,12 @@ BENCHMARK_CAPTURE(ContactUpdates, linear_moments, Law::kLinearMoments)->Apply(Ar
 }  // namespace
 }  // namespace calib::dem
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  mallopt(M_MMAP_THRESHOLD, 64 * 1024);  // as calib-worker does
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) {
+    return 1;
+  }
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+}
