@@ -65,6 +65,7 @@ struct EvaluationKey {
   int sample = 0;
   int experiment = 0;
 
+  // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the zero compared with for a pointer
   friend auto operator<=>(const EvaluationKey&, const EvaluationKey&) = default;
 };
 
