@@ -149,6 +149,7 @@ std::vector<NoiseGroup> NoiseGroupsOf(const DataSet& data) {
     if (taken.count(key) == 0) by_first[key] = {.members = {key}};
   }
   std::vector<NoiseGroup> all;
+  all.reserve(by_first.size());
   for (auto& [first, group] : by_first) all.push_back(std::move(group));
   return all;
 }

@@ -44,6 +44,7 @@ constexpr int kMostStages = 100;  // of tmcmc, unless max_iterations says otherw
 
 void ReadMethod(MapReader& map, Campaign& campaign) {
   std::vector<std::string> names;
+  names.reserve(kMethods.size());
   for (const Method method : kMethods) names.emplace_back(ToString(method));
   const auto chosen = map.Choice("method", names);
   for (const Method method : kMethods) {
