@@ -58,11 +58,12 @@ std::string PosteriorText(const v1::Posterior& posterior,
   }
   text += ".\n";
   if (posterior.has_measured_loss()) {
-    text += Wrapped(fmt::format("Stopping early may have lost {} of the posterior mass; {} stopped "
-                                "samples run to their ends all the same: {}.",
-                                Number(posterior.stated_loss(), 2), posterior.audited(),
-                                Number(posterior.measured_loss(), 2)),
-                    "", "  ");
+    text += Wrapped(
+        fmt::format("Stopping early may have lost {} of the posterior mass. Audit: {} stopped and "
+                    "run to the end all the same might have held {}, and held {}.",
+                    Number(posterior.stated_loss(), 2), posterior.audited(),
+                    Number(posterior.audited_bound(), 2), Number(posterior.measured_loss(), 2)),
+        "", "  ");
   }
   for (const auto& scale : posterior.noise_scale()) {
     text += Wrapped(fmt::format("Errors of {} are {} times as large as stated (5-95 %: {} to {}).",

@@ -159,6 +159,7 @@ std::string PosteriorJson(const v1::Posterior& p) {
                {"stopped_early", p.stopped_early()},
                {"stated_loss", p.stated_loss()},
                {"audited", p.audited()},
+               {"audited_bound", p.has_audited_bound() ? Json(p.audited_bound()) : Json(nullptr)},
                {"measured_loss", p.has_measured_loss() ? Json(p.measured_loss()) : Json(nullptr)},
                {"core_hours", p.core_hours()},
                {"warnings", warnings}});

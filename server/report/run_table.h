@@ -30,7 +30,7 @@ struct ScatteredReadings {
   inference::DataSet of_run;   ///< scatter of the specimen and of one run of the model
   /// Of the best estimate on every packing, for fits to some of the readings: R x T, see
   /// inference::Replicates; none where fewer than two runs came to their ends.
-  Eigen::MatrixXd departures;
+  Eigen::MatrixXd departures{};
   /// False where packings were not varied: both are MakeDataSet, and the scatter of repeats is what
   /// an emulator of the runs says it is.
   bool measured = false;

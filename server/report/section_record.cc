@@ -58,8 +58,10 @@ std::string StoppingSentence(const v1::Posterior& posterior) {
   std::string text = fmt::format("{} samples; they may have lost {} of the posterior mass together",
                                  posterior.stopped_early(), Number(posterior.stated_loss(), 2));
   if (posterior.has_measured_loss()) {
-    text += fmt::format("; {} of the stopped were run to their ends all the same: measured loss {}",
-                        posterior.audited(), Number(posterior.measured_loss(), 2));
+    text += fmt::format(
+        "; audit: {} stopped and run to the end all the same might have held {}, and held {}",
+        posterior.audited(), Number(posterior.audited_bound(), 2),
+        Number(posterior.measured_loss(), 2));
   }
   return text;
 }

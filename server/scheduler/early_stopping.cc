@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "inference/sampling/philox.h"
@@ -144,6 +143,7 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
     if (loss.resume.empty() &&
         loss.stated + one.bound <= definition.campaign.early_stopping->discard_at_most) {
       loss.stated += one.bound;
+      loss.bounds[one.sample] = one.bound;
     } else {
       const auto& of_sample = keys[one.sample];
       loss.resume.insert(loss.resume.end(), of_sample.begin(), of_sample.end());
@@ -153,17 +153,13 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
   return loss;
 }
 
-std::vector<store::EvaluationKey> ToAudit(const Definition& definition, const History& history) {
-  std::map<int, std::vector<store::EvaluationKey>> stopped;
-  for (const store::EvaluationKey& key : history.stopped_keys) {
-    stopped[key.sample].push_back(key);
-  }
+std::vector<int> ToAudit(const Definition& definition, const History& history, const Loss& loss) {
   std::size_t audited = 0;
   std::vector<std::pair<double, int>> order;
   for (const store::SampleRecord& sample : history.samples) {
-    if (sample.audited) {
+    if (!std::isnan(sample.audited)) {
       ++audited;
-    } else if (stopped.count(sample.sample) > 0) {
+    } else if (loss.bounds.count(sample.sample) > 0) {
       inference::PhiloxStream stream({.seed = definition.campaign.seed,
                                       .purpose = inference::StreamPurpose::kAudit,
                                       .iteration = static_cast<std::uint64_t>(sample.iteration),
@@ -174,40 +170,35 @@ std::vector<store::EvaluationKey> ToAudit(const Definition& definition, const Hi
   const auto wanted =
       static_cast<std::size_t>(std::ceil(kAudited * static_cast<double>(order.size() + audited)));
   std::sort(order.begin(), order.end());
-  std::vector<store::EvaluationKey> keys;
+  std::vector<int> chosen;
   for (std::size_t i = 0; i + audited < wanted && i < order.size(); ++i) {
-    const auto& of_sample = stopped[order[i].second];
-    keys.insert(keys.end(), of_sample.begin(), of_sample.end());
+    chosen.push_back(order[i].second);
   }
-  std::sort(keys.begin(), keys.end());
-  return keys;
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
 }
 
-absl::StatusOr<std::optional<double>> MeasuredLoss(const Definition& definition,
-                                                   const History& history) {
-  std::set<int> stopped;
-  for (const store::EvaluationKey& key : history.stopped_keys) {
-    stopped.insert(key.sample);
+absl::StatusOr<Audit> AuditOf(const Definition& definition, const History& history) {
+  Audit audit;
+  for (const store::SampleRecord& sample : history.samples) {
+    if (std::isnan(sample.audited)) continue;
+    ++audit.samples;
+    audit.bound += sample.audited;
   }
-  const auto audited =
-      std::count_if(history.samples.begin(), history.samples.end(),
-                    [](const store::SampleRecord& sample) { return sample.audited; });
-  if (audited == 0) {
-    return std::nullopt;
+  if (audit.samples == 0) {
+    return audit;
   }
   const auto finished = FinishedMass(
       definition, history, inference::LogImportance(definition.priors, history.iterations));
   if (!finished.ok()) {
     return finished.status();
   }
-  double share = 0;
   for (std::size_t i = 0; i < finished->log_weights.size(); ++i) {
-    if (history.samples[i].audited) {
-      share += std::exp(finished->log_weights[i] - finished->log_mass);
+    if (!std::isnan(history.samples[i].audited)) {
+      audit.measured += std::exp(finished->log_weights[i] - finished->log_mass);
     }
   }
-  const auto all = static_cast<double>(stopped.size()) + static_cast<double>(audited);
-  return share * all / static_cast<double>(audited);
+  return audit;
 }
 
 double BestPossible(const Definition& definition, const Eigen::RowVectorXd& predictions) {

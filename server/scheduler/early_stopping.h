@@ -14,7 +14,7 @@
 // `discard_at_most` of the finished mass. Of those that stay stopped a fiftieth is run to the end
 // all the same: the audit.
 
-#include <optional>
+#include <map>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -35,22 +35,27 @@ absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
                                                    const inference::Iteration& next);
 
 struct Loss {
-  double stated = 0;  ///< of those that stay stopped, relative to the finished mass
+  double stated = 0;             ///< of those that stay stopped, relative to the finished mass
+  std::map<int, double> bounds;  ///< of each of those samples: its part of `stated`
   std::vector<store::EvaluationKey> resume;  ///< to be run to their ends, in order
 };
 
 /// What the samples stopped in all iterations may have lost.
 absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& history);
 
-/// Evaluations to be run to their ends to see what stopping them would have lost, in order: of the
-/// stopped samples those that the seed chooses, until a fiftieth of all that were ever stopped (at
-/// least one) is audited. Empty: enough are.
-std::vector<store::EvaluationKey> ToAudit(const Definition& definition, const History& history);
+/// Samples to be run to their ends to see what stopping them would have lost: of those that stay
+/// stopped the ones that the seed chooses, until a fiftieth of all that were ever stopped (at least
+/// one) is audited. Empty: enough are.
+std::vector<int> ToAudit(const Definition& definition, const History& history, const Loss& loss);
 
-/// What all stopped samples would have lost, estimated from the audited ones: their weight relative
-/// to the finished mass, times stopped over audited. Empty: none is audited.
-absl::StatusOr<std::optional<double>> MeasuredLoss(const Definition& definition,
-                                                   const History& history);
+struct Audit {
+  int samples = 0;
+  double bound = 0;     ///< what they might have held of the finished mass when they were chosen
+  double measured = 0;  ///< what they hold
+};
+
+/// Of the audited samples that have finished.
+absl::StatusOr<Audit> AuditOf(const Definition& definition, const History& history);
 
 /// The largest log likelihood that a sample can still reach judged by one evaluation: `predictions`
 /// holds the readings of its experiment so far, NaN everywhere else.

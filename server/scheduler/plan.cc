@@ -54,12 +54,10 @@ class Planner {
       if (campaign_.precomputed.has_value()) {
         plan_.event = CampaignEvent::kStart;
       }
-    } else if (campaign_.table.has_value()) {
-      Finish();  // its runs are all there is
-    } else if (plan_.phase == "calibrating") {
+    } else if (plan_.phase == "calibrating" && !campaign_.table.has_value()) {
       status = Conclude();
     } else {
-      Finish();
+      Finish();  // the runs of a table are all there is
     }
     if (!status.ok()) {
       return status;
@@ -109,21 +107,25 @@ class Planner {
         return absl::OkStatus();
       }
       stated_loss_ = loss->stated;
-      if (const auto audit = ToAudit(definition_, history_); !audit.empty()) {
-        for (const store::EvaluationKey& key : audit) {
-          plan_.resumed.push_back({.key = key, .rest_after = std::nullopt});
-          plan_.audited.push_back(key.sample);
+      if (const auto chosen = ToAudit(definition_, history_, *loss); !chosen.empty()) {
+        for (const int sample : chosen) {
+          plan_.audited.emplace_back(sample, loss->bounds.at(sample));
         }
-        plan_.log.push_back(absl::StrCat(
-            audit.size(),
-            " evaluations stopped early go on to their ends to see what stopping loses"));
+        for (const store::EvaluationKey& key : history_.stopped_keys) {
+          if (std::binary_search(chosen.begin(), chosen.end(), key.sample)) {
+            plan_.resumed.push_back({.key = key, .rest_after = std::nullopt});
+          }
+        }
+        plan_.log.push_back(
+            absl::StrCat(chosen.size(),
+                         " samples stopped early go on to their ends to see what stopping loses"));
         return absl::OkStatus();
       }
-      const auto measured = MeasuredLoss(definition_, history_);
-      if (!measured.ok()) {
-        return Fail(measured.status());
+      const auto audit = AuditOf(definition_, history_);
+      if (!audit.ok()) {
+        return Fail(audit.status());
       }
-      measured_loss_ = *measured;
+      audit_ = *audit;
     }
     if (replicating_) {
       history_.last_posterior = history_.previous_posterior;  // the same iteration once more
@@ -166,11 +168,10 @@ class Planner {
     conclusion.posterior.set_model_evaluations(history_.effort.model_evaluations);
     conclusion.posterior.set_stopped_early(history_.stopped_early);
     conclusion.posterior.set_stated_loss(stated_loss_);
-    conclusion.posterior.set_audited(static_cast<int>(
-        std::count_if(history_.samples.begin(), history_.samples.end(),
-                      [](const store::SampleRecord& sample) { return sample.audited; })));
-    if (measured_loss_.has_value()) {
-      conclusion.posterior.set_measured_loss(*measured_loss_);
+    if (audit_.samples > 0) {
+      conclusion.posterior.set_audited(audit_.samples);
+      conclusion.posterior.set_audited_bound(audit_.bound);
+      conclusion.posterior.set_measured_loss(audit_.measured);
     }
     const auto view =
         inference::ViewOnline(definition_.data, campaign_.filter,
@@ -434,7 +435,7 @@ class Planner {
   const bool replicating_;  // their runs have ended
   History history_;
   double stated_loss_ = 0;
-  std::optional<double> measured_loss_;
+  Audit audit_;
   Plan plan_;
 };
 
@@ -491,8 +492,8 @@ void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgres
     transaction.SetEvaluation(resumed.key, EvaluationStatus::kWaiting, "", 0);
     transaction.SetRest(resumed.key, resumed.rest_after);
   }
-  for (const int sample : plan.audited) {
-    transaction.Audit(campaign, sample);
+  for (const auto& [sample, share] : plan.audited) {
+    transaction.Audit(campaign, sample, share);
   }
   for (const store::StateRecord& state : plan.states) {
     transaction.PutState(state, unix_ms);

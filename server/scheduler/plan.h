@@ -47,7 +47,8 @@ struct Plan {
     std::optional<int> rest_after;  ///< its next rung; empty: to its end
   };
   std::vector<Resumed> resumed;
-  std::vector<int> audited;  ///< samples among them that are run to their ends to be looked at
+  /// (sample, share that its bound leaves it): among them, run to their ends to be looked at.
+  std::vector<std::pair<int, double>> audited;
   std::vector<store::StateRecord> states;  ///< of runs made elsewhere
   std::string phase;                       ///< afterwards
   bool converged = false;

@@ -63,6 +63,7 @@ std::vector<const WorkerEntry*> WorkerTable::Free(const LeaseTable& leases,
   std::stable_sort(free.begin(), free.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<const WorkerEntry*> workers;
+  workers.reserve(free.size());
   for (const auto& [slots, entry] : free) {
     workers.push_back(entry);
   }

@@ -193,7 +193,7 @@ absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign)
                          .log_weight = ToDouble(row.getColumn(3)),
                          .log_likelihood = ToDouble(row.getColumn(4)),
                          .stop_below = ToDouble(row.getColumn(5)),
-                         .audited = row.getColumn(6).getInt() != 0});
+                         .audited = ToDouble(row.getColumn(6))});
     }
     return records;
   });

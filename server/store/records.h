@@ -55,8 +55,10 @@ struct SampleRecord {
   double log_weight = kUnknown;
   double log_likelihood = kUnknown;
   double stop_below =
-      kUnknown;          ///< of its largest log likelihood still possible; unknown: never stopped
-  bool audited = false;  ///< was stopped, and is run to its end to see what that would have lost
+      kUnknown;  ///< of its largest log likelihood still possible; unknown: never stopped
+  /// Of a sample that was stopped and is run to its end to see what that would have lost: the share
+  /// of the finished mass that its bound left it. Unknown: not audited.
+  double audited = kUnknown;
 };
 
 /// Names one model evaluation; its order is the order in which work is handed out.

@@ -113,10 +113,10 @@ void Transaction::NeverStop(std::int64_t campaign, int sample) {
   });
 }
 
-void Transaction::Audit(std::int64_t campaign, int sample) {
+void Transaction::Audit(std::int64_t campaign, int sample, double share) {
   Guard([&] {
-    connection_.Run("UPDATE sample SET audited = 1 WHERE campaign = ? AND sample = ?", campaign,
-                    sample);
+    connection_.Run("UPDATE sample SET audited = ? WHERE campaign = ? AND sample = ?", share,
+                    campaign, sample);
   });
 }
 

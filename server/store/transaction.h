@@ -41,8 +41,9 @@ class Transaction {
   void SetWeight(std::int64_t campaign, int sample, double log_weight, double log_likelihood);
   /// From now on this sample is run to its end.
   void NeverStop(std::int64_t campaign, int sample);
-  /// Marks a stopped sample that is run to its end to see what stopping it would have lost.
-  void Audit(std::int64_t campaign, int sample);
+  /// Marks a stopped sample that is run to its end to see what stopping it would have lost. share:
+  /// see SampleRecord::audited.
+  void Audit(std::int64_t campaign, int sample, double share);
   void InsertEvaluation(const EvaluationRecord& evaluation);
   void SetEvaluation(const EvaluationKey& key, EvaluationStatus status, const std::string& reason,
                      int failures);

@@ -89,8 +89,10 @@ void Print(const std::string& name, const EmulatedResult& result) {
 }
 
 TEST(EmulatorGlassBeads, ErrorsAreAsLargeAsClaimedAndIterationsAgree) {
+  constexpr int kIterations = 4;
   std::vector<Iteration> iterations;
-  for (int k = 0; k < 4; ++k) iterations.push_back(ReadIteration(k));
+  iterations.reserve(kIterations);
+  for (int k = 0; k < kIterations; ++k) iterations.push_back(ReadIteration(k));
   const DataSet data = ReadMeasurement();
   const auto first = EmulatedPosterior(Priors(), data, {.seed = 1}, std::span(iterations).first(1));
   const std::clock_t start = std::clock();

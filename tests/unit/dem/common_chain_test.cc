@@ -84,6 +84,7 @@ TEST(CommonChain, HasTheBitsOfItsKernels) {
                {&ContactBlock::force_x, &ContactBlock::force_y, &ContactBlock::force_z,
                 &ContactBlock::torque_ix, &ContactBlock::torque_iy, &ContactBlock::torque_iz,
                 &ContactBlock::torque_jx, &ContactBlock::torque_jy, &ContactBlock::torque_jz}) {
+            // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): bits are what is compared
             EXPECT_EQ(std::memcmp(one.block.*lane, other.block.*lane, sizeof one.block.dx), 0);
           }
           EXPECT_EQ(

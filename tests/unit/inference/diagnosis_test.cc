@@ -158,8 +158,9 @@ TEST(Diagnosis, ChanceInDifferencesOfRunsIsNotTakenForAnEffect) {
   const auto exact = Screen(model, {{"sine", {3 * Curve(2)}, true, {}}}, {.simulations = 50});
   std::sort(of_effect.begin(), of_effect.end());
   // Two candidates instead of one raise the level that must be reached a little.
-  EXPECT_NEAR(of_effect[kDraws / 2] / exact->front().detectable, 1.05, 0.15);
-  EXPECT_NEAR(unseen, kDraws / 2, 12);  // a product of chance is as often positive
+  constexpr int kHalf = kDraws / 2;
+  EXPECT_NEAR(of_effect[kHalf] / exact->front().detectable, 1.05, 0.15);
+  EXPECT_NEAR(unseen, kHalf, 12);  // a product of chance is as often positive
 }
 
 TEST(Diagnosis, BetterModelHasTheAdvantage) {
@@ -179,11 +180,12 @@ FittedModel LineAndSine(const Eigen::VectorXd& measured) {
   const Eigen::MatrixXd line = model.histories;
   constexpr int kSlopes = 61;  // from 5 to 20
   constexpr int kAmplitudes = 41;
-  model.histories.resize(kSlopes * kAmplitudes, kReadings);
+  constexpr int kMiddle = kAmplitudes / 2;
+  model.histories.resize(static_cast<Eigen::Index>(kSlopes) * kAmplitudes, kReadings);
   for (int g = 0; g < kSlopes; ++g) {
     for (int a = 0; a < kAmplitudes; ++a) {
       model.histories.row(g * kAmplitudes + a) =
-          line.row(1100 + 5 * g) + 0.2 * (a - kAmplitudes / 2) * Curve(2).transpose();
+          line.row(1100 + 5 * g) + 0.2 * (a - kMiddle) * Curve(2).transpose();
     }
   }
   model.parameters = 2;

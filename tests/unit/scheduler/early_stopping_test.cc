@@ -41,11 +41,12 @@ TEST(EarlyStopping, SavesStatesAndLosesNoMoreThanItStates) {
   EXPECT_LE(with.stated_loss(), kAllowed);
   // The audit: one of at most fifty stopped samples went on to its end.
   EXPECT_EQ(with.audited(), 1);
-  EXPECT_LE(with.measured_loss(), kAllowed);
+  EXPECT_LE(with.audited_bound(), kAllowed);
+  EXPECT_LE(with.measured_loss(), with.audited_bound());
   int audited = 0;
   for (const store::SampleRecord& sample : Value(stopping.Read().Samples(1))) {
-    audited += sample.audited ? 1 : 0;
-    if (!sample.audited) continue;
+    audited += std::isnan(sample.audited) ? 0 : 1;
+    if (std::isnan(sample.audited)) continue;
     EXPECT_TRUE(std::isfinite(sample.log_weight)) << "it counts for what it is";
   }
   EXPECT_EQ(audited, with.audited());
@@ -140,40 +141,40 @@ TEST(EarlyStopping, TotalVariationIsWithinTheStatedLoss) {
 TEST(EarlyStopping, AuditTakesAFiftiethOfTheStoppedChosenByTheSeed) {
   const auto definition = MakeDefinition(campaign::Campaign{});
   History history;
-  EXPECT_TRUE(ToAudit(*definition, history).empty());
+  Loss loss;
+  EXPECT_TRUE(ToAudit(*definition, history, loss).empty());
   for (int i = 0; i < 101; ++i) {
     history.samples.push_back({.sample = i, .iteration = 0});
-    history.stopped_keys.push_back({1, i, 0});
-    history.stopped_keys.push_back({1, i, 1});
+    loss.bounds[i] = 1e-6;
   }
-  const auto first = ToAudit(*definition, history);
-  ASSERT_EQ(first.size(), 6U) << "both evaluations of three samples";
-  std::reverse(history.stopped_keys.begin(), history.stopped_keys.end());
-  EXPECT_EQ(ToAudit(*definition, history), first);
-  for (const store::EvaluationKey& key : first) {
-    history.samples[static_cast<std::size_t>(key.sample)].audited = true;
+  const auto first = ToAudit(*definition, history, loss);
+  ASSERT_EQ(first.size(), 3U);
+  EXPECT_TRUE(std::is_sorted(first.begin(), first.end()));
+  EXPECT_EQ(ToAudit(*definition, history, loss), first);
+  for (const int sample : first) {
+    history.samples[static_cast<std::size_t>(sample)].audited = 1e-6;
+    loss.bounds.erase(sample);
   }
-  std::erase_if(history.stopped_keys, [&history](const store::EvaluationKey& key) {
-    return history.samples[static_cast<std::size_t>(key.sample)].audited;
-  });
-  EXPECT_TRUE(ToAudit(*definition, history).empty()) << "three of 101 are enough";
+  EXPECT_TRUE(ToAudit(*definition, history, loss).empty()) << "three of 101 are enough";
 }
 
-TEST(EarlyStopping, MeasuredLossIsTheWeightOfTheAuditedForAllTheStopped) {
-  SimulatedService full("measured_loss");
+TEST(EarlyStopping, AuditSaysWhatTheAuditedHold) {
+  SimulatedService full("audit");
   full.Submit(Campaign("", 0.2));
   full.RunToEnd(1, true);
   store::Reader reader = full.Read();
   const auto definition = *LoadDefinition(reader, Value(reader.Campaign(1)).submitted);
   History history = *LoadHistory(*definition, 1, reader);
-  EXPECT_FALSE(MeasuredLoss(*definition, history)->has_value());
+  EXPECT_EQ(AuditOf(*definition, history)->samples, 0);
   const double exponent = *inference::GuidingExponent(
       definition->priors, definition->data, definition->campaign.filter, history.iterations);
   const Eigen::VectorXd weights = GuidingWeights(*definition, history, exponent);
-  history.samples[3].audited = true;
-  history.samples[8].audited = true;
-  for (int i = 0; i < 6; ++i) history.stopped_keys.push_back({1, 20 + i, 0});
-  EXPECT_NEAR(**MeasuredLoss(*definition, history), (weights[3] + weights[8]) * (2 + 6) / 2, 1e-12);
+  history.samples[3].audited = 0.01;
+  history.samples[8].audited = 0.02;
+  const Audit audit = *AuditOf(*definition, history);
+  EXPECT_EQ(audit.samples, 2);
+  EXPECT_DOUBLE_EQ(audit.bound, 0.03);
+  EXPECT_NEAR(audit.measured, weights[3] + weights[8], 1e-12);
 }
 
 TEST(EarlyStopping, SameBitsWhateverGoesWrong) {
