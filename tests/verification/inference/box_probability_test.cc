@@ -47,7 +47,9 @@ double Equicorrelated(int d, double r, double low, double high) {
   constexpr double kReach = 9;
   const auto cdf = [](double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); };
   double sum = 0;
-  for (double t = -kReach; t <= kReach; t += kStep) {
+  const int steps = static_cast<int>(std::lround(2 * kReach / kStep));
+  for (int k = 0; k <= steps; ++k) {
+    const double t = -kReach + kStep * k;
     const double scale = 1 / std::sqrt(1 - r);
     const double shift = std::sqrt(r) * t;
     const double inside = cdf((high - shift) * scale) - cdf((low - shift) * scale);

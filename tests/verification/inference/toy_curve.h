@@ -53,8 +53,9 @@ struct ToyCurve {
     PhiloxStream stream = StreamOfRun(seed, sample);
     Eigen::VectorXd curve = Mean(parameters);
     PathScatter deviation(stream);
+    const int of_each = readings / 2;
     for (int t = 0; t < readings; ++t) {
-      const double strain = static_cast<double>(t % (readings / 2)) / (readings / 2);
+      const double strain = static_cast<double>(t % of_each) / of_each;
       curve[t] *= 1 + scatter * deviation.Next(strain);
     }
     return curve;
@@ -64,6 +65,7 @@ struct ToyCurve {
   DataSet Measure(const Eigen::VectorXd& parameters, double noise, std::uint64_t seed) const {
     const Eigen::VectorXd curve = Run(parameters, seed, kMeasured);
     std::vector<double> steps;
+    steps.reserve(static_cast<std::size_t>(readings) / 2);
     for (int t = 0; t < readings / 2; ++t) steps.push_back(t);
     return WithErrors(curve, noise * curve, steps, seed);
   }
