@@ -51,9 +51,8 @@ absl::StatusOr<v1::AttemptSpec> ReadSpec(const std::string& path) {
 
 /// The packing file and the meshes that a single evaluation needs, told apart by their digests.
 Fetch FromFiles(const v1::AttemptSpec& spec, const OnceOptions& options) {
-  const std::string packing = spec.packing_digest();
-  return [packing, options](const std::string& digest,
-                            std::stop_token) -> absl::StatusOr<std::string> {
+  return [packing = spec.packing_digest(), options](
+             const std::string& digest, std::stop_token) -> absl::StatusOr<std::string> {
     const bool mesh = digest != packing;
     const std::vector<std::string> paths = mesh ? options.meshes
                                            : options.packing.empty()

@@ -27,6 +27,7 @@ TEST(Specimens, SlotsShareOneFetch) {
   std::vector<std::shared_ptr<const Specimen>> found(4);
   {
     std::vector<std::jthread> slots;
+    slots.reserve(found.size());
     for (auto& specimen : found) {
       slots.emplace_back([&] { specimen = *specimens.Get(Named("a"), {}); });
     }
