@@ -154,7 +154,9 @@ std::vector<std::string> Warnings(const FilterOptions& options, const Ensemble& 
   const auto total = static_cast<double>(ensemble.log_start.size());
   if (ensemble.diverged > 0) {
     warnings.push_back(
-        absl::StrCat(ensemble.diverged, " of ", total, " samples diverged and have weight zero."));
+        absl::StrCat(ensemble.diverged, " of ", total,
+                     " samples did not come to their ends (diverged, or stopped early because they "
+                     "could not matter) and have weight zero."));
   }
   if (ensemble.outside > 0) {
     warnings.push_back(absl::StrCat(ensemble.outside, " of ", total,
