@@ -87,7 +87,7 @@ GroupScatter FitScatter(const ScatterMoments& moments, const std::vector<int>& s
   GroupScatter scatter;
   scatter.sd = ScaledToStages(Eigen::VectorXd::Ones(n), moments, stage).cwiseSqrt();
   scatter.clock = kFarApart * Eigen::VectorXd::LinSpaced(n, 0, static_cast<double>(n - 1));
-  if (n < 3 || !(scatter.sd.minCoeff() > 0)) return scatter;
+  if (n < 3 || !(scatter.sd.maxCoeff() > 0)) return scatter;
   const double whole = control[n - 1] - control[0];
   if (!(whole > 0)) return scatter;
   ScatterMoments floored = moments;

@@ -91,6 +91,15 @@ TEST(Scatter, ReadingAtTheStartItselfHasNone) {
   EXPECT_LT(scatter.sd[0], 0.05 * scatter.sd[n]);
   EXPECT_GT(scatter.sd[1], 0.05 * scatter.sd[n]);
   EXPECT_TRUE(ScatterCovariance(scatter).allFinite());
+  // A stage of its own for the start does not take the others their correlation.
+  std::vector<int> stages(n + 1, 1);
+  stages[0] = 0;
+  const auto staged =
+      FitScatter(MomentsOfReplicates(runs), stages, Eigen::VectorXd::LinSpaced(n + 1, 0, n));
+  EXPECT_GT(staged.length, 0);
+  EXPECT_LT(staged.sd[0], 0.01 * staged.sd[n]);
+  EXPECT_GT(staged.clock[n] - staged.clock[n - 1], 0);
+  EXPECT_LT(staged.clock[n] - staged.clock[n - 1], 1);
 }
 
 TEST(Scatter, FourPackingsAreUnbiasedOnAverage) {
