@@ -22,12 +22,13 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model, i
 
 Assembly::Assembly(const Packing& packing, double density, ContactModel model,
                    Surroundings surroundings, int threads)
-    : particles_(MakeParticles(packing, density)),
+    : particles_(MakeParticles(packing, density, surroundings.thickness)),
       model_(std::move(model)),
       threads_(threads),
       sliding_friction_(model_.sliding_friction()),
       gravity_(surroundings.gravity),
       density_(density),
+      thickness_(surroundings.thickness),
       next_id_(particles_.size()),
       planar_(surroundings.planar),
       walls_(std::move(surroundings.walls)) {
@@ -35,12 +36,12 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model,
   std::copy(std::begin(packing.length), std::end(packing.length), std::begin(cell_.length));
   std::copy(std::begin(surroundings.open), std::end(surroundings.open), std::begin(cell_.open));
   clumps_ = RigidClumps(packing, density, particles_);
+  assert(thickness_ == 0 || (planar_ && clumps_.all().empty()));
   double radii = 0;
   for (std::size_t g = 0; g < particles_.radius.size(); ++g) {
     if (particles_.body.empty() || particles_.body[g] < 0) {
-      const double r = particles_.radius[g];
-      solid_volume_ += 4.0 / 3.0 * std::numbers::pi * r * r * r;
-      radii += r;
+      solid_volume_ += InertiaOf(particles_.radius[g], 1, thickness_).mass;
+      radii += particles_.radius[g];
       ++bodies_;
     }
   }
@@ -57,6 +58,7 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model,
 }
 
 void Assembly::Shrink(const std::vector<std::pair<int, double>>& radii) {
+  assert(thickness_ == 0);
   for (const auto& [grain, radius] : radii) {
     const auto g = static_cast<std::size_t>(grain);
     assert(radius <= particles_.radius[g]);

@@ -35,7 +35,8 @@ struct Surroundings {
   bool open[3] = {true, true, true};  ///< axes without images (PeriodicCell::open)
   Vec3 gravity{};                     ///< [m/s^2]
   std::vector<Wall> walls{};          ///< in a periodic axis they reach a diameter beyond the cell
-  bool planar = false;                ///< grains move in the plane of x and z only, as disks do
+  bool planar = false;                ///< grains move in the plane of x and z only
+  double thickness = 0;               ///< of disks, planar only [m]; 0: the grains are spheres
   double skin = 0.15;  ///< gap up to which pairs are listed, over the mean diameter; flows search
                        ///< less often with a wide one
 };
@@ -146,7 +147,7 @@ class Assembly {
   /// follow at the next evaluation. Precondition: single spheres, no radius grows.
   void Shrink(const std::vector<std::pair<int, double>>& radii);
 
-  /// Sum of sphere volumes, unions for clumps, of the packing as it was given.
+  /// Sum of the volumes of grains, unions for clumps, of the packing as it was given.
   [[nodiscard]] double solid_volume() const { return solid_volume_; }
   /// Of the spheres that have the volumes of the bodies.
   [[nodiscard]] double mean_diameter() const { return mean_diameter_; }
@@ -160,8 +161,8 @@ class Assembly {
     ParticleArrays& p = particles_;
     archive(cell_, p.x, p.y, p.z, p.vx, p.vy, p.vz, p.wx, p.wy, p.wz, p.fx, p.fy, p.fz, p.tx, p.ty,
             p.tz, p.radius, p.inverse_mass, p.inverse_inertia, p.id, p.body);
-    archive(sliding_friction_, viscous_, gravity_, density_, next_id_, planar_, walls_, stale_,
-            reach_, last_dt_);
+    archive(sliding_friction_, viscous_, gravity_, density_, thickness_, next_id_, planar_, walls_,
+            stale_, reach_, last_dt_);
     archive(list_.skin, list_.row, list_.first, list_.second, list_.image, list_.place_row,
             list_.place_i, list_.place_j, order_, lanes_.first, lanes_.second, lanes_.place_i,
             lanes_.place_j, lanes_.image, records_);
@@ -210,6 +211,7 @@ class Assembly {
   bool viscous_ = true;
   Vec3 gravity_;
   double density_ = 0;
+  double thickness_ = 0;  ///< of disks [m]; 0: spheres
   int next_id_ = 0;
   bool planar_ = false;
   WallContacts walls_;

@@ -1,7 +1,6 @@
 // Grains that join and leave.
 #include <algorithm>
 #include <cassert>
-#include <numbers>
 
 #include "dem/dynamics/assembly.h"
 
@@ -59,8 +58,7 @@ void Assembly::Remove(const std::vector<int>& grains) {
   for (const int g : grains) {
     const auto q = static_cast<std::size_t>(g);
     to[q] = kGone;
-    const double r = particles_.radius[q];
-    solid_volume_ -= 4.0 / 3.0 * std::numbers::pi * r * r * r;
+    solid_volume_ -= 1.0 / (particles_.inverse_mass[q] * density_);
   }
   int next = 0;
   for (int& index : to) {
@@ -74,8 +72,7 @@ void Assembly::Insert(const std::vector<NewGrain>& grains) {
   ParticleArrays& p = particles_;
   for (const NewGrain& grain : grains) {
     assert(grain.radius > 0 && grain.radius <= largest_radius_ * (1 + 1e-12));
-    const double volume = 4.0 / 3.0 * std::numbers::pi * grain.radius * grain.radius * grain.radius;
-    const double mass = density_ * volume;
+    const Inertia inertia = InertiaOf(grain.radius, density_, thickness_);
     for (auto* a : {&p.wx, &p.wy, &p.wz, &p.fx, &p.fy, &p.fz, &p.tx, &p.ty, &p.tz}) {
       a->push_back(0);
     }
@@ -86,10 +83,10 @@ void Assembly::Insert(const std::vector<NewGrain>& grains) {
     p.vy.push_back(grain.velocity.y);
     p.vz.push_back(grain.velocity.z);
     p.radius.push_back(grain.radius);
-    p.inverse_mass.push_back(1.0 / mass);
-    p.inverse_inertia.push_back(1.0 / (0.4 * mass * grain.radius * grain.radius));
+    p.inverse_mass.push_back(1.0 / inertia.mass);
+    p.inverse_inertia.push_back(1.0 / inertia.moment);
     p.id.push_back(next_id_++);
-    solid_volume_ += volume;
+    solid_volume_ += inertia.mass / density_;
   }
   stale_ = true;
 }

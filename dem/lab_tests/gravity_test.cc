@@ -25,6 +25,11 @@ ParameterInfo Chosen(const std::string& name, const std::string& unit,
   return Setting(name, unit, {.value = 0, .min = 0, .max = 1000}, description);
 }
 
+ParameterInfo ThicknessOfDisks() {
+  return Setting("thickness", "m", {.value = 0, .min = 0, .max = 10},
+                 "of disks whose axes stand on the plane; 0: the grains are spheres");
+}
+
 std::vector<ParameterInfo> WithCommonSettings(std::vector<ParameterInfo> own) {
   std::vector<ParameterInfo> all = {
       Setting("gravity", "m/s^2", {.value = 9.80665, .min = 1e-3, .max = 1000},

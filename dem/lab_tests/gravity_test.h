@@ -16,6 +16,10 @@ std::vector<std::string> GravityTestNames();
 ParameterInfo Chosen(const std::string& name, const std::string& unit,
                      const std::string& description);
 
+/// `thickness` of tests in a plane: 0 leaves spheres, more makes disks of their radii, m = pi r^2 t
+/// rho, I = m r^2/2.
+ParameterInfo ThicknessOfDisks();
+
 /// A setting with a default of its own, in [min, max].
 struct SettingRange {
   double value = 0;

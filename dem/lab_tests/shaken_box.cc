@@ -9,13 +9,15 @@ GravityTestEntry ShakenBox() {
       .info = {
           .name = "shaken_box",
           .description =
-              "One plane of grains (x and z only) and one intruder in a box that moves by x = "
+              "One plane of grains (x and z only; spheres, or disks of a thickness) and one "
+              "intruder in a box that moves by x = "
               "ax cos(w t), z = az sin(w t) and "
               "tilts by tilt sin(tilt_frequency t). Grains come to rest first, the intruder "
               "at intruder_start above the floor. "
               "Control: time. Heights are in the frame of the box. Fails when a grain escapes",
           .settings = WithCommonSettings(
-              {Setting("intruder_ratio", "1", {.value = 2, .min = 1, .max = 20},
+              {ThicknessOfDisks(),
+               Setting("intruder_ratio", "1", {.value = 2, .min = 1, .max = 20},
                        "diameter of the intruder over the largest grain's"),
                Chosen("intruder_start", "m",
                       "height of its centre before the others fall about it; 0: on the floor"),

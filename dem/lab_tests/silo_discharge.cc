@@ -23,6 +23,7 @@ GravityTestEntry SiloDischarge() {
               {Setting("flat", "1", {.value = 0, .min = 0, .max = 1},
                        "1: one plane of grains, x and z only, outlet a slot; 0: a cylinder, outlet "
                        "a circle"),
+               ThicknessOfDisks(),
                Chosen("silo_width", "m",
                       "diameter, or width if flat; 0: twelve mean grain diameters, forty if flat"),
                Chosen("jam_time", "s",

@@ -26,7 +26,17 @@ std::vector<int> SpatialOrder(const Packing& packing) {
 
 }  // namespace
 
-ParticleArrays MakeParticles(const Packing& packing, double density) {
+Inertia InertiaOf(double radius, double density, double thickness) {
+  const double r = radius;
+  if (thickness > 0) {
+    const double mass = density * std::numbers::pi * r * r * thickness;
+    return {.mass = mass, .moment = 0.5 * mass * r * r};
+  }
+  const double mass = density * 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  return {.mass = mass, .moment = 0.4 * mass * r * r};
+}
+
+ParticleArrays MakeParticles(const Packing& packing, double density, double thickness) {
   const auto n = packing.x.size();
   ParticleArrays p;
   p.id = SpatialOrder(packing);
@@ -37,13 +47,13 @@ ParticleArrays MakeParticles(const Packing& packing, double density) {
   for (std::size_t k = 0; k < n; ++k) {
     const int i = p.id[k];
     const double r = packing.radius[i];
-    const double mass = density * 4.0 / 3.0 * std::numbers::pi * r * r * r;
+    const Inertia inertia = InertiaOf(r, density, thickness);
     p.x[k] = packing.x[i];
     p.y[k] = packing.y[i];
     p.z[k] = packing.z[i];
     p.radius[k] = r;
-    p.inverse_mass[k] = 1.0 / mass;
-    p.inverse_inertia[k] = 1.0 / (0.4 * mass * r * r);
+    p.inverse_mass[k] = 1.0 / inertia.mass;
+    p.inverse_inertia[k] = 1.0 / inertia.moment;
   }
   return p;
 }

@@ -15,15 +15,26 @@ struct ParticleArrays {
   std::vector<double> tx, ty, tz;  ///< net contact torque [N m]
   std::vector<double> radius;      ///< [m]
   std::vector<double> inverse_mass;     ///< [1/kg]
-  std::vector<double> inverse_inertia;  ///< of the solid sphere, 5/(2 m r^2) [1/(kg m^2)]
+  std::vector<double> inverse_inertia;  ///< about the centre (InertiaOf) [1/(kg m^2)]
   std::vector<int> id;                  ///< index in the packing
   std::vector<int> body;                ///< clump of each sphere, -1: none; empty: no clumps at all
 
   [[nodiscard]] int size() const { return static_cast<int>(x.size()); }
 };
 
+/// Mass and moment of inertia of one solid grain.
+struct Inertia {
+  double mass = 0;    ///< [kg]
+  double moment = 0;  ///< about the centre; of a disk about its axis [kg m^2]
+};
+
+/// A sphere, m = 4/3 pi r^3 rho and 2/5 m r^2, or with a thickness [m] > 0 a disk, m = pi r^2 t rho
+/// and m r^2/2. radius [m] > 0, density [kg/m^3] > 0.
+Inertia InertiaOf(double radius, double density, double thickness);
+
 /// Grains at rest, in an order that keeps neighbours close in memory: by grid cell, then by
-/// position, so that the order in which a file lists them does not matter. density [kg/m^3] > 0.
-ParticleArrays MakeParticles(const Packing& packing, double density);
+/// position, so that the order in which a file lists them does not matter. density [kg/m^3] > 0;
+/// thickness [m]: see InertiaOf.
+ParticleArrays MakeParticles(const Packing& packing, double density, double thickness = 0);
 
 }  // namespace calib::dem

@@ -11,6 +11,7 @@
 #include "dem/catalog/catalog.h"
 #include "dem/contact/contact_model.h"
 #include "dem/lab_tests/collision.h"
+#include "dem/particles/particle_arrays.h"
 
 namespace calib::dem {
 namespace {
@@ -28,13 +29,10 @@ Body MakeBody(double radius, double thickness, double density) {
   if (!std::isfinite(radius)) {
     return {};
   }
-  const double r2 = radius * radius;
-  const double volume = thickness > 0 ? std::numbers::pi * r2 * thickness
-                                      : 4.0 / 3.0 * std::numbers::pi * r2 * radius;
-  const double mass = density * volume;
+  const Inertia inertia = InertiaOf(radius, density, thickness);
   return {.radius = radius,
-          .inverse_mass = 1.0 / mass,
-          .inverse_inertia = 1.0 / ((thickness > 0 ? 0.5 : 0.4) * mass * r2)};
+          .inverse_mass = 1.0 / inertia.mass,
+          .inverse_inertia = 1.0 / inertia.moment};
 }
 
 struct Impact {

@@ -249,6 +249,12 @@ std::string ControlOf(const TestInfo& test, const std::map<std::string, double>&
   return test.name == "collision" ? CollisionControl(settings) : test.control;
 }
 
+/// A setting of the test, 0 where it is left out.
+double Given(const Scenario& scenario, const std::string& setting) {
+  const auto it = scenario.settings.find(setting);
+  return it != scenario.settings.end() ? it->second : 0.0;
+}
+
 void CheckTest(const Scenario& scenario, Problems& problems) {
   const TestInfo* test = FindTest(scenario.test);
   if (test == nullptr) {
@@ -270,6 +276,11 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
                      [&](const ParameterInfo& info) { return info.name == name; })) {
       problems.push_back(absl::StrCat("test ", scenario.test, " has no setting \"", name, "\""));
     }
+  }
+  if (test->name == "silo_discharge" && Given(scenario, "thickness") > 0 &&
+      Given(scenario, "flat") == 0) {
+    problems.emplace_back(
+        "thickness makes disks, which need a plane: set flat: 1, or leave thickness out");
   }
   const bool stress_driven = test->control == "mean_stress";
   const auto& range = test->control_range;

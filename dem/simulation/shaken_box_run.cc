@@ -80,7 +80,8 @@ StageEnd RunShakenBox(GravityRun& run) {
   Wall box = MakeMeshWall("box", mesh);
   box.centre = {side + 0.5 * width, 0, 0.5 * top};
   const Vec3 rest = box.centre;
-  Assembly assembly = run.Make(grains, {.walls = {box}, .planar = true});
+  Assembly assembly =
+      run.Make(grains, {.walls = {box}, .planar = true, .thickness = run.Setting("thickness")});
   const double reach = 2 * top + shaking.az;
   const double fastest =
       shaking.w * (shaking.az + shaking.ax) + shaking.tilt * shaking.tilt_w * top;

@@ -211,7 +211,7 @@ StageEnd RunSiloDischarge(GravityRun& run) {
   const double top = TopOf(grains);
   grains.length[0] = grains.length[1] = silo.width + 2 * d;
   grains.length[2] = top;
-  Surroundings walls{.planar = silo.flat};
+  Surroundings walls{.planar = silo.flat, .thickness = run.Setting("thickness")};
   walls.walls.push_back(MakePlane("floor", {0, 0, 0}, {0, 0, 1}));
   if (silo.flat) {
     walls.walls.push_back(MakePlane("left", {m - 0.5 * silo.width, m, 0}, {1, 0, 0}));

@@ -90,6 +90,34 @@ TEST(SiloDischarge, ArchesStopASmallOutletAndAreBroken) {
   EXPECT_GT(Value(run, "silo_discharge", "avalanche_size", 0), 0);
 }
 
+TEST(SiloDischarge, DisksWeighWhatTheirThicknessSays) {
+  // Nothing but the mass differs: of 150 grains all leave a wide outlet, as disks with pi r^2 t rho
+  // each.
+  const double t = 0.7 * kDiameter;
+  Scenario silo = Pour("silo_discharge", 150, {8 * kDiameter});
+  silo.model = Beads(0.1, 0.0);
+  silo.settings = {{"flat", 1}, {"silo_width", 8.5 * kDiameter}};
+  const test::Run spheres = test::RunAll(silo);
+  silo.settings["thickness"] = t;
+  const test::Run disks = test::RunAll(silo);
+  double volume = 0;
+  for (const double r : silo.packing.radius) {
+    volume += 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  }
+  double area = 0;
+  for (const double r : silo.packing.radius) {
+    area += std::numbers::pi * r * r;
+  }
+  const auto mass = [](const test::Run& run) {
+    return Value(run, "silo_discharge", "discharged_mass", 0);
+  };
+  EXPECT_NEAR(mass(spheres), silo.model.density * volume, 1e-9 * mass(spheres));
+  EXPECT_NEAR(mass(disks), silo.model.density * area * t, 1e-9 * mass(disks));
+
+  silo.settings["flat"] = 0;
+  EXPECT_THAT(ScenarioProblems(silo), testing::Contains(testing::HasSubstr("set flat: 1")));
+}
+
 TEST(RotatingDrum, SlopeRisesWithFrictionAndLeansAgainstTheTurn) {
   Scenario drum = Pour("rotating_drum", 250, {2});
   drum.settings = {{"turns", 0.15}};

@@ -120,6 +120,19 @@ TEST(Incline, GrainRollsWithFiveSeventhsOfGravity) {
   EXPECT_NEAR(SpeedDown(alpha, Hard(0.4), Floor(), 0.05), expected, 2e-3 * expected);
 }
 
+TEST(Incline, DiskRollsWithTwoThirdsOfGravity) {
+  const double alpha = 0.3;  // tan = 0.31 < 3 mu
+  const double thickness = 2 * kRadius;
+  const double heavier = 0.75 * thickness / kRadius;  // than a sphere of its radius
+  Surroundings slope = Incline(alpha, Floor());
+  slope.planar = true;
+  slope.thickness = thickness;
+  Ball run(Hard(0.4), {0, 0, kRadius - RestingOverlap(heavier * std::cos(alpha))}, slope);
+  run.Advance(0.05);
+  const double expected = 2.0 / 3.0 * kGravity * std::sin(alpha) * 0.05;
+  EXPECT_NEAR(run.grain().vx[0], expected, 2e-3 * expected);
+}
+
 TEST(Incline, GrainSlidesWhereItCannotRoll) {
   const double alpha = 1.0;
   const double mu = 0.2;  // tan(alpha) = 1.56 > 7/2 mu
