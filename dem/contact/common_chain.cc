@@ -10,9 +10,9 @@
 namespace calib::dem {
 namespace {
 
-/// Normal force and tangential stiffness; the formulas of hertz_mindlin.cc and linear.cc.
+/// Normal force, tangential and normal stiffness; the formulas of hertz_mindlin.cc and linear.cc.
 struct Response {
-  double fn, ks;
+  double fn, ks, kn;
 };
 
 struct HertzLaw {
@@ -20,7 +20,7 @@ struct HertzLaw {
   static CALIB_DEM_INLINE Response At(double normal, double tangential, double radius, double u) {
     const double contact_radius = std::sqrt(radius * u);
     const double kn = normal * contact_radius;
-    return {kn * u, tangential * contact_radius};
+    return {kn * u, tangential * contact_radius, 1.5 * kn};
   }
 };
 
@@ -28,7 +28,7 @@ struct LinearLaw {
   static constexpr bool kLimitBySmaller = true;
   static CALIB_DEM_INLINE Response At(double normal, double tangential, double radius, double u) {
     const double kn = normal * radius;
-    return {kn * u, tangential * kn};
+    return {kn * u, tangential * kn, kn};
   }
 };
 
@@ -59,6 +59,28 @@ CALIB_DEM_INLINE Tangent Stretched(const Turn& t, const Tangent& s, double stiff
   return {cut * x, cut * y, cut * z};
 }
 
+/// Force less what a dashpot of its own stiffness takes, without tension: see viscous_damping.cc.
+CALIB_DEM_INLINE double Damped(double scale, double mass, const Response& response,
+                               double velocity) {
+  const double c = scale * std::sqrt(mass * (response.kn > 0 ? response.kn : 0.0));
+  const double least = response.fn < 0 ? response.fn : 0.0;
+  const double total = response.fn - c * velocity;
+  return total > least ? total : least;
+}
+
+/// A shear spring and, while it sticks, the dashpot beside it: see viscous_damping.cc.
+CALIB_DEM_INLINE Tangent WithDashpot(double c_per_time, const Tangent& s, const Tangent& step,
+                                     double limit) {
+  const double spring = std::sqrt(s.x * s.x + s.y * s.y + s.z * s.z);
+  const double rate = spring < (1.0 - 1e-9) * limit ? c_per_time : 0.0;
+  const double x = s.x - rate * step.x;
+  const double y = s.y - rate * step.y;
+  const double z = s.z - rate * step.z;
+  const double size = std::sqrt(x * x + y * y + z * z);
+  const double cut = rate > 0 && size > limit ? limit / size : 1.0;
+  return {cut * x, cut * y, cut * z};
+}
+
 struct MomentPair {
   double stiffness, limit;
 };
@@ -73,14 +95,18 @@ CALIB_DEM_INLINE MomentPair MomentAt(const MomentLaw& law, double ri, double rj,
 }
 
 /// Formulas, in this order of operations, of ComputeKinematics, the laws, LimitByCoulomb,
-/// IntegrateShear, IntegrateRolling, IntegrateTwisting, ComputeTotals.
-template <class Law, int kMoments>
+/// IntegrateShear, DampNormal, DampShear, IntegrateRolling, IntegrateTwisting, ComputeTotals.
+template <class Law, int kMoments, bool kDamped>
 CALIB_DEM_INLINE void Pass(const CommonChain& chain, ContactBlock& b) {
   const double normal = chain.normal;
   const double tangential = chain.tangential;
   const MomentLaw rolling = kMoments > 0 ? *chain.rolling : MomentLaw{};
   const MomentLaw twisting = kMoments > 1 ? *chain.twisting : MomentLaw{};
+  const Dashpot dashpot = kDamped ? *chain.dashpot : Dashpot{};
+  const double damping = dashpot.twice_ratio * b.viscous;
+  const double density = b.mass_factor * dashpot.mass;
   const double dt = b.dt;
+  const double per_time = dt > 0 ? 1.0 / dt : 0.0;
   const double lx = b.stretch[0];
   const double ly = b.stretch[1];
   const double lz = b.stretch[2];
@@ -138,14 +164,22 @@ CALIB_DEM_INLINE void Pass(const CommonChain& chain, ContactBlock& b) {
                        nz - half_turn * tz,
                        0.5 * dt * (nx * (wix + wjx) + ny * (wiy + wjy) + nz * (wiz + wjz))};
 
-    const Response response =
+    Response response =
         Law::At(normal, tangential, ri * rj * (both * distance), on ? overlap : 0.0);
+    const double mass = kDamped ? EffectiveMass(density, ri, rj) : 0.0;
+    if constexpr (kDamped) {
+      response.fn = Damped(damping, mass, response, vn);
+    }
     const double limit = response.fn > 0 ? friction * response.fn : 0.0;
-    const Tangent fs =
+    Tangent fs =
         Stretched(turn, {memory[0][k], memory[1][k], memory[2][k]}, response.ks, slip, limit);
     memory[0][k] = on ? fs.x : 0.0;
     memory[1][k] = on ? fs.y : 0.0;
     memory[2][k] = on ? fs.z : 0.0;
+    if constexpr (kDamped) {
+      const double c = damping * std::sqrt(mass * response.ks);
+      fs = WithDashpot(c * per_time, fs, slip, limit);
+    }
 
     double mx = 0;
     double my = 0;
@@ -189,19 +223,41 @@ CALIB_DEM_INLINE void Pass(const CommonChain& chain, ContactBlock& b) {
   }
 }
 
-CALIB_DEM_CLONES void Hertz(const CommonChain& c, ContactBlock& b) { Pass<HertzLaw, 0>(c, b); }
+CALIB_DEM_CLONES void Hertz(const CommonChain& c, ContactBlock& b) {
+  Pass<HertzLaw, 0, false>(c, b);
+}
+CALIB_DEM_CLONES void HertzDamped(const CommonChain& c, ContactBlock& b) {
+  Pass<HertzLaw, 0, true>(c, b);
+}
 CALIB_DEM_CLONES void HertzRolling(const CommonChain& c, ContactBlock& b) {
-  Pass<HertzLaw, 1>(c, b);
+  Pass<HertzLaw, 1, false>(c, b);
+}
+CALIB_DEM_CLONES void HertzRollingDamped(const CommonChain& c, ContactBlock& b) {
+  Pass<HertzLaw, 1, true>(c, b);
 }
 CALIB_DEM_CLONES void HertzMoments(const CommonChain& c, ContactBlock& b) {
-  Pass<HertzLaw, 2>(c, b);
+  Pass<HertzLaw, 2, false>(c, b);
 }
-CALIB_DEM_CLONES void Linear(const CommonChain& c, ContactBlock& b) { Pass<LinearLaw, 0>(c, b); }
+CALIB_DEM_CLONES void HertzMomentsDamped(const CommonChain& c, ContactBlock& b) {
+  Pass<HertzLaw, 2, true>(c, b);
+}
+CALIB_DEM_CLONES void Linear(const CommonChain& c, ContactBlock& b) {
+  Pass<LinearLaw, 0, false>(c, b);
+}
+CALIB_DEM_CLONES void LinearDamped(const CommonChain& c, ContactBlock& b) {
+  Pass<LinearLaw, 0, true>(c, b);
+}
 CALIB_DEM_CLONES void LinearRolling(const CommonChain& c, ContactBlock& b) {
-  Pass<LinearLaw, 1>(c, b);
+  Pass<LinearLaw, 1, false>(c, b);
+}
+CALIB_DEM_CLONES void LinearRollingDamped(const CommonChain& c, ContactBlock& b) {
+  Pass<LinearLaw, 1, true>(c, b);
 }
 CALIB_DEM_CLONES void LinearMoments(const CommonChain& c, ContactBlock& b) {
-  Pass<LinearLaw, 2>(c, b);
+  Pass<LinearLaw, 2, false>(c, b);
+}
+CALIB_DEM_CLONES void LinearMomentsDamped(const CommonChain& c, ContactBlock& b) {
+  Pass<LinearLaw, 2, true>(c, b);
 }
 
 CALIB_DEM_CLONES int Touching(const double* overlap, std::uint8_t* touching) {
@@ -253,15 +309,20 @@ std::optional<CommonChain> CommonChainOf(const Model& model) {
     if (!acts || effect.kernels.empty()) {
       continue;
     }
+    const KernelContext context{
+        .contact = model.contact,
+        .density = model.density,
+        .law = parameters,
+        .parameters = ResolveParameters(effect.info.parameters, name + ".", model.parameters)};
+    if (name == "viscous_damping") {
+      chain.dashpot = DashpotFrom(context);
+      continue;
+    }
     const bool rolls = name == "rolling_resistance" && !chain.twisting;
     if (!rolls && !(name == "twisting_resistance" && chain.rolling)) {
       return std::nullopt;
     }
-    (rolls ? chain.rolling : chain.twisting) = MomentLawFrom(
-        {.contact = model.contact,
-         .density = model.density,
-         .law = parameters,
-         .parameters = ResolveParameters(effect.info.parameters, name + ".", model.parameters)});
+    (rolls ? chain.rolling : chain.twisting) = MomentLawFrom(context);
   }
   for (const UserEffect& effect : model.user_effects) {
     if (effect.info.kind == "contact" && std::find(model.effects.begin(), model.effects.end(),
@@ -273,10 +334,15 @@ std::optional<CommonChain> CommonChainOf(const Model& model) {
 }
 
 int EvaluateCommonChain(const CommonChain& chain, ContactBlock& b, std::uint8_t* touching) {
-  constexpr void (*kPasses[2][3])(const CommonChain&, ContactBlock&) = {
-      {&Linear, &LinearRolling, &LinearMoments}, {&Hertz, &HertzRolling, &HertzMoments}};
+  constexpr void (*kPasses[2][3][2])(const CommonChain&, ContactBlock&) = {
+      {{&Linear, &LinearDamped},
+       {&LinearRolling, &LinearRollingDamped},
+       {&LinearMoments, &LinearMomentsDamped}},
+      {{&Hertz, &HertzDamped},
+       {&HertzRolling, &HertzRollingDamped},
+       {&HertzMoments, &HertzMomentsDamped}}};
   const int moments = MomentsOf(chain);
-  kPasses[chain.hertz ? 1 : 0][moments](chain, b);
+  kPasses[chain.hertz ? 1 : 0][moments][chain.dashpot ? 1 : 0](chain, b);
   if (b.count < kBlock) {
     ClearUnused(moments, b);
   }

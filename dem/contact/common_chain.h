@@ -1,13 +1,15 @@
 #pragma once
 // The commonest chains of kernels in one pass over the lanes of a block, so that what one kernel
 // leaves for the next stays in registers: `hertz_mindlin` or `linear` with Coulomb's limit and the
-// shear spring, alone, with rolling_resistance, or with rolling_resistance and twisting_resistance.
+// shear spring, alone, with rolling_resistance, or with rolling_resistance and twisting_resistance;
+// any of them with viscous_damping.
 
 #include <cstdint>
 #include <optional>
 
 #include "dem/contact/contact_block.h"
 #include "dem/effects/moment_stiffness.h"
+#include "dem/effects/viscous_damping.h"
 #include "dem/simulation/scenario.h"
 
 namespace calib::dem {
@@ -17,6 +19,7 @@ struct CommonChain {
   double normal = 0;      ///< kn = normal sqrt(r* u), of linear normal r* [Pa]
   double tangential = 0;  ///< ks = tangential sqrt(r* u) [Pa], of linear tangential kn [-]
   std::optional<MomentLaw> rolling, twisting;  ///< twisting only beside rolling
+  std::optional<Dashpot> dashpot;
 };
 
 /// The chain of a model, where it is one of these; else empty.

@@ -78,7 +78,7 @@ class Assembly {
 
   /// Contact forces, torques and stress of the present configuration; searches neighbours first
   /// when the list may miss a pair. To be called once after every Move. Errors: OUT_OF_RANGE naming
-  /// the grain or the axis (see BuildNeighborList).
+  /// the grain or the axis (see NeighborSearch).
   absl::Status EvaluateForces();
 
   /// One leapfrog step of grains and cell under the loads of the last EvaluateForces.
@@ -184,7 +184,7 @@ class Assembly {
 
   absl::Status SearchNeighbors();
   void ArrangeLanes();
-  void CarryMemory(const NeighborList& old, const std::vector<int>& old_order);
+  void CarryMemory();
   void EvaluateChunk(int chunk);
   void PrepareBlock(ContactBlock& block) const;
   void SetShifts();
@@ -238,6 +238,17 @@ class Assembly {
   std::array<double, 3> stress_ = {0, 0, 0};
   double shear_stress_ = 0;
   std::int64_t contacts_ = 0;
+
+  /// What a search leaves for the next one: the list before it with what contacts remembered, and
+  /// memory that none asks for anew.
+  struct Searching {
+    NeighborSearch search;
+    NeighborList old, sorted;
+    std::vector<int> old_order;
+    std::vector<std::uint8_t> group, old_touching;
+    LaneMemory old_history;
+  };
+  Searching searching_;
 
   RigidClumps clumps_;
   int bodies_ = 0;

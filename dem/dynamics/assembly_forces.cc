@@ -43,9 +43,12 @@ absl::Status Assembly::EvaluateForces() {
   }
   contact_updates_ += contacts_;
   if (!walls_.empty()) {
-    if (auto s = walls_.Evaluate(
-            particles_, model_,
-            {.dt = last_dt_, .viscous = viscous_, .reach = reach_, .threads = threads_});
+    if (auto s = walls_.Evaluate(particles_, model_,
+                                 {.dt = last_dt_,
+                                  .viscous = viscous_,
+                                  .reach = reach_,
+                                  .moved = moved_,
+                                  .threads = threads_});
         !s.ok()) {
       return s;
     }

@@ -27,9 +27,10 @@ double Assembly::ShearSinceSearch() const {
 
 absl::Status Assembly::SearchNeighbors() {
   cell_.Reduce();
-  const NeighborList old = std::exchange(list_, {});
-  const std::vector<int> old_order = std::exchange(order_, {});
-  if (auto s = BuildNeighborList(cell_, skin_, particles_, list_); !s.ok()) {
+  std::swap(list_, searching_.old);
+  std::swap(order_, searching_.old_order);
+  list_.row.clear();
+  if (auto s = searching_.search.Build(cell_, skin_, particles_, searching_.sorted); !s.ok()) {
     return s;
   }
   clumps_.Rewrap(cell_, particles_);
@@ -44,7 +45,7 @@ absl::Status Assembly::SearchNeighbors() {
     walls_.Search(particles_, skin_);
   }
   ArrangeLanes();
-  CarryMemory(old, old_order);
+  CarryMemory();
   loads_.assign(2 * static_cast<std::size_t>(list_.size()) + 1, GrainLoad{});
   sums_.assign(static_cast<std::size_t>(ChunkCount(list_.size(), kPairChunk)), {});
   return absl::OkStatus();
@@ -55,9 +56,10 @@ absl::Status Assembly::SearchNeighbors() {
 void Assembly::ArrangeLanes() {
   SetShifts();
   const ParticleArrays& p = particles_;
-  const NeighborList sorted = list_;
+  const NeighborList& sorted = searching_.sorted;
   const auto slots = sorted.second.size();
-  std::vector<std::uint8_t> group(slots);
+  std::vector<std::uint8_t>& group = searching_.group;
+  group.resize(slots);
   for (std::size_t s = 0; s < slots; ++s) {
     const auto i = static_cast<std::size_t>(sorted.first[s]);
     const auto j = static_cast<std::size_t>(sorted.second[s]);
@@ -82,6 +84,13 @@ void Assembly::ArrangeLanes() {
       }
     }
   }
+  list_.skin = sorted.skin;
+  list_.row = sorted.row;
+  list_.place_row = sorted.place_row;
+  for (auto* values : {&list_.first, &list_.second, &list_.place_i, &list_.place_j}) {
+    values->resize(slots);
+  }
+  list_.image.resize(slots);
   for (std::size_t s = 0; s < slots; ++s) {
     const auto to = static_cast<std::size_t>(order_[s]);
     list_.first[to] = sorted.first[s];
@@ -92,29 +101,33 @@ void Assembly::ArrangeLanes() {
   }
   const std::size_t lanes = (slots + kBlock - 1) / kBlock * kBlock;
   const std::size_t last = slots == 0 ? 0 : (slots - 1) / kBlock * kBlock;  // begin of last block
-  const auto padded = [&](const auto& values, const auto& with) {
-    auto all = values;
+  const auto pad = [&](const auto& values, const auto& with, auto& all) {
+    all = values;
     all.resize(lanes, with);
-    return all;
   };
   if (slots == 0) {
     lanes_ = {};
     return;
   }
   const auto nowhere = static_cast<int>(2 * slots);
-  lanes_ = {.first = padded(list_.first, list_.first[last]),
-            .second = padded(list_.second, list_.second[last]),
-            .place_i = padded(list_.place_i, nowhere),
-            .place_j = padded(list_.place_j, nowhere),
-            .image = padded(list_.image, list_.image[last])};
+  pad(list_.first, list_.first[last], lanes_.first);
+  pad(list_.second, list_.second[last], lanes_.second);
+  pad(list_.place_i, nowhere, lanes_.place_i);
+  pad(list_.place_j, nowhere, lanes_.place_j);
+  pad(list_.image, list_.image[last], lanes_.image);
 }
 
 /// Both lists are visited in the order of (i, j): one merge carries over what contacts remember.
-void Assembly::CarryMemory(const NeighborList& old, const std::vector<int>& old_order) {
+void Assembly::CarryMemory() {
+  const NeighborList& old = searching_.old;
+  const std::vector<int>& old_order = searching_.old_order;
+  const std::vector<std::uint8_t>& old_touching = searching_.old_touching;
+  std::swap(touching_, searching_.old_touching);
+  std::swap(history_, searching_.old_history);
   const auto width = static_cast<std::size_t>(model_.history_size());
   const auto blocks = static_cast<std::size_t>(lanes_.blocks());
-  std::vector<std::uint8_t> touching(blocks * kBlock, 0);
-  LaneMemory history(blocks * width, LaneColumn{});
+  touching_.assign(blocks * kBlock, 0);
+  history_.assign(blocks * width, LaneColumn{});
   auto o = old_order.begin();
   for (const int slot : order_) {
     const auto s = static_cast<std::size_t>(slot);
@@ -130,16 +143,14 @@ void Assembly::CarryMemory(const NeighborList& old, const std::vector<int>& old_
       break;
     }
     const auto from = static_cast<std::size_t>(*o);
-    if (key_of(*o) == key && touching_[from] != 0) {
-      touching[s] = 1;
+    if (key_of(*o) == key && old_touching[from] != 0) {
+      touching_[s] = 1;
       for (std::size_t c = 0; c < width; ++c) {
-        history[s / kBlock * width + c].lane[s % kBlock] =
-            history_[from / kBlock * width + c].lane[from % kBlock];
+        history_[s / kBlock * width + c].lane[s % kBlock] =
+            searching_.old_history[from / kBlock * width + c].lane[from % kBlock];
       }
     }
   }
-  touching_ = std::move(touching);
-  history_ = std::move(history);
 }
 
 }  // namespace calib::dem

@@ -34,22 +34,27 @@ double WallContacts::FrictionOf(int wall, const ContactModel& model) const {
   return w.friction.value_or(model.wall_friction());
 }
 
-void WallContacts::FindContacts(const ParticleArrays& p, double reach, std::size_t r,
+void WallContacts::FindContacts(const ParticleArrays& p, const Step& step, std::size_t r,
                                 ChunkResult& result) {
   constexpr int kMostNear = 64;
   Row& row = rows_[r];
   const auto g = static_cast<std::size_t>(row.grain);
   const Vec3 centre{p.x[g], p.y[g], p.z[g]};
   const double radius = p.radius[g];
+  const double range = radius + step.reach;
+  const double out_of_range = range * (1 + 1e-9) + step.moved + moved_;  // at the search
   const auto end = static_cast<std::size_t>(
-      r + 1 < rows_.size() ? rows_[r + 1].first_candidate : static_cast<int>(candidates_.size()));
+      r + 1 < rows_.size() ? rows_[r + 1].first : static_cast<int>(candidates_.size()));
   Near near[kMostNear];
   int count = 0;
-  for (auto c = static_cast<std::size_t>(row.first_candidate); c < end; ++c) {
+  for (auto c = static_cast<std::size_t>(row.first); c < end; ++c) {
+    if (candidates_[c].distance > out_of_range) {
+      continue;
+    }
     const Vec3 point = NearestOn(candidates_[c], centre);
     const Vec3 d = point - centre;
     const double distance2 = Dot(d, d);
-    if (distance2 < (radius + reach) * (radius + reach)) {
+    if (distance2 < range * range) {
       if (count == kMostNear) {
         result.crowded = row.grain;
         return;
@@ -68,7 +73,11 @@ void WallContacts::FindContacts(const ParticleArrays& p, double reach, std::size
   });
   const double same = kSamePlace * radius;
   const auto apart = [](const Vec3& a, const Vec3& b) { return Length(a - b); };
-  std::array<Contact, kMost> now;
+  struct Now {
+    int before;  ///< the contact that this one goes on from, -1: it is new
+    const Near* at;
+  };
+  Now now[kMost];
   bool claimed[kMost] = {};
   int contacts = 0;
   for (int k = 0; k < count; ++k) {
@@ -87,10 +96,10 @@ void WallContacts::FindContacts(const ParticleArrays& p, double reach, std::size
     if (!real) {
       continue;
     }
-    int before = -1;  // the contact that this one goes on from
+    int before = -1;
     double nearest = kSameContact * radius;
     for (int c = 0; c < row.contacts; ++c) {
-      const Contact& old = row.contact[static_cast<std::size_t>(c)];
+      const Contact& old = ContactOf(row, c);
       const double moved = apart(old.point, near[k].point);
       if (!claimed[c] && old.wall == near[k].wall && moved < nearest) {
         before = c;
@@ -105,16 +114,31 @@ void WallContacts::FindContacts(const ParticleArrays& p, double reach, std::size
       result.crowded = row.grain;
       return;
     }
-    Contact& contact = now[static_cast<std::size_t>(contacts++)];
     if (before >= 0) {
       claimed[before] = true;
-      contact = row.contact[static_cast<std::size_t>(before)];
     }
-    contact.wall = near[k].wall;
-    contact.point = near[k].point;
+    now[contacts++] = {.before = before, .at = &near[k]};
+  }
+  bool in_place = true;
+  for (int c = 0; c < contacts; ++c) {
+    in_place = in_place && (now[c].before == c || (now[c].before < 0 && c >= row.contacts));
+  }
+  if (!in_place) {
+    const std::vector<Contact> old(&ContactOf(row, 0), &ContactOf(row, 0) + row.contacts);
+    for (int c = 0; c < contacts; ++c) {
+      ContactOf(row, c) =
+          now[c].before < 0 ? Contact{} : old[static_cast<std::size_t>(now[c].before)];
+    }
+  }
+  for (int c = 0; c < contacts; ++c) {
+    Contact& contact = ContactOf(row, c);
+    if (now[c].before < 0) {
+      contact = Contact{};
+    }
+    contact.wall = now[c].at->wall;
+    contact.point = now[c].at->point;
   }
   row.contacts = contacts;
-  std::copy_n(now.begin(), contacts, row.contact.begin());
 }
 
 void WallContacts::LoadLane(const ParticleArrays& p, const ContactModel& model, const Row& row,
@@ -146,6 +170,8 @@ void WallContacts::LoadLane(const ParticleArrays& p, const ContactModel& model, 
 void WallContacts::EvaluateChunk(const ParticleArrays& p, const ContactModel& model,
                                  const Step& step, int chunk, ChunkResult& result) {
   result.force.assign(walls_.size(), Vec3{});
+  result.contacts = 0;
+  result.crowded = -1;
   const auto begin = static_cast<std::size_t>(chunk) * kRowChunk;
   const auto end = std::min(begin + kRowChunk, rows_.size());
   ContactBlock block;
@@ -190,10 +216,10 @@ void WallContacts::EvaluateChunk(const ParticleArrays& p, const ContactModel& mo
   };
   for (std::size_t r = begin; r < end; ++r) {
     Row& row = rows_[r];
-    FindContacts(p, step.reach, r, result);
+    FindContacts(p, step, r, result);
     row.load = GrainLoad{};
     for (int c = 0; c < row.contacts; ++c) {
-      Contact& contact = row.contact[static_cast<std::size_t>(c)];
+      Contact& contact = ContactOf(row, c);
       const double friction = FrictionOf(contact.wall, model);
       if (block.count > 0 && friction != block.sliding_friction) {
         flush();
@@ -209,22 +235,25 @@ void WallContacts::EvaluateChunk(const ParticleArrays& p, const ContactModel& mo
   flush();
   for (std::size_t r = begin; r < end; ++r) {  // contacts that nothing holds have opened
     Row& row = rows_[r];
-    const auto last = std::remove_if(row.contact.begin(), row.contact.begin() + row.contacts,
-                                     [](const Contact& contact) { return contact.wall < 0; });
-    row.contacts = static_cast<int>(last - row.contact.begin());
+    if (row.contacts > 0) {
+      Contact* const contact = &ContactOf(row, 0);
+      row.contacts = static_cast<int>(std::remove_if(contact, contact + row.contacts,
+                                                     [](const Contact& c) { return c.wall < 0; }) -
+                                      contact);
+    }
   }
 }
 
 absl::Status WallContacts::Evaluate(const ParticleArrays& p, const ContactModel& model,
                                     const Step& step) {
   const int chunks = ChunkCount(static_cast<int>(rows_.size()), kRowChunk);
-  std::vector<ChunkResult> results(static_cast<std::size_t>(chunks));
+  results_.resize(static_cast<std::size_t>(chunks));
   ForEachChunk(chunks, step.threads, [&](int chunk) {
-    EvaluateChunk(p, model, step, chunk, results[static_cast<std::size_t>(chunk)]);
+    EvaluateChunk(p, model, step, chunk, results_[static_cast<std::size_t>(chunk)]);
   });
   force_.assign(walls_.size(), Vec3{});
   contacts_ = 0;
-  for (const ChunkResult& result : results) {
+  for (const ChunkResult& result : results_) {
     if (result.crowded >= 0) {
       return absl::OutOfRangeError(absl::StrCat(
           "grain ", p.id[static_cast<std::size_t>(result.crowded)], " touches more than ", kMost,

@@ -45,6 +45,7 @@ class WallContacts {
     double dt = 0;
     bool viscous = true;
     double reach = 0;  ///< gap up to which formed contacts may act [m]
+    double moved = 0;  ///< largest displacement of any grain since the search [m]
     int threads = 1;
   };
 
@@ -72,7 +73,7 @@ class WallContacts {
   /// For archives: all state.
   template <class Archive>
   void Visit(Archive& archive) {
-    archive(walls_, searched_, moved_, rows_, candidates_, force_, contacts_);
+    archive(walls_, searched_, moved_, rows_, candidates_, slots_, force_, contacts_);
   }
 
   /// Grain q leaves: to[q] is the new index of a grain, -1 of one that is taken out. The search has
@@ -87,14 +88,15 @@ class WallContacts {
   };
   struct Candidate {
     int wall = 0;
-    int triangle = -1;  ///< -1: a plane
+    int triangle = -1;    ///< -1: a plane
+    double distance = 0;  ///< of the grain's centre at the search [m]
   };
-  /// A grain that may touch walls.
+  /// A grain that may touch walls. Its contacts have the slots of its candidates, which are as many
+  /// or more.
   struct Row {
     int grain = 0;
-    int first_candidate = 0;
+    int first = 0;  ///< candidate
     int contacts = 0;
-    std::array<Contact, kMost> contact;
     GrainLoad load{};
   };
   struct ChunkResult {
@@ -103,7 +105,14 @@ class WallContacts {
     int crowded = -1;  ///< grain with too many contacts
   };
 
-  void FindContacts(const ParticleArrays& p, double reach, std::size_t row, ChunkResult& result);
+  void FindContacts(const ParticleArrays& p, const Step& step, std::size_t row,
+                    ChunkResult& result);
+  [[nodiscard]] Contact& ContactOf(const Row& row, int k) {
+    return slots_[static_cast<std::size_t>(row.first) + static_cast<std::size_t>(k)];
+  }
+  [[nodiscard]] const Contact& ContactOf(const Row& row, int k) const {
+    return slots_[static_cast<std::size_t>(row.first) + static_cast<std::size_t>(k)];
+  }
   void EvaluateChunk(const ParticleArrays& p, const ContactModel& model, const Step& step,
                      int chunk, ChunkResult& result);
   void LoadLane(const ParticleArrays& p, const ContactModel& model, const Row& row,
@@ -116,6 +125,10 @@ class WallContacts {
   double moved_ = 0;
   std::vector<Row> rows_;  ///< ascending by grain
   std::vector<Candidate> candidates_;
+  std::vector<Contact> slots_;      ///< per candidate; the first `contacts` of each row are in use
+  std::vector<Row> old_rows_;       ///< of the search before; memory that none asks for anew
+  std::vector<Contact> old_slots_;  ///< the same
+  std::vector<ChunkResult> results_;
   std::vector<Vec3> force_;
   std::int64_t contacts_ = 0;
 };
@@ -139,7 +152,7 @@ void WallContacts::VisitBlocks(const ParticleArrays& particles, const ContactMod
   for (const Row& row : rows_) {
     for (int c = 0; c < row.contacts; ++c) {
       grains[block.count] = row.grain;
-      LoadLane(particles, model, row, row.contact[static_cast<std::size_t>(c)], block);
+      LoadLane(particles, model, row, ContactOf(row, c), block);
       if (block.count == kBlock) {
         flush();
       }

@@ -8,18 +8,6 @@
 namespace calib::dem {
 namespace {
 
-struct Dashpot {
-  double twice_ratio = 0;  ///< 2 beta
-  double mass = 0;         ///< of a sphere over r^3 [kg/m^3]
-};
-
-/// m1 m2/(m1 + m2)
-inline double EffectiveMass(double mass, double ri, double rj) {
-  const double i3 = ri * ri * ri;
-  const double j3 = rj * rj * rj;
-  return mass * (i3 * j3 / (i3 + j3));
-}
-
 CALIB_DEM_CLONES void DampNormal(const Dashpot dashpot, ContactBlock& b) {
   const double scale = dashpot.twice_ratio * b.viscous;
   for (int k = 0; k < kBlock; ++k) {
@@ -74,11 +62,6 @@ class ShearDashpot final : public ContactKernel {
   Dashpot dashpot_;
 };
 
-Dashpot DashpotFrom(const KernelContext& context) {
-  return {.twice_ratio = 2.0 * context.parameters.Get("ratio"),
-          .mass = 4.0 / 3.0 * std::numbers::pi * context.density};
-}
-
 std::unique_ptr<ContactKernel> MakeNormal(const KernelContext& context) {
   return std::make_unique<NormalDashpot>(DashpotFrom(context));
 }
@@ -88,6 +71,11 @@ std::unique_ptr<ContactKernel> MakeShear(const KernelContext& context) {
 }
 
 }  // namespace
+
+Dashpot DashpotFrom(const KernelContext& context) {
+  return {.twice_ratio = 2.0 * context.parameters.Get("ratio"),
+          .mass = 4.0 / 3.0 * std::numbers::pi * context.density};
+}
 
 EffectEntry ViscousDamping() {
   ParameterInfo ratio;

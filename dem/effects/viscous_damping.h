@@ -2,6 +2,7 @@
 // `viscous_damping`: dashpots beside the springs of a contact.
 
 #include "dem/catalog/registry.h"
+#include "dem/contact/quad.h"
 
 namespace calib::dem {
 
@@ -16,5 +17,19 @@ namespace calib::dem {
 /// quasi-static tests little is left of it, since a settled state has no velocities. One-sided,
 /// vanishes at beta = 0. The time step follows the dashpots.
 EffectEntry ViscousDamping();
+
+/// What the dashpots of all contacts have in common.
+struct Dashpot {
+  double twice_ratio = 0;  ///< 2 beta
+  double mass = 0;         ///< of a sphere over r^3 [kg/m^3]
+};
+Dashpot DashpotFrom(const KernelContext& context);
+
+/// m1 m2/(m1 + m2) [kg]; mass: of a sphere over r^3 [kg/m^3].
+CALIB_DEM_INLINE double EffectiveMass(double mass, double ri, double rj) {
+  const double i3 = ri * ri * ri;
+  const double j3 = rj * rj * rj;
+  return mass * (i3 * j3 / (i3 + j3));
+}
 
 }  // namespace calib::dem

@@ -6,7 +6,7 @@
 
 namespace calib::dem {
 
-CellGrid::CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, double range) {
+void CellGrid::Sort(const PeriodicCell& cell, const ParticleArrays& particles, double range) {
   assert(range > 0);
   const double slope = cell.Tilt() / cell.length[2];
   // Two grains within range differ by up to range sqrt(1 + slope^2) in x - slope z.
@@ -32,10 +32,10 @@ CellGrid::CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, do
     begin_[c] += begin_[c - 1];
   }
   grains_.resize(n);
-  std::vector<int> next(begin_.begin(), begin_.end() - 1);
+  next_.assign(begin_.begin(), begin_.end() - 1);
   for (std::size_t i = 0; i < n; ++i) {
     const auto c = static_cast<std::size_t>(cell_of_[i]);
-    grains_[static_cast<std::size_t>(next[c]++)] = static_cast<int>(i);
+    grains_[static_cast<std::size_t>(next_[c]++)] = static_cast<int>(i);
   }
 }
 

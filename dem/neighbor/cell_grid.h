@@ -19,10 +19,15 @@ struct GridRun {
 
 class CellGrid {
  public:
+  CellGrid() = default;
+  CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, double range) {
+    Sort(cell, particles, range);
+  }
+
   /// Sorts wrapped centres (0 <= z < Lz, 0 <= x - z tilt/Lz < Lx; anywhere along open axes) into
   /// grid cells of at least `range` [m] > 0 per edge; in a sheared cell the edges along x follow
-  /// its tilt and are longer.
-  CellGrid(const PeriodicCell& cell, const ParticleArrays& particles, double range);
+  /// its tilt and are longer. Memory of an earlier sorting is used again.
+  void Sort(const PeriodicCell& cell, const ParticleArrays& particles, double range);
 
   /// Grains of one grid cell in ascending order: grains()[begin(c)] .. grains()[begin(c + 1) - 1].
   [[nodiscard]] int begin(int cell) const { return begin_[static_cast<std::size_t>(cell)]; }
@@ -37,7 +42,7 @@ class CellGrid {
  private:
   std::array<int, 3> count_ = {1, 1, 1};
   std::array<bool, 3> open_ = {false, false, false};
-  std::vector<int> cell_of_, begin_, grains_;
+  std::vector<int> cell_of_, begin_, grains_, next_;
 };
 
 }  // namespace calib::dem

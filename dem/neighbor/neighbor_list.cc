@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <span>
 
 #include "absl/strings/str_cat.h"
-#include "dem/neighbor/cell_grid.h"
 
 namespace calib::dem {
 namespace {
@@ -44,9 +41,14 @@ bool OfOneBody(const ParticleArrays& p, std::size_t i, std::size_t j) {
   return !p.body.empty() && p.body[i] >= 0 && p.body[i] == p.body[j];
 }
 
+constexpr int kImageBits = 8;
+constexpr std::uint64_t kImageMask = (std::uint64_t{1} << kImageBits) - 1;
+
+}  // namespace
+
 /// Slots come sorted by (i, j), so that one pass in slot order meets, for a grain q, first the
 /// pairs (i, q) with i < q, then (q, j): its row of places fills in ascending order of neighbours.
-void AssignPlaces(int grains, NeighborList& list) {
+void NeighborSearch::AssignPlaces(int grains, NeighborList& list) {
   list.place_row.assign(static_cast<std::size_t>(grains) + 1, 0);
   for (std::size_t s = 0; s < list.second.size(); ++s) {
     ++list.place_row[static_cast<std::size_t>(list.first[s]) + 1];
@@ -55,40 +57,20 @@ void AssignPlaces(int grains, NeighborList& list) {
   for (std::size_t i = 1; i < list.place_row.size(); ++i) {
     list.place_row[i] += list.place_row[i - 1];
   }
-  std::vector<int> next(list.place_row.begin(), list.place_row.end() - 1);
+  next_.assign(list.place_row.begin(), list.place_row.end() - 1);
   list.place_i.resize(list.second.size());
   list.place_j.resize(list.second.size());
   for (std::size_t s = 0; s < list.second.size(); ++s) {
-    list.place_i[s] = next[static_cast<std::size_t>(list.first[s])]++;
-    list.place_j[s] = next[static_cast<std::size_t>(list.second[s])]++;
+    list.place_i[s] = next_[static_cast<std::size_t>(list.first[s])]++;
+    list.place_j[s] = next_[static_cast<std::size_t>(list.second[s])]++;
   }
 }
-
-/// A grain as the search reads it, in the order of the grid.
-struct GridGrain {
-  double x, y, z, radius;
-  int index;
-};
-
-std::vector<GridGrain> InGridOrder(const CellGrid& grid, const ParticleArrays& p) {
-  std::vector<GridGrain> grains;
-  grains.reserve(p.x.size());
-  for (const int g : grid.grains()) {
-    const auto q = static_cast<std::size_t>(g);
-    grains.push_back({.x = p.x[q], .y = p.y[q], .z = p.z[q], .radius = p.radius[q], .index = g});
-  }
-  return grains;
-}
-
-/// Grain j and the image it is seen in, in one number that sorts by j.
-using Neighbor = std::uint64_t;
-constexpr int kImageBits = 8;
-constexpr Neighbor kImageMask = (Neighbor{1} << kImageBits) - 1;
 
 /// Appends those grains of a run that are listed with `self`: written always, counted where near,
 /// since which they are cannot be foreseen.
-Neighbor* KeepNear(const GridGrain& self, double skin, const double (&shift)[3], int code,
-                   std::span<const GridGrain> run, Neighbor* end) {
+NeighborSearch::Neighbor* NeighborSearch::KeepNear(const GridGrain& self, double skin,
+                                                   const double (&shift)[3], int code,
+                                                   std::span<const GridGrain> run, Neighbor* end) {
   const double sx = shift[0] - self.x;
   const double sy = shift[1] - self.y;
   const double sz = shift[2] - self.z;
@@ -105,10 +87,8 @@ Neighbor* KeepNear(const GridGrain& self, double skin, const double (&shift)[3],
   return end;
 }
 
-}  // namespace
-
-absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleArrays& p,
-                               NeighborList& list) {
+absl::Status NeighborSearch::Build(const PeriodicCell& cell, double skin, ParticleArrays& p,
+                                   NeighborList& list) {
   if (auto s = WrapAll(cell, p); !s.ok()) {
     return s;
   }
@@ -121,45 +101,48 @@ absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleAr
                                                 " m are needed"));
     }
   }
-  const CellGrid grid(cell, p, range);
+  grid_.Sort(cell, p, range);
   list.skin = skin;
   list.row.assign(1, 0);
   list.first.clear();
   list.second.clear();
   list.image.clear();
-  const std::vector<GridGrain> grains = InGridOrder(grid, p);
-  std::vector<Neighbor> found(grains.size() + 1);
+  grains_.clear();
+  for (const int g : grid_.grains()) {
+    const auto q = static_cast<std::size_t>(g);
+    grains_.push_back({.x = p.x[q], .y = p.y[q], .z = p.z[q], .radius = p.radius[q], .index = g});
+  }
+  found_.resize(std::max(found_.size(), grains_.size() + 1));
   const double tilt = cell.Tilt();
   int grid_cell = -1;
-  std::vector<GridRun> around;
   for (int i = 0; i < p.size(); ++i) {
-    if (grid.cell_of(i) != grid_cell) {
-      grid_cell = grid.cell_of(i);
-      grid.RunsAround(grid_cell, around);
+    if (grid_.cell_of(i) != grid_cell) {
+      grid_cell = grid_.cell_of(i);
+      grid_.RunsAround(grid_cell, around_);
     }
     const GridGrain self{.x = p.x[i], .y = p.y[i], .z = p.z[i], .radius = p.radius[i], .index = i};
-    Neighbor* end = found.data();
-    for (const GridRun& run : around) {
+    Neighbor* end = found_.data();
+    for (const GridRun& run : around_) {
       if (run.largest > i) {
         const double shift[3] = {run.shift[0] * cell.length[0] + run.shift[2] * tilt,
                                  run.shift[1] * cell.length[1], run.shift[2] * cell.length[2]};
         const int code = ImageCode(run.shift[0], run.shift[1], run.shift[2]);
         // With few cells along an axis a grain may be met in several images.
-        const auto room = static_cast<std::size_t>(end - found.data()) +
+        const auto room = static_cast<std::size_t>(end - found_.data()) +
                           static_cast<std::size_t>(run.end - run.begin);
-        if (room >= found.size()) {
-          const auto size = end - found.data();
-          found.resize(2 * room);
-          end = found.data() + size;
+        if (room >= found_.size()) {
+          const auto size = end - found_.data();
+          found_.resize(2 * room);
+          end = found_.data() + size;
         }
         end = KeepNear(self, skin, shift, code,
-                       {&grains[static_cast<std::size_t>(run.begin)],
+                       {&grains_[static_cast<std::size_t>(run.begin)],
                         static_cast<std::size_t>(run.end - run.begin)},
                        end);
       }
     }
-    std::sort(found.data(), end);
-    for (const Neighbor* n = found.data(); n != end; ++n) {
+    std::sort(found_.data(), end);
+    for (const Neighbor* n = found_.data(); n != end; ++n) {
       const auto j = static_cast<int>(*n >> kImageBits);
       if (!OfOneBody(p, static_cast<std::size_t>(i), static_cast<std::size_t>(j))) {
         list.first.push_back(i);

@@ -2,10 +2,12 @@
 // Which grains may touch until the next search: a Verlet list in CSR order, found with a cell grid.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "dem/geometry/periodic_cell.h"
+#include "dem/neighbor/cell_grid.h"
 #include "dem/particles/particle_arrays.h"
 
 namespace calib::dem {
@@ -26,11 +28,35 @@ struct NeighborList {
   [[nodiscard]] int size() const { return static_cast<int>(second.size()); }
 };
 
-/// Wraps all centres into the cell along its periodic axes (its tilt at most half of Lx) and lists
-/// every pair with |x_j - x_i| < r_i + r_j + skin that is not of one clump. Errors: OUT_OF_RANGE
-/// when a centre is not finite or the cell has become shorter than two interaction ranges (pairs
-/// would have several images); list and positions are then unusable.
-absl::Status BuildNeighborList(const PeriodicCell& cell, double skin, ParticleArrays& particles,
-                               NeighborList& list);
+/// Finds lists of neighbours. Keeps the memory of a search for the next one, so that flows, which
+/// search every few dozen steps, ask for none.
+class NeighborSearch {
+ public:
+  /// Wraps all centres into the cell along its periodic axes (its tilt at most half of Lx) and
+  /// lists every pair with |x_j - x_i| < r_i + r_j + skin that is not of one clump. Errors:
+  /// OUT_OF_RANGE when a centre is not finite or the cell has become shorter than two interaction
+  /// ranges (pairs would have several images); list and positions are then unusable.
+  absl::Status Build(const PeriodicCell& cell, double skin, ParticleArrays& particles,
+                     NeighborList& list);
+
+ private:
+  /// A grain as the search reads it, in the order of the grid.
+  struct GridGrain {
+    double x, y, z, radius;
+    int index;
+  };
+  /// Grain j and the image it is seen in, in one number that sorts by j.
+  using Neighbor = std::uint64_t;
+
+  static Neighbor* KeepNear(const GridGrain& self, double skin, const double (&shift)[3], int code,
+                            std::span<const GridGrain> run, Neighbor* end);
+  void AssignPlaces(int grains, NeighborList& list);
+
+  CellGrid grid_;
+  std::vector<GridGrain> grains_;
+  std::vector<GridRun> around_;
+  std::vector<Neighbor> found_;
+  std::vector<int> next_;
+};
 
 }  // namespace calib::dem

@@ -9,9 +9,7 @@
 #include <map>
 #include <string>
 
-#include "dem/dynamics/flow.h"
 #include "dem/dynamics/quasi_static.h"
-#include "dem/particles/loose_fill.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -161,66 +159,7 @@ void CostAgainstSize(benchmark::State& state) {
       static_cast<double>(assembly.contacts()) / assembly.particles().size();
 }
 
-/// Grains that settle in a cylinder: every iteration is one step of a flow between walls.
-void PouringIntoASilo(benchmark::State& state) {
-  const Model model = BenchModel(Law::kHertz);
-  const auto grains = static_cast<int>(state.range(0));
-  const auto sizes = GenerateSizes({.particles = grains, .mean_radius = 0.002});
-  if (!sizes.ok()) {
-    state.SkipWithError("no grains");
-    return;
-  }
-  const double radius = 0.002 * std::cbrt(static_cast<double>(grains));
-  Packing packing =
-      LooseFill(sizes->radius,
-                {.low = {0, 0, 0},
-                 .width = 2 * radius,
-                 .depth = 2 * radius,
-                 .holds =
-                     [&](const Vec3& c, double r) {
-                       return std::hypot(c.x - radius, c.y - radius) + r < 0.99 * radius;
-                     }},
-                1);
-  packing.length[0] = packing.length[1] = 2 * radius;
-  packing.length[2] = TopOf(packing);
-  TriangleMesh side;
-  AddFrustum({.centre = {radius, radius, -0.01},
-              .height = packing.length[2] + 0.02,
-              .lower_radius = radius,
-              .upper_radius = radius,
-              .sides = 32},
-             side);
-  Assembly assembly(
-      packing, 2500, ContactModel(model),
-      {.gravity = {0, 0, -9.81},
-       .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}), MakeMeshWall("side", side)}},
-      1);
-  Flow flow(assembly,
-            {.drop_height = packing.length[2],
-             .low = {-1, -1, -1},
-             .high = {10, 10, 10 * packing.length[2]}},
-            {});
-  if (flow.Advance(0.05) != StageEnd::kDone) {
-    state.SkipWithError(flow.reason().c_str());
-    return;
-  }
-  const std::int64_t steps = assembly.steps();
-  const std::int64_t updates = assembly.contact_updates();
-  while (state.KeepRunning()) {
-    if (flow.Advance(0.5 * flow.time_step()) != StageEnd::kDone) {
-      state.SkipWithError(flow.reason().c_str());
-      return;
-    }
-  }
-  const auto rate = [](std::int64_t count) {
-    return benchmark::Counter(static_cast<double>(count), benchmark::Counter::kIsRate);
-  };
-  state.counters["particle_steps/s"] = rate((assembly.steps() - steps) * grains);
-  state.counters["contact_updates/s"] = rate(assembly.contact_updates() - updates);
-}
-
 BENCHMARK(CostAgainstSize)->Arg(1000)->Arg(5000)->Arg(20'000)->Arg(100'000);
-BENCHMARK(PouringIntoASilo)->Arg(500)->Arg(10000);
 BENCHMARK_CAPTURE(ContactUpdates, hertz, Law::kHertz)->Apply(Arguments);
 BENCHMARK_CAPTURE(ContactUpdates, hertz_rolling, Law::kHertzRolling)->Apply(Arguments);
 BENCHMARK_CAPTURE(ContactUpdates, linear_moments, Law::kLinearMoments)->Apply(Arguments);

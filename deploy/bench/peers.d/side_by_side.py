@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times YADE, LAMMPS, LIGGGHTS and this engine on the same packings: see deploy/bench/peers.
 
-usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|evaluation] [--quick]
+usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|flow|together|evaluation] [--quick]
 Every round runs all codes once, one after the other, so that what disturbs the machine disturbs all of them; the tables
 hold medians over the rounds. One thread is timed by processor time, so that other work on the machine takes nothing
 from anybody; two threads by wall time, which wants an idle machine. Prints Markdown.
@@ -111,6 +111,51 @@ class Work:
             return self.lammps_like("liggghts", "dense.liggghts", grains, threads)
         return self.ours(grains, threads)
 
+    def our_flow(self, name):
+        """Processor time of one step of ours [ms] and its contacts; leaves the state from which the other code goes on."""
+        _, _, text = run(
+            [os.path.join(self.binaries, "dem_bench"), f"--benchmark_filter=Discharge/{name}/", "--benchmark_format=json"],
+            {"CALIB_BENCH_STATE": self.folder})
+        found = json.loads(text[text.index("{"):])["benchmarks"][0]
+        return found["cpu_time"] / 1e6, found["contact_updates/s"] * found["cpu_time"] / 1e9
+
+    def liggghts_flow(self):
+        """Processor time of a step [ms] and its contacts, from the state that our_flow() left."""
+        with open(self.path("flow.txt")) as file:
+            step, *box = (float(word) for word in file.readline().split())
+            grains = [line.split() for line in file]
+        with open(self.path("flow.data"), "w") as file:
+            print(f"flow\n\n{len(grains)} atoms\n1 atom types\n\n0 {box[0]} xlo xhi\n0 {box[1]} ylo yhi\n-0.03 {box[2] + 0.002} zlo zhi",
+                  file=file)
+            print("\nAtoms\n", file=file)
+            for number, (x, y, z, radius, *_) in enumerate(grains, 1):
+                print(number, 1, 2 * float(radius), 2500, x, y, z, file=file)
+            print("\nVelocities\n", file=file)
+            for number, words in enumerate(grains, 1):
+                print(number, *words[4:], 0, 0, 0, file=file)
+        (wall, cpu), _, text = run(
+            ["liggghts", "-in", os.path.join(HERE, "flow.liggghts"), "-log", "none", "-var", "data", self.path("flow.data"), "-var",
+             "vessel", self.path("vessel.stl"), "-var", "skin", "4e-4", "-var", "dt", str(step), "-var", "steps", "1000"],
+            {"OMP_NUM_THREADS": "1"})
+        loop = [float(word) for word in re.findall(r"^Loop time of ([\d.eE+-]+)", text, re.M)][-1]
+        rows = [line.split() for line in text.splitlines() if re.fullmatch(r"\s*\d+(\s+[\d.eE+-]+){2}\s*", line)][-2:]
+        return loop * min(cpu / wall, 1.0), 0.5 * statistics.mean(float(row[2]) for row in rows)
+
+    def ours_at_once(self, grains, runs):
+        """Million contact updates per second and core of that many runs at once, by the processor time of each."""
+        command = [os.path.join(self.binaries, "dem_bench"), f"--benchmark_filter=ContactUpdates/hertz_rolling/{grains}/1/",
+                   "--benchmark_format=json", f"--benchmark_min_time={0.3 if self.quick else 1.5}"]
+        children = [subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+                    for _ in range(runs)]
+        rates = []
+        for child in children:
+            text = child.communicate()[0]
+            if child.returncode != 0:
+                sys.exit(f"{' '.join(command)} ended with {child.returncode}:\n{text[-2000:]}")
+            found = json.loads(text[text.index("{"):])["benchmarks"][0]
+            rates.append(found["contact_updates/s"] * found["real_time"] / found["cpu_time"] / 1e6)
+        return statistics.mean(rates)
+
     def yade_evaluation(self, repeat):
         out = self.path("triaxial_yade.txt")
         run(["yade", "-n", "-x", "-j1", os.path.join(HERE, "yade_triaxial.py"), self.packing(1000), out, str(repeat)])
@@ -185,6 +230,41 @@ def speed(work, grains_list, threads_list, repeats):
             f"{statistics.median(memory for _, memory in found[code, grains, threads_list[0]]):.0f}" for code in codes) + " |")
 
 
+def together(work, grains_list, repeats):
+    cores = os.cpu_count()
+    print(f"\nParameter sets at once, one run a core on {cores} cores, as a worker does it: million contact updates per second and core "
+          f"(processor time), beside the faster of LAMMPS and LIGGGHTS, alone on a core; medians of {repeats}:\n")
+    print("| grains | faster peer | calib, per core | ratio, median of pairs |")
+    print("|---|---|---|---|")
+    for grains in grains_list:
+        if not os.path.exists(work.path(f"dense_{grains}.geometry")):
+            work.yade(grains, 1)  # its dense state is where the others begin
+        pairs = []
+        for repeat in range(repeats):
+            peer = max(work.rate(code, grains, 1)[0] for code in ("LAMMPS", "LIGGGHTS"))
+            pairs.append((peer, work.ours_at_once(grains, cores)))
+            print(f"together {repeat + 1}, {grains} grains: peer {pairs[-1][0]:.2f}, calib {pairs[-1][1]:.2f}", file=sys.stderr, flush=True)
+        print(f"| {grains} | {statistics.median(p for p, _ in pairs):.2f} | {statistics.median(o for _, o in pairs):.2f} | "
+              f"{statistics.median(o / p for p, o in pairs):.2f} |")
+
+
+def flow(work, repeats):
+    print("\nGrains that flow out of a vessel, Hertz-Mindlin with a dashpot, one thread, from the same state with the same time step: "
+          f"processor time of a step [ms], medians of {repeats} (least .. largest):\n")
+    print("| vessel | LIGGGHTS | calib | ratio, median of pairs | contacts of grains in LIGGGHTS | of grains and walls in calib |")
+    print("|---|---|---|---|---|---|")
+    vessels = (("silo/16000", "silo, 16 000 grains in a plane"), ("hopper/10000", "hopper of triangles, 10 000 grains"))
+    for name, what in (("silo/500", "silo, 500 grains in a plane"),) if work.quick else vessels:
+        pairs = []
+        for repeat in range(repeats):
+            ours, peer = work.our_flow(name), work.liggghts_flow()
+            pairs.append((peer, ours))
+            print(f"flow {repeat + 1}, {name}: LIGGGHTS {peer[0]:.3f} ms, calib {ours[0]:.3f} ms", file=sys.stderr, flush=True)
+        columns = [[peer[0] for peer, _ in pairs], [ours[0] for _, ours in pairs]]
+        times = " | ".join(f"{statistics.median(c):.2f} ({min(c):.2f} .. {max(c):.2f})" for c in columns)
+        print(f"| {what} | {times} | {statistics.median(p[0] / o[0] for p, o in pairs):.2f} | {pairs[0][0][1]:.0f} | {pairs[0][1][1]:.0f} |")
+
+
 def evaluation(work, repeats):
     rows = {"YADE": [], "calib": []}
     for repeat in range(repeats):
@@ -210,7 +290,7 @@ def main():
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--grains", default="1000,5000,10000")
     parser.add_argument("--threads", default="1,2")
-    parser.add_argument("--only", choices=("speed", "evaluation"), help="one of the two parts")
+    parser.add_argument("--only", choices=("speed", "together", "flow", "evaluation"), help="one of the parts")
     parser.add_argument("--quick", action="store_true", help="few steps, one repeat: shows that all programs run")
     arguments = parser.parse_args()
     repeats = 1 if arguments.quick else arguments.repeats
@@ -220,10 +300,13 @@ def main():
         parser.error(f"no packing of {unknown} grains; there are {sorted(SKIN)}")
     with tempfile.TemporaryDirectory(prefix="calib-peers-") as folder:
         work = Work(os.path.abspath(arguments.binaries), folder, arguments.quick)
-        if arguments.only != "evaluation":
-            speed(work, grains, [int(word) for word in arguments.threads.split(",")], repeats)
-        if arguments.only != "speed":
-            evaluation(work, repeats)
+        parts = {"speed": lambda: speed(work, grains, [int(word) for word in arguments.threads.split(",")], repeats),
+                 "together": lambda: together(work, grains, repeats),
+                 "flow": lambda: flow(work, repeats),
+                 "evaluation": lambda: evaluation(work, repeats)}
+        for name, part in parts.items():
+            if arguments.only in (None, name):
+                part()
 
 
 if __name__ == "__main__":

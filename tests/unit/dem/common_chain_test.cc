@@ -60,10 +60,17 @@ Model With(const Model& base, const std::vector<std::string>& effects, bool rati
   return model;
 }
 
+Model Damped(Model model) {
+  model.effects.emplace_back("viscous_damping");
+  model.parameters["viscous_damping.ratio"] = 0.3;
+  return model;
+}
+
 TEST(CommonChain, HasTheBitsOfItsKernels) {
   const std::vector<std::vector<std::string>> effects = {
       {}, {"rolling_resistance"}, {"rolling_resistance", "twisting_resistance"}};
-  for (const Model& law : {test::HertzModel(), test::LinearModel()}) {
+  for (const Model& law : {test::HertzModel(), test::LinearModel(), Damped(test::HertzModel()),
+                           Damped(test::LinearModel())}) {
     for (const auto& names : effects) {
       for (const bool ratio : {false, true}) {
         for (unsigned seed = 1; seed <= 30; ++seed) {
@@ -99,10 +106,10 @@ TEST(CommonChain, HasTheBitsOfItsKernels) {
 
 TEST(CommonChain, OtherModelsHaveNone) {
   EXPECT_FALSE(CommonChainOf(With(test::LinearModel(), {"twisting_resistance"}, false)));
-  Model damped = test::HertzModel();
-  damped.effects = {"viscous_damping"};
-  damped.parameters["viscous_damping.ratio"] = 0.1;
-  EXPECT_FALSE(CommonChainOf(damped));
+  Model sticky = test::HertzModel();
+  sticky.effects = {"linear_cohesion"};
+  sticky.parameters["linear_cohesion.energy_density"] = 1e4;
+  EXPECT_FALSE(CommonChainOf(sticky));
   Model tsuji = test::HertzModel();
   tsuji.contact = "tsuji";
   EXPECT_FALSE(CommonChainOf(tsuji));

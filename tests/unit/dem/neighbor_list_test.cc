@@ -38,7 +38,7 @@ TEST(NeighborList, FindsWhatBruteForceFindsInShearedCells) {
     ASSERT_LE(std::abs(cell.Tilt()), 0.5 * cell.length[0] * (1 + 1e-12));
     const double skin = 0.3e-3;
     NeighborList list;
-    ASSERT_TRUE(BuildNeighborList(cell, skin, p, list).ok());
+    ASSERT_TRUE(NeighborSearch().Build(cell, skin, p, list).ok());
     std::set<std::pair<int, int>> expected;
     for (int i = 0; i < p.size(); ++i) {
       for (int j = i + 1; j < p.size(); ++j) {
@@ -71,7 +71,7 @@ TEST(NeighborList, FindsWhatBruteForceFinds) {
     PeriodicCell cell{.length = {packing.length[0], packing.length[1], packing.length[2]}};
     const double skin = 0.3e-3;
     NeighborList list;
-    ASSERT_TRUE(BuildNeighborList(cell, skin, p, list).ok());
+    ASSERT_TRUE(NeighborSearch().Build(cell, skin, p, list).ok());
     std::set<std::pair<int, int>> expected;
     for (int i = 0; i < p.size(); ++i) {
       for (int j = i + 1; j < p.size(); ++j) {
@@ -100,7 +100,7 @@ TEST(NeighborList, PlacesFollowAscendingNeighbours) {
   ParticleArrays p = MakeParticles(packing, 2650);
   PeriodicCell cell{.length = {packing.length[0], packing.length[1], packing.length[2]}};
   NeighborList list;
-  ASSERT_TRUE(BuildNeighborList(cell, 1e-4, p, list).ok());
+  ASSERT_TRUE(NeighborSearch().Build(cell, 1e-4, p, list).ok());
   std::vector<int> neighbour(static_cast<std::size_t>(2 * list.size()), -1);
   for (int s = 0; s < list.size(); ++s) {
     neighbour[list.place_i[s]] = list.second[s];
@@ -119,7 +119,7 @@ TEST(NeighborList, NamesTheGrainThatWasLost) {
   PeriodicCell cell{.length = {packing.length[0], packing.length[1], packing.length[2]}};
   p.y[7] = std::numeric_limits<double>::quiet_NaN();
   NeighborList list;
-  const absl::Status status = BuildNeighborList(cell, 1e-4, p, list);
+  const absl::Status status = NeighborSearch().Build(cell, 1e-4, p, list);
   EXPECT_EQ(status.code(), absl::StatusCode::kOutOfRange);
   EXPECT_NE(std::string(status.message()).find("grain " + std::to_string(p.id[7])),
             std::string::npos);
@@ -130,7 +130,7 @@ TEST(NeighborList, RefusesACellOfLessThanTwoRanges) {
   ParticleArrays p = MakeParticles(packing, 2650);
   PeriodicCell cell{.length = {packing.length[0], packing.length[1], 4e-3}};
   NeighborList list;
-  EXPECT_EQ(BuildNeighborList(cell, 1e-4, p, list).code(), absl::StatusCode::kOutOfRange);
+  EXPECT_EQ(NeighborSearch().Build(cell, 1e-4, p, list).code(), absl::StatusCode::kOutOfRange);
 }
 
 }  // namespace

@@ -1,0 +1,214 @@
+// Speed of grains that flow out of a vessel under gravity: a silo of grains in a plane, a hopper of
+// triangles.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "dem/dynamics/flow.h"
+#include "dem/particles/loose_fill.h"
+#include "tests/support/dem/scenarios.h"
+
+namespace calib::dem {
+namespace {
+
+constexpr double kDiameter = 0.002;
+constexpr double kGravity = 9.81;
+constexpr double kFilling = 0.1;            // s, at most, to come to rest
+constexpr double kFlowing = 0.02;           // s, from the opening to the first step that is timed
+constexpr double kDrain = -10 * kDiameter;  // m, where grains are taken out
+constexpr int kSides = 32;
+constexpr int kSteps = 1000;  // timed; the vessels are far from empty after them
+
+/// Hertz-Mindlin with a dashpot, as deploy/bench/peers gives it to LIGGGHTS.
+Model Beads() {
+  Model model;
+  model.contact = "hertz_mindlin";
+  model.density = 2500;
+  model.effects = {"viscous_damping"};
+  model.parameters = {{"young_modulus", 1e7},
+                      {"poisson_ratio", 0.25},
+                      {"friction_coefficient", 0.5},
+                      {"viscous_damping.ratio", 0.2}};
+  return model;
+}
+
+/// Grains above a plane floor, walls whose outlet is open.
+struct Vessel {
+  Packing grains{};
+  TriangleMesh walls{};
+  bool planar = false;
+};
+
+/// 64 diameters wide and filled with 16 000 grains [Hadjidoukas 2014, sec. 5.3], or as slender with
+/// fewer; an outlet of eight diameters.
+Vessel Silo(int grains) {
+  const double d = kDiameter;
+  const double width = 64 * d * std::sqrt(grains / 16'000.0);
+  const double m = 0.5 * width + d;
+  Vessel vessel{.planar = true};
+  vessel.grains = LooseFill(
+      std::vector<double>(static_cast<std::size_t>(grains), 0.5 * d),
+      {.low = {d, m, 0},
+       .width = width,
+       .holds = [&](const Vec3& c, double r) { return std::abs(c.x - m) + r < 0.5 * width; }},
+      1);
+  const double top = TopOf(vessel.grains) + d;
+  const double depth = 0.5 * width;
+  const auto plate = [&](double x1, double z1, double x2, double z2) {
+    AddQuad({x1, m - depth, z1}, {x2, m - depth, z2}, {x2, m + depth, z2}, {x1, m + depth, z1},
+            vessel.walls);
+  };
+  plate(d, 0, m - 4 * d, 0);
+  plate(m + 4 * d, 0, d + width, 0);
+  plate(d, 0, d, top);
+  plate(d + width, 0, d + width, top);
+  return vessel;
+}
+
+/// A cone of 30 degrees about the vertical below a cylinder, 72 triangles of which grains touch
+/// most.
+Vessel Hopper(int grains) {
+  const double d = kDiameter;
+  const double outlet = 4 * d;
+  const double radius = 0.75 * d * std::cbrt(grains);
+  const double cone = (radius - outlet) * std::sqrt(3.0);
+  const double m = radius + d;
+  const double flat = std::cos(std::numbers::pi / kSides);
+  Vessel vessel;
+  vessel.grains = LooseFill(std::vector<double>(static_cast<std::size_t>(grains), 0.5 * d),
+                            {.low = {d, d, 0},
+                             .width = 2 * radius,
+                             .depth = 2 * radius,
+                             .holds =
+                                 [&](const Vec3& c, double r) {
+                                   const double here =
+                                       outlet + std::min(c.z / cone, 1.0) * (radius - outlet);
+                                   return std::hypot(c.x - m, c.y - m) + 1.2 * r < flat * here;
+                                 }},
+                            1);
+  AddFrustum({.centre = {m, m, 0},
+              .height = cone,
+              .lower_radius = outlet,
+              .upper_radius = radius,
+              .sides = kSides},
+             vessel.walls);
+  AddFrustum({.centre = {m, m, cone},
+              .height = TopOf(vessel.grains),
+              .lower_radius = radius,
+              .upper_radius = radius,
+              .sides = kSides},
+             vessel.walls);
+  return vessel;
+}
+
+/// What another code needs to go on from here, in $CALIB_BENCH_STATE: vessel.stl, and flow.txt with
+/// the time step, the box and one grain per line: x y z r vx vy vz (SI).
+void WriteState(const std::string& folder, const Flow& flow, const TriangleMesh& walls) {
+  const ParticleArrays& p = flow.assembly().particles();
+  const Bounds bounds = BoundsOf(walls);
+  std::ofstream grains(folder + "/flow.txt");
+  grains.precision(std::numeric_limits<double>::max_digits10);
+  grains << flow.time_step() << ' ' << bounds.high.x + kDiameter << ' ' << bounds.high.y + kDiameter
+         << ' ' << bounds.high.z << '\n';
+  for (std::size_t g = 0; g < p.x.size(); ++g) {
+    grains << p.x[g] << ' ' << p.y[g] << ' ' << p.z[g] << ' ' << p.radius[g] << ' ' << p.vx[g]
+           << ' ' << p.vy[g] << ' ' << p.vz[g] << '\n';
+  }
+  std::ofstream stl(folder + "/vessel.stl");
+  stl.precision(std::numeric_limits<double>::max_digits10);
+  stl << "solid vessel\n";
+  for (const auto& corners : walls.triangle) {
+    stl << "facet normal 0 0 0\nouter loop\n";
+    for (const int corner : corners) {
+      const Vec3& v = walls.vertex[static_cast<std::size_t>(corner)];
+      stl << "vertex " << v.x << ' ' << v.y << ' ' << v.z << '\n';
+    }
+    stl << "endloop\nendfacet\n";
+  }
+  stl << "endsolid vessel\n";
+}
+
+/// Flowing out of a vessel that was filled on a plane floor.
+struct Flowing {
+  Assembly assembly;
+  FlowOptions options{};
+  std::string failure{};  ///< empty: none
+};
+
+Flowing FillAndOpen(Vessel vessel) {
+  const Model model = Beads();
+  const double top = TopOf(vessel.grains);
+  const Bounds bounds = BoundsOf(vessel.walls);
+  vessel.grains.length[0] = bounds.high.x + kDiameter;
+  vessel.grains.length[1] = bounds.high.y + kDiameter;
+  vessel.grains.length[2] = top;
+  Flowing flowing{
+      .assembly = Assembly(vessel.grains, model.density, ContactModel(model),
+                           {.gravity = {0, 0, -kGravity},
+                            .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
+                                      MakeMeshWall("vessel", vessel.walls)},
+                            .planar = vessel.planar},
+                           1),
+      .options = {.drop_height = top, .low = {-1, -1, -1}, .high = {10, 10, 10 * top}}};
+  Flow flow(flowing.assembly, flowing.options, {});
+  StageEnd end = flow.Settle(kFilling, 0.3);
+  if (end == StageEnd::kDone) {
+    flowing.assembly.mutable_walls()[0].active = false;
+    flowing.assembly.SearchAgain();
+    flow.SetDrain(kDrain);
+    end = flow.Advance(kFlowing);
+  }
+  flowing.failure = flow.reason();
+  if (const char* folder = std::getenv("CALIB_BENCH_STATE"); folder != nullptr) {
+    WriteState(folder, flow, vessel.walls);
+  }
+  return flowing;
+}
+
+/// Every iteration is one step of the flow.
+void Discharge(benchmark::State& state, Vessel (*make)(int)) {
+  // The library calls a benchmark several times; filling takes longer than what is timed.
+  static std::map<std::pair<Vessel (*)(int), int>, Flowing> all;
+  const auto grains = static_cast<int>(state.range(0));
+  const auto key = std::pair(make, grains);
+  if (!all.contains(key)) {
+    all.emplace(key, FillAndOpen(make(grains)));
+  }
+  const Flowing& flowing = all.at(key);
+  if (!flowing.failure.empty()) {
+    state.SkipWithError(flowing.failure.c_str());
+    return;
+  }
+  Assembly assembly = flowing.assembly;
+  Flow flow(assembly, flowing.options, {});
+  flow.SetDrain(kDrain);
+  const std::int64_t steps = assembly.steps();
+  const std::int64_t updates = assembly.contact_updates();
+  std::int64_t particle_steps = 0;
+  while (state.KeepRunning()) {
+    particle_steps += assembly.particles().size();
+    if (flow.Advance(0.5 * flow.time_step()) != StageEnd::kDone) {
+      state.SkipWithError(flow.reason().c_str());
+      return;
+    }
+  }
+  const auto rate = [](std::int64_t count) {
+    return benchmark::Counter(static_cast<double>(count), benchmark::Counter::kIsRate);
+  };
+  state.counters["particle_steps/s"] = rate(particle_steps);
+  state.counters["contact_updates/s"] = rate(assembly.contact_updates() - updates);
+  state.counters["steps/s"] = rate(assembly.steps() - steps);
+}
+
+BENCHMARK_CAPTURE(Discharge, silo, &Silo)->Arg(500)->Arg(16'000)->Iterations(kSteps);
+BENCHMARK_CAPTURE(Discharge, hopper, &Hopper)->Arg(500)->Arg(10'000)->Iterations(kSteps);
+
+}  // namespace
+}  // namespace calib::dem
