@@ -43,9 +43,14 @@ struct Tangent {
   double x, y, z;
 };
 
+/// A force or moment in the tangent plane, and its length before it was cut at the limit.
+struct Spring : Tangent {
+  double uncut;
+};
+
 /// A spring in the tangent plane: carried along, stretched by -stiffness step, cut at its limit.
-CALIB_DEM_INLINE Tangent Stretched(const Turn& t, const Tangent& s, double stiffness,
-                                   const Tangent& step, double limit) {
+CALIB_DEM_INLINE Spring Stretched(const Turn& t, const Tangent& s, double stiffness,
+                                  const Tangent& step, double limit) {
   const double along = t.nx * s.x + t.ny * s.y + t.nz * s.z;
   const double px = s.x - along * t.mean_x;
   const double py = s.y - along * t.mean_y;
@@ -56,7 +61,7 @@ CALIB_DEM_INLINE Tangent Stretched(const Turn& t, const Tangent& s, double stiff
   const double z = keep * pz + t.spin * (t.nx * py - t.ny * px) - stiffness * step.z;
   const double size = std::sqrt(x * x + y * y + z * z);
   const double cut = size > limit ? limit / size : 1.0;
-  return {cut * x, cut * y, cut * z};
+  return {{cut * x, cut * y, cut * z}, size};
 }
 
 /// Force less what a dashpot of its own stiffness takes, without tension: see viscous_damping.cc.
@@ -68,11 +73,11 @@ CALIB_DEM_INLINE double Damped(double scale, double mass, const Response& respon
   return total > least ? total : least;
 }
 
-/// A shear spring and, while it sticks, the dashpot beside it: see viscous_damping.cc.
-CALIB_DEM_INLINE Tangent WithDashpot(double c_per_time, const Tangent& s, const Tangent& step,
+/// A shear spring and, while it sticks, the dashpot beside it: see viscous_damping.cc. A spring
+/// that was cut is as long as the limit.
+CALIB_DEM_INLINE Tangent WithDashpot(double c_per_time, const Spring& s, const Tangent& step,
                                      double limit) {
-  const double spring = std::sqrt(s.x * s.x + s.y * s.y + s.z * s.z);
-  const double rate = spring < (1.0 - 1e-9) * limit ? c_per_time : 0.0;
+  const double rate = s.uncut < (1.0 - 1e-9) * limit ? c_per_time : 0.0;
   const double x = s.x - rate * step.x;
   const double y = s.y - rate * step.y;
   const double z = s.z - rate * step.z;
@@ -171,14 +176,15 @@ CALIB_DEM_INLINE void Pass(const CommonChain& chain, ContactBlock& b) {
       response.fn = Damped(damping, mass, response, vn);
     }
     const double limit = response.fn > 0 ? friction * response.fn : 0.0;
-    Tangent fs =
+    const Spring spring =
         Stretched(turn, {memory[0][k], memory[1][k], memory[2][k]}, response.ks, slip, limit);
-    memory[0][k] = on ? fs.x : 0.0;
-    memory[1][k] = on ? fs.y : 0.0;
-    memory[2][k] = on ? fs.z : 0.0;
+    memory[0][k] = on ? spring.x : 0.0;
+    memory[1][k] = on ? spring.y : 0.0;
+    memory[2][k] = on ? spring.z : 0.0;
+    Tangent fs{spring.x, spring.y, spring.z};
     if constexpr (kDamped) {
       const double c = damping * std::sqrt(mass * response.ks);
-      fs = WithDashpot(c * per_time, fs, slip, limit);
+      fs = WithDashpot(c * per_time, spring, slip, limit);
     }
 
     double mx = 0;
@@ -186,8 +192,8 @@ CALIB_DEM_INLINE void Pass(const CommonChain& chain, ContactBlock& b) {
     double mz = 0;
     if constexpr (kMoments > 0) {
       const MomentPair law = MomentAt<Law>(rolling, ri, rj, response);
-      const Tangent m = Stretched(turn, {memory[3][k], memory[4][k], memory[5][k]}, law.stiffness,
-                                  {rx - nx * twist, ry - ny * twist, rz - nz * twist}, law.limit);
+      const Spring m = Stretched(turn, {memory[3][k], memory[4][k], memory[5][k]}, law.stiffness,
+                                 {rx - nx * twist, ry - ny * twist, rz - nz * twist}, law.limit);
       memory[3][k] = on ? m.x : 0.0;
       memory[4][k] = on ? m.y : 0.0;
       memory[5][k] = on ? m.z : 0.0;

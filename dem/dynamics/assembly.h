@@ -37,7 +37,7 @@ struct Surroundings {
   std::vector<Wall> walls{};          ///< in a periodic axis they reach a diameter beyond the cell
   bool planar = false;                ///< grains move in the plane of x and z only
   double thickness = 0;               ///< of disks, planar only [m]; 0: the grains are spheres
-  double skin = 0.15;  ///< gap up to which pairs are listed, over the mean diameter; flows search
+  double skin = 0.25;  ///< gap up to which pairs are listed, over the mean diameter; flows search
                        ///< less often with a wide one
 };
 

@@ -19,12 +19,15 @@ constexpr double kSamePlace = 1e-7;
 /// A contact that has moved less than this since the last step is the same one, over the radius.
 constexpr double kSameContact = 0.1;
 
-/// A triangle or plane within range, before contacts are told from each other.
+/// A triangle or plane within range, before contacts are told from each other. Left without values
+/// on purpose: room for many is set aside for every grain at a wall.
 struct Near {
-  int candidate = 0;
-  int wall = 0;
-  Vec3 point{};
-  double distance2 = 0;
+  int candidate;
+  int wall;
+  double x, y, z;  ///< nearest point
+  double distance2;
+
+  [[nodiscard]] Vec3 point() const { return {x, y, z}; }
 };
 
 }  // namespace
@@ -61,7 +64,9 @@ void WallContacts::FindContacts(const ParticleArrays& p, const Step& step, std::
       }
       near[count++] = {.candidate = static_cast<int>(c),
                        .wall = candidates_[c].wall,
-                       .point = point,
+                       .x = point.x,
+                       .y = point.y,
+                       .z = point.z,
                        .distance2 = distance2};
     }
   }
@@ -86,11 +91,11 @@ void WallContacts::FindContacts(const ParticleArrays& p, const Step& step, std::
       if (other == k || near[other].wall != near[k].wall) {
         continue;
       }
-      if (apart(near[other].point, near[k].point) <= same) {
+      if (apart(near[other].point(), near[k].point()) <= same) {
         real = other > k;
       } else if (near[other].distance2 < near[k].distance2) {
         const Candidate& triangle = candidates_[static_cast<std::size_t>(near[other].candidate)];
-        real = apart(NearestOn(triangle, near[k].point), near[k].point) > same;
+        real = apart(NearestOn(triangle, near[k].point()), near[k].point()) > same;
       }
     }
     if (!real) {
@@ -100,7 +105,7 @@ void WallContacts::FindContacts(const ParticleArrays& p, const Step& step, std::
     double nearest = kSameContact * radius;
     for (int c = 0; c < row.contacts; ++c) {
       const Contact& old = ContactOf(row, c);
-      const double moved = apart(old.point, near[k].point);
+      const double moved = apart(old.point, near[k].point());
       if (!claimed[c] && old.wall == near[k].wall && moved < nearest) {
         before = c;
         nearest = moved;
@@ -136,7 +141,7 @@ void WallContacts::FindContacts(const ParticleArrays& p, const Step& step, std::
       contact = Contact{};
     }
     contact.wall = now[c].at->wall;
-    contact.point = now[c].at->point;
+    contact.point = now[c].at->point();
   }
   row.contacts = contacts;
 }

@@ -21,7 +21,7 @@ CALIB_DEM_CLONES void Bend(const Exponent law, ContactBlock& b) {
     const double factor = Power(load > law.least ? load : law.least, law.force);
     b.normal_force[k] *= factor;
     b.normal_stiffness[k] *= law.stiffness * factor;
-    b.tangential_stiffness[k] *= factor;
+    b.tangential_stiffness[k] *= law.stiffness * factor;
   }
 }
 
@@ -65,7 +65,7 @@ EffectEntry HertzNonlinearity() {
                .kind = "contact",
                .description =
                    "F = F_law(u_ref) (u/u_ref)^n with F_law(u_ref) = p_ref (4 r*)^2, shear "
-                   "stiffness in proportion to F; two-sided, vanishes at the exponent of the "
+                   "stiffness in proportion to dF/du; two-sided, vanishes at the exponent of the "
                    "law (linear 1, hertz_mindlin 1.5)",
                .contacts = {"hertz_mindlin", "linear"},
                .parameters = {exponent, ReferencePressure(

@@ -209,7 +209,8 @@ StageEnd RunSiloDischarge(GravityRun& run) {
     return run.Fail("silo_width is too small: no grain fits into the silo");
   }
   const double top = TopOf(grains);
-  grains.length[0] = grains.length[1] = silo.width + 2 * d;
+  grains.length[0] = silo.width + 2 * d;
+  grains.length[1] = silo.flat ? d : grains.length[0];  // one cell deep for searches
   grains.length[2] = top;
   Surroundings walls{.planar = silo.flat, .thickness = run.Setting("thickness")};
   walls.walls.push_back(MakePlane("floor", {0, 0, 0}, {0, 0, 1}));

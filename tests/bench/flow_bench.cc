@@ -147,16 +147,15 @@ Flowing FillAndOpen(Vessel vessel) {
   const double top = TopOf(vessel.grains);
   const Bounds bounds = BoundsOf(vessel.walls);
   vessel.grains.length[0] = bounds.high.x + kDiameter;
-  vessel.grains.length[1] = bounds.high.y + kDiameter;
+  vessel.grains.length[1] = vessel.planar ? kDiameter : bounds.high.y + kDiameter;
   vessel.grains.length[2] = top;
-  Flowing flowing{
-      .assembly = Assembly(vessel.grains, model.density, ContactModel(model),
-                           {.gravity = {0, 0, -kGravity},
-                            .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
-                                      MakeMeshWall("vessel", vessel.walls)},
-                            .planar = vessel.planar},
-                           1),
-      .options = {.drop_height = top, .low = {-1, -1, -1}, .high = {10, 10, 10 * top}}};
+  Flowing flowing{.assembly = Assembly(vessel.grains, model.density, ContactModel(model),
+                                       {.gravity = {0, 0, -kGravity},
+                                        .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
+                                                  MakeMeshWall("vessel", vessel.walls)},
+                                        .planar = vessel.planar},
+                                       1),
+                  .options = {.drop_height = top, .low = {-1, -1, -1}, .high = {10, 10, 10 * top}}};
   Flow flow(flowing.assembly, flowing.options, {});
   StageEnd end = flow.Settle(kFilling, 0.3);
   if (end == StageEnd::kDone) {

@@ -86,6 +86,13 @@ TEST(HertzNonlinearity, ForceIsThatOfTheLawAtTheReferenceAndAPowerElsewhere) {
         const double expected = reference * std::pow(u / u_ref, n);
         EXPECT_NEAR(pair.Force(u), expected, 1e-9 * expected);
         EXPECT_NEAR(pair.block().normal_stiffness[0], n * expected / u, 1e-9 * n * expected / u);
+        // Tangential over normal stiffness stays that of the law.
+        Pair plain(c.base);
+        plain.Force(u);
+        const double ratio =
+            plain.block().tangential_stiffness[0] / plain.block().normal_stiffness[0];
+        EXPECT_NEAR(pair.block().tangential_stiffness[0], ratio * pair.block().normal_stiffness[0],
+                    1e-9 * n * expected / u);
       }
     }
   }
