@@ -33,6 +33,10 @@ absl::Status Assembly::SearchNeighbors() {
   if (auto s = searching_.search.Build(cell_, skin_, particles_, searching_.sorted); !s.ok()) {
     return s;
   }
+  const bool rests = !cell_.open[0];  // grains in a periodic cell search seldom: room counts more
+  if (rests) {
+    searching_.search = {};
+  }
   clumps_.Rewrap(cell_, particles_);
   searched_[0] = particles_.x;
   searched_[1] = particles_.y;
@@ -48,6 +52,9 @@ absl::Status Assembly::SearchNeighbors() {
   CarryMemory();
   loads_.assign(2 * static_cast<std::size_t>(list_.size()) + 1, GrainLoad{});
   sums_.assign(static_cast<std::size_t>(ChunkCount(list_.size(), kPairChunk)), {});
+  if (rests) {
+    searching_ = {};
+  }
   return absl::OkStatus();
 }
 
