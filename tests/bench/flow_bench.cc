@@ -72,7 +72,7 @@ Vessel Silo(int grains) {
   return vessel;
 }
 
-/// A cone of 30 degrees about the vertical below a cylinder, 72 triangles of which grains touch
+/// A cone of 30 degrees about the vertical below a cylinder, 128 triangles of which grains touch
 /// most.
 Vessel Hopper(int grains) {
   const double d = kDiameter;
