@@ -73,7 +73,8 @@ void WallContacts::Search(const ParticleArrays& p, double skin) {
     if (old != old_rows_.end() && old->grain == g) {
       row.load = old->load;
       for (int c = 0; c < old->contacts; ++c) {
-        const Contact& contact = old_slots_[static_cast<std::size_t>(old->first + c)];
+        const Contact& contact =
+            old_slots_[static_cast<std::size_t>(old->first) + static_cast<std::size_t>(c)];
         const bool room = first + static_cast<std::size_t>(row.contacts) < slots_.size();
         if (room && walls_[static_cast<std::size_t>(contact.wall)].active) {
           ContactOf(row, row.contacts++) = contact;

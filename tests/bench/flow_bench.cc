@@ -157,12 +157,11 @@ Flowing FillAndOpen(Vessel vessel) {
                                        1),
                   .options = {.drop_height = top, .low = {-1, -1, -1}, .high = {10, 10, 10 * top}}};
   Flow flow(flowing.assembly, flowing.options, {});
-  StageEnd end = flow.Settle(kFilling, 0.3);
-  if (end == StageEnd::kDone) {
+  if (flow.Settle(kFilling, 0.3) == StageEnd::kDone) {
     flowing.assembly.mutable_walls()[0].active = false;
     flowing.assembly.SearchAgain();
     flow.SetDrain(kDrain);
-    end = flow.Advance(kFlowing);
+    flow.Advance(kFlowing);
   }
   flowing.failure = flow.reason();
   if (const char* folder = std::getenv("CALIB_BENCH_STATE"); folder != nullptr) {
