@@ -45,7 +45,8 @@ class WallContacts {
     double dt = 0;
     bool viscous = true;
     double reach = 0;  ///< gap up to which formed contacts may act [m]
-    double moved = 0;  ///< largest displacement of any grain since the search [m]
+    double moved = 0;  ///< largest displacement of any grain since the search [m]; cells with walls
+                       ///< do not strain
     int threads = 1;
   };
 
