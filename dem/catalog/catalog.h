@@ -93,6 +93,8 @@ struct EffectInfo {
   std::vector<StrengthRay> rays = {};  ///< 1 .. 3, for paired runs with and without the effect
   std::vector<std::string> excited_by = {};  ///< tests whose curves it can change; empty: all
   bool across_pressures = false;  ///< shows only between experiments at different pressures
+  bool needs_motion = false;  ///< shows only where grains move while they are read: not in staged
+                              ///< tests, whose readings are taken at rest
 };
 
 struct ObservableInfo {

@@ -96,7 +96,8 @@ EffectEntry ViscousDamping() {
                    .reference = "Tsuji, Tanaka & Ishida, Powder Technol. 71 (1992) 239; Schwager & "
                                 "Poeschel, Granular Matter 9 (2007) 465",
                    .two_sided = false,
-                   .rays = {{.parameter = "ratio", .steps = {0.3, 2}}}},
+                   .rays = {{.parameter = "ratio", .steps = {0.3, 2}}},
+                   .needs_motion = true},
           .kernels = {{.stage = ContactStage::kNormalExtra, .make = &MakeNormal},
                       {.stage = ContactStage::kShearExtra, .make = &MakeShear}}};
 }

@@ -4,6 +4,7 @@
 #include <grpcpp/client_context.h>
 
 #include <chrono>
+#include <random>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -18,20 +19,36 @@ namespace {
 constexpr std::chrono::milliseconds kConnect{1800};
 constexpr std::chrono::minutes kLongestStream{10};
 
+/// A server that is slow to answer (a disk that stalls, a machine that sleeps) is asked again, so
+/// that hours of a diagnosis do not end with one late answer. Every call may be made twice: those
+/// that change something carry a request_id.
+constexpr int kAttempts = 10;
+
 using Stub = v1::Campaigns::Stub;
 
-// One unary call with its deadline.
+absl::Status NoAnswer() {
+  return absl::DeadlineExceededError(absl::StrCat(
+      "the server has not answered for ",
+      std::chrono::duration_cast<std::chrono::minutes>(kAttempts * rpc::kUnaryDeadline).count(),
+      " minutes; what was submitted goes on there, and the same command again goes on from what is "
+      "done"));
+}
+
+// One unary call, asked again when its deadline passes.
 template <typename Reply, typename Request>
 absl::StatusOr<Reply> Call(Stub& stub,
                            grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
                                                         Reply*),
                            const Request& request) {
-  grpc::ClientContext context;
-  rpc::SetDeadline(context, rpc::kUnaryDeadline);
-  Reply reply;
-  const grpc::Status status = (stub.*method)(&context, request, &reply);
-  if (!status.ok()) return rpc::FromGrpc(status);
-  return reply;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    grpc::ClientContext context;
+    rpc::SetDeadline(context, rpc::kUnaryDeadline);
+    Reply reply;
+    const grpc::Status status = (stub.*method)(&context, request, &reply);
+    if (status.ok()) return reply;
+    if (status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED) return rpc::FromGrpc(status);
+  }
+  return NoAnswer();
 }
 
 // All messages of one stream.
@@ -58,9 +75,18 @@ v1::CampaignRequest Of(const std::string& campaign) {
   return request;
 }
 
+// A name that no other request bears.
+std::string NewRequestId() {
+  std::random_device device;
+  std::string id;
+  for (int word = 0; word < 4; ++word) absl::StrAppend(&id, absl::Hex(device(), absl::kZeroPad8));
+  return id;
+}
+
 v1::ControlRequest ControlOf(const std::string& campaign) {
   v1::ControlRequest request;
   request.set_campaign(campaign);
+  request.set_request_id(NewRequestId());
   return request;
 }
 
@@ -188,6 +214,7 @@ absl::StatusOr<std::vector<v1::WorkerInfo>> Client::ListWorkers() {
 absl::StatusOr<v1::WorkerInfo> Client::DrainWorker(const std::string& worker) {
   v1::DrainRequest request;
   request.set_worker(worker);
+  request.set_request_id(NewRequestId());
   return Call<v1::WorkerInfo>(*impl_->stub, &Stub::DrainWorker, request);
 }
 

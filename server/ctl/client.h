@@ -13,8 +13,8 @@
 
 namespace calib::ctl {
 
-/// Errors of all calls: UNAVAILABLE when the server does not answer, otherwise the codes of the
-/// service definition. Not thread-safe.
+/// Errors of all calls: UNAVAILABLE when the server is not there, DEADLINE_EXCEEDED when it is but
+/// has not answered for minutes, otherwise the codes of the service definition. Not thread-safe.
 class Client {
  public:
   /// UNAVAILABLE when nothing answers at the address within about two seconds.

@@ -48,10 +48,17 @@ absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
   return directions;
 }
 
+// Walked in stages that end when the specimen has come to rest.
+bool ReadAtRest(const campaign::Experiment& experiment) {
+  const dem::TestInfo* const test = dem::FindTest(experiment.test);
+  return test != nullptr && test->needs_packing && !test->poured && !experiment.loading_rate;
+}
+
 // Empty: the tests can show it.
 std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
   std::set<double> pressures;
   bool excited = false;
+  bool moving = false;
   for (const campaign::Experiment& e : base_.view().campaign.experiments) {
     if (e.role != campaign::Role::kCalibrate) continue;
     const auto pressure = e.settings.find("confining_pressure");
@@ -59,6 +66,12 @@ std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
     excited = excited || effect.excited_by.empty() ||
               std::find(effect.excited_by.begin(), effect.excited_by.end(), e.test) !=
                   effect.excited_by.end();
+    moving = moving || !ReadAtRest(e);
+  }
+  if (effect.needs_motion && !moving) {
+    return "all readings are taken at rest: it shows in tests with a loading_rate, in collisions "
+           "and "
+           "in flows";
   }
   if (!excited) return "none of the fitted tests can show it";
   if (effect.across_pressures && pressures.size() < 2) {

@@ -30,6 +30,9 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
   EXPECT_EQ(json["verdict"], "adequate") << first.out;
   EXPECT_TRUE(json["detectable"].is_object());
   ASSERT_FALSE(json["candidates"].empty());
+  for (const Json& candidate : json["candidates"])
+    EXPECT_NE(candidate["effect"], "viscous_damping");
+  EXPECT_NE(first.out.find("all readings are taken at rest"), std::string::npos) << first.out;
   for (const char* field : {"effect", "p_value", "explained_fraction", "amplitude",
                             "predicted_rms_error", "confusable_with"}) {
     EXPECT_TRUE(json["candidates"][0].contains(field)) << field;
