@@ -200,6 +200,7 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
   stopping.discard_at_most =
       map->Quantity("discard_at_most", "1", kFraction).value_or(stopping.discard_at_most);
   stopping.rungs = ReadRungs(*map);
+  stopping.exponent = map->Quantity("exponent", "1", {.min = 0, .max = 1, .min_open = true});
   if (!stopping.rungs.empty() && !IsFilter(campaign.method)) {
     map->Problem("rungs",
                  "is for sqmc and iterative_bayesian_filter; chains and optimisers judge each run "

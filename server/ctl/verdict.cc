@@ -8,7 +8,7 @@ namespace calib::ctl {
 namespace {
 
 constexpr double kClearlyCloser = 0.64;  // of the base model's chi-squared
-constexpr double kClearlyLess = 0.25;    // of the misfit explained, to the screen
+constexpr double kClearlyLess = 0.25;    // of the misfit explained
 constexpr double kFarOff = 4;            // times the chi-squared of the best: twice its rms
 constexpr std::size_t kMostNames = 3;
 
@@ -40,14 +40,16 @@ bool Verdict::Explains(const CandidateEffect& candidate) const {
            *fit->left_out_error > *diagnosis_.left_out_error);
 }
 
-// What the screen promised clearly less of than of the best, and what is still far off after as
-// many batches, or one less.
+// What the screen promised clearly less of than of the best, and what is still far off where the
+// best was after as many batches, or one more.
 bool Verdict::IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const {
   const WarmFit& fit = *Find(other.effect);
   const WarmFit& best = *Find(first.effect);
+  if (fit.chi2_after.empty() || best.chi2_after.empty()) return false;
+  const std::size_t batches = std::min(fit.chi2_after.size() + 1, best.chi2_after.size());
   return other.explained_fraction < first.explained_fraction - kClearlyLess &&
-         fit.iterations + 1 >= best.iterations &&
-         fit.adequacy.chi2 > kFarOff * std::max(best.adequacy.chi2, best.adequacy.degrees);
+         fit.adequacy.chi2 >
+             kFarOff * std::max(best.chi2_after[batches - 1], best.adequacy.degrees);
 }
 
 // Beaten, at its end or with the evidence against it. A fit that was made without runs has no

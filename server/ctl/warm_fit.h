@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "inference/diagnosis/screen.h"
 #include "server/ctl/strength_scale.h"
@@ -17,6 +18,7 @@ struct WarmFit {
   report::CampaignView view{};  ///< its first batch, a campaign of the extended model
   report::RunTable runs{};      ///< of all batches
   int iterations = 0;
+  std::vector<double> chi2_after{};      ///< the smallest chi2, batch after batch
   int idle = 0;                          ///< batches since one came clearly closer
   bool stalled = false;                  ///< several batches have come no closer
   std::map<std::string, double> best{};  ///< parameters of the point with the smallest chi2, SI

@@ -126,6 +126,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
       fit.stalled = true;
       fit.iterations = 1;
       fit.rms = std::numeric_limits<double>::infinity();
+      fit.chi2_after.push_back(fit.rms);
       return absl::OkStatus();
     }
     if (!view.ok()) return view.status();
@@ -150,9 +151,11 @@ absl::Status WarmFits::Continue(const std::string& effect) {
   ++fit.iterations;
   if (fit.runs.histories.rows() == 0) {
     fit.rms = std::numeric_limits<double>::infinity();
+    fit.chi2_after.push_back(fit.rms);
     return absl::OkStatus();
   }
   Judge(effect);
+  fit.chi2_after.push_back(fit.adequacy.chi2);
   const bool closer = fit.rms < kCloser * rms || fit.adequacy.chi2 < kCloser * chi2;
   fit.idle = fit.iterations == 1 || closer ? 0 : fit.idle + 1;
   fit.stalled = fit.idle >= kMostIdle;

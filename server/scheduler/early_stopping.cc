@@ -36,11 +36,20 @@ struct Finished {
   std::vector<double> log_weights{};  // of all samples in order; -inf: not finished
 };
 
+/// Of the likelihood in the weights that are bounded.
+absl::StatusOr<double> ExponentOf(const Definition& definition, const History& history) {
+  const auto& stopping = definition.campaign.early_stopping;
+  if (stopping && stopping->exponent) {
+    return *stopping->exponent;
+  }
+  return inference::GuidingExponent(definition.priors, definition.data, definition.campaign.filter,
+                                    history.iterations);
+}
+
 /// importance: of all samples, in order.
 absl::StatusOr<Finished> FinishedMass(const Definition& definition, const History& history,
                                       const Eigen::VectorXd& importance) {
-  const auto exponent = inference::GuidingExponent(definition.priors, definition.data,
-                                                   definition.campaign.filter, history.iterations);
+  const auto exponent = ExponentOf(definition, history);
   if (absl::IsFailedPrecondition(exponent.status())) {  // no sample has weight
     return Finished{.exponent = 1, .log_mass = kNoMass};
   }

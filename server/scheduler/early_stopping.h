@@ -7,7 +7,9 @@
 // Weights are those that guide the campaign (inference::GuidingExponent): the plain ones where they
 // carry the posterior, otherwise tempered until a fifth of the samples count. A posterior sampled
 // on an emulator needs those samples' states: a run's own likelihood is a lottery of tens of nats,
-// so that untempered weights would stop runs in the very middle of the posterior.
+// so that untempered weights would stop runs in the very middle of the posterior. A campaign may
+// give the exponent itself (`early_stopping.exponent`, 1: the posterior's own weights), where it is
+// to save what it can and its weights or a narrow emulator are to answer.
 //
 // When an iteration ends the bounds are taken again with the weights as they are then, and samples
 // are resumed, largest bound first, until what the others may lose together is within

@@ -66,10 +66,12 @@ std::vector<store::EvaluationKey> Scouts(const Definition& definition, const His
   for (const std::vector<char>& diverged : history.diverged) {
     finished += static_cast<double>(std::count(diverged.begin(), diverged.end(), 0));
   }
-  // So many that are effective is what inference::GuidingExponent asks for.
-  const double effective =
-      std::max(definition.campaign.filter.ess_target * definition.campaign.samples,
-               2.0 * static_cast<double>(definition.priors.size()));
+  // So many that are effective is what inference::GuidingExponent asks for; an exponent that the
+  // campaign gives asks for none.
+  const double share =
+      definition.campaign.early_stopping->exponent ? 0 : definition.campaign.filter.ess_target;
+  const double effective = std::max(share * definition.campaign.samples,
+                                    2.0 * static_cast<double>(definition.priors.size()));
   const double wanted = std::ceil(kFinishedPerEffective * effective);
   if (finished >= wanted) {
     return {};

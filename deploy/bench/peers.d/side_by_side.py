@@ -9,6 +9,7 @@ from anybody; two threads by wall time, which wants an idle machine. Prints Mark
 import argparse
 import csv
 import json
+import math
 import os
 import re
 import statistics
@@ -266,6 +267,16 @@ def flow(work, repeats):
         print(f"| {what} | {times} | {statistics.median(p[0] / o[0] for p, o in pairs):.2f} | {pairs[0][0][1]:.0f} | {pairs[0][1][1]:.0f} |")
 
 
+def agreement(rows, column):
+    """difference of the two mean curves: rms over the largest value, share of states within two standard errors"""
+    ours, theirs = (list(zip(*(v[column] for v in rows[code]))) for code in ("calib", "YADE"))
+    differences = [statistics.mean(a) - statistics.mean(b) for a, b in zip(ours, theirs)]
+    errors = [math.sqrt((statistics.variance(a) + statistics.variance(b)) / len(a)) for a, b in zip(ours, theirs)]
+    largest = max(abs(statistics.mean(b)) for b in theirs)
+    within = sum(abs(d) <= 2 * e for d, e in zip(differences, errors)) / len(errors)
+    return math.sqrt(statistics.mean(d * d for d in differences)) / largest, within
+
+
 def evaluation(work, repeats):
     rows = {"YADE": [], "calib": []}
     for repeat in range(repeats):
@@ -283,6 +294,11 @@ def evaluation(work, repeats):
             for x, digits in ((peaks, 2), (late, 2), (volume, 4))) + " |")
     ratio = statistics.median(y[0] / c[0] for y, c in zip(rows["YADE"], rows["calib"]))
     print(f"\nratio of processor times, median of pairs: {ratio:.1f}")
+    if repeats > 1:
+        for what, column in (("stress ratio", 2), ("volumetric strain", 3)):
+            rms, within = agreement(rows, column)
+            print(f"{what}: mean curves differ by {100 * rms:.1f} % of the largest value (rms); {100 * within:.0f} % of the states are within "
+                  "two standard errors")
 
 
 def main():

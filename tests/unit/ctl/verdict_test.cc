@@ -33,6 +33,7 @@ class VerdictTest : public testing::Test {
     WarmFit fit;
     fit.stalled = true;
     fit.iterations = 4;
+    fit.chi2_after = {kAway, kAway, chi2, chi2};
     fit.runs.histories = Eigen::MatrixXd::Zero(1, kReadings);
     fit.model = Model(chi2);
     fit.adequacy = *inference::TestAdequacy(fit.model);
@@ -108,6 +109,17 @@ TEST_F(VerdictTest, ARefitThatIsFarOffAndPromisedLessIsExcluded) {
   Refit("rolling", kClose);
   Refit("twisting", 5 * kClose, 0.5).stalled = false;
   EXPECT_EQ(Concluded(), "missing_effect");
+}
+
+TEST_F(VerdictTest, ARefitIsComparedWithTheBestAfterAsManyBatches) {
+  Refit("rolling", kClose).chi2_after = {kAway, kAway, kAway, 1.5 * kClose, kClose, kClose};
+  WarmFit& slow = Refit("twisting", 0.9 * kAway, 0.1);
+  slow.stalled = false;
+  slow.chi2_after = {kAway, 0.9 * kAway, 0.9 * kAway};
+  EXPECT_EQ(Concluded(), "missing_effect") << "the best was close after one batch more";
+  diagnosis_.candidates.front().confusable_with.clear();
+  slow.chi2_after.pop_back();
+  EXPECT_EQ(Concluded(), "ambiguous") << "after three the best was no closer";
 }
 
 TEST_F(VerdictTest, WhatTheScreenCannotTellFromItIsNamedUnlessItWasFitted) {
