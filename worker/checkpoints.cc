@@ -64,7 +64,9 @@ absl::StatusOr<Checkpoints> Checkpoints::Open(const std::string& folder, std::in
   if (identity.empty()) {
     return absl::UnavailableError(absl::StrCat(folder, ": cannot be written"));
   }
-  return Checkpoints(folder, std::move(identity), most_bytes);
+  Checkpoints checkpoints(folder, std::move(identity), most_bytes);
+  checkpoints.MakeRoom();
+  return checkpoints;
 }
 
 std::string Checkpoints::PathOf(const std::string& run) const {
@@ -122,8 +124,9 @@ void Checkpoints::MakeRoom() const {
   }
   std::sort(files.begin(), files.end(),
             [](const File& a, const File& b) { return a.used < b.used; });
+  const auto oldest = fs::file_time_type::clock::now() - kLongestUnused;
   for (const File& file : files) {
-    if (all <= most_bytes_) return;
+    if (all <= most_bytes_ && file.used >= oldest) return;
     fs::remove(file.path, error);
     all -= file.bytes;
   }

@@ -1,6 +1,7 @@
 #pragma once
 // What runs that rest go on from, in a folder that several workers of one machine may share.
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -20,8 +21,11 @@ struct HeldRun {
 /// else: whoever does not find it begins anew. Thread-safe, also between processes.
 class Checkpoints {
  public:
+  static constexpr std::chrono::hours kLongestUnused{30 * 24};
+
   /// Makes the folder and gives it an identity. most_bytes: the files that were used longest ago
-  /// give way. Errors: UNAVAILABLE with the reason.
+  /// give way. Files that nobody used for kLongestUnused go at once: a run may rest for ever.
+  /// Errors: UNAVAILABLE with the reason.
   static absl::StatusOr<Checkpoints> Open(const std::string& folder, std::int64_t most_bytes);
 
   /// The same for every process that opens this folder, another one for every other folder.

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <utility>
@@ -73,10 +74,28 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Arguments& argument
 }
 
 Session::~Session() {
+  const bool nothing_rests = server_ != nullptr && !workers_.empty() && AllEnded();
   client_.reset();
   for (ChildProcess& worker : workers_) worker.AskToStop();
   workers_.clear();
   if (server_ != nullptr) server_->Shutdown(kShutdown);
+  if (nothing_rests) {
+    std::error_code ignored;
+    std::filesystem::remove_all(Checkpoints(), ignored);
+  }
+}
+
+bool Session::AllEnded() {
+  if (client_ == nullptr) return false;
+  const auto campaigns = client_->List();
+  return campaigns.ok() &&
+         std::all_of(campaigns->begin(), campaigns->end(), [](const v1::CampaignStatus& c) {
+           return c.state() == "finished" || c.state() == "cancelled";
+         });
+}
+
+std::string Session::Checkpoints() const {
+  return (std::filesystem::path(state_) / "checkpoints").string();
 }
 
 absl::Status Session::StartWorkers(int count) {
@@ -88,8 +107,7 @@ absl::Status Session::StartWorkers(int count) {
     auto worker = ChildProcess::Start(
         *program,
         {"--server", address_, "--slots", "1", "--name", absl::StrCat("local-", getpid(), "-", i),
-         "--checkpoints", (std::filesystem::path(state_) / "checkpoints").string(),
-         "--exit-with-parent", absl::StrCat(getpid())},
+         "--checkpoints", Checkpoints(), "--exit-with-parent", absl::StrCat(getpid())},
         log);
     if (!worker.ok()) return worker.status();
     workers_.push_back(*std::move(worker));

@@ -23,7 +23,8 @@ class Session {
   /// workers start if asked for.
   static absl::StatusOr<std::unique_ptr<Session>> Open(const Arguments& arguments,
                                                        bool may_create = false);
-  /// Ends workers, then the embedded server.
+  /// Ends workers, then the embedded server. Where every campaign of the folder has ended, what
+  /// its resting runs would have gone on from goes too.
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -39,6 +40,8 @@ class Session {
 
  private:
   Session();
+  bool AllEnded();
+  std::string Checkpoints() const;  ///< of local workers
 
   std::string state_;
   std::string address_;

@@ -140,5 +140,19 @@ TEST_F(RestingRun, TheFolderKeepsItsIdentityAndItsSize) {
   EXPECT_FALSE(small.Find("c").has_value());
 }
 
+TEST_F(RestingRun, WhatNobodyGoesOnFromIsNotKeptForEver) {
+  ASSERT_TRUE(Open().Keep("old", {.checkpoint = "x"}).ok());
+  ASSERT_TRUE(Open().Keep("new", {.checkpoint = "x"}).ok());
+  for (const auto& file : std::filesystem::directory_iterator(folder_)) {
+    if (file.path().filename().string().starts_with("old")) {
+      std::filesystem::last_write_time(
+          file, file.last_write_time() - Checkpoints::kLongestUnused - std::chrono::hours(1));
+    }
+  }
+  const Checkpoints again = Open();
+  EXPECT_FALSE(again.Find("old").has_value());
+  EXPECT_TRUE(again.Find("new").has_value());
+}
+
 }  // namespace
 }  // namespace calib::worker
