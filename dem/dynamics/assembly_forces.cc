@@ -75,20 +75,26 @@ absl::Status Assembly::FormulasFinite() const {
 /// spheres less what the loads of the members do on their arms.
 void Assembly::TakeBranchesBetweenBodies() {
   const double volume = cell_.Volume();
+  const GrainLoad* const loads = loads_.data();
+  const int* const row = list_.place_row.data();
   for (const Clump& clump : clumps_.all()) {
+    const int* const members = clump.members.data();
+    const std::array<double, 3>* const arms = clump.arm.data();
     for (std::size_t s = 0; s < clump.members.size(); ++s) {
-      const auto member = static_cast<std::size_t>(clump.members[s]);
-      double force[3] = {0, 0, 0};
-      for (int k = list_.place_row[member]; k < list_.place_row[member + 1]; ++k) {
-        for (int a = 0; a < 3; ++a) {
-          force[a] += loads_[static_cast<std::size_t>(k)].force[a];
-        }
+      double x = 0;
+      double y = 0;
+      double z = 0;
+      const GrainLoad* const end = loads + row[members[s] + 1];
+      for (const GrainLoad* load = loads + row[members[s]]; load != end; ++load) {
+        x += load->force[0];
+        y += load->force[1];
+        z += load->force[2];
       }
-      const std::array<double, 3>& arm = clump.arm[s];
-      for (std::size_t a = 0; a < 3; ++a) {
-        stress_[a] -= force[a] * arm[a] / volume;
-      }
-      shear_stress_ += 0.5 * (force[0] * arm[2] + force[2] * arm[0]) / volume;
+      const std::array<double, 3>& arm = arms[s];
+      stress_[0] -= x * arm[0] / volume;
+      stress_[1] -= y * arm[1] / volume;
+      stress_[2] -= z * arm[2] / volume;
+      shear_stress_ += 0.5 * (x * arm[2] + z * arm[0]) / volume;
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "dem/contact/simd.h"
 #include "dem/dynamics/chunks.h"
 #include "dem/particles/union_of_spheres.h"
 
@@ -13,48 +14,49 @@ namespace {
 using Vector = std::array<double, 3>;
 using Quaternion = std::array<double, 4>;
 
-constexpr int kClumpChunk = 64;
+/// Bodies of a chunk move kLanes at a time, each in a lane of its own.
+constexpr int kLanes = 8;
+constexpr int kClumpChunk = 8 * kLanes;
 
-Vector Cross(const Vector& a, const Vector& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+// Plain members, so that a loop over lanes vectorises.
+struct Vec {
+  double x, y, z;
+};
+struct Turned {  // a quaternion
+  double w, x, y, z;
+};
+
+inline Vec Cross(const Vec& a, const Vec& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
 /// Principal to cell axes.
-Vector Turn(const Quaternion& q, const Vector& v) {
-  const Vector u = {q[1], q[2], q[3]};
-  const Vector t = Cross(u, v);
-  const Vector twice = {2 * t[0], 2 * t[1], 2 * t[2]};
-  const Vector more = Cross(u, twice);
-  return {v[0] + q[0] * twice[0] + more[0], v[1] + q[0] * twice[1] + more[1],
-          v[2] + q[0] * twice[2] + more[2]};
+inline Vec Turn(const Turned& q, const Vec& v) {
+  const Vec u = {q.x, q.y, q.z};
+  const Vec t = Cross(u, v);
+  const Vec twice = {2 * t.x, 2 * t.y, 2 * t.z};
+  const Vec more = Cross(u, twice);
+  return {v.x + q.w * twice.x + more.x, v.y + q.w * twice.y + more.y, v.z + q.w * twice.z + more.z};
 }
 
-Vector TurnBack(const Quaternion& q, const Vector& v) {
-  return Turn({q[0], -q[1], -q[2], -q[3]}, v);
-}
+inline Vec TurnBack(const Turned& q, const Vec& v) { return Turn({q.w, -q.x, -q.y, -q.z}, v); }
 
 /// q after a rotation by the angular velocity w during dt: (1, w dt/2) q, normalised; the angle is
 /// 2 arctan(w dt/2), right to third order.
-Quaternion Rotate(const Quaternion& q, const Vector& w, double dt) {
-  const double x = 0.5 * dt * w[0];
-  const double y = 0.5 * dt * w[1];
-  const double z = 0.5 * dt * w[2];
-  Quaternion r = {q[0] - x * q[1] - y * q[2] - z * q[3], q[1] + x * q[0] + y * q[3] - z * q[2],
-                  q[2] + y * q[0] + z * q[1] - x * q[3], q[3] + z * q[0] + x * q[2] - y * q[1]};
-  const double scale = 1.0 / std::sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3]);
-  for (double& c : r) {
-    c *= scale;
-  }
-  return r;
+inline Turned Rotate(const Turned& q, const Vec& w, double dt) {
+  const double x = 0.5 * dt * w.x;
+  const double y = 0.5 * dt * w.y;
+  const double z = 0.5 * dt * w.z;
+  const Turned r = {q.w - x * q.x - y * q.y - z * q.z, q.x + x * q.w + y * q.z - z * q.y,
+                    q.y + y * q.w + z * q.x - x * q.z, q.z + z * q.w + x * q.y - y * q.x};
+  const double scale = 1.0 / std::sqrt(r.w * r.w + r.x * r.x + r.y * r.y + r.z * r.z);
+  return {r.w * scale, r.x * scale, r.y * scale, r.z * scale};
 }
 
 /// Angular velocity of a body of this momentum, cell axes.
-Vector Spin(const Clump& c, const Quaternion& q, const Vector& momentum) {
-  Vector local = TurnBack(q, momentum);
-  for (std::size_t a = 0; a < 3; ++a) {
-    local[a] /= c.inertia[a];
-  }
-  return Turn(q, local);
+inline Vec Spin(const Turned& q, const Vec& inertia, const Vec& momentum) {
+  const Vec local = TurnBack(q, momentum);
+  return Turn(q, {local.x / inertia.x, local.y / inertia.y, local.z / inertia.z});
 }
 
 /// Quaternion of the rotation whose matrix has the axes as columns.
@@ -75,7 +77,8 @@ Quaternion FromAxes(const std::array<Vector, 3>& axes) {
   } else {
     q = {m(1, 0) - m(0, 1), m(0, 2) + m(2, 0), m(1, 2) + m(2, 1), z2};
   }
-  return Rotate(q, {0, 0, 0}, 0);  // normalised
+  const Turned unit = Rotate({q[0], q[1], q[2], q[3]}, {0, 0, 0}, 0);  // normalised
+  return {unit.w, unit.x, unit.y, unit.z};
 }
 
 Clump MakeClump(const std::vector<int>& members, const Packing& packing, double density,
@@ -109,7 +112,9 @@ Clump MakeClump(const std::vector<int>& members, const Packing& packing, double 
       arm[a] = spheres[s].centre[a] - c.centre[a];
     }
     c.arm.push_back(arm);
-    c.at.push_back(TurnBack(c.orientation, arm));
+    const Quaternion& q = c.orientation;
+    const Vec at = TurnBack({q[0], q[1], q[2], q[3]}, {arm[0], arm[1], arm[2]});
+    c.at.push_back({at.x, at.y, at.z});
     const auto k = static_cast<std::size_t>(members[s]);
     p.inverse_mass[k] = 1.0 / c.mass;
     p.inverse_inertia[k] = 1.0 / c.inertia[0];
@@ -119,68 +124,157 @@ Clump MakeClump(const std::vector<int>& members, const Packing& packing, double 
 }
 
 /// Leapfrog kick of one component with local damping, as for spheres (leapfrog.h).
-double Damped(double load, double velocity, double damping) {
-  return load * (load * velocity > 0 ? 1.0 - damping : 1.0 + damping);
+inline double Damped(double load, double velocity, double damping) {
+  const double factor = load * velocity > 0 ? 1.0 - damping : 1.0 + damping;
+  return load * factor;
 }
 
-void AdvanceOne(const Motion& motion, const PeriodicCell& cell, Clump& c, ParticleArrays& p) {
-  Vector force{};
-  Vector torque{};
+/// Bodies side by side: component, then lane. Lanes without a body hold one that rests.
+struct BodyLanes {
+  double mass[kLanes];
+  double inertia[3][kLanes];
+  double centre[3][kLanes];
+  double velocity[3][kLanes];
+  double momentum[3][kLanes];
+  double orientation[4][kLanes];
+  double force[3][kLanes];
+  double torque[3][kLanes];
+  double spin[3][kLanes];  ///< at mid-step
+};
+
+/// A body's part of the lanes. to_lanes: into them, else back.
+void Copy(Clump& c, int lane, bool to_lanes, BodyLanes& b) {
+  const auto copy = [lane, to_lanes](double* values, double(*rows)[kLanes], int count) {
+    for (int a = 0; a < count; ++a) {
+      (to_lanes ? rows[a][lane] : values[a]) = to_lanes ? values[a] : rows[a][lane];
+    }
+  };
+  copy(&c.mass, &b.mass, 1);
+  copy(c.inertia.data(), b.inertia, 3);
+  copy(c.centre.data(), b.centre, 3);
+  copy(c.velocity.data(), b.velocity, 3);
+  copy(c.momentum.data(), b.momentum, 3);
+  copy(c.orientation.data(), b.orientation, 4);
+}
+
+/// Loads of the members, about the centre of mass.
+void TakeLoads(const Clump& c, const ParticleArrays& p, int lane, BodyLanes& b) {
+  Vec force = {0, 0, 0};
+  Vec torque = {0, 0, 0};
+  const int* const members = c.members.data();
+  const Vector* const arms = c.arm.data();
   for (std::size_t s = 0; s < c.members.size(); ++s) {
-    const auto m = static_cast<std::size_t>(c.members[s]);
-    const Vector f = {p.fx[m], p.fy[m], p.fz[m]};
-    const Vector couple = Cross(c.arm[s], f);
-    const Vector own = {p.tx[m], p.ty[m], p.tz[m]};
-    for (std::size_t a = 0; a < 3; ++a) {
-      force[a] += f[a];
-      torque[a] += own[a] + couple[a];
+    const auto m = static_cast<std::size_t>(members[s]);
+    const Vec f = {p.fx[m], p.fy[m], p.fz[m]};
+    const Vec couple = Cross({arms[s][0], arms[s][1], arms[s][2]}, f);
+    force = {force.x + f.x, force.y + f.y, force.z + f.z};
+    torque = {torque.x + (p.tx[m] + couple.x), torque.y + (p.ty[m] + couple.y),
+              torque.z + (p.tz[m] + couple.z)};
+  }
+  const double of[6] = {force.x, force.y, force.z, torque.x, torque.y, torque.z};
+  for (int a = 0; a < 3; ++a) {
+    b.force[a][lane] = of[a];
+    b.torque[a][lane] = of[a + 3];
+  }
+}
+
+CALIB_DEM_CLONES void AdvanceBodies(const Motion& motion, BodyLanes& b) {
+  const double dt = motion.dt;
+  const double damping = motion.damping;
+  const double stretch[3] = {motion.stretch[0], motion.stretch[1], motion.stretch[2]};
+  const double shear = motion.shear;
+  for (int l = 0; l < kLanes; ++l) {
+    const Turned q = {b.orientation[0][l], b.orientation[1][l], b.orientation[2][l],
+                      b.orientation[3][l]};
+    const Vec inertia = {b.inertia[0][l], b.inertia[1][l], b.inertia[2][l]};
+    const Vec before = {b.momentum[0][l], b.momentum[1][l], b.momentum[2][l]};
+    const Vec spin = Spin(q, inertia, before);
+    const Vec damped = {Damped(b.torque[0][l], spin.x, damping),
+                        Damped(b.torque[1][l], spin.y, damping),
+                        Damped(b.torque[2][l], spin.z, damping)};
+    const Vec half = {before.x + 0.5 * dt * damped.x, before.y + 0.5 * dt * damped.y,
+                      before.z + 0.5 * dt * damped.z};  // at the whole step
+    const Vec after = {before.x + dt * damped.x, before.y + dt * damped.y,
+                       before.z + dt * damped.z};
+    const Turned middle = Rotate(q, Spin(q, inertia, half), 0.5 * dt);
+    const Vec turning = Spin(middle, inertia, after);
+    const Turned next = Rotate(q, turning, dt);
+    b.momentum[0][l] = after.x;
+    b.momentum[1][l] = after.y;
+    b.momentum[2][l] = after.z;
+    b.orientation[0][l] = next.w;
+    b.orientation[1][l] = next.x;
+    b.orientation[2][l] = next.y;
+    b.orientation[3][l] = next.z;
+    b.spin[0][l] = turning.x;
+    b.spin[1][l] = turning.y;
+    b.spin[2][l] = turning.z;
+  }
+  for (int a = 0; a < 3; ++a) {
+    for (int l = 0; l < kLanes; ++l) {
+      const double acceleration = b.force[a][l] / b.mass[l];
+      b.velocity[a][l] +=
+          dt * Damped(acceleration, b.velocity[a][l] + 0.5 * dt * acceleration, damping);
     }
   }
-  const double dt = motion.dt;
-  const Vector spin = Spin(c, c.orientation, c.momentum);
-  Vector half{};  // momentum at the whole step
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double acceleration = force[a] / c.mass;
-    c.velocity[a] +=
-        dt * Damped(acceleration, c.velocity[a] + 0.5 * dt * acceleration, motion.damping);
-    const double damped = Damped(torque[a], spin[a], motion.damping);
-    half[a] = c.momentum[a] + 0.5 * dt * damped;
-    c.momentum[a] += dt * damped;
+  double flow[3][kLanes];
+  for (int l = 0; l < kLanes; ++l) {
+    flow[0][l] = stretch[0] * b.centre[0][l] + shear * b.centre[2][l];
+    flow[1][l] = stretch[1] * b.centre[1][l];
+    flow[2][l] = stretch[2] * b.centre[2][l];
   }
-  const Quaternion middle = Rotate(c.orientation, Spin(c, c.orientation, half), 0.5 * dt);
-  const Vector turning = Spin(c, middle, c.momentum);
-  c.orientation = Rotate(c.orientation, turning, dt);
+  for (int a = 0; a < 3; ++a) {
+    for (int l = 0; l < kLanes; ++l) {
+      b.centre[a][l] += dt * (b.velocity[a][l] + flow[a][l]);
+    }
+  }
+}
 
-  const Vector flow = {motion.stretch[0] * c.centre[0] + motion.shear * c.centre[2],
-                       motion.stretch[1] * c.centre[1], motion.stretch[2] * c.centre[2]};
-  for (std::size_t a = 0; a < 3; ++a) {
-    c.centre[a] += dt * (c.velocity[a] + flow[a]);
-  }
-  const double inverse_dt = dt > 0 ? 1.0 / dt : 0.0;
+/// Places members and gives them velocities; the body's loads stand at the first.
+void PlaceMembers(const Motion& motion, const PeriodicCell& cell, const BodyLanes& b, int lane,
+                  Clump& c, ParticleArrays& p) {
+  const Turned q = {b.orientation[0][lane], b.orientation[1][lane], b.orientation[2][lane],
+                    b.orientation[3][lane]};
+  const double inverse_dt = motion.dt > 0 ? 1.0 / motion.dt : 0.0;
+  const double tilt = cell.Tilt();
+  const int* const members = c.members.data();
+  const Vector* const at = c.at.data();
+  const std::array<int, 3>* const images = c.image.data();
+  Vector* const arms = c.arm.data();
   for (std::size_t s = 0; s < c.members.size(); ++s) {
-    const auto m = static_cast<std::size_t>(c.members[s]);
-    const Vector before = c.arm[s];
-    const Vector arm = Turn(c.orientation, c.at[s]);
-    c.arm[s] = arm;
-    const std::array<int, 3>& image = c.image[s];
-    p.x[m] = c.centre[0] + arm[0] + image[0] * cell.length[0] + image[2] * cell.Tilt();
-    p.y[m] = c.centre[1] + arm[1] + image[1] * cell.length[1];
-    p.z[m] = c.centre[2] + arm[2] + image[2] * cell.length[2];
+    const auto m = static_cast<std::size_t>(members[s]);
+    const Vec before = {arms[s][0], arms[s][1], arms[s][2]};
+    const Vec arm = Turn(q, {at[s][0], at[s][1], at[s][2]});
+    arms[s] = {arm.x, arm.y, arm.z};
+    const std::array<int, 3>& image = images[s];
+    p.x[m] = b.centre[0][lane] + arm.x + image[0] * cell.length[0] + image[2] * tilt;
+    p.y[m] = b.centre[1][lane] + arm.y + image[1] * cell.length[1];
+    p.z[m] = b.centre[2][lane] + arm.z + image[2] * cell.length[2];
     // The cell's flow over the arm is no motion of the body.
-    p.vx[m] = c.velocity[0] + (arm[0] - before[0]) * inverse_dt -
-              (motion.stretch[0] * before[0] + motion.shear * before[2]);
-    p.vy[m] = c.velocity[1] + (arm[1] - before[1]) * inverse_dt - motion.stretch[1] * before[1];
-    p.vz[m] = c.velocity[2] + (arm[2] - before[2]) * inverse_dt - motion.stretch[2] * before[2];
-    p.wx[m] = turning[0];
-    p.wy[m] = turning[1];
-    p.wz[m] = turning[2];
+    p.vx[m] = b.velocity[0][lane] + (arm.x - before.x) * inverse_dt -
+              (motion.stretch[0] * before.x + motion.shear * before.z);
+    p.vy[m] = b.velocity[1][lane] + (arm.y - before.y) * inverse_dt - motion.stretch[1] * before.y;
+    p.vz[m] = b.velocity[2][lane] + (arm.z - before.z) * inverse_dt - motion.stretch[2] * before.z;
+    p.wx[m] = b.spin[0][lane];
+    p.wy[m] = b.spin[1][lane];
+    p.wz[m] = b.spin[2][lane];
     const bool first = s == 0;
-    p.fx[m] = first ? force[0] : 0.0;
-    p.fy[m] = first ? force[1] : 0.0;
-    p.fz[m] = first ? force[2] : 0.0;
-    p.tx[m] = first ? torque[0] : 0.0;
-    p.ty[m] = first ? torque[1] : 0.0;
-    p.tz[m] = first ? torque[2] : 0.0;
+    p.fx[m] = first ? b.force[0][lane] : 0.0;
+    p.fy[m] = first ? b.force[1][lane] : 0.0;
+    p.fz[m] = first ? b.force[2][lane] : 0.0;
+    p.tx[m] = first ? b.torque[0][lane] : 0.0;
+    p.ty[m] = first ? b.torque[1][lane] : 0.0;
+    p.tz[m] = first ? b.torque[2][lane] : 0.0;
+  }
+}
+
+/// Nothing acts on it and it turns to nowhere.
+void FillWithRest(BodyLanes& b) {
+  b = {};
+  for (int l = 0; l < kLanes; ++l) {
+    b.mass[l] = 1;
+    b.inertia[0][l] = b.inertia[1][l] = b.inertia[2][l] = 1;
+    b.orientation[0][l] = 1;
   }
 }
 
@@ -220,8 +314,23 @@ void RigidClumps::Advance(const Motion& motion, const PeriodicCell& cell, int th
   const int count = static_cast<int>(clumps_.size());
   ForEachChunk(ChunkCount(count, kClumpChunk), threads, [&](int chunk) {
     const int end = std::min(count, (chunk + 1) * kClumpChunk);
-    for (int c = chunk * kClumpChunk; c < end; ++c) {
-      AdvanceOne(motion, cell, clumps_[static_cast<std::size_t>(c)], particles);
+    BodyLanes lanes;
+    for (int first = chunk * kClumpChunk; first < end; first += kLanes) {
+      const int bodies = std::min(kLanes, end - first);
+      if (bodies < kLanes) {
+        FillWithRest(lanes);
+      }
+      for (int l = 0; l < bodies; ++l) {
+        Clump& clump = clumps_[static_cast<std::size_t>(first + l)];
+        Copy(clump, l, true, lanes);
+        TakeLoads(clump, particles, l, lanes);
+      }
+      AdvanceBodies(motion, lanes);
+      for (int l = 0; l < bodies; ++l) {
+        Clump& clump = clumps_[static_cast<std::size_t>(first + l)];
+        Copy(clump, l, false, lanes);
+        PlaceMembers(motion, cell, lanes, l, clump, particles);
+      }
     }
   });
 }

@@ -89,12 +89,13 @@ std::vector<TestPlan> PlansFor(const campaign::Campaign& campaign) {
                        std::optional<double> porosity = std::nullopt) {
     const double last = test == "oedometric" ? std::min(strain, kOedometricStrain) : strain;
     const std::string name = fmt::format("next_{}", plans.size() + 1);
-    plans.push_back({.experiment = {.test = test,
-                                    .settings = {{"confining_pressure", pressure}},
-                                    .unloading = unloading},
-                     .name = name,
-                     .file = name + ".csv",
-                     .data = DataText(pattern, Path(last, unloading))});
+    TestPlan& plan = plans.emplace_back();
+    plan.experiment.test = test;
+    plan.experiment.settings["confining_pressure"] = pressure;
+    plan.experiment.unloading = unloading;
+    plan.name = name;
+    plan.file = name + ".csv";
+    plan.data = DataText(pattern, Path(last, unloading));
     if (porosity) plans.back().experiment.settings["porosity"] = *porosity;
   };
   for (const dem::TestInfo& test : dem::Tests()) {

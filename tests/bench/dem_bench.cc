@@ -10,6 +10,7 @@
 #include <string>
 
 #include "dem/dynamics/quasi_static.h"
+#include "dem/simulation/shape_change.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -80,11 +81,7 @@ void Compress(Assembly& assembly, double dt, benchmark::State& state) {
 }
 
 /// Dense at 0.5 MPa, then compressed.
-void ContactUpdates(benchmark::State& state, Law law) {
-  const Model model = BenchModel(law);
-  const int threads = static_cast<int>(state.range(1));
-  Assembly assembly(PackingOf(static_cast<int>(state.range(0))), model.density, ContactModel(model),
-                    threads);
+void SettleAndCompress(Assembly& assembly, benchmark::State& state) {
   const double dt = SettleAt500kPa(assembly, state);
   if (dt == 0) {
     return;
@@ -99,6 +96,25 @@ void ContactUpdates(benchmark::State& state, Law law) {
   state.counters["particle_steps/s"] =
       rate((assembly.steps() - steps) * assembly.particles().size());
   state.counters["contacts"] = static_cast<double>(assembly.contacts());
+}
+
+void ContactUpdates(benchmark::State& state, Law law) {
+  const Model model = BenchModel(law);
+  Assembly assembly(PackingOf(static_cast<int>(state.range(0))), model.density, ContactModel(model),
+                    static_cast<int>(state.range(1)));
+  SettleAndCompress(assembly, state);
+}
+
+/// Rigid bodies of the packing's volume, aspect 1.2, one thread.
+void Clumps(benchmark::State& state) {
+  const Model model = BenchModel(Law::kHertz);
+  const auto packing = Elongate(PackingOf(static_cast<int>(state.range(0))), 1.2, 1, {});
+  if (!packing.ok()) {
+    state.SkipWithError(std::string(packing.status().message()).c_str());
+    return;
+  }
+  Assembly assembly(*packing, model.density, ContactModel(model), 1);
+  SettleAndCompress(assembly, state);
 }
 
 void Arguments(benchmark::internal::Benchmark* bench) {
@@ -163,6 +179,7 @@ BENCHMARK(CostAgainstSize)->Arg(1000)->Arg(5000)->Arg(20'000)->Arg(100'000);
 BENCHMARK_CAPTURE(ContactUpdates, hertz, Law::kHertz)->Apply(Arguments);
 BENCHMARK_CAPTURE(ContactUpdates, hertz_rolling, Law::kHertzRolling)->Apply(Arguments);
 BENCHMARK_CAPTURE(ContactUpdates, linear_moments, Law::kLinearMoments)->Apply(Arguments);
+BENCHMARK(Clumps)->Arg(1000);
 
 }  // namespace
 }  // namespace calib::dem
