@@ -19,8 +19,6 @@ constexpr std::array kPowers{1, 2, 3};
 // Readings that scatter by less than this part of the largest sd, as at the start itself, count as
 // if they scattered by so much.
 constexpr double kNegligible = 1e-3;
-// Of neighbours that are as good as independent.
-constexpr double kFarApart = 1e3;
 
 // The shape of a process that starts with the part `at_start` of its final variance.
 struct Shape {

@@ -20,6 +20,9 @@ struct ScatterMoments {
 /// Of R >= 2 runs (R x n, finite) of one parameter vector on R packings, unbiased (R - 1).
 ScatterMoments MomentsOfReplicates(const Eigen::MatrixXd& runs);
 
+/// Clock between neighbours that are as good as independent, in correlation lengths.
+inline constexpr double kFarApart = 1e3;
+
 /// Scatter of one observable of one experiment, a Gaussian Markov chain along the path:
 /// S_ij = sd_i sd_j exp(-|clock_i - clock_j|).
 struct GroupScatter {

@@ -13,7 +13,6 @@ const v1::Posterior::Scatter* FindScatter(const v1::Posterior& posterior,
 
 inference::GroupScatter GroupScatterOf(const v1::Posterior::Scatter& record,
                                        const Eigen::VectorXd& travelled) {
-  constexpr double kFarApart = 1e3;
   const Eigen::Index n = travelled.size();
   inference::GroupScatter scatter{.sd = Eigen::VectorXd::Zero(n),
                                   .clock = Eigen::VectorXd(n),
@@ -25,8 +24,8 @@ inference::GroupScatter GroupScatterOf(const v1::Posterior::Scatter& record,
     if (reading < record.clock_size()) {
       scatter.clock[i] = record.clock(reading);
     } else {
-      scatter.clock[i] =
-          scatter.length > 0 ? travelled[i] / scatter.length : kFarApart * static_cast<double>(i);
+      scatter.clock[i] = scatter.length > 0 ? travelled[i] / scatter.length
+                                            : inference::kFarApart * static_cast<double>(i);
     }
   }
   return scatter;

@@ -61,6 +61,9 @@ std::string CurvePlot(const ReportData& data, std::size_t e, std::size_t j) {
   }
   const std::vector<double> measured = Scaled(observable.values, unit.factor);
   std::vector<double> shown = measured;
+  for (std::size_t i = 0; ErrorsAreKnown(data.view) && i < sd.size(); ++i) {
+    shown.insert(shown.end(), {measured[i] - sd[i], measured[i] + sd[i]});
+  }
   for (const auto* curve : {&prediction.mean, &prediction.q05, &prediction.q95}) {
     const std::vector<double> scaled = Scaled(*curve, unit.factor);
     shown.insert(shown.end(), scaled.begin(), scaled.end());
