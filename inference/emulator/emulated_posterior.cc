@@ -14,6 +14,7 @@
 #include "inference/filter/weighted_moments.h"
 #include "inference/prior/standard_normal.h"
 #include "inference/sampling/philox.h"
+#include "inference/scatter/moved_draws.h"
 #include "inference/tmcmc/tmcmc.h"
 
 namespace calib::inference {
@@ -175,47 +176,14 @@ void AddScatter(const DataSet& data, const StateEmulator& emulator, EmulatedResu
 void Widen(const JointPrior& priors, const DataSet& data, const EmulatorOptions& options,
            const StateEmulator& emulator, const ScorePrediction& prediction, const Held& held,
            EmulatedResult& result) {
-  const Index n = result.draws.rows();
-  const auto free = static_cast<Index>(held.free.size());
   Eigen::VectorXd sd(static_cast<Index>(data.readings.size()));
   for (Index k = 0; k < sd.size(); ++k) sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
   const Eigen::MatrixXd histories =
       prediction.mean * emulator.components().basis.transpose() * sd.asDiagonal();
-  const Eigen::MatrixXd standard = ToStandard(priors, result.draws)(Eigen::all, held.free);
-  const Eigen::MatrixXd spread =
-      SpreadOfRefits(standard, histories, ErrorCovariance(data), *options.replicates);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(spread);
-  const Eigen::MatrixXd root =
-      parts.eigenvectors() * parts.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
-  constexpr int kAttempts = 100;  // then the draw stays: it lies in a corner of the prior
-  Eigen::VectorXd normal(free);
-  for (Index i = 0; i < n; ++i) {
-    PhiloxStream stream({.seed = options.seed,
-                         .purpose = StreamPurpose::kRefitSpread,
-                         .iteration = 0,
-                         .sample = static_cast<std::uint64_t>(i)});
-    for (int attempt = 0; attempt < kAttempts; ++attempt) {
-      for (double& value : normal) value = stream.Normal();
-      const Eigen::VectorXd moved = standard.row(i).transpose() + root * normal;
-      Eigen::VectorXd point = result.draws.row(i);
-      for (Index k = 0; k < free; ++k) {
-        const auto j = static_cast<std::size_t>(held.free[static_cast<std::size_t>(k)]);
-        point[held.free[static_cast<std::size_t>(k)]] = priors[j].FromStandard(moved[k]);
-      }
-      if (!priors.InSupport(point)) continue;
-      result.draws.row(i) = point;
-      break;
-    }
-  }
-  const Eigen::MatrixXd after = ToStandard(priors, result.draws)(Eigen::all, held.free);
-  for (Index k = 0; k < free; ++k) {
-    const auto deviation = [k](const Eigen::MatrixXd& points) {
-      return (points.col(k).array() - points.col(k).mean()).matrix().norm();
-    };
-    if (deviation(standard) > 0) {
-      result.widened = std::max(result.widened, deviation(after) / deviation(standard));
-    }
-  }
+  MovedDraws moved = MoveByRefits(priors, data, *options.replicates, result.draws, histories,
+                                  held.free, options.seed);
+  result.draws = std::move(moved.draws);
+  result.widened = moved.widened;
 }
 
 // The errors in units of the noise sd, the inferred one with kInferred.

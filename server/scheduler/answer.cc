@@ -5,9 +5,13 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "inference/filter/widened_posterior.h"
 
 namespace calib::scheduler {
 namespace {
+
+/// Of a factor on intervals.
+constexpr double kWorthSaying = 1.1;
 
 constexpr const char* kNothingGiven =
     "No standard deviations, quantiles or held-out judgement are given. ";
@@ -105,6 +109,17 @@ absl::StatusOr<Answer> FindAnswer(const Definition& definition,
   }
   if (!answer.FromWeights()) {
     AskEmulator(definition, iterations, answer);
+  } else if (definition.replicates &&
+             definition.campaign.filter.noise == inference::NoiseMode::kGiven) {
+    const double widened =
+        inference::WidenByRefits(definition.priors, definition.data, *definition.replicates,
+                                 iterations, definition.campaign.filter.seed, answer.weighted);
+    if (widened > kWorthSaying) {
+      answer.warnings.push_back(absl::StrFormat(
+          "Fits to one packing or another differ by more than the errors say: the intervals are "
+          "widened, by a factor of %.1f at most.",
+          widened));
+    }
   }
   return answer;
 }
