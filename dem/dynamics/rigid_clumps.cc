@@ -142,19 +142,28 @@ struct BodyLanes {
   double spin[3][kLanes];  ///< at mid-step
 };
 
-/// A body's part of the lanes. to_lanes: into them, else back.
-void Copy(Clump& c, int lane, bool to_lanes, BodyLanes& b) {
-  const auto copy = [lane, to_lanes](double* values, double(*rows)[kLanes], int count) {
-    for (int a = 0; a < count; ++a) {
-      (to_lanes ? rows[a][lane] : values[a]) = to_lanes ? values[a] : rows[a][lane];
-    }
-  };
-  copy(&c.mass, &b.mass, 1);
-  copy(c.inertia.data(), b.inertia, 3);
-  copy(c.centre.data(), b.centre, 3);
-  copy(c.velocity.data(), b.velocity, 3);
-  copy(c.momentum.data(), b.momentum, 3);
-  copy(c.orientation.data(), b.orientation, 4);
+void Load(const Clump& c, int lane, BodyLanes& b) {
+  b.mass[lane] = c.mass;
+  for (std::size_t a = 0; a < 3; ++a) {
+    b.inertia[a][lane] = c.inertia[a];
+    b.centre[a][lane] = c.centre[a];
+    b.velocity[a][lane] = c.velocity[a];
+    b.momentum[a][lane] = c.momentum[a];
+  }
+  for (std::size_t a = 0; a < 4; ++a) {
+    b.orientation[a][lane] = c.orientation[a];
+  }
+}
+
+void Store(const BodyLanes& b, int lane, Clump& c) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    c.centre[a] = b.centre[a][lane];
+    c.velocity[a] = b.velocity[a][lane];
+    c.momentum[a] = b.momentum[a][lane];
+  }
+  for (std::size_t a = 0; a < 4; ++a) {
+    c.orientation[a] = b.orientation[a][lane];
+  }
 }
 
 /// Loads of the members, about the centre of mass.
@@ -314,7 +323,7 @@ void RigidClumps::Advance(const Motion& motion, const PeriodicCell& cell, int th
   const int count = static_cast<int>(clumps_.size());
   ForEachChunk(ChunkCount(count, kClumpChunk), threads, [&](int chunk) {
     const int end = std::min(count, (chunk + 1) * kClumpChunk);
-    BodyLanes lanes;
+    BodyLanes lanes{};
     for (int first = chunk * kClumpChunk; first < end; first += kLanes) {
       const int bodies = std::min(kLanes, end - first);
       if (bodies < kLanes) {
@@ -322,13 +331,13 @@ void RigidClumps::Advance(const Motion& motion, const PeriodicCell& cell, int th
       }
       for (int l = 0; l < bodies; ++l) {
         Clump& clump = clumps_[static_cast<std::size_t>(first + l)];
-        Copy(clump, l, true, lanes);
+        Load(clump, l, lanes);
         TakeLoads(clump, particles, l, lanes);
       }
       AdvanceBodies(motion, lanes);
       for (int l = 0; l < bodies; ++l) {
         Clump& clump = clumps_[static_cast<std::size_t>(first + l)];
-        Copy(clump, l, false, lanes);
+        Store(lanes, l, clump);
         PlaceMembers(motion, cell, lanes, l, clump, particles);
       }
     }
