@@ -329,16 +329,15 @@ void RigidClumps::Advance(const Motion& motion, const PeriodicCell& cell, int th
       if (bodies < kLanes) {
         FillWithRest(lanes);
       }
+      Clump* const block = clumps_.data() + first;
       for (int l = 0; l < bodies; ++l) {
-        Clump& clump = clumps_[static_cast<std::size_t>(first + l)];
-        Load(clump, l, lanes);
-        TakeLoads(clump, particles, l, lanes);
+        Load(block[l], l, lanes);
+        TakeLoads(block[l], particles, l, lanes);
       }
       AdvanceBodies(motion, lanes);
       for (int l = 0; l < bodies; ++l) {
-        Clump& clump = clumps_[static_cast<std::size_t>(first + l)];
-        Store(lanes, l, clump);
-        PlaceMembers(motion, cell, lanes, l, clump, particles);
+        Store(lanes, l, block[l]);
+        PlaceMembers(motion, cell, lanes, l, block[l], particles);
       }
     }
   });
