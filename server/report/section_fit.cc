@@ -48,6 +48,24 @@ ControlAxis ControlOf(const campaign::Experiment& experiment) {
   return {Scaled(experiment.control, unit.factor), LabelWithUnit(experiment.control_name, unit)};
 }
 
+// Adds the ends of the bars that reach beyond what is shown by more than a plot's margin takes.
+void MakeRoomFor(const std::vector<double>& measured, const std::vector<double>& sd,
+                 std::vector<double>& shown) {
+  constexpr double kMargin = 0.03;  // of the range
+  double low = HUGE_VAL;
+  double high = -HUGE_VAL;
+  for (const double value : shown) {
+    if (!std::isfinite(value)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  const double margin = kMargin * (high - low);
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    if (measured[i] - sd[i] < low - margin) shown.push_back(measured[i] - sd[i]);
+    if (measured[i] + sd[i] > high + margin) shown.push_back(measured[i] + sd[i]);
+  }
+}
+
 std::string CurvePlot(const ReportData& data, std::size_t e, std::size_t j) {
   const campaign::Experiment& experiment = data.view.campaign.experiments[e];
   const campaign::MeasuredObservable& observable = experiment.observables[j];
@@ -61,13 +79,11 @@ std::string CurvePlot(const ReportData& data, std::size_t e, std::size_t j) {
   }
   const std::vector<double> measured = Scaled(observable.values, unit.factor);
   std::vector<double> shown = measured;
-  for (std::size_t i = 0; ErrorsAreKnown(data.view) && i < sd.size(); ++i) {
-    shown.insert(shown.end(), {measured[i] - sd[i], measured[i] + sd[i]});
-  }
   for (const auto* curve : {&prediction.mean, &prediction.q05, &prediction.q95}) {
     const std::vector<double> scaled = Scaled(*curve, unit.factor);
     shown.insert(shown.end(), scaled.begin(), scaled.end());
   }
+  if (ErrorsAreKnown(data.view)) MakeRoomFor(measured, sd, shown);
   Plot plot({.bottom = 24}, Axis::Covering(control.label, control.values),
             Axis::Covering(LabelWithUnit(observable.name, unit), shown, 5));
   plot.HideLabels(true, false);

@@ -61,8 +61,10 @@ double Axis::Fraction(double value) const {
 
 void Axis::PlaceLinearTicks(int wanted, bool tight) {
   const double step = NiceStep(max_ - min_, wanted);
-  const double first = tight ? std::ceil(min_ / step - 1e-9) : std::floor(min_ / step + 1e-9);
-  const double last = tight ? std::floor(max_ / step + 1e-9) : std::ceil(max_ / step - 1e-9);
+  // What reaches beyond a tick by less than this is drawn in the margin: no further tick for it.
+  constexpr double kOverhang = 0.03;
+  const double first = tight ? std::ceil(min_ / step - 1e-9) : std::floor(min_ / step + kOverhang);
+  const double last = tight ? std::floor(max_ / step + 1e-9) : std::ceil(max_ / step - kOverhang);
   for (double k = first; k <= last; ++k) {
     const double value = k * step;
     ticks_.push_back({value, TickLabel(std::abs(value) < 1e-9 * step ? 0 : value)});
