@@ -13,6 +13,7 @@ namespace {
 using Eigen::Index;
 
 constexpr Index kDraws = 2000;
+constexpr double kRounding = 1e-9;  // of a factor
 
 // Rows of the iterations, each as often as its weight asks for: the draws at (i + 1/2) / kDraws of
 // the summed weight.
@@ -55,7 +56,7 @@ double WidenByRefits(const JointPrior& priors, const DataSet& data, const Replic
   const Draws draws = EquallyWeighted(iterations, posterior.log_weights);
   const MovedDraws moved =
       MoveByRefits(priors, data, replicates, draws.parameters, draws.histories, free, seed);
-  if (!(moved.widened > 1)) return 1;
+  if (!(moved.widened > 1 + kRounding)) return 1;
   const Index n = moved.draws.rows();
   const Eigen::VectorXd equal = Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
   for (const Index j : free) {

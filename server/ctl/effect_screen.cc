@@ -69,9 +69,8 @@ std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
     moving = moving || !ReadAtRest(e);
   }
   if (effect.needs_motion && !moving) {
-    return "all readings are taken at rest: it shows in tests with a loading_rate, in collisions "
-           "and "
-           "in flows";
+    return "all readings are taken at rest: "
+           "it shows in tests with a loading_rate, in collisions and in flows";
   }
   if (!excited) return "none of the fitted tests can show it";
   if (effect.across_pressures && pressures.size() < 2) {

@@ -40,8 +40,8 @@ bool Verdict::Explains(const CandidateEffect& candidate) const {
            *fit->left_out_error > *diagnosis_.left_out_error);
 }
 
-// What the screen promised clearly less of than of the best, and what is still far off where the
-// best was after as many batches, or one more.
+// Explains clearly less than the best does, and is far off from where the best was after as many
+// batches, or one more.
 bool Verdict::IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const {
   const WarmFit& fit = *Find(other.effect);
   const WarmFit& best = *Find(first.effect);

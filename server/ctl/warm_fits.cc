@@ -126,7 +126,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
       fit.stalled = true;
       fit.iterations = 1;
       fit.rms = std::numeric_limits<double>::infinity();
-      fit.chi2_after.push_back(fit.rms);
+      fit.chi2_after.push_back(std::numeric_limits<double>::infinity());
       return absl::OkStatus();
     }
     if (!view.ok()) return view.status();
@@ -151,7 +151,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
   ++fit.iterations;
   if (fit.runs.histories.rows() == 0) {
     fit.rms = std::numeric_limits<double>::infinity();
-    fit.chi2_after.push_back(fit.rms);
+    fit.chi2_after.push_back(std::numeric_limits<double>::infinity());
     return absl::OkStatus();
   }
   Judge(effect);

@@ -37,6 +37,8 @@ bool ErrorsAreKnown(const CampaignView& view) {
   return view.campaign.filter.noise != inference::NoiseMode::kEssTarget;
 }
 
+constexpr int kTicks = 5;  // wanted along a curve's values
+
 struct ControlAxis {
   std::vector<double> values;  // as shown
   std::string label;
@@ -48,21 +50,16 @@ ControlAxis ControlOf(const campaign::Experiment& experiment) {
   return {Scaled(experiment.control, unit.factor), LabelWithUnit(experiment.control_name, unit)};
 }
 
-// Adds the ends of the bars that reach beyond what is shown by more than a plot's margin takes.
+// Adds the ends of the bars that reach beyond the axis of what is shown by more than a plot's
+// margin takes.
 void MakeRoomFor(const std::vector<double>& measured, const std::vector<double>& sd,
                  std::vector<double>& shown) {
-  constexpr double kMargin = 0.03;  // of the range
-  double low = HUGE_VAL;
-  double high = -HUGE_VAL;
-  for (const double value : shown) {
-    if (!std::isfinite(value)) continue;
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-  const double margin = kMargin * (high - low);
+  constexpr double kMargin = 0.03;  // of the axis
+  const Axis axis = Axis::Covering("", shown, kTicks);
+  const double margin = kMargin * (axis.max() - axis.min());
   for (std::size_t i = 0; i < measured.size(); ++i) {
-    if (measured[i] - sd[i] < low - margin) shown.push_back(measured[i] - sd[i]);
-    if (measured[i] + sd[i] > high + margin) shown.push_back(measured[i] + sd[i]);
+    if (measured[i] - sd[i] < axis.min() - margin) shown.push_back(measured[i] - sd[i]);
+    if (measured[i] + sd[i] > axis.max() + margin) shown.push_back(measured[i] + sd[i]);
   }
 }
 
@@ -85,7 +82,7 @@ std::string CurvePlot(const ReportData& data, std::size_t e, std::size_t j) {
   }
   if (ErrorsAreKnown(data.view)) MakeRoomFor(measured, sd, shown);
   Plot plot({.bottom = 24}, Axis::Covering(control.label, control.values),
-            Axis::Covering(LabelWithUnit(observable.name, unit), shown, 5));
+            Axis::Covering(LabelWithUnit(observable.name, unit), shown, kTicks));
   plot.HideLabels(true, false);
   const std::string css = held ? " held" : "";
   plot.AddBand(control.values, Scaled(prediction.q05, unit.factor),
