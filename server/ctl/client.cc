@@ -19,36 +19,49 @@ namespace {
 constexpr std::chrono::milliseconds kConnect{1800};
 constexpr std::chrono::minutes kLongestStream{10};
 
-/// A server that is slow to answer (a disk that stalls, a machine that sleeps) is asked again, so
-/// that hours of a diagnosis do not end with one late answer. Every call may be made twice: those
-/// that change something carry a request_id.
-constexpr int kAttempts = 10;
+/// A server that is slow to answer (a disk that stalls, a machine that sleeps) or is started again
+/// is asked again, so that hours of a diagnosis do not end with one late answer. Every call may be
+/// made twice: those that change something carry a request_id.
+constexpr int kLateAnswers = 10;
+constexpr int kLostConnections = 2;  // each waits for the next one up to the call's deadline
 
 using Stub = v1::Campaigns::Stub;
 
-absl::Status NoAnswer() {
-  return absl::DeadlineExceededError(absl::StrCat(
-      "the server has not answered for ",
-      std::chrono::duration_cast<std::chrono::minutes>(kAttempts * rpc::kUnaryDeadline).count(),
-      " minutes; what was submitted goes on there, and the same command again goes on from what is "
-      "done"));
+absl::Status NoAnswer(const grpc::Status& last) {
+  const std::string why = last.error_code() == grpc::StatusCode::UNAVAILABLE
+                              ? "the connection to the server was lost"
+                              : "the server has not answered for minutes";
+  return {static_cast<absl::StatusCode>(last.error_code()),
+          absl::StrCat(why, " (", last.error_message(),
+                       "); what was submitted goes on there, and the same command again goes on "
+                       "from what is done")};
 }
 
-// One unary call, asked again when its deadline passes.
+// One unary call, asked again when its deadline passes or the connection is lost.
 template <typename Reply, typename Request>
 absl::StatusOr<Reply> Call(Stub& stub,
                            grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
                                                         Reply*),
                            const Request& request) {
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+  int late = 0;
+  int lost = 0;
+  while (true) {
     grpc::ClientContext context;
+    context.set_wait_for_ready(lost > 0);
     rpc::SetDeadline(context, rpc::kUnaryDeadline);
     Reply reply;
     const grpc::Status status = (stub.*method)(&context, request, &reply);
     if (status.ok()) return reply;
-    if (status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED) return rpc::FromGrpc(status);
+    const bool is_late = status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
+    const bool is_lost = status.error_code() == grpc::StatusCode::UNAVAILABLE;
+    if (!is_late && !is_lost) return rpc::FromGrpc(status);
+    late += is_late ? 1 : 0;
+    lost += is_lost ? 1 : 0;
+    // A connection that was lost and does not come back is late from then on.
+    if (lost > kLostConnections || late >= (lost > 0 ? kLostConnections : kLateAnswers)) {
+      return NoAnswer(status);
+    }
   }
-  return NoAnswer();
 }
 
 // All messages of one stream.
