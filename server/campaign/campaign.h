@@ -182,6 +182,8 @@ struct Campaign {
   int max_iterations = 4;
   std::optional<Table> table;  ///< with kTable
   std::optional<FirstProposal> first_proposal;
+  /// How often the best estimate is run to measure the scatter of packings; empty: as its number.
+  std::optional<int> replicates;
   std::optional<Lineage> lineage;
   std::map<int, Freeze> freeze;  ///< by iteration, from 1
   std::vector<SharedNoise> shared_noise;

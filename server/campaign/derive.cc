@@ -110,6 +110,9 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
   if (derivation.max_iterations) {
     YamlAt(inference, "max_iterations") = YamlScalar(absl::StrCat(*derivation.max_iterations));
   }
+  if (derivation.replicates) {
+    YamlAt(inference, "replicates") = YamlScalar(absl::StrCat(*derivation.replicates));
+  }
   if (!derivation.first_proposal) return;
   YamlNode proposal =
       YamlMap({{"prior_share", YamlNumber(derivation.first_proposal->prior_share)}});

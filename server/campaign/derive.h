@@ -27,6 +27,7 @@ struct Derivation {
   std::vector<YamlNode> experiments{};  ///< in the place of the parent's, if there are any
   std::optional<int> samples{}, max_iterations{};
   std::optional<FirstProposal> first_proposal{};
+  std::optional<int> replicates{};
   /// Makes it a table: parameter values by name, and whose specimen and seed they take.
   struct Row {
     int like = 0;

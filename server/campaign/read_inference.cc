@@ -136,6 +136,7 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
   constexpr std::int64_t kMostSamples = 1'000'000;
   constexpr std::int64_t kMostIterations = 1000;
   constexpr int kFewestChains = 20;
+  constexpr int kMostReplicates = 1000;
   auto map = campaign_map.Map("inference");
   if (map) {
     ReadMethod(*map, campaign);
@@ -145,6 +146,9 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
     campaign.max_iterations = static_cast<int>(
         map->Integer("max_iterations", 1, kMostIterations).value_or(campaign.max_iterations));
     if (IsFilter(campaign.method)) ReadFilterOptions(*map, campaign);
+    if (const auto replicates = map->Integer("replicates", 0, kMostReplicates)) {
+      campaign.replicates = static_cast<int>(*replicates);
+    }
     ReadFreeze(*map, campaign);
     if (campaign.method == Method::kSurrogateMsrs &&
         map->Choice("surrogate", {"cubic_rbf", "gaussian_process"}) == "gaussian_process") {

@@ -126,6 +126,7 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
       .samples = plan.samples,
       .max_iterations = plan.iterations,
       .first_proposal = campaign::FirstProposal{.prior_share = kPriorShare, .places = {}},
+      .replicates = plan.replicates,
       .rows = {}};
   for (const std::string& name : plan.effects) {
     if (const std::string why = WhyNotJoin(parent.campaign, name); !why.empty()) {

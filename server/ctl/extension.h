@@ -27,6 +27,7 @@ struct ExtensionPlan {
   bool held_out = true;             ///< false: held-out experiments stay closed
   std::optional<int> samples{};     ///< as the parent
   std::optional<int> iterations{};  ///< as the parent
+  std::optional<int> replicates{};  ///< as the parent
 };
 
 /// Half of the first samples from the prior, half about the parent's posterior ten times as wide:

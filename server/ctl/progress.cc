@@ -30,6 +30,7 @@ std::string ProgressText(const v1::CampaignStatus& s) {
   text += fmt::format("  {}  {}/{} samples", Bar(s.samples_done(), s.samples()), s.samples_done(),
                       s.samples());
   if (s.samples_running() > 0) text += fmt::format("  {} running", s.samples_running());
+  if (s.samples_resting() > 0) text += fmt::format("  {} resting", s.samples_resting());
   if (s.samples_stopped_early() > 0) {
     text += fmt::format("  {} stopped early", s.samples_stopped_early());
   }

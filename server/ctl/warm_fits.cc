@@ -16,7 +16,6 @@ using Eigen::Index;
 constexpr int kLeastSamples = 6;
 constexpr int kShares = 15;        // batches that the campaign's number of samples pays for
 constexpr double kPatience = 1.5;  // a batch more must bring a fit this much closer
-constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
 constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
 constexpr int kMostIdle = 3;       // batches in a row that were not
 // Of the mean history at the point that a fit is judged by, sd of the readings.
@@ -32,27 +31,27 @@ std::map<std::string, double> PointOf(const report::CampaignView& view,
   return values;
 }
 
-absl::Status WarmFits::Fit(const std::vector<std::string>& effects) {
+absl::Status WarmFits::Fit(std::vector<std::string> effects) {
   if (effects.empty()) return absl::OkStatus();
-  const auto runs = static_cast<int>(base_.runs().sample.size());
-  samples_ = std::max(kLeastSamples, runs / kShares);
+  samples_ = std::max(kLeastSamples, static_cast<int>(base_.runs().sample.size()) / kShares);
+  const auto allowed = static_cast<int>(base_.view().states.size());  // evaluations of the campaign
+  const int batch = samples_ * base_.fitted_experiments();
+  effects.resize(std::min(effects.size(), static_cast<std::size_t>(std::max(1, allowed / batch))));
   int spent = 0;
   for (const std::string& effect : effects) {  // side by side
     const auto text = FirstText(effect);
     if (!text.ok()) return text.status();
     if (auto status = base_.Announce(*text, effect); !status.ok()) return status;
   }
-  for (int batch = 0; batch < kLeastBatches; ++batch) {
-    for (const std::string& effect : effects) {
-      if (auto status = Continue(effect); !status.ok()) return status;
-      spent += samples_;
-    }
+  for (const std::string& effect : effects) {
+    if (auto status = Continue(effect); !status.ok()) return status;
+    spent += batch;
   }
-  while (spent + samples_ <= runs) {
+  while (spent + batch <= allowed) {
     const std::string* next = Next(effects);
     if (next == nullptr) break;
     if (auto status = Continue(*next); !status.ok()) return status;
-    spent += samples_;
+    spent += batch;
   }
   return absl::OkStatus();
 }
@@ -109,7 +108,8 @@ absl::StatusOr<std::string> WarmFits::FirstText(const std::string& effect) const
                                       .purpose = "warm_fit",
                                       .held_out = false,
                                       .samples = samples_,
-                                      .iterations = 1});
+                                      .iterations = 1,
+                                      .replicates = 0});  // it is judged by the scatter of the base
 }
 
 absl::Status WarmFits::Continue(const std::string& effect) {

@@ -30,10 +30,10 @@ class WarmFits {
   WarmFits(const FittedCampaign& base, const EffectScreen& screen, const Response& response)
       : base_(base), screen_(screen), response_(response) {}
 
-  /// Fits all of them and continues, the most promising first, until each has stalled or as many
-  /// samples have been run as the campaign has. Errors: those of the
-  /// runs.
-  absl::Status Fit(const std::vector<std::string>& effects);
+  /// One batch of each, as far as they go; then the most promising go on, until each has stalled
+  /// or as many evaluations have been made as the campaign has (one batch in any case). Errors:
+  /// those of the runs.
+  absl::Status Fit(std::vector<std::string> effects);
 
   /// A fit that needed no runs.
   void Adopt(const std::string& effect, WarmFit fit) {

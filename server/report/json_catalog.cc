@@ -55,6 +55,7 @@ std::string EffectsJson(std::span<const dem::UserEffect> declared) {
                     {"kind", e->kind},
                     {"description", e->description},
                     {"contacts", e->contacts},
+                    {"two_sided", e->two_sided},
                     {"parameters", Parameters(e->parameters)},
                     {"reference", e->reference}});
   }

@@ -38,6 +38,7 @@ Json Status(const v1::CampaignStatus& s) {
           {"samples", s.samples()},
           {"samples_done", s.samples_done()},
           {"samples_running", s.samples_running()},
+          {"samples_resting", s.samples_resting()},
           {"samples_stopped_early", s.samples_stopped_early()},
           {"samples_diverged", s.samples_diverged()},
           {"effective_sample_size", s.effective_sample_size()},

@@ -83,7 +83,8 @@ int ReplicatesOf(const campaign::Campaign& campaign) {
   for (const campaign::Experiment& experiment : campaign.experiments) {
     most = std::max(most, experiment.specimens.size());
   }
-  return most < 2 ? 0 : static_cast<int>(std::min(most, kMostReplicates));
+  if (most < 2) return 0;
+  return campaign.replicates.value_or(static_cast<int>(std::min(most, kMostReplicates)));
 }
 
 double LargestScatterShare(const campaign::Campaign& campaign) {

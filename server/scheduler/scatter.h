@@ -20,9 +20,9 @@ struct ObservableScatter {
   int runs = 0;                   ///< it was found from
 };
 
-/// How many packings the best estimate is to be run on: the most realizations of an experiment, up
-/// to 16; 0 where no experiment has two, where runs are given and where errors are not
-/// (ess_target).
+/// How often the best estimate is to be run: as the campaign says, else once for each of the most
+/// realizations of an experiment, up to 16; 0 where no experiment has two, where runs are given and
+/// where errors are not (ess_target).
 int ReplicatesOf(const campaign::Campaign& campaign);
 
 /// campaign::ScatterShare, the largest of the calibrated experiments.

@@ -21,6 +21,7 @@ namespace {
 struct SampleStatus {
   std::string name = "waiting";
   std::string reason{};
+  bool at_rung = false;  // stopped there, which it may not be for ever
 };
 
 /// Of one sample from its evaluations: what is worst about it, else how far it has come.
@@ -33,7 +34,10 @@ SampleStatus Summarise(const std::vector<const EvaluationRecord*>& evaluations) 
       case EvaluationStatus::kDiverged:
       case EvaluationStatus::kStoppedEarly:
       case EvaluationStatus::kFailed:
-        return {.name = store::ToString(evaluation->status), .reason = evaluation->reason};
+        return {.name = store::ToString(evaluation->status),
+                .reason = evaluation->reason,
+                .at_rung = evaluation->status == EvaluationStatus::kStoppedEarly &&
+                           evaluation->rest_after.has_value()};
       case EvaluationStatus::kRunning:
         begun = true;
         break;
@@ -67,14 +71,19 @@ std::map<int, SampleStatus> StatusBySample(const std::vector<EvaluationRecord>& 
 void CountSamples(const store::CampaignRecord& record,
                   const std::vector<EvaluationRecord>& evaluations, v1::CampaignStatus& status) {
   const int size = record.submitted.samples;
+  // Whether what rests goes on is known when its iteration ends.
+  const bool open = record.progress.phase == "calibrating" &&
+                    (record.progress.state == "running" || record.progress.state == "paused");
   for (const auto& [sample, sample_status] : StatusBySample(evaluations)) {
     if (sample / size != record.progress.iteration) {
       continue;
     }
     const bool diverged = sample_status.name == "diverged";
-    const bool stopped = sample_status.name == "stopped_early";
+    const bool resting = open && sample_status.at_rung;
+    const bool stopped = sample_status.name == "stopped_early" && !resting;
     status.set_samples_diverged(status.samples_diverged() + (diverged ? 1 : 0));
     status.set_samples_stopped_early(status.samples_stopped_early() + (stopped ? 1 : 0));
+    status.set_samples_resting(status.samples_resting() + (resting ? 1 : 0));
     status.set_samples_running(status.samples_running() +
                                (sample_status.name == "running" ? 1 : 0));
     status.set_samples_done(status.samples_done() +

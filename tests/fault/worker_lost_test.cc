@@ -107,7 +107,7 @@ TEST(WorkerLost, KilledWhileItsSamplesRest) {
     return Eventually(kLong, [&, count] {
       const auto status = client.Show("c1");
       return status.ok() &&
-             (status->samples_stopped_early() >= count || status->state() == "finished");
+             (status->samples_resting() >= count || status->state() == "finished");
     });
   };
   // The first worker holds samples that rest and is gone for good; so is the server, for a moment.

@@ -16,7 +16,7 @@ PAIRS = [('rolling_resistance', 'apparatus_compliance'), ('rolling_resistance', 
 @dataclasses.dataclass(frozen=True)
 class Case:
     name: str
-    row: str                    # of the table
+    rows: tuple                 # of the table
     seed: int                   # of packing, parameters and noise
     effects: tuple = ()         # hidden
     parameters: tuple = ()      # (dotted name, SI value) of the hidden effects
@@ -26,26 +26,34 @@ class Case:
     strength: int = 0           # lambda of a single hidden effect
 
 
-def matrix(strengths, repeats, controls):
-    """strengths: {effect: {lambda: {dotted parameter: value}}}, as the laboratory measured them."""
-    cases = [Case(f'control-r{r + 1}', 'no hidden effect', 1000 + r) for r in range(controls)]
+DISTINCT = 25             # degrees to the nearest rival's signature: nearer ones are in a row of their own
+
+
+def matrix(measured, repeats, controls):
+    """measured: what the laboratory found of the strengths (laboratory.py)."""
+    strengths = {effect: {int(k): values for k, (values, *_) in of['strengths'].items()} for effect, of in measured.items()}
+    cases = [Case(f'control-r{r + 1}', ('no hidden effect',), 1000 + r) for r in range(controls)]
     for staging in ('rate', 'step', 'grains'):
-        cases += [Case(f'control-{staging}-r{r + 1}', 'no hidden effect, other staging', 2000 + 100 * len(staging) + r,
+        cases += [Case(f'control-{staging}-r{r + 1}', ('no hidden effect, other staging',), 2000 + 100 * len(staging) + r,
                        staging=staging) for r in range(max(1, repeats))]
     for number, (effect, by_lambda) in enumerate(sorted(strengths.items())):
         for strength in sorted(by_lambda):
-            row = 'measurement-side effect' if effect in MEASUREMENT_SIDE and strength > 10 else f'lambda = {strength}'
-            cases += [Case(f'{effect}-l{strength}-r{r + 1}', row, 10000 + 1000 * number + strength + r, (effect,),
+            rival = measured[effect].get('rival')
+            alike = strength == 60 and rival is not None and rival[0] <= DISTINCT
+            rows = (f'lambda = {strength}' + (', a rival nearby' if alike else ''),)
+            if effect in MEASUREMENT_SIDE and strength > 10:  # to be named, not merely not mistaken
+                rows += ('measurement-side effect',)
+            cases += [Case(f'{effect}-l{strength}-r{r + 1}', rows, 10000 + 1000 * number + strength + r, (effect,),
                            tuple(sorted(by_lambda[strength].items())),
                            verb='improve' if strength == 60 else 'diagnose', strength=strength) for r in range(repeats)]
         if 60 in by_lambda:
-            cases.append(Case(f'removed-{effect}-r1', 'true effect removed', 10000 + 1000 * number + 500, (effect,),
+            cases.append(Case(f'removed-{effect}-r1', ('true effect removed',), 10000 + 1000 * number + 500, (effect,),
                               tuple(sorted(by_lambda[60].items())), removed=effect))
     for number, pair in enumerate(PAIRS):
         if not all(60 in strengths.get(effect, {}) for effect in pair):
             continue
         values = {k: v for effect in pair for k, v in strengths[effect][max(strengths[effect])].items()}
-        cases += [Case(f'{pair[0]}+{pair[1]}-r{r + 1}', 'two effects at once', 40000 + 100 * number + r, pair,
+        cases += [Case(f'{pair[0]}+{pair[1]}-r{r + 1}', ('two effects at once',), 40000 + 100 * number + r, pair,
                        tuple(sorted(values.items())), verb='improve') for r in range(repeats)]
     # Interrupted runs are then a fair sample of the rows rather than the first few of them.
     random.Random(1).shuffle(cases)

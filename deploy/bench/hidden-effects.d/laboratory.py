@@ -139,7 +139,7 @@ parameters:
         sealed = open(os.path.join(self.folder, 'sealed', case.name + '.json')).read()
         if digest(sealed) != open(self.path(case, 'truth.sha256')).read().strip():
             raise Failed(f'{case.name}: the sealed truth has been changed')
-        return {'case': case, 'verdict': verdict, 'truth': json.loads(sealed)}
+        return {'case': case, 'verdict': verdict, 'truth': json.loads(sealed), 'lambda': self.visible_at_truth(case)}
 
     # ---- strengths ----------------------------------------------------------------------------------------------------
     def catalogue(self):
@@ -154,7 +154,7 @@ parameters:
         if os.path.exists(path):
             return
         for seed in range(1, 6):  # a control that is judged adequate says what could have been seen
-            case = cases.Case(f'scale-{seed}', 'scale', seed)
+            case = cases.Case(f'scale-{seed}', ('scale',), seed)
             self.run(case)
             verdict = json.load(open(self.path(case, 'verdict.json')))['diagnose']
             if verdict['verdict'] == 'adequate':
@@ -163,23 +163,53 @@ parameters:
                 return
         raise Failed('none of five measurements without a hidden effect was judged adequate')
 
+    def visibility(self, jobs):
+        import strengths
+        if not hasattr(self, '_visibility'):
+            self._visibility = strengths.Strengths(self, jobs)
+            self._visibility.prepare()
+        return self._visibility
+
     def strengths(self, jobs=0):
-        """{effect: {lambda: {dotted parameter: value}}}; measured once, with jobs > 0, and kept."""
-        import cases, strengths
+        """{effect: {'strengths': {lambda: [values, lambda found, its se]}, 'measured': ..., 'rival': [degrees, effect]}};
+        measured once, with jobs > 0, and kept."""
+        import cases
         path = os.path.join(self.folder, 'strengths.json')
         if not os.path.exists(path):
             if jobs == 0:
                 return {}
             found = json.load(open(os.path.join(self.folder, 'detectable.json')))['detectable']
-            visible = strengths.Strengths(self, jobs)
-            visible.prepare()
-            document = {}
+            visible = self.visibility(jobs)
+            document, signatures = {}, {}
             for effect, values in sorted(found.items()):
                 infos = {f"{effect}.{p['name']}": p for p in self.catalogue()[effect]['parameters']}
                 of_effect, measured = visible.of(effect, values, infos, cases.LAMBDAS)
                 document[effect] = {'strengths': of_effect, 'measured': measured}
-                print(f'{effect}: lambda ' + ', '.join(f'{value:.0f} +- {error:.0f} at {multiple:g}x' for multiple, value, error in measured),
+                print(f'{effect}: lambda ' + ', '.join(f'{value:.0f} +- {error:.0f} at {multiple:.3g}x' for multiple, value, error in measured),
                       file=sys.stderr, flush=True)
+                if of_effect:  # at 60, or the nearest that there is
+                    near = min(of_effect, key=lambda strength: abs(math.log(strength / 60)))
+                    signatures[effect] = visible.signature((effect,), of_effect[near][0])
+            for effect, own in signatures.items():
+                angles = []
+                for other, its in signatures.items():
+                    two_sided = any(self.catalogue()[e]['two_sided'] for e in (effect, other))
+                    degrees = visible.angle(own, its, two_sided) if other != effect else None
+                    if degrees is not None:
+                        angles.append((degrees, other))
+                document[effect]['rival'] = min(angles, default=None)
             self.write(path, json.dumps(document, indent=1))
-        document = json.load(open(path))
-        return {effect: {int(k): v for k, v in of['strengths'].items()} for effect, of in document.items()}
+        return json.load(open(path))
+
+    def visible_at_truth(self, case, jobs=0):
+        """lambda of what is hidden in a case at that case's own parameters, and its standard error; kept beside the
+        sealed truth, which a finished verdict opens."""
+        path = os.path.join(self.folder, 'sealed', case.name + '.lambda.json')
+        if not os.path.exists(path):
+            if jobs == 0:
+                return None
+            truth = self.outcome(case)['truth']
+            base = {name: truth['parameters'][name] for name in ('young_modulus', 'friction_coefficient')}
+            values = {name: value for name, value in truth['parameters'].items() if name not in base}
+            self.write(path, json.dumps(self.visibility(jobs).visible(tuple(truth['effects']), values, base)))
+        return json.load(open(path))

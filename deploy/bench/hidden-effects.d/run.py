@@ -11,6 +11,7 @@ parser.add_argument('--repeats', type=int, default=3, help='of each effect and s
 parser.add_argument('--controls', type=int, default=100, help='measurements without a hidden effect')
 parser.add_argument('--jobs', type=int, default=os.cpu_count(), help='cases at a time, one worker each')
 parser.add_argument('--minutes', type=float, default=720, help='no case is begun after this time')
+parser.add_argument('--visible', action='store_true', help='measures the lambda of finished cases at their own parameters (needs numpy)')
 parser.add_argument('--list', action='store_true', help='names of the cases, nothing is run')
 parser.add_argument('--table', action='store_true', help='table of what has been finished, nothing is run')
 arguments = parser.parse_args()
@@ -38,13 +39,18 @@ def run(case):
     return True
 
 
-if not arguments.table and not arguments.list:
+still = arguments.table or arguments.list or arguments.visible
+if not still:
     lab.measure_detectability()
-matrix = [c for c in cases.matrix(lab.strengths(0 if arguments.table or arguments.list else arguments.jobs), arguments.repeats, arguments.controls) if wanted(c.name)]
+matrix = [c for c in cases.matrix(lab.strengths(0 if still else arguments.jobs), arguments.repeats, arguments.controls) if wanted(c.name)]
 if arguments.list:
     print('\n'.join(c.name for c in matrix))
     sys.exit(0)
-if not arguments.table:
+if arguments.visible:
+    for case in matrix:
+        if lab.finished(case) and case.effects:
+            lab.visible_at_truth(case, arguments.jobs)
+elif not arguments.table:
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         list(pool.map(run, matrix))
 print(judge.table([lab.outcome(c) for c in matrix if lab.finished(c)], len(matrix)))

@@ -12,7 +12,8 @@ import laboratory
 CENTER = {'young_modulus': 0.85e9, 'friction_coefficient': 0.45}
 RANGE = {'young_modulus': 2.2, 'friction_coefficient': 1.8}      # factors either way that the imitation may use
 PAIRS, SCATTER = 4, 16                                           # packings of the differences, of the covariance
-MULTIPLES = (0.5, 1, 2, 4, 8)                                    # of the strength that the diagnosis calls detectable
+UPWARDS, DOWNWARDS = (1, 2, 4, 8), (0.5, 0.25, 0.125, 1 / 16, 1 / 32)   # times what the diagnosis calls detectable
+CORRECTIONS, NEAR = 3, 0.2                                       # of an interpolated strength, until lambda is this near
 FITTED = [name for name, (_, role) in laboratory.PRESSURES.items() if role == 'calibrate']
 
 
@@ -90,22 +91,45 @@ class Strengths:
         return self.np.stack([a, b, a * a, a * b, b * b], axis=1)
 
     # ---- an effect ----------------------------------------------------------------------------------------------------
-    def visible(self, effect, values):
-        """lambda at given parameter values, and its standard error; None where runs diverge."""
-        np = self.np
-        runs = self.histories([(k, CENTER, (effect,), tuple(values.items())) for k in range(PAIRS)])
+    def signature(self, effects, values, base=None):
+        """What the effects change on each packing at base parameters (CENTER), less the nearest imitation: PAIRS x T, in
+        standard deviations of a measurement; None where runs diverge."""
+        np, base = self.np, base or CENTER
+        jobs = [(k, base, effects, tuple(sorted(values.items()))) for k in range(PAIRS)]
+        if base is not CENTER:
+            jobs += [(k, base) for k in range(PAIRS)]
+        runs = self.histories(jobs)
         if any(run is None for run in runs):
             return None
-        differences = (np.array(runs) - self.plain) @ self.whiten.T
-        mean = differences.mean(axis=0)
-        nearest = self.imitations[np.argmin(((self.imitations - mean) ** 2).sum(axis=1))]
-        rest = differences - nearest
-        products = [float(rest[i] @ rest[j]) for i, j in itertools.combinations(range(PAIRS), 2)]
+        plain = self.plain if base is CENTER else np.array(runs[PAIRS:])
+        differences = (np.array(runs[:PAIRS]) - plain) @ self.whiten.T
+        imitations = self.imitations - self.terms(np.array([self.coordinates(base)])) @ self.response
+        nearest = imitations[np.argmin(((imitations - differences.mean(axis=0)) ** 2).sum(axis=1))]
+        return differences - nearest
+
+    @staticmethod
+    def product(a, b):
+        """Mean of the products of signatures of different packings, and its standard error (that of independent pairs)."""
+        products = [float(a[i] @ b[j] + a[j] @ b[i]) / 2 for i, j in itertools.combinations(range(PAIRS), 2)]
         return statistics.mean(products), statistics.stdev(products) / math.sqrt(len(products))
 
+    def visible(self, effects, values, base=None):
+        """lambda and its standard error; None where runs diverge."""
+        signature = self.signature(effects, values, base)
+        return None if signature is None else self.product(signature, signature)
+
+    def angle(self, a, b, two_sided):
+        """Between two signatures, degrees."""
+        lengths = [self.product(x, x)[0] for x in (a, b)]
+        if min(lengths) <= 0:
+            return None
+        cosine = max(-1.0, min(1.0, self.product(a, b)[0] / math.sqrt(lengths[0] * lengths[1])))
+        return math.degrees(math.acos(abs(cosine) if two_sided else cosine))
+
     def of(self, effect, detectable, infos, wanted):
-        """{lambda: values} and what was measured: strengths by interpolation in logarithms; a lambda that no strength
-        within the effect's default prior reaches is left out."""
+        """{lambda: (values, lambda found there, its standard error)} and what was measured on the way: strengths by
+        interpolation in logarithms, measured there and corrected; a lambda that no strength within the effect's default
+        prior reaches is left out."""
         def at(multiple):
             own = {}
             for name, value in detectable.items():
@@ -117,28 +141,50 @@ class Strengths:
                 low, high = limits.get('min'), limits.get('max')
                 own[name] = min(max(moved, -math.inf if low is None else low), math.inf if high is None else high)
             return own
-        measured = []
-        for multiple in MULTIPLES:
-            found = self.visible(effect, at(multiple))
-            if found is None:
+        measured = {}
+        def measure(multiple):
+            found = self.visible((effect,), at(multiple))
+            if found is not None:
+                measured[multiple] = found
+            return found
+        unseen = 0
+        for multiple in UPWARDS:
+            found = measure(multiple)
+            unseen = unseen + 1 if found is not None and found[0] <= 2 * found[1] else 0
+            if found is None or found[0] > max(wanted) or unseen == 2:
                 break
-            measured.append((multiple, *found))
-            if found[0] > 2 * max(wanted) or multiple >= 1 and found[0] <= 2 * found[1]:
-                break  # enough, or nothing to be seen
-        strengths, highest = {}, 0
-        rising = []
-        for multiple, value, error in measured:  # beyond the chance of zero, and rising
-            if value > 2 * error and value > max(highest, 1):
-                rising.append((math.log(multiple), math.log(value)))
-                highest = value
+        for multiple in DOWNWARDS:
+            least = min(value for value, _ in measured.values())
+            if unseen == 2 or least < min(wanted):
+                break
+            found = measure(multiple)
+            if found is None or found[0] > least + 2 * found[1]:  # an effect that does not vanish towards its null
+                measured.pop(multiple, None)
+                break
+        strengths = {}
         for strength in wanted:
-            y = math.log(strength)
-            if not rising or y > rising[-1][1]:
-                continue
-            if y <= rising[0][1]:  # small strengths: the difference is as large as the strength
-                x = rising[0][0] + (y - rising[0][1]) / 2
-            else:
-                (x0, y0), (x1, y1) = next((a, b) for a, b in zip(rising, rising[1:]) if a[1] < y <= b[1])
-                x = x0 + (x1 - x0) * (y - y0) / (y1 - y0)
-            strengths[strength] = at(math.exp(x))
-        return strengths, measured
+            for _ in range(CORRECTIONS):
+                multiple = interpolate(measured, strength)
+                if multiple is None:
+                    break
+                found = measured.get(multiple) or measure(multiple)
+                if found is None:
+                    break
+                strengths[strength] = (at(multiple), *found)
+                if abs(found[0] / strength - 1) < NEAR:
+                    break
+        return strengths, sorted((multiple, *found) for multiple, found in measured.items())
+
+
+def interpolate(measured, strength):
+    """The multiple at which lambda has the strength, in logarithms between points that rise beyond chance; None outside."""
+    rising, highest = [], 1
+    for multiple, (value, error) in sorted(measured.items()):
+        if value > 2 * error and value > highest:
+            rising.append((math.log(multiple), math.log(value)))
+            highest = value
+    y = math.log(strength)
+    for (x0, y0), (x1, y1) in zip(rising, rising[1:]):
+        if y0 <= y <= y1:
+            return math.exp(x0 + (x1 - x0) * (y - y0) / (y1 - y0))
+    return None

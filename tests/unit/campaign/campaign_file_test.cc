@@ -243,11 +243,12 @@ TEST(CampaignFile, ReadsGroupsOfNoise) {
 TEST(CampaignFile, ReadsWhatIsHeldWhen) {
   const Campaign c = Read(Spoiled("max_iterations: 3}",
                                   "max_iterations: 3, freeze: {1: [young_modulus], 2: converged}, "
-                                  "reversed_path: true}"))
+                                  "reversed_path: true, replicates: 5}"))
                          .campaign;
   EXPECT_THAT(c.freeze.at(1).names, ElementsAre("young_modulus"));
   EXPECT_TRUE(c.freeze.at(2).converged);
   EXPECT_TRUE(c.filter.reversed_path);
+  EXPECT_EQ(c.replicates, 5);
 }
 
 TEST(Identity, ChangesWithEverythingSubmitted) {

@@ -34,6 +34,7 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
        .samples = 12,
        .first_proposal = FirstProposal{.prior_share = 0.5,
                                        .places = {{"young_modulus", {.center = 1e9, .sd = 1e7}}}},
+       .replicates = 0,
        .rate_factor = 2});
   ASSERT_TRUE(text.ok()) << text.status();
   EXPECT_EQ(
@@ -46,6 +47,7 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
       "lineage: {parent: c1, purpose: warm_fit}\n"
       "inference:\n"
       "  samples: 12\n"
+      "  replicates: 0\n"
       "  first_proposal: {prior_share: 0.5, young_modulus: {center: 1e+09, sd: 1e+07}}\n"
       "failure: {pause_above: 1}\n")
       << *text;

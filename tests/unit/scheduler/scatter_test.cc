@@ -17,7 +17,8 @@ namespace {
 
 constexpr int kSamples = 60;
 
-testing::SmallCampaign Campaign(int packings, const std::string& extra = "") {
+testing::SmallCampaign Campaign(int packings, const std::string& extra = "",
+                                const std::string& inference = "") {
   return testing::MakeSmallCampaign({.samples = kSamples,
                                      .max_iterations = 2,
                                      .load_steps = 12,
@@ -25,6 +26,7 @@ testing::SmallCampaign Campaign(int packings, const std::string& extra = "") {
                                      .relative_noise = 0.02,
                                      .packings = packings,
                                      .with_validation = true,
+                                     .inference = inference,
                                      .extra = extra});
 }
 
@@ -50,6 +52,24 @@ Ended RunCampaign(const std::string& name, const testing::SmallCampaign& campaig
     if (iteration.posterior.has_value()) run.posterior = *PosteriorFromJson(*iteration.posterior);
   }
   return run;
+}
+
+TEST(Realizations, ReplicatesAreMadeAsOftenAsTheCampaignSays) {
+  const auto replicates_of = [](int replicates) {
+    const std::string number = std::to_string(replicates);
+    const Ended run = RunCampaign("replicates_" + number,
+                                  Campaign(4, "", "  replicates: " + number + "\n"), 0.05);
+    int count = 0;
+    for (const store::IterationRecord& iteration : run.iterations) {
+      if (iteration.proposal != kReplicates) continue;
+      for (const store::SampleRecord& sample : run.samples) {
+        count += sample.iteration == iteration.number ? 1 : 0;
+      }
+    }
+    return count;
+  };
+  EXPECT_EQ(replicates_of(0), 0);
+  EXPECT_EQ(replicates_of(6), 6);
 }
 
 TEST(Realizations, BestEstimateRunsOnEveryPacking) {
