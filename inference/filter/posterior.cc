@@ -23,6 +23,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastEss = 50;
+constexpr double kLeastTempered = 2;
 constexpr double kLargestParetoIndex = 0.7;
 
 PosteriorPath MakePath(const DataSet& data, const Ensemble& ensemble,
@@ -182,8 +183,16 @@ std::vector<std::string> Warnings(const FilterOptions& options, const Ensemble& 
 // Empty where the weights are enough.
 std::string Degeneracy(const FilterOptions& options, const Ensemble& ensemble,
                        const Posterior& posterior) {
+  if (options.noise == NoiseMode::kEssTarget) {  // the weights are what sigma makes of them
+    if (posterior.ess >= kLeastTempered) return "";
+    return absl::StrCat(
+        "Of ", ensemble.log_start.size(),
+        " samples only one counts, however large sigma is taken, so that nothing can be "
+        "said about the parameters' spread: see why the others did not come to their "
+        "ends, or run more.");
+  }
   const bool heavy = posterior.pareto_k > kLargestParetoIndex;
-  if (options.noise == NoiseMode::kEssTarget || (posterior.ess >= kLeastEss && !heavy)) return "";
+  if (posterior.ess >= kLeastEss && !heavy) return "";
   return absl::StrCat(
       "The weighted samples alone do not make a posterior: ", std::floor(posterior.ess * 10) / 10,
       " of ", ensemble.log_start.size(), " are effective and the Pareto index of their weights is ",

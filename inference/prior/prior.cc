@@ -100,6 +100,12 @@ absl::Status Prior::Validate() const {
   return absl::OkStatus();
 }
 
+double Prior::MassBetweenBounds() const {
+  if (!IsNormal(kind)) return 1;
+  const auto [a, b] = NormalBounds(*this);
+  return std::exp(LogNormalMass(a, b));
+}
+
 bool Prior::InSupport(double x) const {
   if (kind == PriorKind::kLogNormal && !(x > 0)) return false;
   return x >= min && x <= max && std::isfinite(x);

@@ -24,6 +24,9 @@ struct Prior {
   /// INVALID_ARGUMENT with one sentence: min >= max, log prior with min <= 0, sd <= 0, no mass
   /// between the bounds.
   absl::Status Validate() const;
+  /// Share of the untruncated prior that lies between the bounds, [0, 1]; 1 for kinds that are
+  /// their bounds.
+  double MassBetweenBounds() const;
   bool InSupport(double x) const;
   /// Natural log of the density; -inf outside the support.
   double LogDensity(double x) const;

@@ -142,11 +142,17 @@ absl::Status TmcmcOptions::Validate() const {
   };
   if (samples < 20 || samples > 1000000) return wrong("samples", samples, "20 to 1e6");
   if (!(target_cv > 0 && target_cv <= 2)) return wrong("target_cv", target_cv, "above 0 up to 2");
-  if (steps < 1) return wrong("steps", steps, "1 or more");
+  if (steps < 0) return wrong("steps", steps, "0 (as many as the parameters need) or more");
   if (!(acceptance > 0 && acceptance < 1))
     return wrong("acceptance", acceptance, "between 0 and 1");
   if (max_stages < 1) return wrong("max_stages", max_stages, "1 or more");
   return absl::OkStatus();
+}
+
+int StepsPerStage(const TmcmcOptions& options, std::size_t d) {
+  constexpr int kFewest = 10;
+  constexpr int kPerParameter = 3;
+  return options.steps > 0 ? options.steps : std::max(kFewest, kPerParameter * static_cast<int>(d));
 }
 
 double TmcmcState::LogEvidenceStandardError() const {
@@ -213,9 +219,10 @@ absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
     AdaptScale(options, next.accepted - before, next);
   }
   next.evaluated += n;
-  if (next.stages.empty() || next.step == options.steps) {
+  const int steps = StepsPerStage(options, priors.size());
+  if (next.stages.empty() || next.step == steps) {
     if (!next.stages.empty()) {
-      next.stages.back().acceptance = next.accepted / (static_cast<double>(n) * options.steps);
+      next.stages.back().acceptance = next.accepted / (static_cast<double>(n) * steps);
     }
     if (next.exponent == 1) {
       next.proposals.resize(0, next.samples.cols());

@@ -20,14 +20,18 @@ namespace calib::inference {
 struct TmcmcOptions {
   int samples = 1000;  ///< population N, [20, 1e6]
   double target_cv =
-      0.5;         ///< coefficient of variation of a stage's weights, (0, 2]; Ching & Chen take 1
-  int steps = 10;  ///< Metropolis steps per stage, >= 1; Ching & Chen take 1
+      0.5;        ///< coefficient of variation of a stage's weights, (0, 2]; Ching & Chen take 1
+  int steps = 0;  ///< Metropolis steps per stage; 0: StepsPerStage decides; Ching & Chen take 1
   double acceptance =
       0.3;  ///< share of accepted steps that the proposal's scale is steered to, (0, 1)
   int max_stages = 200;  ///< >= 1
   std::uint64_t seed = 0;
   absl::Status Validate() const;
 };
+
+/// options.steps, or where that is 0 three for each of d parameters, at least ten: a random walk
+/// forgets where it came from in a number of steps that grows with d.
+int StepsPerStage(const TmcmcOptions& options, std::size_t d);
 
 /// One finished move from exponent to exponent.
 struct TmcmcStage {

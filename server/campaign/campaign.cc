@@ -33,7 +33,8 @@ int LaterBatch(const Campaign& campaign) {
 int MostBatches(const Campaign& campaign) {
   switch (campaign.method) {
     case Method::kTmcmc:
-      return 1 + campaign.max_iterations * campaign.tmcmc.steps;
+      return 1 + campaign.max_iterations *
+                     inference::StepsPerStage(campaign.tmcmc, campaign.parameters.size());
     case Method::kSurrogateMsrs: {
       const std::int64_t later =
           (static_cast<std::int64_t>(campaign.max_iterations) - 1) * campaign.samples;

@@ -189,6 +189,9 @@ struct Campaign {
   std::vector<SharedNoise> shared_noise;
   inference::FilterOptions filter;
   SurrogateModel surrogate = SurrogateModel::kCubicRbf;
+  /// Of surrogate_msrs: a run ends when its misfit so far exceeds this times the best run's (a half
+  /// and a quarter of it later, inference::TerminationBound); empty: never.
+  std::optional<double> termination = 10;
   inference::TmcmcOptions tmcmc;  ///< steps and target_cv; the rest is set where it is used
   std::optional<EarlyStopping> early_stopping;
   Failure failure;

@@ -79,6 +79,18 @@ void ReadTmcmcOptions(MapReader& map, inference::TmcmcOptions& tmcmc) {
                         .value_or(tmcmc.target_cv);
 }
 
+void ReadTermination(MapReader& map, Campaign& campaign) {
+  constexpr double kLeast = 4;  // a quarter of it, at the end, is the best run's own misfit
+  constexpr double kMost = 1e6;
+  const YamlNode* node = map.Find("termination");
+  if (node == nullptr) return;
+  if (node->kind == YamlNode::Kind::kScalar && node->scalar == "off") {
+    campaign.termination.reset();
+    return;
+  }
+  campaign.termination = map.Quantity("termination", "1", {.min = kLeast, .max = kMost});
+}
+
 void ReadFilterOptions(MapReader& map, Campaign& campaign) {
   inference::FilterOptions& filter = campaign.filter;
   filter.tolerance = map.Quantity("tolerance", "1", kFraction).value_or(filter.tolerance);
@@ -154,6 +166,7 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
         map->Choice("surrogate", {"cubic_rbf", "gaussian_process"}) == "gaussian_process") {
       campaign.surrogate = SurrogateModel::kGaussianProcess;
     }
+    if (campaign.method == Method::kSurrogateMsrs) ReadTermination(*map, campaign);
     if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
     map->Ignore({"rows", "first_proposal"});  // read once the parameters are known
     if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&

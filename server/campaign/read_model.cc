@@ -133,7 +133,9 @@ void HoldToAdmissible(const dem::ParameterInfo& info, const std::string& unit,
   if (low || prior.max > info.max) {
     parameters.Problem(key, absl::StrCat("the prior from ", prior.min, " to ", prior.max,
                                          " leaves what is admissible: ", range.Describe(unit)));
+    return;
   }
+  HoldsMass(prior, key, parameters);
 }
 
 void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign) {

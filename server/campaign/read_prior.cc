@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/suggestion.h"
 
@@ -72,6 +73,21 @@ bool ReadMoments(MapReader& map, const std::string& unit, const std::string& kin
   return true;
 }
 
+}  // namespace
+
+bool HoldsMass(const Prior& prior, const std::string& key, MapReader& map) {
+  constexpr double kLeast = 1e-4;  // as constraints, inference::JointPrior
+  const double mass = prior.MassBetweenBounds();
+  if (mass >= kLeast) return true;
+  map.Problem(key, absl::StrCat("only a share of ", absl::StrFormat("%.2g", mass),
+                                " of this prior lies between ", prior.min, " and ", prior.max,
+                                "; at least ", absl::StrFormat("%g", kLeast),
+                                " is needed: move its mean or the bounds, or widen its sd"));
+  return false;
+}
+
+namespace {
+
 std::optional<Prior> ReadFrom(MapReader& map, const std::string& unit) {
   if (map.Require("prior", "one of " + Listed(Kinds())) == nullptr) {
     map.Ignore({"min", "max", "mean", "sd"});
@@ -95,6 +111,7 @@ std::optional<Prior> ReadFrom(MapReader& map, const std::string& unit) {
     map.Problem("prior", std::string(valid.message()));
     return std::nullopt;
   }
+  if (!HoldsMass(prior, "prior", map)) return std::nullopt;
   return prior;
 }
 

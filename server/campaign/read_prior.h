@@ -9,6 +9,10 @@
 
 namespace calib::campaign {
 
+/// Problem at `key` of `map` when bounds cut off all but 1e-4 of a normal prior: they contradict
+/// it.
+bool HoldsMass(const inference::Prior& prior, const std::string& key, MapReader& map);
+
 /// uniform, log_uniform: min and max. normal: mean, sd, optional min and max. log_normal: mean is
 /// the median in units, sd the standard deviation of ln x (a plain number), optional min and max.
 /// Empty: a problem was added.

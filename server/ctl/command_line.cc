@@ -32,8 +32,8 @@ class Builder {
   }
 
   CLI::App* AddOnCampaign(const std::string& name, int (*verb)(const Arguments&),
-                          const std::string& description) {
-    CLI::App* sub = Add(name, verb, description, name + " c1 --state calib-state");
+                          const std::string& description, const std::string& more = "") {
+    CLI::App* sub = Add(name, verb, description, name + " c1" + more + " --state calib-state");
     sub->add_option("ID", arguments().campaign, "campaign, as shown by `calibctl list`")
         ->required();
     return sub;
@@ -113,7 +113,7 @@ void AddVerbsOnCampaigns(Builder& b) {
                    "as known after this iteration, from 0 [the last complete one]")
       ->check(CLI::NonNegativeNumber);
   b.AddOnCampaign("samples", &Samples, "The ensemble with weights and status");
-  b.AddOnCampaign("states", &States, "The state history of one sample")
+  b.AddOnCampaign("states", &States, "The state history of one sample", " 0")
       ->add_option("SAMPLE", b.arguments().sample, "index, as shown by `calibctl samples`")
       ->required()
       ->check(CLI::NonNegativeNumber);
@@ -130,7 +130,8 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->add_option("--without", b.arguments().effects, "effect that is not to be thought of")
       ->allow_extra_args(false);
   b.AddOnCampaign("extend", &Extend,
-                  "A new campaign: this one joined by effects, started from its posterior")
+                  "A new campaign: this one joined by effects, started from its posterior",
+                  " --effect rolling_resistance")
       ->add_option("--effect", b.arguments().effects, "name, as shown by `calibctl effects`")
       ->required()
       ->allow_extra_args(false);
@@ -144,7 +145,8 @@ void AddVerbsOnCampaigns(Builder& b) {
                    "no calibration is begun after so many model evaluations")
       ->check(CLI::PositiveNumber);
   auto* predict = b.AddOnCampaign(
-      "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance");
+      "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance",
+      " --test other.yaml");
   predict
       ->add_option("--test", b.arguments().test,
                    "YAML: one experiment, or a file with experiments, as in a campaign file")
@@ -155,10 +157,10 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->allow_extra_args(false);
   predict->add_option("--draws", b.arguments().draws, "runs from the posterior [20]")
       ->check(CLI::Range(2, 400));
-  b.AddOnCampaign("report", &Report, "One self-contained HTML file with plots")
+  b.AddOnCampaign("report", &Report, "One self-contained HTML file with plots", " -o c1.html")
       ->add_option("-o,--output", b.arguments().output, "HTML file")
       ->required();
-  b.AddOnCampaign("export", &Export, "CSV and JSON of everything")
+  b.AddOnCampaign("export", &Export, "CSV and JSON of everything", " -o c1")
       ->add_option("-o,--output", b.arguments().output, "folder, created if need be")
       ->required();
   b.AddOnCampaign("pause", &Pause, "Stop handing out work; nothing is lost");

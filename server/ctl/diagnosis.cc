@@ -77,6 +77,13 @@ class Inquiry {
                        " states no size of the errors (noise is inferred or "
                        "tempered), so its model cannot be judged; give the noise"));
     }
+    const std::size_t readings = base_.readings().of_mean.readings.size();
+    const std::size_t parameters = view.campaign.parameters.size();
+    if (readings <= parameters) {
+      return absl::FailedPreconditionError(
+          absl::StrCat(readings, " readings cannot judge a model with ", parameters,
+                       " calibrated parameters: give longer curves or more tests"));
+    }
     if (base_.runs().sample.empty()) {
       return absl::FailedPreconditionError(absl::StrCat("no sample of ", id, " has finished"));
     }

@@ -54,12 +54,11 @@ bool ReadAtRest(const campaign::Experiment& experiment) {
   return test != nullptr && test->needs_packing && !test->poured && !experiment.loading_rate;
 }
 
-// Empty: the tests can show it.
-std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
+std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect) {
   std::set<double> pressures;
   bool excited = false;
   bool moving = false;
-  for (const campaign::Experiment& e : base_.view().campaign.experiments) {
+  for (const campaign::Experiment& e : campaign.experiments) {
     if (e.role != campaign::Role::kCalibrate) continue;
     const auto pressure = e.settings.find("confining_pressure");
     if (pressure != e.settings.end()) pressures.insert(pressure->second);
@@ -76,6 +75,13 @@ std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
   if (effect.across_pressures && pressures.size() < 2) {
     return "it shows only between tests at different pressures";
   }
+  return "";
+}
+
+// Empty: the tests can show it.
+std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
+  const std::string why = WhyNotShown(base_.view().campaign, effect);
+  if (!why.empty()) return why;
   return effect.rays.empty() ? "the catalogue gives no strength to try" : "";
 }
 

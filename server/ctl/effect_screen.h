@@ -16,6 +16,9 @@
 
 namespace calib::ctl {
 
+/// Why the calibrated experiments cannot show an effect, in a clause; empty: they can.
+std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect);
+
 class EffectScreen {
  public:
   explicit EffectScreen(const FittedCampaign& base) : base_(base) {}

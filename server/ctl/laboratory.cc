@@ -24,15 +24,26 @@ bool IsOver(const std::string& state) {
   return state == "finished" || state == "failed" || state == "cancelled";
 }
 
+// About a campaign that is not finished.
+std::string WhatToDo(const v1::CampaignStatus& status) {
+  const std::string& id = status.campaign();
+  if (status.state() == "paused") return absl::StrCat("go on with `calibctl resume ", id, "`");
+  if (status.state() == "failed") {
+    return "its reason says what to change in the campaign file before it is submitted again";
+  }
+  if (status.state() == "cancelled") return "submit it again (with another seed) and let it end";
+  return absl::StrCat("wait for it with `calibctl watch ", id, "`");
+}
+
 }  // namespace
 
 absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& campaign) {
   const auto status = session_.client().Show(campaign);
   if (!status.ok()) return status.status();
   if (status->state() != "finished") {
-    return absl::FailedPreconditionError(
-        absl::StrCat("campaign ", campaign, " is ", status->state(), ", not finished",
-                     status->reason().empty() ? "" : ": " + status->reason()));
+    return absl::FailedPreconditionError(absl::StrCat(
+        "campaign ", campaign, " is ", status->state(), ", not finished",
+        status->reason().empty() ? "" : ": " + status->reason(), "; ", WhatToDo(*status)));
   }
   return LoadView(session_.client(), campaign);
 }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "server/campaign/derive.h"
 #include "server/campaign/yaml_text.h"
 #include "server/ctl/test_plans.h"
@@ -72,6 +73,11 @@ double Distance(const std::vector<Eigen::VectorXd>& a, const std::vector<Eigen::
   }
   return std::sqrt(std::max(0.0, square));
 }
+
+constexpr const char* kSnippetHead =
+    "  # Behind the last entry of `experiments:`. The measured curve goes into the file named in "
+    "`data`,\n"
+    "  # columns named as our observables, SI units unless `units:` says otherwise.\n";
 
 }  // namespace
 
@@ -155,8 +161,9 @@ absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& lab
   YamlNode snippet = entries[finished.front()];
   campaign::YamlAt(campaign::YamlAt(snippet, "data"), "file") =
       campaign::YamlScalar("measurement_to_be_made.csv");
-  next.snippet = campaign::ToYaml(
+  const std::string section = campaign::ToYaml(
       campaign::YamlMap({{"experiments", campaign::YamlList({std::move(snippet)})}}));
+  next.snippet = absl::StrCat(kSnippetHead, section.substr(section.find('\n') + 1));
   return next;
 }
 

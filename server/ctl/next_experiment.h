@@ -24,8 +24,8 @@ struct Rival {
 struct NextExperiment {
   PlannedExperiment best;
   std::vector<std::string> separates;  ///< the rivals
-  std::string
-      snippet;  ///< an entry of `experiments`; the file of the measurement is to be filled in
+  std::string snippet;  ///< an entry of `experiments`, indented, with a comment; the file of the
+                        ///< measurement is to be made
   std::vector<PlannedExperiment> considered;  ///< best first
   std::int64_t evaluations = 0;
   double core_seconds = 0;  ///< of one evaluation, mean over what was tried

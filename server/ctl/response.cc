@@ -142,7 +142,10 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedMod
     add(*refined);
   }
   if (points.rows() == 0) {
-    return absl::FailedPreconditionError("the emulator knows no point of the prior well enough");
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the emulator of the runs of ", base.id(),
+        " knows the model nowhere as well as a judgement needs it (to ", model.most_unknown,
+        " sd of a measurement): run more samples, or see whether the stated errors are too small"));
   }
   Index best = 0;
   histories.rowwise().squaredNorm().minCoeff(&best);

@@ -1,6 +1,8 @@
 #include <iostream>
 
+#include "absl/strings/str_cat.h"
 #include "server/ctl/answer_text.h"
+#include "server/ctl/effect_screen.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/extension.h"
 #include "server/ctl/interrupt.h"
@@ -18,6 +20,14 @@ int Extend(const Arguments& arguments) {
   Laboratory laboratory(**session, arguments);
   const auto parent = laboratory.Finished(arguments.campaign);
   if (!parent.ok()) return Fail(parent.status());
+  for (const std::string& name : arguments.effects) {
+    const dem::EffectInfo* effect = dem::FindEffect(parent->campaign.model.user_effects, name);
+    const std::string why = effect == nullptr ? "" : WhyNotShown(parent->campaign, *effect);
+    if (!why.empty()) {
+      return Fail(absl::InvalidArgumentError(absl::StrCat(
+          name, " cannot be calibrated with the tests of ", arguments.campaign, ": ", why)));
+    }
+  }
   const auto text = ExtensionText(*parent, {.effects = arguments.effects,
                                             .purpose = "extension",
                                             .samples = std::nullopt,

@@ -34,7 +34,7 @@ std::map<std::string, double> PointOf(const report::CampaignView& view,
 absl::Status WarmFits::Fit(std::vector<std::string> effects) {
   if (effects.empty()) return absl::OkStatus();
   samples_ = std::max(kLeastSamples, static_cast<int>(base_.runs().sample.size()) / kShares);
-  const auto allowed = static_cast<int>(base_.view().states.size());  // evaluations of the campaign
+  const int allowed = static_cast<int>(base_.runs().sample.size()) * base_.fitted_experiments();
   const int batch = samples_ * base_.fitted_experiments();
   effects.resize(std::min(effects.size(), static_cast<std::size_t>(std::max(1, allowed / batch))));
   int spent = 0;

@@ -49,6 +49,7 @@ class SurrogateMethod final : public Method {
     options_.max_evaluations = MostEvaluations();
     options_.workers = campaign::LaterBatch(campaign_);
     options_.seed = campaign_.seed;
+    options_.termination = campaign_.termination.value_or(options_.termination);
     if (definition.priors.is_constrained()) {
       options_.admissible = [&definition](const Eigen::VectorXd& u) {
         return definition.priors.MeetsConstraints(FromUnit(definition.priors, u));
@@ -61,7 +62,7 @@ class SurrogateMethod final : public Method {
     if (!state.ok()) {
       return state.status();
     }
-    return MakeBatch(state->design);
+    return MakeBatch(state->design, *state);
   }
 
   absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const override {
@@ -90,7 +91,11 @@ class SurrogateMethod final : public Method {
     const Eigen::MatrixXd& points = *chosen;
     if (points.rows() > 0) {
       outcome.answer.warnings.push_back(outcome.answer.weighted.degeneracy);
-      outcome.next = MakeBatch(points);
+      auto batch = MakeBatch(points, *state);
+      if (!batch.ok()) {
+        return batch.status();
+      }
+      outcome.next = *std::move(batch);
     } else {
       AskEmulator(definition_, history.iterations, outcome.answer);
       outcome.converged = outcome.answer.FromEmulator();
@@ -104,7 +109,10 @@ class SurrogateMethod final : public Method {
     return static_cast<int>(std::min<std::int64_t>(most, std::numeric_limits<int>::max()));
   }
 
-  Batch MakeBatch(const Eigen::MatrixXd& unit) const {
+  /// Points of the state; each may be stopped by what is the best now, however the others of its
+  /// round end, so that the same runs are stopped everywhere.
+  absl::StatusOr<Batch> MakeBatch(const Eigen::MatrixXd& unit,
+                                  const inference::ResponseSurfaceState& state) const {
     Json rows = Json::array();
     Batch batch;
     batch.parameters.resize(unit.rows(), unit.cols());
@@ -115,23 +123,51 @@ class SurrogateMethod final : public Method {
     }
     batch.proposal = Json{{kUnitPoints, rows}}.dump();
     batch.stop_below.assign(static_cast<std::size_t>(unit.rows()), store::kUnknown);
+    // A tempered likelihood has no bound that could be kept.
+    if (!campaign_.termination || campaign_.filter.noise == inference::NoiseMode::kEssTarget) {
+      return batch;
+    }
+    const auto perfect = Perfect();
+    if (!perfect.ok()) {
+      return perfect.status();
+    }
+    const int first =
+        static_cast<int>(state.evaluations.size()) - static_cast<int>(batch.stop_below.size());
+    for (std::size_t i = 0; i < batch.stop_below.size(); ++i) {
+      const double bound =
+          inference::TerminationBound(options_, first + static_cast<int>(i), state);
+      if (std::isfinite(bound)) {
+        batch.stop_below[i] = *perfect - bound * Readings() / 2;
+      }
+    }
     return batch;
   }
 
-  /// Chi-squared per reading of every sample: twice what its log likelihood lacks to that of
-  /// perfect agreement; NaN: diverged.
-  absl::StatusOr<std::vector<Eigen::VectorXd>> Misfits(const History& history) const {
-    const auto readings = static_cast<Eigen::Index>(definition_.data.readings.size());
+  double Readings() const { return static_cast<double>(definition_.data.readings.size()); }
+
+  /// ln likelihood of a run that agrees with every reading.
+  absl::StatusOr<double> Perfect() const {
     const auto perfect = inference::LogLikelihoodBound(
-        definition_.data, campaign_.filter, Eigen::MatrixXd::Constant(1, readings, kNone));
+        definition_.data, campaign_.filter,
+        Eigen::MatrixXd::Constant(1, static_cast<Eigen::Index>(definition_.data.readings.size()),
+                                  kNone));
+    if (!perfect.ok()) {
+      return perfect.status();
+    }
+    return (*perfect)(0);
+  }
+
+  /// Chi-squared per reading of every sample: twice what its log likelihood lacks to that of
+  /// perfect agreement; NaN: diverged or ended early.
+  absl::StatusOr<std::vector<Eigen::VectorXd>> Misfits(const History& history) const {
+    const auto perfect = Perfect();
     auto batches = LogLikelihoodsByBatch(definition_, history);
     if (!perfect.ok() || !batches.ok()) {
       return perfect.ok() ? batches.status() : perfect.status();
     }
     for (Eigen::VectorXd& values : *batches) {
       values = values.unaryExpr([&](double value) {
-        return std::isfinite(value) ? 2 * ((*perfect)(0) - value) / static_cast<double>(readings)
-                                    : kNone;
+        return std::isfinite(value) ? 2 * (*perfect - value) / Readings() : kNone;
       });
     }
     return batches;

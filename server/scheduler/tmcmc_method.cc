@@ -97,8 +97,9 @@ class TmcmcMethod final : public Method {
     if (state.finished()) {
       return absl::StrCat("exponent 1 reached in ", state.stages.size(), " stages");
     }
-    return absl::StrFormat("stage %d, step %d of %d, exponent %.3g", state.stages.size(),
-                           state.step, options_.steps, state.exponent);
+    return absl::StrFormat(
+        "stage %d, step %d of %d, exponent %.3g", state.stages.size(), state.step,
+        inference::StepsPerStage(options_, definition_.priors.size()), state.exponent);
   }
 
   /// Each run weighs as many shares as chains stand on it.

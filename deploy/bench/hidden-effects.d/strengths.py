@@ -5,12 +5,12 @@ the effect and the nearest that the model without it can do. Both are means over
 a percent of strain, so the square of a mean difference is mostly chance: products of the differences of different packings
 are taken, whose mean is lambda without bias.
 """
-import csv, concurrent.futures, itertools, json, math, os, statistics, subprocess
+import csv, concurrent.futures, itertools, json, math, os, statistics, subprocess, sys
 
 import laboratory
 
 CENTER = {'young_modulus': 0.85e9, 'friction_coefficient': 0.45}
-RANGE = {'young_modulus': 2.2, 'friction_coefficient': 1.8}      # factors either way that the imitation may use
+RANGE = {'young_modulus': 2.2, 'friction_coefficient': 1 / 0.45}  # factors either way: friction to the end of its prior
 PAIRS, SCATTER = 4, 16                                           # packings of the differences, of the covariance
 UPWARDS, DOWNWARDS = (1, 2, 4, 8), (0.5, 0.25, 0.125, 1 / 16, 1 / 32)   # times what the diagnosis calls detectable
 CORRECTIONS, NEAR = 3, 0.2                                       # of an interpolated strength, until lambda is this near
@@ -72,7 +72,8 @@ class Strengths:
             correlation = min(max(lag, 0.01), 0.99) ** np.abs(k[:, None] - k[None, :])
             covariance[np.ix_(block, block)] += correlation * sd[:, None] * sd[None, :]
         self.whiten = np.linalg.inv(np.linalg.cholesky(covariance))
-        # What the parameters can imitate: a quadratic in their logarithms through the means over the packings.
+        # What the parameters can imitate: a polynomial in their logarithms, cubic in that of friction, through the means over
+        # the packings.
         grid = [dict(zip(CENTER, (CENTER[n] * RANGE[n] ** (a / 2) for n, a in zip(CENTER, axes))))
                 for axes in itertools.product((-2, -1, 0, 1, 2), repeat=2)]
         runs = self.histories([(k, point) for point in grid for k in range(PAIRS)])
@@ -80,6 +81,11 @@ class Strengths:
         x = np.array([self.coordinates(point) for point in grid])
         change = (means - self.plain.mean(axis=0)) @ self.whiten.T
         self.response = np.linalg.lstsq(self.terms(x), change, rcond=None)[0]
+        fitted = self.terms(x) @ self.response
+        missed = [self.product((runs_of - self.plain) @ self.whiten.T - fit, (runs_of - self.plain) @ self.whiten.T - fit)[0]
+                  for runs_of, fit in zip((np.array(runs[i * PAIRS:(i + 1) * PAIRS]) for i in range(len(grid))), fitted)]
+        print(f'imitation: squared distance of the polynomial from the means at its {len(grid)} points: median '
+              f'{statistics.median(missed):.0f}, largest {max(missed):.0f}', file=sys.stderr, flush=True)
         fine = np.linspace(-1, 1, 81)
         self.imitations = self.terms(np.array(list(itertools.product(fine, fine)))) @ self.response
 
@@ -88,7 +94,7 @@ class Strengths:
 
     def terms(self, x):
         a, b = x[:, 0], x[:, 1]
-        return self.np.stack([a, b, a * a, a * b, b * b], axis=1)
+        return self.np.stack([a, b, a * a, a * b, b * b, a * b * b, b * b * b], axis=1)
 
     # ---- an effect ----------------------------------------------------------------------------------------------------
     def signature(self, effects, values, base=None):

@@ -63,7 +63,7 @@ struct Fit {
   }
 };
 
-Fit FitModel(int model, double speed, int samples) {
+Fit FitModel(int model, double speed, int samples, std::uint64_t seed = 3) {
   const std::vector<Measurement> measurements = ReadTable2();
   const auto uniform = [](double min, double max) {
     return Prior{.kind = PriorKind::kUniform, .min = min, .max = max};
@@ -71,16 +71,17 @@ Fit FitModel(int model, double speed, int samples) {
   std::vector<Prior> priors = {uniform(0.05, 0.2), uniform(0.1, 15), uniform(0.1, 15),
                                uniform(0, 1e-2), uniform(0, 1e-2)};
   if (model == 3) priors.push_back(uniform(0.15, 1.35));
-  auto state = RunTmcmc(priors, {.samples = samples, .seed = 3}, [&](const Eigen::MatrixXd& rows) {
-    Eigen::VectorXd result(rows.rows());
-    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-      const double alpha = model == 1 ? 0.25 : model == 2 ? 0.5 : rows(i, 5);
-      result[i] = LogLikelihoodOfTable2(measurements,
-                                        {rows(i, 0), 1e8 * rows(i, 1), 1e4 * rows(i, 2), alpha},
-                                        speed, {rows(i, 3), rows(i, 4)});
-    }
-    return result;
-  });
+  auto state =
+      RunTmcmc(priors, {.samples = samples, .seed = seed}, [&](const Eigen::MatrixXd& rows) {
+        Eigen::VectorXd result(rows.rows());
+        for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+          const double alpha = model == 1 ? 0.25 : model == 2 ? 0.5 : rows(i, 5);
+          result[i] = LogLikelihoodOfTable2(measurements,
+                                            {rows(i, 0), 1e8 * rows(i, 1), 1e4 * rows(i, 2), alpha},
+                                            speed, {rows(i, 3), rows(i, 4)});
+        }
+        return result;
+      });
   EXPECT_TRUE(state.ok()) << state.status();
   return {.state = *std::move(state)};
 }
@@ -116,12 +117,24 @@ void ExpectTheShapesOfTable4(const std::vector<Fit>& fits) {
 
 TEST(TmcmcRestitution, EvidenceOfModelOne) {
   const auto reference = ReadRestitution("evidence_M1.json").at("results")[0];
+  // Four seeds. What they differ by, 0.3, is twice what each states: the few chains that found the
+  // needle of small errors descend from few draws, and so does the estimate of how few.
+  constexpr int kSeeds = 4;
+  double mean_error = 0;
+  for (std::uint64_t seed = 4; seed < 4 + kSeeds; ++seed) {
+    const TmcmcState state = FitModel(1, 3, 1500, seed).state;
+    const double error = state.log_evidence - reference.at("log_evidence").get<double>();
+    std::cout << "M1, seed " << seed << ": log evidence off by " << error << " +- "
+              << state.LogEvidenceStandardError() << "\n";
+    EXPECT_LE(std::abs(error), 0.6);
+    mean_error += error / kSeeds;
+  }
+  EXPECT_LE(std::abs(mean_error), 0.3);
   const Fit fit = FitModel(1, 3, 1500);
   std::cout << std::setprecision(4) << "M1: log evidence " << fit.state.log_evidence << " +- "
             << fit.state.LogEvidenceStandardError() << ", exact " << reference.at("log_evidence")
             << "; mean mu " << fit.Mean(0) << ", k_t " << fit.Mean(1) << "e8, gamma " << fit.Mean(2)
             << "e4\n";
-  EXPECT_NEAR(fit.state.log_evidence, reference.at("log_evidence").get<double>(), 0.4);
   const std::array<const char*, 3> names = {"mu", "k_t_1e8", "gamma_n_1e4"};
   const std::array<const char*, 3> covs = {"mu", "k_t", "gamma_n"};
   for (std::size_t j = 0; j < 3; ++j) {

@@ -138,6 +138,16 @@ INSTANTIATE_TEST_SUITE_P(
                 "c.yaml:9: parameters.friction_angle: the prior from 0.174533 to 1.65806 leaves "
                 "what is admissible: "
                 "between 0 and 1.5 rad"},
+        Mistake{"PriorCutAway", "{prior: uniform, min: 10 deg, max: 45 deg}",
+                "{prior: normal, mean: 70 deg, sd: 1 deg, max: 45 deg}",
+                "c.yaml:9: parameters.friction_angle.prior: only a share of 3.1e-138 of this prior "
+                "lies between -inf and 0.785398; at least 0.0001 is needed: move its mean or the "
+                "bounds, or widen its sd"},
+        Mistake{"PriorBeyondTheAdmissible", "{prior: uniform, min: 10 deg, max: 45 deg}",
+                "{prior: normal, mean: 100 deg, sd: 1 deg}",
+                "c.yaml:9: parameters.friction_angle: only a share of 3.5e-45 of this prior lies "
+                "between 0 and 1.5; at least 0.0001 is needed: move its mean or the bounds, or "
+                "widen its sd"},
         Mistake{"FixedOutsideAdmissible", "poisson_ratio: 0.2", "poisson_ratio: 0.7",
                 "c.yaml:6: model.fixed.poisson_ratio: '0.7' is outside what is allowed: between 0 "
                 "and 0.5"},

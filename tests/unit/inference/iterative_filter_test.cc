@@ -177,6 +177,15 @@ TEST(ComputePosterior, EffectiveSampleSizeTargetUsesTheLastIterationAndLabelsIts
             absl::StatusCode::kFailedPrecondition);
 }
 
+TEST(ComputePosterior, OneSurvivorIsNoPosteriorHoweverLargeSigmaIsTaken) {
+  const FilterOptions options{.noise = NoiseMode::kEssTarget, .ess_target = 0.3};
+  Iteration iteration = FirstIteration(options, 50);
+  iteration.predictions.topRows(49).setConstant(NAN);
+  const auto posterior = ComputePosterior(Priors(), Data(0), options, std::span(&iteration, 1));
+  ASSERT_TRUE(posterior.ok()) << posterior.status();
+  EXPECT_THAT(posterior->degeneracy, HasSubstr("Of 50 samples only one counts"));
+}
+
 TEST(ComputePosterior, AtBoundWhenTheDataPullOutOfThePrior) {
   const FilterOptions options;
   const Iteration iteration = FirstIteration(options, 500);

@@ -15,14 +15,15 @@ namespace {
 
 using ::testing::HasSubstr;
 
-testing::SmallCampaign Campaign(int samples, int times, double noise,
-                                const std::string& extra = "") {
+testing::SmallCampaign Campaign(int samples, int times, double noise, const std::string& extra = "",
+                                const std::string& inference = "") {
   return testing::MakeSmallCampaign({.samples = samples,
                                      .max_iterations = times,
                                      .load_steps = 12,
                                      .failure_attempts = 100,
                                      .relative_noise = noise,
                                      .method = "surrogate_msrs",
+                                     .inference = inference,
                                      .extra = extra});
 }
 
@@ -48,6 +49,43 @@ TEST(SurrogateCampaign, RoundsOfEightFindABetterFitThanTheDesign) {
   }
   EXPECT_LT(best, first);
   EXPECT_EQ(weight, 1) << "the best run alone";
+}
+
+// What a run that is stopped could still have come to is worse than the best of the round before:
+// it takes no part in the surrogate, and which are stopped does not depend on who answers first.
+TEST(SurrogateCampaign, EndsHopelessRunsEarlyAndFindsAsGoodAFit) {
+  struct Ended {
+    double best = -std::numeric_limits<double>::infinity();  // ln likelihood
+    int stopped = 0;
+    std::vector<double> log_likelihoods{};
+  };
+  const auto run = [](const std::string& name, const std::string& termination, unsigned order) {
+    SimulatedService service(name);
+    service.Submit(Campaign(10, 5, 0.02, "", "  termination: " + termination + "\n"));
+    service.RunToEnd(order, order == 1);
+    Ended ended;
+    ended.stopped =
+        Posterior(service, Value(service.Read().Iterations(1)).size() - 1).stopped_early();
+    for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
+      ended.log_likelihoods.push_back(sample.log_likelihood);
+      if (sample.log_likelihood > ended.best) ended.best = sample.log_likelihood;
+    }
+    return ended;
+  };
+  const Ended all = run("surrogate_all", "off", 1);
+  const Ended some = run("surrogate_some", "4", 1);
+  const Ended again = run("surrogate_again", "4", 2);
+  EXPECT_EQ(all.stopped, 0);
+  EXPECT_GE(some.stopped, 1);
+  EXPECT_LT(some.stopped, 40) << "of the forty after the design";
+  ASSERT_EQ(again.log_likelihoods.size(), some.log_likelihoods.size());
+  for (std::size_t i = 0; i < some.log_likelihoods.size(); ++i) {
+    const double a = some.log_likelihoods[i];
+    const double b = again.log_likelihoods[i];
+    EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << i << ": " << a << " and " << b;
+  }
+  // In sd of the likelihood of a fit at the noise: 12 readings.
+  EXPECT_GT(some.best, all.best - 3 * std::sqrt(12 / 2.0));
 }
 
 TEST(SurrogateCampaign, WithoutAnEmulatorTheBestRunIsGivenAndNoInterval) {

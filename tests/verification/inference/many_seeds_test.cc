@@ -1,6 +1,5 @@
 // Errors over many seeds are as large as stated, no larger and no smaller, where the answer is
-// known. $CALIB_SEEDS sets their number (10 in the suite, 50 for the full check):
-//   CALIB_SEEDS=50 build/dev/bin/inference_many_seeds_test
+// known. $CALIB_SEEDS sets their number.
 
 #include <gtest/gtest.h>
 
@@ -22,11 +21,12 @@
 namespace calib::inference {
 namespace {
 
-constexpr double kAlpha = 1e-3;  // of each check
+constexpr double kAlpha = 1e-3;        // of each check
+constexpr double kMostRefused = 0.05;  // of the seeds
 
 int Seeds() {
   const char* text = std::getenv("CALIB_SEEDS");
-  return text != nullptr ? std::max(2, std::atoi(text)) : 10;
+  return text != nullptr ? std::max(2, std::atoi(text)) : 50;
 }
 
 // Sum of squares of `n` standard normal errors lies below this with probability 1 - alpha.
@@ -41,12 +41,15 @@ struct Found {
   double evidence_se = 0;         // as stated
   std::vector<double> mean_over;  // error of each mean over posterior sd
   std::vector<double> sd_ratio;   // found over exact
+  bool refused = false;           // its method says that this is no posterior
   double independent = 0;         // effective number of draws
 };
 
 // Evidence: normalised errors have mean zero and the stated size. Means: sd / sqrt(n). sd:
-// 1 / sqrt(2 n) of itself.
-void Judge(const std::string& name, const std::vector<Found>& all) {
+// sqrt((kurtosis - 1) / (4 n)) of itself. What a method refuses is not judged, but rare.
+void Judge(const std::string& name, std::vector<Found> all, const Eigen::VectorXd& kurtosis) {
+  const auto refused = std::erase_if(all, [](const Found& one) { return one.refused; });
+  EXPECT_LE(static_cast<double>(refused), kMostRefused * Seeds()) << name;
   const auto seeds = static_cast<int>(all.size());
   double sum = 0;
   double squares = 0;
@@ -66,8 +69,11 @@ void Judge(const std::string& name, const std::vector<Found>& all) {
     double sds = 0;
     for (const Found& one : all) {
       means += std::pow(one.mean_over[j], 2) * one.independent;
-      sds += std::pow(one.sd_ratio[j] - 1, 2) * 2 * one.independent;
+      sds += std::pow(one.sd_ratio[j] - 1, 2) * 4 * one.independent /
+             (kurtosis[static_cast<Eigen::Index>(j)] - 1);
     }
+    std::cout << "  parameter " << j << ": rms error over expected " << std::sqrt(means / seeds)
+              << " of the mean, " << std::sqrt(sds / seeds) << " of the sd\n";
     EXPECT_LE(means, MostSquares(seeds)) << name << ": mean of parameter " << j;
     EXPECT_LE(sds, MostSquares(seeds)) << name << ": sd of parameter " << j;
   }
@@ -75,13 +81,14 @@ void Judge(const std::string& name, const std::vector<Found>& all) {
 
 struct Exact {
   double log_evidence = 0;
-  Eigen::VectorXd mean, sd;
+  Eigen::VectorXd mean, sd, kurtosis;
 };
 
 Exact ExactOf(const LinearModel& model) {
   return {.log_evidence = model.LogEvidence(),
           .mean = model.PosteriorMean(),
-          .sd = model.PosteriorCovariance().diagonal().cwiseSqrt()};
+          .sd = model.PosteriorCovariance().diagonal().cwiseSqrt(),
+          .kurtosis = Eigen::VectorXd::Constant(model.PosteriorMean().size(), 3)};
 }
 
 // Readings y of a model that is a function of one row of parameters.
@@ -113,15 +120,14 @@ Problem Banana() {
             y.col(1) = p.col(1).array() + 0.5 * p.col(0).array().square();
             return y;
           },
-      .exact = {.log_evidence = 0, .mean = Eigen::Vector2d::Zero(), .sd = Eigen::Vector2d::Zero()}};
+      .exact = {}};
   problem.data.readings = {{.load_step = 0, .value = 0.5, .sd = 1},
                            {.load_step = 1, .value = 0.3, .sd = 0.2}};
   constexpr int kCells = 1500;
   constexpr double kHalf = 8;  // four sd of the prior
   const double cell = 2 * kHalf / kCells;
   double mass = 0;
-  Eigen::Vector2d first = Eigen::Vector2d::Zero();
-  Eigen::Vector2d second = Eigen::Vector2d::Zero();
+  Eigen::Matrix<double, 2, 4> moments = Eigen::Matrix<double, 2, 4>::Zero();  // about zero, 1 to 4
   for (int i = 0; i < kCells; ++i) {
     const double a = -kHalf + (i + 0.5) * cell;
     for (int k = 0; k < kCells; ++k) {
@@ -131,13 +137,22 @@ Problem Banana() {
       const double weight = std::exp(-0.5 * squares) * cell * cell /
                             (4 * std::numbers::pi * std::numbers::pi * 4 * 0.2);
       mass += weight;
-      first += weight * Eigen::Vector2d(a, b);
-      second += weight * Eigen::Vector2d(a * a, b * b);
+      Eigen::Vector2d power(1, 1);
+      for (Eigen::Index order = 0; order < 4; ++order) {
+        power = power.cwiseProduct(Eigen::Vector2d(a, b));
+        moments.col(order) += weight * power;
+      }
     }
   }
   problem.exact.log_evidence = std::log(mass);
-  problem.exact.mean = first / mass;
-  problem.exact.sd = (second / mass - problem.exact.mean.cwiseAbs2()).cwiseSqrt();
+  moments /= mass;
+  const Eigen::Array2d m = moments.col(0).array();
+  const Eigen::Array2d variance = moments.col(1).array() - m.square();
+  const Eigen::Array2d fourth = moments.col(3).array() - 4 * m * moments.col(2).array() +
+                                6 * m.square() * moments.col(1).array() - 3 * m.square().square();
+  problem.exact.mean = moments.col(0);
+  problem.exact.sd = variance.sqrt();
+  problem.exact.kurtosis = fourth / variance.square();
   return problem;
 }
 
@@ -146,12 +161,12 @@ Found Filter(const Problem& problem, int iterations, int samples, std::uint64_t 
   const auto runs =
       RunIterations(problem.priors, problem.data, options, iterations, samples, problem.predict);
   const auto posterior = ComputePosterior(problem.priors, problem.data, options, runs);
-  EXPECT_TRUE(posterior.ok() && posterior->degeneracy.empty())
-      << (posterior.ok() ? posterior->degeneracy : posterior.status().ToString());
+  EXPECT_TRUE(posterior.ok()) << posterior.status();
   Found found{.evidence_error = posterior->log_evidence - problem.exact.log_evidence,
               .evidence_se = posterior->log_evidence_se,
               .mean_over = {},
               .sd_ratio = {},
+              .refused = !posterior->degeneracy.empty(),
               .independent = posterior->ess};
   for (std::size_t j = 0; j < problem.priors.size(); ++j) {
     const auto k = static_cast<Eigen::Index>(j);
@@ -162,11 +177,11 @@ Found Filter(const Problem& problem, int iterations, int samples, std::uint64_t 
   return found;
 }
 
-// Draws that share ancestors are not independent: the effective number is that of the moves that
-// the last stage has made, taken as a tenth of the draws.
+// Chains that share an ancestor are not quite independent: half the draws are counted (as found
+// over fifty seeds, all of them on linear models and three fifths on the banana).
 Found Tmcmc(const Problem& problem, int samples, std::uint64_t seed) {
   const auto likelihood = GaussianLikelihood::Create(problem.data, NoiseMode::kGiven);
-  const auto state = RunTmcmc(problem.priors, {.samples = samples, .steps = 15, .seed = seed},
+  const auto state = RunTmcmc(problem.priors, {.samples = samples, .seed = seed},
                               [&](const Eigen::MatrixXd& rows) {
                                 return likelihood->LogLikelihood(problem.predict(rows));
                               });
@@ -175,7 +190,7 @@ Found Tmcmc(const Problem& problem, int samples, std::uint64_t seed) {
               .evidence_se = state->LogEvidenceStandardError(),
               .mean_over = {},
               .sd_ratio = {},
-              .independent = 0.1 * samples};
+              .independent = 0.5 * samples};
   for (Eigen::Index j = 0; j < state->samples.cols(); ++j) {
     const double mean = state->samples.col(j).mean();
     const double sd = std::sqrt((state->samples.col(j).array() - mean).square().mean());
@@ -198,7 +213,7 @@ TEST(ManySeeds, FilterOnLinearGaussianModels) {
       all.push_back(
           Filter(problem, size.iterations, size.samples, static_cast<std::uint64_t>(seed)));
     }
-    Judge("filter, d = " + std::to_string(size.d), all);
+    Judge("filter, d = " + std::to_string(size.d), all, problem.exact.kurtosis);
   }
 }
 
@@ -218,7 +233,7 @@ TEST(ManySeeds, TmcmcOnLinearGaussianModels) {
     for (int seed = 1; seed <= Seeds(); ++seed) {
       all.push_back(Tmcmc(problem, 1000, static_cast<std::uint64_t>(seed)));
     }
-    Judge("tmcmc, d = " + std::to_string(d), all);
+    Judge("tmcmc, d = " + std::to_string(d), all, problem.exact.kurtosis);
   }
 }
 
@@ -230,8 +245,8 @@ TEST(ManySeeds, Banana) {
     filter.push_back(Filter(problem, 4, 600, static_cast<std::uint64_t>(seed)));
     tmcmc.push_back(Tmcmc(problem, 1000, static_cast<std::uint64_t>(seed)));
   }
-  Judge("filter, banana", filter);
-  Judge("tmcmc, banana", tmcmc);
+  Judge("filter, banana", filter, problem.exact.kurtosis);
+  Judge("tmcmc, banana", tmcmc, problem.exact.kurtosis);
 }
 
 }  // namespace
