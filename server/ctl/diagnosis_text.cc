@@ -141,8 +141,12 @@ std::string Sentence(const Diagnosis& d) {
             ? ""
             : fmt::format(" Not excluded, since the refit has not come to an end: {}.", open));
   }
-  return "Unexplained: the model misses the data, and with no known effect does it fit" +
-         (d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
+  const auto refitted = std::count_if(d.candidates.begin(), d.candidates.end(),
+                                      [](const auto& c) { return c.refit_p_value >= 0; });
+  return fmt::format(
+      "Unexplained: the model misses the data, and with none of the {} effects that "
+      "were refitted does it fit{}",
+      refitted, d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
 }
 
 // Of measurements that a right model makes one in a thousand is closer.

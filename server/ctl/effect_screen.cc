@@ -80,7 +80,7 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
 
 // Empty: the tests can show it.
 std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
-  const std::string why = WhyNotShown(base_.view().campaign, effect);
+  std::string why = WhyNotShown(base_.view().campaign, effect);
   if (!why.empty()) return why;
   return effect.rays.empty() ? "the catalogue gives no strength to try" : "";
 }
