@@ -18,7 +18,7 @@
 namespace calib::ctl {
 namespace {
 
-constexpr std::size_t kWarmFits = 6;    // a batch each picks the few to continue
+constexpr std::size_t kWarmFits = 4;    // two batches each pick the few to continue from
 constexpr std::size_t kMostRivals = 3;  // that the next experiment is to separate
 constexpr double kMostUnits = 10;       // of an effect that is calculated on readings
 

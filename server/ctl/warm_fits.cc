@@ -16,6 +16,7 @@ using Eigen::Index;
 constexpr int kLeastSamples = 6;
 constexpr int kShares = 15;        // batches that the campaign's number of samples pays for
 constexpr double kPatience = 1.5;  // a batch more must bring a fit this much closer
+constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
 constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
 constexpr int kMostIdle = 3;       // batches in a row that were not
 // Of the mean history at the point that a fit is judged by, sd of the readings.
@@ -36,16 +37,19 @@ absl::Status WarmFits::Fit(std::vector<std::string> effects) {
   samples_ = std::max(kLeastSamples, static_cast<int>(base_.runs().sample.size()) / kShares);
   const int allowed = static_cast<int>(base_.runs().sample.size()) * base_.fitted_experiments();
   const int batch = samples_ * base_.fitted_experiments();
-  effects.resize(std::min(effects.size(), static_cast<std::size_t>(std::max(1, allowed / batch))));
+  effects.resize(std::min(
+      effects.size(), static_cast<std::size_t>(std::max(1, allowed / (kLeastBatches * batch)))));
   int spent = 0;
   for (const std::string& effect : effects) {  // side by side
     const auto text = FirstText(effect);
     if (!text.ok()) return text.status();
     if (auto status = base_.Announce(*text, effect); !status.ok()) return status;
   }
-  for (const std::string& effect : effects) {
-    if (auto status = Continue(effect); !status.ok()) return status;
-    spent += batch;
+  for (int first = 0; first < kLeastBatches; ++first) {
+    for (const std::string& effect : effects) {
+      if (auto status = Continue(effect); !status.ok()) return status;
+      spent += batch;
+    }
   }
   while (spent + batch <= allowed) {
     const std::string* next = Next(effects);

@@ -30,8 +30,8 @@ class WarmFits {
   WarmFits(const FittedCampaign& base, const EffectScreen& screen, const Response& response)
       : base_(base), screen_(screen), response_(response) {}
 
-  /// One batch of each, as far as they go; then the most promising go on, until each has stalled
-  /// or as many evaluations have been made as the campaign has (one batch in any case). Errors:
+  /// Two batches of each, as far as they go; then the most promising go on, until each has stalled
+  /// or as many evaluations have been made as the campaign has (two batches in any case). Errors:
   /// those of the runs.
   absl::Status Fit(std::vector<std::string> effects);
 
