@@ -106,8 +106,7 @@ TEST(WorkerLost, KilledWhileItsSamplesRest) {
   const auto resting = [&](int count) {
     return Eventually(kLong, [&, count] {
       const auto status = client.Show("c1");
-      return status.ok() &&
-             (status->samples_resting() >= count || status->state() == "finished");
+      return status.ok() && (status->samples_resting() >= count || status->state() == "finished");
     });
   };
   // The first worker holds samples that rest and is gone for good; so is the server, for a moment.
