@@ -186,10 +186,9 @@ std::string Degeneracy(const FilterOptions& options, const Ensemble& ensemble,
   if (options.noise == NoiseMode::kEssTarget) {  // the weights are what sigma makes of them
     if (posterior.ess >= kLeastTempered) return "";
     return absl::StrCat(
-        "Of ", ensemble.log_start.size(),
-        " samples only one counts, however large sigma is taken, so that nothing can be "
-        "said about the parameters' spread: see why the others did not come to their "
-        "ends, or run more.");
+        "Only ", std::floor(posterior.ess * 10) / 10, " of ", ensemble.log_start.size(),
+        " samples are effective, so that nothing can be said about the parameters' spread: see why "
+        "others did not come to their ends, run more samples, or raise ess_target.");
   }
   const bool heavy = posterior.pareto_k > kLargestParetoIndex;
   if (posterior.ess >= kLeastEss && !heavy) return "";

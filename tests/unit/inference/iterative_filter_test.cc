@@ -183,7 +183,7 @@ TEST(ComputePosterior, OneSurvivorIsNoPosteriorHoweverLargeSigmaIsTaken) {
   iteration.predictions.topRows(49).setConstant(NAN);
   const auto posterior = ComputePosterior(Priors(), Data(0), options, std::span(&iteration, 1));
   ASSERT_TRUE(posterior.ok()) << posterior.status();
-  EXPECT_THAT(posterior->degeneracy, HasSubstr("Of 50 samples only one counts"));
+  EXPECT_THAT(posterior->degeneracy, HasSubstr("Only 1 of 50 samples are effective"));
 }
 
 TEST(ComputePosterior, AtBoundWhenTheDataPullOutOfThePrior) {
