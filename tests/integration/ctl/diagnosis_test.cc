@@ -70,6 +70,11 @@ TEST_F(Diagnosis, ExtendsAndRefusesInASentence) {
   EXPECT_EQ(unknown.code, 2);
   EXPECT_NE(unknown.err.find("there is no effect magic"), std::string::npos) << unknown.err;
   EXPECT_NE(Call("diagnose c9 --state s").code, 0);
+  const auto evaluations = Evaluations();
+  const Answer walls = Call("extend c1 --effect wall_friction --state s");
+  EXPECT_EQ(walls.code, 2);
+  EXPECT_NE(walls.err.find("none of the fitted tests can show it"), std::string::npos) << walls.err;
+  EXPECT_EQ(Evaluations(), evaluations);
   const Answer extended =
       Call("extend c1 --effect rolling_resistance --state s --workers 2 --json");
   ASSERT_EQ(extended.code, 0) << extended.err;
@@ -79,6 +84,17 @@ TEST_F(Diagnosis, ExtendsAndRefusesInASentence) {
   EXPECT_EQ(again.out, extended.out);
   const Answer twice = Call("extend c2 --effect rolling_resistance --state s");
   EXPECT_NE(twice.code, 0);
+}
+
+// No verdict without support: two readings for two parameters.
+TEST_F(Diagnosis, SaysWhatCannotBeJudged) {
+  Write("data.csv", "axial_strain,q_over_p,volumetric_strain\n0.005,0.8,0.0012\n");
+  ASSERT_EQ(Call("run small.yaml --state few --workers 2 --json").code, 0) << Read("err");
+  const Answer few = Call("diagnose c1 --state few --workers 2");
+  EXPECT_EQ(few.code, 1);
+  EXPECT_NE(few.err.find("2 readings cannot judge a model with 2 calibrated parameters"),
+            std::string::npos)
+      << few.err;
 }
 
 }  // namespace
