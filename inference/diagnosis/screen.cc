@@ -9,69 +9,13 @@
 #include <numeric>
 #include <set>
 
+#include "inference/diagnosis/whitened.h"
 #include "inference/sampling/philox.h"
 
 namespace calib::inference {
 namespace {
 
 using Eigen::Index;
-
-constexpr Index kFewestDraws = 50;
-
-// The model in coordinates in which a measurement scatters as a standard normal.
-struct Whitened {
-  Eigen::LLT<Eigen::MatrixXd> factor;
-  Eigen::MatrixXd points;   // T x G
-  Eigen::VectorXd squares;  // G
-  Eigen::MatrixXd draws;    // T x S, S may be 0
-};
-
-absl::StatusOr<Whitened> Whiten(const FittedModel& model) {
-  const Index t = model.histories.cols();
-  if (model.histories.rows() < 1 || t < 1 || model.covariance.rows() != t ||
-      model.covariance.cols() != t || !model.histories.allFinite()) {
-    return absl::InvalidArgumentError("diagnosis: histories and covariance do not fit together");
-  }
-  if (model.draws.rows() > 0 &&
-      (model.draws.rows() < kFewestDraws || model.draws.cols() != t || !model.draws.allFinite())) {
-    return absl::InvalidArgumentError(
-        "diagnosis: draws of a measurement are too few or do not fit the histories");
-  }
-  Whitened whitened{.factor = Eigen::LLT<Eigen::MatrixXd>(model.covariance),
-                    .points = {},
-                    .squares = {},
-                    .draws = {}};
-  if (whitened.factor.info() != Eigen::Success) {
-    return absl::InvalidArgumentError("diagnosis: the covariance is not positive definite");
-  }
-  whitened.points = whitened.factor.matrixL().solve(model.histories.transpose());
-  whitened.squares = whitened.points.colwise().squaredNorm();
-  if (model.draws.rows() > 0) {
-    whitened.draws = whitened.factor.matrixL().solve(model.draws.transpose());
-  }
-  return whitened;
-}
-
-// |point + offset|^2 of every point.
-Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& offset) {
-  return (whitened.squares + 2 * (whitened.points.transpose() * offset)).array() +
-         offset.squaredNorm();
-}
-
-// Smallest |point + offset|^2 for each column of offsets, T x S.
-Eigen::VectorXd SmallestFrom(const Whitened& whitened, const Eigen::MatrixXd& offsets) {
-  constexpr Index kAtOnce = 32;  // the products stay in the cache
-  Eigen::VectorXd smallest(offsets.cols());
-  for (Index s = 0; s < offsets.cols(); s += kAtOnce) {
-    const auto some = offsets.middleCols(s, std::min(kAtOnce, offsets.cols() - s));
-    const Eigen::MatrixXd along = whitened.points.transpose() * some;
-    for (Index k = 0; k < some.cols(); ++k) {
-      smallest[s + k] =
-          (whitened.squares + 2 * along.col(k)).minCoeff() + some.col(k).squaredNorm();
-    }
-  }
-  return smallest;
-}
 
 // A difference seen from every point.
 struct Direction {
@@ -83,6 +27,38 @@ struct Direction {
 double Amplitude(double slope, double square, bool two_sided, double limit) {
   if (!(square > 0)) return 0;
   return std::clamp(-slope / square, two_sided ? -limit : 0.0, limit);
+}
+
+std::vector<std::vector<Direction>> DirectionsOf(const std::vector<Signature>& candidates,
+                                                 const Whitened& model) {
+  std::vector<std::vector<Direction>> directions;
+  for (const Signature& candidate : candidates) {
+    std::vector<Direction>& own = directions.emplace_back();
+    for (const Eigen::VectorXd& difference : candidate.differences) {
+      Direction direction{
+          .whitened = model.factor.matrixL().solve(difference), .square = 0, .along = {}};
+      direction.square = direction.whitened.squaredNorm();
+      direction.along = model.points.transpose() * direction.whitened;
+      own.push_back(std::move(direction));
+    }
+  }
+  return directions;
+}
+
+// Variance of the draws along a direction that has unit length in `model`'s coordinates, were
+// each group's as large as `model`'s.
+double VarianceAlong(const Eigen::VectorXd& direction, const Whitened& model,
+                     const std::vector<DrawnGroup>& groups) {
+  if (groups.empty() || direction.isZero()) return 1;
+  const Eigen::VectorXd unwhitened = model.factor.matrixL() * direction;
+  double sum = 0;
+  double count = 0;
+  for (const DrawnGroup& group : groups) {
+    const Eigen::VectorXd own = group.model.factor.matrixL().solve(unwhitened);
+    sum += (own.transpose() * group.draws).squaredNorm() / own.squaredNorm();
+    count += static_cast<double>(group.draws.cols());
+  }
+  return sum / count;
 }
 
 struct Fit {
@@ -165,9 +141,14 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
                            : 1;
     return adequacy;
   }
+  const auto groups = DrawsOf(model);
+  if (!groups.ok()) return groups.status();
   const Index draws = model.draws.rows();
-  const Eigen::VectorXd chi2 =
-      SmallestFrom(*whitened, whitened->draws.colwise() - whitened->points.col(adequacy.best));
+  Eigen::VectorXd chi2(draws);
+  for (const DrawnGroup& group : *groups) {
+    chi2(group.number) =
+        SmallestFrom(group.model, group.draws.colwise() - group.model.points.col(adequacy.best));
+  }
   adequacy.degrees = chi2.mean();
   const double variance =
       (chi2.array() - adequacy.degrees).square().sum() / static_cast<double>(draws - 1);
@@ -183,42 +164,44 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   const auto whitened = Whiten(model);
   if (!whitened.ok()) return whitened.status();
   const auto adequacy = TestAdequacy(model);
+  if (!adequacy.ok()) return adequacy.status();
+  const auto groups = DrawsOf(model);
+  if (!groups.ok()) return groups.status();
   const Index t = model.histories.cols();
-  std::vector<std::vector<Direction>> directions;
   for (const Signature& candidate : candidates) {
-    std::vector<Direction>& own = directions.emplace_back();
     for (const Eigen::VectorXd& difference : candidate.differences) {
       if (difference.size() != t || !difference.allFinite()) {
         return absl::InvalidArgumentError("diagnosis: a signature does not fit the histories");
       }
-      Direction direction{
-          .whitened = whitened->factor.matrixL().solve(difference), .square = 0, .along = {}};
-      direction.square = direction.whitened.squaredNorm();
-      direction.along = whitened->points.transpose() * direction.whitened;
-      own.push_back(std::move(direction));
     }
   }
+  const std::vector<std::vector<Direction>> directions = DirectionsOf(candidates, *whitened);
   // Measurements of the fitted model itself.
   const Eigen::VectorXd fitted = whitened->points.col(adequacy->best);
   std::vector<std::vector<double>> simulated(candidates.size());
-  Eigen::VectorXd offset(t);
-  for (int s = 0; s < options.simulations; ++s) {
+  const auto simulate = [&](const Whitened& own, const std::vector<std::vector<Direction>>& along,
+                            const Eigen::VectorXd& drawn) {
+    const Eigen::VectorXd offset = drawn - own.points.col(adequacy->best);
+    const Eigen::VectorXd distances = DistancesFrom(own, offset);
+    const double base = distances.minCoeff();
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      simulated[c].push_back(base - BestFit(along[c], distances, &offset, candidates[c].two_sided,
+                                            options.max_amplitude)
+                                        .chi2);
+    }
+  };
+  for (const DrawnGroup& group : *groups) {
+    const std::vector<std::vector<Direction>> along = DirectionsOf(candidates, group.model);
+    for (Index k = 0; k < group.draws.cols(); ++k) simulate(group.model, along, group.draws.col(k));
+  }
+  for (int s = 0; groups->empty() && s < options.simulations; ++s) {
     PhiloxStream stream({.seed = options.seed,
                          .purpose = StreamPurpose::kDiagnosisNull,
                          .iteration = 0,
                          .sample = static_cast<std::uint64_t>(s)});
-    if (model.draws.rows() > 0) {
-      offset = whitened->draws.col(s % model.draws.rows()) - fitted;
-    } else {
-      for (Index k = 0; k < t; ++k) offset[k] = stream.Normal() - fitted[k];
-    }
-    const Eigen::VectorXd distances = DistancesFrom(*whitened, offset);
-    const double base = distances.minCoeff();
-    for (std::size_t c = 0; c < candidates.size(); ++c) {
-      simulated[c].push_back(base - BestFit(directions[c], distances, &offset,
-                                            candidates[c].two_sided, options.max_amplitude)
-                                        .chi2);
-    }
+    Eigen::VectorXd drawn(t);
+    for (Index k = 0; k < t; ++k) drawn[k] = stream.Normal();
+    simulate(*whitened, directions, drawn);
   }
   std::vector<Score> scores;
   std::vector<Eigen::VectorXd> visible;  // what no choice of the parameters imitates
@@ -257,11 +240,7 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
     const Eigen::VectorXd strongest = rests.empty() ? Eigen::VectorXd::Zero(t) : *longest;
     const double length = strongest.norm();
     visible.push_back(length > 0 ? Eigen::VectorXd(strongest / length) : strongest);
-    const double sd =  // of a measurement along it
-        model.draws.rows() > 0
-            ? std::sqrt((visible.back().transpose() * whitened->draws).squaredNorm() /
-                        static_cast<double>(model.draws.rows()))
-            : 1;
+    const double sd = std::sqrt(VarianceAlong(visible.back(), *whitened, *groups));
     const double square = SquareOfEffect(rests, candidates[c].strengths, length);
     score.detectable =
         square > 0 ? reach * sd / std::sqrt(square) : std::numeric_limits<double>::infinity();
@@ -293,15 +272,26 @@ absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedM
     return absl::InvalidArgumentError(
         "diagnosis: a gain needs draws of the base model and an extension of it");
   }
-  Whitened larger = *whitened;  // in the same coordinates
-  larger.points = whitened->factor.matrixL().solve(extended.histories.transpose());
-  larger.squares = larger.points.colwise().squaredNorm();
+  const auto groups = DrawsOf(base);
+  if (!groups.ok()) return groups.status();
   Index best = 0;
   const double chi2 = whitened->squares.minCoeff(&best);
-  const Eigen::MatrixXd offsets = whitened->draws.colwise() - whitened->points.col(best);
-  const Eigen::VectorXd gains =
-      (SmallestFrom(*whitened, offsets) - SmallestFrom(larger, offsets)).cwiseMax(0);
-  return TailOf(std::max(0.0, chi2 - larger.squares.minCoeff()), {gains.begin(), gains.end()},
+  const auto in_coordinates_of = [&extended](const Whitened& own) {
+    Whitened larger{.factor = {},
+                    .points = own.factor.matrixL().solve(extended.histories.transpose()),
+                    .squares = {}};
+    larger.squares = larger.points.colwise().squaredNorm();
+    return larger;
+  };
+  std::vector<double> gains;
+  for (const DrawnGroup& group : *groups) {
+    const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.points.col(best);
+    const Eigen::VectorXd own =
+        SmallestFrom(group.model, offsets) - SmallestFrom(in_coordinates_of(group.model), offsets);
+    for (const double gain : own) gains.push_back(std::max(0.0, gain));
+  }
+  const Whitened larger = in_coordinates_of(*whitened);
+  return TailOf(std::max(0.0, chi2 - larger.squares.minCoeff()), gains,
                 static_cast<std::size_t>(extended.parameters - base.parameters));
 }
 

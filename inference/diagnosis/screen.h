@@ -8,20 +8,9 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "inference/diagnosis/fitted_model.h"
 
 namespace calib::inference {
-
-/// A model as a cloud of what it can do. Histories are (prediction - reading) / noise sd.
-struct FittedModel {
-  Eigen::MatrixXd histories;   ///< G x T, mean history at G points of its parameter space
-  Eigen::MatrixXd covariance;  ///< T x T, of a measurement about the true mean history: noise,
-                               ///< scatter, error of the emulator, numerical nuisance
-  int parameters = 0;
-  /// S x T: differences of measurements from the true mean history, S >= 50, as real ones would be;
-  /// with none they are normal with the covariance. A covariance that is merely cautious makes
-  /// distances too small and hides misfit; these say how large distances are of a right model.
-  Eigen::MatrixXd draws{};
-};
 
 /// How an effect would change the histories.
 struct Signature {
@@ -61,7 +50,7 @@ struct Score {
 };
 
 struct ScreenOptions {
-  int simulations = 500;     ///< of the null, [50, 1e5]
+  int simulations = 500;     ///< of the null, [50, 1e5]; where the model has draws, those instead
   double max_amplitude = 4;  ///< of a difference, > 0
   double level = 0.01;       ///< of the test, (0, 0.5)
   std::uint64_t seed = 0;

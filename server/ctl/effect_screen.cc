@@ -165,7 +165,9 @@ absl::StatusOr<inference::Signature> EffectScreen::SignatureOf(const dem::Effect
         (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
     tried.push_back(pair.step);
     if (effect.rays.size() == 1) signature.strengths.push_back(pair.step.step);
-    EffectRun run{.values = pair.with.rows.front().values, .history = with.histories.row(0)};
+    EffectRun run{.values = pair.with.rows.front().values,
+                  .history = with.histories.row(0),
+                  .stream = with.stream.front()};
     run.values.insert(pair.with.fixed.begin(), pair.with.fixed.end());
     runs_with_[effect.name].push_back(std::move(run));
   }

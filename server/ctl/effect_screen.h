@@ -48,6 +48,7 @@ class EffectScreen {
   struct EffectRun {
     std::map<std::string, double> values;
     Eigen::VectorXd history;
+    int stream = 0;  ///< that of the run without the effect
   };
   std::vector<EffectRun> RunsWith(const std::string& effect) const;
 

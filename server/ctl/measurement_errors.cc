@@ -3,16 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "inference/sampling/philox.h"
+#include "inference/scatter/shrunk_covariance.h"
 
 namespace calib::ctl {
 namespace {
 
 using Eigen::Index;
 
-constexpr Index kDraws = 400;  // of measurements
-constexpr int kRunsAbout = 5;  // runs of a campaign or a warm fit about its best point
+constexpr Index kDraws = 400;               // of measurements
+constexpr int kRunsAbout = 5;               // runs of a campaign or a warm fit about its best point
+constexpr std::size_t kFewestPackings = 4;  // whose runs say more than the closed form
 
 // Correlated errors of the readings, one as variance.
 Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
@@ -21,30 +24,73 @@ Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
   return inverse.asDiagonal() * covariance * inverse.asDiagonal();
 }
 
-// Noise, nuisance and scatter of measurements; `missed` holds what the emulator misses of single
-// runs, n x T.
-void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
-                      const std::vector<Eigen::VectorXd>& nuisance, MeasurementErrors& errors) {
-  const campaign::Campaign& campaign = base.view().campaign;
-  const report::ScatteredReadings& readings = base.readings();
-  const inference::DataSet plain = campaign::MakeDataSet(campaign);
-  const auto t = static_cast<Index>(plain.readings.size());
-  Eigen::VectorXd unit(t);     // of the noise in the sd of histories
-  Eigen::VectorXd scatter(t);  // of the measurement, of what is missed of a run
-  for (Index k = 0; k < t; ++k) {
+// Of the noise of each reading in the sd of histories.
+Eigen::VectorXd NoiseSd(const FittedCampaign& base, const inference::DataSet& plain) {
+  Eigen::VectorXd unit(static_cast<Index>(plain.readings.size()));
+  for (Index k = 0; k < unit.size(); ++k) {
     const auto at = static_cast<std::size_t>(k);
-    const inference::Reading& reading = plain.readings[at];
-    unit[k] = reading.sd / readings.of_mean.readings[at].sd;
+    unit[k] = plain.readings[at].sd / base.readings().of_mean.readings[at].sd;
+  }
+  return unit;
+}
+
+// What scatters of a measurement about the mean of the runs, of what the emulator misses of a run.
+Eigen::VectorXd ScatterOfMissed(const FittedCampaign& base, const inference::DataSet& plain) {
+  Eigen::VectorXd scatter(static_cast<Index>(plain.readings.size()));
+  for (Index k = 0; k < scatter.size(); ++k) {
     const campaign::Experiment& experiment =
-        campaign.experiments[static_cast<std::size_t>(reading.experiment)];
+        base.view().campaign.experiments[static_cast<std::size_t>(
+            plain.readings[static_cast<std::size_t>(k)].experiment)];
     const auto packings = static_cast<double>(experiment.specimens.size());
     const double share = campaign::ScatterShare(experiment);
     // A run departs less from the mean over R packings than from that over all, a new one more.
-    scatter[k] = std::sqrt(
-        readings.measured && packings > 1 ? (share + 1 / packings) / (1 - 1 / packings) : share);
+    scatter[k] = std::sqrt(base.readings().measured && packings > 1
+                               ? (share + 1 / packings) / (1 - 1 / packings)
+                               : share);
   }
+  return scatter;
+}
+
+// Scatter as the runs show it, as far as their number supports it; the closed form is part of
+// of_mean.covariance so far. The answer is the group of each run, none where packings are too few.
+std::vector<int> RefineScatter(const Eigen::MatrixXd& departures, const std::vector<int>& packing,
+                               const Eigen::MatrixXd& closed_form, DrawnErrors& of_mean) {
+  const Eigen::MatrixXd unit = of_mean.covariance;
+  const Eigen::MatrixXd rest = unit - closed_form;
+  std::map<int, int> groups;
+  for (const int one : packing) groups.emplace(one, static_cast<int>(groups.size()));
+  if (groups.size() < kFewestPackings) return {};
+  of_mean.without.resize(groups.size());
+  for (const auto& [left_out, number] : groups) {
+    std::vector<Index> rows;
+    std::vector<int> others;
+    for (std::size_t i = 0; i < packing.size(); ++i) {
+      if (packing[i] == left_out) continue;
+      rows.push_back(static_cast<Index>(i));
+      others.push_back(packing[i]);
+    }
+    of_mean.without[static_cast<std::size_t>(number)] =
+        rest + inference::ShrinkCovariance(departures(rows, Eigen::all), others, closed_form, unit)
+                   .covariance;
+  }
+  of_mean.covariance =
+      rest + inference::ShrinkCovariance(departures, packing, closed_form, unit).covariance;
+  std::vector<int> group;
+  for (const int one : packing) group.push_back(groups.at(one));
+  return group;
+}
+
+// Noise, nuisance and scatter of measurements; `missed` holds what the emulator misses of single
+// runs, n x T; group, of each of them, may be empty.
+void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
+                      const std::vector<int>& group, const std::vector<Eigen::VectorXd>& nuisance,
+                      MeasurementErrors& errors) {
+  const campaign::Campaign& campaign = base.view().campaign;
+  const inference::DataSet plain = campaign::MakeDataSet(campaign);
+  const auto t = static_cast<Index>(plain.readings.size());
+  const Eigen::VectorXd scatter = ScatterOfMissed(base, plain);
   const Eigen::MatrixXd noise =
-      unit.asDiagonal() *
+      NoiseSd(base, plain).asDiagonal() *
       Eigen::MatrixXd(Eigen::LLT<Eigen::MatrixXd>(NoiseCorrelation(plain)).matrixL());
   const Eigen::LLT<Eigen::MatrixXd> factor(errors.of_run.covariance);
   errors.of_mean.draws.resize(kDraws, t);
@@ -62,6 +108,7 @@ void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
     const double sign = stream.Normal() < 0 ? -1 : 1;
     draw += sign * scatter.cwiseProduct(missed.row(own).transpose());
     errors.of_mean.draws.row(s) = draw;
+    if (!group.empty()) errors.of_mean.group.push_back(group[static_cast<std::size_t>(own)]);
     // The fits take the closest of the runs about the right point.
     double closest = std::numeric_limits<double>::infinity();
     for (int k = 0; k < kRunsAbout; ++k) {
@@ -82,6 +129,7 @@ void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
 MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
                                        const inference::StateEmulator& emulator,
                                        const Eigen::VectorXd& not_known,
+                                       const std::vector<int>& packing,
                                        const std::vector<Eigen::VectorXd>& nuisance) {
   const report::ScatteredReadings& readings = base.readings();
   const inference::DataSet& data = readings.of_mean;
@@ -101,11 +149,15 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
   const Eigen::VectorXd& sd = emulator.scatter_sd();
   const Eigen::MatrixXd missed =
       covariance_of((not_known.array().square() + sd.array().square()).sqrt());
+  // As large as near the best point: far out the emulator knows less, which is no scatter.
+  const Eigen::MatrixXd of_runs =
+      emulator.cross_validation().standardised * missed.diagonal().cwiseSqrt().asDiagonal();
+  const inference::DataSet plain = campaign::MakeDataSet(base.view().campaign);
+  std::vector<int> group;
   MeasurementErrors errors;
   if (readings.measured) {
     Eigen::VectorXd unit(t);  // sd of one run's difference over that of the mean history's
     double square = 0;
-    const inference::DataSet plain = campaign::MakeDataSet(base.view().campaign);
     for (Index k = 0; k < t; ++k) {
       const auto at = static_cast<std::size_t>(k);
       unit[k] = readings.of_run.readings[at].sd / data.readings[at].sd;
@@ -114,6 +166,13 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
     }
     errors.scatter = std::sqrt(square / static_cast<double>(t));
     errors.of_mean.covariance = NoiseCorrelation(data) + numerical + covariance_of(not_known);
+    const Eigen::VectorXd noise = NoiseSd(base, plain);
+    const Eigen::MatrixXd closed_form =
+        NoiseCorrelation(data) - noise.asDiagonal() * NoiseCorrelation(plain) * noise.asDiagonal();
+    if (static_cast<Index>(packing.size()) == of_runs.rows()) {
+      group = RefineScatter(of_runs * ScatterOfMissed(base, plain).asDiagonal(), packing,
+                            closed_form, errors.of_mean);
+    }
     errors.of_run.covariance =
         unit.asDiagonal() * NoiseCorrelation(readings.of_run) * unit.asDiagonal();
     errors.of_run.covariance += numerical;
@@ -123,10 +182,7 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
     errors.of_mean.covariance = noise + missed;
     errors.of_run.covariance = noise + 2 * covariance_of(sd);
   }
-  // As large as near the best point: far out the emulator knows less, which is no scatter.
-  const Eigen::VectorXd size = missed.diagonal().cwiseSqrt();
-  DrawMeasurements(base, emulator.cross_validation().standardised * size.asDiagonal(), nuisance,
-                   errors);
+  DrawMeasurements(base, of_runs, group, nuisance, errors);
   return errors;
 }
 

@@ -13,7 +13,9 @@ namespace calib::ctl {
 /// Differences over the T readings, in the sd of base.readings().of_mean.
 struct DrawnErrors {
   Eigen::MatrixXd covariance;  ///< T x T
-  Eigen::MatrixXd draws;  ///< S x T; scatter is resampled from what the emulator misses of runs
+  Eigen::MatrixXd draws;     ///< S x T; scatter is resampled from what the emulator misses of runs
+  std::vector<int> group{};  ///< of each draw, and
+  std::vector<Eigen::MatrixXd> without{};  ///< see inference::FittedModel
 };
 
 struct MeasurementErrors {
@@ -24,13 +26,15 @@ struct MeasurementErrors {
 
 /// not_known: sd of the mean history's scores at the point judged by. nuisance: directions (T each)
 /// that a measurement may differ by for numerical reasons, of unit variance. Scatter is what
-/// several packings were measured to differ by, or, where packings were not varied, what the
-/// emulator does not explain of single runs: few packings span few directions, and a covariance of
-/// the runs on them finds a measurement on yet another one impossible
-/// (deploy/bench/hidden-effects.d/README.md).
+/// several packings were measured to differ by, a chain along the path for each observable, and,
+/// as far as their number supports it, what the emulator misses of the runs on them
+/// (inference/scatter/shrunk_covariance.h); draws on a packing are judged by the covariance
+/// without it. Where packings were not varied, what the emulator does not explain of single runs.
+/// packing: of each run that the emulator was validated on, any numbers.
 MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
                                        const inference::StateEmulator& emulator,
                                        const Eigen::VectorXd& not_known,
+                                       const std::vector<int>& packing,
                                        const std::vector<Eigen::VectorXd>& nuisance);
 
 }  // namespace calib::ctl

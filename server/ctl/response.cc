@@ -54,6 +54,18 @@ std::vector<int> PartsOf(const campaign::Campaign& campaign, const inference::Da
   return parts;
 }
 
+// Of some of the runs.
+std::vector<int> PackingsOf(const campaign::Campaign& campaign, const RunTable& runs,
+                            const std::vector<Index>& rows) {
+  const auto packings =
+      static_cast<int>(std::max<std::size_t>(1, campaign::PackingsOfAll(campaign)));
+  std::vector<int> packing;
+  for (const Index row : rows) {
+    packing.push_back(runs.stream[static_cast<std::size_t>(row)] % packings);
+  }
+  return packing;
+}
+
 }  // namespace
 
 absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
@@ -125,11 +137,29 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedMod
   add(*spread);
   add(table.parameters);
   if (model.draws.rows() > 0) add(model.draws);
+  if (points.rows() == 0) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the emulator of the runs of ", base.id(),
+        " knows the model nowhere as well as a judgement needs it (to ", model.most_unknown,
+        " sd of a measurement): run more samples, or see whether the stated errors are too small"));
+  }
+  const std::vector<int> packing = PackingsOf(base.view().campaign, table, trained->relevant);
+  const auto errors_at = [&](Index point) {
+    return ErrorsOfMeasurements(base, emulator, unknown.row(point), packing, nuisance);
+  };
+  Index best = 0;
+  histories.rowwise().squaredNorm().minCoeff(&best);
+  const Eigen::LLT<Eigen::MatrixXd> factor(errors_at(best).of_mean.covariance);
+  Eigen::VectorXd misfit;
   // Ever closer about the best point so far, so that the smallest misfit is met.
   double width = 0.2;
-  for (int round = 0; round < kRounds && points.rows() > 0; ++round, width *= 0.4) {
-    Index best = 0;
-    histories.rowwise().squaredNorm().minCoeff(&best);
+  for (int round = 0;; ++round, width *= 0.4) {
+    const Index before = misfit.size();
+    const Eigen::MatrixXd more = histories.bottomRows(histories.rows() - before).transpose();
+    misfit.conservativeResize(histories.rows());
+    misfit.tail(more.cols()) = factor.matrixL().solve(more).colwise().squaredNorm();
+    misfit.minCoeff(&best);
+    if (round == kRounds) break;
     inference::Proposal proposal;
     inference::MixtureComponent component{.weight = 1, .mean = {}, .covariance = {}};
     component.mean = Standard(priors, points.row(best)).transpose();
@@ -141,18 +171,12 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedMod
     if (!refined.ok()) break;  // next to no mass inside the prior: the corner is the best point
     add(*refined);
   }
-  if (points.rows() == 0) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "the emulator of the runs of ", base.id(),
-        " knows the model nowhere as well as a judgement needs it (to ", model.most_unknown,
-        " sd of a measurement): run more samples, or see whether the stated errors are too small"));
-  }
-  Index best = 0;
-  histories.rowwise().squaredNorm().minCoeff(&best);
-  MeasurementErrors errors = ErrorsOfMeasurements(base, emulator, unknown.row(best), nuisance);
+  MeasurementErrors errors = errors_at(best);
   response.scatter = errors.scatter;
   response.model.covariance = std::move(errors.of_mean.covariance);
   response.model.draws = std::move(errors.of_mean.draws);
+  response.model.group = std::move(errors.of_mean.group);
+  response.model.without = std::move(errors.of_mean.without);
   response.of_run = std::move(errors.of_run);
   response.model.histories = std::move(histories);
   response.points = std::move(points);

@@ -37,6 +37,7 @@ void Append(const report::RunTable& more, report::RunTable& runs) {
   runs.parameters.bottomRows(n) = more.parameters;
   runs.histories.bottomRows(n) = more.histories;
   runs.sample.insert(runs.sample.end(), more.sample.begin(), more.sample.end());
+  runs.stream.insert(runs.stream.end(), more.stream.begin(), more.stream.end());
 }
 
 report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
@@ -56,6 +57,7 @@ report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
     report::RunTable one;
     one.parameters = point;
     one.histories = run.history.transpose();
+    one.stream = {run.stream};
     Append(one, table);
   }
   return table;
@@ -91,6 +93,7 @@ report::RunTable RunsWithoutEffect(const report::RunTable& without,
   table.parameters = *spread;
   table.histories = without.histories;
   table.sample = without.sample;
+  table.stream = without.stream;
   for (Index i = 0; i < table.parameters.rows(); ++i) {
     for (Index j = 0; j < d; ++j) {
       const Index k = from[static_cast<std::size_t>(j)];

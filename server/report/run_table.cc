@@ -132,6 +132,7 @@ RunTable RunsOf(const CampaignView& view, const inference::DataSet& units) {
     const Eigen::RowVectorXd row = HistoryOf(view, sample.index(), data, places);
     if (!row.allFinite()) continue;
     table.sample.push_back(sample.index());
+    table.stream.push_back(campaign::StreamOf(view.campaign, sample.index()));
     histories.emplace_back((row - value).cwiseQuotient(sd));
     Eigen::RowVectorXd& own = parameters.emplace_back(d);
     for (Index j = 0; j < d; ++j) own[j] = sample.parameters(static_cast<int>(j));

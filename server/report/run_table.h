@@ -12,6 +12,7 @@ namespace calib::report {
 /// Predictions of the readings of the calibrated experiments by the finished samples.
 struct RunTable {
   std::vector<int> sample;     ///< numbers, ascending
+  std::vector<int> stream;     ///< what decides on packing and seed of each (campaign::StreamOf)
   Eigen::MatrixXd parameters;  ///< N x d, SI
   Eigen::MatrixXd histories;   ///< N x T, (prediction - reading) / sd, in the order of MakeDataSet
 };

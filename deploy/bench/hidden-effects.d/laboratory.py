@@ -36,7 +36,7 @@ class Laboratory:
     def finished(self, case):
         return os.path.exists(self.path(case, 'verdict.json'))
 
-    def run(self, case):
+    def run(self, case, improve=True):
         if self.finished(case):
             return
         os.makedirs(self.path(case), exist_ok=True)
@@ -46,7 +46,7 @@ class Laboratory:
         options = ['--without', case.removed] if case.removed else []
         verdict = self.call(case, 'diagnose', campaign['campaign'], '--workers', '1', *options)
         document = {'run': campaign, 'diagnose': verdict}
-        if case.verb == 'improve':
+        if case.verb == 'improve' and improve:
             document['improve'] = self.call(case, 'improve', campaign['campaign'], '--workers', '1', '--max-effects', '2')
             final = document['improve']['final_campaign']
             document['final'] = self.call(case, 'posterior', final)
@@ -189,7 +189,7 @@ parameters:
                       file=sys.stderr, flush=True)
                 if of_effect:  # at 60, or the nearest that there is
                     near = min(of_effect, key=lambda strength: abs(math.log(strength / 60)))
-                    signatures[effect] = visible.signature((effect,), of_effect[near][0])
+                    signatures[effect], _ = visible.signature((effect,), of_effect[near][0])
             for effect, own in signatures.items():
                 angles = []
                 for other, its in signatures.items():

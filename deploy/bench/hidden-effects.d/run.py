@@ -11,6 +11,7 @@ parser.add_argument('--repeats', type=int, default=3, help='of each effect and s
 parser.add_argument('--controls', type=int, default=100, help='measurements without a hidden effect')
 parser.add_argument('--jobs', type=int, default=os.cpu_count(), help='cases at a time, one worker each')
 parser.add_argument('--minutes', type=float, default=720, help='no case is begun after this time')
+parser.add_argument('--no-improve', action='store_true', help='cases end with the diagnosis: nothing for the rows after improve')
 parser.add_argument('--visible', action='store_true', help='measures the lambda of finished cases at their own parameters (needs numpy)')
 parser.add_argument('--list', action='store_true', help='names of the cases, nothing is run')
 parser.add_argument('--table', action='store_true', help='table of what has been finished, nothing is run')
@@ -31,7 +32,7 @@ def run(case):
         return False
     began = time.time()
     try:
-        lab.run(case)
+        lab.run(case, improve=not arguments.no_improve)
     except laboratory.Failed as failure:
         print(f'{case.name}: {failure}', file=sys.stderr, flush=True)
         return False

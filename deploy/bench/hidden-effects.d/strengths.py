@@ -4,17 +4,34 @@ lambda(strength) is the squared distance, in standard deviations of a measuremen
 the effect and the nearest that the model without it can do. Both are means over packings. Pairs of runs decorrelate within
 a percent of strain, so the square of a mean difference is mostly chance: products of the differences of different packings
 are taken, whose mean is lambda without bias.
+
+Packings scatter more where friction is high, and more along smooth directions than neighbouring readings tell. So the
+covariance is that of the nearest imitation's friction, and lambda is divided by the variance of a measurement along the
+visible difference as the packings themselves show it: the square of a signal over its noise.
 """
-import csv, concurrent.futures, itertools, json, math, os, statistics, subprocess, sys
+import csv, concurrent.futures, dataclasses, itertools, json, math, os, statistics, subprocess, sys
 
 import laboratory
 
 CENTER = {'young_modulus': 0.85e9, 'friction_coefficient': 0.45}
 RANGE = {'young_modulus': 2.2, 'friction_coefficient': 1 / 0.45}  # factors either way: friction to the end of its prior
-PAIRS, SCATTER = 4, 16                                           # packings of the differences, of the covariance
+PAIRS, SCATTER = 4, 16                                           # packings of the differences, of a covariance
+FRICTIONS = (0.2, 0.45, 0.65, 1.0)                               # at which covariances are measured
 UPWARDS, DOWNWARDS = (1, 2, 4, 8), (0.5, 0.25, 0.125, 1 / 16, 1 / 32)   # times what the diagnosis calls detectable
 CORRECTIONS, NEAR = 3, 0.2                                       # of an interpolated strength, until lambda is this near
 FITTED = [name for name, (_, role) in laboratory.PRESSURES.items() if role == 'calibrate']
+
+
+@dataclasses.dataclass
+class Scatter:
+    whiten: object       # T x T, to unit covariance by the closed form
+    departures: object   # SCATTER x T, of the packings from their mean, whitened
+    noise: object        # T x T: whitened readings of independent unit errors
+
+    def variance(self, direction):
+        """Of a measurement along a whitened direction, T: 1 where the closed form is right."""
+        squares = float(((self.departures @ direction) ** 2).sum()) / (len(self.departures) - 1)
+        return (squares + float(((direction @ self.noise) ** 2).sum())) / float(direction @ direction)
 
 
 class Strengths:
@@ -55,23 +72,8 @@ class Strengths:
         for test in laboratory.PRESSURES:
             rows = ''.join(f'{strain!r},1,1\n' for strain in laboratory.axial_strains())
             self.lab.write(os.path.join(self.work, test + '.csv'), 'axial_strain,q_over_p,volumetric_strain\n' + rows)
-        runs = np.array(self.histories([(k, CENTER) for k in range(PAIRS + SCATTER)]))
-        self.plain, others = runs[:PAIRS], runs[PAIRS:]
-        mean = others.mean(axis=0)
-        steps = len(laboratory.axial_strains())
-        noise = np.concatenate([np.hypot(relative * mean[block], absolute) for block, (relative, absolute) in
-                                zip(np.split(np.arange(len(mean)), len(FITTED) * len(laboratory.NOISE)),
-                                    list(laboratory.NOISE.values()) * len(FITTED))])
-        covariance = np.diag(noise ** 2)
-        # Scatter of one packing: its own sd, correlated exponentially along the path within a test and observable.
-        for block in np.split(np.arange(len(mean)), len(mean) // steps):
-            sd = others[:, block].std(axis=0, ddof=1)
-            z = (others[:, block] - mean[block]) / np.maximum(sd, 1e-300)
-            lag = float(np.mean(z[:, 1:-1] * z[:, 2:]) / np.mean(z[:, 1:] ** 2))
-            k = np.arange(steps)
-            correlation = min(max(lag, 0.01), 0.99) ** np.abs(k[:, None] - k[None, :])
-            covariance[np.ix_(block, block)] += correlation * sd[:, None] * sd[None, :]
-        self.whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+        self.plain = np.array(self.histories([(k, CENTER) for k in range(PAIRS)]))
+        self.scatters = {friction: self.scatter(friction) for friction in FRICTIONS}
         # What the parameters can imitate: a polynomial in their logarithms, cubic in that of friction, through the means over
         # the packings.
         grid = [dict(zip(CENTER, (CENTER[n] * RANGE[n] ** (a / 2) for n, a in zip(CENTER, axes))))
@@ -79,15 +81,37 @@ class Strengths:
         runs = self.histories([(k, point) for point in grid for k in range(PAIRS)])
         means = np.array([np.mean(runs[i * PAIRS:(i + 1) * PAIRS], axis=0) for i in range(len(grid))])
         x = np.array([self.coordinates(point) for point in grid])
-        change = (means - self.plain.mean(axis=0)) @ self.whiten.T
-        self.response = np.linalg.lstsq(self.terms(x), change, rcond=None)[0]
-        fitted = self.terms(x) @ self.response
-        missed = [self.product((runs_of - self.plain) @ self.whiten.T - fit, (runs_of - self.plain) @ self.whiten.T - fit)[0]
-                  for runs_of, fit in zip((np.array(runs[i * PAIRS:(i + 1) * PAIRS]) for i in range(len(grid))), fitted)]
+        self.response = np.linalg.lstsq(self.terms(x), means - self.plain.mean(axis=0), rcond=None)[0]
+        missed = []
+        for i, fit in enumerate(self.terms(x) @ self.response):
+            rest = (np.array(runs[i * PAIRS:(i + 1) * PAIRS]) - self.plain - fit) @ self.near(grid[i]['friction_coefficient']).whiten.T
+            missed.append(self.product(rest, rest)[0])
         print(f'imitation: squared distance of the polynomial from the means at its {len(grid)} points: median '
               f'{statistics.median(missed):.0f}, largest {max(missed):.0f}', file=sys.stderr, flush=True)
         fine = np.linspace(-1, 1, 81)
-        self.imitations = self.terms(np.array(list(itertools.product(fine, fine)))) @ self.response
+        self.points = np.array(list(itertools.product(fine, fine)))
+        self.imitations = self.terms(self.points) @ self.response
+
+    def scatter(self, friction):
+        """Of a measurement at a friction: noise, and what packings differ by, from SCATTER of them."""
+        np = self.np
+        runs = np.array(self.histories([(PAIRS + k, {**CENTER, 'friction_coefficient': friction}) for k in range(SCATTER)]))
+        mean = runs.mean(axis=0)
+        steps = len(laboratory.axial_strains())
+        noise = np.concatenate([np.hypot(relative * mean[block], absolute) for block, (relative, absolute) in
+                                zip(np.split(np.arange(len(mean)), len(FITTED) * len(laboratory.NOISE)),
+                                    list(laboratory.NOISE.values()) * len(FITTED))])
+        covariance = np.diag(noise ** 2)
+        # Scatter of one packing: its own sd, correlated exponentially along the path within a test and observable.
+        for block in np.split(np.arange(len(mean)), len(mean) // steps):
+            sd = runs[:, block].std(axis=0, ddof=1)
+            z = (runs[:, block] - mean[block]) / np.maximum(sd, 1e-300)
+            lag = float(np.mean(z[:, 1:-1] * z[:, 2:]) / np.mean(z[:, 1:] ** 2))
+            k = np.arange(steps)
+            correlation = min(max(lag, 0.01), 0.99) ** np.abs(k[:, None] - k[None, :])
+            covariance[np.ix_(block, block)] += correlation * sd[:, None] * sd[None, :]
+        whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+        return Scatter(whiten, (runs - mean) @ whiten.T, whiten * noise)
 
     def coordinates(self, point):
         return [math.log(point[n] / CENTER[n]) / math.log(RANGE[n]) for n in CENTER]
@@ -96,10 +120,13 @@ class Strengths:
         a, b = x[:, 0], x[:, 1]
         return self.np.stack([a, b, a * a, a * b, b * b, a * b * b, b * b * b], axis=1)
 
+    def near(self, friction):
+        return self.scatters[min(FRICTIONS, key=lambda f: abs(math.log(f / friction)))]
+
     # ---- an effect ----------------------------------------------------------------------------------------------------
     def signature(self, effects, values, base=None):
-        """What the effects change on each packing at base parameters (CENTER), less the nearest imitation: PAIRS x T, in
-        standard deviations of a measurement; None where runs diverge."""
+        """What the effects change on each packing at base parameters (CENTER), less the nearest imitation, PAIRS x T in the
+        readings' units, and the scatter of measurements there; None where runs diverge."""
         np, base = self.np, base or CENTER
         jobs = [(k, base, effects, tuple(sorted(values.items()))) for k in range(PAIRS)]
         if base is not CENTER:
@@ -107,25 +134,34 @@ class Strengths:
         runs = self.histories(jobs)
         if any(run is None for run in runs):
             return None
-        plain = self.plain if base is CENTER else np.array(runs[PAIRS:])
-        differences = (np.array(runs[:PAIRS]) - plain) @ self.whiten.T
+        differences = np.array(runs[:PAIRS]) - (self.plain if base is CENTER else np.array(runs[PAIRS:]))
         imitations = self.imitations - self.terms(np.array([self.coordinates(base)])) @ self.response
-        nearest = imitations[np.argmin(((imitations - differences.mean(axis=0)) ** 2).sum(axis=1))]
-        return differences - nearest
+        scatter = self.near(base['friction_coefficient'])
+        for _ in range(2):  # the nearest in the errors of its own friction
+            distances = (((imitations - differences.mean(axis=0)) @ scatter.whiten.T) ** 2).sum(axis=1)
+            nearest = np.argmin(distances)
+            scatter = self.near(CENTER['friction_coefficient'] * RANGE['friction_coefficient'] ** self.points[nearest, 1])
+        return differences - imitations[nearest], scatter
 
     @staticmethod
     def product(a, b):
-        """Mean of the products of signatures of different packings, and its standard error (that of independent pairs)."""
+        """Mean of the products of whitened signatures of different packings, and its standard error (that of independent pairs)."""
         products = [float(a[i] @ b[j] + a[j] @ b[i]) / 2 for i, j in itertools.combinations(range(PAIRS), 2)]
         return statistics.mean(products), statistics.stdev(products) / math.sqrt(len(products))
 
     def visible(self, effects, values, base=None):
         """lambda and its standard error; None where runs diverge."""
-        signature = self.signature(effects, values, base)
-        return None if signature is None else self.product(signature, signature)
+        found = self.signature(effects, values, base)
+        if found is None:
+            return None
+        signature, scatter = found
+        whitened = signature @ scatter.whiten.T
+        variance = scatter.variance(whitened.mean(axis=0))
+        return tuple(value / variance for value in self.product(whitened, whitened))
 
     def angle(self, a, b, two_sided):
-        """Between two signatures, degrees."""
+        """Between two signatures (readings' units) in the errors at CENTER, degrees."""
+        a, b = (x @ self.near(CENTER['friction_coefficient']).whiten.T for x in (a, b))
         lengths = [self.product(x, x)[0] for x in (a, b)]
         if min(lengths) <= 0:
             return None

@@ -5,6 +5,7 @@
 
 #include "inference/diagnosis/screen.h"
 #include "inference/sampling/philox.h"
+#include "inference/scatter/shrunk_covariance.h"
 
 namespace calib::inference {
 namespace {
@@ -98,6 +99,66 @@ TEST(Diagnosis, DrawsOfAMeasurementSayHowLargeDistancesAre) {
       EXPECT_NEAR(score.detectable / other.detectable, kCautious, 0.1) << score.name;
     }
   }
+}
+
+// Scatter of one packing: three times the noise along a sine, and as much as the noise elsewhere.
+Eigen::VectorXd Scatter(int seed) {
+  return Noise(seed) + 3 * Noise(seed + 50000)[0] * Curve(2).normalized();
+}
+
+// Measurements and runs on packings, five on each of eight; the covariance is estimated from the
+// runs, from which measurements are drawn as well.
+FittedModel LineWithScatter(const Eigen::VectorXd& measured, int seed, bool without_own) {
+  constexpr int kRuns = 40;
+  constexpr int kPackings = 8;
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(kReadings, kReadings);
+  Eigen::MatrixXd departures(kRuns, kReadings);
+  std::vector<int> packing;
+  for (int r = 0; r < kRuns; ++r) {
+    departures.row(r) = Scatter(1000 * (seed + 1) + r);
+    packing.push_back(r % kPackings);
+  }
+  FittedModel model = Line(measured);
+  model.covariance =
+      identity + ShrinkCovariance(departures, packing, identity, 2 * identity).covariance;
+  model.draws.resize(400, kReadings);
+  for (int s = 0; s < 400; ++s) {
+    model.draws.row(s) = Noise(1000 * (seed + 1) + 100 + s) + departures.row(s % kRuns).transpose();
+    if (without_own) model.group.push_back(s % kRuns % kPackings);
+  }
+  for (int g = 0; without_own && g < kPackings; ++g) {
+    std::vector<int> rows;
+    std::vector<int> others;
+    for (int r = 0; r < kRuns; ++r) {
+      if (r % kPackings == g) continue;
+      rows.push_back(r);
+      others.push_back(r % kPackings);
+    }
+    model.without.push_back(
+        identity +
+        ShrinkCovariance(departures(rows, Eigen::all), others, identity, 2 * identity).covariance);
+  }
+  return model;
+}
+
+TEST(Diagnosis, DrawsAreJudgedByACovarianceThatDoesNotKnowTheirRun) {
+  double own = 0;
+  double others = 0;
+  int adequate = 0;
+  constexpr int kMeasurements = 100;
+  for (int seed = 0; seed < kMeasurements; ++seed) {
+    const Eigen::VectorXd measured = 12 * Curve(0) + Noise(seed) + Scatter(500000 + seed);
+    own += TestAdequacy(LineWithScatter(measured, seed, false))->p_value / kMeasurements;
+    const double p_value = TestAdequacy(LineWithScatter(measured, seed, true))->p_value;
+    others += p_value / kMeasurements;
+    adequate += p_value >= 0.01 ? 1 : 0;
+  }
+  EXPECT_LT(own, 0.4);  // what the groups are for
+  EXPECT_NEAR(others, 0.5, 4 * std::sqrt(1.0 / 12 / kMeasurements));
+  EXPECT_GE(adequate, 95);
+  FittedModel wrong = LineWithScatter(12 * Curve(0), 0, true);
+  wrong.group.back() = 8;
+  EXPECT_FALSE(TestAdequacy(wrong).ok());
 }
 
 TEST(Diagnosis, PresentEffectComesFirstWithItsAmplitude) {

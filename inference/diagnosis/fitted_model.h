@@ -1,0 +1,26 @@
+#pragma once
+// A model as the statistics of the diagnosis see it.
+
+#include <Eigen/Dense>
+#include <vector>
+
+namespace calib::inference {
+
+/// A model as a cloud of what it can do. Histories are (prediction - reading) / noise sd.
+struct FittedModel {
+  Eigen::MatrixXd histories;   ///< G x T, mean history at G points of its parameter space
+  Eigen::MatrixXd covariance;  ///< T x T, of a measurement about the true mean history: noise,
+                               ///< scatter, error of the emulator, numerical nuisance
+  int parameters = 0;
+  /// S x T: differences of measurements from the true mean history, S >= 50, as real ones would be;
+  /// with none they are normal with the covariance. A covariance that is merely cautious makes
+  /// distances too small and hides misfit; these say how large distances are of a right model.
+  Eigen::MatrixXd draws{};
+  /// A covariance that was estimated from the runs that draws are made of is too close to them.
+  /// Where `without` has entries, draw i is judged by without[group[i]], which knows nothing of its
+  /// run; the measurement is judged by `covariance`.
+  std::vector<int> group{};                ///< S
+  std::vector<Eigen::MatrixXd> without{};  ///< T x T each
+};
+
+}  // namespace calib::inference

@@ -1,0 +1,93 @@
+#include "inference/diagnosis/whitened.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+constexpr Index kFewestDraws = 50;
+
+absl::StatusOr<Whitened> WhitenBy(const Eigen::MatrixXd& covariance,
+                                  const Eigen::MatrixXd& histories) {
+  Whitened whitened{.factor = Eigen::LLT<Eigen::MatrixXd>(covariance), .points = {}, .squares = {}};
+  if (whitened.factor.info() != Eigen::Success) {
+    return absl::InvalidArgumentError("diagnosis: the covariance is not positive definite");
+  }
+  whitened.points = whitened.factor.matrixL().solve(histories.transpose());
+  whitened.squares = whitened.points.colwise().squaredNorm();
+  return whitened;
+}
+
+bool GroupsFit(const FittedModel& model) {
+  const auto groups = static_cast<int>(model.without.size());
+  if (groups == 0) return true;
+  const Index t = model.histories.cols();
+  return static_cast<Index>(model.group.size()) == model.draws.rows() &&
+         std::all_of(model.group.begin(), model.group.end(),
+                     [groups](int g) { return g >= 0 && g < groups; }) &&
+         std::all_of(model.without.begin(), model.without.end(),
+                     [t](const Eigen::MatrixXd& c) { return c.rows() == t && c.cols() == t; });
+}
+
+}  // namespace
+
+absl::StatusOr<Whitened> Whiten(const FittedModel& model) {
+  const Index t = model.histories.cols();
+  if (model.histories.rows() < 1 || t < 1 || model.covariance.rows() != t ||
+      model.covariance.cols() != t || !model.histories.allFinite()) {
+    return absl::InvalidArgumentError("diagnosis: histories and covariance do not fit together");
+  }
+  return WhitenBy(model.covariance, model.histories);
+}
+
+absl::StatusOr<std::vector<DrawnGroup>> DrawsOf(const FittedModel& model) {
+  std::vector<DrawnGroup> groups;
+  const Index count = model.draws.rows();
+  if (count == 0) return groups;
+  if (count < kFewestDraws || model.draws.cols() != model.histories.cols() ||
+      !model.draws.allFinite() || !GroupsFit(model)) {
+    return absl::InvalidArgumentError(
+        "diagnosis: draws of a measurement are too few or do not fit the histories");
+  }
+  std::vector<std::vector<Index>> numbers(std::max<std::size_t>(1, model.without.size()));
+  for (Index i = 0; i < count; ++i) {
+    const int group = model.without.empty() ? 0 : model.group[static_cast<std::size_t>(i)];
+    numbers[static_cast<std::size_t>(group)].push_back(i);
+  }
+  for (std::size_t g = 0; g < numbers.size(); ++g) {
+    if (numbers[g].empty()) continue;
+    auto whitened =
+        WhitenBy(model.without.empty() ? model.covariance : model.without[g], model.histories);
+    if (!whitened.ok()) return whitened.status();
+    const Eigen::MatrixXd own = model.draws(numbers[g], Eigen::all).transpose();
+    Eigen::MatrixXd draws = whitened->factor.matrixL().solve(own);
+    groups.push_back({.model = *std::move(whitened),
+                      .number = std::move(numbers[g]),
+                      .draws = std::move(draws)});
+  }
+  return groups;
+}
+
+Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& offset) {
+  return (whitened.squares + 2 * (whitened.points.transpose() * offset)).array() +
+         offset.squaredNorm();
+}
+
+Eigen::VectorXd SmallestFrom(const Whitened& whitened, const Eigen::MatrixXd& offsets) {
+  constexpr Index kAtOnce = 32;  // the products stay in the cache
+  Eigen::VectorXd smallest(offsets.cols());
+  for (Index s = 0; s < offsets.cols(); s += kAtOnce) {
+    const auto some = offsets.middleCols(s, std::min(kAtOnce, offsets.cols() - s));
+    const Eigen::MatrixXd along = whitened.points.transpose() * some;
+    for (Index k = 0; k < some.cols(); ++k) {
+      smallest[s + k] =
+          (whitened.squares + 2 * along.col(k)).minCoeff() + some.col(k).squaredNorm();
+    }
+  }
+  return smallest;
+}
+
+}  // namespace calib::inference
