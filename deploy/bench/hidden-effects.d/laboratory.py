@@ -171,7 +171,7 @@ parameters:
         return self._visibility
 
     def strengths(self, jobs=0):
-        """{effect: {'strengths': {lambda: [values, lambda found, its se]}, 'measured': ..., 'rival': [degrees, effect]}};
+        """{effect: {'strengths': {lambda: [values, lambda found, its se, variance]}, 'measured': ..., 'rival': [degrees, effect]}};
         measured once, with jobs > 0, and kept."""
         import cases
         path = os.path.join(self.folder, 'strengths.json')
@@ -185,7 +185,7 @@ parameters:
                 infos = {f"{effect}.{p['name']}": p for p in self.catalogue()[effect]['parameters']}
                 of_effect, measured = visible.of(effect, values, infos, cases.LAMBDAS)
                 document[effect] = {'strengths': of_effect, 'measured': measured}
-                print(f'{effect}: lambda ' + ', '.join(f'{value:.0f} +- {error:.0f} at {multiple:.3g}x' for multiple, value, error in measured),
+                print(f'{effect}: lambda ' + ', '.join(f'{value:.0f} +- {error:.0f} at {multiple:.3g}x (variance {variance:.1f})' for multiple, value, error, variance in measured),
                       file=sys.stderr, flush=True)
                 if of_effect:  # at 60, or the nearest that there is
                     near = min(of_effect, key=lambda strength: abs(math.log(strength / 60)))
@@ -202,8 +202,8 @@ parameters:
         return json.load(open(path))
 
     def visible_at_truth(self, case, jobs=0):
-        """lambda of what is hidden in a case at that case's own parameters, and its standard error; kept beside the
-        sealed truth, which a finished verdict opens."""
+        """lambda of what is hidden in a case at that case's own parameters, its standard error and the variance along it;
+        kept beside the sealed truth, which a finished verdict opens."""
         path = os.path.join(self.folder, 'sealed', case.name + '.lambda.json')
         if not os.path.exists(path):
             if jobs == 0:

@@ -150,14 +150,15 @@ class Strengths:
         return statistics.mean(products), statistics.stdev(products) / math.sqrt(len(products))
 
     def visible(self, effects, values, base=None):
-        """lambda and its standard error; None where runs diverge."""
+        """lambda, its standard error, and the variance along what is visible over that of the closed form; None where runs
+        diverge."""
         found = self.signature(effects, values, base)
         if found is None:
             return None
         signature, scatter = found
         whitened = signature @ scatter.whiten.T
         variance = scatter.variance(whitened.mean(axis=0))
-        return tuple(value / variance for value in self.product(whitened, whitened))
+        return tuple(value / variance for value in self.product(whitened, whitened)) + (variance,)
 
     def angle(self, a, b, two_sided):
         """Between two signatures (readings' units) in the errors at CENTER, degrees."""
@@ -169,7 +170,7 @@ class Strengths:
         return math.degrees(math.acos(abs(cosine) if two_sided else cosine))
 
     def of(self, effect, detectable, infos, wanted):
-        """{lambda: (values, lambda found there, its standard error)} and what was measured on the way: strengths by
+        """{lambda: (values, lambda found there, its standard error, variance)} and what was measured on the way: strengths by
         interpolation in logarithms, measured there and corrected; a lambda that no strength within the effect's default
         prior reaches is left out."""
         def at(multiple):
@@ -196,7 +197,7 @@ class Strengths:
             if found is None or found[0] > max(wanted) or unseen == 2:
                 break
         for multiple in DOWNWARDS:
-            least = min(value for value, _ in measured.values())
+            least = min(value for value, *_ in measured.values())
             if unseen == 2 or least < min(wanted):
                 break
             found = measure(multiple)
@@ -221,7 +222,7 @@ class Strengths:
 def interpolate(measured, strength):
     """The multiple at which lambda has the strength, in logarithms between points that rise beyond chance; None outside."""
     rising, highest = [], 1
-    for multiple, (value, error) in sorted(measured.items()):
+    for multiple, (value, error, _) in sorted(measured.items()):
         if value > 2 * error and value > highest:
             rising.append((math.log(multiple), math.log(value)))
             highest = value
