@@ -109,7 +109,7 @@ CALIB_DEM_INLINE void Pass(const CommonChain& chain, ContactBlock& b) {
   const MomentLaw twisting = kMoments > 1 ? *chain.twisting : MomentLaw{};
   const Dashpot dashpot = kDamped ? *chain.dashpot : Dashpot{};
   const double damping = dashpot.twice_ratio * b.viscous;
-  const double density = b.mass_factor * dashpot.mass;
+  const double mass_factor = b.mass_factor;
   const double dt = b.dt;
   const double per_time = dt > 0 ? 1.0 / dt : 0.0;
   const double lx = b.stretch[0];
@@ -171,7 +171,7 @@ CALIB_DEM_INLINE void Pass(const CommonChain& chain, ContactBlock& b) {
 
     Response response =
         Law::At(normal, tangential, ri * rj * (both * distance), on ? overlap : 0.0);
-    const double mass = kDamped ? EffectiveMass(density, ri, rj) : 0.0;
+    const double mass = kDamped ? EffectiveMass(dashpot.grains, mass_factor, ri, rj) : 0.0;
     if constexpr (kDamped) {
       response.fn = Damped(damping, mass, response, vn);
     }
@@ -293,7 +293,7 @@ void ClearUnused(int moments, ContactBlock& b) {
 
 }  // namespace
 
-std::optional<CommonChain> CommonChainOf(const Model& model) {
+std::optional<CommonChain> CommonChainOf(const Model& model, double thickness) {
   CommonChain chain;
   chain.hertz = model.contact == "hertz_mindlin";
   if (!chain.hertz && model.contact != "linear") {
@@ -318,6 +318,7 @@ std::optional<CommonChain> CommonChainOf(const Model& model) {
     const KernelContext context{
         .contact = model.contact,
         .density = model.density,
+        .thickness = thickness,
         .law = parameters,
         .parameters = ResolveParameters(effect.info.parameters, name + ".", model.parameters)};
     if (name == "viscous_damping") {

@@ -22,8 +22,8 @@ struct CommonChain {
   std::optional<Dashpot> dashpot;
 };
 
-/// The chain of a model, where it is one of these; else empty.
-std::optional<CommonChain> CommonChainOf(const Model& model);
+/// The chain of a model, where it is one of these; else empty. thickness: of disks [m]; 0: spheres.
+std::optional<CommonChain> CommonChainOf(const Model& model, double thickness = 0);
 
 /// What ContactModel::Evaluate() and CloseBlock() do together, with the same bits: overlap, forces,
 /// torques and memory of all lanes; zero where the lane does not overlap or is not in use. Columns

@@ -9,6 +9,7 @@
 #include "dem/catalog/registry.h"
 #include "dem/contact/common_parameters.h"
 #include "dem/contact/contact_kinematics.h"
+#include "dem/contact/grain_mass.h"
 #include "dem/contact/simd.h"
 #include "dem/contact/sliding.h"
 
@@ -33,13 +34,15 @@ CALIB_DEM_CLONES void ClearExtras(ContactBlock& b) {
 
 }  // namespace
 
-ContactModel::ContactModel(const Model& model)
-    : common_(CommonChainOf(model)), sliding_friction_(SlidingFriction(model.parameters)) {
+ContactModel::ContactModel(const Model& model, double thickness)
+    : common_(CommonChainOf(model, thickness)),
+      sliding_friction_(SlidingFriction(model.parameters)) {
   std::vector<std::pair<ContactStage, std::shared_ptr<const ContactKernel>>> kernels;
   const ContactEntry& law = LawNamed(model.contact);
   const ParameterSet law_parameters = ResolveParameters(law.info.parameters, "", model.parameters);
   const KernelContext law_context{.contact = model.contact,
                                   .density = model.density,
+                                  .thickness = thickness,
                                   .law = law_parameters,
                                   .parameters = law_parameters};
   kernels.emplace_back(ContactStage::kNormal, law.make(law_context));
@@ -53,6 +56,7 @@ ContactModel::ContactModel(const Model& model)
       const KernelContext context{
           .contact = model.contact,
           .density = model.density,
+          .thickness = thickness,
           .law = law_parameters,
           .parameters = ResolveParameters(effect.info.parameters, name + ".", model.parameters)};
       if (effect.bound != nullptr) {
@@ -74,7 +78,7 @@ ContactModel::ContactModel(const Model& model)
     }
     formulas_.push_back(std::make_shared<FormulaKernel>(
         effect, ResolveParameters(effect.info.parameters, name + ".", model.parameters),
-        model.density, stage_));
+        GrainMassOf(model.density, thickness), stage_));
     kernels.emplace_back(StageOf(effect), formulas_.back());
   }
   wall_friction_ = walls.friction.value_or(walls.friction_ratio * sliding_friction_);

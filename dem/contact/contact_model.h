@@ -15,8 +15,9 @@ namespace calib::dem {
 /// Immutable and shared between copies; thread-safe.
 class ContactModel {
  public:
-  /// Precondition: ScenarioProblems() finds nothing wrong with the model.
-  explicit ContactModel(const Model& model);
+  /// Precondition: ScenarioProblems() finds nothing wrong with the model. thickness: of disks [m];
+  /// 0: the grains are spheres.
+  explicit ContactModel(const Model& model, double thickness = 0);
 
   /// Doubles that each contact remembers, <= kMaxHistory.
   [[nodiscard]] int history_size() const { return history_size_; }

@@ -30,6 +30,11 @@ bool Drives(const CellTarget& target, const PeriodicCell& cell) {
   return target.displacement != cell.displacement;
 }
 
+bool AllByStress(const CellTarget& target) {
+  return std::all_of(target.begin(), target.end(),
+                     [](const AxisTarget& t) { return t.mode == AxisTarget::Mode::kStress; });
+}
+
 /// Largest relative change of length, or shear strain, that is still to be driven.
 double FurthestToGo(const CellTarget& target, const PeriodicCell& cell) {
   double furthest = std::abs(target.displacement - cell.displacement) / cell.length[2];
@@ -42,6 +47,11 @@ double FurthestToGo(const CellTarget& target, const PeriodicCell& cell) {
 }
 
 }  // namespace
+
+void StrainingSpeed::Adapt(double unbalanced, double settled) {
+  const double faster = unbalanced > 0 ? std::pow(kTarget * settled / unbalanced, kGain) : kFastest;
+  factor_ = std::clamp(factor_ * faster, 1.0, kFastest);
+}
 
 QuasiStatic::QuasiStatic(Assembly& assembly, const StageOptions& options, std::stop_token stop)
     : assembly_(&assembly), options_(options), stop_(std::move(stop)) {}
@@ -70,12 +80,15 @@ StageEnd QuasiStatic::Inspect() {
   if (intervention_) {
     intervention_(*assembly_);
   }
+  if (straining_ && options_.adaptive) {
+    speed_.Adapt(assembly_->UnbalancedForce(), options_.unbalanced);
+  }
   StiffnessEstimate estimate;
   if (auto s = assembly_->EstimateStiffness(estimate); !s.ok()) {
     return Diverge(std::string(s.message()));
   }
-  const double largest =
-      std::min(kMaxStrainPerStep / options_.rate, assembly_->NominalCriticalStep());
+  const double largest = std::min(kMaxStrainPerStep / (options_.rate * speed_.factor()),
+                                  assembly_->NominalCriticalStep());
   dt_ = options_.step_share *
         (estimate.critical_step > 0 ? std::min(largest, estimate.critical_step) : largest);
   for (std::size_t a = 0; a < 3; ++a) {
@@ -96,14 +109,15 @@ bool QuasiStatic::StressesWithin(const CellTarget& target, double tolerance) con
   return true;
 }
 
-double QuasiStatic::MaxServoRate(const CellTarget& target) const {
-  const bool all_stress = std::all_of(target.begin(), target.end(), [](const AxisTarget& t) {
-    return t.mode == AxisTarget::Mode::kStress;
-  });
-  return all_stress ? options_.rate : kServoRateOverDriven * options_.rate;
+double QuasiStatic::Rate(const CellTarget& target) const {
+  return AllByStress(target) ? options_.rate : options_.rate * speed_.factor();
 }
 
-StageEnd QuasiStatic::Step(const CellTarget& target, double damping, double max_servo_rate) {
+double QuasiStatic::MaxServoRate(const CellTarget& target) const {
+  return AllByStress(target) ? options_.rate : kServoRateOverDriven * Rate(target);
+}
+
+StageEnd QuasiStatic::Step(const CellTarget& target, double damping) {
   if (stop_.stop_requested()) {
     return StageEnd::kStopped;
   }
@@ -111,6 +125,8 @@ StageEnd QuasiStatic::Step(const CellTarget& target, double damping, double max_
   Motion motion{.stretch = {0, 0, 0}, .dt = dt_, .damping = damping};
   bool reached[3] = {false, false, false};
   const double furthest = FurthestToGo(target, cell);
+  const double rate = Rate(target);
+  const double max_servo_rate = MaxServoRate(target);
   for (std::size_t a = 0; a < 3; ++a) {
     if (target[a].mode == AxisTarget::Mode::kStress) {
       motion.stretch[a] = -servo_[a].Update({.error = target[a].value - assembly_->stress()[a],
@@ -122,13 +138,12 @@ StageEnd QuasiStatic::Step(const CellTarget& target, double damping, double max_
     const double remaining = target[a].value / cell.length[a] - 1.0;
     // Axes driven together arrive together: rate is that of the one with the furthest to go.
     const double share = furthest > 0 ? std::abs(remaining) / furthest : 1.0;
-    const double largest = options_.rate * dt_ * share;
+    const double largest = rate * dt_ * share;
     reached[a] = std::abs(remaining) <= largest;
     motion.stretch[a] = std::clamp(remaining, -largest, largest) / dt_;
   }
   const double shear = (target.displacement - cell.displacement) / cell.length[2];
-  const double shear_limit =
-      options_.rate * dt_ * (furthest > 0 ? std::abs(shear) / furthest : 1.0);
+  const double shear_limit = rate * dt_ * (furthest > 0 ? std::abs(shear) / furthest : 1.0);
   const bool sheared = std::abs(shear) <= shear_limit;
   motion.shear = std::clamp(shear, -shear_limit, shear_limit) / dt_ -
                  motion.stretch[0] * cell.displacement / cell.length[2];
@@ -156,19 +171,19 @@ CellTarget QuasiStatic::Current(const CellTarget& asked, FollowGap& gap) const {
 StageEnd QuasiStatic::Load(const CellTarget& asked) {
   FollowGap gap;
   CellTarget target = Current(asked, gap);
-  const double max_servo_rate = MaxServoRate(target);
   const bool by_length = Drives(target, assembly_->cell());
+  straining_ = !AllByStress(target);
   for (std::int64_t step = 0; step < options_.max_loading_steps; ++step) {
     target = Current(asked, gap);
     // A followed strain is there within one step; its settling closes the rest.
-    const bool there = follow_     ? gap.strain <= options_.rate * dt_
+    const bool there = follow_     ? gap.strain <= Rate(target) * dt_
                        : by_length ? !Drives(target, assembly_->cell())
                                    : StressesWithin(target, kLoadingTolerance);
     if (there) {
+      straining_ = false;
       return StageEnd::kDone;
     }
-    if (const StageEnd end = Step(target, options_.damping_loading, max_servo_rate);
-        end != StageEnd::kDone) {
+    if (const StageEnd end = Step(target, options_.damping_loading); end != StageEnd::kDone) {
       return end;
     }
   }
@@ -182,7 +197,6 @@ StageEnd QuasiStatic::Settle(const CellTarget& asked) {
   }
   FollowGap gap;
   CellTarget target = Current(asked, gap);
-  const double max_servo_rate = MaxServoRate(target);
   double unbalanced = 0;
   for (std::int64_t step = 0; step <= options_.max_settling_steps; ++step) {
     if (assembly_->cell().Volume() <= options_.least_volume) {
@@ -196,8 +210,7 @@ StageEnd QuasiStatic::Settle(const CellTarget& asked) {
         return StageEnd::kDone;
       }
     }
-    if (const StageEnd end = Step(target, options_.damping_settling, max_servo_rate);
-        end != StageEnd::kDone) {
+    if (const StageEnd end = Step(target, options_.damping_settling); end != StageEnd::kDone) {
       return end;
     }
   }

@@ -38,6 +38,7 @@ struct StageOptions {
                             ///< that move against each other allow sqrt(2). [Cundall & Strack 1979;
                             ///< O'Sullivan & Bray 2004]
   double least_volume = 0;  ///< a settling ends where the cell has shrunk to this [m^3]
+  bool adaptive = false;    ///< strained stages go faster than `rate` where forces stay balanced
   std::int64_t max_settling_steps = 200'000;  ///< a settling that takes longer has diverged
   std::int64_t max_loading_steps = 20'000'000;
 };
@@ -52,6 +53,30 @@ struct FollowGap {
 using Follow = std::function<FollowGap(const std::array<double, 3>& modulus, CellTarget& target)>;
 
 enum class StageEnd { kDone, kStopped, kDiverged };
+
+/// Rate of strained stages over StageOptions::rate, chosen at every inspection while straining so
+/// that the unbalanced force stays near kTarget times the one that ends a settling:
+///   f <- min(kFastest, max(1, f (kTarget unbalanced / U)^kGain))
+/// Elastic stages, which leave little unbalanced, go at several times the rate; where grains
+/// rearrange it is the rate asked for. All-stress stages keep the rate.
+class StrainingSpeed {
+ public:
+  /// U: mean unbalanced over mean contact force [-] >= 0; settled: StageOptions::unbalanced.
+  void Adapt(double unbalanced, double settled);
+  [[nodiscard]] double factor() const { return factor_; }
+
+  template <class Archive>
+  void Visit(Archive& archive) {
+    archive(factor_);
+  }
+
+  static constexpr double kFastest = 8;
+
+ private:
+  static constexpr double kTarget = 2;
+  static constexpr double kGain = 0.25;
+  double factor_ = 1;
+};
 
 /// Drives an assembly. Between calls its forces are those of its present configuration. Looks at
 /// the stop token every step.
@@ -85,6 +110,9 @@ class QuasiStatic {
   template <class Archive>
   void Visit(Archive& archive) {
     archive(servo_, modulus_, dt_, since_inspection_, begun_);
+    if (options_.adaptive) {
+      archive(speed_);
+    }
   }
 
   /// Why the last call returned kDiverged.
@@ -93,18 +121,21 @@ class QuasiStatic {
  private:
   StageEnd Begin();
   StageEnd Load(const CellTarget& target);
-  StageEnd Step(const CellTarget& target, double damping, double max_servo_rate);
+  StageEnd Step(const CellTarget& target, double damping);
   StageEnd Inspect();
   StageEnd Diverge(std::string reason);
   [[nodiscard]] CellTarget Current(const CellTarget& asked, FollowGap& gap) const;
   [[nodiscard]] bool StressesWithin(const CellTarget& target, double tolerance) const;
   [[nodiscard]] double MaxServoRate(const CellTarget& target) const;
+  [[nodiscard]] double Rate(const CellTarget& target) const;
 
   Assembly* assembly_;
   StageOptions options_;
   std::stop_token stop_;
   std::array<StressServo, 3> servo_;
   std::array<double, 3> modulus_ = {0, 0, 0};
+  StrainingSpeed speed_;
+  bool straining_ = false;  ///< not settling; false between calls
   double dt_ = 0;
   std::int64_t since_inspection_ = 0;
   bool begun_ = false;

@@ -1,7 +1,6 @@
 #include "dem/effects/viscous_damping.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "dem/contact/simd.h"
 
@@ -11,7 +10,7 @@ namespace {
 CALIB_DEM_CLONES void DampNormal(const Dashpot dashpot, ContactBlock& b) {
   const double scale = dashpot.twice_ratio * b.viscous;
   for (int k = 0; k < kBlock; ++k) {
-    const double mass = EffectiveMass(b.mass_factor * dashpot.mass, b.radius_i[k], b.radius_j[k]);
+    const double mass = EffectiveMass(dashpot.grains, b.mass_factor, b.radius_i[k], b.radius_j[k]);
     const double stiffness = b.normal_stiffness[k] > 0 ? b.normal_stiffness[k] : 0.0;
     const double c = scale * std::sqrt(mass * stiffness);
     const double elastic = b.normal_force[k];
@@ -26,7 +25,7 @@ CALIB_DEM_CLONES void DampShear(const Dashpot dashpot, ContactBlock& b) {
   const double scale = dashpot.twice_ratio * b.viscous;
   const double per_time = b.dt > 0 ? 1.0 / b.dt : 0.0;
   for (int k = 0; k < kBlock; ++k) {
-    const double mass = EffectiveMass(b.mass_factor * dashpot.mass, b.radius_i[k], b.radius_j[k]);
+    const double mass = EffectiveMass(dashpot.grains, b.mass_factor, b.radius_i[k], b.radius_j[k]);
     const double c = scale * std::sqrt(mass * b.tangential_stiffness[k]);
     const double limit = b.sliding_limit[k];
     const double spring = std::sqrt(b.fx[k] * b.fx[k] + b.fy[k] * b.fy[k] + b.fz[k] * b.fz[k]);
@@ -74,7 +73,7 @@ std::unique_ptr<ContactKernel> MakeShear(const KernelContext& context) {
 
 Dashpot DashpotFrom(const KernelContext& context) {
   return {.twice_ratio = 2.0 * context.parameters.Get("ratio"),
-          .mass = 4.0 / 3.0 * std::numbers::pi * context.density};
+          .grains = GrainMassOf(context.density, context.thickness)};
 }
 
 EffectEntry ViscousDamping() {

@@ -2,7 +2,7 @@
 // `viscous_damping`: dashpots beside the springs of a contact.
 
 #include "dem/catalog/registry.h"
-#include "dem/contact/quad.h"
+#include "dem/contact/grain_mass.h"
 
 namespace calib::dem {
 
@@ -13,23 +13,16 @@ namespace calib::dem {
 /// beta is the damping ratio of two grains on a linear spring, 1 critical. With linear contacts
 /// their restitution is exp(-beta/sqrt(1-beta^2) (pi - arctan(2 beta sqrt(1-beta^2)/(2 beta^2-1))))
 /// [Schwager & Poeschel 2007, Eq. 14]; with Hertz contacts it does not depend on speed either
-/// [Tsuji, Tanaka & Ishida 1992]. Masses are those of spheres. Off during consolidation; in staged
-/// quasi-static tests little is left of it, since a settled state has no velocities. One-sided,
-/// vanishes at beta = 0. The time step follows the dashpots.
+/// [Tsuji, Tanaka & Ishida 1992]. Masses are those of the grains, spheres or disks. Off during
+/// consolidation; in staged quasi-static tests little is left of it, since a settled state has no
+/// velocities. One-sided, vanishes at beta = 0. The time step follows the dashpots.
 EffectEntry ViscousDamping();
 
 /// What the dashpots of all contacts have in common.
 struct Dashpot {
   double twice_ratio = 0;  ///< 2 beta
-  double mass = 0;         ///< of a sphere over r^3 [kg/m^3]
+  GrainMass grains{};
 };
 Dashpot DashpotFrom(const KernelContext& context);
-
-/// m1 m2/(m1 + m2) [kg]; mass: of a sphere over r^3 [kg/m^3].
-CALIB_DEM_INLINE double EffectiveMass(double mass, double ri, double rj) {
-  const double i3 = ri * ri * ri;
-  const double j3 = rj * rj * rj;
-  return mass * (i3 * j3 / (i3 + j3));
-}
 
 }  // namespace calib::dem

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -61,10 +60,10 @@ ContactStage StageOf(const UserEffect& effect) {
 }
 
 FormulaKernel::FormulaKernel(const UserEffect& effect, const ParameterSet& parameters,
-                             double density, std::shared_ptr<const StageState> stage)
+                             const GrainMass& grains, std::shared_ptr<const StageState> stage)
     : effect_(effect),
       formula_(effect.formula, FormulaNames(effect)),
-      mass_(4.0 / 3.0 * std::numbers::pi * density),
+      grains_(grains),
       stage_(std::move(stage)),
       viscous_(IsViscous(effect)),
       remembers_(Uses(formula_, kSlidingDistance)),
@@ -99,11 +98,8 @@ double FormulaKernel::ValueAt(int quantity, const ContactBlock& b, int first, in
       return std::min(b.radius_i[k], b.radius_j[k]);
     case kLargerRadius:
       return std::max(b.radius_i[k], b.radius_j[k]);
-    case kEffectiveMass: {
-      const double i = b.radius_i[k] * b.radius_i[k] * b.radius_i[k];
-      const double j = b.radius_j[k] * b.radius_j[k] * b.radius_j[k];
-      return b.mass_factor * mass_ * (i * j / (i + j));
-    }
+    case kEffectiveMass:
+      return EffectiveMass(grains_, b.mass_factor, b.radius_i[k], b.radius_j[k]);
     case kMeanStress:
       return stage_->mean_stress;
     case kDeviatoricStress:

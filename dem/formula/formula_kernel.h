@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "dem/contact/contact_kernel.h"
+#include "dem/contact/grain_mass.h"
 #include "dem/formula/formula.h"
 #include "dem/formula/user_effect.h"
 
@@ -38,7 +39,7 @@ ContactStage StageOf(const UserEffect& effect);
 class FormulaKernel final : public ContactKernel {
  public:
   /// Precondition: UserEffectProblems() finds nothing. stage: may be null where !NeedsStage().
-  FormulaKernel(const UserEffect& effect, const ParameterSet& parameters, double density,
+  FormulaKernel(const UserEffect& effect, const ParameterSet& parameters, const GrainMass& grains,
                 std::shared_ptr<const StageState> stage);
 
   [[nodiscard]] int HistorySize() const override { return remembers_ ? 1 : 0; }
@@ -58,7 +59,7 @@ class FormulaKernel final : public ContactKernel {
   UserEffect effect_;
   Formula formula_;
   std::vector<double> parameters_;  ///< in the order of the effect
-  double mass_ = 0;                 ///< of a sphere of radius 1 [kg]
+  GrainMass grains_;
   std::shared_ptr<const StageState> stage_;
   bool viscous_ = false;
   bool remembers_ = false;  ///< the sliding distance

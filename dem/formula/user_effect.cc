@@ -31,7 +31,7 @@ const std::vector<FormulaQuantity>& Contact() {
       {"effective_radius", "m", "r1 r2/(r1 + r2); at a wall the grain's radius"},
       {"smaller_radius", "m", "of the two grains"},
       {"larger_radius", "m", "of the two grains"},
-      {"effective_mass", "kg", "m1 m2/(m1 + m2) of spheres; at a wall the grain's"},
+      {"effective_mass", "kg", "m1 m2/(m1 + m2); at a wall the grain's"},
   };
   return *all;
 }

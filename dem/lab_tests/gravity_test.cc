@@ -27,8 +27,7 @@ ParameterInfo Chosen(const std::string& name, const std::string& unit,
 
 ParameterInfo ThicknessOfDisks() {
   return Setting("thickness", "m", {.value = 0, .min = 0, .max = 10},
-                 "of disks whose axes stand on the plane (viscous_damping takes their masses as of "
-                 "spheres); 0: the grains are spheres");
+                 "of disks whose axes stand on the plane; 0: the grains are spheres");
 }
 
 std::vector<ParameterInfo> WithCommonSettings(std::vector<ParameterInfo> own) {

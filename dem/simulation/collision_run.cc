@@ -83,7 +83,7 @@ std::vector<Impact> ImpactsOf(const Scenario& scenario) {
 class CollisionRun {
  public:
   CollisionRun(const Scenario& scenario, std::stop_token stop)
-      : model_(scenario.model), stop_(std::move(stop)) {
+      : model_(scenario.model, SettingOf(scenario, "thickness")), stop_(std::move(stop)) {
     const double thickness = SettingOf(scenario, "thickness");
     body_ = MakeBody(SettingOf(scenario, "radius"), thickness, scenario.model.density);
     partner_ = MakeBody(SettingOf(scenario, "partner_radius"), thickness, scenario.model.density);

@@ -167,6 +167,7 @@ class ElementTestRun {
     options.damping_loading = *staging.damping_loading;
     options.damping_settling = *staging.damping_settling;
     options.unbalanced = *staging.unbalanced;
+    options.adaptive = staging.adaptive;
     return options;
   }
 

@@ -12,8 +12,10 @@ namespace {
 /// their scatter (dem/VERIFICATION.md, rate study). [GDR MiDi 2004: quasi-static below about 1e-3]
 constexpr double kInertialNumber = 5e-4;
 constexpr double kStep = 0.002;
+constexpr double kAdaptiveStep = 0.02;  ///< settled at every reading anyway
 constexpr double kDampingLoading = 0.2;
 constexpr double kDampingSettling = 0.9;
+constexpr double kAdaptiveDampingSettling = 0.7;  ///< fewest steps of 0.5, 0.7 and 0.9
 constexpr double kUnbalanced = 5e-4;
 
 double PressureScale(const Scenario& scenario) {
@@ -33,13 +35,16 @@ const ElementTestEntry& ElementTestNamed(const std::string& test) {
 
 Staging ResolveStaging(const Scenario& scenario, const Assembly& assembly) {
   const Staging& given = scenario.staging;
+  const bool adaptive = given.adaptive && !scenario.loading_rate;
   const double quasi_static_rate = kInertialNumber / assembly.mean_diameter() *
                                    std::sqrt(PressureScale(scenario) / scenario.model.density);
   return {.rate = given.rate.value_or(quasi_static_rate),
-          .step = given.step.value_or(kStep),
+          .step = given.step.value_or(adaptive ? kAdaptiveStep : kStep),
           .damping_loading = given.damping_loading.value_or(kDampingLoading),
-          .damping_settling = given.damping_settling.value_or(kDampingSettling),
-          .unbalanced = given.unbalanced.value_or(kUnbalanced)};
+          .damping_settling = given.damping_settling.value_or(adaptive ? kAdaptiveDampingSettling
+                                                                       : kDampingSettling),
+          .unbalanced = given.unbalanced.value_or(kUnbalanced),
+          .adaptive = adaptive};
 }
 
 Alterations AlterationsOf(const Scenario& scenario) {

@@ -83,7 +83,8 @@ double GravityRun::fall_time() const { return std::sqrt(mean_diameter_ / gravity
 
 Assembly GravityRun::Make(const Packing& grains, Surroundings surroundings) const {
   surroundings.gravity = {0, 0, -gravity()};
-  return {grains, scenario_.model.density, ContactModel(scenario_.model), std::move(surroundings),
+  ContactModel model(scenario_.model, surroundings.thickness);
+  return {grains, scenario_.model.density, std::move(model), std::move(surroundings),
           scenario_.threads};
 }
 

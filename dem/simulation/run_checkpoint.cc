@@ -96,6 +96,12 @@ std::string OptionalBytes(const std::vector<std::optional<double>>& values) {
   return std::move(archive.bytes());
 }
 
+std::string StagingBytes(const Staging& staging) {
+  std::string bytes = OptionalBytes({staging.rate, staging.step, staging.damping_loading,
+                                     staging.damping_settling, staging.unbalanced});
+  return staging.adaptive ? bytes + "adaptive" : bytes;
+}
+
 /// Member by member: what lies between them is anything.
 std::string PathBytes(const std::vector<ControlPoint>& path) {
   SaveArchive archive;
@@ -134,8 +140,7 @@ std::vector<Part> PartsOf(const Scenario& s) {
            OptionalBytes({s.consolidation.friction_coefficient, s.consolidation.porosity})},
           {"initial stress", OptionalBytes({axial, lateral})},
           {"loading rate", OptionalBytes({s.loading_rate})},
-          {"staging", OptionalBytes({s.staging.rate, s.staging.step, s.staging.damping_loading,
-                                     s.staging.damping_settling, s.staging.unbalanced})},
+          {"staging", StagingBytes(s.staging)},
           {"control path", PathBytes(s.path)},
           {"seed", Bytes(s.seed)},
           {"meshes", MeshBytes(s.meshes)}};

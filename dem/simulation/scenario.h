@@ -51,7 +51,10 @@ struct Staging {
       damping_loading;  ///< local (Cundall) damping while straining [-], default 0.2
   std::optional<double> damping_settling;  ///< while settling [-], default 0.9
   std::optional<double>
-      unbalanced;  ///< mean unbalanced force / mean contact force that ends a settling [-]
+      unbalanced;         ///< mean unbalanced force / mean contact force that ends a settling [-]
+  bool adaptive = false;  ///< fewer steps to the same curve: strains up to eight times as fast as
+                          ///< `rate` where forces stay balanced, and settles at readings only, with
+                          ///< less damping, unless step and damping_settling say otherwise
 };
 
 /// One point of the control path. Points are visited in order; the control may go down again.

@@ -115,6 +115,15 @@ TEST(RunCheckpoint, TurningPointsAndRealRatesGoOnBitForBit) {
   ExpectToGoOn(scenario);
 }
 
+TEST(RunCheckpoint, AdaptiveStagingGoesOnBitForBit) {
+  for (Scenario scenario : {ElementTest("triaxial_drained", {0, 0.004, 0.002, 0.006, 0.03}),
+                            ElementTest("oedometric", {0, 0.01, 0.006, 0.01})}) {
+    SCOPED_TRACE(scenario.test);
+    scenario.staging.adaptive = true;
+    ExpectToGoOn(scenario);
+  }
+}
+
 TEST(RunCheckpoint, EffectsThatChangeGrainsReadingsOrStartGoOnBitForBit) {
   const Scenario plain = ElementTest("oedometric", {0, 0.01, 0.02});
   for (const Scenario& scenario :
@@ -193,6 +202,9 @@ TEST(RunCheckpoint, OfAnotherRunIsRefusedNamingWhatDiffers) {
   Scenario grains = scenario;
   grains.packing.x[7] += 1e-12;
   EXPECT_THAT(CheckpointProblem(grains, bytes), HasSubstr("what differs: packing"));
+  Scenario adaptive = scenario;
+  adaptive.staging.adaptive = true;
+  EXPECT_THAT(CheckpointProblem(adaptive, bytes), HasSubstr("what differs: staging"));
   Scenario effect = With(scenario, "rolling_resistance", {{"stiffness", 0}, {"friction", 0}});
   EXPECT_THAT(CheckpointProblem(effect, bytes), HasSubstr("what differs: effects"));
   int states = 0;

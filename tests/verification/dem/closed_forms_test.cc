@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 
 #include "dem/dynamics/quasi_static.h"
@@ -76,6 +77,63 @@ TEST(TangentialLoop, MindlinStiffnessBetweenCoulombsLimits) {
   walk(-1, 2 * steps);
   const double enclosed = 4 * limit * (largest - limit / stiffness);
   EXPECT_NEAR(work, enclosed, 1e-3 * enclosed);
+}
+
+/// Work of a cycle between -d and d at a constant normal force, with partial slip, over (mu F)^2/k.
+/// x = d k/(mu F), k the initial stiffness. Loading follows T = mu F (1 - (1 - 2d/3)^1.5) to gross
+/// sliding at x = 1.5, unloading and reloading are that curve twice as large [Mindlin & Deresiewicz
+/// 1953; Johnson 1985, sec. 7.4].
+double MindlinDeresiewiczLoop(double x) {
+  constexpr int kSteps = 20000;
+  const auto shear = [](double d) { return d < 1.5 ? 1 - std::pow(1 - 2 * d / 3, 1.5) : 1.0; };
+  double work = 0;  // between the branches up from (-x, -T) and down from (x, T)
+  for (int s = 0; s < kSteps; ++s) {
+    const double d = -x + 2 * x * (s + 0.5) / kSteps;
+    const double up = 2 * shear((d + x) / 2) - shear(x);
+    const double down = shear(x) - 2 * shear((x - d) / 2);
+    work += (up - down) * 2 * x / kSteps;
+  }
+  return work;
+}
+
+// What the missing partial slip costs. Mindlin and Deresiewicz lose 36/5 (1 - (1-t)^(5/3) - 5t/6 (1
+// + (1-t)^(2/3))) in a cycle to t = T/(mu F) < 1, and 4 (x - 6/5) beyond gross sliding; without
+// partial slip it is nothing and 4 (x - 1).
+TEST(TangentialLoop, WithoutPartialSlipSmallLoopsLoseNothingAndWideOnesALittleMore) {
+  for (const double t : {0.2, 0.5, 0.9, 1.0}) {
+    const double x = 1.5 * (1 - std::pow(1 - t, 2.0 / 3));
+    const double closed =
+        7.2 * (1 - std::pow(1 - t, 5.0 / 3) - 5 * t / 6 * (1 + std::pow(1 - t, 2.0 / 3)));
+    EXPECT_NEAR(MindlinDeresiewiczLoop(x), closed, 1e-4 * closed) << t;
+  }
+  EXPECT_NEAR(MindlinDeresiewiczLoop(3), 4 * (3 - 1.2), 1e-4 * 7.2);
+
+  const Model model = test::HertzModel();
+  constexpr double kOverlap = 2e-6;
+  ShearedPair pair(model, kOverlap);
+  const double stiffness = -pair.Displace(1e-12) / 1e-12;
+  const double limit = 0.55 * pair.normal_force();
+  const auto loop = [&](double x) {  // over (mu F)^2/k, the second cycle
+    constexpr int kSteps = 2000;
+    const double d = x * limit / stiffness / kSteps;
+    double force = pair.Displace(0);
+    double work = 0;
+    for (const int cycle : {0, 1}) {
+      work = 0;
+      for (const auto& [direction, count] :
+           {std::pair(cycle == 0 ? 1 : 0, kSteps), std::pair(cycle == 0 ? 0 : 1, 2 * kSteps),
+            std::pair(-1, 2 * kSteps)}) {
+        for (int s = 0; s < count; ++s) {
+          const double next = pair.Displace(direction * d);
+          work -= 0.5 * (force + next) * direction * d;
+          force = next;
+        }
+      }
+    }
+    return work * stiffness / (limit * limit);
+  };
+  EXPECT_NEAR(loop(0.9), 0, 1e-6);  // Mindlin and Deresiewicz: 0.196
+  EXPECT_NEAR(loop(3), 4 * (3 - 1), 1e-2);
 }
 
 /// Simple cubic lattice of linear contacts, 4 x 4 x 4, just touching.

@@ -7,6 +7,7 @@
 
 #include "dem/catalog/catalog.h"
 #include "tests/support/dem/scenarios.h"
+#include "tests/support/dem/user_effects.h"
 
 namespace calib::dem {
 namespace {
@@ -185,6 +186,40 @@ TEST(Collision, TwoSpheresAndDisks) {
   EXPECT_NEAR(Value(flat.states[0], "peak_overlap"), expected, 1e-6 * expected);
   EXPECT_NEAR(Value(flat.states[0], "rebound_spin"), -2 * 2 * 0.2 * v / kRadius,
               5e-3 * v / kRadius);  // I = m r^2/2
+}
+
+// Dashpots take the masses of the bodies that collide: a linear contact with beta = 0.3 restitutes
+// the same [Schwager & Poeschel 2007, Eq. 14], be they spheres or disks, equal or not, or at a
+// wall; so does the same dashpot written as a formula.
+TEST(Collision, DashpotsTakeTheMassOfSpheresAndDisks) {
+  const double beta = 0.3;
+  const double root = std::sqrt(1 - beta * beta);
+  const double phase = std::atan2(2 * beta * root, -(2 * beta * beta - 1));
+  const double expected = std::exp(-beta / root * (std::numbers::pi - phase));
+  Scenario damped = Steel("linear", {{"friction_coefficient", 0}});
+  damped.model.effects = {"viscous_damping"};
+  damped.model.parameters["viscous_damping.ratio"] = beta;
+  Scenario formula = Steel("linear", {{"friction_coefficient", 0}});
+  formula.model = test::Joined(
+      formula.model,
+      test::Formula("normal_force",
+                    "max(2 * c * sqrt(effective_mass * normal_stiffness) * closing_velocity, "
+                    "-normal_force)"),
+      {beta});
+  for (Scenario s : {damped, formula}) {
+    for (const double thickness : {0.0, 0.003}) {
+      for (const double partner : {0.0, kRadius, 0.4 * kRadius}) {
+        SCOPED_TRACE(s.model.effects.front() + " " + std::to_string(thickness) + " " +
+                     std::to_string(partner));
+        s.settings["thickness"] = thickness;
+        s.settings.erase("partner_radius");
+        if (partner > 0) {
+          s.settings["partner_radius"] = partner;
+        }
+        EXPECT_NEAR(Value(test::RunAll(s).states[1], "normal_restitution"), expected, 2e-3);
+      }
+    }
+  }
 }
 
 TEST(Collision, NeverGainsEnergy) {

@@ -47,6 +47,15 @@ TEST(Determinism, ThreadsAndRunsChangeNoBit) {
   }
 }
 
+TEST(Determinism, ThreadsChangeNoBitOfAdaptiveStaging) {
+  Scenario s = Large();
+  s.test = "oedometric";
+  s.staging.adaptive = true;
+  const test::Run one = test::RunAll(s);
+  s.threads = 3;
+  ExpectSameBits(one, test::RunAll(s));
+}
+
 TEST(Determinism, OrderOfGrainsInTheFileDoesNotMatter) {
   const Scenario s = test::SmallTriaxial(test::HertzModel());
   Scenario shuffled = s;

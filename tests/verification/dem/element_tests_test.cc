@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "dem/catalog/catalog.h"
 #include "tests/support/dem/scenarios.h"
 
@@ -114,6 +117,64 @@ TEST(Consolidation, InitialStressReplacesTheIsotropicStart) {
   ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
   EXPECT_NEAR(Value(run.states[0], "axial_stress"), 3e5, 3e2);
   EXPECT_NEAR(Value(run.states[2], "lateral_stress"), 2e5, 2e2);
+}
+
+/// Largest difference of an observable over its largest value.
+double LargestDifference(const test::Run& a, const test::Run& b, const std::string& name) {
+  double difference = 0;
+  double largest = 0;
+  for (std::size_t k = 0; k < a.states.size(); ++k) {
+    difference =
+        std::max(difference, std::abs(Value(a.states[k], name) - Value(b.states[k], name)));
+    largest = std::max(largest, std::abs(Value(a.states[k], name)));
+  }
+  return difference / largest;
+}
+
+// How near with 1000 grains: StagingSlow.Adaptive* in staging_study_test.cc.
+TEST(AdaptiveStaging, ReachesTheCurveInFewerSteps) {
+  Scenario fixed = test::SmallTriaxial(test::HertzModel());
+  fixed.test = "oedometric";
+  fixed.packing = test::SmallPacking(200);
+  fixed.path.clear();
+  for (const double strain : {0.0, 0.005, 0.01, 0.015, 0.02, 0.015, 0.01, 0.02}) {
+    fixed.path.push_back({.target = strain, .load_step = static_cast<int>(fixed.path.size())});
+  }
+  Scenario adaptive = fixed;
+  adaptive.staging.adaptive = true;
+  const test::Run a = test::RunAll(fixed);
+  const test::Run b = test::RunAll(adaptive);
+  ASSERT_EQ(b.summary.outcome, Outcome::kCompleted) << b.summary.reason;
+  EXPECT_LT(static_cast<double>(b.summary.steps), 0.8 * static_cast<double>(a.summary.steps));
+  EXPECT_LT(LargestDifference(a, b, "axial_stress"), 0.01);
+  EXPECT_LT(LargestDifference(a, b, "lateral_stress"), 0.01);
+  EXPECT_NEAR(Value(b.states[4], "axial_strain"), 0.02, 1e-15);
+}
+
+TEST(AdaptiveStaging, SaysWhatItUsesAndKeepsWhatIsGiven) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.path.resize(1);
+  s.staging.adaptive = true;
+  const Staging chosen = test::RunAll(s).summary.staging;
+  EXPECT_TRUE(chosen.adaptive);
+  EXPECT_EQ(*chosen.step, 0.02);
+  EXPECT_EQ(*chosen.damping_settling, 0.7);
+  s.staging.step = 0.001;
+  s.staging.damping_settling = 0.8;
+  const Staging given = test::RunAll(s).summary.staging;
+  EXPECT_EQ(*given.step, 0.001);
+  EXPECT_EQ(*given.damping_settling, 0.8);
+}
+
+TEST(AdaptiveStaging, DoesNotTouchARealRate) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.loading_rate = 1;
+  const test::Run plain = test::RunAll(s);
+  s.staging.adaptive = true;
+  const test::Run same = test::RunAll(s);
+  EXPECT_FALSE(same.summary.staging.adaptive);
+  EXPECT_EQ(same.summary.steps, plain.summary.steps);
+  EXPECT_EQ(same.states.back().values, plain.states.back().values);
 }
 
 TEST(LoadingRate, FastLoadingIsStrongerThanQuasiStatic) {

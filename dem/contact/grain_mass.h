@@ -1,0 +1,29 @@
+#pragma once
+// Masses of grains that touch, from their radii alone.
+
+#include <numbers>
+
+#include "dem/contact/quad.h"
+
+namespace calib::dem {
+
+/// m = unit r^3 of spheres, unit r^2 depth of disks, which is rho pi r^2 t [InertiaOf()].
+struct GrainMass {
+  double unit = 0;   ///< 4/3 pi rho [kg/m^3]
+  double depth = 0;  ///< 3/4 of the thickness t of disks [m]; 0: the grains are spheres
+};
+
+/// density [kg/m^3], thickness of disks, or 0 [m].
+inline GrainMass GrainMassOf(double density, double thickness) {
+  return {.unit = 4.0 / 3.0 * std::numbers::pi * density, .depth = 0.75 * thickness};
+}
+
+/// m_i m_j/(m_i + m_j) [kg]; factor: ContactBlock::mass_factor.
+CALIB_DEM_INLINE double EffectiveMass(const GrainMass& grains, double factor, double ri,
+                                      double rj) {
+  const double i = ri * ri * (grains.depth > 0 ? grains.depth : ri);
+  const double j = rj * rj * (grains.depth > 0 ? grains.depth : rj);
+  return factor * grains.unit * (i * j / (i + j));
+}
+
+}  // namespace calib::dem
