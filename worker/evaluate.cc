@@ -24,7 +24,8 @@ std::string ToText(const dem::Staging& staging) {
   return absl::StrCat("rate=", staging.rate.value_or(0), " step=", staging.step.value_or(0),
                       " damping=", staging.damping_loading.value_or(0), ",",
                       staging.damping_settling.value_or(0),
-                      " unbalanced=", staging.unbalanced.value_or(0));
+                      " unbalanced=", staging.unbalanced.value_or(0),
+                      staging.adaptive ? " adaptive" : "");
 }
 
 v1::Finished Ended(v1::Finished::Outcome outcome, const absl::Status& status) {

@@ -23,6 +23,7 @@ dem::Staging StagingFromMessage(const v1::Staging& message) {
   if (message.has_unbalanced()) {
     staging.unbalanced = message.unbalanced();
   }
+  staging.adaptive = message.adaptive();
   return staging;
 }
 

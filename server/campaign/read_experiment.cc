@@ -139,6 +139,9 @@ void ReadStaging(MapReader& map, Experiment& experiment) {
   experiment.staging.unbalanced =
       staging->Quantity("unbalanced", "1", {.min = 0, .max = 1, .min_open = true});
   ReadDamping(*staging, experiment.staging);
+  if (const auto adaptive = staging->Choice("adaptive", {"true", "false"})) {
+    experiment.staging.adaptive = *adaptive == "true";
+  }
   staging->Finish();
 }
 

@@ -47,6 +47,7 @@ v1::Staging ToMessage(const dem::Staging& staging) {
   if (staging.unbalanced.has_value()) {
     message.set_unbalanced(*staging.unbalanced);
   }
+  message.set_adaptive(staging.adaptive);
   return message;
 }
 

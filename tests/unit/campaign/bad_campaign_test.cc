@@ -88,6 +88,10 @@ INSTANTIATE_TEST_SUITE_P(
                 "max_iterations: 3, freeze: {0: [young_modulus]}}",
                 "c.yaml:36: inference.freeze.0: is no iteration after the first; allowed: 1 to 2 "
                 "(the first is 0)"},
+        Mistake{"AdaptiveStagingOften", "    control: axial_strain\n",
+                "    control: axial_strain\n    staging: {adaptive: often}\n",
+                "c.yaml:22: experiments[1].staging.adaptive: 'often' is unknown; allowed: true, "
+                "false"},
         Mistake{"FreezeNobody", "max_iterations: 3}",
                 "max_iterations: 3, freeze: {1: [youngs_modulus]}}",
                 "c.yaml:36: inference.freeze: 'youngs_modulus' is not calibrated here; write names "

@@ -251,6 +251,16 @@ TEST(CampaignFile, ReadsWhatIsHeldWhen) {
   EXPECT_EQ(c.replicates, 5);
 }
 
+TEST(CampaignFile, ReadsAdaptiveStaging) {
+  EXPECT_FALSE(Read(GoodYaml()).campaign.experiments[0].staging.adaptive);
+  const Campaign c = Read(Spoiled("    control: axial_strain\n",
+                                  "    control: axial_strain\n"
+                                  "    staging: {adaptive: true, unbalanced: 1e-3}\n"))
+                         .campaign;
+  EXPECT_TRUE(c.experiments[0].staging.adaptive);
+  EXPECT_EQ(c.experiments[0].staging.unbalanced, 1e-3);
+}
+
 TEST(Identity, ChangesWithEverythingSubmitted) {
   Submission a{
       .campaign_file = "x", .file_name = "c.yaml", .files = {{"p", "d"}}, .seed = std::nullopt};

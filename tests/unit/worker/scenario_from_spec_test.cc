@@ -25,7 +25,8 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
                       .step = 0.002,
                       .damping_loading = 0.2,
                       .damping_settling = 0.9,
-                      .unbalanced = 5e-4};
+                      .unbalanced = 5e-4,
+                      .adaptive = true};
   scenario.path = {{.target = 0.01, .load_step = 0}, {.target = 0.005, .load_step = -1}};
   scenario.seed = 18446744073709551615U;
   const dem::PackingRecipe recipe{.particles = 321, .porosity = 0.4, .seed = 9};
@@ -42,6 +43,7 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
   EXPECT_EQ(back.initial_stress->axial, 2e5);
   EXPECT_EQ(back.loading_rate, scenario.loading_rate);
   EXPECT_EQ(back.staging.unbalanced, scenario.staging.unbalanced);
+  EXPECT_TRUE(back.staging.adaptive);
   ASSERT_EQ(back.path.size(), 2U);
   EXPECT_EQ(back.path[1].target, 0.005);
   EXPECT_EQ(back.path[1].load_step, -1);
@@ -97,6 +99,7 @@ TEST(ScenarioFromSpec, UserEffectsTravelWhereTheyAreUsed) {
 TEST(ScenarioFromSpec, WhatIsNotSetStaysUnset) {
   const dem::Scenario scenario = ScenarioFromSpec(v1::AttemptSpec());
   EXPECT_FALSE(scenario.staging.rate.has_value());
+  EXPECT_FALSE(scenario.staging.adaptive);
   EXPECT_FALSE(scenario.loading_rate.has_value());
   EXPECT_FALSE(scenario.initial_stress.has_value());
   EXPECT_EQ(scenario.threads, 1);
