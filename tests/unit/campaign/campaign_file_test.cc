@@ -297,12 +297,15 @@ TEST(CampaignFile, ReadsGroupsOfNoise) {
 TEST(CampaignFile, ReadsWhatIsHeldWhen) {
   const Campaign c = Read(Spoiled("max_iterations: 3}",
                                   "max_iterations: 3, freeze: {1: [young_modulus], 2: converged}, "
-                                  "reversed_path: true, replicates: 5}"))
+                                  "reversed_path: true, replicates: 5, "
+                                  "mixture: parameters_and_states}"))
                          .campaign;
   EXPECT_THAT(c.freeze.at(1).names, ElementsAre("young_modulus"));
   EXPECT_TRUE(c.freeze.at(2).converged);
   EXPECT_TRUE(c.filter.reversed_path);
   EXPECT_EQ(c.replicates, 5);
+  EXPECT_EQ(c.filter.mixture, inference::MixtureOver::kParametersAndStates);
+  EXPECT_EQ(Read(GoodYaml()).campaign.filter.mixture, inference::MixtureOver::kParameters);
 }
 
 TEST(Identity, ChangesWithEverythingSubmitted) {
