@@ -4,11 +4,13 @@
 #include <boost/math/special_functions/gamma.hpp>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numbers>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/filter/wide_exponential.h"
 
 namespace calib::inference {
 namespace {
@@ -24,35 +26,121 @@ bool AllFinite(const Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>&
   return sum == 0;
 }
 
-// Lower Cholesky factor of Sigma; its smallest pivot tells how much of the last reading the earlier
-// ones leave open.
-absl::StatusOr<Eigen::MatrixXd> CorrelatedCholesky(const DataSet& data, std::pair<int, int> key,
-                                                   const std::vector<int>& members) {
-  const Eigen::MatrixXd correlation = ErrorCorrelation(data, key, members);
+absl::Status Singular(const DataSet& data, std::pair<int, int> key, int reading) {
+  return absl::InvalidArgumentError(absl::StrCat(
+      "the errors of the readings of observable ", key.second, " of experiment ", key.first,
+      " have a singular covariance: the one near the control ",
+      data.readings[static_cast<std::size_t>(reading)].control,
+      " follows from those before it; leave out readings that lie too close together."));
+}
+
+// Lower Cholesky factor of a correlation matrix, up to the first reading that the earlier ones
+// leave too little of (its index is returned; no such: the number of readings).
+Eigen::Index Factorise(const Eigen::MatrixXd& correlation, Eigen::MatrixXd& factor,
+                       Eigen::VectorXd& open) {
   const Eigen::Index size = correlation.rows();
-  Eigen::MatrixXd factor = Eigen::MatrixXd::Zero(size, size);
+  factor = Eigen::MatrixXd::Zero(size, size);
+  open = Eigen::VectorXd::Zero(size);
   for (Eigen::Index i = 0; i < size; ++i) {
     for (Eigen::Index j = 0; j <= i; ++j) {
       double value = correlation(i, j);
       for (Eigen::Index k = 0; k < j; ++k) value -= factor(i, k) * factor(j, k);
       if (i > j) {
         factor(i, j) = value / factor(j, j);
-      } else if (value > 1e-13) {
-        factor(i, i) = std::sqrt(value);
-      } else {
-        return absl::InvalidArgumentError(absl::StrCat(
-            "the errors of the readings of observable ", key.second, " of experiment ", key.first,
-            " have a singular covariance: the one near the control ",
-            data.readings[members[i]].control,
-            " follows from those before it; leave out readings that lie too close together."));
+        continue;
       }
+      open[i] = value;
+      if (!(value > kLeastOpenShare)) return i;
+      factor(i, i) = std::sqrt(value);
     }
   }
-  for (Eigen::Index i = 0; i < size; ++i) factor.row(i) *= data.readings[members[i]].sd;
+  return size;
+}
+
+// Lower Cholesky factor of Sigma.
+absl::StatusOr<Eigen::MatrixXd> CorrelatedCholesky(const DataSet& data, std::pair<int, int> key,
+                                                   const std::vector<int>& members) {
+  Eigen::MatrixXd factor;
+  Eigen::VectorXd open;
+  const Eigen::Index factorised = Factorise(ErrorCorrelation(data, key, members), factor, open);
+  if (factorised < factor.rows()) {
+    return Singular(data, key, members[static_cast<std::size_t>(factorised)]);
+  }
+  for (Eigen::Index i = 0; i < factor.rows(); ++i)
+    factor.row(i) *= data.readings[static_cast<std::size_t>(members[i])].sd;
   return factor;
 }
 
+// The length of exponential correlation where it makes a chain of the readings, whose control then
+// only grows or only falls; 0: independent errors, or a covariance that is no chain.
+double ChainLength(const DataSet& data, std::pair<int, int> key, const std::vector<int>& members) {
+  const auto length = std::find_if(
+      data.correlations.begin(), data.correlations.end(),
+      [&key](const auto& c) { return c.experiment == key.first && c.observable == key.second; });
+  if (length == data.correlations.end()) return 0;
+  const auto control = [&data, &members](std::size_t k) {
+    return data.readings[static_cast<std::size_t>(members[k])].control;
+  };
+  for (std::size_t k = 2; k < members.size(); ++k) {
+    if ((control(k) > control(k - 1)) != (control(1) > control(0))) return 0;
+  }
+  return length->length;
+}
+
+// sum <- sum - factor * the eight numbers from there on.
+[[gnu::always_inline]] inline void Subtract(double factor, const double* from, Lanes& sum) {
+  Lanes term;
+  std::memcpy(&term, from, sizeof(term));
+  sum -= factor * term;
+}
+
+// z <- z - sum_l factors_l earlier_l over n samples, the terms in order; four times eight samples
+// stay in registers until all terms are taken off.
+CALIB_INFERENCE_CLONES void SubtractEarlier(const double* factors, const double* const* earlier,
+                                            Eigen::Index terms, Eigen::Index n, double* z) {
+  Eigen::Index i = 0;
+  for (; i + 4 * kLanes <= n; i += 4 * kLanes) {
+    Lanes first;
+    Lanes second;
+    Lanes third;
+    Lanes fourth;
+    std::memcpy(&first, z + i, sizeof(Lanes));
+    std::memcpy(&second, z + i + kLanes, sizeof(Lanes));
+    std::memcpy(&third, z + i + 2 * kLanes, sizeof(Lanes));
+    std::memcpy(&fourth, z + i + 3 * kLanes, sizeof(Lanes));
+    for (Eigen::Index l = 0; l < terms; ++l) {
+      const double* of_term = earlier[l] + i;
+      Subtract(factors[l], of_term, first);
+      Subtract(factors[l], of_term + kLanes, second);
+      Subtract(factors[l], of_term + 2 * kLanes, third);
+      Subtract(factors[l], of_term + 3 * kLanes, fourth);
+    }
+    std::memcpy(z + i, &first, sizeof(Lanes));
+    std::memcpy(z + i + kLanes, &second, sizeof(Lanes));
+    std::memcpy(z + i + 2 * kLanes, &third, sizeof(Lanes));
+    std::memcpy(z + i + 3 * kLanes, &fourth, sizeof(Lanes));
+  }
+  for (; i < n; ++i) {
+    for (Eigen::Index l = 0; l < terms; ++l) z[i] -= factors[l] * earlier[l][i];
+  }
+}
+
 }  // namespace
+
+OpenShare LeastOpenShare(const Eigen::MatrixXd& covariance) {
+  const Eigen::VectorXd inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  Eigen::MatrixXd factor;
+  Eigen::VectorXd open;
+  const Eigen::Index factorised =
+      Factorise(inverse.asDiagonal() * covariance * inverse.asDiagonal(), factor, open);
+  OpenShare least{.reading = factorised};
+  if (factorised == covariance.rows()) {
+    least.share = open.minCoeff(&least.reading);
+  } else {
+    least.share = open[factorised];
+  }
+  return least;
+}
 
 absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& data,
                                                               NoiseMode noise) {
@@ -63,14 +151,13 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
   likelihood.inferred_ = noise == NoiseMode::kInferred;
   for (const Reading& reading : data.readings) likelihood.values_.push_back(reading.value);
   likelihood.log_diagonal_.resize(likelihood.readings_);
-  likelihood.inverse_sd_.resize(likelihood.readings_);
-  for (int t = 0; t < likelihood.readings_; ++t)
-    likelihood.inverse_sd_[t] = 1 / data.readings[static_cast<std::size_t>(t)].sd;
+  likelihood.links_.resize(data.readings.size());
   likelihood.is_plain_ = !likelihood.inferred_;
 
   for (const auto& [key, indices] : GroupsOf(data)) {
     Group group;
-    if (IsCorrelated(data, key)) {
+    const double length = ChainLength(data, key, indices);
+    if (IsCorrelated(data, key) && length == 0) {
       auto factor = CorrelatedCholesky(data, key, indices);
       if (!factor.ok()) return factor.status();
       for (Eigen::Index k = 0; k < factor->rows(); ++k)
@@ -78,7 +165,23 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
       group.cholesky = *std::move(factor);
       likelihood.is_plain_ = false;
     } else {
-      for (const int t : indices) likelihood.log_diagonal_[t] = std::log(data.readings[t].sd);
+      for (std::size_t k = 0; k < indices.size(); ++k) {
+        const int t = indices[k];
+        const Reading& reading = data.readings[static_cast<std::size_t>(t)];
+        Link& link = likelihood.links_[static_cast<std::size_t>(t)];
+        double pivot = reading.sd;
+        if (length > 0 && k > 0) {
+          link.previous = indices[k - 1];
+          const Reading& before = data.readings[static_cast<std::size_t>(link.previous)];
+          const double distance = std::abs(reading.control - before.control) / length;
+          const double left_open = -std::expm1(-2 * distance);  // of the variance: 1 - rho^2
+          if (!(left_open > kLeastOpenShare)) return Singular(data, key, t);
+          link.carried = std::exp(-distance) * reading.sd / before.sd;
+          pivot *= std::sqrt(left_open);
+        }
+        link.inverse_pivot = 1 / pivot;
+        likelihood.log_diagonal_[t] = std::log(pivot);
+      }
     }
     group.readings = indices;
     likelihood.groups_.push_back(std::move(group));
@@ -103,6 +206,20 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
   return likelihood;
 }
 
+void GaussianLikelihood::WhitenLink(const Rows& predictions, int t,
+                                    Eigen::Ref<Eigen::ArrayXd> z) const {
+  const Link& link = links_[static_cast<std::size_t>(t)];
+  const double value = values_[static_cast<std::size_t>(t)];
+  if (link.previous < 0) {
+    z = (value - predictions.col(t).array()) * link.inverse_pivot;
+    return;
+  }
+  const double before = values_[static_cast<std::size_t>(link.previous)];
+  z = ((value - predictions.col(t).array()) -
+       link.carried * (before - predictions.col(link.previous).array())) *
+      link.inverse_pivot;
+}
+
 // Column by column: every operation is on one element of a column at a time, so that a row's bits
 // do not depend on the other rows.
 void GaussianLikelihood::Whiten(const Rows& predictions, Missing missing, MutableRows z_all) const {
@@ -110,29 +227,26 @@ void GaussianLikelihood::Whiten(const Rows& predictions, Missing missing, Mutabl
   const Eigen::Index n = predictions.rows();
   const bool complete = AllFinite(predictions);
   std::vector<char> reached(static_cast<std::size_t>(n));
+  std::vector<const double*> earlier;
   for (const Group& group : groups_) {
-    const bool correlated = group.cholesky.size() > 0;
     const auto size = static_cast<Eigen::Index>(group.readings.size());
     std::fill(reached.begin(), reached.end(), 1);
+    earlier.clear();
     for (Eigen::Index k = 0; k < size; ++k) {
       const int t = group.readings[static_cast<std::size_t>(k)];
       auto z = z_all.col(t);
-      z = values_[static_cast<std::size_t>(t)] - predictions.col(t).array();
+      if (group.cholesky.size() == 0) {
+        WhitenLink(predictions, t, z.array());
+      } else {  // forward substitution
+        z = values_[static_cast<std::size_t>(t)] - predictions.col(t).array();
+        SubtractEarlier(group.cholesky.row(k).data(), earlier.data(), k, n, z.data());
+        z /= group.cholesky(k, k);
+        earlier.push_back(z.data());
+      }
       for (Eigen::Index i = 0; !complete && i < n; ++i) {
         char& row = reached[static_cast<std::size_t>(i)];
-        row = static_cast<char>(row & static_cast<char>(std::isfinite(z[i])));
+        row = static_cast<char>(row & static_cast<char>(std::isfinite(predictions(i, t))));
         if (row == 0) z[i] = 0;
-      }
-      if (!correlated) {
-        z *= inverse_sd_[t];
-        continue;
-      }
-      for (Eigen::Index l = 0; l < k; ++l) {  // forward substitution
-        z -= group.cholesky(k, l) * z_all.col(group.readings[static_cast<std::size_t>(l)]);
-      }
-      z /= group.cholesky(k, k);
-      for (Eigen::Index i = 0; !complete && i < n; ++i) {
-        if (reached[static_cast<std::size_t>(i)] == 0) z[i] = 0;
       }
     }
     if (complete || missing == Missing::kZeroResidual) continue;
@@ -177,11 +291,9 @@ Eigen::MatrixXd GaussianLikelihood::Fill(const Eigen::MatrixXd& predictions,
   Eigen::MatrixXd increments(predictions.rows(), readings_);
   if (is_plain_ && AllFinite(predictions)) {
     for (int t = 0; t < readings_; ++t) {
-      increments.col(t) =
-          (-kLogSqrtTwoPi - log_diagonal_[t]) -
-          0.5 *
-              ((values_[static_cast<std::size_t>(t)] - predictions.col(t).array()) * inverse_sd_[t])
-                  .square();
+      auto column = increments.col(t).array();
+      WhitenLink(predictions, t, column);
+      column = (-kLogSqrtTwoPi - log_diagonal_[t]) - 0.5 * column.square();
     }
     return increments;
   }

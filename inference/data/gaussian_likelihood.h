@@ -9,6 +9,18 @@
 
 namespace calib::inference {
 
+/// What the earlier readings leave open of a reading: the share of its error's variance that they
+/// do not explain, the pivot of the correlation matrix in the order of readings.
+struct OpenShare {
+  Eigen::Index reading = 0;
+  double share = 1;
+};
+/// A likelihood needs more than this of each.
+inline constexpr double kLeastOpenShare = 1e-13;
+/// The first reading of which no more than kLeastOpenShare is left open, else the one of which the
+/// least is. in: covariance, symmetric, its diagonal positive, at least one reading
+OpenShare LeastOpenShare(const Eigen::MatrixXd& covariance);
+
 /// ln p(y | x) of readings y given predictions x, one independent block per (experiment,
 /// observable) group g:
 ///   kGiven:    N(y_g; x_g, S_g),  S_ij = sd_i sd_j exp(-|c_i - c_j| / length),  with the proper |2
@@ -18,8 +30,10 @@ namespace calib::inference {
 /// Written with S = L L^T and z = L^-1 (y - x), reading k of a group contributes a function of z_0
 /// ... z_k alone (kInferred: of the noise group), its density conditional on the earlier readings.
 /// Summed along the processing order the increments are the exact density after every reading,
-/// whatever the order [Cheng 2019, Eq. 14 and 15, normaliser corrected]. Thread safety: const after
-/// Create.
+/// whatever the order [Cheng 2019, Eq. 14 and 15, normaliser corrected]. Errors that are correlated
+/// exponentially along a control that only grows (or falls) are a Markov chain: z_k needs the
+/// reading before alone, and the cost is O(T); a covariance given in full costs O(T^2) a sample.
+/// Thread safety: const after Create.
 class GaussianLikelihood {
  public:
   /// noise: kGiven or kInferred (kEssTarget: pass WithRelativeErrors(data, sigma) and kGiven).
@@ -58,9 +72,17 @@ class GaussianLikelihood {
   FactorPosterior VarianceFactors(const Eigen::MatrixXd& predictions) const;
 
  private:
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   struct Group {
     std::vector<int> readings;  // indices in processing order
-    Eigen::MatrixXd cholesky;   // L, lower; empty: diagonal
+    RowMajor cholesky;          // L, lower; empty: independent errors or a chain
+  };
+  /// Of independent errors and chains: L^-1 has entries for a reading and the one before it alone,
+  /// z = (r - carried r_previous) / pivot for residuals r.
+  struct Link {
+    int previous = -1;  // reading; -1: none
+    double carried = 0;
+    double inverse_pivot = 0;
   };
   struct FactorGroup {  // kInferred: readings that share a variance factor
     VarianceFactorPrior prior;
@@ -73,15 +95,17 @@ class GaussianLikelihood {
   using MutableRows = Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
   // z, N x T; NaN where not reached, or zero residual there.
   void Whiten(const Rows& predictions, Missing missing, MutableRows z) const;
+  // z of a reading of a group without a Cholesky factor, up to where it is not finite.
+  void WhitenLink(const Rows& predictions, int t, Eigen::Ref<Eigen::ArrayXd> z) const;
   Eigen::MatrixXd Fill(const Eigen::MatrixXd& predictions, Missing missing) const;
   void IntegrateFactor(const FactorGroup& group, MutableRows z) const;
 
   int readings_ = 0;
   bool inferred_ = false;
-  bool is_plain_ = false;  // kGiven and no group correlated
+  bool is_plain_ = false;  // kGiven and no group with a Cholesky factor
   std::vector<double> values_;
   Eigen::VectorXd log_diagonal_;  // ln L_kk by reading
-  Eigen::VectorXd inverse_sd_;    // by reading
+  std::vector<Link> links_;       // by reading
   std::vector<Group> groups_;
   std::vector<FactorGroup> factors_;  // empty: kGiven
 };

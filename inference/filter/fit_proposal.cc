@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <limits>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "inference/filter/ensemble.h"
 #include "inference/filter/iterative_filter.h"
+#include "inference/filter/joint_states.h"
 #include "inference/filter/log_weights.h"
 #include "inference/mixture/dirichlet_mixture.h"
 #include "inference/prior/standard_normal.h"
@@ -46,13 +48,18 @@ std::vector<Eigen::Index> Significant(const Eigen::VectorXd& log_weights) {
   return significant;
 }
 
+struct StandardPoints {
+  WeightedPoints weighted;
+  std::vector<Eigen::Index> samples;  // the row of each point among all samples
+};
+
 // Samples with weight, in standard coordinates, standing for as many observations as they are
 // worth: the counts sum to the effective sample size, not to a multiple of N as copies would [Cheng
 // 2019, footnote 1].
-WeightedPoints Standardized(const JointPrior& priors, const std::vector<Eigen::Index>& columns,
+StandardPoints Standardized(const JointPrior& priors, const std::vector<Eigen::Index>& columns,
                             const Eigen::MatrixXd& parameters, const Eigen::VectorXd& log_weights) {
   const double ess = EffectiveSampleSize(log_weights);
-  const std::vector<Eigen::Index> counted = Significant(log_weights);
+  std::vector<Eigen::Index> counted = Significant(log_weights);
   const auto d = static_cast<Eigen::Index>(columns.size());
   WeightedPoints data{.points = Eigen::MatrixXd(d, counted.size()),
                       .counts = Eigen::VectorXd(counted.size())};
@@ -65,7 +72,29 @@ WeightedPoints Standardized(const JointPrior& priors, const std::vector<Eigen::I
           priors[static_cast<std::size_t>(from)].ToStandard(parameters(counted[k], from));
     }
   }
-  return data;
+  return {.weighted = std::move(data), .samples = std::move(counted)};
+}
+
+// Predictions of some of the ensemble's samples, ascending; each in units of its reading's error.
+Eigen::MatrixXd StatesOf(const Ensemble& ensemble, const std::vector<Eigen::Index>& samples,
+                         const DataSet& data, const FilterOptions& options) {
+  const DataSet& errors =
+      options.noise == NoiseMode::kEssTarget ? WithRelativeErrors(data, *ensemble.sigma) : data;
+  Eigen::RowVectorXd inverse_sd(errors.readings.size());
+  for (Eigen::Index t = 0; t < inverse_sd.size(); ++t)
+    inverse_sd[t] = 1 / errors.readings[static_cast<std::size_t>(t)].sd;
+  Eigen::MatrixXd states(samples.size(), inverse_sd.size());
+  std::size_t k = 0;
+  Eigen::Index first = 0;
+  for (const Iteration& iteration : ensemble.used) {
+    const Eigen::Index end = first + iteration.predictions.rows();
+    for (; k < samples.size() && samples[k] < end; ++k) {
+      states.row(static_cast<Eigen::Index>(k)) =
+          iteration.predictions.row(samples[k] - first).cwiseProduct(inverse_sd);
+    }
+    first = end;
+  }
+  return states;
 }
 
 // The exponent of the likelihood that leaves enough samples to fit to: the target's share of one
@@ -214,9 +243,16 @@ absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& da
   const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
   const Eigen::VectorXd log_weights =
       TemperedLogWeights(*ensemble, TemperingExponent(options, *ensemble));
-  auto proposal = FitMixture(options, Standardized(priors, free, ensemble->parameters, log_weights),
-                             iterations.size());
-  if (proposal.ok()) Complete(priors, free, frozen, *proposal);
+  StandardPoints points = Standardized(priors, free, ensemble->parameters, log_weights);
+  if (options.mixture == MixtureOver::kParametersAndStates) {
+    points.weighted =
+        JoinStates(points.weighted, StatesOf(*ensemble, points.samples, data, options));
+  }
+  auto proposal = FitMixture(options, points.weighted, iterations.size());
+  if (!proposal.ok()) return proposal;
+  proposal->components =
+      MarginalOfFirst(proposal->components, static_cast<Eigen::Index>(free.size()));
+  Complete(priors, free, frozen, *proposal);
   return proposal;
 }
 
@@ -232,7 +268,7 @@ absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const Filt
   }
   const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
   const Eigen::VectorXd equal = Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
-  WeightedPoints points = Standardized(priors, free, draws, equal);
+  WeightedPoints points = Standardized(priors, free, draws, equal).weighted;
   points.counts *= std::min(1.0, kWorthOfDraws / points.counts.sum());
   auto proposal = FitMixture(options, points, iterations);
   if (!proposal.ok()) return proposal;

@@ -22,15 +22,21 @@ namespace calib::inference {
 /// samples^2 x parameters exceeds 4e6, so that the choice stays within seconds.
 enum class Design { kHalton, kSobol, kLatinHypercube, kSymmetricLatinHypercube };
 
+/// What the mixture of the next proposal is fitted to: the parameters, or the parameters joint with
+/// the states of their runs [Cheng 2019, sec. 3.2: the augmented state], see joint_states.h. The
+/// proposal is its density of the parameters either way.
+enum class MixtureOver { kParameters, kParametersAndStates };
+
 struct FilterOptions {
   NoiseMode noise = NoiseMode::kGiven;
   /// (0, 1): effective sample size, as a share of the samples of one iteration, of the tempered
   /// weights that shape the next proposal (and of kEssTarget itself) [Cheng 2019, Table 1, step 4].
   double ess_target = 0.2;
   double tolerance = 1e-2;  ///< > 0; relative change of the means that ends it [Table 1, step 7]
-  double defensive_share = 0.1;     ///< share of the prior in every later proposal, [0, 1)
-  int max_components = 10;          ///< >= 1; truncation of the Dirichlet process
-  double concentration = 0.01;      ///< > 0; its precision alpha [Cheng 2019, sec. 3.5]
+  double defensive_share = 0.1;  ///< share of the prior in every later proposal, [0, 1)
+  int max_components = 10;       ///< >= 1; truncation of the Dirichlet process
+  double concentration = 0.01;   ///< > 0; its precision alpha [Cheng 2019, sec. 3.5]
+  MixtureOver mixture = MixtureOver::kParameters;
   Design design = Design::kHalton;  ///< first iteration
   bool reversed_path = false;       ///< also give the path with the readings in reversed order
   std::uint64_t seed = 0;
@@ -170,18 +176,21 @@ absl::StatusOr<double> GuidingExponent(const JointPrior& priors, const DataSet& 
 
 /// Proposal of the next iteration: variational Dirichlet-process mixture fitted to the tempered
 /// weights of all iterations (kEssTarget: the weights of the last), over the parameters that
-/// `frozen` (empty, or d entries) leaves free. Errors as ComputePosterior, and INVALID_ARGUMENT
-/// when frozen leaves none free, lies outside the prior, or the prior is correlated or constrained.
+/// `frozen` (empty, or d entries) leaves free, alone or joint with their states
+/// (FilterOptions::mixture; of a joint mixture the exact marginal is proposed). Errors as
+/// ComputePosterior, and INVALID_ARGUMENT when frozen leaves none free, lies outside the prior, or
+/// the prior is correlated or constrained.
 absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& data,
                                      const FilterOptions& options,
                                      std::span<const Iteration> iterations,
                                      const std::vector<std::optional<double>>& frozen = {});
 
 /// The proposal of the next iteration where weights carry next to nothing: a mixture fitted to
-/// equally weighted draws (n x d, SI) of an emulated posterior, its covariances widened fourfold, so
-/// that the next runs surround the posterior and the emulator interpolates there. The defensive
+/// equally weighted draws (n x d, SI) of an emulated posterior, its covariances widened fourfold,
+/// so that the next runs surround the posterior and the emulator interpolates there. The defensive
 /// share of the prior joins as always. `iterations`: how many there are so far, which chooses the
-/// random stream. Errors: INVALID_ARGUMENT for shapes; those of the mixture.
+/// random stream. Draws have no states: FilterOptions::mixture has no effect. Errors:
+/// INVALID_ARGUMENT for shapes; those of the mixture.
 absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const FilterOptions& options,
                                             const Eigen::MatrixXd& draws, std::size_t iterations,
                                             const std::vector<std::optional<double>>& frozen = {});

@@ -9,6 +9,18 @@
 
 namespace calib::inference {
 
+std::vector<MixtureComponent> MarginalOfFirst(std::span<const MixtureComponent> components,
+                                              Eigen::Index dimensions) {
+  std::vector<MixtureComponent> marginal;
+  for (const MixtureComponent& joint : components) {
+    assert(dimensions > 0 && dimensions <= joint.mean.size());
+    marginal.push_back({.weight = joint.weight,
+                        .mean = joint.mean.head(dimensions),
+                        .covariance = joint.covariance.topLeftCorner(dimensions, dimensions)});
+  }
+  return marginal;
+}
+
 GaussianMixture::GaussianMixture(std::span<const MixtureComponent> components) {
   assert(!components.empty());
   double total = 0;

@@ -15,6 +15,11 @@ struct MixtureComponent {
   Eigen::MatrixXd covariance;  ///< d x d, symmetric positive definite
 };
 
+/// The density that the first `dimensions` coordinates have by themselves: the other rows and
+/// columns of means and covariances left out. Precondition: 0 < dimensions <= d.
+std::vector<MixtureComponent> MarginalOfFirst(std::span<const MixtureComponent> components,
+                                              Eigen::Index dimensions);
+
 /// Factorised mixture; const and thread safe once made. Precondition: at least one component, equal
 /// sizes, positive definite covariances.
 class GaussianMixture {

@@ -101,6 +101,9 @@ void ReadFilterOptions(MapReader& map, Campaign& campaign) {
       static_cast<int>(map.Integer("max_components", 1, 1000).value_or(filter.max_components));
   filter.concentration =
       map.Quantity("concentration", "1", kPositive).value_or(filter.concentration);
+  if (map.Choice("mixture", {"parameters", "parameters_and_states"}) == "parameters_and_states") {
+    filter.mixture = inference::MixtureOver::kParametersAndStates;
+  }
   ReadDesign(map, filter);
   if (const auto reversed = map.Choice("reversed_path", {"true", "false"})) {
     filter.reversed_path = *reversed == "true";

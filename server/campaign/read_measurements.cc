@@ -8,6 +8,7 @@
 #include "dem/catalog/catalog.h"
 #include "server/campaign/control_path.h"
 #include "server/campaign/laboratory_table.h"
+#include "server/campaign/observable_range.h"
 #include "server/campaign/read_noise.h"
 #include "server/campaign/suggestion.h"
 
@@ -175,7 +176,10 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
     MeasuredObservable observable{.name = spec.name, .values = {}, .sd = {}};
     const bool given = table && (rules.measured || table->Has(spec.name));
     const std::vector<double> raw = given ? table->Raw(spec.name, context) : std::vector<double>();
-    if (given) observable.values = table->ToModel(spec.name, raw, context);
+    if (given) {
+      observable.values = table->ToModel(spec.name, raw, context);
+      CheckRangeOf(spec.name, *table, observable.values, context);
+    }
     ReadNoise(experiment_map, spec.name, spec.node,
               {control.name, rules.noise_needed && rules.measured, rules.measured},
               given ? &*table : nullptr, raw, context, observable);

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "dem/catalog/catalog.h"
+#include "inference/data/gaussian_likelihood.h"
 #include "server/campaign/suggestion.h"
 
 namespace calib::campaign {
@@ -71,6 +72,29 @@ std::vector<double> FromColumn(const NoiseSpec& spec, const std::string& name,
   return sd;
 }
 
+// Empty where the errors can have this covariance and none of them follows from the others.
+std::string WhyNoCovariance(const Eigen::MatrixXd& matrix) {
+  constexpr double kRounding = 1e-9;
+  const std::string advice =
+      "add the independent part of each reading's error to the diagonal, or leave readings out";
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    if (!(matrix(i, i) > 0)) {
+      return absl::StrCat("has the variance ", matrix(i, i), " in row ", i + 1,
+                          "; a variance has to be greater than 0");
+    }
+  }
+  const inference::OpenShare least = inference::LeastOpenShare(matrix);
+  if (least.share > inference::kLeastOpenShare) return "";
+  const std::string row = absl::StrCat("row ", least.reading + 1);
+  if (least.share < -kRounding) {
+    return absl::StrCat("is not positive definite, as a covariance is: ", row,
+                        " contradicts the rows before it; see to its correlations");
+  }
+  return absl::StrCat("is singular to within rounding: the rows before leave a share of ",
+                      std::max(least.share, 0.0), " of the variance of ", row,
+                      " open (needed: ", inference::kLeastOpenShare, "); ", advice);
+}
+
 // Numbers of a square table without a header, row by row; one problem for what is wrong first.
 Eigen::MatrixXd ReadCovariance(const MapReader& noise, const std::string& path,
                                std::size_t readings, double factor, ReadContext& context) {
@@ -115,8 +139,8 @@ Eigen::MatrixXd ReadCovariance(const MapReader& noise, const std::string& path,
               1e-9 * matrix.cwiseAbs().maxCoeff())
                  .any()) {
     problem = "is not symmetric, as a covariance is";
-  } else if (Eigen::LLT<Eigen::MatrixXd>(matrix).info() != Eigen::Success) {
-    problem = "is not positive definite, as a covariance is";
+  } else {
+    problem = WhyNoCovariance(matrix);
   }
   if (problem.empty()) return 0.5 * (matrix + matrix.transpose());
   context.problems().AddIn(path, 0, "", problem);

@@ -19,13 +19,15 @@ namespace {
 constexpr int kParameters = 4;
 constexpr int kReadings = 300;
 
+enum class Errors { kIndependent, kChain, kCovariance };
+
 struct Setting {
   std::vector<Prior> priors;
   DataSet data;
   FilterOptions options{.seed = 1};
   std::vector<Iteration> iterations;
 
-  explicit Setting(int n, bool correlated = false) {
+  explicit Setting(int n, Errors errors = Errors::kIndependent) {
     for (int j = 0; j < kParameters; ++j) {
       priors.push_back(
           {.kind = j == 0 ? PriorKind::kLogUniform : PriorKind::kUniform, .min = 1, .max = 10});
@@ -37,8 +39,9 @@ struct Setting {
                                .value = Model(Eigen::RowVector4d(3, 4, 5, 6), t),
                                .sd = 2});
     }
-    if (correlated)
-      data.correlations = {{.observable = 0, .length = 0.1}, {.observable = 1, .length = 0.1}};
+    for (int observable = 0; observable < 3 && errors != Errors::kIndependent; ++observable)
+      data.correlations.push_back({.observable = observable, .length = 0.1});
+    if (errors == Errors::kCovariance) GiveCovariances();
     Iteration iteration;
     iteration.parameters = DrawSamples({}, priors, options, 0, n).value();
     iteration.predictions.resize(n, kReadings);
@@ -47,6 +50,15 @@ struct Setting {
         iteration.predictions(i, t) = Model(iteration.parameters.row(i), t);
     }
     iterations.push_back(std::move(iteration));
+  }
+
+  // The correlated errors once more, in full.
+  void GiveCovariances() {
+    for (const auto& [group, readings] : GroupsOf(data)) {
+      data.covariances.push_back(
+          {.observable = group.second, .matrix = 4 * ErrorCorrelation(data, group, readings)});
+    }
+    data.correlations.clear();
   }
 
   static double Model(const Eigen::RowVector4d& p, int t) {
@@ -76,14 +88,24 @@ void BM_Posterior(benchmark::State& state) {
 }
 BENCHMARK(BM_Posterior)->Arg(100)->Arg(2000)->Unit(benchmark::kMillisecond);
 
+// The same where the errors of each of the three observables are correlated along the path.
 void BM_PosteriorCorrelated(benchmark::State& state) {
-  const Setting setting(static_cast<int>(state.range(0)), true);
+  const Setting setting(static_cast<int>(state.range(0)), Errors::kChain);
   for (auto _ : state) {
     benchmark::DoNotOptimize(
         ComputePosterior(setting.priors, setting.data, setting.options, setting.iterations)->ess);
   }
 }
 BENCHMARK(BM_PosteriorCorrelated)->Arg(100)->Arg(2000)->Unit(benchmark::kMillisecond);
+
+void BM_PosteriorCovariance(benchmark::State& state) {
+  const Setting setting(static_cast<int>(state.range(0)), Errors::kCovariance);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        ComputePosterior(setting.priors, setting.data, setting.options, setting.iterations)->ess);
+  }
+}
+BENCHMARK(BM_PosteriorCovariance)->Arg(100)->Arg(2000)->Unit(benchmark::kMillisecond);
 
 // One fit of ten starts to samples of equal weight from two Gaussians in 7 dimensions (or 4), ten
 // components at most; mixture_bench.py times scikit-learn on the same.

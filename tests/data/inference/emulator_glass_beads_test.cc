@@ -9,10 +9,13 @@
 #include <cmath>
 #include <ctime>
 #include <iostream>
+#include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "inference/emulator/emulated_posterior.h"
+#include "inference/emulator/state_emulator.h"
 #include "tests/data/inference/reference_files.h"
 
 namespace calib::inference {
@@ -115,6 +118,67 @@ TEST(EmulatorGlassBeads, ErrorsAreAsLargeAsClaimedAndIterationsAgree) {
     EXPECT_LT(std::abs(a.mean - b.mean), 3 * std::hypot(a.sd, b.sd)) << "parameter " << j;
   }
   EXPECT_LT(seconds, 5);
+}
+
+// The emulated histories of iteration 0 in the place of the DEM: what two more iterations gain from
+// a mixture fitted to parameters and states (README.md of inference/filter).
+TEST(EmulatorGlassBeads, EffectiveSamplesWithAndWithoutStatesInTheMixture) {
+  constexpr int kSeeds = 20;
+  constexpr int kSamples = 100;
+  constexpr double kWider = 5;  // errors, so that weights hold more than a sample or two
+  const std::vector<Prior> priors = Priors();
+  DataSet data = ReadMeasurement();
+  for (Reading& reading : data.readings) reading.sd *= kWider;
+  const Iteration runs = ReadIteration(0);
+  const auto standard = [&priors](const Eigen::MatrixXd& p) {
+    Eigen::MatrixXd inputs = p;
+    for (Eigen::Index j = 0; j < p.cols(); ++j) {
+      for (double& x : inputs.col(j)) x = priors[static_cast<std::size_t>(j)].ToStandard(x);
+    }
+    return inputs;
+  };
+  Eigen::RowVectorXd value(data.readings.size());
+  Eigen::RowVectorXd sd(data.readings.size());
+  for (Eigen::Index t = 0; t < value.size(); ++t) {
+    value[t] = data.readings[static_cast<std::size_t>(t)].value;
+    sd[t] = data.readings[static_cast<std::size_t>(t)].sd;
+  }
+  std::vector<Eigen::Index> all(static_cast<std::size_t>(runs.parameters.rows()));
+  std::iota(all.begin(), all.end(), 0);
+  const Eigen::MatrixXd histories =
+      (runs.predictions.rowwise() - value).array().rowwise() / sd.array();
+  const auto emulator = StateEmulator::Fit(standard(runs.parameters), histories, all, {});
+  ASSERT_TRUE(emulator.ok()) << emulator.status();
+  const auto predict = [&](const Eigen::MatrixXd& parameters) {
+    const PrincipalComponents& components = emulator->components();
+    Eigen::MatrixXd states =
+        emulator->Predict(standard(parameters)).mean * components.basis.transpose();
+    states.rowwise() += components.mean;
+    states = (states.array().rowwise() * sd.array()).matrix().rowwise() + value;
+    return states;
+  };
+  double log_ess[2] = {0, 0};
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    for (const MixtureOver over : {MixtureOver::kParameters, MixtureOver::kParametersAndStates}) {
+      const FilterOptions options{.mixture = over, .seed = static_cast<std::uint64_t>(seed)};
+      std::vector<Iteration> iterations;
+      for (int k = 0; k < 3; ++k) {
+        Iteration iteration;
+        if (k > 0) iteration.proposal = FitProposal(priors, data, options, iterations).value();
+        iteration.parameters =
+            DrawSamples(iteration.proposal, priors, options, k, kSamples).value();
+        iteration.predictions = predict(iteration.parameters);
+        iterations.push_back(std::move(iteration));
+      }
+      const auto posterior = ComputePosterior(priors, data, options, iterations);
+      ASSERT_TRUE(posterior.ok()) << posterior.status();
+      log_ess[static_cast<int>(over)] += std::log(posterior->ess) / kSeeds;
+    }
+  }
+  std::cout << "effective of 3 x " << kSamples << " samples, geometric mean of " << kSeeds
+            << " seeds: parameters " << std::exp(log_ess[0]) << ", parameters and states "
+            << std::exp(log_ess[1]) << '\n';
+  EXPECT_NEAR(log_ess[1], log_ess[0], std::log(1.5));
 }
 
 TEST(EmulatorGlassBeads, SameSeedSameBits) {

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "server/campaign/identity.h"
 #include "tests/unit/campaign/good_campaign.h"
@@ -178,7 +180,59 @@ TEST(CampaignFile, FullCovarianceOfTheErrors) {
               ::testing::HasSubstr("covariance.txt:1: has 2 numbers; a row has 6 numbers"));
   files["covariance.txt"] =
       "1 2 0 0 0 0\n2 1 0 0 0 0\n0 0 1 0 0 0\n0 0 0 1 0 0\n0 0 0 0 1 0\n0 0 0 0 0 1\n";
-  EXPECT_THAT(ProblemsOf(yaml, files), ::testing::HasSubstr("is not positive definite"));
+  EXPECT_THAT(ProblemsOf(yaml, files),
+              ::testing::HasSubstr("covariance.txt: is not positive definite, as a covariance is: "
+                                   "row 2 contradicts the rows before it"));
+  // Positive definite by its signs, but the third error is half the sum of the first two to within
+  // a part in 10^14: the likelihood would refuse it after the submission.
+  files["covariance.txt"] =
+      "1 0 0.5 0 0 0\n0 1 0.5 0 0 0\n0.5 0.5 0.50000000000001 0 0 0\n"
+      "0 0 0 1 0 0\n0 0 0 0 1 0\n0 0 0 0 0 1\n";
+  EXPECT_THAT(
+      ProblemsOf(yaml, files),
+      ::testing::HasSubstr("covariance.txt: is singular to within rounding: the rows before "
+                           "leave a share of "));
+  EXPECT_THAT(ProblemsOf(yaml, files),
+              ::testing::HasSubstr("of the variance of row 3 open (needed: 1e-13); add the "
+                                   "independent part of each reading's error to the diagonal, or "
+                                   "leave readings out"));
+  files["covariance.txt"] =
+      "0 0 0 0 0 0\n0 1 0 0 0 0\n0 0 1 0 0 0\n0 0 0 1 0 0\n0 0 0 0 1 0\n0 0 0 0 0 1\n";
+  EXPECT_THAT(ProblemsOf(yaml, files),
+              ::testing::HasSubstr("covariance.txt: has the variance 0 in row 1; a variance has to "
+                                   "be greater than 0"));
+}
+
+// Mistakes of units and signs, by what the observable can be at all.
+TEST(CampaignFile, ReadingsOutsideWhatTheirObservableCanBe) {
+  const auto problems = [](const std::string& observable,
+                           const std::vector<std::string>& readings) {
+    auto files = GoodFiles();
+    std::string& text = files["validation.csv"] = "axial_strain," + observable + "\n";
+    for (int row = 1; const std::string& reading : readings) {
+      text += "0.0" + std::to_string(row++) + "," + reading + "\n";
+    }
+    return ProblemsOf(Spoiled("{q_over_p: {noise: {relative: 0.05}}}",
+                              "{" + observable + ": {noise: {absolute: 0.05}}}"),
+                      files);
+  };
+  EXPECT_EQ(problems("porosity", {"0.39", "0.4", "0.41"}), "");
+  EXPECT_EQ(problems("porosity", {"39", "40", "41"}),
+            "validation.csv:2: porosity: porosity is 39 here (and impossible in 2 later rows); it "
+            "has to be between 0 and 1; if the column is in percent, say so: units: {porosity: "
+            "percent}\n");
+  EXPECT_EQ(problems("void_ratio", {"0.7", "0.71", "72"}),
+            "validation.csv:4: void_ratio: void_ratio is 72 here; it has to be between 0 and 20; "
+            "if the column is in percent, say so: units: {void_ratio: percent}\n");
+  EXPECT_EQ(problems("mean_stress", {"1e5", "-1e5", "2e5"}),
+            "validation.csv:3: mean_stress: mean_stress is -100000 here; it has to be at least 0; "
+            "compression is positive and grains carry no tension: see to its sign\n");
+  EXPECT_EQ(problems("q_over_p", {"-1.5", "3", "0"}), "");
+  EXPECT_EQ(problems("q_over_p", {"0.8", "1", "3.1"}),
+            "validation.csv:4: q_over_p: q_over_p is 3.1 here; it has to be between -1.5 (no axial "
+            "stress) and 3 (no lateral one); compression is positive and grains carry no tension: "
+            "see to its sign\n");
+  EXPECT_EQ(problems("deviatoric_stress", {"-1e9", "0", "1e9"}), "") << "nothing is certain of it";
 }
 
 TEST(CampaignFile, GrainsOfTheSpecimenShareTheScatter) {
@@ -243,12 +297,15 @@ TEST(CampaignFile, ReadsGroupsOfNoise) {
 TEST(CampaignFile, ReadsWhatIsHeldWhen) {
   const Campaign c = Read(Spoiled("max_iterations: 3}",
                                   "max_iterations: 3, freeze: {1: [young_modulus], 2: converged}, "
-                                  "reversed_path: true, replicates: 5}"))
+                                  "reversed_path: true, replicates: 5, "
+                                  "mixture: parameters_and_states}"))
                          .campaign;
   EXPECT_THAT(c.freeze.at(1).names, ElementsAre("young_modulus"));
   EXPECT_TRUE(c.freeze.at(2).converged);
   EXPECT_TRUE(c.filter.reversed_path);
   EXPECT_EQ(c.replicates, 5);
+  EXPECT_EQ(c.filter.mixture, inference::MixtureOver::kParametersAndStates);
+  EXPECT_EQ(Read(GoodYaml()).campaign.filter.mixture, inference::MixtureOver::kParameters);
 }
 
 TEST(CampaignFile, ReadsAdaptiveStaging) {

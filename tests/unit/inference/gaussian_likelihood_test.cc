@@ -63,9 +63,15 @@ double DenseLogDensity(const Eigen::VectorXd& residual, const Eigen::MatrixXd& c
                  static_cast<double>(residual.size()) * std::log(2 * std::numbers::pi));
 }
 
+// The same with a control that turns back, whose readings are no chain.
+DataSet TurnedBack() {
+  DataSet data = SomeData(true);
+  for (Reading& reading : data.readings) reading.control = std::abs(reading.control - 0.0333);
+  return data;
+}
+
 TEST(GaussianLikelihood, EqualsTheDenseGaussianDensity) {
-  for (const bool correlated : {false, true}) {
-    const DataSet data = SomeData(correlated);
+  for (const DataSet& data : {SomeData(false), SomeData(true), TurnedBack()}) {
     const auto likelihood = GaussianLikelihood::Create(data, NoiseMode::kGiven);
     ASSERT_TRUE(likelihood.ok());
     const Eigen::MatrixXd predictions = SomePredictions(3, likelihood->readings());
@@ -78,6 +84,28 @@ TEST(GaussianLikelihood, EqualsTheDenseGaussianDensity) {
                   1e-10 * std::abs(result[i]));
     }
   }
+}
+
+// Bits of a sample do not depend on how many others there are, whatever goes through registers.
+TEST(GaussianLikelihood, RowsDoNotDependOnEachOther) {
+  const Eigen::MatrixXd predictions = SomePredictions(70, 28);
+  for (const DataSet& data : {SomeData(true), TurnedBack()}) {
+    const auto likelihood = GaussianLikelihood::Create(data, NoiseMode::kGiven);
+    const Eigen::MatrixXd together = likelihood->Increments(predictions);
+    for (int i = 0; i < 70; ++i)
+      EXPECT_EQ(likelihood->Increments(predictions.row(i)), together.row(i)) << i;
+  }
+}
+
+TEST(GaussianLikelihood, WhatEarlierReadingsLeaveOpen) {
+  Eigen::Matrix3d covariance;
+  covariance << 4, 1.6, 0, 1.6, 1, 0, 0, 0, 1;
+  const OpenShare least = LeastOpenShare(covariance);
+  EXPECT_EQ(least.reading, 1);
+  EXPECT_NEAR(least.share, 1 - 0.8 * 0.8, 1e-15);
+  covariance(0, 1) = covariance(1, 0) = 2;  // the second error is half of the first
+  EXPECT_EQ(LeastOpenShare(covariance).reading, 1);
+  EXPECT_LE(std::abs(LeastOpenShare(covariance).share), kLeastOpenShare);
 }
 
 // Cumulative increments are the exact density of the readings so far, whatever comes later.

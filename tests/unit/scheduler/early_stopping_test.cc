@@ -138,6 +138,69 @@ TEST(EarlyStopping, TotalVariationIsWithinTheStatedLoss) {
   EXPECT_LE(variation, loss.stated);
 }
 
+// A parameter that the first reading knows to a third of its prior's width, and four later readings
+// that every run meets to a tenth of their error: over a hundred samples are effective, and what a
+// stopped run could still have held is little more than what it holds. A bound that is a tenth too
+// small, or forgets the importance of samples, falls short.
+TEST(EarlyStopping, TotalVariationIsWithinAStatedLossThatIsHardlyLarger) {
+  constexpr Eigen::Index kSamples = 200;
+  constexpr Eigen::Index kReadings = 5;
+  constexpr double kLaterSd = 0.2;
+  Definition definition = *MakeDefinition(campaign::Campaign{});
+  definition.campaign.early_stopping =
+      campaign::EarlyStopping{.discard_at_most = 0.5, .exponent = 1};
+  definition.priors =
+      std::vector<inference::Prior>{{.kind = inference::PriorKind::kUniform, .min = -3, .max = 3}};
+  for (int t = 0; t < kReadings; ++t) {
+    definition.data.readings.push_back({.load_step = t, .value = 0, .sd = t == 0 ? 1 : kLaterSd});
+  }
+  History complete;
+  for (int k = 0; k < 2; ++k) {
+    inference::Iteration iteration;
+    if (k == 1) {  // narrower than the prior: samples that stop are worth more than one
+      iteration.proposal.components.push_back({.weight = 1,
+                                               .mean = Eigen::VectorXd::Zero(1),
+                                               .covariance = Eigen::MatrixXd::Constant(1, 1, 0.3)});
+      iteration.proposal.defensive_share = 0.5;
+      iteration.proposal.log_acceptance =
+          inference::LogMassInSupport(iteration.proposal.components, definition.priors);
+    }
+    iteration.parameters = *inference::DrawSamples(iteration.proposal, definition.priors,
+                                                   definition.campaign.filter, k, kSamples);
+    iteration.predictions = Eigen::MatrixXd::Constant(kSamples, kReadings, 0.1 * kLaterSd);
+    iteration.predictions.col(0) = iteration.parameters;
+    complete.iterations.push_back(std::move(iteration));
+    complete.stopped.push_back(Eigen::MatrixXd::Constant(kSamples, kReadings, std::nan("")));
+    for (int i = 0; i < kSamples; ++i) {
+      complete.samples.push_back(
+          {.sample = static_cast<int>(complete.samples.size()), .iteration = k});
+    }
+  }
+  History before = complete;
+  before.iterations.pop_back();
+  const auto thresholds = *StopThresholds(definition, before, complete.iterations[1]);
+
+  History stopped = complete;
+  for (int i = 0; i < kSamples; ++i) {
+    Eigen::RowVectorXd seen = Eigen::RowVectorXd::Constant(kReadings, std::nan(""));
+    seen[0] = complete.iterations[1].predictions(i, 0);
+    if (BestPossible(definition, seen) >= thresholds[static_cast<std::size_t>(i)]) continue;
+    stopped.iterations[1].predictions.row(i).setConstant(std::nan(""));
+    stopped.stopped[1].row(i) = seen;
+    stopped.stopped_keys.push_back({0, static_cast<int>(kSamples) + i, 0});
+  }
+  const auto loss = *StatedLoss(definition, stopped);
+  ASSERT_TRUE(loss.resume.empty());
+  const Eigen::VectorXd with = GuidingWeights(definition, complete, 1);
+  const Eigen::VectorXd without = GuidingWeights(definition, stopped, 1);
+  EXPECT_GT(1 / with.squaredNorm(), 100) << "effective samples";
+  EXPECT_GT(stopped.stopped_keys.size(), 20U);
+  EXPECT_GT(loss.stated, 0.01);
+  const double variation = 0.5 * (with - without).cwiseAbs().sum();
+  EXPECT_LE(variation, loss.stated);
+  EXPECT_GT(variation, 0.9 * loss.stated) << "the case is no longer tight";
+}
+
 TEST(EarlyStopping, AuditTakesAFiftiethOfTheStoppedChosenByTheSeed) {
   const auto definition = MakeDefinition(campaign::Campaign{});
   History history;
