@@ -79,9 +79,10 @@ void EmulatedLikelihood::Project(const Form& form, const Eigen::VectorXd& z,
 // S^T G S,
 //   -1/2 (m^T G m - 2 m^T (WB)^T W r - |M^{-1/2} S^T g|^2 + ln det M)         [matrix inversion and
 //   determinant lemmas]
-double EmulatedLikelihood::Combine(const Eigen::VectorXd& mean, const Eigen::VectorXd& sd,
-                                   const Eigen::MatrixXd& gram,
-                                   const Eigen::VectorXd& projection) const {
+EmulatedLikelihood::Combined EmulatedLikelihood::Combine(const Eigen::VectorXd& mean,
+                                                         const Eigen::VectorXd& sd,
+                                                         const Eigen::MatrixXd& gram,
+                                                         const Eigen::VectorXd& projection) const {
   const Eigen::VectorXd along = gram * mean;
   const Eigen::VectorXd left = projection - along;
   const Eigen::VectorXd spread = (sd.array().square() + scatter_variance_.array()).sqrt();
@@ -90,9 +91,8 @@ double EmulatedLikelihood::Combine(const Eigen::VectorXd& mean, const Eigen::Vec
   inner.diagonal().array() += 1;
   const Eigen::LLT<Eigen::MatrixXd> cholesky(inner);
   const Eigen::VectorXd explained = cholesky.matrixL().solve(factor.transpose() * left);
-  const double log_determinant = 2 * cholesky.matrixLLT().diagonal().array().log().sum();
-  return -0.5 *
-         (mean.dot(along) - 2 * mean.dot(projection) - explained.squaredNorm() + log_determinant);
+  return {.quadratic = mean.dot(along) - 2 * mean.dot(projection) - explained.squaredNorm(),
+          .log_determinant = 2 * cholesky.matrixLLT().diagonal().array().log().sum()};
 }
 
 Eigen::VectorXd EmulatedLikelihood::LogLikelihood(const ScorePrediction& prediction,
@@ -112,9 +112,28 @@ Eigen::VectorXd EmulatedLikelihood::LogLikelihood(const ScorePrediction& predict
       sum += form.log_normaliser - 0.5 * form.square / factor -
              0.5 * static_cast<double>(form.readings.size()) * std::log(factor);
     }
-    result[i] = sum + Combine(prediction.mean.row(i), prediction.sd.row(i), gram, projection);
+    result[i] =
+        sum + Combine(prediction.mean.row(i), prediction.sd.row(i), gram, projection).LogDensity();
   }
   return result;
+}
+
+Eigen::VectorXd EmulatedLikelihood::Misfit(const ScorePrediction& prediction) const {
+  const Index q = prediction.mean.cols();
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(q, q);
+  Eigen::VectorXd projection = Eigen::VectorXd::Zero(q);
+  double square = 0;
+  for (const Form& form : forms_) {
+    gram += form.gram;
+    projection += form.projection;
+    square += form.square;
+  }
+  Eigen::VectorXd misfit(prediction.mean.rows());
+  for (Index i = 0; i < misfit.size(); ++i) {
+    misfit[i] =
+        square + Combine(prediction.mean.row(i), prediction.sd.row(i), gram, projection).quadratic;
+  }
+  return misfit;
 }
 
 double EmulatedLikelihood::LogDensity(const ScorePrediction& prediction, Index row,
@@ -131,7 +150,8 @@ double EmulatedLikelihood::LogDensity(const ScorePrediction& prediction, Index r
     projection += one;
     sum += form.log_normaliser - 0.5 * square;
   }
-  return sum + Combine(prediction.mean.row(row), prediction.sd.row(row), gram, projection);
+  return sum +
+         Combine(prediction.mean.row(row), prediction.sd.row(row), gram, projection).LogDensity();
 }
 
 }  // namespace calib::inference

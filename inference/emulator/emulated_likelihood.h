@@ -38,6 +38,10 @@ class EmulatedLikelihood {
   Eigen::VectorXd LogLikelihood(const ScorePrediction& prediction,
                                 const Eigen::MatrixXd& factors) const;
 
+  /// chi^2 of the measured readings about the emulator's prediction, in the same covariance, m
+  /// entries; chi-squared distributed with T degrees of freedom over readings replicated from it.
+  Eigen::VectorXd Misfit(const ScorePrediction& prediction) const;
+
   /// ln p(z | point) for one point with readings z (T, noise units about the measured ones), all
   /// factors one.
   double LogDensity(const ScorePrediction& prediction, Eigen::Index row,
@@ -57,8 +61,13 @@ class EmulatedLikelihood {
   };
   void Project(const Form& form, const Eigen::VectorXd& z, Eigen::VectorXd& projection,
                double& square) const;
-  double Combine(const Eigen::VectorXd& mean, const Eigen::VectorXd& sd,
-                 const Eigen::MatrixXd& gram, const Eigen::VectorXd& projection) const;
+  struct Combined {
+    double quadratic = 0;  // of chi^2, beside |W r|^2
+    double log_determinant = 0;
+    double LogDensity() const { return -0.5 * (quadratic + log_determinant); }
+  };
+  Combined Combine(const Eigen::VectorXd& mean, const Eigen::VectorXd& sd,
+                   const Eigen::MatrixXd& gram, const Eigen::VectorXd& projection) const;
 
   Eigen::RowVectorXd mean_;
   Eigen::VectorXd scatter_variance_;    // share * scatter_sd^2

@@ -186,6 +186,17 @@ void Widen(const JointPrior& priors, const DataSet& data, const EmulatorOptions&
   result.widened = moved.widened;
 }
 
+double PredictiveP(const EmulatedLikelihood& likelihood, const ScorePrediction& prediction,
+                   std::size_t readings) {
+  const Eigen::VectorXd misfit = likelihood.Misfit(prediction);
+  double sum = 0;
+  for (const double chi_squared : misfit) {
+    sum +=
+        boost::math::gamma_q(0.5 * static_cast<double>(readings), 0.5 * std::max(0.0, chi_squared));
+  }
+  return sum / static_cast<double>(misfit.size());
+}
+
 // The errors in units of the noise sd, the inferred one with kInferred.
 void StateErrors(const TrainedEmulator& trained, double noise_variance, EmulatedResult& result) {
   const CrossValidation& check = trained.emulator.cross_validation();
@@ -347,6 +358,9 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   result.log_evidence_se = state->LogEvidenceStandardError();
   ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, result.draws));
   const double unknown = prediction.sd.squaredNorm();
+  if (options.noise == NoiseMode::kGiven) {
+    result.predictive_p = PredictiveP(*likelihood, prediction, data.readings.size());
+  }
   if (options.replicates && options.noise == NoiseMode::kGiven) {
     Widen(priors, data, options, trained->emulator, prediction, held, result);
     prediction = trained->emulator.Predict(ToStandard(priors, result.draws));

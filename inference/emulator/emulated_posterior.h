@@ -71,6 +71,13 @@ struct EmulatedResult {
   /// sd.
   double widened = 1;
 
+  /// kGiven: posterior predictive p-value of the misfit, the mean over the posterior (before refits
+  /// widen it) of P(chi^2_T >= chi^2(y, x)), the emulator's error and the shared scatter in the
+  /// covariance [Gelman et al. 1996]; see Posterior::predictive_p.
+  std::optional<double> predictive_p;
+  /// As Posterior::split_half, of SplitHalfOfEmulator (split_half.h); empty: not asked for.
+  Eigen::VectorXd split_half;
+
   /// Scatter of a single run about the mean history, in units of the readings: covariance
   /// scatter_factor scatter_factor^T + diag(scatter_white).
   Eigen::MatrixXd scatter_factor;  ///< T x q

@@ -38,6 +38,7 @@ class CubicRbf {
   double Value(const Eigen::VectorXd& x, const Eigen::VectorXd& distances) const;
 
   const Eigen::VectorXd& point(int i) const { return points_[static_cast<std::size_t>(i)]; }
+  double value(int i) const { return values_[static_cast<std::size_t>(i)]; }
   /// lambda in the order of Add, n.
   const Eigen::VectorXd& coefficients() const { return coefficients_; }
   /// c_0, c_1 ... c_d.

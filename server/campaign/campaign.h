@@ -150,6 +150,11 @@ struct SharedNoise {
 /// What surrogate_msrs asks where to look next.
 enum class SurrogateModel { kCubicRbf, kGaussianProcess };
 
+/// When a campaign decides while runs are under way (the next point of surrogate_msrs, which run
+/// to end early). kReproducible: by what follows from results in their order, whatever arrived
+/// first; kImmediate: at once, by what has arrived.
+enum class Decisions { kReproducible, kImmediate };
+
 struct EarlyStopping {
   double discard_at_most = 1e-3;
   /// Shares of an experiment's load steps, increasing, within (0, 1): all samples come to the first
@@ -192,6 +197,10 @@ struct Campaign {
   /// Of surrogate_msrs: a run ends when its misfit so far exceeds this times the best run's (a half
   /// and a quarter of it later, inference::TerminationBound); empty: never.
   std::optional<double> termination = 10;
+  /// Of surrogate_msrs: points under way at most, >= 1. With kReproducible point k is chosen once
+  /// all up to k - in_flight have ended, and by their results alone.
+  int in_flight = 8;
+  Decisions decisions = Decisions::kReproducible;
   inference::TmcmcOptions tmcmc;  ///< steps and target_cv; the rest is set where it is used
   std::optional<EarlyStopping> early_stopping;
   Failure failure;
@@ -199,13 +208,13 @@ struct Campaign {
   std::uint64_t seed = 0;
 };
 
-/// Points of surrogate_msrs chosen together, whatever the number of workers.
+/// Points of surrogate_msrs that make an iteration after the first; they are chosen one by one.
 inline constexpr int kSurrogateBatch = 8;
 
-/// Samples that the campaign draws at once after the first `samples` of them.
+/// Samples of an iteration after the first.
 int LaterBatch(const Campaign& campaign);
 /// The most batches it can come to: iterations of a filter, Metropolis steps of tmcmc and its prior
-/// draws, rounds of surrogate_msrs.
+/// draws, eights of surrogate_msrs.
 int MostBatches(const Campaign& campaign);
 
 /// Path length of the control at each reading: the distance in the correlation of errors. Readings

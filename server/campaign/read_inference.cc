@@ -91,6 +91,18 @@ void ReadTermination(MapReader& map, Campaign& campaign) {
   campaign.termination = map.Quantity("termination", "1", {.min = kLeast, .max = kMost});
 }
 
+void ReadDecisions(MapReader& map, Campaign& campaign) {
+  if (map.Choice("decisions", {"reproducible", "immediate"}) != "immediate") return;
+  if (campaign.method != Method::kSurrogateMsrs && !IsFilter(campaign.method)) {
+    map.Problem("decisions", absl::StrCat(ToString(campaign.method),
+                                          " decides nothing while runs are under way; immediate "
+                                          "is for surrogate_msrs, and for sqmc and "
+                                          "iterative_bayesian_filter with early_stopping"));
+    return;
+  }
+  campaign.decisions = Decisions::kImmediate;
+}
+
 void ReadFilterOptions(MapReader& map, Campaign& campaign) {
   inference::FilterOptions& filter = campaign.filter;
   filter.tolerance = map.Quantity("tolerance", "1", kFraction).value_or(filter.tolerance);
@@ -152,6 +164,7 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
   constexpr std::int64_t kMostIterations = 1000;
   constexpr int kFewestChains = 20;
   constexpr int kMostReplicates = 1000;
+  constexpr int kMostInFlight = 1000;
   auto map = campaign_map.Map("inference");
   if (map) {
     ReadMethod(*map, campaign);
@@ -169,7 +182,12 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
         map->Choice("surrogate", {"cubic_rbf", "gaussian_process"}) == "gaussian_process") {
       campaign.surrogate = SurrogateModel::kGaussianProcess;
     }
-    if (campaign.method == Method::kSurrogateMsrs) ReadTermination(*map, campaign);
+    if (campaign.method == Method::kSurrogateMsrs) {
+      ReadTermination(*map, campaign);
+      campaign.in_flight = static_cast<int>(
+          map->Integer("in_flight", 1, kMostInFlight).value_or(campaign.in_flight));
+    }
+    ReadDecisions(*map, campaign);
     if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
     map->Ignore({"rows", "first_proposal"});  // read once the parameters are known
     if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&
@@ -225,6 +243,10 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
     map->Problem("rungs",
                  "is for sqmc and iterative_bayesian_filter; chains and optimisers judge each run "
                  "on its own");
+  } else if (!stopping.rungs.empty() && campaign.decisions == Decisions::kImmediate) {
+    map->Problem("rungs",
+                 "makes samples wait for each other, which inference.decisions: immediate does "
+                 "not; remove one of the two");
   }
   map->Finish();
   // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "inference/emulator/split_half.h"
 #include "inference/filter/widened_posterior.h"
 
 namespace calib::scheduler {
@@ -56,11 +57,13 @@ void AskEmulator(const Definition& definition, std::span<const inference::Iterat
   options.training.scatter_share =
       definition.mean_data ? 0 : LargestScatterShare(definition.campaign);
   options.replicates = definition.replicates;
-  auto emulated = inference::EmulatedPosterior(
-      definition.priors, definition.mean_data.value_or(definition.data), options, iterations);
+  const inference::DataSet& data = definition.mean_data ? *definition.mean_data : definition.data;
+  auto emulated = inference::EmulatedPosterior(definition.priors, data, options, iterations);
   if (emulated.ok()) {
     if (emulated->adequate) {
       answer.scatter = ScatterOfEmulator(definition, *emulated);
+      emulated->split_half =
+          inference::SplitHalfOfEmulator(definition.priors, data, options, iterations, *emulated);
     }
     answer.emulated = *std::move(emulated);
     ExplainEmulator(answer, answer.warnings);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
 
 namespace calib::scheduler {
@@ -37,35 +38,71 @@ absl::StatusOr<std::unique_ptr<CampaignRun>> CampaignRun::Load(store::Reader& re
 }
 
 absl::Status CampaignRun::Reload(store::Reader& reader) {
+  parameters_.clear();
+  stop_below_.clear();
+  arrived_.clear();
+  evaluations_.clear();
+  return Extend(reader);
+}
+
+absl::Status CampaignRun::Extend(store::Reader& reader) {
   const auto samples = reader.Samples(id_);
   const auto evaluations = reader.Evaluations(id_);
-  const auto states = reader.States(id_);
-  for (const absl::Status& status : {samples.status(), evaluations.status(), states.status()}) {
+  for (const absl::Status& status : {samples.status(), evaluations.status()}) {
     if (!status.ok()) {
       return status;
     }
   }
-  parameters_.clear();
-  stop_below_.clear();
-  Eigen::Index rows = 0;
+  const bool everything = evaluations_.empty();
+  std::vector<store::EvaluationRecord> added;
+  std::set<int> of_samples;
+  std::set<int> open;
+  for (const store::EvaluationRecord& evaluation : *evaluations) {
+    if (evaluations_.count(evaluation.key) > 0) {
+      continue;
+    }
+    added.push_back(evaluation);
+    of_samples.insert(evaluation.key.sample);
+    if (!store::IsTerminal(evaluation.status)) {
+      open.insert(evaluation.key.sample);
+    }
+  }
+  const Eigen::RowVectorXd nothing =
+      Eigen::RowVectorXd::Constant(static_cast<Eigen::Index>(definition_->data.readings.size()),
+                                   std::numeric_limits<double>::quiet_NaN());
   for (const store::SampleRecord& sample : *samples) {
-    parameters_[sample.sample] = sample.parameters;
+    if (!parameters_.emplace(sample.sample, sample.parameters).second) {
+      continue;
+    }
     if (!std::isnan(sample.stop_below)) {
       stop_below_[sample.sample] = sample.stop_below;
     }
-    rows += sample.iteration == record_.progress.iteration ? 1 : 0;
+    if (IsOfRunningIteration(sample.sample) || open.count(sample.sample) > 0) {
+      arrived_[sample.sample] = {.predictions = nothing};
+    }
   }
-  predictions_.setConstant(rows, static_cast<Eigen::Index>(definition_->data.readings.size()),
-                           std::numeric_limits<double>::quiet_NaN());
-  diverged_.assign(static_cast<std::size_t>(rows), 0);
-  evaluations_.clear();
-  for (const store::EvaluationRecord& evaluation : *evaluations) {
+  for (const store::EvaluationRecord& evaluation : added) {
     const auto steps = definition_->LoadSteps(evaluation.key.experiment);
     evaluations_[evaluation.key] = {.missing = {steps.begin(), steps.end()},
                                     .rest_after = evaluation.rest_after,
                                     .held_in = evaluation.held_in,
                                     .digest = evaluation.digest};
     SetStatus(evaluation.key, evaluation.status, evaluation.failures);
+  }
+  if (everything) {
+    return AddStates(reader.States(id_));
+  }
+  for (const int sample : of_samples) {
+    if (absl::Status status = AddStates(reader.States(id_, sample)); !status.ok()) {
+      return status;
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CampaignRun::AddStates(const absl::StatusOr<std::vector<store::StateRecord>>& states) {
+  if (!states.ok()) {
+    return states.status();
   }
   for (const store::StateRecord& stored : *states) {
     AddState(stored.key, stored.load_step, stored.observables);
@@ -102,6 +139,28 @@ std::vector<EvaluationKey> CampaignRun::With(EvaluationStatus status) const {
 bool CampaignRun::AllTerminal() const {
   return std::all_of(evaluations_.begin(), evaluations_.end(),
                      [](const auto& item) { return store::IsTerminal(item.second.status); });
+}
+
+std::size_t CampaignRun::Results() const {
+  const bool in_order = definition_->campaign.decisions == campaign::Decisions::kReproducible;
+  std::size_t results = 0;
+  for (const auto& [key, evaluation] : evaluations_) {
+    if (store::IsTerminal(evaluation.status)) {
+      ++results;
+    } else if (in_order) {
+      break;
+    }
+  }
+  return results;
+}
+
+bool CampaignRun::WantsPlan() const {
+  return AllTerminal() || (DecidesWhileRunning(*definition_) &&
+                           record_.progress.phase == "calibrating" && planned_ != Results());
+}
+
+void CampaignRun::Planned(bool again) {
+  planned_ = again ? std::nullopt : std::optional<std::size_t>(Results());
 }
 
 std::string CampaignRun::Refusal(const EvaluationKey& key, int load_step,
@@ -143,18 +202,21 @@ bool CampaignRun::HasArrived(const EvaluationKey& key) const {
   return true;
 }
 
-Eigen::Index CampaignRun::Position(int sample) const {
-  const int position = sample - record_.progress.iteration * record_.submitted.samples;
-  return position >= 0 && position < predictions_.rows() ? position : -1;
+bool CampaignRun::IsOfRunningIteration(int sample) const {
+  return sample / record_.submitted.samples == record_.progress.iteration;
+}
+
+int CampaignRun::SamplesOfRunningIteration() const {
+  return static_cast<int>(
+      std::count_if(parameters_.begin(), parameters_.end(),
+                    [this](const auto& item) { return IsOfRunningIteration(item.first); }));
 }
 
 void CampaignRun::AddState(const EvaluationKey& key, int load_step,
                            std::span<const double> observables) {
   evaluations_[key].missing.erase(load_step);
-  if (const Eigen::Index position = Position(key.sample); position >= 0) {
-    Eigen::RowVectorXd row = predictions_.row(position);
-    definition_->readings.Place(key.experiment, load_step, observables, row);
-    predictions_.row(position) = row;
+  if (const auto found = arrived_.find(key.sample); found != arrived_.end()) {
+    definition_->readings.Place(key.experiment, load_step, observables, found->second.predictions);
   }
 }
 
@@ -162,20 +224,20 @@ void CampaignRun::SetStatus(const EvaluationKey& key, EvaluationStatus status, i
   Evaluation& evaluation = evaluations_[key];
   evaluation.status = status;
   evaluation.failures = failures;
-  const Eigen::Index position = Position(key.sample);
-  if (position >= 0 &&
+  const auto found = arrived_.find(key.sample);
+  if (found != arrived_.end() &&
       (status == EvaluationStatus::kDiverged || status == EvaluationStatus::kStoppedEarly)) {
-    diverged_[static_cast<std::size_t>(position)] = 1;
+    found->second.out = true;
   }
 }
 
 bool CampaignRun::ShouldStop(const EvaluationKey& key) const {
   const auto threshold = stop_below_.find(key.sample);
-  const Eigen::Index position = Position(key.sample);
-  if (threshold == stop_below_.end() || position < 0) {
+  const auto arrived = arrived_.find(key.sample);
+  if (threshold == stop_below_.end() || arrived == arrived_.end()) {
     return false;
   }
-  Eigen::RowVectorXd own = predictions_.row(position);
+  Eigen::RowVectorXd own = arrived->second.predictions;
   for (std::size_t t = 0; t < definition_->data.readings.size(); ++t) {
     if (definition_->data.readings[t].experiment != key.experiment) {
       own(static_cast<Eigen::Index>(t)) = std::numeric_limits<double>::quiet_NaN();
@@ -187,7 +249,7 @@ bool CampaignRun::ShouldStop(const EvaluationKey& key) const {
 int CampaignRun::Diverged() const {
   std::set<int> samples;
   for (const EvaluationKey& key : With(EvaluationStatus::kDiverged)) {
-    if (Position(key.sample) >= 0) {
+    if (IsOfRunningIteration(key.sample)) {
       samples.insert(key.sample);
     }
   }
@@ -197,19 +259,29 @@ int CampaignRun::Diverged() const {
 int CampaignRun::Done() const {
   std::set<int> open;
   for (const auto& [key, evaluation] : evaluations_) {
-    if (Position(key.sample) >= 0 && !store::IsTerminal(evaluation.status)) {
+    if (IsOfRunningIteration(key.sample) && !store::IsTerminal(evaluation.status)) {
       open.insert(key.sample);
     }
   }
-  return static_cast<int>(predictions_.rows()) - static_cast<int>(open.size());
+  return SamplesOfRunningIteration() - static_cast<int>(open.size());
 }
 
 LiveView CampaignRun::View() const {
-  if (predictions_.rows() == 0) {
+  Eigen::MatrixXd predictions(static_cast<Eigen::Index>(arrived_.size()),
+                              static_cast<Eigen::Index>(definition_->data.readings.size()));
+  std::vector<char> out;
+  for (const auto& [sample, arrived] : arrived_) {
+    if (IsOfRunningIteration(sample)) {
+      predictions.row(static_cast<Eigen::Index>(out.size())) = arrived.predictions;
+      out.push_back(arrived.out ? 1 : 0);
+    }
+  }
+  if (out.empty()) {
     return {};
   }
-  const auto view = inference::ViewOnline(definition_->data, definition_->campaign.filter,
-                                          predictions_, diverged_);
+  predictions.conservativeResize(static_cast<Eigen::Index>(out.size()), Eigen::NoChange);
+  const auto view =
+      inference::ViewOnline(definition_->data, definition_->campaign.filter, predictions, out);
   return {.effective_samples = view.ess, .best_misfit = view.best_rms};
 }
 

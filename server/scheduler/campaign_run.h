@@ -1,7 +1,7 @@
 #pragma once
 // A live campaign in memory: which evaluations still need what, and how well the running iteration
-// does so far. It mirrors the store; after a restart, and after every plan, it is read again from
-// there.
+// does so far. It mirrors the store; after a restart, and after every plan made while nothing ran,
+// it is read again from there. What a plan adds while others run is read beside what is known.
 
 #include <cstdint>
 #include <map>
@@ -42,6 +42,8 @@ class CampaignRun {
   /// Reads samples, evaluations and states again. Progress is kept: memory may be ahead of the disk
   /// in it.
   absl::Status Reload(store::Reader& reader);
+  /// Reads samples and evaluations that are new, and leaves the others as memory has them.
+  absl::Status Extend(store::Reader& reader);
 
   std::int64_t id() const { return id_; }
   const Definition& definition() const { return *definition_; }
@@ -56,6 +58,11 @@ class CampaignRun {
   /// Keys with this status, in order.
   std::vector<store::EvaluationKey> With(store::EvaluationStatus status) const;
   bool AllTerminal() const;
+  /// Whether a plan may have something to say: everything has ended, or the campaign decides while
+  /// runs are under way (decisions.h) and something has ended that no plan has seen.
+  bool WantsPlan() const;
+  /// A plan is made of what is known now. again: and one more after it, whatever it says.
+  void Planned(bool again);
   const std::vector<double>& Parameters(int sample) const { return parameters_.at(sample); }
 
   /// Everything wrong with a state that a worker sent, in a sentence; empty: acceptable.
@@ -70,6 +77,8 @@ class CampaignRun {
   /// True when an evaluation has shown, by its states so far, that its sample cannot count
   /// (early_stopping.h).
   bool ShouldStop(const store::EvaluationKey& key) const;
+  /// Another threshold for that, see store::SampleRecord.
+  void SetStopBelow(int sample, double stop_below) { stop_below_[sample] = stop_below; }
 
   /// Samples of the running iteration of which an evaluation diverged, and those with nothing left
   /// to run.
@@ -80,7 +89,18 @@ class CampaignRun {
  private:
   CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition)
       : id_(id), definition_(std::move(definition)) {}
-  Eigen::Index Position(int sample) const;  ///< row of a sample of the running iteration, else -1
+  /// Readings of a sample of the running iteration, or of one before it that had not ended.
+  struct Arrived {
+    Eigen::RowVectorXd predictions;  ///< NaN where they have not
+    bool out = false;                ///< diverged or stopped
+  };
+  using ArrivedBySample = std::map<int, Arrived>;
+  absl::Status AddStates(const absl::StatusOr<std::vector<store::StateRecord>>& states);
+  bool IsOfRunningIteration(int sample) const;
+  int SamplesOfRunningIteration() const;
+  /// Results that a plan could go by: how many have ended, in their order up to the first that has
+  /// not where the campaign decides reproducibly.
+  std::size_t Results() const;
 
   std::int64_t id_;
   std::shared_ptr<const Definition> definition_;
@@ -89,8 +109,8 @@ class CampaignRun {
   std::map<store::EvaluationKey, Evaluation> evaluations_;
   std::map<int, std::vector<double>> parameters_;  // by sample
   std::map<int, double> stop_below_;               // samples that may be stopped early
-  Eigen::MatrixXd predictions_;                    // of the running iteration
-  std::vector<char> diverged_;
+  ArrivedBySample arrived_;
+  std::optional<std::size_t> planned_;  // Results() when a plan was made last
 };
 
 }  // namespace calib::scheduler

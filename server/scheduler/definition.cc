@@ -97,12 +97,14 @@ std::shared_ptr<const Definition> MakeDefinition(campaign::Campaign campaign) {
   inference::DataSet data = campaign::MakeDataSet(campaign);
   inference::JointPrior priors = campaign::Priors(campaign);
   ReadingIndex readings(campaign, data);
+  auto interpolant = std::make_shared<inference::CubicRbf>(static_cast<int>(priors.size()));
   return std::make_shared<const Definition>(Definition{.campaign = std::move(campaign),
                                                        .data = std::move(data),
                                                        .mean_data = std::nullopt,
                                                        .replicates = std::nullopt,
                                                        .priors = std::move(priors),
-                                                       .readings = std::move(readings)});
+                                                       .readings = std::move(readings),
+                                                       .interpolant = std::move(interpolant)});
 }
 
 absl::StatusOr<std::shared_ptr<const Definition>> LoadDefinition(

@@ -12,6 +12,7 @@
 
 #include "absl/status/statusor.h"
 #include "inference/scatter/refit_spread.h"
+#include "inference/surrogate/cubic_rbf.h"
 #include "server/campaign/campaign.h"
 #include "server/campaign/campaign_file.h"
 #include "server/store/reader.h"
@@ -45,6 +46,9 @@ struct Definition {
   std::optional<inference::Replicates> replicates{};
   inference::JointPrior priors;
   ReadingIndex readings;
+  /// Of surrogate_msrs, kept from one plan to the next: nothing that the store does not give again
+  /// bit for bit. A campaign has one plan in the making at a time.
+  std::shared_ptr<inference::CubicRbf> interpolant{};
 
   /// Load steps that a complete evaluation of the experiment has.
   std::vector<int> LoadSteps(int experiment) const;

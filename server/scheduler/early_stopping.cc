@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "inference/sampling/philox.h"
+#include "server/scheduler/decisions.h"
 
 namespace calib::scheduler {
 namespace {
@@ -74,6 +75,13 @@ absl::StatusOr<Finished> FinishedMass(const Definition& definition, const Histor
   return Finished{.exponent = *exponent, .log_mass = log_mass, .log_weights = std::move(weights)};
 }
 
+/// See StopThresholds. n: samples of the iteration.
+double Threshold(const Definition& definition, const Finished& finished, double importance,
+                 Eigen::Index n) {
+  const double share = definition.campaign.early_stopping->discard_at_most / static_cast<double>(n);
+  return (finished.log_mass + std::log(share) - importance) / finished.exponent;
+}
+
 }  // namespace
 
 bool StopsEarly(const Definition& definition) {
@@ -86,7 +94,8 @@ absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
                                                    const History& history,
                                                    const inference::Iteration& next) {
   const Eigen::Index n = next.parameters.rows();
-  std::vector<double> thresholds(static_cast<std::size_t>(n), store::kUnknown);
+  const bool at_once = DecidesAtOnce(definition);
+  std::vector<double> thresholds(static_cast<std::size_t>(n), at_once ? kNoMass : store::kUnknown);
   if (!StopsEarly(definition) || history.iterations.empty()) {
     return thresholds;
   }
@@ -100,13 +109,35 @@ absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
   if (!std::isfinite(finished->log_mass)) {
     return thresholds;
   }
-  const double share = definition.campaign.early_stopping->discard_at_most / static_cast<double>(n);
   const Eigen::Index first = importance.size() - n;
   for (Eigen::Index i = 0; i < n; ++i) {
     thresholds[static_cast<std::size_t>(i)] =
-        (finished->log_mass + std::log(share) - importance(first + i)) / finished->exponent;
+        Threshold(definition, *finished, importance(first + i), n);
   }
   return thresholds;
+}
+
+absl::StatusOr<std::vector<std::pair<int, double>>> ThresholdsNow(const Definition& definition,
+                                                                  const History& history) {
+  std::vector<std::pair<int, double>> changed;
+  const Eigen::VectorXd importance =
+      inference::LogImportance(definition.priors, history.iterations);
+  const auto finished = FinishedMass(definition, history, importance);
+  if (!finished.ok()) {
+    return finished.status();
+  }
+  const std::vector<char>& ended = history.ended.back();
+  const auto n = static_cast<Eigen::Index>(ended.size());
+  const Eigen::Index first = importance.size() - n;
+  for (Eigen::Index i = 0; std::isfinite(finished->log_mass) && i < n; ++i) {
+    const store::SampleRecord& sample = history.samples[static_cast<std::size_t>(first + i)];
+    const double threshold = Threshold(definition, *finished, importance(first + i), n);
+    const bool may_stop = !std::isnan(sample.stop_below);
+    if (ended[static_cast<std::size_t>(i)] == 0 && may_stop && threshold != sample.stop_below) {
+      changed.emplace_back(sample.sample, threshold);
+    }
+  }
+  return changed;
 }
 
 absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& history) {

@@ -4,6 +4,8 @@
 //
 // Thresholds are fixed when an iteration starts, from the complete iterations before it, and each
 // evaluation is judged by its own states alone: the same states are stored whatever arrives first.
+// A campaign that decides at once (decisions.h) takes them again whenever a run ends, with the mass
+// that has finished by then, its own iteration's among it.
 // Weights are those that guide the campaign (inference::GuidingExponent): the plain ones where they
 // carry the posterior, otherwise tempered until a fifth of the samples count. A posterior sampled
 // on an emulator needs those samples' states: a run's own likelihood is a lottery of tens of nats,
@@ -17,6 +19,7 @@
 // all the same: the audit.
 
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -31,10 +34,15 @@ bool StopsEarly(const Definition& definition);
 /// Per new sample, the largest LogLikelihoodBound with which it is stopped:
 ///   [ln(finished weight) + ln(discard_at_most / N) - ln(prior / proposals)_i] / exponent
 /// where exponent is the guiding one and the proposals are those of all iterations and the new one.
-/// NaN (never stopped) for all while no sample has finished.
+/// While no sample has finished NaN (never stopped) for all, with decisions at once -inf (not yet).
 absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
                                                    const History& history,
                                                    const inference::Iteration& next);
+
+/// (sample, threshold as above) of the samples of the last iteration that are under way and may be
+/// stopped, where it is another than the one they have; next: the last iteration itself.
+absl::StatusOr<std::vector<std::pair<int, double>>> ThresholdsNow(const Definition& definition,
+                                                                  const History& history);
 
 struct Loss {
   double stated = 0;             ///< of those that stay stopped, relative to the finished mass

@@ -50,6 +50,11 @@ class FilterMethod final : public Method {
     return outcome;
   }
 
+  absl::StatusOr<std::vector<std::pair<int, double>>> Thresholds(
+      const History& history) const override {
+    return ThresholdsNow(definition_, history);
+  }
+
  private:
   // Where the weights hold a handful of samples, the emulator of their states knows better where
   // the posterior lies, even one that is not good enough for an interval yet.

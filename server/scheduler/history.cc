@@ -49,10 +49,38 @@ void AddSamples(const Definition& definition, History& history) {
   }
 }
 
+using Places = std::map<int, std::pair<std::size_t, Eigen::Index>>;  // by sample
+
+/// What has ended and what is open, of all evaluations or those of the samples that have a place
+/// alone.
+void AddEnds(const std::vector<store::EvaluationRecord>& evaluations, const Places& place,
+             bool placed_alone, History& history) {
+  for (const inference::Iteration& iteration : history.iterations) {
+    history.ended.emplace_back(static_cast<std::size_t>(iteration.parameters.rows()), 1);
+  }
+  std::int64_t ran = 0;  // to an end here
+  for (const store::EvaluationRecord& evaluation : evaluations) {
+    const auto found = place.find(evaluation.key.sample);
+    if (placed_alone && found == place.end()) {
+      continue;
+    }
+    if (store::IsTerminal(evaluation.status)) {
+      ran += evaluation.reused ? 0 : 1;
+      continue;
+    }
+    ++history.open;
+    if (found != place.end()) {
+      const auto [k, row] = found->second;
+      history.ended[k][static_cast<std::size_t>(row)] = 0;
+    }
+  }
+  history.effort.model_evaluations = ran;
+}
+
 }  // namespace
 
 absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t campaign,
-                                    store::Reader& reader) {
+                                    store::Reader& reader, std::optional<int> first_iterations) {
   History history;
   auto iterations = reader.Iterations(campaign);
   auto samples = reader.Samples(campaign);
@@ -69,6 +97,9 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     if (record.proposal == kHeldOutDraws || record.proposal == kReplicates) {
       break;  // nothing of the ensemble comes after them
     }
+    if (first_iterations.has_value() && record.number >= *first_iterations) {
+      break;
+    }
     inference::Iteration& iteration = history.iterations.emplace_back();
     if (campaign::IsFilter(definition.campaign.method)) {
       auto proposal = ProposalFromJson(record.proposal);
@@ -84,6 +115,7 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     if (record.posterior.has_value()) {
       history.previous_posterior = std::move(history.last_posterior);
       history.last_posterior = std::move(record.posterior);
+      ++history.concluded;
     }
   }
   history.samples = *std::move(samples);
@@ -94,12 +126,13 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
   AddSamples(definition, history);
 
   // Position of a sample within its iteration, by its number.
-  std::map<int, std::pair<std::size_t, Eigen::Index>> place;
+  Places place;
   std::vector<Eigen::Index> next(history.iterations.size(), 0);
   for (const store::SampleRecord& sample : history.samples) {
     const auto k = static_cast<std::size_t>(sample.iteration);
     place[sample.sample] = {k, next[k]++};
   }
+  AddEnds(*evaluations, place, first_iterations.has_value(), history);
   const auto finished = WithStatus(*evaluations, store::EvaluationStatus::kFinished);
   const auto stopped = WithStatus(*evaluations, store::EvaluationStatus::kStoppedEarly);
   std::set<int> stopped_samples;

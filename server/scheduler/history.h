@@ -24,10 +24,13 @@ struct History {
   std::map<store::EvaluationKey, int> resting;     ///< those with a rung: they came no
                                                    ///< further than this load step
   std::vector<std::vector<char>> diverged;   ///< [iteration][position]: it has no finite prediction
+  std::vector<std::vector<char>> ended;      ///< likewise: nothing of it is waiting or running
   std::vector<store::SampleRecord> samples;  ///< of all iterations
   std::optional<std::string> last_posterior;      ///< JSON, of the last iteration that has one
   std::optional<std::string> previous_posterior;  ///< of the iteration before that
+  int concluded = 0;      ///< iterations that have a posterior, the first ones
   int stopped_early = 0;  ///< samples; those rejected without a run are not among them
+  std::int64_t open = 0;  ///< evaluations waiting or running
   store::Effort effort;
 };
 
@@ -37,8 +40,9 @@ inline constexpr const char* kHeldOutDraws = "\"draws from the posterior\"";
 /// Likewise when they are the best estimate on every packing, one sample each.
 inline constexpr const char* kReplicates = "\"best estimate on every packing\"";
 
-/// Reads every record in the order of its natural key.
+/// Reads every record in the order of its natural key. iterations: the first ones alone, as if
+/// nothing had followed (the core seconds are those of all); empty: all.
 absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t campaign,
-                                    store::Reader& reader);
+                                    store::Reader& reader, std::optional<int> iterations = {});
 
 }  // namespace calib::scheduler

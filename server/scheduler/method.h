@@ -3,10 +3,12 @@
 // that have ended. One .cc per family: filter_method, tmcmc_method, surrogate_method.
 
 #include <Eigen/Dense>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -26,6 +28,7 @@ struct Batch {
   std::vector<double> stop_below;  ///< n: see store::SampleRecord
   /// n or empty: needs no evaluation, whatever its likelihood it counts for nothing.
   std::vector<char> refused;
+  bool continues = false;  ///< with the last iteration; `proposal` is then that of all its samples
 };
 
 /// What a campaign has come to with the batch that has just ended.
@@ -42,8 +45,21 @@ class Method {
  public:
   virtual ~Method() = default;
   virtual absl::StatusOr<Batch> First() const = 0;
-  /// history: at least one batch, all of it ended. affordable: another batch is within the budget.
+  /// history: at least one batch, all of it ended. affordable: another batch is within the budget
+  /// (of a method that chooses while runs are under way: more points have been chosen).
   virtual absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const = 0;
+  /// Points that can be chosen while others are under way, at most `affordable` of them, and no
+  /// more than go into one iteration. No rows: none before more has ended, or never again.
+  virtual absl::StatusOr<Batch> More(const History& /*history*/,
+                                     std::int64_t /*affordable*/) const {
+    return Batch{};
+  }
+  /// (sample, SampleRecord::stop_below) of samples under way, where what has arrived gives another
+  /// threshold than the one they have. Asked of campaigns that decide at once.
+  virtual absl::StatusOr<std::vector<std::pair<int, double>>> Thresholds(
+      const History& /*history*/) const {
+    return std::vector<std::pair<int, double>>{};
+  }
 };
 
 /// Of definition.campaign.method; keeps a reference to the definition.

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/scheduler/answer.h"
 #include "server/scheduler/attempt_spec.h"
+#include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
 #include "server/scheduler/history.h"
 #include "server/scheduler/method.h"
@@ -27,6 +28,10 @@ using store::EvaluationStatus;
 // more of the weighted ones than hold this share.
 constexpr std::size_t kHeldOutRuns = 20;
 constexpr double kValidatedMass = 0.99;
+
+constexpr const char* kDecidedAtOnce =
+    "Decisions were taken at once, by what had arrived (inference.decisions: immediate): not "
+    "reproducible, the same campaign run again may choose other samples or stop others.";
 
 class Planner {
  public:
@@ -51,11 +56,19 @@ class Planner {
     absl::Status status;
     if (history_.iterations.empty()) {
       status = Begin(campaign_.table.has_value() ? TableBatch() : MakeMethod(definition_)->First());
+      if (DecidesAtOnce(definition_)) {
+        plan_.log.emplace_back(
+            "decisions are immediate (inference.decisions): this campaign is not reproducible");
+      }
       if (campaign_.precomputed.has_value()) {
         plan_.event = CampaignEvent::kStart;
       }
+    } else if (plan_.phase == "calibrating" && DecidesWhileRunning(definition_) && !replicating_) {
+      status = GoOn();
+    } else if (history_.open > 0) {
+      return std::move(plan_);  // nothing to say
     } else if (plan_.phase == "calibrating" && !campaign_.table.has_value()) {
-      status = Conclude();
+      status = Conclude(!BudgetSpent() && !replicating_);
     } else {
       Finish();  // the runs of a table are all there is
     }
@@ -79,8 +92,63 @@ class Planner {
     return absl::OkStatus();
   }
 
+  /// While runs are under way, or after the last one: points and thresholds that follow from what
+  /// has ended, and the posterior of the first iteration that has ended and has none.
+  absl::Status GoOn() {
+    const std::unique_ptr<Method> method = MakeMethod(definition_);
+    const bool at_rest = history_.open == 0;
+    if (at_rest && campaign::IsFilter(campaign_.method)) {
+      return Conclude(!BudgetSpent());
+    }
+    const auto more = method->More(history_, Affordable());
+    auto thresholds = DecidesAtOnce(definition_) ? method->Thresholds(history_)
+                                                 : std::vector<std::pair<int, double>>{};
+    for (const absl::Status& status : {more.status(), thresholds.status()}) {
+      if (!status.ok()) {  // told when nothing is under way any more
+        return at_rest ? Fail(status) : absl::OkStatus();
+      }
+    }
+    plan_.stop_below = *std::move(thresholds);
+    const bool grows = more->parameters.rows() > 0;
+    const auto next = static_cast<std::size_t>(history_.concluded);
+    const bool is_last = next + 1 >= history_.iterations.size();
+    if (at_rest && is_last && !grows) {
+      return Conclude(false);
+    }
+    if (grows) {
+      if (absl::Status status = Begin(*more); !status.ok()) {
+        return status;
+      }
+    }
+    const bool is_complete = !is_last || (grows && !more->continues);
+    return is_complete && HasEnded(next) ? ConcludeEarlier() : absl::OkStatus();
+  }
+
+  bool HasEnded(std::size_t iteration) const {
+    if (iteration >= history_.ended.size()) {
+      return false;
+    }
+    const std::vector<char>& ended = history_.ended[iteration];
+    return std::all_of(ended.begin(), ended.end(), [](char is) { return is != 0; });
+  }
+
+  /// Posterior of the first iteration that has none, as if nothing had followed it.
+  absl::Status ConcludeEarlier() {
+    auto history = LoadHistory(definition_, record_.submitted.id, reader_, history_.concluded + 1);
+    if (!history.ok()) {
+      return history.status();
+    }
+    history_ = *std::move(history);
+    const auto outcome = MakeMethod(definition_)->Conclude(history_, true);
+    if (!outcome.ok()) {
+      return Fail(outcome.status());
+    }
+    AddConclusion(*outcome);
+    return absl::OkStatus();
+  }
+
   /// Posterior of the iteration that has just ended, then whatever follows from it.
-  absl::Status Conclude() {
+  absl::Status Conclude(bool affordable) {
     if (campaign::IsFilter(campaign_.method)) {
       if (const auto scouts = Scouts(definition_, history_); !scouts.empty()) {
         for (const store::EvaluationKey& key : scouts) {
@@ -130,7 +198,7 @@ class Planner {
     if (replicating_) {
       history_.last_posterior = history_.previous_posterior;  // the same iteration once more
     }
-    auto outcome = MakeMethod(definition_)->Conclude(history_, !BudgetSpent() && !replicating_);
+    auto outcome = MakeMethod(definition_)->Conclude(history_, affordable);
     if (!outcome.ok()) {
       return Fail(outcome.status());
     }
@@ -167,6 +235,9 @@ class Planner {
     conclusion.posterior.set_campaign(absl::StrCat("c", record_.submitted.id));
     conclusion.posterior.set_model_evaluations(history_.effort.model_evaluations);
     conclusion.posterior.set_stopped_early(history_.stopped_early);
+    if (DecidesAtOnce(definition_)) {
+      conclusion.posterior.add_warnings(kDecidedAtOnce);
+    }
     conclusion.posterior.set_stated_loss(stated_loss_);
     if (audit_.samples > 0) {
       conclusion.posterior.set_audited(audit_.samples);
@@ -245,15 +316,30 @@ class Planner {
 
   /// True when the next iteration would exceed what the user allowed.
   bool BudgetSpent() const {
-    return Exceeds(static_cast<std::int64_t>(campaign::LaterBatch(campaign_)) *
-                   static_cast<std::int64_t>(definition_.ExperimentsOf(Role::kCalibrate).size()));
+    const bool one_by_one = campaign_.method == campaign::Method::kSurrogateMsrs;
+    return Exceeds((one_by_one ? 1 : campaign_.samples) * Calibrated());
   }
 
-  /// True when so many evaluations more would.
+  /// How many samples more would not.
+  std::int64_t Affordable() const {
+    if (Exceeds(Calibrated()) || !campaign_.budget.model_evaluations.has_value()) {
+      return Exceeds(Calibrated()) ? 0 : std::numeric_limits<std::int64_t>::max();
+    }
+    return (*campaign_.budget.model_evaluations - history_.effort.model_evaluations -
+            history_.open) /
+           Calibrated();
+  }
+
+  /// Evaluations of one sample.
+  std::int64_t Calibrated() const {
+    return static_cast<std::int64_t>(definition_.ExperimentsOf(Role::kCalibrate).size());
+  }
+
+  /// True when so many evaluations, beside those under way, would exceed it.
   bool Exceeds(std::int64_t next) const {
     const campaign::Budget& budget = campaign_.budget;
     return (budget.model_evaluations.has_value() &&
-            history_.effort.model_evaluations + next > *budget.model_evaluations) ||
+            history_.effort.model_evaluations + history_.open + next > *budget.model_evaluations) ||
            (budget.core_hours.has_value() &&
             history_.effort.core_seconds > *budget.core_hours * 3600);
   }
@@ -272,13 +358,19 @@ class Planner {
     if (!batch.ok()) {
       return Fail(batch.status());
     }
-    const auto iteration = static_cast<int>(history_.iterations.size());
-    Start start{.iteration = iteration, .proposal = batch->proposal, .samples = {}};
+    const auto iterations = static_cast<int>(history_.iterations.size());
+    const int iteration = batch->continues ? iterations - 1 : iterations;
+    const Eigen::Index there =
+        batch->continues ? history_.iterations.back().parameters.rows() : Eigen::Index{0};
+    Start start{.iteration = iteration,
+                .proposal = batch->proposal,
+                .samples = {},
+                .continues = batch->continues};
     for (Eigen::Index i = 0; i < batch->parameters.rows(); ++i) {
       const Eigen::VectorXd row = batch->parameters.row(i);
       const auto position = static_cast<std::size_t>(i);
       start.samples.push_back(
-          {.sample = iteration * record_.submitted.samples + static_cast<int>(i),
+          {.sample = iteration * record_.submitted.samples + static_cast<int>(there + i),
            .iteration = iteration,
            .parameters = {row.begin(), row.end()},
            .stop_below = batch->stop_below[position]});
@@ -461,47 +553,6 @@ absl::StatusOr<Plan> PlanNext(const Definition& definition, const store::Campaig
   }
   const Definition with = DefinitionWith(definition, *scatter);
   return Planner(with, campaign, reader, true, std::move(scatter->observables)).Next();
-}
-
-void Write(const Plan& plan, std::int64_t campaign, const store::CampaignProgress& progress,
-           std::int64_t unix_ms, store::Transaction& transaction) {
-  if (plan.conclusion.has_value()) {
-    const Conclusion& conclusion = *plan.conclusion;
-    transaction.SetPosterior(campaign, conclusion.iteration, PosteriorToJson(conclusion.posterior));
-    for (std::size_t i = 0; i < conclusion.log_weights.size(); ++i) {
-      transaction.SetWeight(campaign, conclusion.samples[i], conclusion.log_weights[i],
-                            conclusion.log_likelihoods[i]);
-    }
-  }
-  for (const std::optional<Start>& start : {plan.start, plan.draws}) {
-    if (start.has_value()) {
-      transaction.InsertIteration(campaign, start->iteration, start->proposal);
-      for (const store::SampleRecord& sample : start->samples) {
-        transaction.InsertSample(campaign, sample);
-      }
-    }
-  }
-  for (const store::EvaluationRecord& evaluation : plan.evaluations) {
-    transaction.InsertEvaluation(evaluation);
-  }
-  for (const auto& [from, to] : plan.reused) {
-    transaction.ReuseEvaluation(from, to);
-  }
-  for (const Plan::Resumed& resumed : plan.resumed) {
-    transaction.NeverStop(campaign, resumed.key.sample);
-    transaction.SetEvaluation(resumed.key, EvaluationStatus::kWaiting, "", 0);
-    transaction.SetRest(resumed.key, resumed.rest_after);
-  }
-  for (const auto& [sample, share] : plan.audited) {
-    transaction.Audit(campaign, sample, share);
-  }
-  for (const store::StateRecord& state : plan.states) {
-    transaction.PutState(state, unix_ms);
-  }
-  transaction.SetProgress(campaign, progress);
-  for (const std::string& line : plan.log) {
-    transaction.Log(campaign, unix_ms, line);
-  }
 }
 
 }  // namespace calib::scheduler

@@ -26,11 +26,12 @@ struct Conclusion {
   std::vector<double> log_likelihoods;  ///< likewise; NaN with ess_target
 };
 
-/// A new iteration.
+/// A new iteration, or more samples of the last one.
 struct Start {
   int iteration = 0;
-  std::string proposal;  ///< JSON
+  std::string proposal;  ///< JSON, of all its samples
   std::vector<store::SampleRecord> samples;
+  bool continues = false;  ///< the iteration is there already
 };
 
 /// Everything to be written, in one transaction.
@@ -49,6 +50,8 @@ struct Plan {
   std::vector<Resumed> resumed;
   /// (sample, share that its bound leaves it): among them, run to their ends to be looked at.
   std::vector<std::pair<int, double>> audited;
+  /// (sample under way, SampleRecord::stop_below), where what has arrived moves it.
+  std::vector<std::pair<int, double>> stop_below;
   std::vector<store::StateRecord> states;  ///< of runs made elsewhere
   std::string phase;                       ///< afterwards
   bool converged = false;
@@ -58,8 +61,9 @@ struct Plan {
 };
 
 /// The step after everything planned so far has ended: the first iteration; posterior and next
-/// iteration; posterior and validation; the end. Errors: those of the store. What inference cannot
-/// do becomes a plan with event kFail.
+/// iteration; posterior and validation; the end. While evaluations are under way (decisions.h):
+/// points that can be chosen by now, the posterior of an iteration that has ended, thresholds; or
+/// nothing. Errors: those of the store. What inference cannot do becomes a plan with event kFail.
 absl::StatusOr<Plan> PlanNext(const Definition& definition, const store::CampaignRecord& campaign,
                               store::Reader& reader);
 

@@ -48,8 +48,9 @@ void AddParameters(const Definition& definition, const Answer& answer, v1::Poste
     out.set_at_bound(summary.at_bound);
     const auto& frozen = answer.weighted.frozen;
     out.set_conditioned_on(!frozen.empty() && frozen[i].has_value());
-    const Eigen::VectorXd& halves = answer.weighted.split_half;
-    out.set_split_half(answer.FromWeights() && halves.size() > 0
+    const Eigen::VectorXd& halves =
+        answer.FromEmulator() ? answer.emulated->split_half : answer.weighted.split_half;
+    out.set_split_half(answer.HasIntervals() && halves.size() > 0
                            ? halves[static_cast<Eigen::Index>(i)]
                            : std::numeric_limits<double>::quiet_NaN());
     out.set_prior_min(std::isfinite(prior.min) ? prior.min : prior.Quantile(kTail));
@@ -212,8 +213,10 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
   AddPath(definition, posterior.reversed_path, *message.mutable_reversed_path());
   AddNoiseScale(definition, emulated ? answer.emulated->noise_scale : posterior.noise_scale,
                 message);
-  if (answer.FromWeights() && posterior.predictive_p.has_value()) {
-    message.set_predictive_p(*posterior.predictive_p);
+  const std::optional<double>& predictive_p =
+      emulated ? answer.emulated->predictive_p : posterior.predictive_p;
+  if (answer.HasIntervals() && predictive_p.has_value()) {
+    message.set_predictive_p(*predictive_p);
   }
   message.mutable_warnings()->Add(answer.warnings.begin(), answer.warnings.end());
   message.set_noise(ToString(definition.campaign.filter.noise));

@@ -276,9 +276,10 @@ void Scheduler::PauseIfTooManyDiverged(CampaignRun& run) {
 void Scheduler::Advance(std::int64_t campaign) {
   CampaignRun* run = FindRun(campaign);
   if (run == nullptr || computing_.count(campaign) > 0 || !IsLeasable(run->state()) ||
-      !run->AllTerminal()) {
+      !run->WantsPlan()) {
     return;
   }
+  run->Planned(false);
   computing_.insert(campaign);
   // An empty write: when it is done, everything that memory knows of this campaign is on disk.
   ports_.Write([](Transaction&) {},
@@ -320,7 +321,8 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
   store::CampaignProgress& progress = run->progress();
   progress.phase = plan.phase;
   progress.converged = plan.converged;
-  if (plan.start.has_value()) {
+  const bool begins = plan.start.has_value() && !plan.start->continues;
+  if (begins) {
     progress.iteration = plan.start->iteration;
     progress.pause_waived = false;
   }
@@ -330,27 +332,54 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
     // Allowed in every state in which a plan is computed (transitions.cc).
     (void)run->Apply(*plan.event, plan.reason);
   }
+  if (plan.conclusion.has_value() || plan.start.has_value()) {
+    run->Planned(true);
+  }
   const bool over = IsOver(run->state());
-  ports_.Write([plan = std::move(plan), campaign, progress, now = ports_.UnixMs()](
-                   Transaction& t) { scheduler::Write(plan, campaign, progress, now, t); },
-               [this, campaign, over](const absl::Status& status) {
-                 computing_.erase(campaign);
-                 ++version_;
-                 CampaignRun* planned = FindRun(campaign);
-                 if (!status.ok() || planned == nullptr) {
-                   return;
-                 }
-                 if (over) {
-                   runs_.erase(campaign);
-                   return;
-                 }
-                 durations_.erase(campaign);
-                 if (auto reader = ports_.Read(); reader.ok() && planned->Reload(*reader).ok()) {
-                   Enqueue(*planned);
-                   Advance(campaign);
-                   Dispatch();
-                 }
-               });
+  if (over) {  // with runs under way only where the plan could not be made
+    Enqueue(*run);
+    for (const LeaseEntry& lease : leases_.OfCampaign(campaign)) {
+      leases_.Release(lease.attempt);
+      GiveBack(lease, {}, "cancelled", false);
+      if (const WorkerEntry* worker = workers_.Find(lease.worker); worker != nullptr) {
+        v1::ServerMessage message;
+        message.mutable_stop()->set_attempt(lease.attempt);
+        ports_.Send(worker->session, std::move(message));
+      }
+    }
+  }
+  // Where runs are under way memory may be ahead of the disk in them.
+  const bool at_rest = run->AllTerminal();
+  ports_.Write(
+      [plan, campaign, progress, now = ports_.UnixMs()](Transaction& t) {
+        scheduler::Write(plan, campaign, progress, now, t);
+      },
+      [this, campaign, over, at_rest, begins,
+       stop_below = plan.stop_below](const absl::Status& status) {
+        computing_.erase(campaign);
+        ++version_;
+        CampaignRun* planned = FindRun(campaign);
+        if (!status.ok() || planned == nullptr) {
+          return;
+        }
+        if (over) {
+          runs_.erase(campaign);
+          Dispatch();
+          return;
+        }
+        if (at_rest || begins) {
+          durations_.erase(campaign);
+        }
+        for (const auto& [sample, threshold] : stop_below) {
+          planned->SetStopBelow(sample, threshold);
+        }
+        auto reader = ports_.Read();
+        if (reader.ok() && (at_rest ? planned->Reload(*reader) : planned->Extend(*reader)).ok()) {
+          Enqueue(*planned);
+          Advance(campaign);
+          Dispatch();
+        }
+      });
 }
 
 }  // namespace calib::scheduler

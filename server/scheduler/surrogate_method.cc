@@ -1,6 +1,11 @@
-// surrogate_msrs: a symmetric Latin hypercube, then rounds of points chosen on a response surface
-// of the misfit. Rounds are of one size, whatever the number of workers, so that the same points
-// are chosen everywhere.
+// surrogate_msrs: a symmetric Latin hypercube, then points chosen one by one on a response surface
+// of the misfit while those before are under way, `in_flight` of them at most.
+//
+// Reproducibly, point k is chosen by the results of all points up to k - in_flight, those between
+// pending even if their results are there: the same points for any number of workers and any order
+// of arrival. Where too few of these have a value, results of later points join in order until a
+// point can be chosen. At once, a point is chosen by all results that are there
+// [Samuelsson 2023, sec. 3.7].
 
 #include <algorithm>
 #include <cmath>
@@ -47,7 +52,7 @@ class SurrogateMethod final : public Method {
     options_.dimensions = static_cast<int>(definition.priors.size());
     options_.initial_points = campaign_.samples;
     options_.max_evaluations = MostEvaluations();
-    options_.workers = campaign::LaterBatch(campaign_);
+    options_.workers = campaign_.in_flight;
     options_.seed = campaign_.seed;
     options_.termination = campaign_.termination.value_or(options_.termination);
     if (definition.priors.is_constrained()) {
@@ -62,17 +67,19 @@ class SurrogateMethod final : public Method {
     if (!state.ok()) {
       return state.status();
     }
-    return MakeBatch(state->design, *state);
+    return MakeBatch(
+        state->design, 0,
+        std::vector<double>(static_cast<std::size_t>(state->design.rows()), store::kUnknown));
   }
 
-  absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const override {
-    const auto misfits = Misfits(history);
-    if (!misfits.ok()) {
-      return misfits.status();
+  absl::StatusOr<Outcome> Conclude(const History& history, bool goes_on) const override {
+    const auto results = Results(history);
+    auto state = Pending(history);
+    if (!results.ok() || !state.ok()) {
+      return results.ok() ? state.status() : results.status();
     }
-    auto state = Rebuild(history, *misfits);
-    if (!state.ok()) {
-      return state.status();
+    if (absl::Status status = ReportEnded(*results, *state); !status.ok()) {
+      return status;
     }
     if (state->best < 0) {
       return absl::FailedPreconditionError(
@@ -83,19 +90,8 @@ class SurrogateMethod final : public Method {
     outcome.log = absl::StrCat("best chi-squared per reading ",
                                state->evaluations[static_cast<std::size_t>(state->best)].value,
                                ", step ", state->step);
-    const absl::StatusOr<Eigen::MatrixXd> chosen =
-        affordable ? ChoosePoints(*state) : Eigen::MatrixXd{};
-    if (!chosen.ok()) {
-      return chosen.status();
-    }
-    const Eigen::MatrixXd& points = *chosen;
-    if (points.rows() > 0) {
+    if (goes_on) {
       outcome.answer.warnings.push_back(outcome.answer.weighted.degeneracy);
-      auto batch = MakeBatch(points, *state);
-      if (!batch.ok()) {
-        return batch.status();
-      }
-      outcome.next = *std::move(batch);
     } else {
       AskEmulator(definition_, history.iterations, outcome.answer);
       outcome.converged = outcome.answer.FromEmulator();
@@ -103,44 +99,121 @@ class SurrogateMethod final : public Method {
     return outcome;
   }
 
+  absl::StatusOr<Batch> More(const History& history, std::int64_t affordable) const override {
+    const auto results = Results(history);
+    auto state = Pending(history);
+    if (!results.ok() || !state.ok()) {
+      return results.ok() ? state.status() : results.status();
+    }
+    const bool at_once = campaign_.decisions == campaign::Decisions::kImmediate;
+    if (at_once) {
+      if (absl::Status status = ReportEnded(*results, *state); !status.ok()) {
+        return status;
+      }
+    }
+    const Eigen::Index size = campaign::LaterBatch(campaign_);
+    const Eigen::Index last = history.iterations.back().parameters.rows();
+    const bool continues = history.iterations.size() > 1 && last < size;
+    const std::int64_t most = std::min<std::int64_t>(affordable, continues ? size - last : size);
+    std::size_t reported = 0;
+    std::vector<double> stop_below;
+    while (static_cast<std::int64_t>(stop_below.size()) < most) {
+      const auto point = at_once ? NextAtOnce(*state) : NextInOrder(*results, reported, *state);
+      if (!point.ok()) {
+        return point.status();
+      }
+      if (!point->has_value()) {
+        break;
+      }
+      const auto threshold = StopBelow(static_cast<int>(state->evaluations.size()) - 1, *state);
+      if (!threshold.ok()) {
+        return threshold.status();
+      }
+      stop_below.push_back(*threshold);
+    }
+    if (stop_below.empty()) {
+      return Batch{};
+    }
+    const Eigen::Index there = continues ? last : 0;
+    Eigen::MatrixXd unit(there + static_cast<Eigen::Index>(stop_below.size()), options_.dimensions);
+    const std::size_t first = state->evaluations.size() - static_cast<std::size_t>(unit.rows());
+    for (Eigen::Index i = 0; i < unit.rows(); ++i) {
+      unit.row(i) = state->evaluations[first + static_cast<std::size_t>(i)].point;
+    }
+    return MakeBatch(unit, there, std::move(stop_below));
+  }
+
+  absl::StatusOr<std::vector<std::pair<int, double>>> Thresholds(
+      const History& history) const override {
+    const auto results = Results(history);
+    auto state = Pending(history);
+    if (!results.ok() || !state.ok()) {
+      return results.ok() ? state.status() : results.status();
+    }
+    if (absl::Status status = ReportEnded(*results, *state); !status.ok()) {
+      return status;
+    }
+    std::vector<std::pair<int, double>> changed;
+    for (std::size_t i = 0; i < results->size(); ++i) {
+      const store::SampleRecord& sample = history.samples[i];
+      const auto threshold = StopBelow(static_cast<int>(i), *state);
+      if (!threshold.ok()) {
+        return threshold.status();
+      }
+      // NaN, never stopped, equals nothing.
+      if (!(*results)[i].ended && !std::isnan(*threshold) && *threshold != sample.stop_below) {
+        changed.emplace_back(sample.sample, *threshold);
+      }
+    }
+    return changed;
+  }
+
  private:
+  using State = inference::ResponseSurfaceState;
+  using Point = std::optional<Eigen::VectorXd>;
+
+  /// Of one point.
+  struct Result {
+    bool ended = false;
+    std::optional<double> value{};  ///< chi-squared per reading; empty: none, or not yet
+  };
+
   int MostEvaluations() const {
     const auto most = static_cast<std::int64_t>(campaign_.samples) * campaign_.max_iterations;
     return static_cast<int>(std::min<std::int64_t>(most, std::numeric_limits<int>::max()));
   }
 
-  /// Points of the state; each may be stopped by what is the best now, however the others of its
-  /// round end, so that the same runs are stopped everywhere.
-  absl::StatusOr<Batch> MakeBatch(const Eigen::MatrixXd& unit,
-                                  const inference::ResponseSurfaceState& state) const {
+  /// unit: all points of the iteration; those from row `there` on are new.
+  Batch MakeBatch(const Eigen::MatrixXd& unit, Eigen::Index there,
+                  std::vector<double> stop_below) const {
     Json rows = Json::array();
     Batch batch;
-    batch.parameters.resize(unit.rows(), unit.cols());
+    batch.parameters.resize(unit.rows() - there, unit.cols());
     for (Eigen::Index i = 0; i < unit.rows(); ++i) {
       const Eigen::VectorXd row = unit.row(i);
       rows.push_back(std::vector<double>(row.begin(), row.end()));
-      batch.parameters.row(i) = FromUnit(definition_.priors, row);
-    }
-    batch.proposal = Json{{kUnitPoints, rows}}.dump();
-    batch.stop_below.assign(static_cast<std::size_t>(unit.rows()), store::kUnknown);
-    // A tempered likelihood has no bound that could be kept.
-    if (!campaign_.termination || campaign_.filter.noise == inference::NoiseMode::kEssTarget) {
-      return batch;
-    }
-    const auto perfect = Perfect();
-    if (!perfect.ok()) {
-      return perfect.status();
-    }
-    const int first =
-        static_cast<int>(state.evaluations.size()) - static_cast<int>(batch.stop_below.size());
-    for (std::size_t i = 0; i < batch.stop_below.size(); ++i) {
-      const double bound =
-          inference::TerminationBound(options_, first + static_cast<int>(i), state);
-      if (std::isfinite(bound)) {
-        batch.stop_below[i] = *perfect - bound * Readings() / 2;
+      if (i >= there) {
+        batch.parameters.row(i - there) = FromUnit(definition_.priors, row);
       }
     }
+    batch.proposal = Json{{kUnitPoints, rows}}.dump();
+    batch.stop_below = std::move(stop_below);
+    batch.continues = there > 0;
     return batch;
+  }
+
+  /// Where a run of this point ends by what the state knows; NaN: it never does. A tempered
+  /// likelihood has no bound that could be kept.
+  absl::StatusOr<double> StopBelow(int id, const State& state) const {
+    if (!campaign_.termination || campaign_.filter.noise == inference::NoiseMode::kEssTarget) {
+      return store::kUnknown;
+    }
+    const auto perfect = Perfect();
+    const double bound = inference::TerminationBound(options_, id, state);
+    if (!perfect.ok() || !std::isfinite(bound)) {
+      return perfect.ok() ? absl::StatusOr<double>(store::kUnknown) : perfect.status();
+    }
+    return *perfect - bound * Readings() / 2;
   }
 
   double Readings() const { return static_cast<double>(definition_.data.readings.size()); }
@@ -157,55 +230,119 @@ class SurrogateMethod final : public Method {
     return (*perfect)(0);
   }
 
-  /// Chi-squared per reading of every sample: twice what its log likelihood lacks to that of
-  /// perfect agreement; NaN: diverged or ended early.
-  absl::StatusOr<std::vector<Eigen::VectorXd>> Misfits(const History& history) const {
+  /// Of every point in order. Chi-squared is twice what the log likelihood lacks to that of perfect
+  /// agreement.
+  absl::StatusOr<std::vector<Result>> Results(const History& history) const {
     const auto perfect = Perfect();
-    auto batches = LogLikelihoodsByBatch(definition_, history);
+    const auto batches = LogLikelihoodsByBatch(definition_, history);
     if (!perfect.ok() || !batches.ok()) {
       return perfect.ok() ? batches.status() : perfect.status();
     }
-    for (Eigen::VectorXd& values : *batches) {
-      values = values.unaryExpr([&](double value) {
-        return std::isfinite(value) ? 2 * (*perfect - value) / Readings() : kNone;
-      });
+    std::vector<Result> results;
+    for (std::size_t k = 0; k < batches->size(); ++k) {
+      for (Eigen::Index i = 0; i < (*batches)[k].size(); ++i) {
+        Result& result = results.emplace_back();
+        result.ended = history.ended[k][static_cast<std::size_t>(i)] != 0;
+        const double value = (*batches)[k](i);
+        if (result.ended && std::isfinite(value)) {
+          result.value = 2 * (*perfect - value) / Readings();
+        }
+      }
     }
-    return batches;
+    return results;
   }
 
-  /// The optimiser as it was after everything in the history, results reported round by round in
-  /// order.
-  absl::StatusOr<inference::ResponseSurfaceState> Rebuild(
-      const History& history, const std::vector<Eigen::VectorXd>& misfits) const {
-    inference::ResponseSurfaceState state;
+  /// The optimiser with all points of the history and no result.
+  absl::StatusOr<State> Pending(const History& history) const {
+    State state;
     state.step = options_.max_step;
-    for (std::size_t k = 0; k < misfits.size(); ++k) {
+    for (std::size_t k = 0; k < history.proposals.size(); ++k) {
       const auto points = UnitPoints(history.proposals[k]);
       if (!points.ok()) {
         return points.status();
       }
-      if (points->rows() != misfits[k].size()) {
-        return absl::DataLossError(absl::StrCat("batch ", k, " has ", misfits[k].size(),
-                                                " samples but ", points->rows(), " points"));
+      const Eigen::Index samples = history.iterations[k].parameters.rows();
+      if (points->rows() != samples) {
+        return absl::DataLossError(absl::StrCat("iteration ", k, " has ", samples, " samples but ",
+                                                points->rows(), " points"));
       }
       if (k == 0) {
         state.design = *points;
       }
-      const auto first = static_cast<int>(state.evaluations.size());
       for (Eigen::Index i = 0; i < points->rows(); ++i) {
         state.evaluations.push_back({.point = points->row(i)});
       }
-      for (Eigen::Index i = 0; i < points->rows(); ++i) {
-        const double value = misfits[k](i);
-        if (auto status = inference::Report(
-                options_, first + static_cast<int>(i),
-                std::isfinite(value) ? std::optional<double>(value) : std::nullopt, state);
+    }
+    return state;
+  }
+
+  absl::Status ReportEnded(const std::vector<Result>& results, State& state) const {
+    for (std::size_t i = 0; i < results.size(); ++i) {
+      if (!results[i].ended) {
+        continue;
+      }
+      if (absl::Status status =
+              inference::Report(options_, static_cast<int>(i), results[i].value, state);
+          !status.ok()) {
+        return status;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  /// reported: results that the state knows, the first ones.
+  absl::StatusOr<Point> NextInOrder(const std::vector<Result>& results, std::size_t& reported,
+                                    State& state) const {
+    const std::size_t next = state.evaluations.size();
+    if (static_cast<int>(next) >= options_.max_evaluations) {
+      return Point{};
+    }
+    const auto lag = static_cast<std::size_t>(campaign_.in_flight);
+    for (std::size_t wanted = next < lag ? 0 : next + 1 - lag;; ++wanted) {
+      for (; reported < wanted; ++reported) {
+        if (reported >= results.size() || !results[reported].ended) {
+          return Point{};
+        }
+        if (absl::Status status = inference::Report(options_, static_cast<int>(reported),
+                                                    results[reported].value, state);
             !status.ok()) {
           return status;
         }
       }
+      auto point = Choose(state);
+      if (!point.ok() || point->has_value()) {
+        return point;
+      }
     }
-    return state;
+  }
+
+  absl::StatusOr<Point> NextAtOnce(State& state) const {
+    const auto under_way = std::count_if(state.evaluations.begin(), state.evaluations.end(),
+                                         [](const inference::Evaluation& e) {
+                                           return e.status == inference::EvaluationStatus::kPending;
+                                         });
+    return under_way < campaign_.in_flight ? Choose(state) : Point{};
+  }
+
+  absl::StatusOr<Point> Choose(State& state) const {
+    return campaign_.surrogate == campaign::SurrogateModel::kGaussianProcess
+               ? inference::NextByExpectedImprovement(options_, state)
+               : inference::NextPoint(options_, state, Interpolant(state));
+  }
+
+  /// The one kept since the last choice, where a new one would begin as it is.
+  inference::CubicRbf& Interpolant(const State& state) const {
+    inference::CubicRbf& kept = *definition_.interpolant;
+    bool same = kept.size() <= static_cast<int>(state.completed.size());
+    for (int i = 0; same && i < kept.size(); ++i) {
+      const inference::Evaluation& evaluation =
+          state.evaluations[static_cast<std::size_t>(state.completed[static_cast<std::size_t>(i)])];
+      same = kept.point(i) == evaluation.point && kept.value(i) == evaluation.value;
+    }
+    if (!same) {
+      kept = inference::CubicRbf(options_.dimensions);
+    }
+    return kept;
   }
 
   absl::StatusOr<Eigen::MatrixXd> UnitPoints(const std::string& proposal) const {
@@ -224,30 +361,6 @@ class SurrogateMethod final : public Method {
     } catch (const Json::exception& error) {
       return absl::DataLossError(absl::StrCat("stored points: ", error.what()));
     }
-  }
-
-  /// The next round; no rows: the budget is used up, or too few runs have a value.
-  absl::StatusOr<Eigen::MatrixXd> ChoosePoints(inference::ResponseSurfaceState& state) const {
-    inference::CubicRbf surrogate(options_.dimensions);
-    std::vector<Eigen::VectorXd> chosen;
-    while (static_cast<int>(chosen.size()) < campaign::LaterBatch(campaign_)) {
-      absl::StatusOr<std::optional<Eigen::VectorXd>> point =
-          campaign_.surrogate == campaign::SurrogateModel::kGaussianProcess
-              ? inference::NextByExpectedImprovement(options_, state)
-              : inference::NextPoint(options_, state, surrogate);
-      if (!point.ok()) {
-        return point.status();
-      }
-      if (!point->has_value()) {
-        break;
-      }
-      chosen.push_back(**point);
-    }
-    Eigen::MatrixXd points(static_cast<Eigen::Index>(chosen.size()), options_.dimensions);
-    for (std::size_t i = 0; i < chosen.size(); ++i) {
-      points.row(static_cast<Eigen::Index>(i)) = chosen[i];
-    }
-    return points;
   }
 
   /// The best run, and no posterior.

@@ -80,6 +80,13 @@ void Transaction::InsertIteration(std::int64_t campaign, int number, const std::
   });
 }
 
+void Transaction::SetProposal(std::int64_t campaign, int number, const std::string& proposal) {
+  Guard([&] {
+    connection_.Run("UPDATE iteration SET proposal = ? WHERE campaign = ? AND number = ?", proposal,
+                    campaign, number);
+  });
+}
+
 void Transaction::SetPosterior(std::int64_t campaign, int number, const std::string& posterior) {
   Guard([&] {
     connection_.Run("UPDATE iteration SET posterior = ? WHERE campaign = ? AND number = ?",
@@ -103,6 +110,13 @@ void Transaction::SetWeight(std::int64_t campaign, int sample, double log_weight
     connection_.Run(
         "UPDATE sample SET log_weight = ?, log_likelihood = ? WHERE campaign = ? AND sample = ?",
         log_weight, log_likelihood, campaign, sample);
+  });
+}
+
+void Transaction::SetStopBelow(std::int64_t campaign, int sample, double stop_below) {
+  Guard([&] {
+    connection_.Run("UPDATE sample SET stop_below = ? WHERE campaign = ? AND sample = ?",
+                    stop_below, campaign, sample);
   });
 }
 

@@ -36,9 +36,13 @@ class Transaction {
   void DeleteCampaign(std::int64_t campaign);
 
   void InsertIteration(std::int64_t campaign, int number, const std::string& proposal);
+  /// Of an iteration that goes on growing.
+  void SetProposal(std::int64_t campaign, int number, const std::string& proposal);
   void SetPosterior(std::int64_t campaign, int number, const std::string& posterior);
   void InsertSample(std::int64_t campaign, const SampleRecord& sample);
   void SetWeight(std::int64_t campaign, int sample, double log_weight, double log_likelihood);
+  /// See SampleRecord::stop_below.
+  void SetStopBelow(std::int64_t campaign, int sample, double stop_below);
   /// From now on this sample is run to its end.
   void NeverStop(std::int64_t campaign, int sample);
   /// Marks a stopped sample that is run to its end to see what stopping it would have lost. share:

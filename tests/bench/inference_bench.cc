@@ -164,6 +164,20 @@ void BM_NextPoint(benchmark::State& state) {
 }
 BENCHMARK(BM_NextPoint)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
 
+// The interpolant of n values from nothing, as the first choice after a server has started has it.
+void BM_RebuiltInterpolant(benchmark::State& state) {
+  const Eigen::MatrixXd points = ScrambledSobol(static_cast<int>(state.range(0)), 5, 1);
+  for (auto _ : state) {
+    CubicRbf surrogate(5);
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+      const Eigen::VectorXd point = points.row(i);
+      surrogate.Add(point, (point.array() - 0.3).square().sum()).IgnoreError();
+    }
+    benchmark::DoNotOptimize(surrogate.tail()[0]);
+  }
+}
+BENCHMARK(BM_RebuiltInterpolant)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
+
 }  // namespace
 }  // namespace calib::inference
 

@@ -255,6 +255,19 @@ INSTANTIATE_TEST_SUITE_P(
                 "method: surrogate_msrs, samples: 8",
                 "c.yaml:36: inference: samples is 8; surrogate_msrs starts from at least 9 for 4 "
                 "parameters (two each and one)"},
+        Mistake{"NoneInFlight", "method: iterative_bayesian_filter, samples: 20",
+                "method: surrogate_msrs, samples: 20, in_flight: 0",
+                "c.yaml:36: inference.in_flight: '0' is not a whole number from 1 to 1000"},
+        Mistake{"ChainsDecideNothingAtOnce", "method: iterative_bayesian_filter",
+                "method: tmcmc, decisions: immediate",
+                "c.yaml:36: inference.decisions: tmcmc decides nothing while runs are under way; "
+                "immediate is for surrogate_msrs, and for sqmc and iterative_bayesian_filter with "
+                "early_stopping"},
+        Mistake{"RungsAndAtOnce", "max_iterations: 3}\nearly_stopping: {discard_at_most: 1e-3}",
+                "max_iterations: 3, decisions: immediate}\n"
+                "early_stopping: {discard_at_most: 1e-3, rungs: [0.5]}",
+                "c.yaml:37: early_stopping.rungs: makes samples wait for each other, which "
+                "inference.decisions: immediate does not; remove one of the two"},
         Mistake{"TemperedErrorsForChains",
                 "noise: given\ninference: {method: iterative_bayesian_filter",
                 "noise: ess_target\ninference: {method: tmcmc",

@@ -253,6 +253,45 @@ TEST(EarlyStopping, SameBitsWhateverGoesWrong) {
   }
 }
 
+// Decided at once, runs of the first iteration are stopped too: by the mass that has finished by
+// then. What that may lose is stated against all of it in the end, and audited, as ever.
+TEST(EarlyStopping, DecidedAtOnceItStopsInTheFirstIterationWithinTheStatedLoss) {
+  const auto campaign = [](const std::string& decisions) {
+    return testing::MakeSmallCampaign(
+        {.samples = 40,
+         .max_iterations = 1,
+         .load_steps = 12,
+         .failure_attempts = 100,
+         .relative_noise = 0.02,
+         .method = "sqmc",
+         .inference = "  ess_target: 0.1\n  decisions: " + decisions + "\n",
+         .extra = "early_stopping: {discard_at_most: 1e-3, exponent: 1}\n"});
+  };
+  SimulatedService depth("at_once_not");
+  depth.Submit(campaign("reproducible"));
+  depth.RunToEnd(1, true);
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SimulatedService service("at_once");
+    service.Submit(campaign("immediate"));
+    service.RunToEnd(seed, seed == 1);
+    const v1::Posterior with = LastPosterior(service);
+    EXPECT_GT(with.stopped_early(), 0);
+    EXPECT_LE(with.stated_loss(), kAllowed);
+    EXPECT_GE(with.audited(), 1);
+    EXPECT_LE(with.measured_loss(), with.audited_bound());
+    EXPECT_LT(service.Read().States(1)->size(), depth.Read().States(1)->size());
+    double variation = 0;
+    const auto full = Value(depth.Read().Samples(1));
+    const auto part = Value(service.Read().Samples(1));
+    ASSERT_EQ(full.size(), part.size());
+    for (std::size_t i = 0; i < full.size(); ++i) {
+      ASSERT_EQ(full[i].parameters, part[i].parameters);
+      variation += 0.5 * std::abs(std::exp(full[i].log_weight) - std::exp(part[i].log_weight));
+    }
+    EXPECT_LE(variation, with.stated_loss());
+  }
+}
+
 TEST(EarlyStopping, ThresholdIsNeverSetWithoutAFinishedSample) {
   SimulatedService service("thresholds");
   service.Submit(Campaign(kStopping));

@@ -260,6 +260,74 @@ void SimulatedService::RunToEnd(unsigned seed, bool calm) {
   EXPECT_EQ(Campaign().progress.state, "finished") << Campaign().progress.reason;
 }
 
+SimulatedService::Shift SimulatedService::RunTimed(int workers,
+                                                   const std::function<double(int)>& seconds) {
+  struct Timed {
+    std::int64_t session = 0;
+    v1::Lease lease;
+    int sent = 0;
+    double begun = 0;
+    bool busy = false;
+  };
+  Shift shift;
+  const Clock::time_point start = ports_->now;
+  std::vector<Timed> team(static_cast<std::size_t>(workers));
+  for (std::size_t i = 0; i < team.size(); ++i) {
+    team[i].session = Connect("w" + std::to_string(i), 1);
+  }
+  const auto take = [&](Timed& worker) {
+    for (auto& inbox = ports_->inbox[worker.session]; !inbox.empty(); inbox.pop_front()) {
+      const v1::ServerMessage& message = inbox.front();
+      if (message.has_stop() && worker.busy) {
+        shift.computing += shift.elapsed - worker.begun;
+        worker.busy = false;
+      } else if (message.has_lease()) {
+        worker = {.session = worker.session,
+                  .lease = message.lease(),
+                  .begun = shift.elapsed,
+                  .busy = true};
+      }
+    }
+  };
+  const auto steps = [](const v1::Lease& lease) {
+    const auto& path = lease.spec().path();
+    return static_cast<int>(std::count_if(
+        path.begin(), path.end(), [](const v1::ControlPoint& p) { return p.load_step() >= 0; }));
+  };
+  while (scheduler_->live() > 0) {
+    Timed* next = nullptr;
+    double at = 0;
+    for (Timed& worker : team) {
+      take(worker);
+      if (!worker.busy) continue;
+      const double due = worker.begun + seconds(static_cast<int>(worker.lease.attempt())) *
+                                            (worker.sent + 1) / steps(worker.lease);
+      if (next == nullptr || due < at) {
+        next = &worker;
+        at = due;
+      }
+    }
+    if (next == nullptr) break;
+    shift.elapsed = at;
+    ports_->now = start + std::chrono::duration_cast<Clock::duration>(
+                              std::chrono::duration<double>(shift.elapsed));
+    for (const Timed& worker : team) {  // nobody falls silent, whatever a run takes
+      v1::Heartbeat heartbeat;
+      if (worker.busy) heartbeat.add_attempts(worker.lease.attempt());
+      scheduler_->Receive(worker.session, heartbeat);
+    }
+    SendStates(next->session, next->lease, next->sent++, 1);
+    take(*next);
+    if (next->busy && next->sent == steps(next->lease)) {
+      shift.computing += shift.elapsed - next->begun;
+      next->busy = false;
+      SendEnd(next->session, next->lease.attempt(), v1::Finished::OUTCOME_COMPLETED);
+    }
+  }
+  EXPECT_EQ(Campaign().progress.state, "finished") << Campaign().progress.reason;
+  return shift;
+}
+
 std::string SimulatedService::Fingerprint() {
   store::Reader reader = Read();
   std::string text;

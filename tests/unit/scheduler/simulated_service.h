@@ -70,6 +70,14 @@ class SimulatedService {
   /// server is restarted now and then. calm: nothing goes wrong, one worker.
   void RunToEnd(unsigned seed, bool calm);
 
+  /// One worker of one slot each, calm, in simulated time: evaluation k of the campaign takes
+  /// seconds(k), its states come evenly spread over that. Until the campaign is over.
+  struct Shift {
+    double elapsed = 0;    ///< s
+    double computing = 0;  ///< s, of all workers
+  };
+  Shift RunTimed(int workers, const std::function<double(int)>& seconds);
+
   store::CampaignRecord Campaign();
   /// What the store holds about the campaign's result, with every bit.
   std::string Fingerprint();

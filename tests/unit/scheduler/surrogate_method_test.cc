@@ -1,4 +1,5 @@
-// surrogate_msrs as a campaign: rounds of points through simulated workers and the store.
+// surrogate_msrs as a campaign: points chosen while others run, through simulated workers and the
+// store.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
+#include "inference/sampling/philox.h"
 #include "server/scheduler/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
@@ -31,12 +34,12 @@ v1::Posterior Posterior(SimulatedService& service, std::size_t iteration) {
   return *PosteriorFromJson(*Value(service.Read().Iterations(1)).at(iteration).posterior);
 }
 
-TEST(SurrogateCampaign, RoundsOfEightFindABetterFitThanTheDesign) {
+TEST(SurrogateCampaign, FindsABetterFitThanTheDesign) {
   SimulatedService service("surrogate");
   service.Submit(Campaign(10, 5, 0.02));
   service.RunToEnd(1, true);
   const auto iterations = Value(service.Read().Iterations(1));
-  ASSERT_EQ(iterations.size(), 6U) << "10 points, then 40 in rounds of eight";
+  ASSERT_EQ(iterations.size(), 6U) << "10 points, then 40 in eights";
   double first = std::numeric_limits<double>::infinity();  // of -ln likelihood
   double best = first;
   double weight = 0;
@@ -136,7 +139,112 @@ TEST(SurrogateCampaign, TheBudgetOfModelEvaluationsEndsIt) {
   SimulatedService service("surrogate_budget");
   service.Submit(Campaign(10, 100, 0.02, "budget: {model_evaluations: 30}\n"));
   service.RunToEnd(1, true);
-  EXPECT_EQ(Value(service.Read().Evaluations(1)).size(), 26U) << "10 + 8 + 8; eight more are 34";
+  EXPECT_EQ(Value(service.Read().Evaluations(1)).size(), 30U);
+}
+
+std::string InFlight(int points, const char* decisions = "reproducible") {
+  return "  termination: off\n  in_flight: " + std::to_string(points) +
+         "\n  decisions: " + decisions + "\n";
+}
+
+/// Seconds of a run, lognormal: one in twelve takes twice the median or more.
+double ServiceTime(int attempt) {
+  inference::PhiloxStream stream({.seed = 3, .sample = static_cast<std::uint64_t>(attempt)});
+  return 100 * std::exp(0.5 * stream.Normal());
+}
+
+// Fixed lag: point k is chosen by the results up to k - L, which is the same whoever is fast.
+TEST(SurrogateCampaign, SamePointsForAnyNumberOfWorkersAndAnyServiceTimes) {
+  for (const int in_flight : {3, 20}) {
+    std::string expected;
+    for (const int workers : {1, 3, 8}) {
+      SimulatedService service("surrogate_workers");
+      service.Submit(Campaign(10, 3, 0.02, "", InFlight(in_flight)));
+      service.RunTimed(workers, ServiceTime);
+      const std::string found = service.Fingerprint();
+      if (expected.empty()) expected = found;
+      EXPECT_TRUE(found == expected) << workers << " workers, in_flight " << in_flight;
+      EXPECT_EQ(Value(service.Read().Samples(1)).size(), 30U);
+    }
+  }
+}
+
+// The ends of what is under way are not waited for: a point is chosen as soon as it may be.
+TEST(SurrogateCampaign, ChoosesTheNextPointWhenTheOldestOfEightHasEnded) {
+  SimulatedService service("surrogate_lag");
+  service.Submit(Campaign(10, 4, 0.02, "", InFlight(8)));
+  const std::int64_t team = service.Connect("team", 40);
+  std::vector<v1::Lease> design;
+  for (int i = 0; i < 10; ++i) {
+    design.push_back(service.Next(team, v1::ServerMessage::kLease).lease());
+    ASSERT_NE(design.back().attempt(), 0);
+  }
+  const auto samples = [&service] { return Value(service.Read().Samples(1)).size(); };
+  const auto end = [&](int i) {
+    const v1::Lease& lease = design[static_cast<std::size_t>(i)];
+    service.SendStates(team, lease, 0, 12);
+    service.SendEnd(team, lease.attempt(), v1::Finished::OUTCOME_COMPLETED);
+  };
+  // A surrogate of two parameters needs five values.
+  for (const int i : {0, 1, 2, 4, 5, 6, 7}) {
+    end(i);
+    EXPECT_EQ(samples(), 10U) << "point 3 is not known";
+  }
+  end(3);
+  EXPECT_EQ(samples(), 16U) << "points 0 to 7 are known, which is enough for point 15";
+  end(9);
+  EXPECT_EQ(samples(), 16U);
+  end(8);
+  EXPECT_EQ(samples(), 18U);
+  // The design has ended: its posterior is there beside the points under way.
+  EXPECT_TRUE(Value(service.Read().Iterations(1)).at(0).posterior.has_value());
+  EXPECT_EQ(service.Campaign().progress.iteration, 1);
+}
+
+// Eight workers, 100 points. In rounds of eight, as points were chosen before, they waited for
+// 0.49 of the time.
+TEST(SurrogateCampaign, WorkersWaitLessThanInRounds) {
+  const auto idle = [](const std::string& inference) {
+    SimulatedService service("surrogate_idle");
+    service.Submit(Campaign(20, 5, 0.02, "", inference));
+    const auto shift = service.RunTimed(8, ServiceTime);
+    EXPECT_EQ(Value(service.Read().Samples(1)).size(), 100U);
+    return 1 - shift.computing / (8 * shift.elapsed);
+  };
+  EXPECT_LT(idle(InFlight(8)), 0.4);                // found: 0.34
+  EXPECT_LT(idle(InFlight(16)), 0.15);              // 0.11; with 32 0.05
+  EXPECT_LT(idle(InFlight(8, "immediate")), 0.08);  // 0.04
+}
+
+TEST(SurrogateCampaign, DecidedAtOnceItSaysSoAndEndsRunsByTheBestOfTheMoment) {
+  const auto run = [](const char* name, const char* decisions) {
+    SimulatedService service(name);
+    service.Submit(Campaign(10, 5, 0.02, "",
+                            std::string("  termination: 4\n  decisions: ") + decisions + "\n"));
+    service.RunTimed(4, ServiceTime);
+    return Posterior(service, Value(service.Read().Iterations(1)).size() - 1);
+  };
+  const v1::Posterior in_order = run("surrogate_in_order", "reproducible");
+  const v1::Posterior at_once = run("surrogate_at_once", "immediate");
+  const auto says_so = [](const v1::Posterior& posterior) {
+    return std::any_of(
+        posterior.warnings().begin(), posterior.warnings().end(),
+        [](const std::string& text) { return text.find("not reproducible") != text.npos; });
+  };
+  EXPECT_FALSE(says_so(in_order));
+  EXPECT_TRUE(says_so(at_once));
+  EXPECT_GE(at_once.stopped_early(), 1);
+  EXPECT_EQ(at_once.model_evaluations(), 50);
+}
+
+// What was decided is in the store: a server that is killed goes on from there.
+TEST(SurrogateCampaign, DecidedAtOnceItSurvivesWhateverGoesWrong) {
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SimulatedService storm("surrogate_at_once_storm");
+    storm.Submit(Campaign(10, 3, 0.02, "", "  decisions: immediate\n"));
+    storm.RunToEnd(seed, false);
+    EXPECT_EQ(Value(storm.Read().Samples(1)).size(), 30U);
+  }
 }
 
 }  // namespace

@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <vector>
 
+#include "inference/emulator/split_half.h"
 #include "inference/sampling/halton.h"
 #include "inference/sampling/sobol.h"
 #include "tests/verification/inference/linear_model.h"
@@ -103,6 +105,72 @@ TEST(EmulatedPosterior, SameSeedSameBitsAndDivergedRunsAreLeftOut) {
   EXPECT_EQ(first->predictive_q95, second->predictive_q95);
 }
 
+// The model is linear, so that the misfit of each draw is known exactly. A sawtooth of two sd is
+// nothing that a model with three smooth parameters could follow.
+TEST(EmulatedPosterior, PredictiveProbabilityIsTheExactOneAndTellsAWrongModel) {
+  const LinearModel model(30, 3, 0.2, 77);
+  const Iteration runs = PriorRuns(model, 60);
+  for (const double sawtooth : {0.0, 2.0}) {
+    DataSet data = model.Data();
+    for (std::size_t t = 0; t < data.readings.size(); ++t)
+      data.readings[t].value += (t % 2 == 0 ? 1 : -1) * sawtooth * data.readings[t].sd;
+    const auto result = EmulatedPosterior(model.priors, data, {.seed = 1}, {&runs, 1});
+    ASSERT_TRUE(result.ok()) << result.status();
+    ASSERT_TRUE(result->predictive_p.has_value());
+    const Eigen::MatrixXd histories = model.Predict(result->draws);
+    double exact = 0;
+    for (Eigen::Index i = 0; i < histories.rows(); ++i) {
+      double misfit = 0;
+      for (std::size_t t = 0; t < data.readings.size(); ++t) {
+        const Reading& reading = data.readings[t];
+        misfit +=
+            std::pow((histories(i, static_cast<Eigen::Index>(t)) - reading.value) / reading.sd, 2);
+      }
+      exact += boost::math::gamma_q(15, misfit / 2) / static_cast<double>(histories.rows());
+    }
+    EXPECT_NEAR(*result->predictive_p, exact, 0.02);
+    if (sawtooth > 0) {
+      EXPECT_LT(*result->predictive_p, 1e-3);
+    } else {
+      EXPECT_GT(*result->predictive_p, 0.05);
+    }
+  }
+}
+
+// Twins: each run twice, so that both halves are the same. Then every second run comes from a model
+// whose first parameter is off by a fifth of the prior's sd: the halves say so.
+TEST(SplitHalfOfEmulator, OfTwinsIsZeroAndOfOppositesIsWhatTheyDifferBy) {
+  const LinearModel model(30, 2, 0.2, 77);
+  const Iteration single = PriorRuns(model, 30);
+  Iteration twins;
+  twins.parameters = single.parameters(Eigen::ArrayXi::LinSpaced(60, 0, 59) / 2, Eigen::all);
+  twins.predictions = model.Predict(twins.parameters);
+  const EmulatorOptions options{.seed = 1};
+  const auto of_twins = EmulatedPosterior(model.priors, model.Data(), options, {&twins, 1});
+  ASSERT_TRUE(of_twins.ok()) << of_twins.status();
+  const Eigen::VectorXd zero =
+      SplitHalfOfEmulator(model.priors, model.Data(), options, {&twins, 1}, *of_twins);
+  EXPECT_EQ(zero, Eigen::Vector2d(0, 0));
+
+  const Iteration runs = PriorRuns(model, 60);
+  const auto right = EmulatedPosterior(model.priors, model.Data(), options, {&runs, 1});
+  ASSERT_TRUE(right.ok()) << right.status();
+  const Eigen::VectorXd agree =
+      SplitHalfOfEmulator(model.priors, model.Data(), options, {&runs, 1}, *right);
+  EXPECT_LT(agree.maxCoeff(), 0.3);  // sampling alone: 500 draws each
+
+  constexpr double kOff = 0.2;
+  Iteration opposites = runs;
+  for (Eigen::Index i = 1; i < 60; i += 2) {
+    Eigen::MatrixXd moved = runs.parameters.row(i);
+    moved(0, 0) += kOff;
+    opposites.predictions.row(i) = model.Predict(moved);
+  }
+  const Eigen::VectorXd differ =
+      SplitHalfOfEmulator(model.priors, model.Data(), options, {&opposites, 1}, *right);
+  EXPECT_NEAR(differ[0] * right->parameters[0].sd, kOff, 0.1 * kOff);
+}
+
 TEST(EmulatedPosterior, BandHoldsTheHistoryThatWasMeasured) {
   const ToyCurve toy{.d = 3};
   const Eigen::VectorXd truth = Eigen::Vector3d(0.4, 0.6, 0.5);
@@ -160,10 +228,8 @@ TEST(EmulatedPosterior, RefusesAPosteriorWhereNoRunIs) {
                            {.kind = PriorKind::kUniform, .min = 0, .max = 1}});
   DataSet data;
   for (int k = 0; k < 20; ++k) {
-    data.readings.push_back({.load_step = k,
-                             .control = 0.01 * k,
-                             .value = strength(0.13, 0.5, k) + 0.5,
-                             .sd = 0.1});
+    data.readings.push_back(
+        {.load_step = k, .control = 0.01 * k, .value = strength(0.13, 0.5, k) + 0.5, .sd = 0.1});
   }
   const auto posterior = [&](double reach) {
     Iteration runs;

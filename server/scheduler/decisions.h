@@ -1,0 +1,18 @@
+#pragma once
+// When a campaign decides: when everything asked for has ended, or while runs are under way. Pure.
+// What is decided is in the store before it has any effect, so that a server that was killed goes
+// on from there.
+
+#include "server/scheduler/definition.h"
+
+namespace calib::scheduler {
+
+/// Whether plans are made while runs are under way: the points of surrogate_msrs, and everything
+/// that is decided at once.
+bool DecidesWhileRunning(const Definition& definition);
+
+/// Whether runs are stopped, or points chosen, by what has arrived at that moment: another run of
+/// the same campaign may decide otherwise.
+bool DecidesAtOnce(const Definition& definition);
+
+}  // namespace calib::scheduler
