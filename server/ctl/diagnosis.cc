@@ -33,6 +33,7 @@ class Inquiry {
 
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();
+    diagnosis_.only_adequacy = options_.only_adequacy;
     if (auto possible = CheckPossible(); !possible.ok()) return possible;
     const bool elsewhere = base_.view().campaign.precomputed.has_value();
     if (!options_.only_adequacy && !elsewhere) {
@@ -224,7 +225,8 @@ class Inquiry {
          .over_base = {},
          .gain_p_value = {},
          .left_out_error = {},
-         .over_base_evidence = {}});
+         .over_base_evidence = {},
+         .angles = score.angles});
     if (std::isfinite(score.detectable)) {
       diagnosis_.detectable[score.name] =
           StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);

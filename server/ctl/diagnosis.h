@@ -34,6 +34,7 @@ struct CandidateEffect {
   /// ln of the Bayes factor over the base model where the strength's prior is kStrengthScales times
   /// as wide; of those that explain the readings and are known well enough by an emulator.
   std::optional<ScaledEvidence> over_base_evidence{};
+  std::map<std::string, double> angles{};  ///< to the other candidates, as in inference::Score
 };
 
 struct Diagnosis {
@@ -57,6 +58,8 @@ struct Diagnosis {
   double emulator_error = 0, scatter = 0;
   std::int64_t screen_evaluations = 0, warm_evaluations = 0;
   std::optional<NextExperiment> next_experiment;
+  bool only_adequacy = false;                  ///< no effect was tried
+  std::map<std::string, std::string> units{};  ///< SI, of the strengths of effects
 };
 
 struct DiagnosisOptions {

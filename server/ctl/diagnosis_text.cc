@@ -32,7 +32,8 @@ Json CandidateJson(const CandidateEffect& c) {
                {"explained_fraction", c.explained_fraction},
                {"amplitude", c.amplitude},
                {"predicted_rms_error", c.predicted_rms_error},
-               {"confusable_with", c.confusable_with}};
+               {"confusable_with", c.confusable_with},
+               {"angles", c.angles}};
   if (!c.campaign.empty()) {
     json["warm_fit"] = {{"campaign", c.campaign},
                         {"p_value", c.refit_p_value < 0 ? Json(nullptr) : Json(c.refit_p_value)},
@@ -182,6 +183,9 @@ std::string DiagnosisJson(const Diagnosis& d) {
                  {"left_out_error", OrNull(d.left_out_error)},
                  {"emulator_error", d.emulator_error},
                  {"scatter", d.scatter}}}};
+  json["only_adequacy"] = d.only_adequacy;
+  json["units"] = d.units;
+  json["sentence"] = Sentence(d);
   json["warnings"] = Json::array();
   if (IsTooGood(d)) json["warnings"].push_back(kTooGood);
   if (d.verdict == "adequate") json["detectable"] = d.detectable;

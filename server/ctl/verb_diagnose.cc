@@ -3,6 +3,7 @@
 #include "dem/formula/user_effect.h"
 #include "server/ctl/diagnosis.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/findings.h"
 #include "server/ctl/interrupt.h"
 #include "server/ctl/verbs.h"
 
@@ -23,6 +24,7 @@ int Diagnose(const Arguments& arguments) {
   }
   const auto diagnosis = Diagnose(laboratory, *view, {.without = arguments.effects});
   if (!diagnosis.ok()) return Fail(diagnosis.status());
+  KeepFinding((*session)->client(), arguments.campaign, kDiagnosis, DiagnosisJson(*diagnosis));
   std::cout << (arguments.json ? DiagnosisJson(*diagnosis) : DiagnosisText(*diagnosis));
   return kDone;
 }

@@ -16,6 +16,7 @@
 #include "server/ctl/diagnosis.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/extension.h"
+#include "server/ctl/findings.h"
 #include "server/ctl/interrupt.h"
 #include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
@@ -159,6 +160,9 @@ class Improvement {
       diagnosis = Diagnosis{};
       diagnosis->verdict = "unexplained";
     }
+    if (!diagnosis->campaign.empty()) {
+      KeepFinding(client_, diagnosis->campaign, kDiagnosis, DiagnosisJson(*diagnosis));
+    }
     evaluations_ += diagnosis->screen_evaluations + diagnosis->warm_evaluations;
     steps_.push_back({.campaign = view.status.campaign(),
                       .effects = view.campaign.model.effects,
@@ -225,6 +229,9 @@ class Improvement {
         report::Compare(*first_, report::PredictReadings(*first_)).heldout_rms_error;
     steps_.back().heldout_rms_error =
         report::Compare(*last_, report::PredictReadings(*last_)).heldout_rms_error;
+    const std::string opened = ToJson(steps_, digest_, evaluations_).dump();
+    KeepFinding(client_, steps_.front().campaign, kImprovement, opened);
+    if (steps_.size() > 1) KeepFinding(client_, steps_.back().campaign, kImprovement, opened);
     return absl::OkStatus();
   }
 

@@ -41,6 +41,10 @@ std::string SummarySection(const ReportData& data) {
     if (data.comparison.heldout_rms_error) {
       html += Card(Number(*data.comparison.heldout_rms_error, 3), "rms misfit of held-out data");
     }
+    if (const auto* d = LatestOf(data.story.diagnoses, view.status.campaign())) {
+      html += Card(d->effect.empty() ? NameForPeople(d->verdict) : NameForPeople(d->effect),
+                   d->effect.empty() ? "verdict of the diagnosis" : "missing, says the diagnosis");
+    }
     html += Card(Number(posterior.ess(), 3), "effective number of samples");
     html += Card(fmt::format("{} ± {}", Number(posterior.log_evidence(), 5),
                              Number(posterior.log_evidence_se(), 2)),

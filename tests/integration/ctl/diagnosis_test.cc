@@ -41,6 +41,13 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
   EXPECT_EQ(Call("diagnose c1 --state s --workers 2 --json").out, first.out);
   EXPECT_EQ(Evaluations(), evaluations);
 
+  // The report shows what was concluded, once.
+  ASSERT_EQ(Call("report c1 --state s -o r.html").code, 0);
+  const std::string report = Read("r.html");
+  EXPECT_NE(report.find("<strong>Adequate: noise, scatter"), std::string::npos);
+  EXPECT_NE(report.find("What would have been found"), std::string::npos);
+  EXPECT_NE(report.find("Diagnosis of 2"), std::string::npos) << "the day";
+
   // Fewer candidates, no run more.
   const std::string left_out = json["candidates"][0]["effect"];
   const Answer without = Call("diagnose c1 --state s --workers 2 --json --without " + left_out);
