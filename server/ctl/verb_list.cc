@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/lineage.h"
 #include "server/ctl/session.h"
 #include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
@@ -10,6 +11,16 @@
 #include "server/report/people_units.h"
 
 namespace calib::ctl {
+namespace {
+
+// A parent that is not above it has been deleted.
+std::string Purpose(const Branch& branch) {
+  const v1::CampaignStatus& s = branch.status;
+  const bool orphan = branch.depth == 0 && !s.parent().empty();
+  return orphan ? s.purpose() + " of " + s.parent() + ", gone" : s.purpose();
+}
+
+}  // namespace
 
 int List(const Arguments& arguments) {
   const auto session = Session::Open(arguments);
@@ -20,10 +31,12 @@ int List(const Arguments& arguments) {
     std::cout << report::StatusListJson(*campaigns);
     return kDone;
   }
-  TextTable table(
-      {"<id", "<name", "<state", "iteration", "samples", "evaluations", "core hours", "misfit"});
-  for (const v1::CampaignStatus& s : *campaigns) {
-    table.AddRow({s.campaign(), s.name(), s.state(),
+  TextTable table({"<id", "<name", "<purpose", "<state", "iteration", "samples", "evaluations",
+                   "core hours", "misfit"});
+  for (const Branch& branch : AsTree(*campaigns)) {
+    const v1::CampaignStatus& s = branch.status;
+    table.AddRow({std::string(static_cast<std::size_t>(2 * branch.depth), ' ') + s.campaign(),
+                  s.name(), Purpose(branch), s.state(),
                   fmt::format("{}/{}", s.iteration() + 1, s.max_iterations()),
                   fmt::format("{}/{}", s.samples_done(), s.samples()),
                   std::to_string(s.model_evaluations()), report::Number(s.core_hours(), 3),

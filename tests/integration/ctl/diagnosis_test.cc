@@ -87,6 +87,20 @@ TEST_F(Diagnosis, ExtendsAndRefusesInASentence) {
   ASSERT_EQ(extended.code, 0) << extended.err;
   EXPECT_EQ(extended.json()["campaign"], "c2");
   EXPECT_EQ(extended.json()["parameters"].size(), 4U);
+  const Json list = Call("list --state s --json").json();
+  ASSERT_EQ(list.size(), 2U);
+  EXPECT_TRUE(list[0]["parent"].is_null());
+  EXPECT_EQ(list[1]["parent"], "c1");
+  EXPECT_EQ(list[1]["purpose"], "extension");
+  EXPECT_EQ(list[1]["effects"], Json({"rolling_resistance"}));
+  EXPECT_NE(Call("list --state s").out.find("\n  c2 "), std::string::npos) << Read("out");
+  EXPECT_EQ(Call("show c1 --state s --json").json()["children"][0]["campaign"], "c2");
+  EXPECT_NE(Call("show c1 --state s").out.find("Extended with rolling_resistance: c2, finished"),
+            std::string::npos)
+      << Read("out");
+  EXPECT_NE(Call("show c2 --state s").out.find("Made from c1 (small) as extension."),
+            std::string::npos)
+      << Read("out");
   const Answer again = Call("extend c1 --effect rolling_resistance --state s --json");
   EXPECT_EQ(again.out, extended.out);
   const Answer twice = Call("extend c2 --effect rolling_resistance --state s");
