@@ -166,7 +166,14 @@ void AddVerbsOnCampaigns(Builder& b) {
   b.AddOnCampaign("pause", &Pause, "Stop handing out work; nothing is lost");
   b.AddOnCampaign("resume", &Resume, "Go on with a paused campaign");
   b.AddOnCampaign("cancel", &Cancel, "End a campaign for good, keeping what it has");
-  b.AddOnCampaign("delete", &Delete, "Remove an ended campaign and all its data");
+  auto* remove = b.AddOnCampaign("delete", &Delete, "Remove an ended campaign and all its data");
+  auto* children =
+      remove->add_flag("--with-children", b.arguments().with_children,
+                       "everything that diagnose, extend and improve made from it too");
+  remove
+      ->add_flag("--force", b.arguments().force,
+                 "although campaigns come from it, which stay without their parent")
+      ->excludes(children);
 }
 
 void AddOtherVerbs(Builder& b) {

@@ -105,6 +105,28 @@ TEST_F(Diagnosis, ExtendsAndRefusesInASentence) {
   EXPECT_EQ(again.out, extended.out);
   const Answer twice = Call("extend c2 --effect rolling_resistance --state s");
   EXPECT_NE(twice.code, 0);
+
+  const Answer parent = Call("delete c1 --state s");
+  EXPECT_EQ(parent.code, 1);
+  EXPECT_NE(parent.err.find("1 campaign comes from it (1 extension"), std::string::npos)
+      << parent.err;
+  EXPECT_NE(parent.err.find("--with-children"), std::string::npos) << parent.err;
+  EXPECT_EQ(Call("list --state s --json").json().size(), 2U);
+  EXPECT_EQ(Call("delete c1 --force --state s").code, 0) << Read("err");
+  EXPECT_NE(Call("show c2 --state s").out.find("Made from c1, which has been deleted"),
+            std::string::npos)
+      << Read("out");
+  EXPECT_EQ(Call("delete c2 --state s --json").json()["deleted"], true) << "it has no children";
+}
+
+TEST_F(Diagnosis, DeletesACampaignWithAllThatComesFromIt) {
+  ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  ASSERT_EQ(Call("extend c1 --effect rolling_resistance --state s --workers 2 --json").code, 0);
+  EXPECT_EQ(Call("delete c1 --with-children --force --state s").code, 2);
+  const Answer gone = Call("delete c1 --with-children --state s --json");
+  ASSERT_EQ(gone.code, 0) << gone.err;
+  EXPECT_EQ(gone.json()["campaigns"], 2);
+  EXPECT_TRUE(Call("list --state s --json").json().empty());
 }
 
 // No verdict without support: two readings for two parameters.
