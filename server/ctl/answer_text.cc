@@ -91,6 +91,7 @@ std::string ComparisonText(const report::Comparison& comparison) {
                         Number(*comparison.heldout_rms_error, 3));
   }
   if (!comparison.note.empty()) text += Wrapped(comparison.note, "", "");
+  for (const std::string& warning : comparison.warnings) text += Wrapped(warning, "! ", "  ");
   TextTable observables(
       {"<experiment", "<observable", "readings", "rms/sd", "scatter/noise", "rms", "z", "p", "<"});
   for (const report::ObservableMisfit& m : comparison.by_observable) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "server/campaign/noise_check.h"
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/reading_effects.h"
@@ -20,7 +21,9 @@ namespace {
 
 constexpr std::size_t kWarmFits = 4;    // two batches each pick the few to continue from
 constexpr std::size_t kMostRivals = 3;  // that the next experiment is to separate
-constexpr double kMostUnits = 10;       // of an effect that is calculated on readings
+// Of measurements that a right model makes one in a thousand is closer.
+constexpr double kTooGood = 0.999;
+constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
 
 class Inquiry {
  public:
@@ -34,6 +37,7 @@ class Inquiry {
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();
     diagnosis_.only_adequacy = options_.only_adequacy;
+    diagnosis_.warnings = campaign::NoiseWarnings(base_.view().campaign);
     if (auto possible = CheckPossible(); !possible.ok()) return possible;
     const bool elsewhere = base_.view().campaign.precomputed.has_value();
     if (!options_.only_adequacy && !elsewhere) {
@@ -100,6 +104,11 @@ class Inquiry {
     diagnosis_.adequacy = *adequacy;
     diagnosis_.emulator_error = response_.emulator_error;
     diagnosis_.scatter = response_.scatter;
+    if (adequacy->p_value > kTooGood) {
+      diagnosis_.warnings.emplace_back(
+          "The model is closer to the readings than the stated errors and the scatter explain: "
+          "they seem too large, and an effect can hide in them.");
+    }
     diagnosis_.rms = response_.model.histories.row(adequacy->best).norm() /
                      std::sqrt(static_cast<double>(response_.model.histories.cols()));
     // A misfit beyond all that the emulator does not know is one however little that is.

@@ -59,6 +59,7 @@ struct Diagnosis {
   std::int64_t screen_evaluations = 0, warm_evaluations = 0;
   std::optional<NextExperiment> next_experiment;
   bool only_adequacy = false;                  ///< no effect was tried
+  std::vector<std::string> warnings{};         ///< about the noise stated, a sentence each
   std::map<std::string, std::string> units{};  ///< SI, of the strengths of effects
 };
 

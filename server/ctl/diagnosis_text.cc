@@ -150,14 +150,6 @@ std::string Sentence(const Diagnosis& d) {
       refitted, d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
 }
 
-// Of measurements that a right model makes one in a thousand is closer.
-bool IsTooGood(const Diagnosis& d) { return d.adequacy.p_value > 0.999; }
-
-constexpr const char* kTooGood =
-    "The model is closer to the readings than the stated errors and the scatter explain: they seem "
-    "too "
-    "large, and an effect can hide in them.";
-
 }  // namespace
 
 std::string DiagnosisJson(const Diagnosis& d) {
@@ -186,8 +178,7 @@ std::string DiagnosisJson(const Diagnosis& d) {
   json["only_adequacy"] = d.only_adequacy;
   json["units"] = d.units;
   json["sentence"] = Sentence(d);
-  json["warnings"] = Json::array();
-  if (IsTooGood(d)) json["warnings"].push_back(kTooGood);
+  json["warnings"] = d.warnings;
   if (d.verdict == "adequate") json["detectable"] = d.detectable;
   if (d.verdict == "ambiguous") json["unfinished"] = d.unfinished;
   if (d.verdict == "unexplained") json["best_partial"] = OrNull(d.best_partial);
@@ -201,7 +192,7 @@ std::string DiagnosisText(const Diagnosis& d) {
                               Number(d.rms, 3), Number(d.adequacy.chi2, 4),
                               Number(d.adequacy.degrees, 4), Number(d.adequacy.p_value, 2)),
                   "", "  ");
-  if (IsTooGood(d)) text += Wrapped(kTooGood, "", "");
+  for (const std::string& warning : d.warnings) text += Wrapped(warning, "! ", "  ");
   if (!d.candidates.empty()) {
     TextTable table({"<effect", "p (screen)", "explains", "rms with it", "refitted p", "left out"});
     for (const CandidateEffect& c : d.candidates) {

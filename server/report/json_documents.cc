@@ -280,6 +280,7 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                {"trends", trends},
                {"discrepancy", discrepancy},
                {"at_bound", c.at_bound},
+               {"warnings", c.warnings},
                {"note", c.note}});
 }
 
@@ -409,12 +410,13 @@ std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers) {
   return Dump(list);
 }
 
-std::string ProblemsJson(const std::vector<campaign::Problem>& problems) {
+std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
+                         const std::vector<std::string>& warnings) {
   Json list = Json::array();
   for (const campaign::Problem& p : problems) {
     list.push_back({{"file", p.file}, {"line", p.line}, {"key", p.key}, {"message", p.message}});
   }
-  return Dump({{"valid", problems.empty()}, {"problems", list}});
+  return Dump({{"valid", problems.empty()}, {"problems", list}, {"warnings", warnings}});
 }
 
 std::string DataJson(const campaign::Campaign& campaign) {

@@ -32,7 +32,9 @@ std::string StatesJson(const std::string& campaign, int sample,
 /// A table of states (experiment,load_step,...) row by row.
 std::string StateTableJson(const std::string& csv);
 std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers);
-std::string ProblemsJson(const std::vector<campaign::Problem>& problems);
+/// warnings: of a campaign that is valid.
+std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
+                         const std::vector<std::string>& warnings = {});
 /// The measurements as compared: SI, logarithmic strains, standard deviations.
 std::string DataJson(const campaign::Campaign& campaign);
 

@@ -53,7 +53,8 @@ std::string SummarySection(const ReportData& data) {
     html += Card(Number(posterior.core_hours(), 3), "core hours");
     html += "</div>\n";
   }
-  const std::vector<std::string> warnings = Warnings(view);
+  std::vector<std::string> warnings = Warnings(view);
+  warnings.insert(warnings.end(), data.comparison.warnings.begin(), data.comparison.warnings.end());
   if (!warnings.empty()) {
     html += "<div class=\"warn\" role=\"note\"><b>Read this first</b><ul>\n";
     for (const std::string& warning : warnings) html += "<li>" + Escape(warning) + "</li>\n";
