@@ -13,6 +13,7 @@
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
+#include "server/ctl/strengths.h"
 #include "server/ctl/verdict.h"
 #include "server/ctl/warm_fits.h"
 
@@ -236,9 +237,22 @@ class Inquiry {
          .left_out_error = {},
          .over_base_evidence = {},
          .angles = score.angles});
-    if (std::isfinite(score.detectable)) {
-      diagnosis_.detectable[score.name] =
-          StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
+    const dem::Model& model = base_.view().campaign.model;
+    const dem::EffectInfo& effect = *dem::FindEffect(model.user_effects, score.name);
+    diagnosis_.units.merge(UnitsOf(effect, model.contact));
+    if (!std::isfinite(score.detectable)) {
+      diagnosis_.undetectable.emplace_back(
+          score.name,
+          "the parameters imitate it, or what it changes is another at another strength");
+      return;
+    }
+    const std::map<std::string, double> strength =
+        StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
+    const std::string why = WhyNotAdmissible(effect, model.contact, strength);
+    if (why.empty()) {
+      diagnosis_.detectable[score.name] = strength;
+    } else {
+      diagnosis_.undetectable.emplace_back(score.name, why);
     }
   }
 

@@ -44,6 +44,8 @@ struct Diagnosis {
   std::vector<CandidateEffect> candidates;  ///< best first
   std::vector<std::pair<std::string, std::string>> not_excitable;   ///< effect, why
   std::map<std::string, std::map<std::string, double>> detectable;  ///< effect -> parameter -> SI
+  /// Effects that would not have been found at any strength that they can have, and why.
+  std::vector<std::pair<std::string, std::string>> undetectable{};
   /// Named in the group although they do not explain the readings: their refits have not come to an
   /// end, so that they cannot be excluded.
   std::vector<std::string> unfinished{};

@@ -9,6 +9,7 @@
 #include "server/ctl/diagnosis.h"
 #include "server/ctl/text_table.h"
 #include "server/report/people_units.h"
+#include "server/report/stored_diagnosis.h"
 
 namespace calib::ctl {
 namespace {
@@ -24,6 +25,14 @@ Json EvidenceJson(const std::optional<ScaledEvidence>& evidence) {
   return {{"strength_prior_scale", kStrengthScales},
           {"log_bayes_factor", evidence->log_evidence},
           {"standard_error", evidence->standard_error}};
+}
+
+Json ReasonsJson(const std::vector<std::pair<std::string, std::string>>& list) {
+  Json json = Json::array();
+  for (const auto& [effect, reason] : list) {
+    json.push_back({{"effect", effect}, {"reason", reason}});
+  }
+  return json;
 }
 
 Json CandidateJson(const CandidateEffect& c) {
@@ -103,17 +112,24 @@ std::string NextText(const NextExperiment& next) {
   return text;
 }
 
-std::string Strength(const std::map<std::string, double>& amplitude) {
-  std::string text;
-  for (const auto& [name, value] : amplitude) {
-    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name, Number(value, 3));
-  }
-  return text;
-}
-
 std::string Listed(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+// Effects that share a reason in one sentence.
+std::string ByReason(const std::string& begin,
+                     const std::vector<std::pair<std::string, std::string>>& list) {
+  std::map<std::string, std::string> by_reason;
+  for (const auto& [effect, reason] : list) {
+    std::string& names = by_reason[reason];
+    names += (names.empty() ? "" : ", ") + effect;
+  }
+  std::string text;
+  for (const auto& [reason, names] : by_reason) {
+    text += Wrapped(fmt::format("{} {}: {}.", begin, reason, names), "", "  ");
+  }
   return text;
 }
 
@@ -155,15 +171,11 @@ std::string Sentence(const Diagnosis& d) {
 std::string DiagnosisJson(const Diagnosis& d) {
   Json candidates = Json::array();
   for (const CandidateEffect& c : d.candidates) candidates.push_back(CandidateJson(c));
-  Json not_excitable = Json::array();
-  for (const auto& [effect, reason] : d.not_excitable) {
-    not_excitable.push_back({{"effect", effect}, {"reason", reason}});
-  }
   Json json = {{"campaign", d.campaign},
                {"verdict", d.verdict},
                {"effect", OrNull(d.effect)},
                {"candidates", candidates},
-               {"not_excitable", not_excitable},
+               {"not_excitable", ReasonsJson(d.not_excitable)},
                {"next_experiment", NextJson(d.next_experiment)},
                {"model_evaluations", d.screen_evaluations},
                {"warm_fit_evaluations", d.warm_evaluations},
@@ -179,7 +191,10 @@ std::string DiagnosisJson(const Diagnosis& d) {
   json["units"] = d.units;
   json["sentence"] = Sentence(d);
   json["warnings"] = d.warnings;
-  if (d.verdict == "adequate") json["detectable"] = d.detectable;
+  if (d.verdict == "adequate") {
+    json["detectable"] = d.detectable;
+    json["undetectable"] = ReasonsJson(d.undetectable);
+  }
   if (d.verdict == "ambiguous") json["unfinished"] = d.unfinished;
   if (d.verdict == "unexplained") json["best_partial"] = OrNull(d.best_partial);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
@@ -213,8 +228,9 @@ std::string DiagnosisText(const Diagnosis& d) {
   }
   for (const CandidateEffect& c : d.candidates) {
     if (c.refit_p_value < 0) continue;
-    text +=
-        Wrapped(fmt::format("{} comes closest at {}.", c.effect, Strength(c.amplitude)), "", "  ");
+    text += Wrapped(fmt::format("{} comes closest at {}.", c.effect,
+                                report::StrengthInWords(c.amplitude, d.units)),
+                    "", "  ");
   }
   for (const CandidateEffect& c : d.candidates) {
     const bool named = d.verdict == "ambiguous" && &c == &d.candidates.front();
@@ -234,17 +250,13 @@ std::string DiagnosisText(const Diagnosis& d) {
   if (d.verdict == "adequate" && !d.detectable.empty()) {
     text += "\nWould have been found with 90 % power from:\n";
     for (const auto& [effect, strength] : d.detectable) {
-      text += fmt::format("  {}: {}\n", effect, Strength(strength));
+      text += fmt::format("  {}: {}\n", effect, report::StrengthInWords(strength, d.units));
     }
   }
-  std::map<std::string, std::string> by_reason;
-  for (const auto& [effect, reason] : d.not_excitable) {
-    std::string& names = by_reason[reason];
-    names += (names.empty() ? "" : ", ") + effect;
+  if (d.verdict == "adequate") {
+    text += ByReason("Would not have been found at any strength, because", d.undetectable);
   }
-  for (const auto& [reason, names] : by_reason) {
-    text += Wrapped(fmt::format("Not tried, because {}: {}.", reason, names), "", "  ");
-  }
+  text += ByReason("Not tried, because", d.not_excitable);
   if (d.next_experiment) text += NextText(*d.next_experiment);
   text += fmt::format("{} model evaluations for the screen, {} for warm fits.\n",
                       d.screen_evaluations, d.warm_evaluations);

@@ -28,7 +28,11 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
     EXPECT_TRUE(json.contains(field)) << field;
   }
   EXPECT_EQ(json["verdict"], "adequate") << first.out;
-  EXPECT_TRUE(json["detectable"].is_object());
+  ASSERT_TRUE(json["detectable"].is_object());
+  for (const auto& [effect, strength] : json["detectable"].items()) {
+    for (const auto& [name, value] : strength.items()) EXPECT_TRUE(json["units"].contains(name));
+  }
+  EXPECT_EQ(json["detectable"].size() + json["undetectable"].size(), json["candidates"].size());
   ASSERT_FALSE(json["candidates"].empty());
   for (const Json& candidate : json["candidates"])
     EXPECT_NE(candidate["effect"], "viscous_damping");
