@@ -142,7 +142,8 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->check(CLI::Range(1, 10));
   improve
       ->add_option("--max-evaluations", b.arguments().max_evaluations,
-                   "no calibration is begun after so many model evaluations")
+                   "model evaluations of all screens, refits and calibrations, those that diagnose "
+                   "has made already included; held-out tests of a calibration come on top")
       ->check(CLI::PositiveNumber);
   auto* predict = b.AddOnCampaign(
       "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance",

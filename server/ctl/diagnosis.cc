@@ -42,6 +42,7 @@ class Inquiry {
     if (auto possible = CheckPossible(); !possible.ok()) return possible;
     const bool elsewhere = base_.view().campaign.precomputed.has_value();
     if (!options_.only_adequacy && !elsewhere) {
+      if (auto affordable = CheckBudget(); !affordable.ok()) return affordable;
       auto nuisance = screen_.MeasureNuisance();
       if (!nuisance.ok()) return nuisance.status();
       nuisance_ = *std::move(nuisance);
@@ -94,6 +95,15 @@ class Inquiry {
       return absl::FailedPreconditionError(absl::StrCat("no sample of ", id, " has finished"));
     }
     return absl::OkStatus();
+  }
+
+  absl::Status CheckBudget() const {
+    if (!options_.max_evaluations) return absl::OkStatus();
+    const std::int64_t screen = screen_.Planned(options_.without);
+    if (screen + fits_.Least() <= *options_.max_evaluations) return absl::OkStatus();
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the screen of effects takes ", screen, " model evaluations and a refit ", fits_.Least(),
+        ", and ", std::max<std::int64_t>(0, *options_.max_evaluations), " are left"));
   }
 
   absl::Status JudgeBase() {
@@ -271,7 +281,9 @@ class Inquiry {
 
   absl::Status FitWarm(const inference::FittedModel& base) {
     if (!base_.view().campaign.precomputed) {
-      if (auto status = fits_.Fit(WorthARefit()); !status.ok()) return status;
+      std::optional<std::int64_t> most = options_.max_evaluations;
+      if (most) *most -= screen_.evaluations();
+      if (auto status = fits_.Fit(WorthARefit(), most); !status.ok()) return status;
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (CandidateEffect& candidate : diagnosis_.candidates) Describe(candidate);

@@ -50,6 +50,7 @@ struct Diagnosis {
   /// end, so that they cannot be excluded.
   std::vector<std::string> unfinished{};
   std::string best_partial;  ///< with unexplained: the effect that helps most, if any does
+  std::string reason{};  ///< with unexplained: why no effect is best_partial, or none explains it
   inference::Adequacy adequacy;
   /// Of the best fit, residual over the sd of a measurement: noise, and scatter between packings
   /// where it was measured.
@@ -69,11 +70,15 @@ struct DiagnosisOptions {
   double level = 0.01;                    ///< of the adequacy test and of the screen
   bool only_adequacy = false;             ///< no runs: says adequate or unexplained
   std::vector<std::string> without = {};  ///< effects that do not take part
+  /// Of the screen and the warm fits together, on the fitted experiments; those that were made
+  /// before count too.
+  std::optional<std::int64_t> max_evaluations = {};
   bool next_experiment = true;  ///< where the model is not adequate: the test that separates rivals
 };
 
 /// Errors: FAILED_PRECONDITION with a sentence when nothing can be said (no posterior, noise not
-/// given independently, runs made elsewhere); those of the runs.
+/// given independently, runs made elsewhere); RESOURCE_EXHAUSTED when max_evaluations does not
+/// suffice; those of the runs.
 absl::StatusOr<Diagnosis> Diagnose(Laboratory& laboratory, const report::CampaignView& view,
                                    const DiagnosisOptions& options = {});
 

@@ -158,12 +158,10 @@ std::string Sentence(const Diagnosis& d) {
             ? ""
             : fmt::format(" Not excluded, since the refit has not come to an end: {}.", open));
   }
-  const auto refitted = std::count_if(d.candidates.begin(), d.candidates.end(),
-                                      [](const auto& c) { return c.refit_p_value >= 0; });
   return fmt::format(
-      "Unexplained: the model misses the data, and with none of the {} effects that "
-      "were refitted does it fit{}",
-      refitted, d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
+      "Unexplained: the model misses the data, and {}{}",
+      d.reason.empty() ? "no effect was tried" : d.reason,
+      d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
 }
 
 }  // namespace
@@ -196,7 +194,10 @@ std::string DiagnosisJson(const Diagnosis& d) {
     json["undetectable"] = ReasonsJson(d.undetectable);
   }
   if (d.verdict == "ambiguous") json["unfinished"] = d.unfinished;
-  if (d.verdict == "unexplained") json["best_partial"] = OrNull(d.best_partial);
+  if (d.verdict == "unexplained") {
+    json["best_partial"] = OrNull(d.best_partial);
+    json["reason"] = OrNull(d.reason);
+  }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -127,6 +127,7 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
       .max_iterations = plan.iterations,
       .first_proposal = campaign::FirstProposal{.prior_share = kPriorShare, .places = {}},
       .replicates = plan.replicates,
+      .model_evaluations = plan.model_evaluations,
       .rows = {}};
   for (const std::string& name : plan.effects) {
     if (const std::string why = WhyNotJoin(parent.campaign, name); !why.empty()) {

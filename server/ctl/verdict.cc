@@ -4,6 +4,8 @@
 #include <iterator>
 #include <vector>
 
+#include "absl/strings/str_format.h"
+
 namespace calib::ctl {
 namespace {
 
@@ -65,7 +67,9 @@ bool Verdict::Excluded(const CandidateEffect& other, const CandidateEffect& firs
 void Verdict::Conclude(bool base_fits) {
   if (diagnosis_.candidates.empty() || !Explains(diagnosis_.candidates.front())) {
     diagnosis_.verdict = base_fits ? "adequate" : "unexplained";
-    if (!base_fits) diagnosis_.best_partial = Closest();
+    if (base_fits) return;
+    diagnosis_.best_partial = Closest();
+    diagnosis_.reason = WhyUnexplained();
     return;
   }
   CandidateEffect& first = diagnosis_.candidates.front();
@@ -108,6 +112,48 @@ void Verdict::Conclude(bool base_fits) {
       diagnosis_.unfinished.push_back(other->effect);
     }
   }
+}
+
+// A clause: that no refit fits, or that one does but not clearly better; and why none is the best.
+std::string Verdict::WhyUnexplained() const {
+  const CandidateEffect* closest = nullptr;
+  const CandidateEffect* fitting = nullptr;
+  for (const CandidateEffect& candidate : diagnosis_.candidates) {
+    if (Find(candidate.effect) == nullptr || candidate.refit_p_value < 0) continue;
+    if (closest == nullptr || candidate.refit_chi2 < closest->refit_chi2) closest = &candidate;
+    if (fitting == nullptr && candidate.refit_p_value >= level_) fitting = &candidate;
+  }
+  if (closest == nullptr) return "no effect could be refitted";
+  if (fitting != nullptr) {
+    const bool misses_more = fitting->left_out_error && diagnosis_.left_out_error &&
+                             *fitting->left_out_error > *diagnosis_.left_out_error;
+    const std::string why =
+        misses_more
+            ? absl::StrFormat("it misses data it was not fitted to by %.3g sd, %.3g without",
+                              *fitting->left_out_error, *diagnosis_.left_out_error)
+        : fitting->gain_p_value
+            ? absl::StrFormat(
+                  "so much better may be chance (p = %.2g, before it is counted that "
+                  "%d effects were refitted)",
+                  *fitting->gain_p_value, static_cast<int>(fits_.size()))
+            : absl::StrFormat(
+                  "its advantage is %.3g ± %.2g nats, two standard deviations are "
+                  "asked for",
+                  fitting->over_base.nats, fitting->over_base.sd);
+    return absl::StrFormat("with %s it fits (p = %.2g), but is not clearly better than without: %s",
+                           fitting->effect, fitting->refit_p_value, why);
+  }
+  std::string text = absl::StrFormat("with none of the %d effects that were refitted does it fit",
+                                     static_cast<int>(fits_.size()));
+  const auto base = inference::TestAdequacy(base_);
+  if (diagnosis_.best_partial.empty() && base.ok()) {
+    absl::StrAppendFormat(
+        &text,
+        ", and none comes clearly closer: with %s chi-squared is %.4g, without %.4g "
+        "(clearly is below %.4g)",
+        closest->effect, closest->refit_chi2, base->chi2, kClearlyCloser * base->chi2);
+  }
+  return text;
 }
 
 // Judged or not: the fit that comes closest, if it comes clearly closer than the base model.
