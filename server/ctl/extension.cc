@@ -95,7 +95,13 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
     return absl::StrCat("there is no effect ", name, "; this build has ",
                         absl::StrJoin(names, ", "));
   }
-  if (campaign.precomputed) return "runs that were made elsewhere cannot be joined by an effect";
+  if (campaign.precomputed) {
+    return absl::StrCat(
+        "runs that were made elsewhere cannot be joined by ", name,
+        "; `calibctl diagnose` says what instruments or a denser start would change of them, and "
+        "runs that your code makes with ",
+        name, " are a campaign of their own (compare it: `calibctl models`)");
+  }
   const auto& has = campaign.model.effects;
   if (std::find(has.begin(), has.end(), name) != has.end()) {
     return absl::StrCat(name, " is part of the model already");
