@@ -203,14 +203,15 @@ std::string DiagnosisJson(const Diagnosis& d) {
 
 std::string DiagnosisText(const Diagnosis& d) {
   std::string text = Wrapped(Sentence(d), "", "");
-  text += Wrapped(fmt::format("Best fit: residual {} sd of a measurement (rms); chi-squared {}, of "
+  text += Wrapped(fmt::format("Error of the best fit: {} sd; chi-squared {}, of "
                               "a right model {} are expected (p = {}).",
                               Number(d.rms, 3), Number(d.adequacy.chi2, 4),
                               Number(d.adequacy.degrees, 4), Number(d.adequacy.p_value, 2)),
                   "", "  ");
   for (const std::string& warning : d.warnings) text += Wrapped(warning, "! ", "  ");
   if (!d.candidates.empty()) {
-    TextTable table({"<effect", "p (screen)", "explains", "rms with it", "refitted p", "left out"});
+    TextTable table(
+        {"<effect", "p (screen)", "explains", "error with it", "refitted p", "left out"});
     for (const CandidateEffect& c : d.candidates) {
       table.AddRow({c.effect, Number(c.p_value, 2), report::Percent(c.explained_fraction, 2),
                     Number(c.predicted_rms_error, 3),
@@ -220,7 +221,7 @@ std::string DiagnosisText(const Diagnosis& d) {
     text += "\n" + table.ToString();
     if (d.left_out_error) {
       text += Wrapped(
-          fmt::format("Left out: rms of what a model misses of data it was not fitted to, one "
+          fmt::format("Left out: error on data that a model was not fitted to, one "
                       "experiment or stage after the other, in sd of a measurement; {} without any "
                       "of these effects.",
                       Number(*d.left_out_error, 3)),

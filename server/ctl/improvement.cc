@@ -71,7 +71,8 @@ absl::Status Improvement::From(report::CampaignView view) {
     ImproveStep& step = steps_.back();
     const std::string next = NextEffect(*diagnosis);
     if (diagnosis->verdict == "adequate") {
-      step.reason = "Noise, scatter and the emulator's error explain what is left.";
+      step.reason = absl::StrCat("Noise, scatter and the emulator's error explain what is left.",
+                                 step.reason.empty() ? "" : " ", step.reason);
       break;
     }
     if (last) {

@@ -117,7 +117,7 @@ std::string DiagnosisSection(const ReportData& data) {
   std::string html = "<h2>Which effect is missing</h2>\n<p><strong>" +
                      Escape(d->sentence.empty() ? d->verdict : d->sentence) + "</strong></p>\n";
   html += fmt::format(
-      "<p>Best fit: error {} sd of a measurement; chi-squared {}, of a right model {} are expected "
+      "<p>Error of the best fit: {} sd; chi-squared {}, of a right model {} are expected "
       "(p = {}).{}</p>\n",
       Number(d->rms, 3), Number(d->chi2, 4), Number(d->degrees, 4), Number(d->p_value, 2),
       d->only_adequacy ? " Whether an effect would fit better was not asked." : "");

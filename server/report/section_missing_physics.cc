@@ -86,7 +86,7 @@ std::string Tree(const ReportData& data) {
 std::string StepTable(const Story& story) {
   std::string html =
       "<div class=\"scroll\"><table><tr><th>campaign</th><th class=\"l\">effects added</th>"
-      "<th>error</th><th>held out</th><th class=\"l\">verdict</th></tr>\n";
+      "<th>error, sd</th><th>held out</th><th class=\"l\">verdict</th></tr>\n";
   for (const ErrorStep& step : story.steps) {
     const StoredDiagnosis* d = LatestOf(story.diagnoses, step.campaign);
     std::string verdict = d == nullptr ? "–" : NameForPeople(d->verdict);
@@ -119,7 +119,7 @@ std::string StageTable(const std::vector<ErrorStep>& steps) {
   }
   if (rows.empty()) return "";
   return "<div class=\"scroll\"><table><tr><th>experiment</th><th class=\"l\">observable</th><th "
-         "class=\"l\">stage</th><th>rms / sd before</th><th>after</th></tr>\n" +
+         "class=\"l\">stage</th><th>error before, sd</th><th>after</th></tr>\n" +
          rows + "</table></div>\n";
 }
 
@@ -142,7 +142,7 @@ std::string ErrorChart(const Story& story) {
     }
   }
   Plot plot({}, Axis("effects added", 0, x.back(), static_cast<int>(steps.size())),
-            Axis::Covering("rms of residual / sd", all, 5));
+            Axis::Covering("error, sd", all, 5));
   plot.AddHorizontal(1);
   plot.AddLine(x, fitted, "mean");
   plot.AddPoints(x, fitted, 3.5);
@@ -157,7 +157,7 @@ std::string ErrorChart(const Story& story) {
       "is as close as the errors let it be.</figcaption>\n</figure>\n</div>\n" +
       StepTable(story) +
       "<div class=\"scroll\"><table><tr><th>model</th><th class=\"l\">experiment</th><th "
-      "class=\"l\">observable</th><th>rms / sd</th></tr>\n";
+      "class=\"l\">observable</th><th>error, sd</th></tr>\n";
   for (const ErrorStep& step : steps) {
     for (const ObservableMisfit& m : step.by_observable) {
       if (m.heldout && !step.heldout_rms_error) continue;

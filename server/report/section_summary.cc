@@ -33,13 +33,13 @@ std::string SummarySection(const ReportData& data) {
     html += Card(posterior.converged() ? "yes" : "not yet", "converged");
     if (view.campaign.filter.noise != inference::NoiseMode::kEssTarget) {
       html += Card(Number(data.comparison.rms_error, 3),
-                   "rms misfit in standard deviations (1: as expected)");
+                   "error of the fitted data, sd (1: as expected)");
     }
     if (data.comparison.reduced_chi2) {
       html += Card(Number(*data.comparison.reduced_chi2, 3), "reduced chi-squared");
     }
     if (data.comparison.heldout_rms_error) {
-      html += Card(Number(*data.comparison.heldout_rms_error, 3), "rms misfit of held-out data");
+      html += Card(Number(*data.comparison.heldout_rms_error, 3), "error of the held-out data, sd");
     }
     if (const auto* d = LatestOf(data.story.diagnoses, view.status.campaign())) {
       html += Card(d->effect.empty() ? NameForPeople(d->verdict) : NameForPeople(d->effect),
