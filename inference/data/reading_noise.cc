@@ -16,7 +16,7 @@ constexpr double kFewest = 6;    // independent differences
 constexpr double kSure = 1e-3;   // of a limit on one side
 constexpr double kLarger = 1.3;  // times the stated error
 constexpr double kSmaller = 1 / 1.5;
-constexpr double kStays = 0.8;            // of the scale from one order to the next: noise
+constexpr double kStays = 0.6;            // of the scale from one order to the next: noise
 constexpr double kNormalMedian = 0.6745;  // of the size of a standard normal number
 constexpr double kMedianEfficiency = 0.37;
 

@@ -33,7 +33,7 @@ struct ReadingNoise {
 /// differences the smaller scale is taken.
 ///   surely_larger: 0.999 lower limit of `robust` above 1.3, and fourth differences say no less
 ///   than
-///     0.8 times of what third ones say: what falls with the order is a curve, not noise.
+///     0.6 times of what third ones say: what falls with the order is a curve, not noise.
 ///   surely_smaller: 0.999 upper limit of `scale` below 2/3. A curve only adds to it.
 /// Limits are those of chi-squared over its degrees, the degrees m^2 / |R|_F^2 for m differences
 /// with stated correlation R [Satterthwaite 1946]; of the median 0.37 of them, its efficiency.

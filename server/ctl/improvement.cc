@@ -32,7 +32,7 @@ std::string WhyNext(const Diagnosis& diagnosis, const std::string& next) {
     return absl::StrCat(next, " is added, the best of those that these tests do not tell apart: ",
                         absl::StrJoin(diagnosis.candidates.front().confusable_with, ", "), ".");
   }
-  return absl::StrCat(next, " is added: no effect explains the misfit alone, it helps most.");
+  return absl::StrCat(next, " is added, it helps most: ", diagnosis.reason, ".");
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ std::string Family(const v1::CampaignStatus& status,
                         child.campaign(), child.state());
   }
   if (!trials.empty()) {
-    text += fmt::format("Tried on it: {} ({} to {}).\n", CountedByPurpose(trials),
+    text += fmt::format("Made from it: {} ({} to {}).\n", CountedByPurpose(trials),
                         trials.front().campaign(), trials.back().campaign());
   }
   return text;

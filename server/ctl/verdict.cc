@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_format.h"
@@ -116,44 +117,48 @@ void Verdict::Conclude(bool base_fits) {
 
 // A clause: that no refit fits, or that one does but not clearly better; and why none is the best.
 std::string Verdict::WhyUnexplained() const {
-  const CandidateEffect* closest = nullptr;
-  const CandidateEffect* fitting = nullptr;
+  const std::pair<const std::string, WarmFit>* closest = nullptr;
+  const std::pair<const std::string, WarmFit>* fitting = nullptr;
   for (const CandidateEffect& candidate : diagnosis_.candidates) {
-    if (Find(candidate.effect) == nullptr || candidate.refit_p_value < 0) continue;
-    if (closest == nullptr || candidate.refit_chi2 < closest->refit_chi2) closest = &candidate;
-    if (fitting == nullptr && candidate.refit_p_value >= level_) fitting = &candidate;
+    const auto fit = fits_.find(candidate.effect);
+    if (fit == fits_.end() || fit->second.model.histories.rows() == 0) continue;
+    const inference::Adequacy& adequacy = fit->second.adequacy;
+    if (closest == nullptr || adequacy.chi2 < closest->second.adequacy.chi2) closest = &*fit;
+    if (fitting == nullptr && adequacy.p_value >= level_) fitting = &*fit;
   }
   if (closest == nullptr) return "no effect could be refitted";
   if (fitting != nullptr) {
-    const bool misses_more = fitting->left_out_error && diagnosis_.left_out_error &&
-                             *fitting->left_out_error > *diagnosis_.left_out_error;
-    const std::string why =
-        misses_more
-            ? absl::StrFormat("it misses data it was not fitted to by %.3g sd, %.3g without",
-                              *fitting->left_out_error, *diagnosis_.left_out_error)
-        : fitting->gain_p_value
-            ? absl::StrFormat(
-                  "so much better may be chance (p = %.2g, before it is counted that "
-                  "%d effects were refitted)",
-                  *fitting->gain_p_value, static_cast<int>(fits_.size()))
-            : absl::StrFormat(
-                  "its advantage is %.3g ± %.2g nats, two standard deviations are "
-                  "asked for",
-                  fitting->over_base.nats, fitting->over_base.sd);
+    const WarmFit& fit = fitting->second;
     return absl::StrFormat("with %s it fits (p = %.2g), but is not clearly better than without: %s",
-                           fitting->effect, fitting->refit_p_value, why);
+                           fitting->first, fit.adequacy.p_value, WhyNotBetter(fit));
   }
   std::string text = absl::StrFormat("with none of the %d effects that were refitted does it fit",
                                      static_cast<int>(fits_.size()));
   const auto base = inference::TestAdequacy(base_);
   if (diagnosis_.best_partial.empty() && base.ok()) {
-    absl::StrAppendFormat(
-        &text,
-        ", and none comes clearly closer: with %s chi-squared is %.4g, without %.4g "
-        "(clearly is below %.4g)",
-        closest->effect, closest->refit_chi2, base->chi2, kClearlyCloser * base->chi2);
+    absl::StrAppendFormat(&text,
+                          ", and none comes clearly closer: with %s chi-squared is %.4g, without "
+                          "%.4g (clearly is below %.4g)",
+                          closest->first, closest->second.adequacy.chi2, base->chi2,
+                          kClearlyCloser * base->chi2);
   }
   return text;
+}
+
+// Of an adequate fit that does not explain.
+std::string Verdict::WhyNotBetter(const WarmFit& fit) const {
+  if (fit.left_out_error && diagnosis_.left_out_error &&
+      *fit.left_out_error > *diagnosis_.left_out_error) {
+    return absl::StrFormat("it misses data it was not fitted to by %.3g sd, %.3g without",
+                           *fit.left_out_error, *diagnosis_.left_out_error);
+  }
+  if (fit.gain_p_value) {
+    return absl::StrFormat("so much better is chance with p = %.2g, of the best of %d refits",
+                           std::min(1.0, *fit.gain_p_value * static_cast<double>(fits_.size())),
+                           static_cast<int>(fits_.size()));
+  }
+  return absl::StrFormat("its advantage is %.3g ± %.3g nats, two standard deviations are asked for",
+                         fit.over_base.nats, fit.over_base.sd);
 }
 
 // Judged or not: the fit that comes closest, if it comes clearly closer than the base model.

@@ -32,6 +32,7 @@ class Verdict {
   bool IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const;
   std::string Closest() const;
   std::string WhyUnexplained() const;
+  std::string WhyNotBetter(const WarmFit& fit) const;
 
   Diagnosis& diagnosis_;
   const std::map<std::string, WarmFit>& fits_;

@@ -38,6 +38,20 @@ std::string Alike(const TriedEffect& tried) {
   return text;
 }
 
+// Beside the effect its own name in front of each parameter goes without saying.
+std::string OwnStrength(const std::string& effect, const std::map<std::string, double>& strength,
+                        const std::map<std::string, std::string>& units) {
+  std::map<std::string, double> values;
+  std::map<std::string, std::string> own_units;
+  for (const auto& [name, value] : strength) {
+    const std::string own =
+        NameForPeople(name.starts_with(effect + ".") ? name.substr(effect.size() + 1) : name);
+    values[own] = value;
+    if (const auto unit = units.find(name); unit != units.end()) own_units[own] = unit->second;
+  }
+  return StrengthInWords(values, own_units);
+}
+
 std::string CandidateTable(const StoredDiagnosis& d) {
   if (d.candidates.empty()) return "";
   std::string html =
@@ -48,12 +62,12 @@ std::string CandidateTable(const StoredDiagnosis& d) {
     const bool named = tried.effect == d.effect;
     html += fmt::format(
         "<tr><td>{}{}{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
-        "<td class=\"l\">{}</td><td class=\"l\">{}</td></tr>\n",
+        "<td class=\"l wide\">{}</td><td class=\"l wide\">{}</td></tr>\n",
         named ? "<strong>" : "", Escape(NameForPeople(tried.effect)), named ? "</strong>" : "",
         Number(tried.p_value, 2), Percent(tried.explained_fraction, 2),
         Number(tried.predicted_rms_error, 3), OrDash(tried.refit_p_value, 2),
-        OrDash(tried.left_out_error, 3), Escape(StrengthInWords(tried.amplitude, d.units)),
-        Escape(Alike(tried)));
+        OrDash(tried.left_out_error, 3),
+        Escape(OwnStrength(tried.effect, tried.amplitude, d.units)), Escape(Alike(tried)));
   }
   html +=
       "</table></div>\n<p class=\"sub\">Best first. Explains: share of the misfit beyond noise "
@@ -85,7 +99,7 @@ std::string Detectable(const StoredDiagnosis& d) {
       "<h3>What would have been found</h3>\n<p class=\"sub\">The smallest strength that these "
       "tests would have shown with 90 % power.</p>\n<ul>\n";
   for (const auto& [effect, strength] : d.detectable) {
-    html += "<li>" + Escape(NameForPeople(effect) + ": " + StrengthInWords(strength, d.units)) +
+    html += "<li>" + Escape(NameForPeople(effect) + ": " + OwnStrength(effect, strength, d.units)) +
             "</li>\n";
   }
   return html + "</ul>\n";

@@ -118,8 +118,9 @@ std::string StageTable(const std::vector<ErrorStep>& steps) {
         Number(before->rms_error, 3), Number(after.rms_error, 3));
   }
   if (rows.empty()) return "";
-  return "<div class=\"scroll\"><table><tr><th>experiment</th><th class=\"l\">observable</th><th "
-         "class=\"l\">stage</th><th>error before, sd</th><th>after</th></tr>\n" +
+  return "<h3>By loading stage</h3>\n<div class=\"scroll\"><table><tr><th>experiment</th><th "
+         "class=\"l\">observable</th><th class=\"l\">stage</th><th>error before, "
+         "sd</th><th>after</th></tr>\n" +
          rows + "</table></div>\n";
 }
 
@@ -156,7 +157,8 @@ std::string ErrorChart(const Story& story) {
       "<figcaption>Fitted data; held-out data for the first and the last model. At one the model "
       "is as close as the errors let it be.</figcaption>\n</figure>\n</div>\n" +
       StepTable(story) +
-      "<div class=\"scroll\"><table><tr><th>model</th><th class=\"l\">experiment</th><th "
+      "<h3>By observable</h3>\n<div class=\"scroll\"><table><tr><th>model</th><th "
+      "class=\"l\">experiment</th><th "
       "class=\"l\">observable</th><th>error, sd</th></tr>\n";
   for (const ErrorStep& step : steps) {
     for (const ObservableMisfit& m : step.by_observable) {

@@ -116,12 +116,12 @@ constexpr const char* kDiagnosis = R"json({"campaign": "c1", "verdict": "missing
   "adequacy": {"chi2": 431, "degrees": 76, "p_value": 1e-40, "rms": 2.4, "left_out_error": 3.1},
   "candidates": [
     {"effect": "contact_plasticity", "p_value": 0.0013, "explained_fraction": 0.98,
-     "predicted_rms_error": 0.91, "amplitude": {"rolling_resistance.stiffness": 3200},
+     "predicted_rms_error": 0.91, "amplitude": {"contact_plasticity.stiffness": 3200, "cohesion.range": 2},
      "confusable_with": ["twisting_resistance"], "angles": {"twisting_resistance": 12.4},
      "warm_fit": {"campaign": "c7", "p_value": 0.56, "left_out_error": 1.02}},
     {"effect": "<b>membrane", "p_value": 1, "explained_fraction": 0.02, "predicted_rms_error": 2.4,
      "amplitude": {}, "confusable_with": []}],
-  "units": {"rolling_resistance.stiffness": "Pa"}, "only_adequacy": false,
+  "units": {"contact_plasticity.stiffness": "Pa"}, "only_adequacy": false,
   "not_excitable": [{"effect": "wall_friction", "reason": "none of the fitted tests can show it"}],
   "next_experiment": {"snippet": "  - name: next\n", "separates": ["contact_plasticity"],
                       "expected_power": 0.93}, "warnings": ["closer than the stated errors"]})json";
@@ -139,7 +139,7 @@ TEST(Report, ShowsTheDiagnosisThatWasKept) {
   for (const char* said :
        {"Missing: contact_plasticity.", "<b>contact plasticity</b><span>missing, says",
         "<strong>contact plasticity</strong>", "<td>0.0013</td><td>98 %</td><td>0.91</td>",
-        "<td>0.56</td><td>1.02</td>", "rolling_resistance.stiffness = 3.2 kPa",
+        "<td>0.56</td><td>1.02</td>", ">cohesion: range = 2, stiffness = 3.2 kPa<",
         "twisting resistance (12°)", "&lt;b&gt;membrane", "chi-squared 431", "SHA-256 5f1e",
         "wall friction: none of the fitted tests can show it", "closer than the stated errors",
         "  - name: next"}) {
