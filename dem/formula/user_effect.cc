@@ -104,14 +104,16 @@ double Probe(const FormulaQuantity& quantity, int which) {
 }
 
 /// Value of the formula with quantities at one of their usual values, parameters at the middle of
-/// their prior or, `removed`, at their null.
-double ProbedValue(const UserEffect& effect, const Formula& formula, int which, bool removed) {
+/// their prior or, `removed`, at their null; the quantity `zero` is zero.
+double ProbedValue(const UserEffect& effect, const Formula& formula, int which, bool removed,
+                   const std::string& zero = "") {
   const std::vector<FormulaQuantity> quantities = QuantitiesOf(effect.info.kind);
   std::vector<double> row;
   for (const int i : formula.used()) {
     const auto index = static_cast<std::size_t>(i);
     if (index < quantities.size()) {
-      row.push_back(Probe(quantities[index], which));
+      const FormulaQuantity& quantity = quantities[index];
+      row.push_back(quantity.name == zero ? 0 : Probe(quantity, which));
       continue;
     }
     const ParameterInfo& p = effect.info.parameters[index - quantities.size()];
@@ -129,6 +131,11 @@ double ProbedValue(const UserEffect& effect, const Formula& formula, int which, 
 }
 
 constexpr int kProbes = 3;
+
+/// Quantities that are zero in every run: before loading, at rest, where a contact begins.
+constexpr const char* kZeros[] = {"overlap",          "closing_velocity", "sliding_velocity",
+                                  "sliding_distance", "axial_strain",     "volumetric_strain",
+                                  "deviatoric_stress"};
 
 }  // namespace
 
@@ -256,8 +263,15 @@ std::string NullProblem(const UserEffect& effect) {
     }
     finite = finite || std::isfinite(ProbedValue(effect, formula, which, false));
   }
-  return finite ? ""
-                : "is not finite at usual values of its quantities and the middle of its priors";
+  if (!finite)
+    return "is not finite at usual values of its quantities and the middle of its priors";
+  for (const char* zero : kZeros) {
+    if (std::isfinite(ProbedValue(effect, formula, 0, false, zero))) continue;
+    return absl::StrCat("is not finite where ", zero,
+                        " is zero, as it is in every run; say what it is there, e.g. with max(",
+                        zero, ", ...) or ", zero, " > 0 ? ... : ", none);
+  }
+  return "";
 }
 
 const EffectInfo* FindEffect(std::span<const UserEffect> declared, const std::string& name) {

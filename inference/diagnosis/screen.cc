@@ -246,14 +246,17 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
         square > 0 ? reach * sd / std::sqrt(square) : std::numeric_limits<double>::infinity();
     scores.push_back(std::move(score));
   }
-  const double close = std::cos(25 * std::numbers::pi / 180);
+  constexpr double kClose = 25;  // degrees
   for (std::size_t a = 0; a < scores.size(); ++a) {
     for (std::size_t b = 0; b < scores.size(); ++b) {
+      if (a == b) continue;
       const double cosine = visible[a].dot(visible[b]);
       const bool either_sign = candidates[a].two_sided || candidates[b].two_sided;
-      if (a != b && (either_sign ? std::abs(cosine) : cosine) > close) {
-        scores[a].confusable_with.push_back(scores[b].name);
-      }
+      const double angle =
+          std::acos(std::clamp(either_sign ? std::abs(cosine) : cosine, -1.0, 1.0)) * 180 /
+          std::numbers::pi;
+      scores[a].angles[scores[b].name] = angle;
+      if (angle < kClose) scores[a].confusable_with.push_back(scores[b].name);
     }
   }
   std::stable_sort(scores.begin(), scores.end(), [](const Score& a, const Score& b) {

@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,9 @@ struct Score {
   /// or differences at two strengths or more have nothing in common.
   double detectable = 0;
   std::vector<std::string> confusable_with{};  ///< signatures less than 25 degrees away
+  /// Between what no choice of the parameters imitates of this signature and of each other one, by
+  /// name [degrees], 0 to 90 where either effect is two-sided, else to 180.
+  std::map<std::string, double> angles{};
 };
 
 struct ScreenOptions {

@@ -113,6 +113,10 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
   if (derivation.replicates) {
     YamlAt(inference, "replicates") = YamlScalar(absl::StrCat(*derivation.replicates));
   }
+  if (derivation.model_evaluations) {
+    YamlAt(YamlAt(root, "budget"), "model_evaluations") =
+        YamlScalar(absl::StrCat(*derivation.model_evaluations));
+  }
   if (!derivation.first_proposal) return;
   YamlNode proposal =
       YamlMap({{"prior_share", YamlNumber(derivation.first_proposal->prior_share)}});

@@ -3,6 +3,7 @@
 // with what is said here changed. Pure: the same parent and changes give the same text, by which it
 // is recognised when it is asked for again. However many runs diverge, it is not paused.
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -28,6 +29,7 @@ struct Derivation {
   std::optional<int> samples{}, max_iterations{};
   std::optional<FirstProposal> first_proposal{};
   std::optional<int> replicates{};
+  std::optional<std::int64_t> model_evaluations{};  ///< its budget; not of a table
   /// Makes it a table: parameter values by name, and whose specimen and seed they take.
   struct Row {
     int like = 0;

@@ -270,6 +270,7 @@ dem::UserEffect ReadOne(MapReader& map, const std::string& name) {
     map.Problem("formula", problem);
     return effect;
   }
+  effect.info.needs_motion = dem::IsViscous(effect);
   const dem::Formula formula(effect.formula, dem::FormulaNames(effect));
   const auto first = static_cast<int>(dem::QuantitiesOf(effect.info.kind).size());
   for (std::size_t p = 0; p < effect.info.parameters.size(); ++p) {

@@ -79,20 +79,21 @@ std::string ComparisonText(const report::Comparison& comparison) {
   if (comparison.by_observable.empty()) {
     return "There is nothing to compare yet: no sample with weight has reached a reading.\n";
   }
-  std::string text = fmt::format("Misfit: rms of residual over standard deviation {}",
-                                 Number(comparison.rms_error, 3));
+  std::string text =
+      fmt::format("Error of the fitted data: {} sd", Number(comparison.rms_error, 3));
   if (comparison.reduced_chi2) {
     text += fmt::format(", reduced chi-squared {}", Number(*comparison.reduced_chi2, 3));
   }
   if (comparison.p_value) text += fmt::format(" (p = {})", Number(*comparison.p_value, 2));
   text += ".\n";
   if (comparison.heldout_rms_error) {
-    text += fmt::format("Held-out data, never fitted: rms {}.\n",
+    text += fmt::format("Error of the held-out data, never fitted: {} sd.\n",
                         Number(*comparison.heldout_rms_error, 3));
   }
   if (!comparison.note.empty()) text += Wrapped(comparison.note, "", "");
-  TextTable observables(
-      {"<experiment", "<observable", "readings", "rms/sd", "scatter/noise", "rms", "z", "p", "<"});
+  for (const std::string& warning : comparison.warnings) text += Wrapped(warning, "! ", "  ");
+  TextTable observables({"<experiment", "<observable", "readings", "error", "scatter/noise",
+                         "residual", "z", "p", "<"});
   for (const report::ObservableMisfit& m : comparison.by_observable) {
     observables.AddRow(
         {m.experiment + (m.heldout ? " (held out)" : ""), m.observable, std::to_string(m.readings),
@@ -101,8 +102,8 @@ std::string ComparisonText(const report::Comparison& comparison) {
          m.z ? Number(*m.z, 2) : "–", m.p_value ? Number(*m.p_value, 2) : "–",
          m.z ? Verdict(m.rms_error, m.p_value) : ""});
   }
-  TextTable segments({"<experiment", "<observable", "<stage", "model − measured", "z", "rms/sd",
-                      "chi2", "<shape"});
+  TextTable segments(
+      {"<experiment", "<observable", "<stage", "model − measured", "z", "error", "chi2", "<shape"});
   for (const report::SegmentMisfit& m : comparison.by_segment) {
     segments.AddRow({m.experiment + (m.heldout ? " (held out)" : ""), m.observable, m.segment,
                      report::NumberWithUnit(m.bias, m.observable, UnitOf(m.observable), 3),

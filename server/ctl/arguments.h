@@ -32,6 +32,8 @@ struct Arguments {
   int draws = 20;                               ///< of the posterior, to predict from
   std::vector<std::string> exceed;              ///< OBSERVABLE=LEVEL
   std::string output;                           ///< file or folder; empty: standard output
+  bool with_children = false;                   ///< of delete: what comes from the campaign too
+  bool force = false;                           ///< of delete: although something comes from it
   std::string vtk;                              ///< folder
   std::string checkpoint;                       ///< folder
 };

@@ -11,6 +11,7 @@
 #include "calib/v1/campaign.grpc.pb.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/client_options.h"
+#include "proto/rpc/digest.h"
 #include "proto/rpc/status.h"
 
 namespace calib::ctl {
@@ -199,6 +200,22 @@ absl::StatusOr<v1::CampaignSource> Client::GetSource(const std::string& campaign
 
 absl::StatusOr<std::vector<v1::LogEntry>> Client::GetLog(const std::string& campaign) {
   return Collect(*impl_->stub, &Stub::GetLog, Of(campaign));
+}
+
+absl::Status Client::AddFinding(const std::string& campaign, const std::string& kind,
+                                const std::string& document) {
+  if (auto put = PutBlob(document); !put.ok()) return put;
+  v1::AddFindingRequest request;
+  request.set_campaign(campaign);
+  request.set_kind(kind);
+  request.set_digest(rpc::Sha256Hex(document));
+  return Call<v1::Finding>(*impl_->stub, &Stub::AddFinding, request).status();
+}
+
+absl::StatusOr<std::vector<v1::Finding>> Client::Findings(const std::string& campaign) {
+  const auto list = Call<v1::FindingList>(*impl_->stub, &Stub::ListFindings, Of(campaign));
+  if (!list.ok()) return list.status();
+  return std::vector<v1::Finding>(list->findings().begin(), list->findings().end());
 }
 
 absl::StatusOr<v1::CampaignStatus> Client::Pause(const std::string& campaign) {

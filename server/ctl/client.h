@@ -38,6 +38,11 @@ class Client {
                                                           std::optional<int> sample);
   absl::StatusOr<v1::CampaignSource> GetSource(const std::string& campaign);
   absl::StatusOr<std::vector<v1::LogEntry>> GetLog(const std::string& campaign);
+  /// Puts the document and keeps it as a conclusion about the campaign. kind: diagnosis |
+  /// improvement.
+  absl::Status AddFinding(const std::string& campaign, const std::string& kind,
+                          const std::string& document);
+  absl::StatusOr<std::vector<v1::Finding>> Findings(const std::string& campaign);
   absl::StatusOr<v1::CampaignStatus> Pause(const std::string& campaign);
   absl::StatusOr<v1::CampaignStatus> Resume(const std::string& campaign);
   absl::StatusOr<v1::CampaignStatus> Cancel(const std::string& campaign);

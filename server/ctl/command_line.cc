@@ -16,6 +16,16 @@ constexpr const char* kDescription =
     "  calibctl run sand.yaml                          the whole calibration on this machine\n"
     "  calibctl report c1 --state calib-state -o r.html\n";
 
+constexpr const char* kErrorMeans =
+    "\n\nError: root mean square over readings of (model - measurement) / sd, where sd is that of "
+    "a\n"
+    "measurement: its noise and, where it is known, the scatter between packings. 1 is as "
+    "expected.\n"
+    "  fitted, held out   of the model at its posterior, by the role of the experiments\n"
+    "  of the best fit    of the point of the parameter space that comes closest (diagnose)\n"
+    "  with an effect     of the best fit with it: by the screen, or refitted where a p says so\n"
+    "  left out           of data that the model was not fitted to, part after part";
+
 // Declares one verb after the other; options write into one Arguments.
 class Builder {
  public:
@@ -30,6 +40,9 @@ class Builder {
     sub->callback([this, verb] { command_.verb = verb; });
     return sub;
   }
+
+  // For verbs that speak of errors.
+  static void ExplainError(CLI::App* sub) { sub->footer(sub->get_footer() + kErrorMeans); }
 
   CLI::App* AddOnCampaign(const std::string& name, int (*verb)(const Arguments&),
                           const std::string& description, const std::string& more = "") {
@@ -117,17 +130,19 @@ void AddVerbsOnCampaigns(Builder& b) {
       ->add_option("SAMPLE", b.arguments().sample, "index, as shown by `calibctl samples`")
       ->required()
       ->check(CLI::NonNegativeNumber);
-  b.AddOnCampaign("compare", &Compare,
-                  "Model against measurements: where it fits and where it fails");
+  Builder::ExplainError(b.AddOnCampaign(
+      "compare", &Compare, "Model against measurements: where it fits and where it fails"));
   b.AddOnCampaign("sensitivity", &Sensitivity,
                   "Which parameters move what: Sobol indices, correlations with bulk properties");
   b.Add("models", &Models, "Which model do the data favour: evidence, Bayes factors, probabilities",
         "models c1 c2 --state calib-state")
       ->add_option("ID", b.arguments().campaigns, "campaigns on the same data, two or more")
       ->required();
-  b.AddOnCampaign("diagnose", static_cast<int (*)(const Arguments&)>(&Diagnose),
-                  "Which physical effect is missing; runs what it needs, and goes on when killed")
-      ->add_option("--without", b.arguments().effects, "effect that is not to be thought of")
+  auto* diagnose = b.AddOnCampaign(
+      "diagnose", static_cast<int (*)(const Arguments&)>(&Diagnose),
+      "Which physical effect is missing; runs what it needs, and goes on when killed");
+  Builder::ExplainError(diagnose);
+  diagnose->add_option("--without", b.arguments().effects, "effect that is not to be thought of")
       ->allow_extra_args(false);
   b.AddOnCampaign("extend", &Extend,
                   "A new campaign: this one joined by effects, started from its posterior",
@@ -138,11 +153,13 @@ void AddVerbsOnCampaigns(Builder& b) {
   auto* improve =
       b.AddOnCampaign("improve", &Improve,
                       "Compare, diagnose, extend until the misfit is explained or nothing helps");
+  Builder::ExplainError(improve);
   improve->add_option("--max-effects", b.arguments().max_effects, "at most so many are added [3]")
       ->check(CLI::Range(1, 10));
   improve
       ->add_option("--max-evaluations", b.arguments().max_evaluations,
-                   "no calibration is begun after so many model evaluations")
+                   "model evaluations of all screens, refits and calibrations, those that diagnose "
+                   "has made already included; held-out tests of a calibration come on top")
       ->check(CLI::PositiveNumber);
   auto* predict = b.AddOnCampaign(
       "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance",
@@ -166,7 +183,14 @@ void AddVerbsOnCampaigns(Builder& b) {
   b.AddOnCampaign("pause", &Pause, "Stop handing out work; nothing is lost");
   b.AddOnCampaign("resume", &Resume, "Go on with a paused campaign");
   b.AddOnCampaign("cancel", &Cancel, "End a campaign for good, keeping what it has");
-  b.AddOnCampaign("delete", &Delete, "Remove an ended campaign and all its data");
+  auto* remove = b.AddOnCampaign("delete", &Delete, "Remove an ended campaign and all its data");
+  auto* children =
+      remove->add_flag("--with-children", b.arguments().with_children,
+                       "everything that diagnose, extend and improve made from it too");
+  remove
+      ->add_flag("--force", b.arguments().force,
+                 "although campaigns come from it, which stay without their parent")
+      ->excludes(children);
 }
 
 void AddOtherVerbs(Builder& b) {

@@ -8,10 +8,12 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "server/campaign/noise_check.h"
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
+#include "server/ctl/strengths.h"
 #include "server/ctl/verdict.h"
 #include "server/ctl/warm_fits.h"
 
@@ -20,7 +22,9 @@ namespace {
 
 constexpr std::size_t kWarmFits = 4;    // two batches each pick the few to continue from
 constexpr std::size_t kMostRivals = 3;  // that the next experiment is to separate
-constexpr double kMostUnits = 10;       // of an effect that is calculated on readings
+// Of measurements that a right model makes one in a thousand is closer.
+constexpr double kTooGood = 0.999;
+constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
 
 class Inquiry {
  public:
@@ -33,9 +37,12 @@ class Inquiry {
 
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();
+    diagnosis_.only_adequacy = options_.only_adequacy;
+    diagnosis_.warnings = campaign::NoiseWarnings(base_.view().campaign);
     if (auto possible = CheckPossible(); !possible.ok()) return possible;
     const bool elsewhere = base_.view().campaign.precomputed.has_value();
     if (!options_.only_adequacy && !elsewhere) {
+      if (auto affordable = CheckBudget(); !affordable.ok()) return affordable;
       auto nuisance = screen_.MeasureNuisance();
       if (!nuisance.ok()) return nuisance.status();
       nuisance_ = *std::move(nuisance);
@@ -90,6 +97,15 @@ class Inquiry {
     return absl::OkStatus();
   }
 
+  absl::Status CheckBudget() const {
+    if (!options_.max_evaluations) return absl::OkStatus();
+    const std::int64_t screen = screen_.Planned(options_.without);
+    if (screen + fits_.Least() <= *options_.max_evaluations) return absl::OkStatus();
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the screen of effects takes ", screen, " model evaluations and a refit ", fits_.Least(),
+        ", and ", std::max<std::int64_t>(0, *options_.max_evaluations), " are left"));
+  }
+
   absl::Status JudgeBase() {
     auto response = RespondTo(base_, nuisance_);
     if (!response.ok()) return response.status();
@@ -99,6 +115,11 @@ class Inquiry {
     diagnosis_.adequacy = *adequacy;
     diagnosis_.emulator_error = response_.emulator_error;
     diagnosis_.scatter = response_.scatter;
+    if (adequacy->p_value > kTooGood) {
+      diagnosis_.warnings.emplace_back(
+          "The model is closer to the readings than the stated errors and the scatter explain: "
+          "they seem too large, and an effect can hide in them.");
+    }
     diagnosis_.rms = response_.model.histories.row(adequacy->best).norm() /
                      std::sqrt(static_cast<double>(response_.model.histories.cols()));
     // A misfit beyond all that the emulator does not know is one however little that is.
@@ -224,10 +245,24 @@ class Inquiry {
          .over_base = {},
          .gain_p_value = {},
          .left_out_error = {},
-         .over_base_evidence = {}});
-    if (std::isfinite(score.detectable)) {
-      diagnosis_.detectable[score.name] =
-          StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
+         .over_base_evidence = {},
+         .angles = score.angles});
+    const dem::Model& model = base_.view().campaign.model;
+    const dem::EffectInfo& effect = *dem::FindEffect(model.user_effects, score.name);
+    diagnosis_.units.merge(UnitsOf(effect, model.contact));
+    if (!std::isfinite(score.detectable)) {
+      diagnosis_.undetectable.emplace_back(
+          score.name,
+          "the parameters imitate it, or what it changes is another at another strength");
+      return;
+    }
+    const std::map<std::string, double> strength =
+        StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
+    const std::string why = WhyNotAdmissible(effect, model.contact, strength);
+    if (why.empty()) {
+      diagnosis_.detectable[score.name] = strength;
+    } else {
+      diagnosis_.undetectable.emplace_back(score.name, why);
     }
   }
 
@@ -246,7 +281,9 @@ class Inquiry {
 
   absl::Status FitWarm(const inference::FittedModel& base) {
     if (!base_.view().campaign.precomputed) {
-      if (auto status = fits_.Fit(WorthARefit()); !status.ok()) return status;
+      std::optional<std::int64_t> most = options_.max_evaluations;
+      if (most) *most -= screen_.evaluations();
+      if (auto status = fits_.Fit(WorthARefit(), most); !status.ok()) return status;
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (CandidateEffect& candidate : diagnosis_.candidates) Describe(candidate);

@@ -34,6 +34,7 @@ struct CandidateEffect {
   /// ln of the Bayes factor over the base model where the strength's prior is kStrengthScales times
   /// as wide; of those that explain the readings and are known well enough by an emulator.
   std::optional<ScaledEvidence> over_base_evidence{};
+  std::map<std::string, double> angles{};  ///< to the other candidates, as in inference::Score
 };
 
 struct Diagnosis {
@@ -43,10 +44,13 @@ struct Diagnosis {
   std::vector<CandidateEffect> candidates;  ///< best first
   std::vector<std::pair<std::string, std::string>> not_excitable;   ///< effect, why
   std::map<std::string, std::map<std::string, double>> detectable;  ///< effect -> parameter -> SI
+  /// Effects that would not have been found at any strength that they can have, and why.
+  std::vector<std::pair<std::string, std::string>> undetectable{};
   /// Named in the group although they do not explain the readings: their refits have not come to an
   /// end, so that they cannot be excluded.
   std::vector<std::string> unfinished{};
   std::string best_partial;  ///< with unexplained: the effect that helps most, if any does
+  std::string reason{};  ///< with unexplained: why no effect is best_partial, or none explains it
   inference::Adequacy adequacy;
   /// Of the best fit, residual over the sd of a measurement: noise, and scatter between packings
   /// where it was measured.
@@ -57,17 +61,24 @@ struct Diagnosis {
   double emulator_error = 0, scatter = 0;
   std::int64_t screen_evaluations = 0, warm_evaluations = 0;
   std::optional<NextExperiment> next_experiment;
+  bool only_adequacy = false;                  ///< no effect was tried
+  std::vector<std::string> warnings{};         ///< about the noise stated, a sentence each
+  std::map<std::string, std::string> units{};  ///< SI, of the strengths of effects
 };
 
 struct DiagnosisOptions {
   double level = 0.01;                    ///< of the adequacy test and of the screen
   bool only_adequacy = false;             ///< no runs: says adequate or unexplained
   std::vector<std::string> without = {};  ///< effects that do not take part
+  /// Of the screen and the warm fits together, on the fitted experiments; those that were made
+  /// before count too.
+  std::optional<std::int64_t> max_evaluations = {};
   bool next_experiment = true;  ///< where the model is not adequate: the test that separates rivals
 };
 
 /// Errors: FAILED_PRECONDITION with a sentence when nothing can be said (no posterior, noise not
-/// given independently, runs made elsewhere); those of the runs.
+/// given independently, runs made elsewhere); RESOURCE_EXHAUSTED when max_evaluations does not
+/// suffice; those of the runs.
 absl::StatusOr<Diagnosis> Diagnose(Laboratory& laboratory, const report::CampaignView& view,
                                    const DiagnosisOptions& options = {});
 

@@ -9,6 +9,7 @@
 #include "server/ctl/diagnosis.h"
 #include "server/ctl/text_table.h"
 #include "server/report/people_units.h"
+#include "server/report/stored_diagnosis.h"
 
 namespace calib::ctl {
 namespace {
@@ -26,13 +27,22 @@ Json EvidenceJson(const std::optional<ScaledEvidence>& evidence) {
           {"standard_error", evidence->standard_error}};
 }
 
+Json ReasonsJson(const std::vector<std::pair<std::string, std::string>>& list) {
+  Json json = Json::array();
+  for (const auto& [effect, reason] : list) {
+    json.push_back({{"effect", effect}, {"reason", reason}});
+  }
+  return json;
+}
+
 Json CandidateJson(const CandidateEffect& c) {
   Json json = {{"effect", c.effect},
                {"p_value", c.p_value},
                {"explained_fraction", c.explained_fraction},
                {"amplitude", c.amplitude},
                {"predicted_rms_error", c.predicted_rms_error},
-               {"confusable_with", c.confusable_with}};
+               {"confusable_with", c.confusable_with},
+               {"angles", c.angles}};
   if (!c.campaign.empty()) {
     json["warm_fit"] = {{"campaign", c.campaign},
                         {"p_value", c.refit_p_value < 0 ? Json(nullptr) : Json(c.refit_p_value)},
@@ -102,17 +112,24 @@ std::string NextText(const NextExperiment& next) {
   return text;
 }
 
-std::string Strength(const std::map<std::string, double>& amplitude) {
-  std::string text;
-  for (const auto& [name, value] : amplitude) {
-    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name, Number(value, 3));
-  }
-  return text;
-}
-
 std::string Listed(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+// Effects that share a reason in one sentence.
+std::string ByReason(const std::string& begin,
+                     const std::vector<std::pair<std::string, std::string>>& list) {
+  std::map<std::string, std::string> by_reason;
+  for (const auto& [effect, reason] : list) {
+    std::string& names = by_reason[reason];
+    names += (names.empty() ? "" : ", ") + effect;
+  }
+  std::string text;
+  for (const auto& [reason, names] : by_reason) {
+    text += Wrapped(fmt::format("{} {}: {}.", begin, reason, names), "", "  ");
+  }
   return text;
 }
 
@@ -141,36 +158,22 @@ std::string Sentence(const Diagnosis& d) {
             ? ""
             : fmt::format(" Not excluded, since the refit has not come to an end: {}.", open));
   }
-  const auto refitted = std::count_if(d.candidates.begin(), d.candidates.end(),
-                                      [](const auto& c) { return c.refit_p_value >= 0; });
   return fmt::format(
-      "Unexplained: the model misses the data, and with none of the {} effects that "
-      "were refitted does it fit{}",
-      refitted, d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
+      "Unexplained: the model misses the data, and {}{}",
+      d.reason.empty() ? "no effect was tried" : d.reason,
+      d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
 }
-
-// Of measurements that a right model makes one in a thousand is closer.
-bool IsTooGood(const Diagnosis& d) { return d.adequacy.p_value > 0.999; }
-
-constexpr const char* kTooGood =
-    "The model is closer to the readings than the stated errors and the scatter explain: they seem "
-    "too "
-    "large, and an effect can hide in them.";
 
 }  // namespace
 
 std::string DiagnosisJson(const Diagnosis& d) {
   Json candidates = Json::array();
   for (const CandidateEffect& c : d.candidates) candidates.push_back(CandidateJson(c));
-  Json not_excitable = Json::array();
-  for (const auto& [effect, reason] : d.not_excitable) {
-    not_excitable.push_back({{"effect", effect}, {"reason", reason}});
-  }
   Json json = {{"campaign", d.campaign},
                {"verdict", d.verdict},
                {"effect", OrNull(d.effect)},
                {"candidates", candidates},
-               {"not_excitable", not_excitable},
+               {"not_excitable", ReasonsJson(d.not_excitable)},
                {"next_experiment", NextJson(d.next_experiment)},
                {"model_evaluations", d.screen_evaluations},
                {"warm_fit_evaluations", d.warm_evaluations},
@@ -182,24 +185,33 @@ std::string DiagnosisJson(const Diagnosis& d) {
                  {"left_out_error", OrNull(d.left_out_error)},
                  {"emulator_error", d.emulator_error},
                  {"scatter", d.scatter}}}};
-  json["warnings"] = Json::array();
-  if (IsTooGood(d)) json["warnings"].push_back(kTooGood);
-  if (d.verdict == "adequate") json["detectable"] = d.detectable;
+  json["only_adequacy"] = d.only_adequacy;
+  json["units"] = d.units;
+  json["sentence"] = Sentence(d);
+  json["warnings"] = d.warnings;
+  if (d.verdict == "adequate") {
+    json["detectable"] = d.detectable;
+    json["undetectable"] = ReasonsJson(d.undetectable);
+  }
   if (d.verdict == "ambiguous") json["unfinished"] = d.unfinished;
-  if (d.verdict == "unexplained") json["best_partial"] = OrNull(d.best_partial);
+  if (d.verdict == "unexplained") {
+    json["best_partial"] = OrNull(d.best_partial);
+    json["reason"] = OrNull(d.reason);
+  }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string DiagnosisText(const Diagnosis& d) {
   std::string text = Wrapped(Sentence(d), "", "");
-  text += Wrapped(fmt::format("Best fit: residual {} sd of a measurement (rms); chi-squared {}, of "
+  text += Wrapped(fmt::format("Error of the best fit: {} sd; chi-squared {}, of "
                               "a right model {} are expected (p = {}).",
                               Number(d.rms, 3), Number(d.adequacy.chi2, 4),
                               Number(d.adequacy.degrees, 4), Number(d.adequacy.p_value, 2)),
                   "", "  ");
-  if (IsTooGood(d)) text += Wrapped(kTooGood, "", "");
+  for (const std::string& warning : d.warnings) text += Wrapped(warning, "! ", "  ");
   if (!d.candidates.empty()) {
-    TextTable table({"<effect", "p (screen)", "explains", "rms with it", "refitted p", "left out"});
+    TextTable table(
+        {"<effect", "p (screen)", "explains", "error with it", "refitted p", "left out"});
     for (const CandidateEffect& c : d.candidates) {
       table.AddRow({c.effect, Number(c.p_value, 2), report::Percent(c.explained_fraction, 2),
                     Number(c.predicted_rms_error, 3),
@@ -209,7 +221,7 @@ std::string DiagnosisText(const Diagnosis& d) {
     text += "\n" + table.ToString();
     if (d.left_out_error) {
       text += Wrapped(
-          fmt::format("Left out: rms of what a model misses of data it was not fitted to, one "
+          fmt::format("Left out: error on data that a model was not fitted to, one "
                       "experiment or stage after the other, in sd of a measurement; {} without any "
                       "of these effects.",
                       Number(*d.left_out_error, 3)),
@@ -218,8 +230,9 @@ std::string DiagnosisText(const Diagnosis& d) {
   }
   for (const CandidateEffect& c : d.candidates) {
     if (c.refit_p_value < 0) continue;
-    text +=
-        Wrapped(fmt::format("{} comes closest at {}.", c.effect, Strength(c.amplitude)), "", "  ");
+    text += Wrapped(fmt::format("{} comes closest at {}.", c.effect,
+                                report::StrengthInWords(c.amplitude, d.units)),
+                    "", "  ");
   }
   for (const CandidateEffect& c : d.candidates) {
     const bool named = d.verdict == "ambiguous" && &c == &d.candidates.front();
@@ -239,17 +252,13 @@ std::string DiagnosisText(const Diagnosis& d) {
   if (d.verdict == "adequate" && !d.detectable.empty()) {
     text += "\nWould have been found with 90 % power from:\n";
     for (const auto& [effect, strength] : d.detectable) {
-      text += fmt::format("  {}: {}\n", effect, Strength(strength));
+      text += fmt::format("  {}: {}\n", effect, report::StrengthInWords(strength, d.units));
     }
   }
-  std::map<std::string, std::string> by_reason;
-  for (const auto& [effect, reason] : d.not_excitable) {
-    std::string& names = by_reason[reason];
-    names += (names.empty() ? "" : ", ") + effect;
+  if (d.verdict == "adequate") {
+    text += ByReason("Would not have been found at any strength, because", d.undetectable);
   }
-  for (const auto& [reason, names] : by_reason) {
-    text += Wrapped(fmt::format("Not tried, because {}: {}.", reason, names), "", "  ");
-  }
+  text += ByReason("Not tried, because", d.not_excitable);
   if (d.next_experiment) text += NextText(*d.next_experiment);
   text += fmt::format("{} model evaluations for the screen, {} for warm fits.\n",
                       d.screen_evaluations, d.warm_evaluations);

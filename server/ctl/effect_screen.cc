@@ -27,13 +27,16 @@ std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& eff
   return steps;
 }
 
-absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
-  std::vector<Eigen::VectorXd> directions;
+bool EffectScreen::RateIsGiven() const {
   const auto& experiments = base_.view().campaign.experiments;
-  const bool given = std::any_of(experiments.begin(), experiments.end(), [](const auto& e) {
+  return std::any_of(experiments.begin(), experiments.end(), [](const auto& e) {
     return e.staging.rate && e.role == campaign::Role::kCalibrate;
   });
-  if (!given) return directions;
+}
+
+absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
+  std::vector<Eigen::VectorXd> directions;
+  if (!RateIsGiven()) return directions;
   const Index best = base_.BestRuns(1).front();
   campaign::Derivation derivation = base_.Derived("nuisance", "twice the rate");
   derivation.rate_factor = 2;
@@ -86,7 +89,8 @@ std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
 }
 
 std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
-    const std::vector<std::string>& without) {
+    const std::vector<std::string>& without,
+    std::vector<std::pair<std::string, std::string>>* reasons) const {
   std::vector<const dem::EffectInfo*> effects;
   for (const dem::EffectInfo* info : dem::AllEffects(base_.view().campaign.model.user_effects)) {
     const dem::EffectInfo& effect = *info;
@@ -95,23 +99,37 @@ std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
     const std::string why = left_out ? "left out as asked for" : WhyNotExcitable(effect);
     if (why.empty()) {
       effects.push_back(&effect);
-    } else {
-      not_excitable_.emplace_back(effect.name, why);
+    } else if (reasons != nullptr) {
+      reasons->emplace_back(effect.name, why);
     }
   }
   return effects;
 }
 
+// Runs from which each of so many effects is tried.
+std::size_t EffectScreen::RowsFor(std::size_t effects) const {
+  const int experiments = std::max(1, base_.fitted_experiments());
+  const double share = kScreenShare * static_cast<double>(base_.runs().sample.size()) *
+                       experiments / static_cast<double>(effects);
+  return static_cast<std::size_t>(
+      std::clamp(static_cast<int>(std::max<double>(kMostRuns, share)) / experiments, 1, 2));
+}
+
+std::int64_t EffectScreen::Planned(const std::vector<std::string>& without) const {
+  const std::vector<const dem::EffectInfo*> effects = Excitable(without, nullptr);
+  std::size_t runs = RateIsGiven() ? 1 : 0;
+  for (const dem::EffectInfo* effect : effects) {
+    runs += StepsOf(*effect, RowsFor(effects.size())).size();
+  }
+  return static_cast<std::int64_t>(runs) * base_.fitted_experiments();
+}
+
 absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignatures(
     const std::vector<std::string>& without) {
   std::vector<inference::Signature> signatures;
-  const std::vector<const dem::EffectInfo*> effects = Excitable(without);
+  const std::vector<const dem::EffectInfo*> effects = Excitable(without, &not_excitable_);
   if (effects.empty()) return signatures;
-  const int experiments = std::max(1, base_.fitted_experiments());
-  const double share = kScreenShare * static_cast<double>(base_.runs().sample.size()) *
-                       experiments / static_cast<double>(effects.size());
-  const auto rows = static_cast<std::size_t>(
-      std::clamp(static_cast<int>(std::max<double>(kMostRuns, share)) / experiments, 1, 2));
+  const std::size_t rows = RowsFor(effects.size());
   const std::vector<Index> runs = base_.BestRuns(rows);
   // All at once, so that no worker waits for the last run of an effect.
   for (const dem::EffectInfo* effect : effects) {

@@ -27,6 +27,9 @@ class EffectScreen {
   /// to the engine.
   absl::StatusOr<std::vector<Eigen::VectorXd>> MeasureNuisance();
 
+  /// Model evaluations that MeasureNuisance() and MeasureSignatures() take together.
+  std::int64_t Planned(const std::vector<std::string>& without) const;
+
   /// One signature of each effect that the fitted tests can show. `without` take no part. At most
   /// the larger of a quarter of the campaign's evaluations and four runs for each effect.
   absl::StatusOr<std::vector<inference::Signature>> MeasureSignatures(
@@ -69,7 +72,12 @@ class EffectScreen {
               std::size_t rows) const;
   static std::vector<Step> StepsOf(const dem::EffectInfo& effect, std::size_t rows);
   std::string WhyNotExcitable(const dem::EffectInfo& effect) const;
-  std::vector<const dem::EffectInfo*> Excitable(const std::vector<std::string>& without);
+  /// reasons: of those that are not, added where it is not nullptr.
+  std::vector<const dem::EffectInfo*> Excitable(
+      const std::vector<std::string>& without,
+      std::vector<std::pair<std::string, std::string>>* reasons) const;
+  bool RateIsGiven() const;
+  std::size_t RowsFor(std::size_t effects) const;
   absl::StatusOr<inference::Signature> SignatureOf(const dem::EffectInfo& effect,
                                                    const std::vector<Eigen::Index>& runs,
                                                    std::size_t rows);

@@ -95,7 +95,13 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
     return absl::StrCat("there is no effect ", name, "; this build has ",
                         absl::StrJoin(names, ", "));
   }
-  if (campaign.precomputed) return "runs that were made elsewhere cannot be joined by an effect";
+  if (campaign.precomputed) {
+    return absl::StrCat(
+        "runs that were made elsewhere cannot be joined by ", name,
+        "; `calibctl diagnose` says what instruments or a denser start would change of them, and "
+        "runs that your code makes with ",
+        name, " are a campaign of their own (compare it: `calibctl models`)");
+  }
   const auto& has = campaign.model.effects;
   if (std::find(has.begin(), has.end(), name) != has.end()) {
     return absl::StrCat(name, " is part of the model already");
@@ -127,6 +133,7 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
       .max_iterations = plan.iterations,
       .first_proposal = campaign::FirstProposal{.prior_share = kPriorShare, .places = {}},
       .replicates = plan.replicates,
+      .model_evaluations = plan.model_evaluations,
       .rows = {}};
   for (const std::string& name : plan.effects) {
     if (const std::string why = WhyNotJoin(parent.campaign, name); !why.empty()) {

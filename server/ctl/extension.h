@@ -1,6 +1,7 @@
 #pragma once
 // A campaign joined by effects: its text, warm-started from the posterior of the campaign without.
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -24,10 +25,11 @@ struct ExtensionPlan {
   /// Parameters of a run that is known to come close, SI; takes the place of the parent's posterior
   /// in the half of the first samples that is not from the prior.
   std::map<std::string, double> near{};
-  bool held_out = true;             ///< false: held-out experiments stay closed
-  std::optional<int> samples{};     ///< as the parent
-  std::optional<int> iterations{};  ///< as the parent
-  std::optional<int> replicates{};  ///< as the parent
+  bool held_out = true;                             ///< false: held-out experiments stay closed
+  std::optional<int> samples{};                     ///< as the parent
+  std::optional<int> iterations{};                  ///< as the parent
+  std::optional<int> replicates{};                  ///< as the parent
+  std::optional<std::int64_t> model_evaluations{};  ///< budget; as the parent
 };
 
 /// Half of the first samples from the prior, half about the parent's posterior ten times as wide:

@@ -13,6 +13,7 @@
 #include "server/campaign/sha256.h"
 #include "server/ctl/interrupt.h"
 #include "server/ctl/load_view.h"
+#include "server/ctl/no_worker_notice.h"
 #include "server/ctl/progress.h"
 
 namespace calib::ctl {
@@ -35,6 +36,14 @@ std::string WhatToDo(const v1::CampaignStatus& status) {
   return absl::StrCat("wait for it with `calibctl watch ", id, "`");
 }
 
+// Runs that another verb made for a purpose of its own say nothing by themselves.
+std::string WhyNoCalibration(const v1::CampaignStatus& status) {
+  const bool trial = status.purpose() == "warm_fit" || status.method() == "table";
+  if (!trial || status.parent().empty()) return "";
+  return absl::StrCat(status.campaign(), " is no calibration but a trial (", status.purpose(),
+                      ") made of ", status.parent(), "; ask ", status.parent(), " instead");
+}
+
 }  // namespace
 
 absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& campaign) {
@@ -45,11 +54,15 @@ absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& cam
         "campaign ", campaign, " is ", status->state(), ", not finished",
         status->reason().empty() ? "" : ": " + status->reason(), "; ", WhatToDo(*status)));
   }
+  if (const std::string why = WhyNoCalibration(*status); !why.empty()) {
+    return absl::FailedPreconditionError(why);
+  }
   return LoadView(session_.client(), campaign);
 }
 
 absl::Status Laboratory::Wait(const std::string& campaign, const std::string& what) {
   std::optional<ProgressLine> line;  // nothing is said of what is done already
+  NoWorkerNotice notice(session_);
   for (;;) {
     const auto status = session_.client().Show(campaign);
     if (!status.ok()) return status.status();
@@ -63,6 +76,7 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
                kMilestones * 2 * status->iteration() +
                    kMilestones * status->samples_done() / std::max(1, status->samples()));
     if (status->state() == "finished") return absl::OkStatus();
+    notice.Look(*status);
     if (IsOver(status->state()) || status->state() == "paused") {
       const std::string why =
           absl::StrCat("campaign ", campaign, " (", what, ") is ", status->state(),

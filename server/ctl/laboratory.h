@@ -19,7 +19,8 @@ class Laboratory {
   Laboratory(Session& session, const Arguments& arguments)
       : session_(session), arguments_(arguments) {}
 
-  /// A finished campaign. FAILED_PRECONDITION with a sentence when it is not finished.
+  /// A finished calibration. FAILED_PRECONDITION with a sentence when it is not finished, or a
+  /// trial that diagnose made for another one.
   absl::StatusOr<report::CampaignView> Finished(const std::string& campaign);
 
   /// Submits the text with the parent's files and does not wait, so that several campaigns keep all

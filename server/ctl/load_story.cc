@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "server/campaign/yaml_text.h"
+#include "server/ctl/findings.h"
 #include "server/ctl/load_view.h"
 #include "server/report/predictions.h"
 
@@ -19,53 +19,69 @@ struct Known {
   bool finished = false;
 };
 
-// What a campaign's text says of itself, without its files.
-report::Relative RelativeOf(const v1::CampaignStatus& status, const std::string& yaml) {
-  report::Relative r{.campaign = status.campaign(),
-                     .name = status.name(),
-                     .parent = "",
-                     .purpose = "",
-                     .effects = {},
-                     .log_evidence = std::nan("")};
-  const auto parsed = campaign::ParseYaml(yaml);
-  if (!parsed.root) return r;
-  if (const auto* lineage = campaign::YamlFind(*parsed.root, "lineage"); lineage != nullptr) {
-    if (const auto* parent = campaign::YamlFind(*lineage, "parent")) r.parent = parent->scalar;
-    if (const auto* purpose = campaign::YamlFind(*lineage, "purpose")) r.purpose = purpose->scalar;
-  }
-  if (const auto* model = campaign::YamlFind(*parsed.root, "model"); model != nullptr) {
-    if (const auto* effects = campaign::YamlFind(*model, "effects"); effects != nullptr) {
-      for (const auto& item : effects->items) r.effects.push_back(item.scalar);
-      if (effects->items.empty() && !effects->scalar.empty() && effects->scalar != "none") {
-        r.effects.push_back(effects->scalar);
-      }
-    }
-  }
-  return r;
-}
-
 report::ErrorStep StepOf(const report::CampaignView& view, bool held_out) {
   report::Comparison comparison = report::Compare(view, report::PredictReadings(view));
   return {.campaign = view.status.campaign(),
           .effects = view.campaign.model.effects,
           .rms_error = comparison.rms_error,
           .heldout_rms_error = held_out ? comparison.heldout_rms_error : std::nullopt,
-          .by_observable = std::move(comparison.by_observable)};
+          .by_observable = std::move(comparison.by_observable),
+          .by_segment = std::move(comparison.by_segment)};
+}
+
+// Documents that another version wrote and this one cannot read are passed over.
+absl::Status AddDiagnoses(Client& client, const std::string& campaign,
+                          std::vector<report::StoredDiagnosis>& diagnoses) {
+  const auto findings = client.Findings(campaign);
+  if (!findings.ok()) return findings.status();
+  for (const v1::Finding& finding : *findings) {
+    if (finding.kind() != kDiagnosis) continue;
+    const auto document = client.GetBlob(finding.digest());
+    if (!document.ok()) return document.status();
+    auto diagnosis = report::ReadDiagnosis(*document);
+    if (!diagnosis.ok()) continue;
+    diagnosis->digest = finding.digest();
+    diagnosis->created_unix_ms = finding.created_unix_ms();
+    diagnoses.push_back(*std::move(diagnosis));
+  }
+  return absl::OkStatus();
+}
+
+// The campaigns after it in the last improvement that it took part in.
+absl::StatusOr<std::vector<std::string>> ImprovedFrom(Client& client, const std::string& campaign) {
+  const auto findings = client.Findings(campaign);
+  if (!findings.ok()) return findings.status();
+  std::vector<std::string> after;
+  for (const v1::Finding& finding : *findings) {
+    if (finding.kind() != kImprovement) continue;
+    const auto document = client.GetBlob(finding.digest());
+    if (!document.ok()) return document.status();
+    const auto steps = report::ReadImprovedCampaigns(*document);
+    if (!steps.ok()) continue;
+    const auto at = std::find(steps->begin(), steps->end(), campaign);
+    after.assign(at == steps->end() ? at : at + 1, steps->end());
+  }
+  return after;
 }
 
 }  // namespace
 
 absl::StatusOr<report::Story> LoadStory(Client& client, const report::CampaignView& view) {
   report::Story story;
+  story.known = true;
   if (auto drift = report::ParameterDrifts(view); drift.ok()) story.drift = *std::move(drift);
   const auto statuses = client.List();
   if (!statuses.ok()) return statuses.status();
   std::map<std::string, Known> known;
   for (const v1::CampaignStatus& status : *statuses) {
-    const auto source = client.GetSource(status.campaign());
-    if (!source.ok()) return source.status();
-    known[status.campaign()] = {.relative = RelativeOf(status, source->campaign_file()),
-                                .finished = status.state() == "finished"};
+    known[status.campaign()] = {
+        .relative = {.campaign = status.campaign(),
+                     .name = status.name(),
+                     .parent = status.parent(),
+                     .purpose = status.purpose(),
+                     .effects = {status.effects().begin(), status.effects().end()},
+                     .log_evidence = std::nan("")},
+        .finished = status.state() == "finished"};
   }
   // The line of ancestors, base first.
   std::vector<std::string> line;
@@ -73,6 +89,16 @@ absl::StatusOr<report::Story> LoadStory(Client& client, const report::CampaignVi
        at = known.at(at).relative.parent) {
     if (std::find(line.begin(), line.end(), at) != line.end()) break;
     line.insert(line.begin(), at);
+  }
+  // Where improve went on from it.
+  const auto improved = ImprovedFrom(client, view.status.campaign());
+  if (!improved.ok()) return improved.status();
+  for (const std::string& id : *improved) {
+    const bool there = known.contains(id) && known.at(id).finished;
+    if (there && std::find(line.begin(), line.end(), id) == line.end()) line.push_back(id);
+  }
+  for (const std::string& id : line) {
+    if (auto status = AddDiagnoses(client, id, story.diagnoses); !status.ok()) return status;
   }
   const auto add = [&](const std::string& id) -> absl::Status {
     report::Relative relative = known.at(id).relative;

@@ -30,6 +30,7 @@ class Session {
   Session& operator=(const Session&) = delete;
 
   Client& client() { return *client_; }
+  const std::string& address() const { return address_; }  ///< HOST:PORT of its server
   /// The folder is served by another process, to which this session is connected.
   bool is_guest() const { return server_ == nullptr; }
 

@@ -2,9 +2,11 @@
 #include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/load_view.h"
+#include "server/ctl/next_step.h"
 #include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 #include "server/report/discrepancies.h"
@@ -12,6 +14,21 @@
 #include "server/report/parameter_drift.h"
 
 namespace calib::ctl {
+namespace {
+
+std::string Next(const Arguments& arguments, const report::Comparison& comparison) {
+  constexpr double kMisses = 0.01;  // p, as of the adequacy test of diagnose
+  if (!comparison.p_value) return "";
+  if (*comparison.p_value < kMisses) {
+    return NextStep(CommandOf(arguments, "diagnose " + arguments.campaign),
+                    "which physical effect is missing");
+  }
+  return NextStep(CommandOf(arguments, absl::StrCat("report ", arguments.campaign, " -o ",
+                                                    arguments.campaign, ".html")),
+                  "parameters, curves and misfit in one file");
+}
+
+}  // namespace
 
 int Compare(const Arguments& arguments) {
   const auto session = Session::Open(arguments);
@@ -32,7 +49,7 @@ int Compare(const Arguments& arguments) {
                        ("Drift of the parameters: " + std::string(drifts.status().message()) + ".");
   }
   std::cout << (arguments.json ? report::ComparisonJson(arguments.campaign, comparison)
-                               : ComparisonText(comparison));
+                               : ComparisonText(comparison) + Next(arguments, comparison));
   return kDone;
 }
 

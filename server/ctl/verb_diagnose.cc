@@ -1,12 +1,33 @@
 #include <iostream>
 
+#include "absl/strings/str_cat.h"
 #include "dem/formula/user_effect.h"
 #include "server/ctl/diagnosis.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/findings.h"
 #include "server/ctl/interrupt.h"
+#include "server/ctl/next_step.h"
 #include "server/ctl/verbs.h"
 
 namespace calib::ctl {
+namespace {
+
+std::string Next(const Arguments& arguments, const report::CampaignView& view,
+                 const Diagnosis& diagnosis) {
+  const std::string& id = arguments.campaign;
+  if (diagnosis.verdict == "adequate" || view.campaign.precomputed) {
+    return NextStep(CommandOf(arguments, absl::StrCat("report ", id, " -o ", id, ".html")),
+                    "this verdict with parameters and curves, in one file");
+  }
+  if (diagnosis.verdict == "unexplained" && diagnosis.best_partial.empty()) {
+    return NextStep(CommandOf(arguments, "compare " + id),
+                    "where the model fails; an effect of your own may be declared in the file");
+  }
+  return NextStep(CommandOf(arguments, "improve " + id),
+                  "the effect added and fitted, judged on data that took no part");
+}
+
+}  // namespace
 
 int Diagnose(const Arguments& arguments) {
   CatchInterrupts();
@@ -23,7 +44,9 @@ int Diagnose(const Arguments& arguments) {
   }
   const auto diagnosis = Diagnose(laboratory, *view, {.without = arguments.effects});
   if (!diagnosis.ok()) return Fail(diagnosis.status());
-  std::cout << (arguments.json ? DiagnosisJson(*diagnosis) : DiagnosisText(*diagnosis));
+  KeepFinding((*session)->client(), arguments.campaign, kDiagnosis, DiagnosisJson(*diagnosis));
+  std::cout << (arguments.json ? DiagnosisJson(*diagnosis)
+                               : DiagnosisText(*diagnosis) + Next(arguments, *view, *diagnosis));
   return kDone;
 }
 

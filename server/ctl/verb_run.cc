@@ -8,6 +8,7 @@
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/interrupt.h"
 #include "server/ctl/load_view.h"
+#include "server/ctl/no_worker_notice.h"
 #include "server/ctl/progress.h"
 #include "server/ctl/session.h"
 #include "server/ctl/source_files.h"
@@ -37,6 +38,7 @@ absl::Status TakeUp(Client& client, const std::string& campaign) {
 // interrupts.
 absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& campaign) {
   ProgressLine line;
+  NoWorkerNotice notice(session);
   for (;;) {
     auto status = session.client().Show(campaign);
     if (!status.ok()) return status;
@@ -45,6 +47,7 @@ absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& c
               kMilestones * 2 * status->iteration() +
                   kMilestones * status->samples_done() / std::max(1, status->samples()));
     if (IsOver(*status) || status->state() == "paused" || Interrupted()) return status;
+    notice.Look(*status);
     if (auto alive = session.CheckWorkers(); !alive.ok()) return alive;
     std::this_thread::sleep_for(kPollCampaign);
   }

@@ -1,7 +1,9 @@
 #include <iostream>
 
+#include "server/campaign/noise_check.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/source_files.h"
+#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 
@@ -10,11 +12,12 @@ namespace calib::ctl {
 int Validate(const Arguments& arguments) {
   const auto source = ReadSourceFiles(arguments);
   if (!source) return kBadInput;
+  const campaign::Campaign& campaign = source->outcome.campaign;
+  const std::vector<std::string> warnings = campaign::NoiseWarnings(campaign);
   if (arguments.json) {
-    std::cout << report::ProblemsJson({});
+    std::cout << report::ProblemsJson({}, warnings);
     return kDone;
   }
-  const campaign::Campaign& campaign = source->outcome.campaign;
   std::size_t readings = 0;
   for (const campaign::Experiment& experiment : campaign.experiments) {
     readings += experiment.control.size() * experiment.observables.size();
@@ -23,6 +26,7 @@ int Validate(const Arguments& arguments) {
             << campaign.experiments.size() << " experiment(s), " << readings
             << " measured numbers, " << campaign.samples << " samples in each of at most "
             << campaign.max_iterations << " iteration(s).\n";
+  for (const std::string& warning : warnings) std::cout << Wrapped(warning, "! ", "  ");
   return kDone;
 }
 

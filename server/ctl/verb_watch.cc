@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/no_worker_notice.h"
 #include "server/ctl/progress.h"
 #include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
@@ -14,10 +15,13 @@ int Watch(const Arguments& arguments) {
   if (!session.ok()) return Fail(session.status());
   std::optional<v1::CampaignStatus> last;
   absl::Status ended;
+  // The server speaks only when something changes, which nothing does without workers.
+  NoWorkerNotice notice(**session, std::chrono::milliseconds(0));
   {
     ProgressLine line;
     ended = (*session)->client().Watch(arguments.campaign, [&](const v1::CampaignStatus& status) {
       last = status;
+      notice.Look(status);
       line.Show(ProgressText(status), 10 * status.iteration() + 10 * status.samples_done() /
                                                                     std::max(1, status.samples()));
     });

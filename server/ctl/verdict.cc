@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 #include <vector>
+
+#include "absl/strings/str_format.h"
 
 namespace calib::ctl {
 namespace {
@@ -65,7 +68,9 @@ bool Verdict::Excluded(const CandidateEffect& other, const CandidateEffect& firs
 void Verdict::Conclude(bool base_fits) {
   if (diagnosis_.candidates.empty() || !Explains(diagnosis_.candidates.front())) {
     diagnosis_.verdict = base_fits ? "adequate" : "unexplained";
-    if (!base_fits) diagnosis_.best_partial = Closest();
+    if (base_fits) return;
+    diagnosis_.best_partial = Closest();
+    diagnosis_.reason = WhyUnexplained();
     return;
   }
   CandidateEffect& first = diagnosis_.candidates.front();
@@ -108,6 +113,52 @@ void Verdict::Conclude(bool base_fits) {
       diagnosis_.unfinished.push_back(other->effect);
     }
   }
+}
+
+// A clause: that no refit fits, or that one does but not clearly better; and why none is the best.
+std::string Verdict::WhyUnexplained() const {
+  const std::pair<const std::string, WarmFit>* closest = nullptr;
+  const std::pair<const std::string, WarmFit>* fitting = nullptr;
+  for (const CandidateEffect& candidate : diagnosis_.candidates) {
+    const auto fit = fits_.find(candidate.effect);
+    if (fit == fits_.end() || fit->second.model.histories.rows() == 0) continue;
+    const inference::Adequacy& adequacy = fit->second.adequacy;
+    if (closest == nullptr || adequacy.chi2 < closest->second.adequacy.chi2) closest = &*fit;
+    if (fitting == nullptr && adequacy.p_value >= level_) fitting = &*fit;
+  }
+  if (closest == nullptr) return "no effect could be refitted";
+  if (fitting != nullptr) {
+    const WarmFit& fit = fitting->second;
+    return absl::StrFormat("with %s it fits (p = %.2g), but is not clearly better than without: %s",
+                           fitting->first, fit.adequacy.p_value, WhyNotBetter(fit));
+  }
+  std::string text = absl::StrFormat("with none of the %d effects that were refitted does it fit",
+                                     static_cast<int>(fits_.size()));
+  const auto base = inference::TestAdequacy(base_);
+  if (diagnosis_.best_partial.empty() && base.ok()) {
+    absl::StrAppendFormat(&text,
+                          ", and none comes clearly closer: with %s chi-squared is %.4g, without "
+                          "%.4g (clearly is below %.4g)",
+                          closest->first, closest->second.adequacy.chi2, base->chi2,
+                          kClearlyCloser * base->chi2);
+  }
+  return text;
+}
+
+// Of an adequate fit that does not explain.
+std::string Verdict::WhyNotBetter(const WarmFit& fit) const {
+  if (fit.left_out_error && diagnosis_.left_out_error &&
+      *fit.left_out_error > *diagnosis_.left_out_error) {
+    return absl::StrFormat("it misses data it was not fitted to by %.3g sd, %.3g without",
+                           *fit.left_out_error, *diagnosis_.left_out_error);
+  }
+  if (fit.gain_p_value) {
+    return absl::StrFormat("so much better is chance with p = %.2g, of the best of %d refits",
+                           std::min(1.0, *fit.gain_p_value * static_cast<double>(fits_.size())),
+                           static_cast<int>(fits_.size()));
+  }
+  return absl::StrFormat("its advantage is %.3g ± %.3g nats, two standard deviations are asked for",
+                         fit.over_base.nats, fit.over_base.sd);
 }
 
 // Judged or not: the fit that comes closest, if it comes clearly closer than the base model.

@@ -22,8 +22,8 @@ class Verdict {
   /// Adequate, clearly better than the base model, and not worse on readings it was not fitted to.
   bool Explains(const CandidateEffect& candidate) const;
 
-  /// Sets verdict, effect, best_partial and the group of the first candidate. base_fits: the model
-  /// without any effect is adequate.
+  /// Sets verdict, effect, best_partial, reason and the group of the first candidate. base_fits:
+  /// the model without any effect is adequate.
   void Conclude(bool base_fits);
 
  private:
@@ -31,6 +31,8 @@ class Verdict {
   bool Excluded(const CandidateEffect& other, const CandidateEffect& first) const;
   bool IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const;
   std::string Closest() const;
+  std::string WhyUnexplained() const;
+  std::string WhyNotBetter(const WarmFit& fit) const;
 
   Diagnosis& diagnosis_;
   const std::map<std::string, WarmFit>& fits_;

@@ -21,6 +21,12 @@ constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth 
 constexpr int kMostIdle = 3;       // batches in a row that were not
 // Of the mean history at the point that a fit is judged by, sd of the readings.
 constexpr double kMostUnknown = 1;
+
+// Samples of a batch.
+int BatchOf(const FittedCampaign& base) {
+  return std::max(kLeastSamples, static_cast<int>(base.runs().sample.size()) / kShares);
+}
+
 }  // namespace
 
 std::map<std::string, double> PointOf(const report::CampaignView& view,
@@ -32,11 +38,16 @@ std::map<std::string, double> PointOf(const report::CampaignView& view,
   return values;
 }
 
-absl::Status WarmFits::Fit(std::vector<std::string> effects) {
+std::int64_t WarmFits::Least() const {
+  return static_cast<std::int64_t>(kLeastBatches) * BatchOf(base_) * base_.fitted_experiments();
+}
+
+absl::Status WarmFits::Fit(std::vector<std::string> effects, std::optional<std::int64_t> most) {
   if (effects.empty()) return absl::OkStatus();
-  samples_ = std::max(kLeastSamples, static_cast<int>(base_.runs().sample.size()) / kShares);
-  const int allowed = static_cast<int>(base_.runs().sample.size()) * base_.fitted_experiments();
+  samples_ = BatchOf(base_);
   const int batch = samples_ * base_.fitted_experiments();
+  int allowed = static_cast<int>(base_.runs().sample.size()) * base_.fitted_experiments();
+  if (most) allowed = static_cast<int>(std::min<std::int64_t>(allowed, *most));
   effects.resize(std::min(
       effects.size(), static_cast<std::size_t>(std::max(1, allowed / (kLeastBatches * batch)))));
   int spent = 0;

@@ -31,9 +31,11 @@ class WarmFits {
       : base_(base), screen_(screen), response_(response) {}
 
   /// Two batches of each, as far as they go; then the most promising go on, until each has stalled
-  /// or as many evaluations have been made as the campaign has (two batches in any case). Errors:
-  /// those of the runs.
-  absl::Status Fit(std::vector<std::string> effects);
+  /// or as many evaluations have been made as the campaign has, or as `most` allows; Least() in any
+  /// case. Errors: those of the runs.
+  absl::Status Fit(std::vector<std::string> effects, std::optional<std::int64_t> most = {});
+  /// Model evaluations of two batches of one effect.
+  std::int64_t Least() const;
 
   /// A fit that needed no runs.
   void Adopt(const std::string& effect, WarmFit fit) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "server/campaign/noise_check.h"
 #include "server/report/residual_group.h"
 
 namespace calib::report {
@@ -226,6 +227,7 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
     comparison.note =
         "There are fewer readings than parameters: nothing is left to judge the fit by.";
   }
+  comparison.warnings = campaign::NoiseWarnings(view.campaign);
   ToShares(comparison.by_segment);
   comparison.trends = TrendsOf(view.campaign, comparison.by_segment);
   for (const auto& parameter : view.posterior.parameters()) {

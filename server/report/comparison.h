@@ -81,7 +81,9 @@ struct Comparison {
   std::vector<std::string> at_bound;  ///< parameters pressed against a bound of their prior
   std::vector<ParameterDrift> parameter_drift;  ///< filled by whoever has the time: ParameterDrifts
   std::vector<ObservableDiscrepancy> discrepancies;  ///< filled by AddDiscrepancies()
-  std::string note;                                  ///< why something is not given; may be empty
+  /// The stated noise against the curves themselves: campaign::NoiseWarnings.
+  std::vector<std::string> warnings{};
+  std::string note;  ///< why something is not given; may be empty
 };
 
 /// Errors are those stated in the campaign, correlated where a correlation length is given, and the

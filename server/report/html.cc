@@ -45,7 +45,7 @@ h3{font-size:15px;margin:22px 0 6px}p{margin:6px 0;max-width:75ch}.sub{color:var
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:14px;width:100%}
 th,td{padding:5px 10px;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
 th{color:var(--soft);font-weight:600;font-size:13px}th:first-child,td:first-child{text-align:left}td.l,th.l{text-align:left}
-td.bad{color:var(--warn);font-weight:600}td.good{color:var(--good)}
+td.wide{white-space:normal;min-width:150px}td.bad{color:var(--warn);font-weight:600}td.good{color:var(--good)}
 .grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(320px,1fr));gap:16px}
 figure{margin:0}.fit{grid-template-columns:repeat(auto-fit,minmax(440px,1fr))}figcaption{font-size:13px;color:var(--soft)}
 svg{display:block;max-width:100%;height:auto}svg text{fill:var(--ink);font-size:12px}svg .tick{fill:var(--soft);font-size:11px}

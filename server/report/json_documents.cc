@@ -47,7 +47,10 @@ Json Status(const v1::CampaignStatus& s) {
           {"model_evaluations", s.model_evaluations()},
           {"core_hours", s.core_hours()},
           {"converged", s.converged()},
-          {"created_unix_ms", s.created_unix_ms()}};
+          {"created_unix_ms", s.created_unix_ms()},
+          {"parent", s.parent().empty() ? Json(nullptr) : Json(s.parent())},
+          {"purpose", s.purpose().empty() ? Json(nullptr) : Json(s.purpose())},
+          {"effects", std::vector<std::string>(s.effects().begin(), s.effects().end())}};
 }
 
 Json Emulator(const v1::Posterior& p) {
@@ -277,6 +280,7 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                {"trends", trends},
                {"discrepancy", discrepancy},
                {"at_bound", c.at_bound},
+               {"warnings", c.warnings},
                {"note", c.note}});
 }
 
@@ -298,6 +302,26 @@ std::string ModelsJson(const ModelComparison& comparison) {
 }
 
 std::string StatusJson(const v1::CampaignStatus& status) { return Dump(Status(status)); }
+
+std::string ShownJson(const v1::CampaignStatus& status,
+                      const std::vector<v1::CampaignStatus>& children,
+                      const std::vector<v1::Finding>& findings) {
+  Json json = Status(status);
+  json["children"] = Json::array();
+  for (const v1::CampaignStatus& child : children) {
+    json["children"].push_back({{"campaign", child.campaign()},
+                                {"purpose", child.purpose()},
+                                {"name", child.name()},
+                                {"state", child.state()}});
+  }
+  json["findings"] = Json::array();
+  for (const v1::Finding& finding : findings) {
+    json["findings"].push_back({{"kind", finding.kind()},
+                                {"digest", finding.digest()},
+                                {"created_unix_ms", finding.created_unix_ms()}});
+  }
+  return Dump(json);
+}
 
 std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses) {
   Json list = Json::array();
@@ -386,12 +410,13 @@ std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers) {
   return Dump(list);
 }
 
-std::string ProblemsJson(const std::vector<campaign::Problem>& problems) {
+std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
+                         const std::vector<std::string>& warnings) {
   Json list = Json::array();
   for (const campaign::Problem& p : problems) {
     list.push_back({{"file", p.file}, {"line", p.line}, {"key", p.key}, {"message", p.message}});
   }
-  return Dump({{"valid", problems.empty()}, {"problems", list}});
+  return Dump({{"valid", problems.empty()}, {"problems", list}, {"warnings", warnings}});
 }
 
 std::string DataJson(const campaign::Campaign& campaign) {

@@ -19,6 +19,10 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& compar
 std::string SensitivityJson(const std::string& campaign, const Sensitivity& sensitivity);
 std::string ModelsJson(const ModelComparison& comparison);
 std::string StatusJson(const v1::CampaignStatus& status);
+/// With what comes from it directly and what was concluded about it.
+std::string ShownJson(const v1::CampaignStatus& status,
+                      const std::vector<v1::CampaignStatus>& children,
+                      const std::vector<v1::Finding>& findings);
 std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses);
 /// parameters: names in the order of each sample's values.
 std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,
@@ -28,7 +32,9 @@ std::string StatesJson(const std::string& campaign, int sample,
 /// A table of states (experiment,load_step,...) row by row.
 std::string StateTableJson(const std::string& csv);
 std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers);
-std::string ProblemsJson(const std::vector<campaign::Problem>& problems);
+/// warnings: of a campaign that is valid.
+std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
+                         const std::vector<std::string>& warnings = {});
 /// The measurements as compared: SI, logarithmic strains, standard deviations.
 std::string DataJson(const campaign::Campaign& campaign);
 

@@ -44,7 +44,7 @@ bool StandsOut(const SegmentMisfit& m) {
 
 std::string StageSentence(const SegmentMisfit& m) {
   std::string text = fmt::format(
-      "{}, {}, {}: the model is too {} by {} on average ({} sd; rms {} sd", m.experiment,
+      "{}, {}, {}: the model is too {} by {} on average ({} sd; error {} sd", m.experiment,
       NameForPeople(m.observable), NameForPeople(m.segment), m.bias > 0 ? "high" : "low",
       Shown(std::abs(m.bias), m.observable), Number(std::abs(*m.z), 2), Number(m.rms_error, 2));
   if (m.chi2_share) {

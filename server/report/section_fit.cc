@@ -217,11 +217,12 @@ std::string ObservableTable(const ReportData& data) {
       "<h3>Misfit by observable</h3>\n<p class=\"sub\">Noise is the error stated for the "
       "measurement, scatter what runs of the model differ by among themselves, on other "
       "packings or as an emulator of them leaves it: root mean squares of their standard "
-      "deviations. Both are part of sd in rms / sd and p, the scatter as far as the "
+      "deviations. Both are part of sd in the error (root mean square of residual / sd) and in p, "
+      "the scatter as far as the "
       "specimen has it too.</p>\n"
       "<div class=\"scroll\"><table><tr><th>experiment</th><th class=\"l\">observable</th>"
       "<th>readings</th><th>noise</th><th>scatter</th><th>scatter / noise</th>"
-      "<th class=\"l\">from</th><th>residual</th><th>rms / sd</th><th>p</th></tr>\n";
+      "<th class=\"l\">from</th><th>residual</th><th>error, sd</th><th>p</th></tr>\n";
   for (const ObservableMisfit& misfit : data.comparison.by_observable) {
     const dem::ObservableInfo* info = dem::FindObservable(misfit.observable);
     const auto with_unit = [&](double value) {
@@ -254,7 +255,7 @@ std::string SegmentTable(const ReportData& data) {
       "explain.</p>\n"
       "<div class=\"scroll\"><table><tr><th>experiment</th><th class=\"l\">observable</th><th "
       "class=\"l\">stage</th><th>bias</th>"
-      "<th>z</th><th>rms / sd</th><th>share of the misfit</th><th class=\"l\">shape</th></tr>\n";
+      "<th>z</th><th>error, sd</th><th>share of the misfit</th><th class=\"l\">shape</th></tr>\n";
   for (const SegmentMisfit& segment : data.comparison.by_segment) {
     const dem::ObservableInfo* info = dem::FindObservable(segment.observable);
     const bool bad = segment.z && std::abs(*segment.z) > kClear;

@@ -82,7 +82,50 @@ std::string Tree(const ReportData& data) {
   return html;
 }
 
-std::string ErrorChart(const std::vector<ErrorStep>& steps) {
+// The models on the way with what the diagnosis of each said.
+std::string StepTable(const Story& story) {
+  std::string html =
+      "<div class=\"scroll\"><table><tr><th>campaign</th><th class=\"l\">effects added</th>"
+      "<th>error, sd</th><th>held out</th><th class=\"l\">verdict</th></tr>\n";
+  for (const ErrorStep& step : story.steps) {
+    const StoredDiagnosis* d = LatestOf(story.diagnoses, step.campaign);
+    std::string verdict = d == nullptr ? "–" : NameForPeople(d->verdict);
+    if (d != nullptr && !d->effect.empty()) verdict += ": " + NameForPeople(d->effect);
+    html += fmt::format(
+        "<tr><td>{}</td><td class=\"l\">{}</td><td>{}</td><td>{}</td><td "
+        "class=\"l\">{}</td></tr>\n",
+        Escape(step.campaign), Escape(InWords(step.effects)), Number(step.rms_error, 3),
+        step.heldout_rms_error ? Number(*step.heldout_rms_error, 3) : "–", Escape(verdict));
+  }
+  return html + "</table></div>\n";
+}
+
+// Stage by stage, of the first model and the last.
+std::string StageTable(const std::vector<ErrorStep>& steps) {
+  std::string rows;
+  for (const SegmentMisfit& after : steps.back().by_segment) {
+    const auto& first = steps.front().by_segment;
+    const auto before = std::find_if(first.begin(), first.end(), [&after](const SegmentMisfit& m) {
+      return m.experiment == after.experiment && m.observable == after.observable &&
+             m.segment == after.segment;
+    });
+    if (before == first.end()) continue;
+    rows += fmt::format(
+        "<tr><td>{}{}</td><td class=\"l\">{}</td><td "
+        "class=\"l\">{}</td><td>{}</td><td>{}</td></tr>\n",
+        Escape(after.experiment), after.heldout ? " (held out)" : "",
+        Escape(NameForPeople(after.observable)), Escape(NameForPeople(after.segment)),
+        Number(before->rms_error, 3), Number(after.rms_error, 3));
+  }
+  if (rows.empty()) return "";
+  return "<h3>By loading stage</h3>\n<div class=\"scroll\"><table><tr><th>experiment</th><th "
+         "class=\"l\">observable</th><th class=\"l\">stage</th><th>error before, "
+         "sd</th><th>after</th></tr>\n" +
+         rows + "</table></div>\n";
+}
+
+std::string ErrorChart(const Story& story) {
+  const std::vector<ErrorStep>& steps = story.steps;
   if (steps.size() < 2) return "";
   std::vector<double> x;
   std::vector<double> fitted;
@@ -100,7 +143,7 @@ std::string ErrorChart(const std::vector<ErrorStep>& steps) {
     }
   }
   Plot plot({}, Axis("effects added", 0, x.back(), static_cast<int>(steps.size())),
-            Axis::Covering("rms of residual / sd", all, 5));
+            Axis::Covering("error, sd", all, 5));
   plot.AddHorizontal(1);
   plot.AddLine(x, fitted, "mean");
   plot.AddPoints(x, fitted, 3.5);
@@ -112,9 +155,11 @@ std::string ErrorChart(const std::vector<ErrorStep>& steps) {
           "Error against the number of effects added",
           "rms of residual over standard deviation of the fitted data and of the held-out data") +
       "<figcaption>Fitted data; held-out data for the first and the last model. At one the model "
-      "is as close as the errors let it be.</figcaption>\n</figure>\n</div>\n"
-      "<div class=\"scroll\"><table><tr><th>model</th><th class=\"l\">experiment</th><th "
-      "class=\"l\">observable</th><th>rms / sd</th></tr>\n";
+      "is as close as the errors let it be.</figcaption>\n</figure>\n</div>\n" +
+      StepTable(story) +
+      "<h3>By observable</h3>\n<div class=\"scroll\"><table><tr><th>model</th><th "
+      "class=\"l\">experiment</th><th "
+      "class=\"l\">observable</th><th>error, sd</th></tr>\n";
   for (const ErrorStep& step : steps) {
     for (const ObservableMisfit& m : step.by_observable) {
       if (m.heldout && !step.heldout_rms_error) continue;
@@ -124,14 +169,14 @@ std::string ErrorChart(const std::vector<ErrorStep>& steps) {
           Escape(NameForPeople(m.observable)), Number(m.rms_error, 3));
     }
   }
-  return html + "</table></div>\n";
+  return html + "</table></div>\n" + StageTable(steps);
 }
 
 }  // namespace
 
 std::string MissingPhysicsSection(const ReportData& data) {
   const std::string body = Failures(data.comparison) + DriftTable(data.story.drift) + Tree(data) +
-                           ErrorChart(data.story.steps);
+                           ErrorChart(data.story);
   return body.empty() ? "" : "<h2>Where the model fails</h2>\n" + body;
 }
 

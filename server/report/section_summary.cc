@@ -33,13 +33,17 @@ std::string SummarySection(const ReportData& data) {
     html += Card(posterior.converged() ? "yes" : "not yet", "converged");
     if (view.campaign.filter.noise != inference::NoiseMode::kEssTarget) {
       html += Card(Number(data.comparison.rms_error, 3),
-                   "rms misfit in standard deviations (1: as expected)");
+                   "error of the fitted data, sd (1: as expected)");
     }
     if (data.comparison.reduced_chi2) {
       html += Card(Number(*data.comparison.reduced_chi2, 3), "reduced chi-squared");
     }
     if (data.comparison.heldout_rms_error) {
-      html += Card(Number(*data.comparison.heldout_rms_error, 3), "rms misfit of held-out data");
+      html += Card(Number(*data.comparison.heldout_rms_error, 3), "error of the held-out data, sd");
+    }
+    if (const auto* d = LatestOf(data.story.diagnoses, view.status.campaign())) {
+      html += Card(d->effect.empty() ? NameForPeople(d->verdict) : NameForPeople(d->effect),
+                   d->effect.empty() ? "verdict of the diagnosis" : "missing, says the diagnosis");
     }
     html += Card(Number(posterior.ess(), 3), "effective number of samples");
     html += Card(fmt::format("{} ± {}", Number(posterior.log_evidence(), 5),
@@ -49,7 +53,8 @@ std::string SummarySection(const ReportData& data) {
     html += Card(Number(posterior.core_hours(), 3), "core hours");
     html += "</div>\n";
   }
-  const std::vector<std::string> warnings = Warnings(view);
+  std::vector<std::string> warnings = Warnings(view);
+  warnings.insert(warnings.end(), data.comparison.warnings.begin(), data.comparison.warnings.end());
   if (!warnings.empty()) {
     html += "<div class=\"warn\" role=\"note\"><b>Read this first</b><ul>\n";
     for (const std::string& warning : warnings) html += "<li>" + Escape(warning) + "</li>\n";

@@ -28,6 +28,8 @@ std::string FitSection(
     const ReportData& data);  ///< section_fit.cc: curves, residuals, misfit by stage
 std::string MissingPhysicsSection(
     const ReportData& data);  ///< section_missing_physics.cc: where it fails, what was tried on it
+std::string DiagnosisSection(
+    const ReportData& data);  ///< section_diagnosis.cc: the verdict and what it rests on
 std::string PosteriorSection(
     const ReportData& data);  ///< section_posterior.cc: marginals and pairs
 std::string EvolutionSection(

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/report/comparison.h"
+#include "server/report/stored_diagnosis.h"
 
 namespace calib::report {
 
@@ -26,12 +27,16 @@ struct ErrorStep {
   /// Of the first and the last model alone: held-out data do not choose between models.
   std::optional<double> heldout_rms_error;
   std::vector<ObservableMisfit> by_observable;
+  std::vector<SegmentMisfit> by_segment{};
 };
 
 struct Story {
   std::vector<Relative> family;  ///< parents before their children
   std::vector<ErrorStep> steps;  ///< base first; fewer than two: nothing was added
   std::vector<ParameterDrift> drift;
+  /// Of the campaigns on the way, in the order in which they were kept.
+  std::vector<StoredDiagnosis> diagnoses{};
+  bool known = false;  ///< the server was asked
 };
 
 }  // namespace calib::report

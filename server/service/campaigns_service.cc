@@ -151,6 +151,16 @@ grpc::ServerWriteReactor<v1::LogEntry>* CampaignsService::GetLog(
   return Stream<v1::LogEntry>(core_, request->campaign(), LogOf);
 }
 
+grpc::ServerUnaryReactor* CampaignsService::ListFindings(Context* context,
+                                                         const v1::CampaignRequest* request,
+                                                         v1::FindingList* reply) {
+  return Ask<v1::FindingList>(
+      context, reply, [request](store::Reader& reader) -> absl::StatusOr<v1::FindingList> {
+        const auto id = ParseCampaign(request->campaign());
+        return id.ok() ? FindingsOf(reader, *id) : absl::StatusOr<v1::FindingList>(id.status());
+      });
+}
+
 // ---- contents ----
 
 grpc::ServerReadReactor<v1::BlobChunk>* CampaignsService::PutBlob(Context* /*context*/,
@@ -317,6 +327,31 @@ grpc::ServerUnaryReactor* CampaignsService::Delete(Context* context,
         [reactor](const absl::StatusOr<std::int64_t>& campaign) {
           reactor->Finish(rpc::ToGrpc(campaign.status()));
         });
+  });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* CampaignsService::AddFinding(Context* context,
+                                                       const v1::AddFindingRequest* request,
+                                                       v1::Finding* reply) {
+  Unary* reactor = context->DefaultReactor();
+  core_.Post([this, request, reply, reactor] {
+    auto reader = core_.Read();
+    const auto finding = !core_.health().ok() ? core_.health()
+                         : reader.ok()        ? CheckFinding(*request, core_.UnixMs(), *reader)
+                                              : absl::StatusOr<NewFinding>(reader.status());
+    if (!finding.ok()) {
+      reactor->Finish(rpc::ToGrpc(finding.status()));
+      return;
+    }
+    reply->set_kind(finding->record.kind);
+    reply->set_digest(finding->record.digest);
+    reply->set_created_unix_ms(finding->record.created_unix_ms);
+    core_.Write(
+        [finding = *finding](store::Transaction& transaction) {
+          transaction.PutFinding(finding.campaign, finding.record);
+        },
+        [reactor](const absl::Status& status) { reactor->Finish(rpc::ToGrpc(status)); });
   });
   return reactor;
 }

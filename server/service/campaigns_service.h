@@ -30,6 +30,8 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   Unary* GetSource(Context*, const v1::CampaignRequest*, v1::CampaignSource*) override;
   grpc::ServerWriteReactor<v1::BlobChunk>* GetBlob(Context*, const v1::BlobByDigest*) override;
   grpc::ServerWriteReactor<v1::LogEntry>* GetLog(Context*, const v1::CampaignRequest*) override;
+  Unary* AddFinding(Context*, const v1::AddFindingRequest*, v1::Finding*) override;
+  Unary* ListFindings(Context*, const v1::CampaignRequest*, v1::FindingList*) override;
   Unary* Pause(Context*, const v1::ControlRequest*, v1::CampaignStatus*) override;
   Unary* Resume(Context*, const v1::ControlRequest*, v1::CampaignStatus*) override;
   Unary* Cancel(Context*, const v1::ControlRequest*, v1::CampaignStatus*) override;

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "server/campaign/origin.h"
 #include "server/scheduler/definition.h"
 #include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
@@ -165,6 +166,10 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_method(record->submitted.method);
   status.set_created_unix_ms(record->submitted.created_unix_ms);
   status.set_phase(record->progress.phase);
+  campaign::Origin origin = campaign::OriginOf(record->submitted.yaml);
+  status.set_parent(std::move(origin.parent));
+  status.set_purpose(std::move(origin.purpose));
+  status.mutable_effects()->Add(origin.effects.begin(), origin.effects.end());
   return status;
 }
 
@@ -303,6 +308,24 @@ absl::StatusOr<v1::CampaignSource> SourceOf(store::Reader& reader, std::int64_t 
     source.set_seed(*record->submitted.seed);
   }
   return source;
+}
+
+absl::StatusOr<v1::FindingList> FindingsOf(store::Reader& reader, std::int64_t campaign) {
+  const auto record = reader.Campaign(campaign);
+  const auto findings = reader.Findings(campaign);
+  for (const absl::Status& status : {record.status(), findings.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  v1::FindingList list;
+  for (const store::FindingRecord& finding : *findings) {
+    v1::Finding& message = *list.add_findings();
+    message.set_kind(finding.kind);
+    message.set_digest(finding.digest);
+    message.set_created_unix_ms(finding.created_unix_ms);
+  }
+  return list;
 }
 
 absl::StatusOr<std::vector<v1::LogEntry>> LogOf(store::Reader& reader, std::int64_t campaign) {

@@ -24,6 +24,7 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
 absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, std::int64_t campaign,
                                                        std::optional<int> sample);
 absl::StatusOr<v1::CampaignSource> SourceOf(store::Reader& reader, std::int64_t campaign);
+absl::StatusOr<v1::FindingList> FindingsOf(store::Reader& reader, std::int64_t campaign);
 absl::StatusOr<std::vector<v1::LogEntry>> LogOf(store::Reader& reader, std::int64_t campaign);
 
 }  // namespace calib::service

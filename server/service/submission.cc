@@ -8,6 +8,7 @@
 #include "proto/rpc/digest.h"
 #include "server/campaign/campaign_file.h"
 #include "server/scheduler/definition.h"
+#include "server/service/queries.h"
 
 namespace calib::service {
 absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmission(
@@ -52,6 +53,41 @@ absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmissio
     accepted.samples = static_cast<int>(campaign.precomputed->parameters.rows());
   }
   return accepted;
+}
+
+absl::StatusOr<NewFinding> CheckFinding(const v1::AddFindingRequest& request, std::int64_t unix_ms,
+                                        store::Reader& reader) {
+  constexpr std::size_t kLongestKind = 32;
+  const std::string& kind = request.kind();
+  if (kind.empty() || kind.size() > kLongestKind ||
+      kind.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != std::string::npos) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("a finding is of a kind of 1 to ", kLongestKind, " of the letters a-z and _"));
+  }
+  const auto campaign = ParseCampaign(request.campaign());
+  if (!campaign.ok()) {
+    return campaign.status();
+  }
+  const auto there = reader.HasBlob(request.digest());
+  const auto before = FindingsOf(reader, *campaign);
+  for (const absl::Status& status : {there.status(), before.status()}) {
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  if (!*there) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("the document of the finding (SHA-256 ", request.digest(), ") was not put"));
+  }
+  NewFinding finding{
+      .campaign = *campaign,
+      .record = {.kind = kind, .digest = request.digest(), .created_unix_ms = unix_ms}};
+  for (const v1::Finding& earlier : before->findings()) {
+    if (earlier.kind() == kind && earlier.digest() == request.digest()) {
+      finding.record.created_unix_ms = earlier.created_unix_ms();
+    }
+  }
+  return finding;
 }
 
 std::string ContentDigest(const v1::SubmitRequest& request) {

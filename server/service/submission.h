@@ -1,5 +1,5 @@
 #pragma once
-// What is checked before a campaign is stored.
+// What is checked before a campaign, or a conclusion about one, is stored.
 
 #include <variant>
 
@@ -13,6 +13,15 @@ namespace calib::service {
 /// content was not put.
 absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmission(
     const v1::SubmitRequest& request, store::Reader& reader);
+
+/// A conclusion ready to be stored. An equal one that is there already keeps its time. Errors:
+/// those of the rpc AddFinding.
+struct NewFinding {
+  std::int64_t campaign = 0;
+  store::FindingRecord record{};
+};
+absl::StatusOr<NewFinding> CheckFinding(const v1::AddFindingRequest& request, std::int64_t unix_ms,
+                                        store::Reader& reader);
 
 /// SHA-256 of everything in the request but its id.
 std::string ContentDigest(const v1::SubmitRequest& request);

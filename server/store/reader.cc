@@ -335,4 +335,19 @@ absl::StatusOr<std::vector<EventRecord>> Reader::Events(std::int64_t campaign) {
   });
 }
 
+absl::StatusOr<std::vector<FindingRecord>> Reader::Findings(std::int64_t campaign) {
+  return Guard([&] {
+    std::vector<FindingRecord> findings;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT kind, digest, created_unix_ms FROM finding WHERE campaign = ? ORDER BY id",
+        campaign);
+    while (row.executeStep()) {
+      findings.push_back({.kind = row.getColumn(0).getString(),
+                          .digest = row.getColumn(1).getString(),
+                          .created_unix_ms = row.getColumn(2).getInt64()});
+    }
+    return findings;
+  });
+}
+
 }  // namespace calib::store

@@ -54,6 +54,8 @@ class Reader {
   absl::StatusOr<std::map<int, int>> AttemptsBySample(std::int64_t campaign);
   absl::StatusOr<Effort> EffortOf(std::int64_t campaign);
   absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);
+  /// In the order in which they were first put.
+  absl::StatusOr<std::vector<FindingRecord>> Findings(std::int64_t campaign);
 
  private:
   /// Runs `read`; SQLite's exceptions end here.

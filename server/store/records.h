@@ -126,6 +126,13 @@ struct EventRecord {
   std::string what{};
 };
 
+/// A conclusion about a campaign; what it says is the blob of its digest.
+struct FindingRecord {
+  std::string kind{};  ///< diagnosis | improvement
+  std::string digest{};
+  std::int64_t created_unix_ms = 0;
+};
+
 struct RequestRecord {
   std::string digest{};
   std::string answer{};

@@ -235,6 +235,16 @@ void Transaction::PutState(const StateRecord& state, std::int64_t unix_ms) {
   });
 }
 
+void Transaction::PutFinding(std::int64_t campaign, const FindingRecord& finding) {
+  Guard([&] {
+    connection_.Run(
+        "INSERT INTO finding(campaign, kind, digest, created_unix_ms) "
+        "SELECT campaign.id, ?, blob.digest, ? FROM campaign, blob "
+        "WHERE campaign.id = ? AND blob.digest = ? ON CONFLICT DO NOTHING",
+        finding.kind, finding.created_unix_ms, campaign, finding.digest);
+  });
+}
+
 void Transaction::Log(std::int64_t campaign, std::int64_t unix_ms, const std::string& what) {
   Guard([&] {
     std::optional<std::int64_t> owner;

@@ -28,7 +28,11 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
     EXPECT_TRUE(json.contains(field)) << field;
   }
   EXPECT_EQ(json["verdict"], "adequate") << first.out;
-  EXPECT_TRUE(json["detectable"].is_object());
+  ASSERT_TRUE(json["detectable"].is_object());
+  for (const auto& [effect, strength] : json["detectable"].items()) {
+    for (const auto& [name, value] : strength.items()) EXPECT_TRUE(json["units"].contains(name));
+  }
+  EXPECT_EQ(json["detectable"].size() + json["undetectable"].size(), json["candidates"].size());
   ASSERT_FALSE(json["candidates"].empty());
   for (const Json& candidate : json["candidates"])
     EXPECT_NE(candidate["effect"], "viscous_damping");
@@ -40,6 +44,13 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
   const auto evaluations = Evaluations();
   EXPECT_EQ(Call("diagnose c1 --state s --workers 2 --json").out, first.out);
   EXPECT_EQ(Evaluations(), evaluations);
+
+  // The report shows what was concluded, once.
+  ASSERT_EQ(Call("report c1 --state s -o r.html").code, 0);
+  const std::string report = Read("r.html");
+  EXPECT_NE(report.find("<strong>Adequate: noise, scatter"), std::string::npos);
+  EXPECT_NE(report.find("What would have been found"), std::string::npos);
+  EXPECT_NE(report.find("Diagnosis of 2"), std::string::npos) << "the day";
 
   // Fewer candidates, no run more.
   const std::string left_out = json["candidates"][0]["effect"];
@@ -80,10 +91,46 @@ TEST_F(Diagnosis, ExtendsAndRefusesInASentence) {
   ASSERT_EQ(extended.code, 0) << extended.err;
   EXPECT_EQ(extended.json()["campaign"], "c2");
   EXPECT_EQ(extended.json()["parameters"].size(), 4U);
+  const Json list = Call("list --state s --json").json();
+  ASSERT_EQ(list.size(), 2U);
+  EXPECT_TRUE(list[0]["parent"].is_null());
+  EXPECT_EQ(list[1]["parent"], "c1");
+  EXPECT_EQ(list[1]["purpose"], "extension");
+  EXPECT_EQ(list[1]["effects"], Json({"rolling_resistance"}));
+  EXPECT_NE(Call("list --state s").out.find("\n  c2 "), std::string::npos) << Read("out");
+  EXPECT_EQ(Call("show c1 --state s --json").json()["children"][0]["campaign"], "c2");
+  EXPECT_NE(Call("show c1 --state s").out.find("Extended with rolling_resistance: c2, finished"),
+            std::string::npos)
+      << Read("out");
+  EXPECT_NE(Call("show c2 --state s").out.find("Made from c1 (small) as extension."),
+            std::string::npos)
+      << Read("out");
   const Answer again = Call("extend c1 --effect rolling_resistance --state s --json");
   EXPECT_EQ(again.out, extended.out);
   const Answer twice = Call("extend c2 --effect rolling_resistance --state s");
   EXPECT_NE(twice.code, 0);
+
+  const Answer parent = Call("delete c1 --state s");
+  EXPECT_EQ(parent.code, 1);
+  EXPECT_NE(parent.err.find("1 campaign comes from it (1 extension"), std::string::npos)
+      << parent.err;
+  EXPECT_NE(parent.err.find("--with-children"), std::string::npos) << parent.err;
+  EXPECT_EQ(Call("list --state s --json").json().size(), 2U);
+  EXPECT_EQ(Call("delete c1 --force --state s").code, 0) << Read("err");
+  EXPECT_NE(Call("show c2 --state s").out.find("Made from c1, which has been deleted"),
+            std::string::npos)
+      << Read("out");
+  EXPECT_EQ(Call("delete c2 --state s --json").json()["deleted"], true) << "it has no children";
+}
+
+TEST_F(Diagnosis, DeletesACampaignWithAllThatComesFromIt) {
+  ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  ASSERT_EQ(Call("extend c1 --effect rolling_resistance --state s --workers 2 --json").code, 0);
+  EXPECT_EQ(Call("delete c1 --with-children --force --state s").code, 2);
+  const Answer gone = Call("delete c1 --with-children --state s --json");
+  ASSERT_EQ(gone.code, 0) << gone.err;
+  EXPECT_EQ(gone.json()["campaigns"], 2);
+  EXPECT_TRUE(Call("list --state s --json").json().empty());
 }
 
 // No verdict without support: two readings for two parameters.

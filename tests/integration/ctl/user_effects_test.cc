@@ -69,6 +69,15 @@ TEST_F(UserEffects, AreValidatedListedAndSimulated) {
   EXPECT_NE(stopped.err.find("grains "), std::string::npos) << stopped.err;
 }
 
+// As viscous_damping: readings of staged tests are taken when all has come to rest.
+TEST_F(UserEffects, ThatNeedMotionAreNotTriedOnReadingsAtRest) {
+  Write("viscous.yaml", Campaign(false, "sliding_velocity > 0 ? 1 + 0.001 * c : 1"));
+  ASSERT_EQ(Call("run viscous.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  const Answer extended = Call("extend c1 --effect hardening --state s");
+  EXPECT_EQ(extended.code, 2);
+  EXPECT_NE(extended.err.find("all readings are taken at rest"), std::string::npos) << extended.err;
+}
+
 TEST_F(UserEffects, AreCandidatesAndJoinTheModel) {
   Write("small.yaml", Campaign(false));
   ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");

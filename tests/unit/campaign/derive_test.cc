@@ -53,6 +53,17 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
       << *text;
 }
 
+TEST(Derive, ABudgetTakesThePlaceOfTheParents) {
+  const std::string parent = "name: a\nbudget: {model_evaluations: 400, core_hours: 2}\n";
+  const auto text = Derive(parent, {.name = "b",
+                                    .lineage = {.parent = "c1", .purpose = "extension"},
+                                    .first_proposal = std::nullopt,
+                                    .model_evaluations = 37});
+  ASSERT_TRUE(text.ok()) << text.status();
+  EXPECT_NE(text->find("budget: {model_evaluations: 37, core_hours: 2}"), std::string::npos)
+      << *text;
+}
+
 TEST(Derive, WhatTiesAParameterGoesWithIt) {
   const auto text = Derive(
       "name: a\nmodel: {contact: linear}\nparameters: {f: default, f.g: default, h: default}\n"

@@ -42,5 +42,15 @@ TEST(CommandLine, BadUsageIsTwoAndHelpIsZero) {
   EXPECT_EQ(Parse({"run", "--help"}).exit_code, kDone);
 }
 
+TEST(CommandLine, VerbsThatSpeakOfErrorsSayWhatTheyAre) {
+  for (const char* verb : {"compare", "diagnose", "improve"}) {
+    ::testing::internal::CaptureStdout();
+    EXPECT_EQ(Parse({verb, "--help"}).exit_code, kDone);
+    EXPECT_NE(::testing::internal::GetCapturedStdout().find("Error: root mean square"),
+              std::string::npos)
+        << verb;
+  }
+}
+
 }  // namespace
 }  // namespace calib::ctl

@@ -66,6 +66,9 @@ TEST_F(VerdictTest, NothingThatExplainsAModelThatDoesNotFit) {
   Refit("rolling", 0.9 * kAway);
   EXPECT_EQ(Concluded(), "unexplained");
   EXPECT_EQ(diagnosis_.best_partial, "");  // no clear step
+  EXPECT_EQ(diagnosis_.reason,
+            "with none of the 1 effects that were refitted does it fit, and none comes clearly "
+            "closer: with rolling chi-squared is 360, without 400 (clearly is below 256)");
   EXPECT_EQ(diagnosis_.effect, "");
 }
 
@@ -133,6 +136,11 @@ TEST_F(VerdictTest, WhatTheScreenCannotTellFromItIsNamedUnlessItWasFitted) {
 TEST_F(VerdictTest, AFitThatPredictsOtherReadingsWorseExplainsNothing) {
   Refit("rolling", kClose).left_out_error = 4;
   EXPECT_EQ(Concluded(), "unexplained");
+  EXPECT_NE(
+      diagnosis_.reason.find("with rolling it fits (p = 0.38), but is not clearly better than "
+                             "without: it misses data it was not fitted to by 4 sd, 3 without"),
+      std::string::npos)
+      << diagnosis_.reason;
 }
 
 TEST_F(VerdictTest, AGainThatChanceGivesExplainsNothing) {

@@ -109,6 +109,13 @@ TEST(UserEffectProblems, NullHasToRemoveTheEffect) {
   EXPECT_EQ(NullProblem(test::Formula("normal_force", "1 + c", FormulaAction::kScales)), "");
   EXPECT_THAT(NullProblem(test::Formula("normal_force", "c", FormulaAction::kScales)),
               HasSubstr("has to be 1"));
+  for (const char* zero : {"overlap", "sliding_distance", "closing_velocity", "axial_strain"}) {
+    const std::string name = zero;
+    EXPECT_THAT(NullProblem(test::Formula("normal_force", "c > 0 ? c / " + name + " : 0")),
+                HasSubstr("is not finite where " + name + " is zero"));
+    EXPECT_EQ(NullProblem(test::Formula("normal_force", "c > 0 ? c / max(" + name + ", 1e-9) : 0")),
+              "");
+  }
   EXPECT_THAT(NullProblem(test::Formula("normal_force", "c * log(-overlap)")),
               HasSubstr("at the null value"));  // 0 * NaN
   EXPECT_THAT(NullProblem(test::Formula("normal_force", "c > 0 ? c * log(-overlap) : 0")),

@@ -110,6 +110,75 @@ TEST(Report, TellsTheStoryOfAnAddedEffect) {
   EXPECT_THAT(html, Not(HasSubstr("nan")));
 }
 
+// The JSON of `calibctl diagnose`, shortened.
+constexpr const char* kDiagnosis = R"json({"campaign": "c1", "verdict": "missing_effect",
+  "effect": "contact_plasticity", "sentence": "Missing: contact_plasticity.",
+  "adequacy": {"chi2": 431, "degrees": 76, "p_value": 1e-40, "rms": 2.4, "left_out_error": 3.1},
+  "candidates": [
+    {"effect": "contact_plasticity", "p_value": 0.0013, "explained_fraction": 0.98,
+     "predicted_rms_error": 0.91, "amplitude": {"contact_plasticity.stiffness": 3200, "cohesion.range": 2},
+     "confusable_with": ["twisting_resistance"], "angles": {"twisting_resistance": 12.4},
+     "warm_fit": {"campaign": "c7", "p_value": 0.56, "left_out_error": 1.02}},
+    {"effect": "<b>membrane", "p_value": 1, "explained_fraction": 0.02, "predicted_rms_error": 2.4,
+     "amplitude": {}, "confusable_with": []}],
+  "units": {"contact_plasticity.stiffness": "Pa"}, "only_adequacy": false,
+  "not_excitable": [{"effect": "wall_friction", "reason": "none of the fitted tests can show it"}],
+  "next_experiment": {"snippet": "  - name: next\n", "separates": ["contact_plasticity"],
+                      "expected_power": 0.93}, "warnings": ["closer than the stated errors"]})json";
+
+TEST(Report, ShowsTheDiagnosisThatWasKept) {
+  const CampaignView view = testing::ExampleView("sand");
+  Story story;
+  story.known = true;
+  EXPECT_THAT(RenderReport(view, story), HasSubstr("calibctl diagnose c1"));
+  auto diagnosis = ReadDiagnosis(kDiagnosis);
+  ASSERT_TRUE(diagnosis.ok()) << diagnosis.status();
+  diagnosis->digest = "5f1e";
+  story.diagnoses = {*diagnosis};
+  const std::string html = RenderReport(view, story);
+  for (const char* said :
+       {"Missing: contact_plasticity.", "<b>contact plasticity</b><span>missing, says",
+        "<strong>contact plasticity</strong>", "<td>0.0013</td><td>98 %</td><td>0.91</td>",
+        "<td>0.56</td><td>1.02</td>", ">cohesion: range = 2, stiffness = 3.2 kPa<",
+        "twisting resistance (12°)", "&lt;b&gt;membrane", "chi-squared 431", "SHA-256 5f1e",
+        "wall friction: none of the fitted tests can show it", "closer than the stated errors",
+        "  - name: next"}) {
+    EXPECT_THAT(html, HasSubstr(said));
+  }
+  EXPECT_THAT(html, Not(HasSubstr("nan")));
+}
+
+TEST(StoredDiagnosis, TheLatestThatTriedEffectsIsShown) {
+  const auto make = [](const char* verdict, bool only_adequacy, const char* next) {
+    StoredDiagnosis d;
+    d.campaign = "c1";
+    d.verdict = verdict;
+    d.only_adequacy = only_adequacy;
+    d.next_experiment = next;
+    return d;
+  };
+  std::vector<StoredDiagnosis> kept = {make("unexplained", true, "")};
+  EXPECT_EQ(LatestOf(kept, "c1"), &kept[0]);
+  EXPECT_EQ(LatestOf(kept, "c2"), nullptr);
+  kept.push_back(make("missing_effect", false, "- name: next"));
+  kept.push_back(make("missing_effect", false, ""));
+  kept.push_back(make("unexplained", true, ""));
+  EXPECT_EQ(LatestOf(kept, "c1"), &kept[1]);
+  kept.push_back(make("ambiguous", false, ""));
+  EXPECT_EQ(LatestOf(kept, "c1"), &kept[4]);
+}
+
+TEST(StoredDiagnosis, AnotherDocumentIsRefused) {
+  for (const char* text : {"", "{", "[]", "{}", R"({"campaign": 3, "verdict": "adequate"})"}) {
+    EXPECT_FALSE(ReadDiagnosis(text).ok()) << text;
+    EXPECT_FALSE(ReadImprovedCampaigns(text).ok()) << text;
+  }
+  const auto campaigns = ReadImprovedCampaigns(
+      R"({"steps": [{"campaign": "c1"}, {"campaign": null}, 4, {"campaign": "c9"}]})");
+  ASSERT_TRUE(campaigns.ok());
+  EXPECT_EQ(*campaigns, (std::vector<std::string>{"c1", "c9"}));
+}
+
 TEST(Report, ACampaignWithoutAnIterationSaysSo) {
   CampaignView view = testing::ExampleView("young");
   view.posterior = v1::Posterior();

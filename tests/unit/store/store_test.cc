@@ -202,5 +202,26 @@ TEST_F(StoreTest, AReaderSeesOneMomentOnly) {
   EXPECT_EQ(Read().Campaigns()->size(), 2U);
 }
 
+// A document that is not there, or a campaign that is gone, must not break the commit they share.
+TEST_F(StoreTest, FindingsAreKeptOnceAndGoWithTheirCampaign) {
+  Write([&](Transaction& t) {
+    PutEvaluation(t);
+    t.PutBlob("abc", "{}");
+    t.PutFinding(1, {.kind = "diagnosis", .digest = "abc", .created_unix_ms = 5});
+    t.PutFinding(1, {.kind = "diagnosis", .digest = "abc", .created_unix_ms = 6});
+    t.PutFinding(1, {.kind = "improvement", .digest = "abc", .created_unix_ms = 7});
+    t.PutFinding(1, {.kind = "diagnosis", .digest = "never put", .created_unix_ms = 8});
+    t.PutFinding(9, {.kind = "diagnosis", .digest = "abc", .created_unix_ms = 9});
+  });
+  const auto findings = Read().Findings(1);
+  ASSERT_TRUE(findings.ok()) << findings.status();
+  ASSERT_EQ(findings->size(), 2U);
+  EXPECT_EQ((*findings)[0].kind, "diagnosis");
+  EXPECT_EQ((*findings)[0].created_unix_ms, 5);
+  EXPECT_EQ((*findings)[1].kind, "improvement");
+  Write([](Transaction& t) { t.DeleteCampaign(1); });
+  EXPECT_TRUE(Read().Findings(1)->empty());
+}
+
 }  // namespace
 }  // namespace calib::store

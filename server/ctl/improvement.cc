@@ -1,0 +1,245 @@
+#include "server/ctl/improvement.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "server/campaign/sha256.h"
+#include "server/ctl/extension.h"
+#include "server/ctl/findings.h"
+#include "server/report/comparison.h"
+#include "server/report/people_units.h"
+
+namespace calib::ctl {
+namespace {
+
+// The effect to try next: named, or the best of a group, or what helps most.
+std::string NextEffect(const Diagnosis& diagnosis) {
+  if (!diagnosis.effect.empty()) return diagnosis.effect;
+  if (diagnosis.verdict == "ambiguous") return diagnosis.candidates.front().effect;
+  return diagnosis.best_partial;
+}
+
+std::string WhyNext(const Diagnosis& diagnosis, const std::string& next) {
+  if (!diagnosis.effect.empty()) return absl::StrCat(next, " is named and added.");
+  if (diagnosis.verdict == "ambiguous") {
+    return absl::StrCat(next, " is added, the best of those that these tests do not tell apart: ",
+                        absl::StrJoin(diagnosis.candidates.front().confusable_with, ", "), ".");
+  }
+  return absl::StrCat(next, " is added, it helps most: ", diagnosis.reason, ".");
+}
+
+}  // namespace
+
+struct Improvement::ClosestRun {
+  std::map<std::string, double> values{};
+  double rms = std::numeric_limits<double>::infinity();  // residual over noise sd
+};
+
+Improvement::ClosestRun Improvement::ClosestRunWith(const std::string& effect,
+                                                    const Diagnosis& diagnosis) {
+  for (const CandidateEffect& candidate : diagnosis.candidates) {
+    if (candidate.effect == effect && !candidate.closest.empty()) {
+      return {.values = candidate.closest, .rms = candidate.predicted_rms_error};
+    }
+  }
+  return {};
+}
+
+double Improvement::ErrorOf(const report::CampaignView& view) {
+  return report::Compare(view, report::PredictReadings(view)).rms_error;
+}
+
+std::optional<std::int64_t> Improvement::Left() const {
+  if (!limits_.evaluations) return std::nullopt;
+  return std::max<std::int64_t>(0, *limits_.evaluations - evaluations_);
+}
+
+absl::Status Improvement::From(report::CampaignView view) {
+  first_ = view;
+  std::vector<std::string> added;
+  for (;;) {
+    const bool last = static_cast<int>(added.size()) >= limits_.effects || Spent();
+    const auto diagnosis = Judge(view, last || (!added.empty() && Fits(view)));
+    if (!diagnosis.ok()) return diagnosis.status();
+    ImproveStep& step = steps_.back();
+    const std::string next = NextEffect(*diagnosis);
+    if (diagnosis->verdict == "adequate") {
+      step.reason = absl::StrCat("Noise, scatter and the emulator's error explain what is left.",
+                                 step.reason.empty() ? "" : " ", step.reason);
+      break;
+    }
+    if (last) {
+      step.reason = Spent() ? "--max-evaluations is used up, so no effect was looked for."
+                            : absl::StrCat("--max-effects allows ", limits_.effects, ".");
+      break;
+    }
+    if (next.empty()) {
+      if (step.reason.empty()) step.reason = diagnosis->reason;
+      break;
+    }
+    auto extended = Extended(view, {next}, ClosestRunWith(next, *diagnosis));
+    if (absl::IsResourceExhausted(extended.status())) {
+      step.reason = absl::StrCat(next, " would be added, but --max-evaluations forbids it: ",
+                                 extended.status().message(), ".");
+      break;
+    }
+    if (!extended.ok()) return extended.status();
+    if (extended->posterior.posterior_from() == "none" && !(ErrorOf(*extended) < step.rms_error)) {
+      step.reason = absl::StrCat(
+          "The calibration with ", next, " (", extended->status.campaign(),
+          ") has no posterior and comes no closer, so it is no step: run more samples.");
+      break;
+    }
+    step.next_effect = next;
+    step.reason = WhyNext(*diagnosis, next);
+    added.push_back(next);
+    view = *std::move(extended);
+  }
+  last_ = std::move(view);
+  if (auto status = Prune(added); !status.ok()) return status;
+  return Open();
+}
+
+// Adds a step. A diagnosis that cannot be paid for is no more than the adequacy of the model.
+absl::StatusOr<Diagnosis> Improvement::Judge(const report::CampaignView& view, bool only_adequacy) {
+  DiagnosisOptions options{.only_adequacy = only_adequacy, .next_experiment = false};
+  options.max_evaluations = Left();
+  std::string reason;
+  auto diagnosis = Diagnose(laboratory_, view, options);
+  if (absl::IsResourceExhausted(diagnosis.status())) {
+    reason = absl::StrCat("No effect was looked for, --max-evaluations forbids it: ",
+                          diagnosis.status().message(), ".");
+    options.only_adequacy = true;
+    diagnosis = Diagnose(laboratory_, view, options);
+  }
+  if (!diagnosis.ok()) {
+    if (steps_.empty() || !absl::IsFailedPrecondition(diagnosis.status())) return diagnosis;
+    // It comes closer, but how well it could do is not known: no adequacy without support.
+    reason = absl::StrCat("Its adequacy is not known: ", diagnosis.status().message(), ".");
+    diagnosis = Diagnosis{};
+    diagnosis->verdict = "unexplained";
+  } else {
+    KeepFinding(client_, diagnosis->campaign, kDiagnosis, DiagnosisJson(*diagnosis));
+  }
+  evaluations_ += diagnosis->screen_evaluations + diagnosis->warm_evaluations;
+  steps_.push_back({.campaign = view.status.campaign(),
+                    .effects = view.campaign.model.effects,
+                    .rms_error = ErrorOf(view),
+                    .heldout_rms_error = std::nullopt,
+                    .log_evidence = view.posterior.log_evidence(),
+                    .verdict = diagnosis->verdict,
+                    .next_effect = "",
+                    .reason = std::move(reason)});
+  return diagnosis;
+}
+
+// An effect that was added early may be needless beside the later ones: the model is kept without
+// the first that it is adequate without.
+absl::Status Improvement::Prune(const std::vector<std::string>& added) {
+  if (steps_.back().verdict != "adequate") return absl::OkStatus();
+  for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
+    std::vector<std::string> others = added;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    auto without = Extended(*first_, others, ClosestRun{});
+    if (absl::IsResourceExhausted(without.status())) return absl::OkStatus();
+    if (!without.ok()) return without.status();
+    if (without->posterior.posterior_from() == "none" || !Fits(*without)) continue;
+    last_ = *std::move(without);
+    if (auto judged = Judge(*last_, true); !judged.ok()) return judged.status();
+    steps_.back().reason = absl::StrCat("As adequate without ", added[k], ", which is taken out.");
+    return absl::OkStatus();
+  }
+  return absl::OkStatus();
+}
+
+// With a parameter more the parent's iterations may not do: then as many again.
+absl::StatusOr<report::CampaignView> Improvement::Extended(const report::CampaignView& view,
+                                                           const std::vector<std::string>& effects,
+                                                           const ClosestRun& closest) {
+  const auto fitted =
+      std::count_if(view.campaign.experiments.begin(), view.campaign.experiments.end(),
+                    [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
+  const std::int64_t least = static_cast<std::int64_t>(view.campaign.samples) * fitted;
+  absl::StatusOr<report::CampaignView> extended = absl::UnknownError("not run");
+  for (const int times : {1, 2}) {
+    std::optional<std::int64_t> budget = Left();
+    if (budget && *budget < least) {
+      if (times > 1) break;
+      return absl::ResourceExhaustedError(absl::StrCat(
+          "an iteration takes ", least, " model evaluations, and ", *budget, " are left"));
+    }
+    if (budget && view.campaign.budget.model_evaluations) {
+      budget = std::min(*budget, *view.campaign.budget.model_evaluations);
+    }
+    const auto text = ExtensionText(
+        view, {.effects = effects,
+               .purpose = "extension",
+               .near = closest.values,
+               .samples = std::nullopt,
+               .iterations = times == 1 ? std::nullopt
+                                        : std::optional<int>(times * view.campaign.max_iterations),
+               .replicates = std::nullopt,
+               .model_evaluations = budget});
+    if (!text.ok()) return text.status();
+    extended = laboratory_.Run(view, *text, "calibration with " + absl::StrJoin(effects, " + "));
+    if (!extended.ok()) break;
+    evaluations_ += extended->status.model_evaluations();
+    // A posterior that misses more than a single run did has not been found yet.
+    if (extended->posterior.posterior_from() != "none" && ErrorOf(*extended) <= closest.rms) break;
+  }
+  return extended;
+}
+
+bool Improvement::Fits(const report::CampaignView& view) {
+  const auto quick = Diagnose(laboratory_, view, {.only_adequacy = true});
+  return quick.ok() && quick->verdict == "adequate";
+}
+
+// The verdict is stored by its digest before held-out data are looked at.
+absl::Status Improvement::Open() {
+  const std::string verdict = Json();
+  if (auto stored = client_.PutBlob(verdict); !stored.ok()) return stored;
+  digest_ = campaign::Sha256Hex(verdict);
+  const auto held_out = [](const report::CampaignView& view) {
+    return report::Compare(view, report::PredictReadings(view)).heldout_rms_error;
+  };
+  steps_.front().heldout_rms_error = held_out(*first_);
+  steps_.back().heldout_rms_error = held_out(*last_);
+  const std::string opened = Json();
+  KeepFinding(client_, steps_.front().campaign, kImprovement, opened);
+  if (steps_.size() > 1) KeepFinding(client_, steps_.back().campaign, kImprovement, opened);
+  return absl::OkStatus();
+}
+
+std::string Improvement::Json() const {
+  using nlohmann::json;
+  json list = json::array();
+  for (const ImproveStep& step : steps_) {
+    list.push_back(
+        {{"campaign", step.campaign},
+         {"effects", step.effects},
+         {"rms_error", step.rms_error},
+         {"heldout_rms_error",
+          step.heldout_rms_error ? json(*step.heldout_rms_error) : json(nullptr)},
+         {"log_evidence", step.log_evidence},
+         {"verdict", step.verdict},
+         {"next_effect", step.next_effect.empty() ? json(nullptr) : json(step.next_effect)},
+         {"reason", step.reason}});
+  }
+  return json({{"steps", list},
+               {"verdict", steps_.back().verdict},
+               {"final_campaign", steps_.back().campaign},
+               {"verdict_digest", digest_},
+               {"model_evaluations", evaluations_}})
+             .dump(2, ' ', false, json::error_handler_t::replace) +
+         "\n";
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,34 @@
+#include "server/ctl/next_step.h"
+
+#include "absl/strings/str_cat.h"
+
+namespace calib::ctl {
+namespace {
+
+std::string Quoted(const std::string& word) {
+  const bool plain = !word.empty() && word.find_first_not_of(
+                                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                          "0123456789_-./:,+=@%") == std::string::npos;
+  if (plain) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
+}  // namespace
+
+std::string CommandOf(const Arguments& arguments, const std::string& words) {
+  std::string command = absl::StrCat("calibctl ", words);
+  if (!arguments.state.empty()) {
+    absl::StrAppend(&command, " --state ", Quoted(arguments.state));
+  } else if (arguments.server_given) {
+    absl::StrAppend(&command, " --server ", Quoted(arguments.server));
+  }
+  return command;
+}
+
+std::string NextStep(const std::string& command, const std::string& what_it_says) {
+  return absl::StrCat("\nNext: ", command, "\n      ", what_it_says, "\n");
+}
+
+}  // namespace calib::ctl

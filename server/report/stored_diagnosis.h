@@ -1,0 +1,67 @@
+#pragma once
+// A diagnosis as it was kept at the server: the JSON document of `calibctl diagnose`, read back for
+// people.
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+
+namespace calib::report {
+
+/// An effect that was tried on the model.
+struct TriedEffect {
+  std::string effect{};
+  double p_value = 1;             ///< of the screen, adjusted for the number of candidates
+  double explained_fraction = 0;  ///< of the misfit beyond noise and scatter, 0 to 1
+  double predicted_rms_error = 0;
+  std::map<std::string, double>
+      amplitude{};  ///< dotted parameter -> strength [StoredDiagnosis::units]
+  std::vector<std::string> confusable_with{};
+  std::map<std::string, double> angles{};  ///< to the other effects [degrees]
+  std::optional<double> refit_p_value{}, left_out_error{};
+};
+
+struct StoredDiagnosis {
+  std::string campaign{};
+  std::string digest{};  ///< SHA-256 of the document
+  std::int64_t created_unix_ms = 0;
+  std::string verdict{};       ///< adequate | missing_effect | ambiguous | unexplained
+  std::string effect{};        ///< named, with missing_effect
+  std::string sentence{};      ///< the verdict in words
+  bool only_adequacy = false;  ///< no effect was tried
+  double rms = 0;              ///< of the best fit, in sd of a measurement
+  double chi2 = 0, degrees = 0, p_value = 1;
+  std::optional<double> left_out_error{};
+  std::vector<TriedEffect> candidates{};  ///< best first
+  std::map<std::string, std::string> units{};
+  std::vector<std::pair<std::string, std::string>> not_excitable{};  ///< effect, why
+  std::map<std::string, std::map<std::string, double>> detectable{};
+  std::vector<std::pair<std::string, std::string>> undetectable{};  ///< effect, why
+  std::vector<std::string> warnings{};
+  std::string next_experiment{};  ///< the lines for the campaign file; empty: none was planned
+  std::vector<std::string> next_separates{};
+  double next_power = 0;
+};
+
+/// INVALID_ARGUMENT when the text is no such document; fields of other versions are left out.
+absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& json);
+
+/// Of several the one to show: the latest that tried effects, else the latest; of equal verdicts
+/// the one that planned the next experiment. nullptr: there is none of the campaign.
+const StoredDiagnosis* LatestOf(const std::vector<StoredDiagnosis>& diagnoses,
+                                const std::string& campaign);
+
+/// Campaigns of an improvement in order, base first, of the JSON document of `calibctl improve`.
+/// Errors as above.
+absl::StatusOr<std::vector<std::string>> ReadImprovedCampaigns(const std::string& json);
+
+/// "stiffness = 8.2 kN m/rad, friction = 0.1", in the units given by dotted parameter.
+std::string StrengthInWords(const std::map<std::string, double>& amplitude,
+                            const std::map<std::string, std::string>& units);
+
+}  // namespace calib::report

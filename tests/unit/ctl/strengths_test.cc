@@ -1,0 +1,41 @@
+#include "server/ctl/strengths.h"
+
+#include <gtest/gtest.h>
+
+namespace calib::ctl {
+namespace {
+
+const dem::EffectInfo& Rolling() { return *dem::FindEffect("rolling_resistance"); }
+
+TEST(Strengths, HaveTheUnitOfTheirParameterUnderTheContact) {
+  for (const char* contact : {"linear", "hertz_mindlin"}) {
+    const auto units = UnitsOf(Rolling(), contact);
+    EXPECT_EQ(units.size(), Rolling().parameters.size());
+    for (const dem::ParameterInfo& parameter : Rolling().parameters) {
+      EXPECT_EQ(units.at("rolling_resistance." + parameter.name), dem::UnitFor(parameter, contact));
+    }
+  }
+}
+
+TEST(Strengths, OutsideTheRangeOfTheCatalogueIsSaid) {
+  dem::EffectInfo effect;
+  effect.name = "crushing";
+  effect.parameters.resize(2);
+  effect.parameters[0].name = "strength";
+  effect.parameters[0].unit = "Pa";
+  effect.parameters[0].min = 0;
+  effect.parameters[0].min_open = true;
+  effect.parameters[0].max = 2e6;
+  effect.parameters[1].name = "modulus";
+  effect.parameters[1].max = 10;
+  EXPECT_EQ(WhyNotAdmissible(effect, "linear", {{"crushing.strength", 2e6}}), "");
+  EXPECT_EQ(WhyNotAdmissible(effect, "linear", {{"crushing.strength", 3.1e6}}),
+            "crushing.strength would have to be 3.1 MPa, not within its range (up to 2 MPa)");
+  EXPECT_EQ(WhyNotAdmissible(effect, "linear", {{"crushing.strength", 0.0}}),
+            "crushing.strength would have to be 0 Pa, not within its range (from 0 Pa)");
+  EXPECT_EQ(WhyNotAdmissible(effect, "linear", {{"crushing.modulus", 0.0}}), "") << "not open";
+  EXPECT_EQ(WhyNotAdmissible(effect, "linear", {{"young_modulus", -1.0}}), "");
+}
+
+}  // namespace
+}  // namespace calib::ctl
