@@ -28,7 +28,8 @@ ShrunkCovariance ShrinkCovariance(const Eigen::MatrixXd& departures, const std::
     const Eigen::MatrixXd own = z(Eigen::all, rows);
     chance += (own * own.transpose() - static_cast<double>(rows.size()) * seen).squaredNorm();
   }
-  chance /= count * count;
+  const auto witnesses = static_cast<double>(groups.size());
+  chance *= witnesses / (witnesses - 1) / (count * count);
   const double distance = (seen - closed).squaredNorm();
   const double weight = distance > chance ? chance / distance : 1;
   return {

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 
@@ -13,6 +16,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kRightAngle = std::numbers::pi / 2;
+constexpr double kErrors = 4;    // sd that a reading may be off by
+constexpr double kDrift = 0.02;  // of the largest reading
 
 struct ObservableRange {
   const char* name;
@@ -23,8 +28,7 @@ struct ObservableRange {
 
 constexpr const char* kPercent = "if the column is in percent, say so: units: {%s: percent}";
 constexpr const char* kDegrees = "if the column is in degrees, say so: units: {%s: deg}";
-constexpr const char* kSign =
-    "compression is positive and grains carry no tension: see to its sign";
+constexpr const char* kSign = "compression is positive here: see to its sign";
 
 // Restitution may exceed one, where spin turns into translation or by errors of measurement, but
 // not by much; void ratios of the loosest powders stay below 20 (a porosity of 0.95).
@@ -52,22 +56,35 @@ std::string WithName(std::string advice, const std::string& name) {
 
 }  // namespace
 
-void CheckRangeOf(const std::string& observable, const LaboratoryTable& table,
-                  const std::vector<double>& values, ReadContext& context) {
+void CheckRangeOf(const MeasuredObservable& observable, const LaboratoryTable& table,
+                  ReadContext& context) {
+  const std::string& name = observable.name;
   const auto range = std::find_if(kRanges.begin(), kRanges.end(),
-                                  [&observable](const auto& r) { return observable == r.name; });
+                                  [&name](const auto& r) { return name == r.name; });
   if (range == kRanges.end()) return;
-  const auto outside = [&range](double value) { return value < range->min || value > range->max; };
-  const auto first = std::find_if(values.begin(), values.end(), outside);
-  if (first == values.end()) return;
-  const auto others = std::count_if(first + 1, values.end(), outside);
+  const std::vector<double>& values = observable.values;
+  double largest = 0;
+  for (const double value : values) {
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  std::vector<std::size_t> outside;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool stated = i < observable.sd.size() && std::isfinite(observable.sd[i]);
+    const double slack = std::max(stated ? kErrors * observable.sd[i] : 0.0, kDrift * largest);
+    if (values[i] < range->min - slack || values[i] > range->max + slack) outside.push_back(i);
+  }
+  // Grains that stick together can carry some tension, and zeros drift: a sign is wrong where most
+  // stresses are.
+  const bool is_stress = std::string_view(range->usual_mistake) == kSign;
+  if (outside.empty() || (is_stress && 2 * outside.size() <= values.size())) return;
+  const std::size_t others = outside.size() - 1;
   context.problems().AddIn(
-      table.path(), table.LineOf(static_cast<std::size_t>(first - values.begin())),
-      table.ColumnOf(observable),
-      absl::StrCat(observable, " is ", *first, " here",
-                   others > 0 ? absl::StrCat(" (and impossible in ", others, " later rows)") : "",
-                   "; it has to be ", range->allowed, "; ",
-                   WithName(range->usual_mistake, observable)));
+      table.path(), table.LineOf(outside.front()), table.ColumnOf(name),
+      absl::StrCat("is ", values[outside.front()], " here",
+                   others > 0 ? absl::StrCat(" (and impossible in ", others,
+                                             others == 1 ? " later row)" : " later rows)")
+                              : "",
+                   "; it has to be ", range->allowed, "; ", WithName(range->usual_mistake, name)));
 }
 
 }  // namespace calib::campaign

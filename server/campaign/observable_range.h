@@ -2,19 +2,19 @@
 // What a measured observable can be at all: mistakes of units and signs are found before anything
 // runs.
 
-#include <string>
-#include <vector>
-
+#include "server/campaign/campaign.h"
 #include "server/campaign/laboratory_table.h"
 
 namespace calib::campaign {
 
 /// Adds one problem, naming file, row and column, for the first reading outside what its observable
-/// can be whatever the material: a porosity is a fraction, grains carry no tension, an angle of
-/// repose is at most a right one. Observables whose range is not certain are not looked at; strains
-/// are by LaboratoryTable::ToModel.
-/// in: values, SI, one per row of the table; NaN where a field could not be read
-void CheckRangeOf(const std::string& observable, const LaboratoryTable& table,
-                  const std::vector<double>& values, ReadContext& context);
+/// can be whatever the material: a porosity is a fraction, most stresses are compressive, an angle
+/// of repose is at most a right one. A reading may be outside by four times its error or by 2 % of
+/// the largest of the column, as zeros drift. Observables whose range is not certain are not looked
+/// at; strains are by LaboratoryTable::ToModel. in: observable.values, SI, one per row of the
+/// table, NaN where a field could not be read;
+///     observable.sd, as many or none
+void CheckRangeOf(const MeasuredObservable& observable, const LaboratoryTable& table,
+                  ReadContext& context);
 
 }  // namespace calib::campaign

@@ -178,11 +178,11 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
     const std::vector<double> raw = given ? table->Raw(spec.name, context) : std::vector<double>();
     if (given) {
       observable.values = table->ToModel(spec.name, raw, context);
-      CheckRangeOf(spec.name, *table, observable.values, context);
     }
     ReadNoise(experiment_map, spec.name, spec.node,
               {control.name, rules.noise_needed && rules.measured, rules.measured},
               given ? &*table : nullptr, raw, context, observable);
+    if (given) CheckRangeOf(observable, *table, context);
     experiment.observables.push_back(std::move(observable));
   }
   if (!table) return;

@@ -157,9 +157,10 @@ void AddVerbsOnCampaigns(Builder& b) {
   improve->add_option("--max-effects", b.arguments().max_effects, "at most so many are added [3]")
       ->check(CLI::Range(1, 10));
   improve
-      ->add_option("--max-evaluations", b.arguments().max_evaluations,
-                   "model evaluations of all screens, refits and calibrations, those that diagnose "
-                   "has made already included; held-out tests of a calibration come on top")
+      ->add_option(
+          "--max-evaluations", b.arguments().max_evaluations,
+          "model evaluations of all screens, refits and calibrations, those that diagnose "
+          "has made already included; held-out tests of a calibration count and may exceed it")
       ->check(CLI::PositiveNumber);
   auto* predict = b.AddOnCampaign(
       "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance",

@@ -35,6 +35,14 @@ std::string WhyNext(const Diagnosis& diagnosis, const std::string& next) {
   return absl::StrCat(next, " is added, it helps most: ", diagnosis.reason, ".");
 }
 
+// No calibration takes more: all iterations, replicates and held-out draws.
+std::int64_t MostEvaluations(const campaign::Campaign& campaign, int times) {
+  constexpr std::int64_t kReplicatesAndDraws = 100;
+  const auto samples = static_cast<std::int64_t>(campaign.samples) * campaign.max_iterations;
+  return (samples * times + kReplicatesAndDraws) *
+         static_cast<std::int64_t>(campaign.experiments.size());
+}
+
 }  // namespace
 
 struct Improvement::ClosestRun {
@@ -76,8 +84,9 @@ absl::Status Improvement::From(report::CampaignView view) {
       break;
     }
     if (last) {
-      step.reason = Spent() ? "--max-evaluations is used up, so no effect was looked for."
-                            : absl::StrCat("--max-effects allows ", limits_.effects, ".");
+      absl::StrAppend(&step.reason, step.reason.empty() ? "" : " ",
+                      Spent() ? "--max-evaluations is used up, so no effect was looked for."
+                              : absl::StrCat("--max-effects allows ", limits_.effects, "."));
       break;
     }
     if (next.empty()) {
@@ -175,6 +184,8 @@ absl::StatusOr<report::CampaignView> Improvement::Extended(const report::Campaig
       return absl::ResourceExhaustedError(absl::StrCat(
           "an iteration takes ", least, " model evaluations, and ", *budget, " are left"));
     }
+    const std::int64_t most = MostEvaluations(view.campaign, times);
+    if (budget && *budget >= most && !view.campaign.budget.model_evaluations) budget.reset();
     if (budget && view.campaign.budget.model_evaluations) {
       budget = std::min(*budget, *view.campaign.budget.model_evaluations);
     }

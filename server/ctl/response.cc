@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <utility>
 
@@ -54,11 +55,15 @@ std::vector<int> PartsOf(const campaign::Campaign& campaign, const inference::Da
   return parts;
 }
 
-// Of some of the runs.
+// Of some of the runs: those that share a packing in any experiment have the same number.
 std::vector<int> PackingsOf(const campaign::Campaign& campaign, const RunTable& runs,
                             const std::vector<Index>& rows) {
-  const auto packings =
-      static_cast<int>(std::max<std::size_t>(1, campaign::PackingsOfAll(campaign)));
+  int packings = 0;
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    if (experiment.role != campaign::Role::kCalibrate || experiment.specimens.size() < 2) continue;
+    packings = std::gcd(packings, static_cast<int>(experiment.specimens.size()));
+  }
+  packings = std::max(1, packings);
   std::vector<int> packing;
   for (const Index row : rows) {
     packing.push_back(runs.stream[static_cast<std::size_t>(row)] % packings);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <iostream>
+#include <iterator>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -14,6 +15,7 @@ namespace {
 // What comes from a campaign cannot be found by it any more once it is gone: diagnose and improve
 // would run everything again, and reports lose what was tried.
 absl::Status CheckChildren(const Arguments& arguments,
+                           const std::vector<v1::CampaignStatus>& campaigns,
                            const std::vector<v1::CampaignStatus>& children) {
   if (children.empty() || arguments.force) return absl::OkStatus();
   if (!arguments.with_children) {
@@ -23,13 +25,18 @@ absl::Status CheckChildren(const Arguments& arguments,
         CountedByPurpose(children), "; `calibctl list` shows them below it); delete them with it: ",
         "--with-children, or ", arguments.campaign, " alone: --force"));
   }
-  for (const v1::CampaignStatus& child : children) {
-    if (child.state() == "finished" || child.state() == "failed" || child.state() == "cancelled") {
+  std::vector<v1::CampaignStatus> leaving = children;
+  std::copy_if(campaigns.begin(), campaigns.end(), std::back_inserter(leaving),
+               [&arguments](const auto& c) { return c.campaign() == arguments.campaign; });
+  for (const v1::CampaignStatus& one : leaving) {
+    if (one.state() == "finished" || one.state() == "failed" || one.state() == "cancelled") {
       continue;
     }
-    return absl::FailedPreconditionError(absl::StrCat("nothing is deleted: ", child.campaign(),
-                                                      ", which comes from ", arguments.campaign,
-                                                      ", is ", child.state(), "; cancel it first"));
+    const bool parent = one.campaign() == arguments.campaign;
+    return absl::FailedPreconditionError(
+        absl::StrCat("nothing is deleted: ", one.campaign(),
+                     parent ? "" : ", which comes from " + arguments.campaign + ",", " is ",
+                     one.state(), "; cancel it first"));
   }
   return absl::OkStatus();
 }
@@ -43,7 +50,8 @@ int Delete(const Arguments& arguments) {
   const auto campaigns = client.List();
   if (!campaigns.ok()) return Fail(campaigns.status());
   const std::vector<v1::CampaignStatus> children = Descendants(*campaigns, arguments.campaign);
-  if (auto status = CheckChildren(arguments, children); !status.ok()) return Fail(status);
+  if (auto status = CheckChildren(arguments, *campaigns, children); !status.ok())
+    return Fail(status);
   std::vector<std::string> leaving = {arguments.campaign};
   if (arguments.with_children) {
     for (const v1::CampaignStatus& child : children) leaving.push_back(child.campaign());

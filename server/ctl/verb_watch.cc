@@ -21,7 +21,7 @@ int Watch(const Arguments& arguments) {
     ProgressLine line;
     ended = (*session)->client().Watch(arguments.campaign, [&](const v1::CampaignStatus& status) {
       last = status;
-      notice.Look(status);
+      if (arguments.workers.value_or(0) == 0) notice.Look(status);  // else they are on their way
       line.Show(ProgressText(status), 10 * status.iteration() + 10 * status.samples_done() /
                                                                     std::max(1, status.samples()));
     });

@@ -14,9 +14,15 @@ constexpr double kClearlyCloser = 0.64;  // of the base model's chi-squared
 constexpr double kClearlyLess = 0.25;    // of the misfit explained
 constexpr double kFarOff = 4;            // times the chi-squared of the best: twice its rms
 constexpr std::size_t kMostNames = 3;
+constexpr double kNearlyAll = 0.9;  // of the misfit
 
-bool ClearlyBetter(const WarmFit& a, const WarmFit& b) {
-  const auto advantage = inference::Compare(a.model, b.model);
+// In errors that are the same for both.
+bool ClearlyBetter(const WarmFit& a, const WarmFit& b, const Eigen::MatrixXd& errors) {
+  const auto judged = [&errors](const WarmFit& fit) {
+    return inference::FittedModel{
+        .histories = fit.model.histories, .covariance = errors, .parameters = fit.model.parameters};
+  };
+  const auto advantage = inference::Compare(judged(a), judged(b));
   return advantage.ok() && advantage->nats > 2 * advantage->sd && advantage->nats > 0;
 }
 
@@ -38,9 +44,17 @@ const WarmFit* Verdict::Find(const std::string& effect) const {
 
 bool Verdict::Explains(const CandidateEffect& candidate) const {
   const WarmFit* fit = Find(candidate.effect);
-  return fit != nullptr && fit->Explains(level_, fits_.size()) &&
+  return fit != nullptr && (fit->Explains(level_, fits_.size()) || Settles(candidate, *fit)) &&
          !(fit->left_out_error && diagnosis_.left_out_error &&
            *fit->left_out_error > *diagnosis_.left_out_error);
+}
+
+// The model without it is wrong beyond doubt, and with it adequate and rid of nearly all the
+// misfit. The advantage in nats of a misfit that sits in one stage of loading is never twice its
+// bootstrapped deviation.
+bool Verdict::Settles(const CandidateEffect& candidate, const WarmFit& fit) const {
+  return fit.adequacy.p_value >= level_ && candidate.explained_fraction >= kNearlyAll &&
+         diagnosis_.adequacy.p_value * static_cast<double>(fits_.size()) < level_ * level_;
 }
 
 // Explains clearly less than the best does, and is far off from where the best was after as many
@@ -62,7 +76,8 @@ bool Verdict::Excluded(const CandidateEffect& other, const CandidateEffect& firs
   const WarmFit& fit = *Find(other.effect);
   const bool outweighed = EvidenceFavours(best.evidence, fit.evidence);
   if (!Explains(other)) return fit.stalled || outweighed || IsFarOff(other, first);
-  return ClearlyBetter(best, fit) && (outweighed || fit.runs.histories.rows() == 0);
+  return ClearlyBetter(best, fit, base_.covariance) &&
+         (outweighed || fit.runs.histories.rows() == 0);
 }
 
 void Verdict::Conclude(bool base_fits) {

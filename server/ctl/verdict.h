@@ -19,7 +19,8 @@ class Verdict {
           const inference::FittedModel& base, double level)
       : diagnosis_(diagnosis), fits_(fits), base_(base), level_(level) {}
 
-  /// Adequate, clearly better than the base model, and not worse on readings it was not fitted to.
+  /// Adequate, clearly better than the base model (or rid of nearly all the misfit of one that is
+  /// wrong beyond doubt), and not worse on readings it was not fitted to.
   bool Explains(const CandidateEffect& candidate) const;
 
   /// Sets verdict, effect, best_partial, reason and the group of the first candidate. base_fits:
@@ -28,6 +29,7 @@ class Verdict {
 
  private:
   const WarmFit* Find(const std::string& effect) const;
+  bool Settles(const CandidateEffect& candidate, const WarmFit& fit) const;
   bool Excluded(const CandidateEffect& other, const CandidateEffect& first) const;
   bool IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const;
   std::string Closest() const;

@@ -239,8 +239,14 @@ void WarmFits::Judge(const std::string& effect) {
     fit.model = std::move(response->model);
     points = std::move(response->points);
   }
+  // By the base model's errors: covariances that were estimated apart differ by chance, which is
+  // no merit of a model.
+  const inference::FittedModel base = Base();
+  const inference::FittedModel by_base = {.histories = fit.model.histories,
+                                          .covariance = base.covariance,
+                                          .parameters = fit.model.parameters};
   const auto adequacy = inference::TestAdequacy(fit.model);
-  const auto advantage = inference::Compare(fit.model, Base());
+  const auto advantage = inference::Compare(by_base, base);
   if (!adequacy.ok() || !advantage.ok()) return;
   fit.adequacy = *adequacy;
   fit.over_base = *advantage;
@@ -251,7 +257,7 @@ void WarmFits::Judge(const std::string& effect) {
   fit.best = PointOf(fit.view, points, adequacy->best);
   fit.rms = std::sqrt(fit.model.histories.rowwise().squaredNorm().minCoeff() /
                       static_cast<double>(fit.model.histories.cols()));
-  if (const auto error = inference::LeftOutError(fit.model, response_.parts); error.ok()) {
+  if (const auto error = inference::LeftOutError(by_base, response_.parts); error.ok()) {
     fit.left_out_error = *error;
   }
 }

@@ -206,12 +206,6 @@ bool CampaignRun::IsOfRunningIteration(int sample) const {
   return sample / record_.submitted.samples == record_.progress.iteration;
 }
 
-int CampaignRun::SamplesOfRunningIteration() const {
-  return static_cast<int>(
-      std::count_if(parameters_.begin(), parameters_.end(),
-                    [this](const auto& item) { return IsOfRunningIteration(item.first); }));
-}
-
 void CampaignRun::AddState(const EvaluationKey& key, int load_step,
                            std::span<const double> observables) {
   evaluations_[key].missing.erase(load_step);
@@ -246,10 +240,21 @@ bool CampaignRun::ShouldStop(const EvaluationKey& key) const {
   return BestPossible(*definition_, own) < threshold->second;
 }
 
+// The running iteration; where points are chosen while others run, as many of the last points as
+// the first iteration has samples.
+bool CampaignRun::CountsForPause(int sample) const {
+  if (definition_->campaign.method != campaign::Method::kSurrogateMsrs) {
+    return IsOfRunningIteration(sample);
+  }
+  const auto found = parameters_.find(sample);
+  return found != parameters_.end() &&
+         std::distance(found, parameters_.end()) <= record_.submitted.samples;
+}
+
 int CampaignRun::Diverged() const {
   std::set<int> samples;
   for (const EvaluationKey& key : With(EvaluationStatus::kDiverged)) {
-    if (IsOfRunningIteration(key.sample)) {
+    if (CountsForPause(key.sample)) {
       samples.insert(key.sample);
     }
   }
@@ -257,13 +262,14 @@ int CampaignRun::Diverged() const {
 }
 
 int CampaignRun::Done() const {
+  std::set<int> all;
   std::set<int> open;
   for (const auto& [key, evaluation] : evaluations_) {
-    if (IsOfRunningIteration(key.sample) && !store::IsTerminal(evaluation.status)) {
-      open.insert(key.sample);
-    }
+    if (!CountsForPause(key.sample)) continue;
+    all.insert(key.sample);
+    if (!store::IsTerminal(evaluation.status)) open.insert(key.sample);
   }
-  return SamplesOfRunningIteration() - static_cast<int>(open.size());
+  return static_cast<int>(all.size() - open.size());
 }
 
 LiveView CampaignRun::View() const {

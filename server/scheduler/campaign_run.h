@@ -97,7 +97,7 @@ class CampaignRun {
   using ArrivedBySample = std::map<int, Arrived>;
   absl::Status AddStates(const absl::StatusOr<std::vector<store::StateRecord>>& states);
   bool IsOfRunningIteration(int sample) const;
-  int SamplesOfRunningIteration() const;
+  bool CountsForPause(int sample) const;
   /// Results that a plan could go by: how many have ended, in their order up to the first that has
   /// not where the campaign decides reproducibly.
   std::size_t Results() const;

@@ -30,6 +30,7 @@ double LogSumExp(const std::vector<double>& terms) {
 }
 
 constexpr double kAudited = 0.02;  // of the stopped samples
+constexpr double kFinishedPerEffective = 2;
 
 struct Finished {
   double exponent = 1;                // of the likelihood in all weights
@@ -90,6 +91,14 @@ bool StopsEarly(const Definition& definition) {
          definition.campaign.filter.noise != inference::NoiseMode::kEssTarget;
 }
 
+double FinishedWanted(const Definition& definition) {
+  const campaign::Campaign& campaign = definition.campaign;
+  const double share = campaign.early_stopping->exponent ? 0 : campaign.filter.ess_target;
+  const double effective =
+      std::max(share * campaign.samples, 2.0 * static_cast<double>(definition.priors.size()));
+  return std::ceil(kFinishedPerEffective * effective);
+}
+
 absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
                                                    const History& history,
                                                    const inference::Iteration& next) {
@@ -125,6 +134,12 @@ absl::StatusOr<std::vector<std::pair<int, double>>> ThresholdsNow(const Definiti
   const auto finished = FinishedMass(definition, history, importance);
   if (!finished.ok()) {
     return finished.status();
+  }
+  const auto done = std::count_if(finished->log_weights.begin(), finished->log_weights.end(),
+                                  [](double weight) { return std::isfinite(weight); });
+  if (!definition.campaign.early_stopping->exponent &&
+      static_cast<double>(done) < FinishedWanted(definition)) {
+    return changed;
   }
   const std::vector<char>& ended = history.ended.back();
   const auto n = static_cast<Eigen::Index>(ended.size());

@@ -31,6 +31,10 @@ namespace calib::scheduler {
 /// Whether a campaign may stop samples at all: it asks for it, and its noise is fixed in advance.
 bool StopsEarly(const Definition& definition);
 
+/// Samples that have to finish before the guiding exponent is known: twice as many as it leaves
+/// effective. An exponent that the campaign gives asks for none effective but 2 d.
+double FinishedWanted(const Definition& definition);
+
 /// Per new sample, the largest LogLikelihoodBound with which it is stopped:
 ///   [ln(finished weight) + ln(discard_at_most / N) - ln(prior / proposals)_i] / exponent
 /// where exponent is the guiding one and the proposals are those of all iterations and the new one.
@@ -40,7 +44,9 @@ absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
                                                    const inference::Iteration& next);
 
 /// (sample, threshold as above) of the samples of the last iteration that are under way and may be
-/// stopped, where it is another than the one they have; next: the last iteration itself.
+/// stopped, where it is another than the one they have; next: the last iteration itself. None
+/// before FinishedWanted samples have finished, unless the campaign gives the exponent: of fewer
+/// the guiding one is too sharp, and would stop runs in the middle of the posterior.
 absl::StatusOr<std::vector<std::pair<int, double>>> ThresholdsNow(const Definition& definition,
                                                                   const History& history);
 

@@ -28,7 +28,6 @@ std::vector<int> RungsOf(const Definition& definition, int experiment) {
 }
 
 /// So many finished samples per effective one.
-constexpr double kFinishedPerEffective = 2;
 
 }  // namespace
 
@@ -66,13 +65,7 @@ std::vector<store::EvaluationKey> Scouts(const Definition& definition, const His
   for (const std::vector<char>& diverged : history.diverged) {
     finished += static_cast<double>(std::count(diverged.begin(), diverged.end(), 0));
   }
-  // So many that are effective is what inference::GuidingExponent asks for; an exponent that the
-  // campaign gives asks for none.
-  const double share =
-      definition.campaign.early_stopping->exponent ? 0 : definition.campaign.filter.ess_target;
-  const double effective = std::max(share * definition.campaign.samples,
-                                    2.0 * static_cast<double>(definition.priors.size()));
-  const double wanted = std::ceil(kFinishedPerEffective * effective);
+  const double wanted = FinishedWanted(definition);
   if (finished >= wanted) {
     return {};
   }

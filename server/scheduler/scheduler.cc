@@ -324,7 +324,9 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
   const bool begins = plan.start.has_value() && !plan.start->continues;
   if (begins) {
     progress.iteration = plan.start->iteration;
-    progress.pause_waived = false;
+    if (run->definition().campaign.method != campaign::Method::kSurrogateMsrs) {
+      progress.pause_waived = false;  // its iterations are blocks of one run of points
+    }
   }
   if (plan.event.has_value()) {
     plan.log.push_back(

@@ -153,7 +153,8 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
     status.set_effective_sample_size((*posterior)->ess());
     status.set_best_misfit((*posterior)->best_misfit());
   }
-  if (live.has_value() && record->progress.phase == "calibrating") {
+  // Nothing is known of it before all its samples have a reading in common.
+  if (live.has_value() && record->progress.phase == "calibrating" && live->view.best_misfit > 0) {
     status.set_effective_sample_size(live->view.effective_samples);
     status.set_best_misfit(live->view.best_misfit);
   }

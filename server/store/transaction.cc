@@ -179,8 +179,10 @@ void Transaction::ReuseEvaluation(const EvaluationKey& from, const EvaluationKey
     connection_.Run(
         "UPDATE evaluation SET (status, reason, reused) = (SELECT status, reason, 1 "
         "FROM evaluation WHERE campaign = ? AND sample = ? AND experiment = ?) "
-        "WHERE campaign = ? AND sample = ? AND experiment = ?",
-        from.campaign, from.sample, from.experiment, to.campaign, to.sample, to.experiment);
+        "WHERE campaign = ? AND sample = ? AND experiment = ? AND EXISTS (SELECT 1 FROM evaluation "
+        "WHERE campaign = ? AND sample = ? AND experiment = ?)",  // it may have been deleted since
+        from.campaign, from.sample, from.experiment, to.campaign, to.sample, to.experiment,
+        from.campaign, from.sample, from.experiment);
     connection_.Run(
         "INSERT INTO state(campaign, sample, experiment, load_step, observables) "
         "SELECT ?, ?, ?, load_step, observables FROM state "

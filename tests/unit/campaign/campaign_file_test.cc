@@ -218,19 +218,23 @@ TEST(CampaignFile, ReadingsOutsideWhatTheirObservableCanBe) {
   };
   EXPECT_EQ(problems("porosity", {"0.39", "0.4", "0.41"}), "");
   EXPECT_EQ(problems("porosity", {"39", "40", "41"}),
-            "validation.csv:2: porosity: porosity is 39 here (and impossible in 2 later rows); it "
+            "validation.csv:2: porosity: is 39 here (and impossible in 2 later rows); it "
             "has to be between 0 and 1; if the column is in percent, say so: units: {porosity: "
             "percent}\n");
   EXPECT_EQ(problems("void_ratio", {"0.7", "0.71", "72"}),
-            "validation.csv:4: void_ratio: void_ratio is 72 here; it has to be between 0 and 20; "
+            "validation.csv:4: void_ratio: is 72 here; it has to be between 0 and 20; "
             "if the column is in percent, say so: units: {void_ratio: percent}\n");
-  EXPECT_EQ(problems("mean_stress", {"1e5", "-1e5", "2e5"}),
-            "validation.csv:3: mean_stress: mean_stress is -100000 here; it has to be at least 0; "
-            "compression is positive and grains carry no tension: see to its sign\n");
+  EXPECT_EQ(
+      problems("mean_stress", {"1e5", "-1e5", "-2e5"}),
+      "validation.csv:3: mean_stress: is -100000 here (and impossible in 1 later row); it has "
+      "to be at least 0; compression is positive here: see to its sign\n");
+  EXPECT_EQ(problems("mean_stress", {"1e5", "-1e5", "2e5"}), "") << "grains may stick together";
   EXPECT_EQ(problems("q_over_p", {"-1.5", "3", "0"}), "");
-  EXPECT_EQ(problems("q_over_p", {"0.8", "1", "3.1"}),
-            "validation.csv:4: q_over_p: q_over_p is 3.1 here; it has to be between -1.5 (no axial "
-            "stress) and 3 (no lateral one); compression is positive and grains carry no tension: "
+  EXPECT_EQ(problems("mean_stress", {"1e3", "-2", "-300"}), "") << "liquefied, zeros drift";
+  EXPECT_EQ(problems("porosity", {"0.4", "1.1"}), "") << "two of its errors";
+  EXPECT_EQ(problems("q_over_p", {"0.8", "-4", "-5"}),
+            "validation.csv:3: q_over_p: is -4 here (and impossible in 1 later row); it has to be "
+            "between -1.5 (no axial stress) and 3 (no lateral one); compression is positive here: "
             "see to its sign\n");
   EXPECT_EQ(problems("deviatoric_stress", {"-1e9", "0", "1e9"}), "") << "nothing is certain of it";
 }

@@ -86,6 +86,21 @@ TEST_F(VerdictTest, TheOnlyOneThatExplainsIsNamed) {
   EXPECT_EQ(diagnosis_.effect, "rolling");
 }
 
+// All the misfit in one stage of loading: the bootstrap over blocks of readings knows no more than
+// one of them.
+TEST_F(VerdictTest, AMisfitInOneStageThatGoesIsExplained) {
+  for (const bool beyond_doubt : {true, false}) {
+    diagnosis_ = {};
+    diagnosis_.adequacy.p_value = beyond_doubt ? 1e-50 : 1e-3;
+    Refit("plasticity", kClose, 0.95);
+    fits_["plasticity"].over_base = {.nats = 500, .sd = 300};
+    EXPECT_EQ(Concluded(), beyond_doubt ? "missing_effect" : "unexplained");
+    diagnosis_.candidates.front().explained_fraction = 0.8;
+    diagnosis_.effect = "";
+    EXPECT_EQ(Concluded(), "unexplained");
+  }
+}
+
 TEST_F(VerdictTest, TwoThatDoAsWellAreNamedTogether) {
   Refit("rolling", kClose);
   Refit("twisting", 1.05 * kClose);

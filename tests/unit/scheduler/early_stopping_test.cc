@@ -292,6 +292,28 @@ TEST(EarlyStopping, DecidedAtOnceItStopsInTheFirstIterationWithinTheStatedLoss) 
   }
 }
 
+// Without an exponent of the campaign's the guiding one, of few finished samples too sharp by far,
+// has to wait for as many as it is meant for.
+TEST(EarlyStopping, DecidedAtOnceItWaitsForTheSamplesThatGuide) {
+  const auto campaign =
+      testing::MakeSmallCampaign({.samples = 40,
+                                  .max_iterations = 1,
+                                  .load_steps = 12,
+                                  .failure_attempts = 100,
+                                  .relative_noise = 0.005,
+                                  .method = "sqmc",
+                                  .inference = "  ess_target: 0.2\n  decisions: immediate\n",
+                                  .extra = "early_stopping: {discard_at_most: 1e-3}\n"});
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SimulatedService service("at_once_guided");
+    service.Submit(campaign);
+    service.RunToEnd(seed, true);
+    const v1::Posterior posterior = LastPosterior(service);
+    EXPECT_LE(posterior.stopped_early(), 40 - 2 * 8);
+    EXPECT_LE(posterior.stated_loss(), kAllowed);
+  }
+}
+
 TEST(EarlyStopping, ThresholdIsNeverSetWithoutAFinishedSample) {
   SimulatedService service("thresholds");
   service.Submit(Campaign(kStopping));
