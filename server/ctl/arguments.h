@@ -17,6 +17,8 @@ struct Arguments {
   bool json = false;
 
   // Of some.
+  bool with_children = false;            ///< of delete: what comes from the campaign too
+  bool force = false;                    ///< of delete: although something comes from it
   std::string file;                      ///< campaign file
   std::string campaign;                  ///< id
   std::vector<std::string> campaigns{};  ///< ids
@@ -32,8 +34,6 @@ struct Arguments {
   int draws = 20;                               ///< of the posterior, to predict from
   std::vector<std::string> exceed;              ///< OBSERVABLE=LEVEL
   std::string output;                           ///< file or folder; empty: standard output
-  bool with_children = false;                   ///< of delete: what comes from the campaign too
-  bool force = false;                           ///< of delete: although something comes from it
   std::string vtk;                              ///< folder
   std::string checkpoint;                       ///< folder
 };

@@ -84,7 +84,8 @@ std::string Reasons(const std::string& heading,
   std::map<std::string, std::string> by_reason;
   for (const auto& [effect, reason] : list) {
     std::string& names = by_reason[reason];
-    names += (names.empty() ? "" : ", ") + NameForPeople(effect);
+    names += names.empty() ? "" : ", ";
+    names += NameForPeople(effect);
   }
   std::string html = "<h3>" + heading + "</h3>\n<ul>\n";
   for (const auto& [reason, names] : by_reason) {
