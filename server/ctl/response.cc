@@ -65,6 +65,7 @@ std::vector<int> PackingsOf(const campaign::Campaign& campaign, const RunTable& 
   }
   packings = std::max(1, packings);
   std::vector<int> packing;
+  packing.reserve(rows.size());
   for (const Index row : rows) {
     packing.push_back(runs.stream[static_cast<std::size_t>(row)] % packings);
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <ctime>
 
+#include "absl/strings/str_cat.h"
 #include "server/report/html.h"
 #include "server/report/sections.h"
 #include "server/report/stored_diagnosis.h"
@@ -89,7 +90,7 @@ std::string Reasons(const std::string& heading,
   }
   std::string html = "<h3>" + heading + "</h3>\n<ul>\n";
   for (const auto& [reason, names] : by_reason) {
-    html += "<li>" + Escape(names + ": " + reason) + ".</li>\n";
+    absl::StrAppend(&html, "<li>", Escape(absl::StrCat(names, ": ", reason)), ".</li>\n");
   }
   return html + "</ul>\n";
 }
