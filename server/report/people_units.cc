@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ctime>
 #include <numbers>
 
 namespace calib::report {
@@ -76,6 +77,14 @@ std::string NumberWithUnit(double value, const std::string& name, const std::str
   const DisplayUnit unit = UnitForPeople(name, si_unit, std::abs(value));
   const std::string number = Number(value * unit.factor, digits);
   return unit.label.empty() ? number : number + (unit.label == "%" ? "" : " ") + unit.label;
+}
+
+std::string DateForPeople(std::int64_t unix_ms) {
+  const std::time_t seconds = unix_ms / 1000;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02} UTC", utc.tm_year + 1900, utc.tm_mon + 1,
+                     utc.tm_mday, utc.tm_hour, utc.tm_min);
 }
 
 std::string Percent(double share, int digits) {

@@ -2,6 +2,7 @@
 // Units and numbers as people like to read them: MPa instead of 1e6 Pa, percent for strains,
 // degrees for angles.
 
+#include <cstdint>
 #include <string>
 
 namespace calib::report {
@@ -23,6 +24,9 @@ std::string NameForPeople(const std::string& name);
 /// `digits` significant digits without trailing zeros, no exponent between 1e-3 and 1e6; "–" for
 /// NaN.
 std::string Number(double value, int digits = 4);
+
+/// "2026-11-23 03:46 UTC".
+std::string DateForPeople(std::int64_t unix_ms);
 
 /// A share in percent: "4.1 %"; "–" for NaN.
 std::string Percent(double share, int digits);

@@ -1,23 +1,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <ctime>
 
 #include "absl/strings/str_cat.h"
 #include "server/report/html.h"
+#include "server/report/people_units.h"
 #include "server/report/sections.h"
 #include "server/report/stored_diagnosis.h"
 
 namespace calib::report {
 namespace {
-
-std::string DayOf(std::int64_t unix_ms) {
-  const std::time_t seconds = unix_ms / 1000;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02} UTC", utc.tm_year + 1900, utc.tm_mon + 1,
-                     utc.tm_mday, utc.tm_hour, utc.tm_min);
-}
 
 std::string OrDash(const std::optional<double>& value, int digits) {
   return value ? Number(*value, digits) : "–";
@@ -141,7 +133,7 @@ std::string DiagnosisSection(const ReportData& data) {
   html += CandidateTable(*d) + Detectable(*d) + Reasons("Not to be detected", d->undetectable) +
           Reasons("Not tried", d->not_excitable) + NextExperimentHtml(*d);
   return html + fmt::format("<p class=\"sub\">Diagnosis of {}, kept as SHA-256 {}.</p>\n",
-                            DayOf(d->created_unix_ms), Escape(d->digest));
+                            DateForPeople(d->created_unix_ms), Escape(d->digest));
 }
 
 }  // namespace calib::report

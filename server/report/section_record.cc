@@ -1,9 +1,8 @@
 #include <fmt/format.h>
 
-#include <ctime>
-
 #include "dem/catalog/catalog.h"
 #include "server/report/html.h"
+#include "server/report/people_units.h"
 #include "server/report/sections.h"
 
 namespace calib::report {
@@ -17,14 +16,6 @@ std::string Listed(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
   return text.empty() ? "none" : text;
-}
-
-std::string Date(std::int64_t unix_ms) {
-  const std::time_t seconds = unix_ms / 1000;
-  std::tm utc{};
-  gmtime_r(&seconds, &utc);
-  return fmt::format("{:04}-{:02}-{:02} {:02}:{:02} UTC", utc.tm_year + 1900, utc.tm_mon + 1,
-                     utc.tm_mday, utc.tm_hour, utc.tm_min);
 }
 
 std::string NoiseSentence(const campaign::Campaign& campaign) {
@@ -73,7 +64,7 @@ std::string RecordSection(const ReportData& data) {
   const campaign::Campaign& campaign = view.campaign;
   std::string html =
       "<h2>Record</h2>\n<dl>\n" + Entry("campaign", view.status.campaign()) +
-      Entry("submitted", Date(view.status.created_unix_ms())) +
+      Entry("submitted", DateForPeople(view.status.created_unix_ms())) +
       Entry("model", campaign.precomputed ? "runs made elsewhere" : campaign.model.contact) +
       Entry("effects", campaign.precomputed ? "–" : Listed(campaign.model.effects)) +
       Entry("engine", dem::EngineVersion()) + Entry("seed", std::to_string(campaign.seed)) +

@@ -74,12 +74,9 @@ class SurrogateMethod final : public Method {
 
   absl::StatusOr<Outcome> Conclude(const History& history, bool goes_on) const override {
     const auto results = Results(history);
-    auto state = Pending(history);
-    if (!results.ok() || !state.ok()) {
-      return results.ok() ? state.status() : results.status();
-    }
-    if (absl::Status status = ReportEnded(*results, *state); !status.ok()) {
-      return status;
+    auto state = Known(history, results, true);
+    if (!state.ok()) {
+      return state.status();
     }
     if (state->best < 0) {
       return absl::FailedPreconditionError(
@@ -100,16 +97,11 @@ class SurrogateMethod final : public Method {
   }
 
   absl::StatusOr<Batch> More(const History& history, std::int64_t affordable) const override {
-    const auto results = Results(history);
-    auto state = Pending(history);
-    if (!results.ok() || !state.ok()) {
-      return results.ok() ? state.status() : results.status();
-    }
     const bool at_once = campaign_.decisions == campaign::Decisions::kImmediate;
-    if (at_once) {
-      if (absl::Status status = ReportEnded(*results, *state); !status.ok()) {
-        return status;
-      }
+    const auto results = Results(history);
+    auto state = Known(history, results, at_once);
+    if (!state.ok()) {
+      return state.status();
     }
     const Eigen::Index size = campaign::LaterBatch(campaign_);
     const Eigen::Index last = history.iterations.back().parameters.rows();
@@ -146,12 +138,9 @@ class SurrogateMethod final : public Method {
   absl::StatusOr<std::vector<std::pair<int, double>>> Thresholds(
       const History& history) const override {
     const auto results = Results(history);
-    auto state = Pending(history);
-    if (!results.ok() || !state.ok()) {
-      return results.ok() ? state.status() : results.status();
-    }
-    if (absl::Status status = ReportEnded(*results, *state); !status.ok()) {
-      return status;
+    auto state = Known(history, results, true);
+    if (!state.ok()) {
+      return state.status();
     }
     std::vector<std::pair<int, double>> changed;
     for (std::size_t i = 0; i < results->size(); ++i) {
@@ -276,18 +265,27 @@ class SurrogateMethod final : public Method {
     return state;
   }
 
-  absl::Status ReportEnded(const std::vector<Result>& results, State& state) const {
-    for (std::size_t i = 0; i < results.size(); ++i) {
-      if (!results[i].ended) {
+  /// The optimiser with all points chosen so far, and with the results of those that have ended if
+  /// `ended`; without them all are pending.
+  absl::StatusOr<State> Known(const History& history,
+                              const absl::StatusOr<std::vector<Result>>& results,
+                              bool ended) const {
+    auto state = Pending(history);
+    if (!results.ok() || !state.ok()) {
+      return results.ok() ? state.status() : results.status();
+    }
+    for (std::size_t i = 0; ended && i < results->size(); ++i) {
+      const Result& result = (*results)[i];
+      if (!result.ended) {
         continue;
       }
       if (absl::Status status =
-              inference::Report(options_, static_cast<int>(i), results[i].value, state);
+              inference::Report(options_, static_cast<int>(i), result.value, *state);
           !status.ok()) {
         return status;
       }
     }
-    return absl::OkStatus();
+    return state;
   }
 
   /// reported: results that the state knows, the first ones.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
@@ -292,25 +293,42 @@ TEST(EarlyStopping, DecidedAtOnceItStopsInTheFirstIterationWithinTheStatedLoss) 
   }
 }
 
-// Without an exponent of the campaign's the guiding one, of few finished samples too sharp by far,
-// has to wait for as many as it is meant for.
+// Of few finished samples the guiding exponent is one, and stops what lies a few nats lower:
+// without an exponent of the campaign's nothing is stopped before twice as many as it leaves
+// effective.
 TEST(EarlyStopping, DecidedAtOnceItWaitsForTheSamplesThatGuide) {
-  const auto campaign =
-      testing::MakeSmallCampaign({.samples = 40,
-                                  .max_iterations = 1,
-                                  .load_steps = 12,
-                                  .failure_attempts = 100,
-                                  .relative_noise = 0.005,
-                                  .method = "sqmc",
-                                  .inference = "  ess_target: 0.2\n  decisions: immediate\n",
-                                  .extra = "early_stopping: {discard_at_most: 1e-3}\n"});
-  for (unsigned seed = 1; seed <= 3; ++seed) {
-    SimulatedService service("at_once_guided");
-    service.Submit(campaign);
-    service.RunToEnd(seed, true);
-    const v1::Posterior posterior = LastPosterior(service);
-    EXPECT_LE(posterior.stopped_early(), 40 - 2 * 8);
-    EXPECT_LE(posterior.stated_loss(), kAllowed);
+  constexpr int kSamples = 40;
+  constexpr int kWanted = 16;  // 2 x 0.2 x 40
+  Definition definition = *MakeDefinition(campaign::Campaign{});
+  definition.campaign.samples = kSamples;
+  definition.campaign.filter = {.ess_target = 0.2, .seed = 3};
+  definition.campaign.early_stopping = campaign::EarlyStopping{.discard_at_most = 1e-3};
+  definition.campaign.decisions = campaign::Decisions::kImmediate;
+  definition.priors =
+      std::vector<inference::Prior>{{.kind = inference::PriorKind::kUniform, .min = -3, .max = 3}};
+  definition.data.readings.push_back({.load_step = 0, .value = 0, .sd = 0.01});
+  inference::Iteration iteration;
+  iteration.parameters = *inference::DrawSamples(iteration.proposal, definition.priors,
+                                                 definition.campaign.filter, 0, kSamples);
+  for (const int done : {1, kWanted - 1, kWanted}) {
+    for (const bool given : {false, true}) {
+      definition.campaign.early_stopping->exponent =
+          given ? std::optional<double>(1) : std::nullopt;
+      History history;
+      history.iterations = {iteration};
+      history.iterations[0].predictions = iteration.parameters;
+      history.iterations[0].predictions.bottomRows(kSamples - done).setConstant(std::nan(""));
+      history.ended = {std::vector<char>(kSamples, 0)};
+      std::fill_n(history.ended[0].begin(), done, 1);
+      for (int i = 0; i < kSamples; ++i) {
+        history.samples.push_back(
+            {.sample = i, .iteration = 0, .stop_below = -std::numeric_limits<double>::infinity()});
+      }
+      const auto thresholds = *ThresholdsNow(definition, history);
+      const bool known = given || done >= kWanted;
+      EXPECT_EQ(thresholds.size(), known ? static_cast<std::size_t>(kSamples - done) : 0U)
+          << done << " finished, exponent " << (given ? "given" : "guiding");
+    }
   }
 }
 
