@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "inference/sampling/philox.h"
 #include "inference/scatter/shrunk_covariance.h"
@@ -125,6 +126,15 @@ void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
 }
 
 }  // namespace
+
+int PackingsApart(const campaign::Campaign& campaign) {
+  int packings = 0;
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    if (experiment.role != campaign::Role::kCalibrate || experiment.specimens.size() < 2) continue;
+    packings = std::gcd(packings, static_cast<int>(experiment.specimens.size()));
+  }
+  return std::max(1, packings);
+}
 
 MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
                                        const inference::StateEmulator& emulator,

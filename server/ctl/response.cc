@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <set>
 #include <utility>
 
@@ -58,12 +57,7 @@ std::vector<int> PartsOf(const campaign::Campaign& campaign, const inference::Da
 // Of some of the runs: those that share a packing in any experiment have the same number.
 std::vector<int> PackingsOf(const campaign::Campaign& campaign, const RunTable& runs,
                             const std::vector<Index>& rows) {
-  int packings = 0;
-  for (const campaign::Experiment& experiment : campaign.experiments) {
-    if (experiment.role != campaign::Role::kCalibrate || experiment.specimens.size() < 2) continue;
-    packings = std::gcd(packings, static_cast<int>(experiment.specimens.size()));
-  }
-  packings = std::max(1, packings);
+  const int packings = PackingsApart(campaign);
   std::vector<int> packing;
   packing.reserve(rows.size());
   for (const Index row : rows) {
