@@ -240,37 +240,41 @@ bool CampaignRun::ShouldStop(const EvaluationKey& key) const {
   return BestPossible(*definition_, own) < threshold->second;
 }
 
-// The running iteration; where points are chosen while others run, as many of the last points as
-// the first iteration has samples.
-bool CampaignRun::CountsForPause(int sample) const {
-  if (definition_->campaign.method != campaign::Method::kSurrogateMsrs) {
-    return IsOfRunningIteration(sample);
+std::set<int> CampaignRun::OpenSamples() const {
+  std::set<int> open;
+  for (const auto& [key, evaluation] : evaluations_) {
+    if (!store::IsTerminal(evaluation.status)) open.insert(key.sample);
   }
-  const auto found = parameters_.find(sample);
-  return found != parameters_.end() &&
-         std::distance(found, parameters_.end()) <= record_.submitted.samples;
+  return open;
+}
+
+// Where points are chosen while others run, those that end are of iterations before the newest: the
+// last that have ended, as many as the first iteration has samples, stand for the running one.
+std::set<int> CampaignRun::EndedForPause() const {
+  const std::set<int> open = OpenSamples();
+  const bool overlaps = definition_->campaign.method == campaign::Method::kSurrogateMsrs;
+  const auto most = static_cast<std::size_t>(record_.submitted.samples);
+  std::set<int> ended;
+  for (auto it = parameters_.rbegin(); it != parameters_.rend(); ++it) {
+    if (overlaps ? ended.size() == most : !IsOfRunningIteration(it->first)) break;
+    if (open.count(it->first) == 0) ended.insert(it->first);
+  }
+  return ended;
 }
 
 int CampaignRun::Diverged() const {
+  const bool overlaps = definition_->campaign.method == campaign::Method::kSurrogateMsrs;
+  const std::set<int> ended = overlaps ? EndedForPause() : std::set<int>{};
   std::set<int> samples;
   for (const EvaluationKey& key : With(EvaluationStatus::kDiverged)) {
-    if (CountsForPause(key.sample)) {
+    if (overlaps ? ended.count(key.sample) > 0 : IsOfRunningIteration(key.sample)) {
       samples.insert(key.sample);
     }
   }
   return static_cast<int>(samples.size());
 }
 
-int CampaignRun::Done() const {
-  std::set<int> all;
-  std::set<int> open;
-  for (const auto& [key, evaluation] : evaluations_) {
-    if (!CountsForPause(key.sample)) continue;
-    all.insert(key.sample);
-    if (!store::IsTerminal(evaluation.status)) open.insert(key.sample);
-  }
-  return static_cast<int>(all.size() - open.size());
-}
+int CampaignRun::Done() const { return static_cast<int>(EndedForPause().size()); }
 
 LiveView CampaignRun::View() const {
   Eigen::MatrixXd predictions(static_cast<Eigen::Index>(arrived_.size()),

@@ -81,7 +81,7 @@ class CampaignRun {
   void SetStopBelow(int sample, double stop_below) { stop_below_[sample] = stop_below; }
 
   /// Samples of the running iteration of which an evaluation diverged, and those with nothing left
-  /// to run.
+  /// to run; of surrogate_msrs the last that have ended, as many as its first iteration has.
   int Diverged() const;
   int Done() const;
   LiveView View() const;
@@ -97,7 +97,8 @@ class CampaignRun {
   using ArrivedBySample = std::map<int, Arrived>;
   absl::Status AddStates(const absl::StatusOr<std::vector<store::StateRecord>>& states);
   bool IsOfRunningIteration(int sample) const;
-  bool CountsForPause(int sample) const;
+  std::set<int> OpenSamples() const;
+  std::set<int> EndedForPause() const;
   /// Results that a plan could go by: how many have ended, in their order up to the first that has
   /// not where the campaign decides reproducibly.
   std::size_t Results() const;
