@@ -9,12 +9,13 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/scheduler/answer.h"
-#include "server/scheduler/attempt_spec.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
+#include "server/scheduler/held_out.h"
 #include "server/scheduler/history.h"
 #include "server/scheduler/method.h"
 #include "server/scheduler/posterior_record.h"
+#include "server/scheduler/requests.h"
 #include "server/scheduler/rungs.h"
 #include "server/scheduler/scatter.h"
 
@@ -22,12 +23,6 @@ namespace calib::scheduler {
 namespace {
 
 using campaign::Role;
-using store::EvaluationStatus;
-
-// Held-out experiments are run for the samples that carry the posterior: so many at most, and no
-// more of the weighted ones than hold this share.
-constexpr std::size_t kHeldOutRuns = 20;
-constexpr double kValidatedMass = 0.99;
 
 constexpr const char* kDecidedAtOnce =
     "Decisions were taken at once, by what had arrived (inference.decisions: immediate): not "
@@ -306,7 +301,7 @@ class Planner {
                                .iteration = start.iteration,
                                .parameters = best,
                                .log_weight = -std::numeric_limits<double>::infinity()});
-      if (absl::Status status = Ask(start.samples.back(), experiments); !status.ok()) {
+      if (absl::Status status = requests_.Run(start.samples.back(), experiments); !status.ok()) {
         return status;
       }
     }
@@ -375,74 +370,11 @@ class Planner {
            .parameters = {row.begin(), row.end()},
            .stop_below = batch->stop_below[position]});
       const bool refused = !batch->refused.empty() && batch->refused[position] != 0;
-      if (absl::Status status = AddEvaluations(start.samples.back(), refused); !status.ok()) {
+      if (absl::Status status = requests_.Calibrate(start.samples.back(), refused); !status.ok()) {
         return status;
       }
     }
     plan_.start = std::move(start);
-    return absl::OkStatus();
-  }
-
-  absl::Status AddEvaluations(const store::SampleRecord& sample, bool refused) {
-    if (campaign_.precomputed.has_value()) {
-      return TakeFromTables(sample);
-    }
-    if (!refused) {
-      const std::size_t first = plan_.evaluations.size();
-      absl::Status status = Ask(sample, definition_.ExperimentsOf(Role::kCalibrate));
-      for (std::size_t i = first; i < plan_.evaluations.size(); ++i) {
-        plan_.evaluations[i].rest_after =
-            FirstRung(definition_, plan_.evaluations[i].key.experiment);
-      }
-      return status;
-    }
-    for (const int experiment : definition_.ExperimentsOf(Role::kCalibrate)) {
-      plan_.evaluations.push_back({.key = {record_.submitted.id, sample.sample, experiment},
-                                   .status = EvaluationStatus::kStoppedEarly,
-                                   .reason = "outside the prior: rejected without a run",
-                                   .reused = true});  // no effort of this campaign
-    }
-    return absl::OkStatus();
-  }
-
-  /// Adds evaluations of these experiments, reusing what was run before.
-  absl::Status Ask(const store::SampleRecord& sample, const std::vector<int>& experiments) {
-    for (const int experiment : experiments) {
-      store::EvaluationRecord evaluation{
-          .key = {record_.submitted.id, sample.sample, experiment},
-          .digest = SpecDigest(SpecOf(campaign_, experiment, sample.parameters, sample.sample))};
-      const auto equal = reader_.FindEqual(evaluation.digest);
-      if (!equal.ok()) {
-        return equal.status();
-      }
-      if (equal->has_value()) {
-        plan_.reused.emplace_back(**equal, evaluation.key);
-      }
-      plan_.evaluations.push_back(std::move(evaluation));
-    }
-    return absl::OkStatus();
-  }
-
-  absl::Status TakeFromTables(const store::SampleRecord& sample) {
-    for (std::size_t e = 0; e < campaign_.experiments.size(); ++e) {
-      const std::size_t width = campaign_.experiments[e].observables.size();
-      const auto& values =
-          campaign_.precomputed->values[e][static_cast<std::size_t>(sample.sample)];
-      const bool finite =
-          std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-      const store::EvaluationKey key{record_.submitted.id, sample.sample, static_cast<int>(e)};
-      plan_.evaluations.push_back(
-          {.key = key,
-           .status = finite ? EvaluationStatus::kFinished : EvaluationStatus::kDiverged,
-           .reason = finite ? "" : "the table holds a value that is not finite",
-           .reused = true});
-      for (std::size_t r = 0; finite && (r + 1) * width <= values.size(); ++r) {
-        const auto at = values.begin() + static_cast<std::ptrdiff_t>(r * width);
-        plan_.states.push_back({.key = key,
-                                .load_step = static_cast<int>(r),
-                                .observables = {at, at + static_cast<std::ptrdiff_t>(width)}});
-      }
-    }
     return absl::OkStatus();
   }
 
@@ -457,65 +389,34 @@ class Planner {
     if (answer.FromEmulator()) {
       return ValidateDraws(answer.emulated->draws, experiments);
     }
-    return answer.draws.rows() > 0 ? ValidateEvenly(experiments) : ValidateSamples(experiments);
-  }
-
-  /// The runs on which evenly spaced shares of the weight fall.
-  absl::Status ValidateEvenly(const std::vector<int>& experiments) {
     const std::vector<double>& log_weights = plan_.conclusion->log_weights;
-    double mass = 0;
-    double next = 0.5;
-    for (std::size_t i = 0; i < log_weights.size(); ++i) {
-      mass += std::exp(log_weights[i]) * static_cast<double>(kHeldOutRuns);
-      if (mass <= next) {
-        continue;
-      }
-      next = std::floor(mass - 0.5) + 1.5;
-      if (absl::Status status = Ask(history_.samples[i], experiments); !status.ok()) {
+    for (const std::size_t i :
+         answer.draws.rows() > 0 ? EvenlyByWeight(log_weights) : Heaviest(log_weights)) {
+      if (absl::Status status = requests_.Run(history_.samples[i], experiments); !status.ok()) {
         return status;
       }
     }
     return absl::OkStatus();
   }
 
-  /// Draws evenly spaced in the population, as samples of an iteration of their own.
+  /// Some of the draws, as samples of an iteration of their own.
   absl::Status ValidateDraws(const Eigen::MatrixXd& draws, const std::vector<int>& experiments) {
     Start start{.iteration = static_cast<int>(history_.iterations.size()) + (replicating_ ? 1 : 0),
                 .proposal = kHeldOutDraws,
                 .samples = {}};
-    const auto count = static_cast<Eigen::Index>(
-        std::min({kHeldOutRuns, static_cast<std::size_t>(campaign_.samples),
-                  static_cast<std::size_t>(draws.rows())}));
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Eigen::VectorXd row = draws.row(i * draws.rows() / count);
+    const Eigen::MatrixXd rows = EvenlySpaced(draws, static_cast<std::size_t>(campaign_.samples));
+    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+      const Eigen::VectorXd row = rows.row(i);
       start.samples.push_back(
           {.sample = start.iteration * record_.submitted.samples + static_cast<int>(i),
            .iteration = start.iteration,
            .parameters = {row.begin(), row.end()},
            .log_weight = -std::numeric_limits<double>::infinity()});  // not of the ensemble
-      if (absl::Status status = Ask(start.samples.back(), experiments); !status.ok()) {
+      if (absl::Status status = requests_.Run(start.samples.back(), experiments); !status.ok()) {
         return status;
       }
     }
     plan_.draws = std::move(start);
-    return absl::OkStatus();
-  }
-
-  /// The samples with the largest weights (ties: the earlier sample).
-  absl::Status ValidateSamples(const std::vector<int>& experiments) {
-    const std::vector<double>& log_weights = plan_.conclusion->log_weights;
-    std::vector<std::size_t> order(log_weights.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::size_t a, std::size_t b) { return log_weights[a] > log_weights[b]; });
-    double mass = 0;
-    for (std::size_t i = 0; i < std::min(order.size(), kHeldOutRuns) && mass < kValidatedMass;
-         ++i) {
-      mass += std::exp(log_weights[order[i]]);
-      if (absl::Status status = Ask(history_.samples[order[i]], experiments); !status.ok()) {
-        return status;
-      }
-    }
     return absl::OkStatus();
   }
 
@@ -529,6 +430,7 @@ class Planner {
   double stated_loss_ = 0;
   Audit audit_;
   Plan plan_;
+  Requests requests_{definition_, record_.submitted.id, reader_, plan_};
 };
 
 }  // namespace

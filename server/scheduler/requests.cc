@@ -1,0 +1,76 @@
+#include "server/scheduler/requests.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/scheduler/attempt_spec.h"
+#include "server/scheduler/rungs.h"
+
+namespace calib::scheduler {
+
+using campaign::Role;
+using store::EvaluationStatus;
+
+absl::Status Requests::Calibrate(const store::SampleRecord& sample, bool refused) {
+  if (definition_.campaign.precomputed.has_value()) {
+    TakeFromTables(sample);
+    return absl::OkStatus();
+  }
+  if (!refused) {
+    const std::size_t first = plan_.evaluations.size();
+    absl::Status status = Run(sample, definition_.ExperimentsOf(Role::kCalibrate));
+    for (std::size_t i = first; i < plan_.evaluations.size(); ++i) {
+      plan_.evaluations[i].rest_after = FirstRung(definition_, plan_.evaluations[i].key.experiment);
+    }
+    return status;
+  }
+  for (const int experiment : definition_.ExperimentsOf(Role::kCalibrate)) {
+    plan_.evaluations.push_back({.key = {id_, sample.sample, experiment},
+                                 .status = EvaluationStatus::kStoppedEarly,
+                                 .reason = "outside the prior: rejected without a run",
+                                 .reused = true});  // no effort of this campaign
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Requests::Run(const store::SampleRecord& sample, const std::vector<int>& experiments) {
+  for (const int experiment : experiments) {
+    store::EvaluationRecord evaluation{
+        .key = {id_, sample.sample, experiment},
+        .digest =
+            SpecDigest(SpecOf(definition_.campaign, experiment, sample.parameters, sample.sample))};
+    const auto equal = reader_.FindEqual(evaluation.digest);
+    if (!equal.ok()) {
+      return equal.status();
+    }
+    if (equal->has_value()) {
+      plan_.reused.emplace_back(**equal, evaluation.key);
+    }
+    plan_.evaluations.push_back(std::move(evaluation));
+  }
+  return absl::OkStatus();
+}
+
+void Requests::TakeFromTables(const store::SampleRecord& sample) {
+  for (std::size_t e = 0; e < definition_.campaign.experiments.size(); ++e) {
+    const std::size_t width = definition_.campaign.experiments[e].observables.size();
+    const auto& values =
+        definition_.campaign.precomputed->values[e][static_cast<std::size_t>(sample.sample)];
+    const bool finite =
+        std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+    const store::EvaluationKey key{id_, sample.sample, static_cast<int>(e)};
+    plan_.evaluations.push_back(
+        {.key = key,
+         .status = finite ? EvaluationStatus::kFinished : EvaluationStatus::kDiverged,
+         .reason = finite ? "" : "the table holds a value that is not finite",
+         .reused = true});
+    for (std::size_t r = 0; finite && (r + 1) * width <= values.size(); ++r) {
+      const auto at = values.begin() + static_cast<std::ptrdiff_t>(r * width);
+      plan_.states.push_back({.key = key,
+                              .load_step = static_cast<int>(r),
+                              .observables = {at, at + static_cast<std::ptrdiff_t>(width)}});
+    }
+  }
+}
+
+}  // namespace calib::scheduler

@@ -1,0 +1,35 @@
+#pragma once
+// The evaluations that a sample needs: to be run, done before under the same digest, refused or
+// taken from tables of runs made elsewhere.
+
+#include <vector>
+
+#include "absl/status/status.h"
+#include "server/scheduler/definition.h"
+#include "server/scheduler/plan.h"
+#include "server/store/reader.h"
+
+namespace calib::scheduler {
+
+class Requests {
+ public:
+  /// Adds to `plan`. All must outlive it.
+  Requests(const Definition& definition, std::int64_t campaign, store::Reader& reader, Plan& plan)
+      : definition_(definition), id_(campaign), reader_(reader), plan_(plan) {}
+
+  /// The calibrated experiments, up to their first rung where samples rest at rungs. refused: by
+  /// the proposal, outside the prior; nothing is run. Errors: those of the store.
+  absl::Status Calibrate(const store::SampleRecord& sample, bool refused);
+  /// These experiments to their ends, reusing what was run before. Errors: those of the store.
+  absl::Status Run(const store::SampleRecord& sample, const std::vector<int>& experiments);
+
+ private:
+  void TakeFromTables(const store::SampleRecord& sample);
+
+  const Definition& definition_;
+  std::int64_t id_;
+  store::Reader& reader_;
+  Plan& plan_;
+};
+
+}  // namespace calib::scheduler

@@ -1,0 +1,42 @@
+#include "server/scheduler/held_out.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace calib::scheduler {
+namespace {
+
+std::vector<double> Logs(const std::vector<double>& weights) {
+  std::vector<double> logs;
+  for (const double w : weights) logs.push_back(std::log(w));
+  return logs;
+}
+
+TEST(HeldOut, TheHeaviestUpToTheirShareOfTheWeight) {
+  EXPECT_EQ(Heaviest(Logs({0.004, 0.5, 0.496})), (std::vector<std::size_t>{1, 2}));
+  EXPECT_EQ(Heaviest(Logs({0.25, 0.5, 0.25})), (std::vector<std::size_t>{1, 0, 2}))
+      << "ties: the earlier one";
+  EXPECT_EQ(Heaviest(std::vector<double>(100, std::log(0.01))).size(), kHeldOutRuns);
+  EXPECT_TRUE(Heaviest({}).empty());
+}
+
+TEST(HeldOut, EvenSharesOfTheWeightFallOnSamples) {
+  // Twenty shares: a sample with two of them is run once, one with half of one every other time.
+  std::vector<double> weights(40, 0.5 / 20);
+  EXPECT_EQ(EvenlyByWeight(Logs(weights)).size(), kHeldOutRuns);
+  EXPECT_EQ(EvenlyByWeight(Logs({0.1, 0.8, 0.1})), (std::vector<std::size_t>{0, 1, 2}));
+  EXPECT_EQ(EvenlyByWeight(Logs({0.001, 0.998, 0.001})), (std::vector<std::size_t>{1}));
+}
+
+TEST(HeldOut, DrawsEvenlySpacedInTheirOrder) {
+  const Eigen::MatrixXd draws = Eigen::VectorXd::LinSpaced(1000, 0, 999);
+  const Eigen::MatrixXd rows = EvenlySpaced(draws, 100);
+  ASSERT_EQ(rows.rows(), static_cast<Eigen::Index>(kHeldOutRuns));
+  EXPECT_EQ(rows(1, 0), 50);
+  EXPECT_EQ(EvenlySpaced(draws, 4)(3, 0), 750);
+  EXPECT_EQ(EvenlySpaced(draws.topRows(3), 100), draws.topRows(3));
+}
+
+}  // namespace
+}  // namespace calib::scheduler
