@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 namespace calib::ctl {
 namespace {
@@ -236,6 +235,43 @@ std::vector<ReadingEffect> EffectsOnReadings(
   });
   add("initial_density", "densification", kPorosity, kNoPorosity, ShiftPorosity);
   return effects;
+}
+
+std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
+                                            const inference::DataSet& data,
+                                            const Eigen::MatrixXd& histories,
+                                            const Eigen::VectorXd& gain,
+                                            const Eigen::VectorXd& offset) {
+  const std::vector<Curve> curves = CurvesOf(campaign, data);
+  const auto t = static_cast<Index>(data.readings.size());
+  Eigen::RowVectorXd value(t);
+  Eigen::RowVectorXd sd(t);
+  for (Index k = 0; k < t; ++k) {
+    value[k] = data.readings[static_cast<std::size_t>(k)].value;
+    sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+  }
+  for (const Curve& curve : curves) {
+    const Stress any{.axial = 1, .lateral = 1};
+    // Loads count from the start of loading, which must be among the readings.
+    const campaign::Experiment& experiment = *curve.experiment;
+    if (Read(experiment.control_name, any) || experiment.control.front() != 0) return std::nullopt;
+    const auto path = StressPath(curve, value);
+    for (const auto& [name, at] : curve.at) {
+      if (!Read(name, any)) continue;
+      for (std::size_t s = 0; s < at.size(); ++s) {
+        if (at[s] >= 0 && !(path[s] && path.front())) return std::nullopt;
+      }
+    }
+  }
+  Eigen::MatrixXd misread = histories;
+  Eigen::RowVectorXd change(t);
+  for (Index i = 0; i < histories.rows(); ++i) {
+    const Eigen::RowVectorXd y = value + histories.row(i).cwiseProduct(sd);
+    change.setZero();
+    for (const Curve& curve : curves) MisreadLoad(curve, gain[i], offset[i], y, change);
+    misread.row(i) += change.cwiseQuotient(sd);
+  }
+  return misread;
 }
 
 inference::FittedModel Join(const inference::FittedModel& model, const ReadingEffect& effect,

@@ -1,10 +1,11 @@
 #pragma once
 // Effects of the measurement's side and of the initial state on curves that exist already: for
 // campaigns whose runs were made elsewhere, where nothing can be run with and without an effect but
-// what an instrument does to a curve can be calculated.
+// what an instrument does to a curve can be calculated; and of load cells for all campaigns.
 
 #include <Eigen/Dense>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,6 +31,16 @@ struct ReadingEffect {
 std::vector<ReadingEffect> EffectsOnReadings(
     const campaign::Campaign& campaign, const Eigen::MatrixXd& histories,
     std::vector<std::pair<std::string, std::string>>& impossible);
+
+/// Histories as load cells with these errors read them, one gain [-] and offset [Pa] for each:
+/// exact, the specimen does not feel them. histories: N x T, (prediction - reading) / sd in the
+/// order of `data`. Empty where a calibrated experiment does not let it be calculated: its control
+/// is a stress, or a stress is read where the readings do not tell axial and lateral stress apart.
+std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
+                                            const inference::DataSet& data,
+                                            const Eigen::MatrixXd& histories,
+                                            const Eigen::VectorXd& gain,
+                                            const Eigen::VectorXd& offset);
 
 /// The model joined by the effect: at every point the strength in [lowest, highest] units that
 /// brings it closest to the readings. `strengths`: that of each point, in units.

@@ -177,13 +177,18 @@ absl::Status WarmFits::Continue(const std::string& effect) {
   return absl::OkStatus();
 }
 
-// Its own, those of the screen, and the base model's: at its null an effect changes nothing.
+// Its own, those of the screen, and the base model's: at its null an effect changes nothing, and
+// what a load cell does to a run can be calculated.
 report::RunTable WarmFits::RunsFor(const std::string& effect) const {
   const WarmFit& fit = fits_.at(effect);
   const campaign::Campaign& campaign = fit.view.campaign;
   report::RunTable runs = fit.runs;
   Append(RunsOfScreen(screen_.RunsWith(effect), campaign), runs);
-  Append(RunsWithoutEffect(base_.runs(), base_.view().campaign, campaign), runs);
+  const campaign::Campaign& parent = base_.view().campaign;
+  auto misread = effect == "load_cell_error"
+                     ? RunsMisread(base_.runs(), parent, base_.readings().of_mean, campaign)
+                     : std::nullopt;
+  Append(misread ? *std::move(misread) : RunsWithoutEffect(base_.runs(), parent, campaign), runs);
   return runs;
 }
 

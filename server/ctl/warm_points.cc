@@ -1,10 +1,10 @@
 #include "server/ctl/warm_points.h"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 #include "dem/catalog/catalog.h"
+#include "server/ctl/reading_effects.h"
 
 namespace calib::ctl {
 namespace {
@@ -24,6 +24,42 @@ inference::Iteration IterationOf(const report::RunTable& runs, const inference::
         (runs.histories.col(k).array() * reading.sd + reading.value).matrix();
   }
   return iteration;
+}
+
+// Column in the parent's table of each parameter of `extended`, -1: it is on top.
+std::vector<Index> ColumnsOf(const campaign::Campaign& parent, const campaign::Campaign& extended) {
+  std::vector<Index> from(extended.parameters.size(), -1);
+  for (std::size_t j = 0; j < from.size(); ++j) {
+    for (std::size_t k = 0; k < parent.parameters.size(); ++k) {
+      if (parent.parameters[k].name == extended.parameters[j].name) from[j] = static_cast<Index>(k);
+    }
+  }
+  return from;
+}
+
+std::vector<Index> OnTop(const campaign::Campaign& parent, const campaign::Campaign& extended) {
+  std::vector<Index> on_top;
+  const std::vector<Index> from = ColumnsOf(parent, extended);
+  for (std::size_t j = 0; j < from.size(); ++j) {
+    if (from[j] < 0) on_top.push_back(static_cast<Index>(j));
+  }
+  return on_top;
+}
+
+// The parent's runs with what is on top spread over its prior; empty where that cannot be drawn.
+report::RunTable SpreadOnTop(const report::RunTable& without, const campaign::Campaign& parent,
+                             const campaign::Campaign& extended) {
+  const auto spread =
+      inference::DrawSamples(inference::Proposal{}, campaign::Priors(extended), extended.filter, 0,
+                             static_cast<int>(without.parameters.rows()));
+  if (!spread.ok()) return {};
+  report::RunTable table = without;
+  table.parameters = *spread;
+  const std::vector<Index> from = ColumnsOf(parent, extended);
+  for (std::size_t j = 0; j < from.size(); ++j) {
+    if (from[j] >= 0) table.parameters.col(static_cast<Index>(j)) = without.parameters.col(from[j]);
+  }
+  return table;
 }
 
 }  // namespace
@@ -66,17 +102,9 @@ report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
 report::RunTable RunsWithoutEffect(const report::RunTable& without,
                                    const campaign::Campaign& parent,
                                    const campaign::Campaign& extended) {
-  const auto d = static_cast<Index>(extended.parameters.size());
-  std::vector<Index> from(static_cast<std::size_t>(d), -1);  // column of the parent
   std::vector<std::pair<Index, double>> nulls;
-  for (Index j = 0; j < d; ++j) {
+  for (const Index j : OnTop(parent, extended)) {
     const campaign::CalibratedParameter& own = extended.parameters[static_cast<std::size_t>(j)];
-    for (std::size_t k = 0; k < parent.parameters.size(); ++k) {
-      if (parent.parameters[k].name == own.name) {
-        from[static_cast<std::size_t>(j)] = static_cast<Index>(k);
-      }
-    }
-    if (from[static_cast<std::size_t>(j)] >= 0) continue;
     const dem::ParameterInfo* info = dem::FindParameter(
         extended.model.user_effects, extended.model.contact, extended.model.effects, own.name);
     const auto null =
@@ -84,24 +112,30 @@ report::RunTable RunsWithoutEffect(const report::RunTable& without,
     // A prior over orders of magnitude ends where the effect no longer matters.
     if (null) nulls.emplace_back(j, std::clamp(*null, own.prior.min, own.prior.max));
   }
-  report::RunTable table;
-  if (nulls.empty()) return table;
-  const auto spread =
-      inference::DrawSamples(inference::Proposal{}, campaign::Priors(extended), extended.filter, 0,
-                             static_cast<int>(without.parameters.rows()));
-  if (!spread.ok()) return table;
-  table.parameters = *spread;
-  table.histories = without.histories;
-  table.sample = without.sample;
-  table.stream = without.stream;
+  if (nulls.empty()) return {};
+  report::RunTable table = SpreadOnTop(without, parent, extended);
   for (Index i = 0; i < table.parameters.rows(); ++i) {
-    for (Index j = 0; j < d; ++j) {
-      const Index k = from[static_cast<std::size_t>(j)];
-      if (k >= 0) table.parameters(i, j) = without.parameters(i, k);
-    }
     const auto& [j, null] = nulls[static_cast<std::size_t>(i) % nulls.size()];
     table.parameters(i, j) = null;
   }
+  return table;
+}
+
+std::optional<report::RunTable> RunsMisread(const report::RunTable& without,
+                                            const campaign::Campaign& parent,
+                                            const inference::DataSet& data,
+                                            const campaign::Campaign& extended) {
+  report::RunTable table = SpreadOnTop(without, parent, extended);
+  Eigen::VectorXd gain = Eigen::VectorXd::Zero(table.parameters.rows());
+  Eigen::VectorXd offset = gain;
+  for (const Index j : OnTop(parent, extended)) {
+    const std::string& name = extended.parameters[static_cast<std::size_t>(j)].name;
+    if (name == "load_cell_error.gain") gain = table.parameters.col(j);
+    if (name == "load_cell_error.offset") offset = table.parameters.col(j);
+  }
+  auto misread = MisreadLoads(parent, data, table.histories, gain, offset);
+  if (!misread) return std::nullopt;
+  table.histories = *std::move(misread);
   return table;
 }
 

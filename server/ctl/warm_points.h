@@ -3,6 +3,7 @@
 // screen and of the base model at the effect's null among it.
 
 #include <Eigen/Dense>
+#include <optional>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -23,6 +24,14 @@ report::RunTable RunsOfScreen(const std::vector<EffectScreen::EffectRun>& runs,
 report::RunTable RunsWithoutEffect(const report::RunTable& without,
                                    const campaign::Campaign& parent,
                                    const campaign::Campaign& extended);
+
+/// The same runs read by load cells with errors drawn from their priors in `extended`, which has
+/// load_cell_error on top: a run at every strength, and no run to be made. data: units of the
+/// histories. Empty where it cannot be calculated (MisreadLoads).
+std::optional<report::RunTable> RunsMisread(const report::RunTable& without,
+                                            const campaign::Campaign& parent,
+                                            const inference::DataSet& data,
+                                            const campaign::Campaign& extended);
 
 /// The rows of `more` behind those of `runs`.
 void Append(const report::RunTable& more, report::RunTable& runs);

@@ -72,6 +72,48 @@ TEST(EffectsOnReadings, StressesFromTheirRatio) {
   }
 }
 
+TEST(MisreadLoads, EachHistoryByItsOwnGainAndOffset) {
+  const campaign::Campaign campaign = Triaxial("stress_ratio", kRatio, 0.1);
+  const inference::DataSet data = campaign::MakeDataSet(campaign);
+  const Eigen::MatrixXd histories = Eigen::MatrixXd::Constant(2, 5, 0.5);  // R is 0.05 larger
+  const auto misread =
+      MisreadLoads(campaign, data, histories, Eigen::Vector2d(0.1, -0.2), Eigen::Vector2d(0, 2e3));
+  ASSERT_TRUE(misread);
+  for (Eigen::Index k = 0; k < 5; ++k) {
+    const double load = kRatio[static_cast<std::size_t>(k)] - 1;  // over the cell pressure
+    EXPECT_NEAR((*misread)(0, k), 0.5 + 0.1 * load / 0.1, 1e-9);
+    EXPECT_NEAR((*misread)(1, k), 0.5 + (-0.2 * load + 2e3 / kPressure) / 0.1, 1e-9);
+  }
+}
+
+// A reading without the load cell stays as it is.
+TEST(MisreadLoads, NotWhatIsNoStress) {
+  campaign::Campaign campaign = Triaxial("stress_ratio", kRatio, 0.1);
+  campaign.experiments[0].observables.push_back(
+      {.name = "volumetric_strain", .values = {0, 0, 0, 0, 0}, .sd = {1, 1, 1, 1, 1}});
+  const inference::DataSet data = campaign::MakeDataSet(campaign);
+  const auto misread = MisreadLoads(campaign, data, Eigen::MatrixXd::Zero(1, 10),
+                                    Eigen::VectorXd::Constant(1, 0.1), Eigen::VectorXd::Zero(1));
+  ASSERT_TRUE(misread);
+  EXPECT_EQ((misread->array() != 0).count(), 4) << "four readings of the stress under load";
+}
+
+TEST(MisreadLoads, NothingWhereItCannotBeCalculated) {
+  const auto of = [](const campaign::Campaign& campaign) {
+    return MisreadLoads(campaign, campaign::MakeDataSet(campaign), Eigen::MatrixXd::Zero(1, 5),
+                        Eigen::VectorXd::Zero(1), Eigen::VectorXd::Zero(1));
+  };
+  campaign::Campaign driven = Triaxial("stress_ratio", kRatio, 0.1);
+  driven.experiments[0].control_name = "axial_stress";
+  EXPECT_FALSE(of(driven)) << "the rig follows the cell";
+  campaign::Campaign late = Triaxial("stress_ratio", kRatio, 0.1);
+  late.experiments[0].control[0] = 0.005;
+  EXPECT_FALSE(of(late)) << "the load at the start is not known";
+  campaign::Campaign undrained = Triaxial("deviatoric_stress", kRatio, 0.1);
+  undrained.experiments[0].test = "triaxial_undrained";
+  EXPECT_FALSE(of(undrained)) << "q alone, at a lateral stress that is not known";
+}
+
 // y read at strain e is y(e - x C): minus the slope of its stage times x C.
 TEST(EffectsOnReadings, ComplianceOfTheFrame) {
   std::vector<std::pair<std::string, std::string>> impossible;

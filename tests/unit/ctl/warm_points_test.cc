@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "server/ctl/reading_effects.h"
+
 namespace calib::ctl {
 namespace {
 
@@ -78,6 +80,29 @@ TEST(WarmPoints, AScreensRunCountsWhereItGivesEveryParameter) {
   ASSERT_EQ(table.parameters.rows(), 1);
   EXPECT_EQ(table.parameters(0, 1), 0.2);
   EXPECT_EQ(table.histories(0, 1), 2);
+}
+
+// Every run keeps what it was run with and is read at a strength of its own.
+TEST(WarmPoints, RunsAreReadByLoadCellsOfEveryStrength) {
+  campaign::Campaign parent = Square();
+  parent.experiments[0].control = {0, 0.02};
+  campaign::Campaign extended = parent;
+  extended.parameters.push_back(
+      {.name = "load_cell_error.gain",
+       .unit = "1",
+       .prior = {.kind = inference::PriorKind::kUniform, .min = -0.3, .max = 0.3}});
+  const report::RunTable runs = Runs(30);
+  const inference::DataSet data = campaign::MakeDataSet(parent);
+  const auto misread = RunsMisread(runs, parent, data, extended);
+  ASSERT_TRUE(misread);
+  EXPECT_EQ(misread->parameters.leftCols(2), runs.parameters);
+  EXPECT_LT(misread->parameters.col(2).minCoeff(), -0.2);
+  EXPECT_GT(misread->parameters.col(2).maxCoeff(), 0.2);
+  const auto expected = MisreadLoads(parent, data, runs.histories, misread->parameters.col(2),
+                                     Eigen::VectorXd::Zero(30));
+  ASSERT_TRUE(expected);
+  EXPECT_EQ(misread->histories, *expected);
+  EXPECT_GT((misread->histories - runs.histories).cwiseAbs().maxCoeff(), 0.1);
 }
 
 }  // namespace
