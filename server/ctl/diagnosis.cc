@@ -138,7 +138,11 @@ class Inquiry {
   }
 
   absl::Status ScreenEffects() {
-    const auto signatures = screen_.MeasureSignatures(options_.without);
+    const Eigen::LLT<Eigen::MatrixXd> factor(response_.model.covariance);
+    const auto signatures = screen_.MeasureSignatures(
+        options_.without, [this, &factor](const Eigen::VectorXd& difference) {
+          return factor.matrixL().solve(difference).squaredNorm() / diagnosis_.adequacy.degrees;
+        });
     if (!signatures.ok()) return signatures.status();
     diagnosis_.not_excitable = screen_.not_excitable();
     diagnosis_.screen_evaluations = screen_.evaluations();

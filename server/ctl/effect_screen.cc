@@ -1,6 +1,7 @@
 #include "server/ctl/effect_screen.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "absl/strings/str_cat.h"
@@ -13,6 +14,21 @@ using Eigen::Index;
 
 constexpr int kMostRuns = 4;           // of one effect, or
 constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all effects
+// A second strength is to change three times what two runs differ by chance: of what a measurement
+// scatters, in square.
+constexpr double kWanted = 18;
+constexpr double kLeastRatio = 1.5;  // of the second strength to the first
+constexpr double kMostRatio = 16;
+
+// The last step within the default prior, at least a little more than the first.
+double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
+                const std::string& contact, const dem::ReferenceState& state) {
+  const auto parameter = std::find_if(effect.parameters.begin(), effect.parameters.end(),
+                                      [&ray](const auto& p) { return p.name == ray.parameter; });
+  const double end = dem::PriorOf(*parameter, contact, state).max;
+  const double reach = end - dem::NullValueOf(*parameter, contact).value_or(0);
+  return std::max(kLeastRatio * ray.steps[0], reach / dem::ScaleOf(*parameter, contact, state));
+}
 
 }  // namespace
 
@@ -25,6 +41,17 @@ std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& eff
   }
   if (steps.size() > rows) steps.resize(rows);
   return steps;
+}
+
+// How strong to try what has been tried at its first strength: strong enough to stand out from the
+// chance in a difference of two runs, which is the same however strong the effect is.
+double EffectScreen::SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
+                                double square) const {
+  const std::string& contact = base_.view().campaign.model.contact;
+  const double ratio =
+      square > 0 ? std::clamp(std::sqrt(kWanted / square), kLeastRatio, kMostRatio) : kMostRatio;
+  const double step = std::min(ratio * ray.steps[0], LastStep(effect, ray, contact, base_.state()));
+  return dem::RayAdmits(effect, ray, step, contact, base_.state()) ? step : ray.steps[1];
 }
 
 bool EffectScreen::RateIsGiven() const {
@@ -125,71 +152,82 @@ std::int64_t EffectScreen::Planned(const std::vector<std::string>& without) cons
 }
 
 absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignatures(
-    const std::vector<std::string>& without) {
+    const std::vector<std::string>& without, const SquareOfDifference& square_of) {
   std::vector<inference::Signature> signatures;
   const std::vector<const dem::EffectInfo*> effects = Excitable(without, &not_excitable_);
   if (effects.empty()) return signatures;
   const std::size_t rows = RowsFor(effects.size());
   const std::vector<Index> runs = base_.BestRuns(rows);
-  // All at once, so that no worker waits for the last run of an effect.
   for (const dem::EffectInfo* effect : effects) {
-    for (std::size_t k = 0; k < StepsOf(*effect, rows).size(); ++k) {
-      const Pair pair = PairOf(*effect, k, runs, rows);
-      if (auto status = base_.Announce(pair.with, pair.what); !status.ok()) return status;
+    signatures.push_back(
+        {.name = effect->name, .differences = {}, .two_sided = effect->two_sided, .strengths = {}});
+  }
+  std::vector<std::vector<Step>> steps;
+  for (const dem::EffectInfo* effect : effects) steps.push_back(StepsOf(*effect, rows));
+  for (std::size_t k = 0; k < rows; ++k) {
+    const Index like = runs[std::min(k, runs.size() - 1)];
+    std::vector<Pair> pairs;
+    // All at once, so that no worker waits for the last run of an effect.
+    for (std::size_t e = 0; e < effects.size(); ++e) {
+      if (k >= steps[e].size()) continue;
+      if (k > 0 && effects[e]->rays.size() == 1 && !signatures[e].differences.empty()) {
+        steps[e][k].step =
+            SecondStep(*effects[e], *steps[e][k].ray, square_of(signatures[e].differences.front()));
+      }
+      pairs.push_back(PairOf(*effects[e], steps[e][k], k, like));
+      if (auto status = base_.Announce(pairs.back().with, pairs.back().what); !status.ok()) {
+        return status;
+      }
+    }
+    auto pair = pairs.begin();
+    for (std::size_t e = 0; e < effects.size(); ++e) {
+      if (k >= steps[e].size()) continue;
+      if (auto status = Measure(*effects[e], *pair++, signatures[e]); !status.ok()) return status;
     }
   }
-  for (const dem::EffectInfo* effect : effects) {
-    auto signature = SignatureOf(*effect, runs, rows);
-    if (!signature.ok()) return signature.status();
-    if (signature->differences.empty()) {
-      not_excitable_.emplace_back(effect->name, "runs with it diverge");
-    } else {
-      signatures.push_back(*std::move(signature));
+  for (const inference::Signature& signature : signatures) {
+    if (signature.differences.empty()) {
+      not_excitable_.emplace_back(signature.name, "runs with it diverge");
     }
   }
+  signatures.erase(std::remove_if(signatures.begin(), signatures.end(),
+                                  [](const auto& s) { return s.differences.empty(); }),
+                   signatures.end());
   return signatures;
 }
 
 // A campaign for each step: rays set different parameters. Those of the ray are given by the rows;
 // what it holds goes along.
-EffectScreen::Pair EffectScreen::PairOf(const dem::EffectInfo& effect, std::size_t k,
-                                        const std::vector<Index>& runs, std::size_t rows) const {
-  const std::vector<Step> steps = StepsOf(effect, rows);
-  Pair pair{.step = steps[k],
-            .without = runs[std::min(k, runs.size() - 1)],
+EffectScreen::Pair EffectScreen::PairOf(const dem::EffectInfo& effect, Step step, std::size_t k,
+                                        Index without) const {
+  Pair pair{.step = step,
+            .without = without,
             .with = base_.Derived("screen", absl::StrCat(effect.name, ", step ", k + 1)),
-            .what = absl::StrCat("screen of ", effect.name, " (", k + 1, "/", steps.size(), ")")};
+            .what = absl::StrCat("screen of ", effect.name, ", step ", k + 1)};
   pair.with.effects = {effect.name};
-  pair.with.fixed = dem::ParametersOnRay(effect, *pair.step.ray, pair.step.step,
+  pair.with.fixed = dem::ParametersOnRay(effect, *step.ray, step.step,
                                          base_.view().campaign.model.contact, base_.state());
-  pair.with.rows = {base_.RowLike(pair.without)};
+  pair.with.rows = {base_.RowLike(without)};
   return pair;
 }
 
-absl::StatusOr<inference::Signature> EffectScreen::SignatureOf(const dem::EffectInfo& effect,
-                                                               const std::vector<Index>& runs,
-                                                               std::size_t rows) {
-  inference::Signature signature{
-      .name = effect.name, .differences = {}, .two_sided = effect.two_sided, .strengths = {}};
-  std::vector<Step>& tried = tried_[effect.name];
-  for (std::size_t k = 0; k < StepsOf(effect, rows).size(); ++k) {
-    const Pair pair = PairOf(effect, k, runs, rows);
-    const auto view = base_.Run(pair.with, pair.what);
-    if (!view.ok()) return view.status();
-    evaluations_ += base_.fitted_experiments();
-    const report::RunTable with = report::RunsOf(*view, base_.readings().of_mean);
-    if (with.sample.empty()) continue;
-    signature.differences.emplace_back(
-        (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
-    tried.push_back(pair.step);
-    if (effect.rays.size() == 1) signature.strengths.push_back(pair.step.step);
-    EffectRun run{.values = pair.with.rows.front().values,
-                  .history = with.histories.row(0),
-                  .stream = with.stream.front()};
-    run.values.insert(pair.with.fixed.begin(), pair.with.fixed.end());
-    runs_with_[effect.name].push_back(std::move(run));
-  }
-  return signature;
+absl::Status EffectScreen::Measure(const dem::EffectInfo& effect, const Pair& pair,
+                                   inference::Signature& signature) {
+  const auto view = base_.Run(pair.with, pair.what);
+  if (!view.ok()) return view.status();
+  evaluations_ += base_.fitted_experiments();
+  const report::RunTable with = report::RunsOf(*view, base_.readings().of_mean);
+  if (with.sample.empty()) return absl::OkStatus();
+  signature.differences.emplace_back(
+      (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
+  if (effect.rays.size() == 1) signature.strengths.push_back(pair.step.step);
+  tried_[effect.name].push_back(pair.step);
+  EffectRun run{.values = pair.with.rows.front().values,
+                .history = with.histories.row(0),
+                .stream = with.stream.front()};
+  run.values.insert(pair.with.fixed.begin(), pair.with.fixed.end());
+  runs_with_[effect.name].push_back(std::move(run));
+  return absl::OkStatus();
 }
 
 std::vector<EffectScreen::EffectRun> EffectScreen::RunsWith(const std::string& effect) const {

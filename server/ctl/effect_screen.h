@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -19,6 +20,10 @@ namespace calib::ctl {
 /// Why the calibrated experiments cannot show an effect, in a clause; empty: they can.
 std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect);
 
+/// Squared length of a difference of histories over that of a measurement from a model that is
+/// right.
+using SquareOfDifference = std::function<double(const Eigen::VectorXd&)>;
+
 class EffectScreen {
  public:
   explicit EffectScreen(const FittedCampaign& base) : base_(base) {}
@@ -31,9 +36,11 @@ class EffectScreen {
   std::int64_t Planned(const std::vector<std::string>& without) const;
 
   /// One signature of each effect that the fitted tests can show. `without` take no part. At most
-  /// the larger of a quarter of the campaign's evaluations and four runs for each effect.
+  /// the larger of a quarter of the campaign's evaluations and four runs for each effect. The first
+  /// strength is the catalogue's; the second is such that the difference stands out from what two
+  /// runs differ by chance, three times that as far as the prior of the effect allows.
   absl::StatusOr<std::vector<inference::Signature>> MeasureSignatures(
-      const std::vector<std::string>& without);
+      const std::vector<std::string>& without, const SquareOfDifference& square_of);
 
   /// Parameters in SI at a multiple of the `which`th difference of a signature; what the ray of
   /// strength holds constant is part of it.
@@ -68,8 +75,7 @@ class EffectScreen {
     campaign::Derivation with;
     std::string what;
   };
-  Pair PairOf(const dem::EffectInfo& effect, std::size_t k, const std::vector<Eigen::Index>& runs,
-              std::size_t rows) const;
+  Pair PairOf(const dem::EffectInfo& effect, Step step, std::size_t k, Eigen::Index without) const;
   static std::vector<Step> StepsOf(const dem::EffectInfo& effect, std::size_t rows);
   std::string WhyNotExcitable(const dem::EffectInfo& effect) const;
   /// reasons: of those that are not, added where it is not nullptr.
@@ -78,9 +84,10 @@ class EffectScreen {
       std::vector<std::pair<std::string, std::string>>* reasons) const;
   bool RateIsGiven() const;
   std::size_t RowsFor(std::size_t effects) const;
-  absl::StatusOr<inference::Signature> SignatureOf(const dem::EffectInfo& effect,
-                                                   const std::vector<Eigen::Index>& runs,
-                                                   std::size_t rows);
+  double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
+                    double square) const;
+  absl::Status Measure(const dem::EffectInfo& effect, const Pair& pair,
+                       inference::Signature& signature);
 
   const FittedCampaign& base_;
   std::map<std::string, std::vector<Step>> tried_;
