@@ -48,7 +48,7 @@ def matrix(measured, repeats, controls):
                            verb='improve' if strength == 60 else 'diagnose', strength=strength) for r in range(repeats)]
         if 60 in by_lambda:
             cases.append(Case(f'removed-{effect}-r1', ('true effect removed',), 10000 + 1000 * number + 500, (effect,),
-                              tuple(sorted(by_lambda[60].items())), removed=effect))
+                              tuple(sorted(by_lambda[60].items())), removed=effect, strength=60))
     for number, pair in enumerate(PAIRS):
         if not all(60 in strengths.get(effect, {}) for effect in pair):
             continue

@@ -1,11 +1,12 @@
 """Makes the measurements, runs the campaigns and keeps what came out; knows calibctl and files only."""
-import csv, hashlib, json, math, os, random, subprocess, sys
+import csv, hashlib, json, math, os, random, subprocess, sys, threading
 
 YOUNG, FRICTION = (0.6e9, 1.2e9), (0.3, 0.6)     # where the truth is drawn from, well inside the priors
 NOISE = {'q_over_p': (0.015, 0.01), 'volumetric_strain': (0.0, 3e-4)}   # relative, absolute
 READINGS, STRAIN = 24, 0.08
 PRESSURES = {'low': ('0.1 MPa', 'calibrate'), 'high': ('0.4 MPa', 'calibrate'), 'held': ('0.2 MPa', 'validate')}
 PACKINGS = 8                                       # of a campaign; the sd among four is known to 40 % only
+DRAWS = 5                                          # of base parameters, until the hidden effect can be as strong as wanted
 STAGING = {'rate': 0.1, 'step': 0.004, 'grains': 300}
 
 
@@ -27,11 +28,15 @@ def axial_strains():
 class Laboratory:
     def __init__(self, calibctl, folder):
         self.calibctl, self.folder = calibctl, folder
+        self._lock, self._visibility = threading.Lock(), None
         os.makedirs(os.path.join(folder, 'sealed'), exist_ok=True)
 
     # ---- one case -----------------------------------------------------------------------------------------------------
     def path(self, case, *names):
         return os.path.join(self.folder, case.name, *names)
+
+    def sealed(self, case, ending):
+        return os.path.join(self.folder, 'sealed', case.name + ending)
 
     def finished(self, case):
         return os.path.exists(self.path(case, 'verdict.json'))
@@ -92,10 +97,27 @@ parameters:
 """
         return text + 'inference: {method: iterative_bayesian_filter, samples: 24, max_iterations: 3}\nseed: 7\n'
 
+    def draw_truth(self, case, rnd):
+        """Base parameters, and strengths of what is hidden: of a single effect such that lambda is the case's at just these base
+        parameters. It differs by a factor of two over the priors; parameters where no strength reaches it are drawn again."""
+        for _ in range(DRAWS):
+            truth = {'young_modulus': math.exp(rnd.uniform(*map(math.log, YOUNG))), 'friction_coefficient': rnd.uniform(*FRICTION)}
+            if not case.strength:
+                return truth, case.parameters
+            effect, = case.effects
+            own = self.strengths()[effect]
+            tuned = self.visibility(1).tuned(effect, self.detectable()[effect], self.parameters_of(effect), own['measured'],
+                                             case.strength, truth)
+            if tuned is not None:
+                values, found = tuned
+                self.write(self.sealed(case, '.lambda.json'), json.dumps(found))
+                return truth, tuple(sorted(values.items()))
+        raise Failed(f'no strength of {effect} has lambda = {case.strength} at {DRAWS} draws of the base parameters')
+
     def measure(self, case):
         """Another packing (seed), 340 grains instead of 300, another rate, step or number of grains where the case says so."""
         rnd = random.Random(case.seed)
-        truth = {'young_modulus': math.exp(rnd.uniform(*map(math.log, YOUNG))), 'friction_coefficient': rnd.uniform(*FRICTION)}
+        truth, parameters = self.draw_truth(case, rnd)
         staging = {**STAGING, 'grains': 340}
         staging.update({'rate': {'rate': 0.2}, 'step': {'step': 0.002}, 'grains': {'grains': 600}}.get(case.staging, {}))
         work = self.path(case, 'making')
@@ -105,7 +127,7 @@ parameters:
             rows = ''.join(f'{strain!r},1,1\n' for strain in path)
             self.write(os.path.join(work, name + '.csv'), 'axial_strain,q_over_p,volumetric_strain\n' + rows)
         self.write(os.path.join(work, 'campaign.yaml'),
-                   self.campaign(case.seed + 50000, staging['grains'], staging, case.effects, case.parameters, 1))
+                   self.campaign(case.seed + 50000, staging['grains'], staging, case.effects, parameters, 1))
         states = os.path.join(work, 'states.csv')
         given = [a for k, v in truth.items() for a in ('--set', f'{k}={v!r}')]
         r = subprocess.run([self.calibctl, 'simulate', os.path.join(work, 'campaign.yaml'), *given, '-o', states],
@@ -124,8 +146,8 @@ parameters:
                     values_.append(y + rnd.gauss(0, 1) * math.hypot(relative * y, absolute))
                 text += f'{strain!r},{values_[0]:.6g},{values_[1]:.6g}\n'
             self.write(self.path(case, name + '.csv'), text)
-        sealed = json.dumps({'effects': case.effects, 'parameters': {**truth, **dict(case.parameters)}, 'staging': case.staging}, indent=1)
-        self.write(os.path.join(self.folder, 'sealed', case.name + '.json'), sealed)
+        sealed = json.dumps({'effects': case.effects, 'parameters': {**truth, **dict(parameters)}, 'staging': case.staging}, indent=1)
+        self.write(self.sealed(case, '.json'), sealed)
         self.write(self.path(case, 'truth.sha256'), digest(sealed) + '\n')
         for entry in os.listdir(work):
             os.remove(os.path.join(work, entry))
@@ -136,7 +158,7 @@ parameters:
     def outcome(self, case):
         """Verdict first, then the truth: its digest must be the one written down when the measurement was made."""
         verdict = json.load(open(self.path(case, 'verdict.json')))
-        sealed = open(os.path.join(self.folder, 'sealed', case.name + '.json')).read()
+        sealed = open(self.sealed(case, '.json')).read()
         if digest(sealed) != open(self.path(case, 'truth.sha256')).read().strip():
             raise Failed(f'{case.name}: the sealed truth has been changed')
         return {'case': case, 'verdict': verdict, 'truth': json.loads(sealed), 'lambda': self.visible_at_truth(case)}
@@ -147,6 +169,12 @@ parameters:
             r = subprocess.run([self.calibctl, 'effects', '--json'], capture_output=True, text=True, check=True)
             self._catalogue = {e['name']: e for e in json.loads(r.stdout)}
         return self._catalogue
+
+    def parameters_of(self, effect):
+        return {f"{effect}.{p['name']}": p for p in self.catalogue()[effect]['parameters']}
+
+    def detectable(self):
+        return json.load(open(os.path.join(self.folder, 'detectable.json')))['detectable']
 
     def measure_detectability(self):
         import cases
@@ -165,9 +193,10 @@ parameters:
 
     def visibility(self, jobs):
         import strengths
-        if not hasattr(self, '_visibility'):
-            self._visibility = strengths.Strengths(self, jobs)
-            self._visibility.prepare()
+        with self._lock:  # cases are measured side by side
+            if self._visibility is None:
+                self._visibility = strengths.Strengths(self, jobs)
+                self._visibility.prepare()
         return self._visibility
 
     def strengths(self, jobs=0):
@@ -178,12 +207,10 @@ parameters:
         if not os.path.exists(path):
             if jobs == 0:
                 return {}
-            found = json.load(open(os.path.join(self.folder, 'detectable.json')))['detectable']
-            visible = self.visibility(jobs)
+            found, visible = self.detectable(), self.visibility(jobs)
             document, signatures = {}, {}
             for effect, values in sorted(found.items()):
-                infos = {f"{effect}.{p['name']}": p for p in self.catalogue()[effect]['parameters']}
-                of_effect, measured = visible.of(effect, values, infos, cases.LAMBDAS)
+                of_effect, measured = visible.of(effect, values, self.parameters_of(effect), cases.LAMBDAS)
                 document[effect] = {'strengths': of_effect, 'measured': measured}
                 print(f'{effect}: lambda ' + ', '.join(f'{value:.0f} +- {error:.0f} at {multiple:.3g}x (variance {variance:.1f})' for multiple, value, error, variance in measured),
                       file=sys.stderr, flush=True)
@@ -204,7 +231,7 @@ parameters:
     def visible_at_truth(self, case, jobs=0):
         """lambda of what is hidden in a case at that case's own parameters, its standard error and the variance along it;
         kept beside the sealed truth, which a finished verdict opens."""
-        path = os.path.join(self.folder, 'sealed', case.name + '.lambda.json')
+        path = self.sealed(case, '.lambda.json')
         if not os.path.exists(path):
             if jobs == 0:
                 return None

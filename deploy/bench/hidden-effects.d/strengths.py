@@ -174,16 +174,7 @@ class Strengths:
         interpolation in logarithms, measured there and corrected; a lambda that no strength within the effect's default
         prior reaches is left out."""
         def at(multiple):
-            own = {}
-            for name, value in detectable.items():
-                null = infos[name]['null_value']
-                null = infos[name].get('null_by_contact', {}).get('hertz_mindlin', null)
-                moved = value if null is None else null + (value - null) * multiple  # what only shapes the effect is held
-                # Default priors of dimensionless parameters are taken as they are; others are scaled to the grains.
-                limits = infos[name]['default_prior'] if infos[name]['unit'] == '1' else infos[name]
-                low, high = limits.get('min'), limits.get('max')
-                own[name] = min(max(moved, -math.inf if low is None else low), math.inf if high is None else high)
-            return own
+            return values_at(multiple, detectable, infos)
         measured = {}
         def measure(multiple):
             found = self.visible((effect,), at(multiple))
@@ -217,6 +208,41 @@ class Strengths:
                 if abs(found[0] / strength - 1) < NEAR:
                     break
         return strengths, sorted((multiple, *found) for multiple, found in measured.items())
+
+
+    def tuned(self, effect, detectable, infos, known, wanted, base):
+        """(values, (lambda, its standard error, variance)) where lambda at these base parameters is the one wanted, within NEAR;
+        None where no strength within the effect's default prior reaches it. known: rows of what of() measured at CENTER."""
+        measured, tried = {}, None
+        multiple = min((row for row in known if row[1] > 0), key=lambda row: abs(math.log(row[1] / wanted)))[0]
+        for _ in range(1 + 2 * CORRECTIONS):
+            values = values_at(multiple, detectable, infos)
+            if values == tried:  # the end of the prior
+                return None
+            tried, found = values, self.visible((effect,), values, base)
+            if found is None:
+                return None
+            if abs(found[0] / wanted - 1) < NEAR:
+                return values, found
+            measured[multiple] = found
+            between = interpolate(measured, wanted)
+            # A squared distance: it grows with the square of the strength, or about so.
+            multiple = between or multiple * min(max(math.sqrt(wanted / max(found[0], 1)), 0.4), 2.5)
+        return None
+
+
+def values_at(multiple, detectable, infos):
+    """Parameters of an effect at a multiple of what is called detectable, within its default prior."""
+    own = {}
+    for name, value in detectable.items():
+        null = infos[name]['null_value']
+        null = infos[name].get('null_by_contact', {}).get('hertz_mindlin', null)
+        moved = value if null is None else null + (value - null) * multiple  # what only shapes the effect is held
+        # Default priors of dimensionless parameters are taken as they are; others are scaled to the grains.
+        limits = infos[name]['default_prior'] if infos[name]['unit'] == '1' else infos[name]
+        low, high = limits.get('min'), limits.get('max')
+        own[name] = min(max(moved, -math.inf if low is None else low), math.inf if high is None else high)
+    return own
 
 
 def interpolate(measured, strength):
