@@ -87,7 +87,7 @@ ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
     const std::string& observable =
         experiment.observables[static_cast<std::size_t>(key.second)].name;
     const v1::Posterior::Scatter* record = FindScatter(view.posterior, experiment.name, observable);
-    if (record == nullptr || record->from() != "realizations" ||
+    if (record == nullptr || record->from() == "emulator" ||
         record->sd_size() != static_cast<int>(readings.size())) {
       continue;
     }

@@ -207,8 +207,9 @@ double RmsScatter(const v1::Posterior::Scatter& scatter) {
 }
 
 std::string ScatterOrigin(const v1::Posterior::Scatter& scatter) {
-  return scatter.from() == "realizations" ? fmt::format("{} packings", scatter.runs())
-                                          : fmt::format("emulator, {} runs", scatter.runs());
+  if (scatter.from() == "realizations") return fmt::format("{} packings", scatter.runs());
+  if (scatter.from() == "repeats") return fmt::format("{} repeats", scatter.runs());
+  return fmt::format("emulator, {} runs", scatter.runs());
 }
 
 std::string ObservableTable(const ReportData& data) {
@@ -216,7 +217,8 @@ std::string ObservableTable(const ReportData& data) {
   std::string html =
       "<h3>Misfit by observable</h3>\n<p class=\"sub\">Noise is the error stated for the "
       "measurement, scatter what runs of the model differ by among themselves, on other "
-      "packings or as an emulator of them leaves it: root mean squares of their standard "
+      "packings, repeated on one or as an emulator of them leaves it: root mean squares of their "
+      "standard "
       "deviations. Both are part of sd in the error (root mean square of residual / sd) and in p, "
       "the scatter as far as the "
       "specimen has it too.</p>\n"

@@ -284,22 +284,25 @@ class Planner {
     return wanted;
   }
 
-  /// The best estimate on every packing, all experiments, as samples of an iteration of their own:
-  /// consecutive numbers meet every packing once.
+  /// The best estimate on every packing, or repeated on the only one, all experiments, as samples
+  /// of an iteration of their own: consecutive numbers meet every packing once.
   absl::Status Replicate(const Answer& answer, int count) {
     Start start{.iteration = static_cast<int>(history_.iterations.size()),
                 .proposal = kReplicates,
                 .samples = {}};
-    std::vector<double> best;
-    for (const inference::ParameterSummary& parameter : answer.Parameters()) {
-      best.push_back(parameter.mean);
+    const std::vector<inference::ParameterSummary> parameters = answer.Parameters();
+    Eigen::VectorXd best(static_cast<Eigen::Index>(parameters.size()));
+    for (std::size_t j = 0; j < parameters.size(); ++j) {
+      best(static_cast<Eigen::Index>(j)) = parameters[j].mean;
     }
+    const bool moved = !VariesPackings(campaign_);
     std::vector<int> experiments(campaign_.experiments.size());
     std::iota(experiments.begin(), experiments.end(), 0);
     for (int i = 0; i < count; ++i) {
+      const Eigen::VectorXd own = moved ? Repeat(best, i) : best;
       start.samples.push_back({.sample = start.iteration * record_.submitted.samples + i,
                                .iteration = start.iteration,
-                               .parameters = best,
+                               .parameters = {own.begin(), own.end()},
                                .log_weight = -std::numeric_limits<double>::infinity()});
       if (absl::Status status = requests_.Run(start.samples.back(), experiments); !status.ok()) {
         return status;
@@ -307,6 +310,17 @@ class Planner {
     }
     plan_.draws = std::move(start);
     return absl::OkStatus();
+  }
+
+  /// As good as the same parameters, towards the middle of their priors.
+  Eigen::VectorXd Repeat(const Eigen::VectorXd& parameters, int number) const {
+    Eigen::VectorXd moved = parameters;
+    for (Eigen::Index j = 0; number > 0 && j < moved.size(); ++j) {
+      const inference::Prior& prior = definition_.priors[static_cast<std::size_t>(j)];
+      const double standard = prior.ToStandard(moved(j));
+      moved(j) = prior.FromStandard(standard - std::copysign(kRepeatShift * number, standard));
+    }
+    return moved;
   }
 
   /// True when the next iteration would exceed what the user allowed.

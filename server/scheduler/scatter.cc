@@ -75,15 +75,20 @@ absl::StatusOr<Eigen::MatrixXd> ReplicateRuns(const campaign::Campaign& campaign
 
 }  // namespace
 
+bool VariesPackings(const campaign::Campaign& campaign) {
+  return std::any_of(campaign.experiments.begin(), campaign.experiments.end(),
+                     [](const auto& experiment) { return experiment.specimens.size() > 1; });
+}
+
 int ReplicatesOf(const campaign::Campaign& campaign) {
   if (campaign.precomputed || campaign.filter.noise == inference::NoiseMode::kEssTarget) {
     return 0;
   }
+  if (!VariesPackings(campaign)) return campaign.replicates.value_or(0);
   std::size_t most = 0;
   for (const campaign::Experiment& experiment : campaign.experiments) {
     most = std::max(most, experiment.specimens.size());
   }
-  if (most < 2) return 0;
   return campaign.replicates.value_or(static_cast<int>(std::min(most, kMostReplicates)));
 }
 
@@ -131,7 +136,9 @@ absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std
       // Beyond its own packings an experiment's replicates are repetitions.
       const auto& specimens =
           definition.campaign.experiments[static_cast<std::size_t>(group.first.first)].specimens;
-      const Index packings = std::min(runs->rows(), static_cast<Index>(specimens.size()));
+      const bool varies = VariesPackings(definition.campaign);
+      const Index packings =
+          varies ? std::min(runs->rows(), static_cast<Index>(specimens.size())) : runs->rows();
       Eigen::MatrixXd finished(packings, static_cast<Index>(group.second.size()));
       Index count = 0;
       for (Index r = 0; r < packings; ++r) {
@@ -145,7 +152,7 @@ absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std
       }
       result.observables.push_back(Fit(definition.campaign, data, group,
                                        inference::MomentsOfReplicates(finished.topRows(count))));
-      result.observables.back().from = "realizations";
+      result.observables.back().from = varies ? "realizations" : "repeats";
       result.observables.back().runs = static_cast<int>(count);
     }
   }

@@ -16,13 +16,19 @@ namespace calib::scheduler {
 
 struct ObservableScatter {
   inference::GroupScatter group;  ///< indices of campaign.experiments and its observables
-  const char* from = "";          ///< realizations | emulator
+  const char* from = "";          ///< realizations | repeats | emulator
   int runs = 0;                   ///< it was found from
 };
 
+/// Whether an experiment has two packings. Where none has, replicates are repeats on the one there
+/// is: every parameter is moved by some kRepeatShift, which rounding makes another run of within a
+/// percent of strain.
+bool VariesPackings(const campaign::Campaign& campaign);
+inline constexpr double kRepeatShift = 1e-6;  ///< in standardised coordinates, times the repeat
+
 /// How often the best estimate is to be run: as the campaign says, else once for each of the most
-/// realizations of an experiment, up to 16; 0 where no experiment has two, where runs are given and
-/// where errors are not (ess_target).
+/// realizations of an experiment, up to 16, and not at all where no experiment has two; 0 where
+/// runs are given and where errors are not (ess_target).
 int ReplicatesOf(const campaign::Campaign& campaign);
 
 /// campaign::ScatterShare, the largest of the calibrated experiments.
@@ -37,7 +43,8 @@ struct MeasuredScatter {
 };
 
 /// Scatter of every observable of every experiment (held-out ones too) that has two or more
-/// finished replicates on different packings. Errors: those of the store.
+/// finished replicates on different packings, or where none are varied finished repeats. Errors:
+/// those of the store.
 absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std::int64_t campaign,
                                                store::Reader& reader);
 

@@ -104,6 +104,45 @@ TEST(Realizations, BestEstimateRunsOnEveryPacking) {
   }
 }
 
+// One packing, run again and again with parameters that differ by a millionth.
+TEST(Repeats, OfTheBestEstimateOnTheOnlyPackingAreMadeWhereAskedFor) {
+  SimulatedService service("repeats");
+  service.repeat_scatter = 0.05;
+  service.Submit(Campaign(1, "", "  replicates: 12\n"));
+  service.RunToEnd(1, true);
+  v1::Posterior posterior;
+  std::vector<store::SampleRecord> repeats;
+  for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
+    if (iteration.posterior) posterior = *PosteriorFromJson(*iteration.posterior);
+    if (iteration.proposal != kReplicates) continue;
+    for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
+      if (sample.iteration == iteration.number) repeats.push_back(sample);
+    }
+  }
+  ASSERT_EQ(repeats.size(), 12U);
+  for (std::size_t i = 1; i < repeats.size(); ++i) {
+    for (std::size_t j = 0; j < repeats[i].parameters.size(); ++j) {
+      EXPECT_NE(repeats[i].parameters[j], repeats[i - 1].parameters[j]) << "a run of its own";
+      EXPECT_NEAR(repeats[i].parameters[j] / repeats[0].parameters[j], 1, 1e-4);
+    }
+  }
+  // sd of a uniform number on (-1, 1) is 0.58; the curve ends near 1 + 2 tan(friction).
+  ASSERT_EQ(posterior.scatter_size(), 2);
+  for (const auto& scatter : posterior.scatter()) {
+    EXPECT_EQ(scatter.from(), "repeats");
+    EXPECT_EQ(scatter.runs(), 12);
+    ASSERT_EQ(scatter.sd_size(), 12);
+    EXPECT_GT(scatter.sd(11), 0.02);
+    EXPECT_LT(scatter.sd(11), 0.15);
+  }
+}
+
+TEST(Repeats, AreNotMadeUnasked) {
+  const Ended run = RunCampaign("no_repeats", Campaign(1), 0);
+  EXPECT_TRUE(std::none_of(run.iterations.begin(), run.iterations.end(),
+                           [](const auto& i) { return i.proposal == kReplicates; }));
+}
+
 TEST(Realizations, ASpecimenOfManyGrainsSharesLittleOfTheScatterAndIsKnownBetter) {
   testing::SmallCampaign campaign = Campaign(4);
   const std::string key = "    control: axial_strain\n";

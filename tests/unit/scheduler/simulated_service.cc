@@ -18,15 +18,18 @@ constexpr SchedulerOptions kOptions{.lease = std::chrono::milliseconds(1000),
                                     .heartbeat = std::chrono::milliseconds(100)};
 
 /// A smooth curve with the parameters in it, in place of the mechanics.
-double Model(const v1::AttemptSpec& spec, int load_step, double packing_scatter) {
+double Model(const v1::AttemptSpec& spec, int load_step, double packing_scatter,
+             double repeat_scatter) {
   const double stiffness = std::log(spec.parameters().at("young_modulus") / 5e7);
   const double friction = spec.parameters().at("friction_angle");
   const double packing =
       spec.packing_digest().empty()
           ? 0
           : std::stoi(spec.packing_digest().substr(0, 4), nullptr, 16) / 32768.0 - 1;
+  // Of digits that no measurement knows.
+  const double repeat = 2 * std::fmod(1e9 * std::abs(stiffness), 1) - 1;
   return (1 + friction * 2 * (1 - std::exp(-0.3 * stiffness * (load_step + 1)))) *
-         (1 + packing_scatter * packing);
+         (1 + packing_scatter * packing + repeat_scatter * repeat);
 }
 
 std::string Bytes(const std::vector<double>& values) {
@@ -147,7 +150,7 @@ void SimulatedService::SendStates(std::int64_t session, const v1::Lease& lease, 
     v1::State& state = *batch.add_states();
     state.set_load_step(i);
     for (std::size_t k = 0; k < width; ++k) {
-      state.add_values(Model(lease.spec(), i, packing_scatter));
+      state.add_values(Model(lease.spec(), i, packing_scatter, repeat_scatter));
     }
   }
   scheduler_->Receive(session, batch);

@@ -84,6 +84,8 @@ class SimulatedService {
 
   /// Relative change of a curve from one packing to another, a number of order one times this.
   double packing_scatter = 0;
+  /// The same between parameters that differ in digits that nobody knows, from -1 to 1 times this.
+  double repeat_scatter = 0;
   /// Load steps that workers of RunToEnd() had to compute: without those of a checkpoint.
   int computed = 0;
 
