@@ -21,8 +21,8 @@ struct ObservableScatter {
 };
 
 /// Whether an experiment has two packings. Where none has, replicates are repeats on the one there
-/// is: every parameter is moved by some kRepeatShift, which rounding makes another run of within a
-/// percent of strain.
+/// is: every parameter is moved by some kRepeatShift, which rounding makes another run of within
+/// some percent of strain.
 bool VariesPackings(const campaign::Campaign& campaign);
 inline constexpr double kRepeatShift = 1e-6;  ///< in standardised coordinates, times the repeat
 
