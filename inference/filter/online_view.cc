@@ -1,5 +1,6 @@
 // The live view of a running iteration.
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <vector>
@@ -48,10 +49,16 @@ OnlineView ViewOnline(const DataSet& data, const FilterOptions& options,
     if (!diverged[i]) rows.push_back(i);
   }
   if (rows.empty()) return view;
-  const std::vector<int> common = CommonReadings(data, predictions, rows);
-  view.readings = static_cast<int>(common.size());
   view.ess = static_cast<double>(rows.size());
-  if (common.empty()) return view;
+  std::vector<int> common = CommonReadings(data, predictions, rows);
+  if (common.empty()) {  // some have hardly begun: those that have ended tell more than nothing
+    rows.erase(std::remove_if(rows.begin(), rows.end(),
+                              [&](Eigen::Index row) { return !predictions.row(row).allFinite(); }),
+               rows.end());
+    if (rows.empty()) return view;
+    common = CommonReadings(data, predictions, rows);
+  }
+  view.readings = static_cast<int>(common.size());
 
   const bool ess_target = options.noise == NoiseMode::kEssTarget;
   const DataSet part = Restricted(ess_target ? WithRelativeErrors(data, 1) : data, common);

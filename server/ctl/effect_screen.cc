@@ -32,6 +32,14 @@ double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
 
 }  // namespace
 
+double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
+                  const std::string& contact, const dem::ReferenceState& state) {
+  const double ratio =
+      square > 0 ? std::clamp(std::sqrt(kWanted / square), kLeastRatio, kMostRatio) : kMostRatio;
+  const double step = std::min(ratio * ray.steps[0], LastStep(effect, ray, contact, state));
+  return dem::RayAdmits(effect, ray, step, contact, state) ? step : ray.steps[1];
+}
+
 std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& effect,
                                                       std::size_t rows) {
   std::vector<Step> steps;
@@ -41,17 +49,6 @@ std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& eff
   }
   if (steps.size() > rows) steps.resize(rows);
   return steps;
-}
-
-// How strong to try what has been tried at its first strength: strong enough to stand out from the
-// chance in a difference of two runs, which is the same however strong the effect is.
-double EffectScreen::SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
-                                double square) const {
-  const std::string& contact = base_.view().campaign.model.contact;
-  const double ratio =
-      square > 0 ? std::clamp(std::sqrt(kWanted / square), kLeastRatio, kMostRatio) : kMostRatio;
-  const double step = std::min(ratio * ray.steps[0], LastStep(effect, ray, contact, base_.state()));
-  return dem::RayAdmits(effect, ray, step, contact, base_.state()) ? step : ray.steps[1];
 }
 
 bool EffectScreen::RateIsGiven() const {
@@ -172,7 +169,8 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
       if (k >= steps[e].size()) continue;
       if (k > 0 && effects[e]->rays.size() == 1 && !signatures[e].differences.empty()) {
         steps[e][k].step =
-            SecondStep(*effects[e], *steps[e][k].ray, square_of(signatures[e].differences.front()));
+            SecondStep(*effects[e], *steps[e][k].ray, square_of(signatures[e].differences.front()),
+                       base_.view().campaign.model.contact, base_.state());
       }
       pairs.push_back(PairOf(*effects[e], steps[e][k], k, like));
       if (auto status = base_.Announce(pairs.back().with, pairs.back().what); !status.ok()) {

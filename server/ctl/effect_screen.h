@@ -24,6 +24,12 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
 /// right.
 using SquareOfDifference = std::function<double(const Eigen::VectorXd&)>;
 
+/// How strong to try an effect whose first strength changes the histories by `square` (see above):
+/// so that it stands out from the chance in a difference of two runs, which is the same however
+/// strong the effect is; 1.5 to 16 times the first, within the default prior. In units of the ray.
+double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
+                  const std::string& contact, const dem::ReferenceState& state);
+
 class EffectScreen {
  public:
   explicit EffectScreen(const FittedCampaign& base) : base_(base) {}
@@ -84,8 +90,6 @@ class EffectScreen {
       std::vector<std::pair<std::string, std::string>>* reasons) const;
   bool RateIsGiven() const;
   std::size_t RowsFor(std::size_t effects) const;
-  double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
-                    double square) const;
   absl::Status Measure(const dem::EffectInfo& effect, const Pair& pair,
                        inference::Signature& signature);
 

@@ -237,6 +237,17 @@ TEST(ViewOnline, CountsWhatEveryUndivergedSampleHasReached) {
   EXPECT_NEAR(view.ess, 1, 0.3);
 }
 
+// A worker that takes one sample after the other: the one under way has nothing yet.
+TEST(ViewOnline, ThoseThatHaveEndedWhereOthersHaveHardlyBegun) {
+  Eigen::MatrixXd predictions(4, 2);
+  predictions << 0.4, 3.0, 0.4, 3.0, 3, 3, NAN, NAN;
+  const std::vector<char> diverged{0, 0, 0, 0};
+  const OnlineView view = ViewOnline(Data(0.1), {}, predictions, diverged);
+  EXPECT_EQ(view.readings, 2);
+  EXPECT_NEAR(view.ess, 2, 1e-6) << "two alike and one far off";
+  EXPECT_LE(view.best, 1);
+}
+
 TEST(ViewOnline, BeforeAnythingHasArrived) {
   const Eigen::MatrixXd predictions = Eigen::MatrixXd::Constant(2, 2, NAN);
   const OnlineView view = ViewOnline(Data(0.1), {}, predictions, std::vector<char>{0, 0});

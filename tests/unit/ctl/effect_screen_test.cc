@@ -1,0 +1,48 @@
+#include "server/ctl/effect_screen.h"
+
+#include <gtest/gtest.h>
+
+namespace calib::ctl {
+namespace {
+
+constexpr dem::ReferenceState kState{.pressure = 1e5, .diameter = 1e-3, .modulus = 1e9};
+
+double Second(const std::string& effect, double square) {
+  const dem::EffectInfo& info = *dem::FindEffect(effect);
+  return SecondStep(info, info.rays.front(), square, "hertz_mindlin", kState) /
+         info.rays.front().steps[0];
+}
+
+TEST(SecondStep, GrowsWithTheRootOfWhatIsMissing) {
+  EXPECT_NEAR(Second("contact_plasticity", 2), 3, 1e-12) << "18 are wanted";
+  EXPECT_NEAR(Second("contact_plasticity", 0.5), 6, 1e-12);
+}
+
+TEST(SecondStep, StaysAwayFromTheFirst) {
+  EXPECT_NEAR(Second("contact_plasticity", 1000), 1.5, 1e-12);
+}
+
+TEST(SecondStep, GoesNoFurtherThanItsPrior) {
+  const dem::EffectInfo& density = *dem::FindEffect("initial_density");
+  EXPECT_NEAR(Second("initial_density", 0) * density.rays.front().steps[0] * 0.01,
+              density.parameters.front().default_prior.max, 1e-12);
+  const double membrane = Second("membrane_stiffness", 0);
+  EXPECT_NEAR(membrane, 16, 1e-9) << "a wide prior: no more than so many times";
+}
+
+// Every effect of the catalogue, whatever its first difference.
+TEST(SecondStep, IsAdmissible) {
+  for (const dem::EffectInfo& effect : dem::Effects()) {
+    for (const dem::StrengthRay& ray : effect.rays) {
+      const std::string contact = effect.contacts.empty() ? "hertz_mindlin" : effect.contacts[0];
+      for (const double square : {0.0, 0.01, 1.0, 100.0}) {
+        const double step = SecondStep(effect, ray, square, contact, kState);
+        EXPECT_TRUE(dem::RayAdmits(effect, ray, step, contact, kState)) << effect.name;
+        EXPECT_NE(step, ray.steps[0]) << effect.name;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace calib::ctl
