@@ -19,6 +19,8 @@ constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all
 constexpr double kWanted = 18;
 constexpr double kLeastRatio = 1.5;  // of the second strength to the first
 constexpr double kMostRatio = 16;
+constexpr double kMaybeChance = 4;  // twice what two runs differ by chance
+constexpr double kGrades = 4;       // of an octave: the last bits of a history change no run
 
 // The last step within the default prior, at least a little more than the first.
 double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
@@ -34,8 +36,11 @@ double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
 
 double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
                   const std::string& contact, const dem::ReferenceState& state) {
-  const double ratio =
-      square > 0 ? std::clamp(std::sqrt(kWanted / square), kLeastRatio, kMostRatio) : kMostRatio;
+  if (!(square > 0)) return ray.steps[1];
+  const double second = ray.steps[1] / ray.steps[0];
+  const double grade = std::round(kGrades * std::log2(std::sqrt(kWanted / square))) / kGrades;
+  const double least = square < kMaybeChance ? second : kLeastRatio;
+  const double ratio = std::clamp(std::exp2(grade), least, kMostRatio);
   const double step = std::min(ratio * ray.steps[0], LastStep(effect, ray, contact, state));
   return dem::RayAdmits(effect, ray, step, contact, state) ? step : ray.steps[1];
 }
@@ -167,7 +172,9 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
     // All at once, so that no worker waits for the last run of an effect.
     for (std::size_t e = 0; e < effects.size(); ++e) {
       if (k >= steps[e].size()) continue;
-      if (k > 0 && effects[e]->rays.size() == 1 && !signatures[e].differences.empty()) {
+      const bool chosen = effects[e]->rays.size() == 1 && !signatures[e].differences.empty() &&
+                          dem::FindEffect(effects[e]->name) != nullptr;
+      if (k > 0 && chosen) {
         steps[e][k].step =
             SecondStep(*effects[e], *steps[e][k].ray, square_of(signatures[e].differences.front()),
                        base_.view().campaign.model.contact, base_.state());

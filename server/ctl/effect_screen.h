@@ -24,9 +24,10 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
 /// right.
 using SquareOfDifference = std::function<double(const Eigen::VectorXd&)>;
 
-/// How strong to try an effect whose first strength changes the histories by `square` (see above):
-/// so that it stands out from the chance in a difference of two runs, which is the same however
-/// strong the effect is; 1.5 to 16 times the first, within the default prior. In units of the ray.
+/// How strong to try an effect of the catalogue whose first strength changes the histories by
+/// `square` (see above): so that it stands out from the chance in a difference of two runs, which
+/// is the same however strong the effect is; 1.5 to 16 times the first, no less than the
+/// catalogue's second where the first may be chance, within the default prior. In units of the ray.
 double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
                   const std::string& contact, const dem::ReferenceState& state);
 
@@ -43,8 +44,7 @@ class EffectScreen {
 
   /// One signature of each effect that the fitted tests can show. `without` take no part. At most
   /// the larger of a quarter of the campaign's evaluations and four runs for each effect. The first
-  /// strength is the catalogue's; the second is such that the difference stands out from what two
-  /// runs differ by chance, three times that as far as the prior of the effect allows.
+  /// strength is the catalogue's; the second is that of SecondStep(), or as a user's effect says.
   absl::StatusOr<std::vector<inference::Signature>> MeasureSignatures(
       const std::vector<std::string>& without, const SquareOfDifference& square_of);
 

@@ -34,8 +34,8 @@ int PackingsApart(const campaign::Campaign& campaign);
 /// several packings were measured to differ by, a chain along the path for each observable, and,
 /// as far as their number supports it, what the emulator misses of the runs on them
 /// (inference/scatter/shrunk_covariance.h); draws on a packing are judged by the covariance
-/// without it. Where packings were not varied, what the emulator does not explain of single runs.
-/// packing: of each run that the emulator was validated on, any numbers.
+/// without it. Where neither packings were varied nor repeats made, what the emulator does not
+/// explain of single runs. packing: of each run that the emulator was validated on, any numbers.
 MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
                                        const inference::StateEmulator& emulator,
                                        const Eigen::VectorXd& not_known,

@@ -66,7 +66,8 @@ std::optional<Stress> StressAt(const Curve& curve, std::size_t step, const Eigen
     return Stress{.axial = *a, .lateral = *l};
   }
   if (!triaxial) return std::nullopt;
-  const double lateral = pressure->second;
+  const auto& initial = curve.experiment->initial_stress;
+  const double lateral = initial ? initial->lateral : pressure->second;
   if (const auto a = value("axial_stress")) return Stress{.axial = *a, .lateral = lateral};
   if (const auto q = value("deviatoric_stress")) {
     return Stress{.axial = lateral + *q, .lateral = lateral};
@@ -95,6 +96,12 @@ double LoadOf(const Curve& curve, Stress now, Stress start) {
   return curve.experiment->test == "oedometric"
              ? now.axial - start.axial
              : (now.axial - now.lateral) - (start.axial - start.lateral);
+}
+
+// The others report stresses as they are.
+bool HasLoadCell(const campaign::Experiment& experiment) {
+  return experiment.test == "triaxial_drained" || experiment.test == "triaxial_undrained" ||
+         experiment.test == "oedometric";
 }
 
 std::vector<std::optional<Stress>> StressPath(const Curve& curve, const Eigen::RowVectorXd& y) {
@@ -242,7 +249,7 @@ std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
                                             const Eigen::MatrixXd& histories,
                                             const Eigen::VectorXd& gain,
                                             const Eigen::VectorXd& offset) {
-  const std::vector<Curve> curves = CurvesOf(campaign, data);
+  std::vector<Curve> curves = CurvesOf(campaign, data);
   const auto t = static_cast<Index>(data.readings.size());
   Eigen::RowVectorXd value(t);
   Eigen::RowVectorXd sd(t);
@@ -250,6 +257,17 @@ std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
     value[k] = data.readings[static_cast<std::size_t>(k)].value;
     sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
   }
+  // A formula of the user's may read anything.
+  for (const dem::UserEffect& effect : campaign.model.user_effects) {
+    const auto& used = campaign.model.effects;
+    if (effect.info.kind == "measurement" &&
+        std::find(used.begin(), used.end(), effect.info.name) != used.end()) {
+      return std::nullopt;
+    }
+  }
+  curves.erase(std::remove_if(curves.begin(), curves.end(),
+                              [](const Curve& curve) { return !HasLoadCell(*curve.experiment); }),
+               curves.end());
   for (const Curve& curve : curves) {
     const Stress any{.axial = 1, .lateral = 1};
     // Loads count from the start of loading, which must be among the readings.

@@ -35,7 +35,8 @@ std::vector<ReadingEffect> EffectsOnReadings(
 /// Histories as load cells with these errors read them, one gain [-] and offset [Pa] for each:
 /// exact, the specimen does not feel them. histories: N x T, (prediction - reading) / sd in the
 /// order of `data`. Empty where a calibrated experiment does not let it be calculated: its control
-/// is a stress, or a stress is read where the readings do not tell axial and lateral stress apart.
+/// is a stress, or a stress is read where the readings do not tell axial and lateral stress apart;
+/// and where the model has a formula on readings. Tests without a load cell stay as they are.
 std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
                                             const inference::DataSet& data,
                                             const Eigen::MatrixXd& histories,

@@ -20,7 +20,7 @@ struct ObservableMisfit {
   double rms_error = 0;        ///< rms of residual / sd of noise and packing scatter together
   double rms_residual = 0;     ///< rms of residual [SI]
   double scatter = 0;          ///< rms of the scatter's sd over that of the noise; 0: none is known
-  std::string scatter_from{};  ///< realizations | emulator; empty: none is known
+  std::string scatter_from{};  ///< realizations | repeats | emulator; empty: none is known
   std::optional<double>
       z;  ///< chi-squared of the group as a standard normal deviate [Wilson & Hilferty 1931]
   std::optional<double>

@@ -100,7 +100,7 @@ ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
     of_run.back().experiment = key.first;
     of_run.back().observable = key.second;
     of_mean.push_back(of_run.back());
-    of_mean.back().share += 1.0 / record->runs();
+    if (record->from() == "realizations") of_mean.back().share += 1.0 / record->runs();
   }
   return {.of_mean = inference::WithScatter(data, of_mean, 0),
           .of_run = inference::WithScatter(data, of_run, 1),

@@ -24,16 +24,16 @@ RunTable RunsOf(const CampaignView& view);
 RunTable RunsOf(const CampaignView& view, const inference::DataSet& units);
 
 /// The readings of the calibrated experiments with the scatter in their errors that the campaign
-/// has measured on several packings.
+/// has measured on several packings, or on repeats.
 struct ScatteredReadings {
   inference::DataSet of_mean;  ///< scatter of the measured specimen, and 1/R of it for the model's
-                               ///< mean history, which R packings know no better
+                               ///< mean history, which R packings know no better (repeats do)
   inference::DataSet of_run;   ///< scatter of the specimen and of one run of the model
   /// Of the best estimate on every packing, for fits to some of the readings: R x T, see
   /// inference::Replicates; none where fewer than two runs came to their ends.
   Eigen::MatrixXd departures{};
-  /// False where packings were not varied: both are MakeDataSet, and the scatter of repeats is what
-  /// an emulator of the runs says it is.
+  /// False where packings were not varied and no repeats made: both are MakeDataSet, and the
+  /// scatter of repeats is what an emulator of the runs says it is.
   bool measured = false;
 };
 ScatteredReadings ReadingsWithScatter(const CampaignView& view);

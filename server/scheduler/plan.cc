@@ -278,7 +278,7 @@ class Planner {
     }
     if (Exceeds(static_cast<std::int64_t>(wanted) *
                 static_cast<std::int64_t>(campaign_.experiments.size()))) {
-      plan_.log.emplace_back("the scatter of packings is not measured: it would exceed the budget");
+      plan_.log.emplace_back("scatter is not measured: it would exceed the budget");
       return 0;
     }
     return wanted;

@@ -195,9 +195,10 @@ Definition DefinitionWith(const Definition& definition, const MeasuredScatter& s
         definition.campaign.experiments[static_cast<std::size_t>(one.group.experiment)];
     if (experiment.role == Role::kCalibrate) {
       groups.push_back(one.group);
-      // The mean over R packings is off by 1/R of the scatter, however many samples share them.
+      // The mean over R packings is off by 1/R of the scatter, however many samples share them;
+      // every sample on the only packing is a repeat of its own.
       of_mean.push_back(one.group);
-      of_mean.back().share += 1.0 / one.runs;
+      if (VariesPackings(definition.campaign)) of_mean.back().share += 1.0 / one.runs;
     }
   }
   if (!groups.empty()) {

@@ -112,7 +112,7 @@ parameters:
                 values, found = tuned
                 self.write(self.sealed(case, '.lambda.json'), json.dumps(found))
                 return truth, tuple(sorted(values.items()))
-        raise Failed(f'no strength of {effect} has lambda = {case.strength} at {DRAWS} draws of the base parameters')
+        raise Failed(f'no strength of {effect} was found at which lambda is {case.strength}, for {DRAWS} draws of the base parameters')
 
     def measure(self, case):
         """Another packing (seed), 340 grains instead of 300, another rate, step or number of grains where the case says so."""
@@ -197,6 +197,7 @@ parameters:
             if self._visibility is None:
                 self._visibility = strengths.Strengths(self, jobs)
                 self._visibility.prepare()
+            self._visibility.jobs = jobs
         return self._visibility
 
     def strengths(self, jobs=0):

@@ -212,7 +212,8 @@ class Strengths:
 
     def tuned(self, effect, detectable, infos, known, wanted, base):
         """(values, (lambda, its standard error, variance)) where lambda at these base parameters is the one wanted, within NEAR;
-        None where no strength within the effect's default prior reaches it. known: rows of what of() measured at CENTER."""
+        None where none was found: the end of the effect's default prior is reached before, or runs diverge. known: rows of what
+        of() measured at CENTER."""
         measured, tried = {}, None
         multiple = min((row for row in known if row[1] > 0), key=lambda row: abs(math.log(row[1] / wanted)))[0]
         for _ in range(1 + 2 * CORRECTIONS):

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace calib::ctl {
 namespace {
 
@@ -14,8 +16,15 @@ double Second(const std::string& effect, double square) {
 }
 
 TEST(SecondStep, GrowsWithTheRootOfWhatIsMissing) {
-  EXPECT_NEAR(Second("contact_plasticity", 2), 3, 1e-12) << "18 are wanted";
-  EXPECT_NEAR(Second("contact_plasticity", 0.5), 6, 1e-12);
+  EXPECT_NEAR(Second("contact_plasticity", 18. / 32), std::sqrt(32), 1e-12) << "18 are wanted";
+  EXPECT_NEAR(Second("contact_plasticity", 4.5), 2, 1e-12);
+  EXPECT_EQ(Second("contact_plasticity", 4.5), Second("contact_plasticity", 4.5001)) << "in grades";
+}
+
+// The catalogue's second strength is four times its first here.
+TEST(SecondStep, IsNoWeakerThanTheCataloguesWhereTheFirstMayBeChance) {
+  EXPECT_NEAR(Second("contact_plasticity", 3.9), 4, 1e-12);
+  EXPECT_NEAR(Second("contact_plasticity", 0), 4, 1e-12) << "nothing to go by";
 }
 
 TEST(SecondStep, StaysAwayFromTheFirst) {
@@ -24,9 +33,9 @@ TEST(SecondStep, StaysAwayFromTheFirst) {
 
 TEST(SecondStep, GoesNoFurtherThanItsPrior) {
   const dem::EffectInfo& density = *dem::FindEffect("initial_density");
-  EXPECT_NEAR(Second("initial_density", 0) * density.rays.front().steps[0] * 0.01,
+  EXPECT_NEAR(Second("initial_density", 1e-3) * density.rays.front().steps[0] * 0.01,
               density.parameters.front().default_prior.max, 1e-12);
-  const double membrane = Second("membrane_stiffness", 0);
+  const double membrane = Second("membrane_stiffness", 1e-3);
   EXPECT_NEAR(membrane, 16, 1e-9) << "a wide prior: no more than so many times";
 }
 

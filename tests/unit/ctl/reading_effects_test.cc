@@ -98,6 +98,27 @@ TEST(MisreadLoads, NotWhatIsNoStress) {
   EXPECT_EQ((misread->array() != 0).count(), 4) << "four readings of the stress under load";
 }
 
+// Of a test without a load cell no reading, whatever it reads.
+TEST(MisreadLoads, NotWhereNoLoadCellIs) {
+  campaign::Campaign campaign = Triaxial("q_over_p", kRatio, 0.1);
+  campaign.experiments[0].test = "simple_shear";
+  const auto misread =
+      MisreadLoads(campaign, campaign::MakeDataSet(campaign), Eigen::MatrixXd::Zero(1, 5),
+                   Eigen::VectorXd::Constant(1, 0.1), Eigen::VectorXd::Constant(1, 1e3));
+  ASSERT_TRUE(misread);
+  EXPECT_TRUE(misread->isZero(0));
+}
+
+TEST(MisreadLoads, AtTheLateralStressThatIsHeld) {
+  campaign::Campaign campaign = Triaxial("stress_ratio", kRatio, 0.1);
+  campaign.experiments[0].initial_stress = dem::InitialStress{.axial = 3e5, .lateral = 2e5};
+  const auto misread =
+      MisreadLoads(campaign, campaign::MakeDataSet(campaign), Eigen::MatrixXd::Zero(1, 5),
+                   Eigen::VectorXd::Zero(1), Eigen::VectorXd::Constant(1, 4e3));
+  ASSERT_TRUE(misread);
+  EXPECT_NEAR((*misread)(0, 2), 4e3 / 2e5 / 0.1, 1e-9);
+}
+
 TEST(MisreadLoads, NothingWhereItCannotBeCalculated) {
   const auto of = [](const campaign::Campaign& campaign) {
     return MisreadLoads(campaign, campaign::MakeDataSet(campaign), Eigen::MatrixXd::Zero(1, 5),
