@@ -258,6 +258,10 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
       scores[a].angles[scores[b].name] = angle;
       if (angle < kClose) scores[a].confusable_with.push_back(scores[b].name);
     }
+    std::stable_sort(scores[a].confusable_with.begin(), scores[a].confusable_with.end(),
+                     [&angles = scores[a].angles](const std::string& x, const std::string& y) {
+                       return angles.at(x) < angles.at(y);
+                     });
   }
   std::stable_sort(scores.begin(), scores.end(), [](const Score& a, const Score& b) {
     return a.p_value != b.p_value ? a.p_value < b.p_value : a.gain > b.gain;

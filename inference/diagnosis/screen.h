@@ -47,7 +47,8 @@ struct Score {
   /// 90 % power at this test's level; infinite when the parameters imitate the effect completely,
   /// or differences at two strengths or more have nothing in common.
   double detectable = 0;
-  std::vector<std::string> confusable_with{};  ///< signatures less than 25 degrees away
+  /// Signatures less than 25 degrees away, nearest first.
+  std::vector<std::string> confusable_with{};
   /// Between what no choice of the parameters imitates of this signature and of each other one, by
   /// name [degrees], 0 to 90 where either effect is two-sided, else to 180.
   std::map<std::string, double> angles{};

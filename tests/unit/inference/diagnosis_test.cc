@@ -190,6 +190,22 @@ TEST(Diagnosis, ParallelSignaturesAreConfusable) {
   EXPECT_NE(scores->front().confusable_with.front(), "sine");
 }
 
+TEST(Diagnosis, TheNearestOfConfusableSignaturesComesFirst) {
+  std::vector<Signature> candidates = {{"wavy", {5 * Curve(1) + 0.1 * Curve(2)}, false}};
+  candidates.insert(candidates.end(), kCandidates.begin(), kCandidates.end());
+  const auto scores = Screen(Line(12 * Curve(0) + 30 * Curve(1) + Noise(3)), candidates);
+  for (const Score& score : *scores) {
+    for (std::size_t k = 1; k < score.confusable_with.size(); ++k) {
+      EXPECT_LE(score.angles.at(score.confusable_with[k - 1]),
+                score.angles.at(score.confusable_with[k]));
+    }
+    // In the order of the candidates it would be "wavy".
+    if (score.name != "parabola") continue;
+    ASSERT_EQ(score.confusable_with.size(), 2U);
+    EXPECT_EQ(score.confusable_with.front(), "power");
+  }
+}
+
 TEST(Diagnosis, SignatureThatTheParametersImitateIsNotDetectable) {
   const auto scores = Screen(Line(12 * Curve(0) + Noise(4)), {{"line", {3 * Curve(0)}, true}});
   EXPECT_GT(scores->front().detectable, 10);
