@@ -14,7 +14,7 @@ import csv, concurrent.futures, dataclasses, itertools, json, math, os, statisti
 import laboratory
 
 CENTER = {'young_modulus': 0.85e9, 'friction_coefficient': 0.45}
-RANGE = {'young_modulus': 2.2, 'friction_coefficient': 1 / 0.45}  # factors either way: friction to the end of its prior
+RANGE = {'young_modulus': 4 / 0.85, 'friction_coefficient': 1 / 0.45}  # factors either way, to the ends of the priors
 PAIRS, SCATTER = 4, 16                                           # packings of the differences, of a covariance
 FRICTIONS = (0.2, 0.45, 0.65, 1.0)                               # at which covariances are measured
 UPWARDS, DOWNWARDS = (1, 2, 4, 8), (0.5, 0.25, 0.125, 1 / 16, 1 / 32)   # times what the diagnosis calls detectable
@@ -74,8 +74,7 @@ class Strengths:
             self.lab.write(os.path.join(self.work, test + '.csv'), 'axial_strain,q_over_p,volumetric_strain\n' + rows)
         self.plain = np.array(self.histories([(k, CENTER) for k in range(PAIRS)]))
         self.scatters = {friction: self.scatter(friction) for friction in FRICTIONS}
-        # What the parameters can imitate: a polynomial in their logarithms, cubic in that of friction, through the means over
-        # the packings.
+        # What the parameters can imitate: a polynomial in their logarithms, cubic in each, through the means over the packings.
         grid = [dict(zip(CENTER, (CENTER[n] * RANGE[n] ** (a / 2) for n, a in zip(CENTER, axes))))
                 for axes in itertools.product((-2, -1, 0, 1, 2), repeat=2)]
         runs = self.histories([(k, point) for point in grid for k in range(PAIRS)])
@@ -118,7 +117,7 @@ class Strengths:
 
     def terms(self, x):
         a, b = x[:, 0], x[:, 1]
-        return self.np.stack([a, b, a * a, a * b, b * b, a * b * b, b * b * b], axis=1)
+        return self.np.stack([a, b, a * a, a * b, b * b, a * a * a, a * a * b, a * b * b, b * b * b], axis=1)
 
     def near(self, friction):
         return self.scatters[min(FRICTIONS, key=lambda f: abs(math.log(f / friction)))]
