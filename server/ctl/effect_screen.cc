@@ -165,6 +165,7 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
         {.name = effect->name, .differences = {}, .two_sided = effect->two_sided, .strengths = {}});
   }
   std::vector<std::vector<Step>> steps;
+  steps.reserve(effects.size());
   for (const dem::EffectInfo* effect : effects) steps.push_back(StepsOf(*effect, rows));
   for (std::size_t k = 0; k < rows; ++k) {
     const Index like = runs[std::min(k, runs.size() - 1)];

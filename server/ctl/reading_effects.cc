@@ -151,7 +151,8 @@ void MisreadStrain(const Curve& curve, const StrainOfLoad& strain, const Eigen::
                    Eigen::Ref<Eigen::RowVectorXd> change) {
   const auto path = StressPath(curve, y);
   const campaign::Experiment& experiment = *curve.experiment;
-  for (const auto& [name, at] : curve.at) {
+  for (const auto& observable : curve.at) {
+    const std::vector<Index>& at = observable.second;
     for (std::size_t s = 0; s < at.size(); ++s) {
       if (at[s] < 0 || !path[s] || !path.front()) continue;
       const auto same_stage = [&](std::size_t other) {
