@@ -17,19 +17,17 @@ constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all
 // A second strength is to change three times what two runs differ by chance: of what a measurement
 // scatters, in square.
 constexpr double kWanted = 18;
-constexpr double kLeastRatio = 1.5;  // of the second strength to the first
-constexpr double kMostRatio = 16;
-constexpr double kMaybeChance = 4;  // twice what two runs differ by chance
-constexpr double kGrades = 4;       // of an octave: the last bits of a history change no run
+constexpr double kMostRatio = 16;  // of the second strength to the first
+constexpr double kGrades = 4;      // of an octave: the last bits of a history change no run
 
-// The last step within the default prior, at least a little more than the first.
+// The last step within the default prior, or the catalogue's second.
 double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
                 const std::string& contact, const dem::ReferenceState& state) {
   const auto parameter = std::find_if(effect.parameters.begin(), effect.parameters.end(),
                                       [&ray](const auto& p) { return p.name == ray.parameter; });
   const double end = dem::PriorOf(*parameter, contact, state).max;
   const double reach = end - dem::NullValueOf(*parameter, contact).value_or(0);
-  return std::max(kLeastRatio * ray.steps[0], reach / dem::ScaleOf(*parameter, contact, state));
+  return std::max(ray.steps[1], reach / dem::ScaleOf(*parameter, contact, state));
 }
 
 }  // namespace
@@ -37,11 +35,10 @@ double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
 double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
                   const std::string& contact, const dem::ReferenceState& state) {
   if (!(square > 0)) return ray.steps[1];
-  const double second = ray.steps[1] / ray.steps[0];
   const double grade = std::round(kGrades * std::log2(std::sqrt(kWanted / square))) / kGrades;
-  const double least = square < kMaybeChance ? second : kLeastRatio;
-  const double ratio = std::clamp(std::exp2(grade), least, kMostRatio);
-  const double step = std::min(ratio * ray.steps[0], LastStep(effect, ray, contact, state));
+  const double wanted = std::max(ray.steps[1], std::exp2(grade) * ray.steps[0]);
+  const double step = std::min({wanted, std::max(ray.steps[1], kMostRatio * ray.steps[0]),
+                                LastStep(effect, ray, contact, state)});
   return dem::RayAdmits(effect, ray, step, contact, state) ? step : ray.steps[1];
 }
 

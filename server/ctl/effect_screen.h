@@ -26,8 +26,8 @@ using SquareOfDifference = std::function<double(const Eigen::VectorXd&)>;
 
 /// How strong to try an effect of the catalogue whose first strength changes the histories by
 /// `square` (see above): so that it stands out from the chance in a difference of two runs, which
-/// is the same however strong the effect is; 1.5 to 16 times the first, no less than the
-/// catalogue's second where the first may be chance, within the default prior. In units of the ray.
+/// is the same however strong the effect is; from the catalogue's second strength to 16 times the
+/// first, within the default prior. In units of the ray.
 double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
                   const std::string& contact, const dem::ReferenceState& state);
 
