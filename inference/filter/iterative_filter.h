@@ -207,7 +207,8 @@ std::vector<char> ConvergedMeans(const Posterior& before, const Posterior& now,
 
 /// State of the running iteration from the readings that have arrived, for the live view: only load
 /// steps that every undiverged sample has reached count, per experiment; where there is none, the
-/// samples that have ended, with all of theirs. Weights are likelihoods alone. N x T predictions, NaN where not yet reached; diverged: N flags.
+/// samples that have ended, with all of theirs. Weights are likelihoods alone. N x T predictions,
+/// NaN where not yet reached; diverged: N flags.
 struct OnlineView {
   int readings = 0;  ///< readings that count
   double ess = 0;    ///< effective number of samples

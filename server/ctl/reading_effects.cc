@@ -80,6 +80,20 @@ std::optional<Stress> StressAt(const Curve& curve, std::size_t step, const Eigen
   return std::nullopt;
 }
 
+struct Rows {
+  Eigen::RowVectorXd value, sd;  // T each, of the readings
+};
+
+Rows ReadingRows(const inference::DataSet& data) {
+  const auto t = static_cast<Index>(data.readings.size());
+  Rows rows{.value = Eigen::RowVectorXd(t), .sd = Eigen::RowVectorXd(t)};
+  for (Index k = 0; k < t; ++k) {
+    rows.value[k] = data.readings[static_cast<std::size_t>(k)].value;
+    rows.sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+  }
+  return rows;
+}
+
 // What an observable reads at a stress; nothing for those that are no stress.
 std::optional<double> Read(const std::string& observable, Stress s) {
   if (observable == "axial_stress") return s.axial;
@@ -189,13 +203,10 @@ std::vector<ReadingEffect> EffectsOnReadings(
     std::vector<std::pair<std::string, std::string>>& impossible) {
   const inference::DataSet data = campaign::MakeDataSet(campaign);
   const std::vector<Curve> curves = CurvesOf(campaign, data);
-  const auto t = static_cast<Index>(data.readings.size());
-  Eigen::RowVectorXd value(t);
-  Eigen::RowVectorXd sd(t);
-  for (Index k = 0; k < t; ++k) {
-    value[k] = data.readings[static_cast<std::size_t>(k)].value;
-    sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
-  }
+  const Rows rows = ReadingRows(data);
+  const Eigen::RowVectorXd& value = rows.value;
+  const Eigen::RowVectorXd& sd = rows.sd;
+  const Index t = value.size();
   const Scales scales = ScalesOf(curves, value);
   std::vector<ReadingEffect> effects;
   const auto add = [&](const char* effect, const char* parameter, double unit, const char* why_not,
@@ -251,13 +262,10 @@ std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
                                             const Eigen::VectorXd& gain,
                                             const Eigen::VectorXd& offset) {
   std::vector<Curve> curves = CurvesOf(campaign, data);
-  const auto t = static_cast<Index>(data.readings.size());
-  Eigen::RowVectorXd value(t);
-  Eigen::RowVectorXd sd(t);
-  for (Index k = 0; k < t; ++k) {
-    value[k] = data.readings[static_cast<std::size_t>(k)].value;
-    sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
-  }
+  const Rows rows = ReadingRows(data);
+  const Eigen::RowVectorXd& value = rows.value;
+  const Eigen::RowVectorXd& sd = rows.sd;
+  const Index t = value.size();
   // A formula of the user's may read anything.
   for (const dem::UserEffect& effect : campaign.model.user_effects) {
     const auto& used = campaign.model.effects;

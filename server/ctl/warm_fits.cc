@@ -185,9 +185,7 @@ report::RunTable WarmFits::RunsFor(const std::string& effect) const {
   report::RunTable runs = fit.runs;
   Append(RunsOfScreen(screen_.RunsWith(effect), campaign), runs);
   const campaign::Campaign& parent = base_.view().campaign;
-  auto misread = effect == "load_cell_error"
-                     ? RunsMisread(base_.runs(), parent, base_.readings().of_mean, campaign)
-                     : std::nullopt;
+  auto misread = RunsMisread(base_.runs(), parent, base_.readings().of_mean, campaign);
   Append(misread ? *std::move(misread) : RunsWithoutEffect(base_.runs(), parent, campaign), runs);
   return runs;
 }

@@ -130,8 +130,13 @@ std::optional<report::RunTable> RunsMisread(const report::RunTable& without,
   Eigen::VectorXd offset = gain;
   for (const Index j : OnTop(parent, extended)) {
     const std::string& name = extended.parameters[static_cast<std::size_t>(j)].name;
-    if (name == "load_cell_error.gain") gain = table.parameters.col(j);
-    if (name == "load_cell_error.offset") offset = table.parameters.col(j);
+    if (name == "load_cell_error.gain") {
+      gain = table.parameters.col(j);
+    } else if (name == "load_cell_error.offset") {
+      offset = table.parameters.col(j);
+    } else {
+      return std::nullopt;
+    }
   }
   auto misread = MisreadLoads(parent, data, table.histories, gain, offset);
   if (!misread) return std::nullopt;

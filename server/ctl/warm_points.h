@@ -25,9 +25,9 @@ report::RunTable RunsWithoutEffect(const report::RunTable& without,
                                    const campaign::Campaign& parent,
                                    const campaign::Campaign& extended);
 
-/// The same runs read by load cells with errors drawn from their priors in `extended`, which has
-/// load_cell_error on top: a run at every strength, and no run to be made. data: units of the
-/// histories. Empty where it cannot be calculated (MisreadLoads).
+/// The same runs read by load cells with errors drawn from their priors in `extended`: a run at
+/// every strength, and no run to be made. data: units of the histories. Empty where `extended` has
+/// anything but load_cell_error on top, or it cannot be calculated (MisreadLoads).
 std::optional<report::RunTable> RunsMisread(const report::RunTable& without,
                                             const campaign::Campaign& parent,
                                             const inference::DataSet& data,

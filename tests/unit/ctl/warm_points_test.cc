@@ -105,5 +105,16 @@ TEST(WarmPoints, RunsAreReadByLoadCellsOfEveryStrength) {
   EXPECT_GT((misread->histories - runs.histories).cwiseAbs().maxCoeff(), 0.1);
 }
 
+TEST(WarmPoints, WhatElseIsOnTopCannotBeReadIntoARun) {
+  campaign::Campaign parent = Square();
+  parent.experiments[0].control = {0, 0.02};
+  campaign::Campaign extended = parent;
+  extended.parameters.push_back(
+      {.name = "rolling_resistance.friction",
+       .unit = "1",
+       .prior = {.kind = inference::PriorKind::kUniform, .min = 0, .max = 1}});
+  EXPECT_FALSE(RunsMisread(Runs(5), parent, campaign::MakeDataSet(parent), extended));
+}
+
 }  // namespace
 }  // namespace calib::ctl
