@@ -39,20 +39,17 @@ absl::Status Singular(const DataSet& data, std::pair<int, int> key, int reading)
 Eigen::Index Factorise(const Eigen::MatrixXd& correlation, Eigen::MatrixXd& factor,
                        Eigen::VectorXd& open) {
   const Eigen::Index size = correlation.rows();
-  factor = Eigen::MatrixXd::Zero(size, size);
+  factor = correlation.triangularView<Eigen::Lower>();
   open = Eigen::VectorXd::Zero(size);
-  for (Eigen::Index i = 0; i < size; ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      double value = correlation(i, j);
-      for (Eigen::Index k = 0; k < j; ++k) value -= factor(i, k) * factor(j, k);
-      if (i > j) {
-        factor(i, j) = value / factor(j, j);
-        continue;
-      }
-      open[i] = value;
-      if (!(value > kLeastOpenShare)) return i;
-      factor(i, i) = std::sqrt(value);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    const Eigen::Index below = size - j;
+    for (Eigen::Index k = 0; k < j; ++k) {
+      factor.col(j).tail(below) -= factor(j, k) * factor.col(k).tail(below);
     }
+    open[j] = factor(j, j);
+    if (!(open[j] > kLeastOpenShare)) return j;
+    factor(j, j) = std::sqrt(open[j]);
+    factor.col(j).tail(below - 1) /= factor(j, j);
   }
   return size;
 }
@@ -122,6 +119,31 @@ CALIB_INFERENCE_CLONES void SubtractEarlier(const double* factors, const double*
   }
   for (; i < n; ++i) {
     for (Eigen::Index l = 0; l < terms; ++l) z[i] -= factors[l] * earlier[l][i];
+  }
+}
+
+// The same for kRows readings at once, which load each earlier one together.
+constexpr Eigen::Index kRows = 6;
+CALIB_INFERENCE_CLONES void SubtractEarlierFromRows(const double* const* factors,
+                                                    const double* const* earlier,
+                                                    Eigen::Index terms, Eigen::Index n,
+                                                    double* const* z) {
+  Eigen::Index i = 0;
+  for (; i + kLanes <= n; i += kLanes) {
+    Lanes sum[kRows];
+#pragma GCC unroll 6
+    for (Eigen::Index r = 0; r < kRows; ++r) std::memcpy(&sum[r], z[r] + i, sizeof(Lanes));
+    for (Eigen::Index l = 0; l < terms; ++l) {
+#pragma GCC unroll 6
+      for (Eigen::Index r = 0; r < kRows; ++r) Subtract(factors[r][l], earlier[l] + i, sum[r]);
+    }
+#pragma GCC unroll 6
+    for (Eigen::Index r = 0; r < kRows; ++r) std::memcpy(z[r] + i, &sum[r], sizeof(Lanes));
+  }
+  for (; i < n; ++i) {
+    for (Eigen::Index r = 0; r < kRows; ++r) {
+      for (Eigen::Index l = 0; l < terms; ++l) z[r][i] -= factors[r][l] * earlier[l][i];
+    }
   }
 }
 
@@ -227,27 +249,23 @@ void GaussianLikelihood::Whiten(const Rows& predictions, Missing missing, Mutabl
   const Eigen::Index n = predictions.rows();
   const bool complete = AllFinite(predictions);
   std::vector<char> reached(static_cast<std::size_t>(n));
-  std::vector<const double*> earlier;
   for (const Group& group : groups_) {
-    const auto size = static_cast<Eigen::Index>(group.readings.size());
     std::fill(reached.begin(), reached.end(), 1);
-    earlier.clear();
-    for (Eigen::Index k = 0; k < size; ++k) {
-      const int t = group.readings[static_cast<std::size_t>(k)];
-      auto z = z_all.col(t);
-      if (group.cholesky.size() == 0) {
-        WhitenLink(predictions, t, z.array());
-      } else {  // forward substitution
-        z = values_[static_cast<std::size_t>(t)] - predictions.col(t).array();
-        SubtractEarlier(group.cholesky.row(k).data(), earlier.data(), k, n, z.data());
-        z /= group.cholesky(k, k);
-        earlier.push_back(z.data());
-      }
+    // What comes after a reading takes nothing from it where it was not reached.
+    const auto close = [&](int t) {
       for (Eigen::Index i = 0; !complete && i < n; ++i) {
         char& row = reached[static_cast<std::size_t>(i)];
         row = static_cast<char>(row & static_cast<char>(std::isfinite(predictions(i, t))));
-        if (row == 0) z[i] = 0;
+        if (row == 0) z_all(i, t) = 0;
       }
+    };
+    if (group.cholesky.size() == 0) {
+      for (const int t : group.readings) {
+        WhitenLink(predictions, t, z_all.col(t).array());
+        close(t);
+      }
+    } else {
+      SubstituteForward(group, predictions, z_all, close);
     }
     if (complete || missing == Missing::kZeroResidual) continue;
     std::fill(reached.begin(), reached.end(), 1);
@@ -257,6 +275,32 @@ void GaussianLikelihood::Whiten(const Rows& predictions, Missing missing, Mutabl
         row = static_cast<char>(row & static_cast<char>(std::isfinite(predictions(i, t))));
         if (row == 0) z_all(i, t) = kNaN;
       }
+    }
+  }
+}
+
+void GaussianLikelihood::SubstituteForward(const Group& group, const Rows& predictions,
+                                           MutableRows z_all,
+                                           absl::FunctionRef<void(int)> close) const {
+  const Eigen::Index n = predictions.rows();
+  const auto size = static_cast<Eigen::Index>(group.readings.size());
+  std::vector<double*> z;
+  std::vector<const double*> factors;
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const int t = group.readings[static_cast<std::size_t>(k)];
+    z_all.col(t) = values_[static_cast<std::size_t>(t)] - predictions.col(t).array();
+    z.push_back(z_all.col(t).data());
+    factors.push_back(group.cholesky.row(k).data());
+  }
+  for (Eigen::Index begin = 0; begin < size; begin += kRows) {
+    const bool whole = begin + kRows <= size;
+    if (whole) SubtractEarlierFromRows(&factors[begin], z.data(), begin, n, &z[begin]);
+    const Eigen::Index taken = whole ? begin : 0;
+    for (Eigen::Index k = begin; k < std::min(begin + kRows, size); ++k) {
+      SubtractEarlier(factors[k] + taken, &z[taken], k - taken, n, z[k]);
+      const int t = group.readings[static_cast<std::size_t>(k)];
+      z_all.col(t) /= group.cholesky(k, k);
+      close(t);
     }
   }
 }
@@ -297,15 +341,20 @@ Eigen::MatrixXd GaussianLikelihood::Fill(const Eigen::MatrixXd& predictions,
     }
     return increments;
   }
-  constexpr Eigen::Index kBlock = 256;  // rows whose columns stay in the cache
+  constexpr Eigen::Index kBlock = 64;  // rows whose columns stay in the cache, close together
+  Eigen::MatrixXd scratch(std::min(kBlock, predictions.rows()), readings_);
   for (Eigen::Index first = 0; first < predictions.rows(); first += kBlock) {
     const Eigen::Index size = std::min(kBlock, predictions.rows() - first);
-    MutableRows block = increments.middleRows(first, size);
+    MutableRows block = scratch.topRows(size);
     Whiten(predictions.middleRows(first, size), missing, block);
     for (const FactorGroup& group : factors_) IntegrateFactor(group, block);
-    for (int t = 0; !inferred_ && t < readings_; ++t) {
-      auto column = block.col(t).array();
-      column = (-kLogSqrtTwoPi - log_diagonal_[t]) - 0.5 * column.square();
+    MutableRows to = increments.middleRows(first, size);
+    if (inferred_) {
+      to = block;
+      continue;
+    }
+    for (int t = 0; t < readings_; ++t) {
+      to.col(t).array() = (-kLogSqrtTwoPi - log_diagonal_[t]) - 0.5 * block.col(t).array().square();
     }
   }
   return increments;

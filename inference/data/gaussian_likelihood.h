@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 #include "inference/data/data_set.h"
 
@@ -95,6 +96,9 @@ class GaussianLikelihood {
   using MutableRows = Eigen::Ref<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
   // z, N x T; NaN where not reached, or zero residual there.
   void Whiten(const Rows& predictions, Missing missing, MutableRows z) const;
+  // z of a group with a Cholesky factor; close(t) after each reading t, before later ones use it.
+  void SubstituteForward(const Group& group, const Rows& predictions, MutableRows z,
+                         absl::FunctionRef<void(int)> close) const;
   // z of a reading of a group without a Cholesky factor, up to where it is not finite.
   void WhitenLink(const Rows& predictions, int t, Eigen::Ref<Eigen::ArrayXd> z) const;
   Eigen::MatrixXd Fill(const Eigen::MatrixXd& predictions, Missing missing) const;
