@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -40,10 +41,11 @@ std::string NewIdentity() {
 std::string IdentityOf(const std::string& folder) {
   const std::string path = folder + "/identity";
   const std::string own = absl::StrCat(path, ".", getpid());
-  if (std::ofstream(own) << NewIdentity()) {
-    // Fails where there is one already, which then counts.
-    if (link(own.c_str(), path.c_str()) != 0 && errno != EEXIST) return "";
-  }
+  std::ofstream file(own);
+  file << NewIdentity();
+  file.close();  // tells whether the disk has taken it
+  // Linking fails where there is an identity already, which then counts.
+  if (!file || (link(own.c_str(), path.c_str()) != 0 && errno != EEXIST)) return "";
   std::error_code ignored;
   fs::remove(own, ignored);
   return ReadAll(path);

@@ -20,12 +20,13 @@ v1::Finished::Outcome ToMessage(dem::Outcome outcome) {
   return v1::Finished::OUTCOME_DIVERGED;
 }
 
+// Of a test that is walked in stages; empty: of any other.
 std::string ToText(const dem::Staging& staging) {
-  return absl::StrCat("rate=", staging.rate.value_or(0), " step=", staging.step.value_or(0),
-                      " damping=", staging.damping_loading.value_or(0), ",",
-                      staging.damping_settling.value_or(0),
-                      " unbalanced=", staging.unbalanced.value_or(0),
-                      staging.adaptive ? " adaptive" : "");
+  if (!staging.rate.has_value()) return "";
+  return absl::StrCat(
+      "rate=", staging.rate.value_or(0), " step=", staging.step.value_or(0),
+      " damping=", staging.damping_loading.value_or(0), ",", staging.damping_settling.value_or(0),
+      " unbalanced=", staging.unbalanced.value_or(0), staging.adaptive ? " adaptive" : "");
 }
 
 v1::Finished Ended(v1::Finished::Outcome outcome, const absl::Status& status) {
@@ -41,9 +42,15 @@ v1::Finished Ended(v1::Finished::Outcome outcome, const absl::Status& status) {
 v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const dem::StateSink& sink,
                       std::stop_token stop, const dem::Recording& recording) {
   const auto start = std::chrono::steady_clock::now();
+  const auto core_seconds = [start](int threads) {
+    return threads *
+           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
   const auto specimen = specimens.Get(spec, stop);
   if (!specimen.ok()) {
-    return Ended(v1::Finished::OUTCOME_FAILED, specimen.status());
+    v1::Finished finished = Ended(v1::Finished::OUTCOME_FAILED, specimen.status());
+    finished.set_core_seconds(core_seconds(1));
+    return finished;
   }
   dem::Scenario scenario = ScenarioFromSpec(spec);
   scenario.packing = (*specimen)->packing;
@@ -69,8 +76,7 @@ v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const d
                      summary.status());
   }
   finished.set_states(states);
-  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  finished.set_core_seconds(elapsed.count() * scenario.threads);
+  finished.set_core_seconds(core_seconds(scenario.threads));
   return finished;
 }
 

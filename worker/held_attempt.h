@@ -31,6 +31,7 @@ class HeldAttempt {
   bool started() const { return thread_.joinable(); }
   /// True from Run() until the end has been handed to AddEnd().
   bool running() const { return started() && !end_.has_value(); }
+  bool ended() const { return end_.has_value(); }
   void Stop() { thread_.request_stop(); }
 
   void AddState(const dem::State& state);
@@ -42,8 +43,6 @@ class HeldAttempt {
   void StreamLost();
   /// The server has stored states up to this position; it need not be told again.
   void Acknowledge(std::int64_t up_to);
-
-  std::int64_t id() const { return id_; }
 
  private:
   std::int64_t id_;

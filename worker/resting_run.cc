@@ -62,7 +62,7 @@ v1::Finished EvaluateToRung(const v1::AttemptSpec& spec, const RestingRun& resti
   const HeldRun so_far{.steps = finished.steps(),
                        .contact_updates = finished.contact_updates(),
                        .checkpoint = std::move(checkpoint)};
-  if (held.has_value()) {
+  if (held.has_value() && so_far.steps >= held->steps) {  // none when it could not be resumed
     finished.set_steps(so_far.steps - held->steps);
     finished.set_contact_updates(so_far.contact_updates - held->contact_updates);
   }

@@ -12,9 +12,9 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
 #include "calib/v1/worker.grpc.pb.h"
+#include "proto/rpc/backoff.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/client_options.h"
-#include "proto/rpc/retry.h"
 #include "proto/rpc/status.h"
 
 namespace calib::worker {

@@ -12,8 +12,8 @@
 #include <utility>
 
 #include "dem/catalog/catalog.h"
+#include "proto/rpc/backoff.h"
 #include "proto/rpc/digest.h"
-#include "proto/rpc/retry.h"
 #include "worker/checkpoints.h"
 #include "worker/held_attempt.h"
 #include "worker/server_link.h"
@@ -211,7 +211,7 @@ class Worker::Impl {
       if (running >= options_.slots || stopping_) {
         return;
       }
-      if (!attempt.started()) {
+      if (!attempt.started() && !attempt.ended()) {  // one that came while draining has ended
         ++running;
         spdlog::info("start attempt={}", id);
         attempt.Run(

@@ -75,9 +75,11 @@ struct ContactInfo {
 /// One way to turn an effect up from nothing: a parameter leaves its null while others are held.
 struct StrengthRay {
   std::string parameter;                 ///< undotted; has a null value
-  std::array<double, 2> steps = {0, 0};  ///< two moderate distances from the null, ascending, in
-                                         ///< units of the parameter's scale; of a two-sided effect
-                                         ///< -steps are as good where they are admissible
+  std::array<double, 2> steps = {0, 0};  ///< two moderate distances from the null, none of them 0,
+                                         ///< the nearer first, in units of the parameter's scale:
+                                         ///< > 0 in the catalogue, of either sign in a user's
+                                         ///< effect; of a two-sided effect -steps are as good where
+                                         ///< they are admissible
   std::map<std::string, double> held = {};  ///< other parameters / scale; not listed: their default
 };
 

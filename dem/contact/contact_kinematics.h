@@ -10,8 +10,8 @@ namespace calib::dem {
 /// and twisting during block.dt. The homogeneous velocity of the cell acts over the branch vector.
 ///   n = d/|d|, u = r_i + r_j - |d|, v = v_j - v_i + L d
 ///   slip  = dt [ (r_i + r_j)/|d| (v - n (n.v)) - (r_i w_i + r_j w_j) x n ]
-///   roll  = dt [ (w_j - w_i) - n (n.(w_j - w_i)) ],   twist = dt n.(w_j - w_i),   spin = dt/2
-///   n.(w_i + w_j)
+///   roll  = dt [ (w_j - w_i) - n (n.(w_j - w_i)) ]
+///   twist = dt n.(w_j - w_i),   spin = dt/2 n.(w_i + w_j)
 /// Slip uses rigid arms r_i, r_j (the translation scaled by (r_i + r_j)/|d|): objective, and
 /// without the ratcheting that arms changing with the overlap give in cycles [McNamara,
 /// Garcia-Rojo, Herrmann, Phys. Rev. E 77 (2008) 031304]. Precondition: |d| > 0 in every lane.

@@ -9,7 +9,7 @@
 
 namespace calib::dem {
 
-/// Goes to an archive as it lies in memory. Types with a Visit() of their own are not asked.
+/// Goes to an archive as it lies in memory, unless it has a Visit() of its own and stands alone.
 template <class T>
 inline constexpr bool kPlain = std::is_trivially_copyable_v<T>;
 
@@ -80,7 +80,7 @@ class LoadArchive {
   }
   template <class T>
   void Get(std::vector<T>& values) {
-    const std::uint64_t size = Size();
+    const std::uint64_t size = Size(kPlain<T> ? sizeof(T) : 1);
     values.assign(size, T{});
     if constexpr (kPlain<T>) {
       Take(values.data(), values.size() * sizeof(T));
@@ -91,14 +91,14 @@ class LoadArchive {
     }
   }
   void Get(std::string& text) {
-    text.assign(Size(), '\0');
+    text.assign(Size(1), '\0');
     Take(text.data(), text.size());
   }
-  /// A length that the remaining bytes could hold.
-  std::uint64_t Size() {
+  /// A length of which the remaining bytes could hold all elements of `least` bytes.
+  std::uint64_t Size(std::size_t least) {
     std::uint64_t size = 0;
     Get(size);
-    ok_ = ok_ && size <= bytes_.size() - at_;
+    ok_ = ok_ && size <= (bytes_.size() - at_) / least;
     return ok_ ? size : 0;
   }
   void Take(void* to, std::size_t size) {

@@ -61,11 +61,11 @@ class Assembly {
            int threads);
 
   /// Takes out the grains at these indices of particles(), ascending. To be followed by
-  /// EvaluateForces.
+  /// EvaluateForces. Precondition: single spheres (no clumps).
   void Remove(const std::vector<int>& grains);
 
-  /// Lets grains join, with the next free ids. To be followed by EvaluateForces. Precondition: the
-  /// skin and the step were chosen for grains like these.
+  /// Lets grains join, with the next free ids. To be followed by EvaluateForces. Preconditions:
+  /// single spheres (no clumps); the skin and the step were chosen for grains like these.
   void Insert(const std::vector<NewGrain>& grains);
 
   /// Velocities, activity and friction of walls may be set between steps.
@@ -127,14 +127,10 @@ class Assembly {
   [[nodiscard]] const GrainLoad& load_on_j(int slot) const {
     return loads_[static_cast<std::size_t>(list_.place_j[static_cast<std::size_t>(slot)])];
   }
-  [[nodiscard]] const GrainLoad& load_on_i(int slot) const {
-    return loads_[static_cast<std::size_t>(list_.place_i[static_cast<std::size_t>(slot)])];
-  }
 
   /// Love-Weber stress sum_c f_a d_a / V of the last EvaluateForces, compression positive [Pa].
   [[nodiscard]] const std::array<double, 3>& stress() const { return stress_; }
-  /// Its component xz (mean of xz and zx), positive where the top is pushed along +x by what is
-  /// below: shearing the top along +x against friction makes it positive [Pa].
+  /// Minus its component xz (mean of xz and zx): positive when the top is sheared along +x [Pa].
   [[nodiscard]] double shear_stress() const { return shear_stress_; }
   /// Contacts between grains; those with walls are counted by walls().
   [[nodiscard]] std::int64_t contacts() const { return contacts_; }
@@ -147,7 +143,8 @@ class Assembly {
   /// follow at the next evaluation. Precondition: single spheres, no radius grows.
   void Shrink(const std::vector<std::pair<int, double>>& radii);
 
-  /// Sum of the volumes of grains, unions for clumps, of the packing as it was given.
+  /// Sum of the volumes of grains, unions for clumps, of the packing as it was given, less what
+  /// Remove() took out, with what Insert() put in [m^3].
   [[nodiscard]] double solid_volume() const { return solid_volume_; }
   /// Of the spheres that have the volumes of the bodies.
   [[nodiscard]] double mean_diameter() const { return mean_diameter_; }

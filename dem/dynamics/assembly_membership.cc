@@ -51,6 +51,7 @@ void Assembly::Renumber(const std::vector<int>& to) {
 }
 
 void Assembly::Remove(const std::vector<int>& grains) {
+  assert(clumps_.empty());
   if (grains.empty()) {
     return;
   }
@@ -69,6 +70,7 @@ void Assembly::Remove(const std::vector<int>& grains) {
 }
 
 void Assembly::Insert(const std::vector<NewGrain>& grains) {
+  assert(clumps_.empty());
   ParticleArrays& p = particles_;
   for (const NewGrain& grain : grains) {
     assert(grain.radius > 0 && grain.radius <= largest_radius_ * (1 + 1e-12));

@@ -15,8 +15,8 @@ struct Motion {
 };
 
 /// Moves grains [begin, end) by their loads fx .. tz:
-///   v += dt F'/m,  F' = F (1 - damping sign(F (v + dt F/2m))) per component;  w likewise;  x += dt
-///   (v + L x)
+///   v += dt F'/m,  F' = F (1 - damping sign(F (v + dt F/2m))) per component;  w likewise;
+///   x += dt (v + L x)
 /// v is peculiar; the inertia of the homogeneous motion is left out, being of the order of the
 /// squared inertial number. [local damping: Cundall 1987; sign at mid-step]
 void AdvanceGrains(const Motion& motion, int begin, int end, ParticleArrays& particles);

@@ -37,8 +37,6 @@ class StressServo {
     return rate;
   }
 
-  void Reset() { integral_ = 0; }
-
  private:
   static constexpr double kProportional = 0.3;
   static constexpr double kIntegral = 0.005;

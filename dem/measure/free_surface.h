@@ -16,8 +16,8 @@ struct Heap {
 /// A heap about the vertical through `axis`. The surface is the highest point of any grain in each
 /// of eight sectors and each ring of width `diameter`, averaged with empty sectors as bare floor;
 /// its slope is that of the least-squares line through the rings whose surface lies between 15 % of
-/// the height, at least one diameter, and 85 %. No heap where fewer than three rings do, or where it is lower than two
-/// diameters.
+/// the height, at least one diameter, and 85 %. No heap where fewer than three rings do, or where
+/// it is lower than two diameters.
 Heap ConicalHeap(const ParticleArrays& particles, const Vec3& axis, double diameter);
 
 /// Slope of the surface over x [rad], positive where it rises with x: least-squares line through

@@ -21,8 +21,8 @@ struct FillRegion {
 
 /// The radii in an order drawn from the seed, set on a cubic lattice whose pitch is 1.08 largest
 /// diameters, each displaced at random by up to 3 % of the largest radius, so that no two touch.
-/// Fewer grains than radii come back where
-/// the region is too small. The same arguments give the same bits.
+/// Fewer grains than radii come back where the region is too small. The same arguments give the
+/// same bits.
 Packing LooseFill(std::vector<double> radii, const FillRegion& region, std::uint64_t seed);
 
 /// z of the highest point of any grain [m]. Precondition: there is one.

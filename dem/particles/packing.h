@@ -44,8 +44,8 @@ struct PackingRecipe {
   std::uint64_t seed = 1;
 };
 
-/// Grains of the recipe's sizes, thrown loosely into a cell, for tests that pour them themselves; its
-/// porosity and pressure are not used. Errors as GeneratePacking.
+/// Grains of the recipe's sizes, thrown loosely into a cell, for tests that pour them themselves;
+/// its porosity and pressure are not used. Errors as GeneratePacking.
 absl::StatusOr<Packing> GenerateSizes(const PackingRecipe& recipe);
 
 /// Generates a packing; the same recipe gives the same bits on every thread count. Independent of

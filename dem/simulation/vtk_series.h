@@ -11,11 +11,11 @@
 namespace calib::dem {
 
 /// Three series in one folder, each a PVD that names its files with their load steps as time:
-///   grains.pvd    grains_NNNN.vtu    a vertex per grain in the order of the packing: id, radius
-///   [m],
-///                                    velocity [m/s], angular_velocity [rad/s], coordination_number
-///                                    (contacts with grains), clump where there are some (-1:
-///                                    none); field data load_step, cell_length [m], cell_tilt [m]
+///   grains.pvd    grains_NNNN.vtu    a vertex per grain in the order of the packing: id,
+///                                    radius [m], velocity [m/s], angular_velocity [rad/s],
+///                                    coordination_number (contacts with grains), clump where
+///                                    there are some (-1: none); field data load_step,
+///                                    cell_length [m], cell_tilt [m]
 ///   contacts.pvd  contacts_NNNN.vtp  a line per contact of grains from centre to centre:
 ///                                    normal_force (compression positive), tangential_force [N]
 ///   walls.pvd     walls_NNNN.vtp     the triangles of walls that are meshes; only with such walls

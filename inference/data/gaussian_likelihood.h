@@ -18,16 +18,18 @@ struct OpenShare {
 };
 /// A likelihood needs more than this of each.
 inline constexpr double kLeastOpenShare = 1e-13;
+
 /// The first reading of which no more than kLeastOpenShare is left open, else the one of which the
-/// least is. in: covariance, symmetric, its diagonal positive, at least one reading
+/// least is.
+/// in: covariance, symmetric, its diagonal positive, at least one reading
 OpenShare LeastOpenShare(const Eigen::MatrixXd& covariance);
 
 /// ln p(y | x) of readings y given predictions x, one independent block per (experiment,
 /// observable) group g:
-///   kGiven:    N(y_g; x_g, S_g),  S_ij = sd_i sd_j exp(-|c_i - c_j| / length),  with the proper |2
-///   pi S|^(-1/2)
+///   kGiven:    N(y_g; x_g, S_g),  S_ij = sd_i sd_j exp(-|c_i - c_j| / length),
+///              with the proper |2 pi S|^(-1/2)
 ///   kInferred: the same with f S_g, f common to the groups of a NoiseGroup and integrated out over
-///   its VarianceFactorPrior: a multivariate t density
+///              its VarianceFactorPrior: a multivariate t density
 /// Written with S = L L^T and z = L^-1 (y - x), reading k of a group contributes a function of z_0
 /// ... z_k alone (kInferred: of the noise group), its density conditional on the earlier readings.
 /// Summed along the processing order the increments are the exact density after every reading,
@@ -59,8 +61,8 @@ class GaussianLikelihood {
   Eigen::VectorXd ReachedLogLikelihood(const Eigen::MatrixXd& predictions) const;
 
   /// The largest value LogLikelihood can still take once the predictions that are not finite yet
-  /// arrive: those of a group from the first missing one on have zero residual given its past, z =
-  /// 0. N. Sound because each increment is largest at z = 0, and with kInferred the marginal falls
+  /// arrive: those of a group from the first missing one on have zero residual given its past,
+  /// z = 0. N. Sound because each increment is largest at z = 0, and with kInferred the marginal falls
   /// with every z^2.
   Eigen::VectorXd LogLikelihoodBound(const Eigen::MatrixXd& predictions) const;
 

@@ -31,17 +31,17 @@ struct ReadingNoise {
 /// sizes over 0.6745]. Each is divided by its sd under the stated covariance: 1 is as stated. With
 /// every order what is left of the curve itself falls and noise stays, so of third and fourth
 /// differences the smaller scale is taken.
-///   surely_larger: 0.999 lower limit of `robust` above 1.3, and fourth differences say no less
-///   than
-///     0.6 times of what third ones say: what falls with the order is a curve, not noise.
+///   surely_larger:  0.999 lower limit of `robust` above 1.3, and fourth differences say no less
+///                   than 0.6 times of what third ones say: what falls with the order is a curve,
+///                   not noise.
 ///   surely_smaller: 0.999 upper limit of `scale` below 2/3. A curve only adds to it.
 /// Limits are those of chi-squared over its degrees, the degrees m^2 / |R|_F^2 for m differences
 /// with stated correlation R [Satterthwaite 1946]; of the median 0.37 of them, its efficiency.
 /// Errors that are correlated over many readings but stated as independent show as smaller, too.
-/// in: runs, any number; shorter than 5 readings are passed over. out: no verdict from less than 6
-///   effective differences (about 17 readings in one run).
+/// in:  runs, any number; shorter than 5 readings are passed over
+/// out: no verdict from less than 6 effective differences (about 17 readings in one run)
 /// Errors: INVALID_ARGUMENT when a covariance does not fit its values, is not finite or gives a
-///   difference no variance.
+/// difference no variance.
 absl::StatusOr<ReadingNoise> CompareReadingNoise(const std::vector<ReadingRun>& runs);
 
 }  // namespace calib::inference

@@ -19,8 +19,9 @@ struct Signature {
   std::vector<Eigen::VectorXd> differences{};  ///< T each: with minus without the effect, one per
                                                ///< ray and strength tried
   bool two_sided = false;
-  /// Of each difference where all lie on one ray, else empty: ascending, > 0, in any unit. What
-  /// differences of single runs share is the effect, what they do not is chance.
+  /// Of each difference where all lie on one ray, else empty: of either sign, none 0, the farthest
+  /// from 0 last, in any unit. What differences of single runs share is the effect, what they do
+  /// not is chance.
   std::vector<double> strengths{};
 };
 

@@ -25,8 +25,8 @@ struct Minimum {
 
 /// Projected BFGS [Bertsekas 1982; Nocedal & Wright 2006, sec. 6.1 and 16.7]: variables at a bound
 /// that the gradient pushes outwards are held, the quasi-Newton step of the others is cut back at
-/// the bounds, Armijo's rule decides on its length. Deterministic. in: lower <= start <= upper, all
-/// finite, function finite at start.
+/// the bounds, Armijo's rule decides on its length. Deterministic.
+/// in: lower <= start <= upper, all finite, function finite at start
 Minimum MinimizeInBox(const SmoothFunction& function, const Eigen::VectorXd& start,
                       const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
                       const MinimizerOptions& options = {});

@@ -11,8 +11,8 @@
 namespace calib::inference {
 
 /// Density of readings z, in units of their noise sd, under the emulator:
-///   N(z; mean + B m, F (R + diag(remainder)) + B D C D B^T),    D^2 = diag(sd^2 + share *
-///   scatter_sd^2)
+///   N(z; mean + B m, F (R + diag(remainder)) + B D C D B^T),
+///   D^2 = diag(sd^2 + share * scatter_sd^2)
 /// with mean, basis B, remainder and error correlation C of the emulator, its prediction m, sd at a
 /// point, the noise's correlation R (identity, or exponential along the control), and one variance
 /// factor per (experiment, observable) group in F. `share` is the part of a run's scatter that the
@@ -23,8 +23,8 @@ class EmulatedLikelihood {
     bool correlated_noise = true;  ///< use data.correlations
     double scatter_share = 1;
   };
-  /// in: data that ValidateData accepts for kGiven; emulator of the same T readings. Keeps no
-  /// reference. Errors: INVALID_ARGUMENT when correlated readings lie so close that their
+  /// in: data that ValidateData accepts for kGiven; emulator of the same T readings
+  /// Keeps no reference. Errors: INVALID_ARGUMENT when correlated readings lie so close that their
   /// covariance is singular.
   static absl::StatusOr<EmulatedLikelihood> Create(const DataSet& data,
                                                    const StateEmulator& emulator,

@@ -26,8 +26,8 @@ struct GaussianProcessOptions {
 };
 
 /// output = f(input) + scatter,  f ~ GP(0, k),  scatter ~ N(0, scatter variance) independent,
-///   k(x, x') = b^2 (1 + x . x') + s (1 + sqrt5 r + 5/3 r^2) exp(-sqrt5 r),  r^2 = sum_j (x_j -
-///   x'_j)^2 / l_j^2,
+///   k(x, x') = b^2 (1 + x . x') + s (1 + sqrt5 r + 5/3 r^2) exp(-sqrt5 r),
+///   r^2 = sum_j (x_j - x'_j)^2 / l_j^2,
 /// a vague linear trend plus a Matern 5/2 departure with one length per input. Matern rather than
 /// squared exponential: histories of granular runs bend where grains begin to slide, and the
 /// squared exponential, which takes every function for analytic, then claims too small a variance

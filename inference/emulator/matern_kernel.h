@@ -14,8 +14,8 @@ struct KernelParameters {
   double signal = 1;
 };
 
-/// k(x, x') = b^2 (1 + x . x') + s (1 + sqrt5 r + 5/3 r^2) exp(-sqrt5 r) between the rows of a (m x
-/// d) and b (n x d); m x n.
+/// k(x, x') = b^2 (1 + x . x') + s (1 + sqrt5 r + 5/3 r^2) exp(-sqrt5 r) between the rows of
+/// a (m x d) and b (n x d); m x n.
 Eigen::MatrixXd KernelMatrix(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
                              const KernelParameters& parameters);
 

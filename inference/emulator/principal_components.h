@@ -27,7 +27,8 @@ struct PrincipalComponents {
 
 /// Principal components of weighted rows (N x T), as few as leave the judged rows a mean square per
 /// reading of at most `truncation`. Weights keep rows that lie far from all that matters from
-/// turning the basis towards them. in: weights > 0, N; judged: indices of rows, at least one
+/// turning the basis towards them.
+/// in: weights > 0, N; judged: indices of rows, at least one
 PrincipalComponents FitPrincipalComponents(const Eigen::MatrixXd& rows,
                                            const Eigen::VectorXd& weights,
                                            std::span<const Eigen::Index> judged,

@@ -34,8 +34,8 @@ struct CrossValidation {
 class StateEmulator {
  public:
   /// in: inputs n x d, standardised parameters; histories n x T, (prediction - reading) / noise sd;
-  /// relevant: rows that
-  ///     matter for the posterior, on which truncation and errors are judged; all finite, n >= 4
+  ///     relevant: rows that matter for the posterior, on which truncation and errors are judged;
+  ///     all finite, n >= 4
   static absl::StatusOr<StateEmulator> Fit(const Eigen::MatrixXd& inputs,
                                            const Eigen::MatrixXd& histories,
                                            std::span<const Eigen::Index> relevant,

@@ -12,12 +12,11 @@ struct EvidenceEstimate {
 
 /// ln (1/N sum_i W_i), W_i = prior x likelihood / proposal, and its standard error by the delta
 /// method
-///   se = sd(W) / (sqrt(N) mean(W)) = sqrt((N / ESS - 1) / (N - 1))                     [Owen 2013,
-///   ch. 9]
+///   se = sd(W) / (sqrt(N) mean(W)) = sqrt((N / ESS - 1) / (N - 1))              [Owen 2013, ch. 9]
 /// The estimate of the evidence itself is unbiased; the error is that of independent draws, an
 /// upper guide for quasi-random ones, and means nothing once the Pareto index of the weights
-/// exceeds 0.7. in: log_weights ln W_i of all N samples drawn, -inf for those with no likelihood;
-/// not normalised
+/// exceeds 0.7.
+/// in: log_weights ln W_i of all N samples drawn, -inf for those with no likelihood; not normalised
 EvidenceEstimate ImportanceEvidence(const Eigen::VectorXd& log_weights);
 
 }  // namespace calib::inference

@@ -19,7 +19,8 @@ struct ModelProbability {
 };
 
 /// Errors of ln Z are taken as independent and normal; averages and quantiles are over 10 000 fixed
-/// draws of them, so that equal input gives equal bits. in: finite values, standard errors >= 0
+/// draws of them, so that equal input gives equal bits.
+/// in: finite values, standard errors >= 0
 std::vector<ModelProbability> ModelProbabilities(std::span<const EvidenceEstimate> evidence);
 
 }  // namespace calib::inference

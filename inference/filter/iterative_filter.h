@@ -71,8 +71,8 @@ struct Iteration {
 };
 
 /// ln of the mass that a mixture has inside the support of the priors: log_acceptance of a
-/// proposal. To about 1e-4 in a box; with constraints from 2^14 scrambled Sobol points per
-/// component, to about 1e-3.
+/// proposal. In a box to the error of BoxProbability (1e-3 in six dimensions); with constraints
+/// from 2^14 scrambled Sobol points per component, to about 1e-3.
 double LogMassInSupport(std::span<const MixtureComponent> components, const JointPrior& priors);
 
 /// Draws n samples (n x d). Deterministic in (options.seed, iteration, sample index), and row i

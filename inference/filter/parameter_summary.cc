@@ -24,13 +24,17 @@ double MassWhere(const Eigen::VectorXd& log_weights, const Eigen::VectorXd& valu
 
 }  // namespace
 
+double CoefficientOfVariation(double mean, double sd) {
+  return mean == 0 ? std::numeric_limits<double>::quiet_NaN() : sd / std::abs(mean);
+}
+
 ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weights,
                            const Eigen::VectorXd& values) {
   const Eigen::VectorXd mean = WeightedMean(log_weights, values);
   ParameterSummary summary;
   summary.mean = mean[0];
   summary.sd = std::sqrt(WeightedCovariance(log_weights, values, mean)(0, 0));
-  summary.cov = summary.sd / std::abs(summary.mean);
+  summary.cov = CoefficientOfVariation(summary.mean, summary.sd);
   const std::vector<double> quantiles = WeightedQuantiles(log_weights, values, {0.05, 0.5, 0.95});
   summary.q05 = quantiles[0];
   summary.q50 = quantiles[1];

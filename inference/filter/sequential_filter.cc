@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "inference/filter/log_weights.h"
+#include "inference/filter/parameter_summary.h"
 #include "inference/filter/wide_exponential.h"
 
 namespace calib::inference {
@@ -77,8 +78,7 @@ SequentialResult SequentialFilter(const Eigen::VectorXd& log_start,
       const double mean = parameters(0, j) + shift[j];
       const double variance = (weights * (relative.col(j).array() - shift[j]).square()).sum() / sum;
       result.mean(s, j) = mean;
-      result.cov(s, j) = mean == 0 ? std::numeric_limits<double>::quiet_NaN()
-                                   : std::sqrt(variance) / std::abs(mean);
+      result.cov(s, j) = CoefficientOfVariation(mean, std::sqrt(variance));
     }
   }
   return result;

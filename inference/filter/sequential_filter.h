@@ -23,9 +23,8 @@ struct SequentialResult {
   Eigen::VectorXd log_evidence_increments;
 };
 
-/// log w_t = log w_{t-1} + ln p(y_t | x_t), normalised after each step                 [Cheng 2019,
-/// Eq. 14] in: log_start N, not necessarily normalised (-inf: sample does not count); at least one
-/// finite;
+/// log w_t = log w_{t-1} + ln p(y_t | x_t), normalised after each step.       [Cheng 2019, Eq. 14]
+/// in: log_start N, not necessarily normalised (-inf: sample does not count); at least one finite;
 ///     increments N x T, ln p(y_t | earlier, x) of each reading, finite for samples that count;
 ///     parameters N x d
 SequentialResult SequentialFilter(const Eigen::VectorXd& log_start,

@@ -20,11 +20,11 @@ struct Tempering {
 /// goes to zero (a posterior that ignores the data), the largest exponent whose ESS is the target's
 /// share target / n of the ESS of the starting weights. A logarithmic grid (24 points per decade)
 /// brackets, TOMS 748 refines to 1e-13 relative in the exponent; humps narrower than a grid step
-/// can be missed. in: log_start, log_likelihood of equal size n, -inf for samples that do not
-/// count; target in (0, n];
-///     max_exponent > 0, infinite for none.
+/// can be missed.
+/// in:  log_start, log_likelihood of equal size n, -inf for samples that do not count;
+///      target in (0, n]; max_exponent > 0, infinite for none
 /// out: when no sample has weight, or fewer than target have: the exponent as above with `reached`
-/// false.
+///      false
 struct TemperingProblem {
   const Eigen::VectorXd& log_start;
   const Eigen::VectorXd& log_likelihood;

@@ -7,12 +7,11 @@
 
 namespace calib::inference {
 
-/// sum_i w_i x_i per column; d.                                                      [Cheng 2019,
-/// Eq. 16] Summed relative to the first row, so that columns far from zero keep their digits.
+/// sum_i w_i x_i per column; d.                                               [Cheng 2019, Eq. 16]
+/// Summed relative to the first row, so that columns far from zero keep their digits.
 Eigen::VectorXd WeightedMean(const Eigen::VectorXd& log_weights, const Eigen::MatrixXd& values);
 
-/// sum_i w_i (x_i - mean)(x_i - mean)^T, d x d.                                      [Cheng 2019,
-/// Eq. 17]
+/// sum_i w_i (x_i - mean)(x_i - mean)^T, d x d.                               [Cheng 2019, Eq. 17]
 Eigen::MatrixXd WeightedCovariance(const Eigen::VectorXd& log_weights,
                                    const Eigen::MatrixXd& values, const Eigen::VectorXd& mean);
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "inference/filter/parameter_summary.h"
+#include "inference/filter/weighted_moments.h"
 #include "inference/scatter/moved_draws.h"
 
 namespace calib::inference {
@@ -64,8 +65,10 @@ double WidenByRefits(const JointPrior& priors, const DataSet& data, const Replic
     const double mean = posterior.parameters[k].mean;
     posterior.parameters[k] = Summarize(priors[k], equal, moved.draws.col(j));
     posterior.parameters[k].mean = mean;
-    posterior.parameters[k].cov = posterior.parameters[k].sd / std::abs(mean);
+    posterior.parameters[k].cov = CoefficientOfVariation(mean, posterior.parameters[k].sd);
   }
+  posterior.correlation =
+      CorrelationOf(WeightedCovariance(equal, moved.draws, WeightedMean(equal, moved.draws)));
   return moved.widened;
 }
 

@@ -30,8 +30,8 @@ MixturePrior EmpiricalPrior(const WeightedPoints& data, double concentration,
                             double covariance_floor);
 
 /// Variational posterior of K components:
-///   v_k ~ Beta(a_k, b_k),  mu_k | L_k ~ N(m_k, (beta_k L_k)^-1),  L_k ~ Wishart(W_k, nu_k),  C_k =
-///   W_k^-1 / nu_k
+///   v_k ~ Beta(a_k, b_k),  mu_k | L_k ~ N(m_k, (beta_k L_k)^-1),  L_k ~ Wishart(W_k, nu_k),
+///   C_k = W_k^-1 / nu_k
 struct MixtureState {
   Eigen::VectorXd a, b;                      ///< K
   Eigen::VectorXd mean_precision;            ///< K, beta_k
@@ -82,8 +82,7 @@ MixtureState MStep(const MixturePrior& prior, const Eigen::MatrixXd& moments);
 double IterationBound(const MixtureState& state, const CovarianceFactors& factors, double entropy);
 
 /// The complete evidence lower bound at a state with its own E step:
-///   sum_n c_n ln sum_k rho_nk - sum_k KL(Beta) - sum_k KL(Gauss-Wishart)          [Bishop 2006,
-///   Eq. 10.70]
+///   sum_n c_n ln sum_k rho_nk - sum_k KL(Beta) - sum_k KL(Gauss-Wishart)  [Bishop 2006, Eq. 10.70]
 double EvidenceLowerBound(const WeightedPoints& data, const MixturePrior& prior,
                           const MixtureState& state);
 

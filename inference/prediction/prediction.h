@@ -25,8 +25,9 @@ struct QuantityPrediction {
 /// linear in the parameters, so that a linear regression on them tells its variance from that of
 /// the scatter (residual variance, unbiased; the noise that the fit picks up is taken off the
 /// parameters' part).
-/// in: parameters N x d, any linear scale (the prior's standardised one); runs N x T; error_sd T,
-/// >= 0, of a reading that would be taken (0: of the model alone). N >= 2, all finite.
+/// in: parameters N x d, any linear scale (the prior's standardised one); runs N x T;
+///     error_sd T, >= 0, of a reading that would be taken (0: of the model alone); N >= 2, all
+///     finite
 /// Errors: INVALID_ARGUMENT naming what does not fit.
 absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parameters,
                                                    const Eigen::MatrixXd& runs,
@@ -36,8 +37,7 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
 /// independent of scatter and parameters: it joins sd_model, sd and the quantiles, not the mean.
 QuantityPrediction WithModelError(QuantityPrediction prediction, const Eigen::VectorXd& sd);
 
-/// Pr(Q_t >= level) for each of the T quantities                                       [Eqs. 11,
-/// 12]
+/// Pr(Q_t >= level) for each of the T quantities                                    [Eqs. 11, 12]
 Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, double level);
 
 }  // namespace calib::inference

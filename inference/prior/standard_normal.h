@@ -9,8 +9,7 @@ double LogNormalDensity(double x);
 
 /// ln Phi(x) for any x, +-infinity included: erfc where it does not underflow, below -37 the
 /// asymptotic series
-///   Phi(x) ~ phi(x)/|x| (1 - 1/x^2 + 3/x^4 - 15/x^6 + ...)                       [Abramowitz &
-///   Stegun 26.2.12]
+///   Phi(x) ~ phi(x)/|x| (1 - 1/x^2 + 3/x^4 - 15/x^6 + ...)         [Abramowitz & Stegun 26.2.12]
 double LogNormalCdf(double x);
 
 /// ln (Phi(b) - Phi(a)), a <= b; the difference is taken in the tail where it does not cancel, and

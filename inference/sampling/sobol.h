@@ -10,8 +10,8 @@ namespace calib::inference {
 /// from Boost.Random; the origin included, so that 2^m points form a net), scrambled as in [Owen
 /// 1995]: bit b of a coordinate is flipped by a random bit that depends on the coordinate and on
 /// all its higher bits. Every point is then uniform in (0, 1)^d, and any 2^m points keep their
-/// equidistribution. n x d; pure function of (n, d, seed), and row i does not depend on n. Range: 0
-/// <= n < 2^31, 1 <= d <= 3667.
+/// equidistribution. n x d; pure function of (n, d, seed), and row i does not depend on n.
+/// Range: 0 <= n < 2^31, 1 <= d <= 3667.
 Eigen::MatrixXd ScrambledSobol(int n, int d, std::uint64_t seed);
 
 }  // namespace calib::inference

@@ -18,9 +18,10 @@ struct Replicates {
 };
 
 /// What R runs (R x T, units of the readings; rows that are not finite are left out) depart from
-/// their mean, scaled as Replicates asks for. in: share, T, see GroupScatter; negative: the packing
-/// of the experiment was not varied, no departure. out: (finite rows) x T, none with fewer than
-/// two.
+/// their mean, scaled as Replicates asks for.
+/// in:  share, T, see GroupScatter; negative: the packing of the experiment was not varied, no
+///      departure
+/// out: (finite rows) x T, none with fewer than two
 Eigen::MatrixXd ScaledDepartures(const Eigen::MatrixXd& runs, const Eigen::VectorXd& share);
 
 /// What must be added to the posterior's covariance of the parameters so that they scatter as
@@ -28,12 +29,14 @@ Eigen::MatrixXd ScaledDepartures(const Eigen::MatrixXd& runs, const Eigen::Vecto
 /// covariance scatter + J Spread J^T, J the sensitivity of the histories. That covariance moves in
 /// directions only that the parameters absorb: neither misfit nor evidence changes by it. In a
 /// known direction refits vary with R - 1 degrees of freedom; their variance is taken times the
-/// square of Student's over the normal 95 % quantile (R = 4: 2.0, 10: 1.2). Never negative. in:
-/// draws S x d and histories S x T, of the posterior and the model's mean histories there;
-///     covariance T x T of the readings' errors, replicates.scatter included. Any unit of the
-///     parameters.
-/// out: d x d, positive semi-definite. For four packings intervals are then too long for some
-///     measurements and too short for others, right on average (README.md).
+/// square of Student's over the normal 95 % quantile (R = 4: 2.0, 10: 1.2). Never negative.
+/// in:  draws S x d and histories S x T, of the posterior and the model's mean histories there;
+///      covariance T x T of the readings' errors, replicates.scatter included; any unit of the
+///      parameters
+/// out: d x d, positive semi-definite; zero, so that nothing is widened, where the covariance of
+///      the errors or that of the draws cannot be factorised
+/// For four packings intervals are then too long for some measurements and too short for others,
+/// right on average (README.md).
 Eigen::MatrixXd SpreadOfRefits(const Eigen::MatrixXd& draws, const Eigen::MatrixXd& histories,
                                const Eigen::MatrixXd& covariance, const Replicates& replicates);
 

@@ -45,8 +45,9 @@ struct GroupScatter {
 /// from 1e-4 to 1, p 1 to 3). The likelihood of a zero-mean Markov chain needs no more than
 /// neighbours. Deterministic.
 /// in: stage, one number per reading (equal within a loading stage); control, n, ascending path
-///     length since the start. Few replicates know the sd to 1/sqrt(2 (R - 1)) of itself at worst:
-///     readings of a stage are no independent witnesses.
+///     length since the start
+/// Few replicates know the sd to 1/sqrt(2 (R - 1)) of itself at worst: readings of a stage are no
+/// independent witnesses.
 GroupScatter FitScatter(const ScatterMoments& moments, const std::vector<int>& stage,
                         const Eigen::VectorXd& control);
 

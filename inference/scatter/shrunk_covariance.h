@@ -18,7 +18,7 @@ struct ShrunkCovariance {
 /// identity, so that readings count by their errors. Chance is judged by whole groups: runs of a
 /// group share a packing and are no independent witnesses.
 /// in: departures n x T, zero mean, finite; group, n numbers of any value; target, unit: T x T,
-///     positive semidefinite and definite, same units.
+///     positive semidefinite and definite, same units
 /// With fewer than two groups the target.
 ShrunkCovariance ShrinkCovariance(const Eigen::MatrixXd& departures, const std::vector<int>& group,
                                   const Eigen::MatrixXd& target, const Eigen::MatrixXd& unit);

@@ -1,6 +1,7 @@
 #include "inference/surrogate/expected_improvement.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -120,8 +121,7 @@ absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
                            .purpose = StreamPurpose::kExpectedImprovement,
                            .iteration = state.evaluations.size(),
                            .sample = drawn++});
-      for (Index j = 0; j < d; ++j)
-        points(k, j) = std::clamp(center[j] + step * stream.Normal(), 0.0, 1.0);
+      points.row(k) = Perturbed(options, center, step, stream);
     }
     return points;
   };
@@ -134,7 +134,8 @@ absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
     consider(about(chosen.point, step, kRefined));
     step /= 2;
   }
-  if (!(chosen.improvement > 0)) chosen = farthest;
+  if (!(chosen.improvement > 0)) chosen = farthest;  // at least a point about the best, admissible
+  assert(chosen.point.size() == d);
   state.evaluations.push_back({.point = chosen.point});
   return state.evaluations.back().point;
 }

@@ -18,7 +18,8 @@ Eigen::VectorXd Merits(const Eigen::VectorXd& surrogate, const Eigen::VectorXd& 
                        double weight);
 
 /// Candidate of least merit among those at least min_distance away, the first of equals; the
-/// farthest one when all lie closer. in: surrogate values and distances of m >= 1 candidates
+/// farthest one when all lie closer.
+/// in: surrogate values and distances of m >= 1 candidates
 Eigen::Index BestCandidate(const Eigen::VectorXd& surrogate, const Eigen::VectorXd& distances,
                            const MeritOptions& options);
 

@@ -38,18 +38,7 @@ Eigen::MatrixXd Candidates(const ResponseSurfaceOptions& options,
                          .purpose = StreamPurpose::kResponseSurface,
                          .iteration = state.evaluations.size(),
                          .sample = static_cast<std::uint64_t>(k)});
-    // Redrawn where not admissible, ever closer to the best point, which is.
-    constexpr int kPerStep = 20;
-    Eigen::VectorXd point(options.dimensions);
-    double step = state.step;
-    for (int draw = 1;; ++draw) {
-      for (Index j = 0; j < options.dimensions; ++j) {
-        point[j] = std::clamp(best[j] + step * stream.Normal(), 0.0, 1.0);
-      }
-      if (IsAdmissible(options, point) || step < 1e-12) break;
-      if (draw % kPerStep == 0) step /= 2;
-    }
-    candidates.col(k) = step < 1e-12 ? best : point;
+    candidates.col(k) = Perturbed(options, best, state.step, stream);
   }
   return candidates;
 }
@@ -111,6 +100,21 @@ Eigen::VectorXd ChoosePoint(const ResponseSurfaceOptions& options, const CubicRb
 }
 
 }  // namespace
+
+Eigen::VectorXd Perturbed(const ResponseSurfaceOptions& options, const Eigen::VectorXd& center,
+                          double step, PhiloxStream& stream) {
+  constexpr int kPerStep = 20;
+  constexpr double kLeastStep = 1e-12;
+  Eigen::VectorXd point(options.dimensions);
+  for (int draw = 1; step >= kLeastStep; ++draw) {
+    for (Index j = 0; j < options.dimensions; ++j) {
+      point[j] = std::clamp(center[j] + step * stream.Normal(), 0.0, 1.0);
+    }
+    if (IsAdmissible(options, point)) return point;
+    if (draw % kPerStep == 0) step /= 2;
+  }
+  return center;
+}
 
 absl::Status ResponseSurfaceOptions::Validate() const {
   const auto wrong = [](const char* name, double found, const std::string& allowed) {

@@ -11,6 +11,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "inference/sampling/philox.h"
 #include "inference/surrogate/cubic_rbf.h"
 
 namespace calib::inference {
@@ -36,6 +37,12 @@ struct ResponseSurfaceOptions {
   std::uint64_t seed = 0;
   absl::Status Validate() const;
 };
+
+/// An admissible point of the cube moved by normal steps, cut off at the faces so that an optimum
+/// on a face can be met exactly; drawn again where not admissible, ever closer, at last the point
+/// itself.
+Eigen::VectorXd Perturbed(const ResponseSurfaceOptions& options, const Eigen::VectorXd& center,
+                          double step, PhiloxStream& stream);
 
 enum class EvaluationStatus {
   kPending,     ///< dispatched; counts for the distance

@@ -26,7 +26,6 @@ class DataTable {
 
   const std::vector<std::string>& columns() const { return columns_; }
   std::size_t rows() const { return rows_.size(); }
-  int header_line() const { return header_line_; }
   int LineOf(std::size_t row) const { return rows_[row].line; }
   bool Has(const std::string& column) const;
 

@@ -57,8 +57,10 @@ absl::StatusOr<Reply> Call(Stub& stub,
     const bool is_lost = status.error_code() == grpc::StatusCode::UNAVAILABLE;
     if (!is_late && !is_lost) return rpc::FromGrpc(status);
     late += is_late ? 1 : 0;
-    lost += is_lost ? 1 : 0;
-    // A connection that was lost and does not come back is late from then on.
+    if (is_lost) {
+      ++lost;
+      late = 0;  // a connection that does not come back is late from then on
+    }
     if (lost > kLostConnections || late >= (lost > 0 ? kLostConnections : kLateAnswers)) {
       return NoAnswer(status);
     }

@@ -31,8 +31,7 @@ class Evaluation {
   /// The table of states, `load_step,<observables>`; complete or not.
   std::string Table() const;
   /// OK; ABORTED with the reason when the model diverged; INVALID_ARGUMENT when the checkpoint is
-  /// not of this run; INTERNAL otherwise. Only after Poll() has
-  /// said true.
+  /// not of this run; INTERNAL otherwise. Only after Poll() has said true.
   absl::Status Result();
 
  private:

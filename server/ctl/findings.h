@@ -11,8 +11,8 @@ namespace calib::ctl {
 inline constexpr const char* kDiagnosis = "diagnosis";      ///< the JSON of `calibctl diagnose`
 inline constexpr const char* kImprovement = "improvement";  ///< the JSON of `calibctl improve`
 
-/// Keeps a document. Where that fails the answer is as good as
-/// without: a line on standard error says so.
+/// Keeps a document. Where that fails the answer is as good as without: a line on standard error
+/// says so.
 void KeepFinding(Client& client, const std::string& campaign, const std::string& kind,
                  const std::string& document);
 

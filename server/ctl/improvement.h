@@ -28,9 +28,9 @@ struct ImproveStep {
 
 struct ImprovementLimits {
   int effects = 3;  ///< that are added, at most
-  /// Model evaluations of the screens, refits and calibrations, those that
-  /// were made before included, so that the same call ends the same way. What a calibration runs on
-  /// held-out tests counts, and may exceed it.
+  /// Model evaluations of the screens, refits and calibrations, those that were made before
+  /// included, so that the same call ends the same way. What a calibration runs on held-out tests
+  /// counts, and may exceed it.
   std::optional<std::int64_t> evaluations{};
 };
 

@@ -1,91 +1,23 @@
 #include "server/ctl/prediction.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
-#include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
-#include "server/campaign/campaign_file.h"
 #include "server/campaign/derive.h"
 #include "server/campaign/quantity.h"
-#include "server/campaign/sha256.h"
 #include "server/campaign/suggestion.h"
-#include "server/campaign/yaml_text.h"
-#include "server/ctl/text_table.h"
 #include "server/report/discrepancies.h"
-#include "server/report/people_units.h"
 
 namespace calib::ctl {
 namespace {
 
-using campaign::YamlNode;
 using Eigen::Index;
-using Kind = YamlNode::Kind;
-using Json = nlohmann::json;
 
-constexpr int kMostReadings = 10000;
 constexpr double kStays = 0.95;  // probability of a discrepancy that is spoken of
-
-absl::StatusOr<std::string> ReadText(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return absl::InvalidArgumentError(absl::StrCat(path, ": no such file"));
-  return std::string(std::istreambuf_iterator<char>(file), {});
-}
-
-absl::Status ProblemIn(const std::string& path, int line, const std::string& text) {
-  return absl::InvalidArgumentError(absl::StrCat(path, ":", line, ": ", text));
-}
-
-// control: {column, to, readings} as a table of its own.
-absl::Status SpellOutControl(const std::string& path, YamlNode& experiment,
-                             std::map<std::string, std::string>& files) {
-  const YamlNode* control = campaign::YamlFind(experiment, "control");
-  const YamlNode* to = control != nullptr ? campaign::YamlFind(*control, "to") : nullptr;
-  if (to == nullptr) return absl::OkStatus();
-  const YamlNode* column = campaign::YamlFind(*control, "column");
-  const YamlNode* readings = campaign::YamlFind(*control, "readings");
-  if (campaign::YamlFind(experiment, "data") != nullptr) {
-    return ProblemIn(path, control->line,
-                     "control.to stands for the readings of a file; give data or to, not both");
-  }
-  const std::string name = column != nullptr ? column->scalar : "";
-  const dem::ObservableInfo* info = dem::FindObservable(name);
-  if (info == nullptr) {
-    return ProblemIn(path, control->line,
-                     "control.column names what drives the test, e.g. axial_strain");
-  }
-  const auto end = campaign::ParseQuantity(to->scalar, info->unit);
-  if (!end.ok()) {
-    return ProblemIn(path, to->line,
-                     absl::StrCat("control.to: ", std::string(end.status().message())));
-  }
-  int count = 20;
-  if (readings != nullptr) {
-    const auto number = campaign::ParseQuantity(readings->scalar, "1");
-    if (!number.ok() || *number != std::floor(*number) || *number < 1 || *number > kMostReadings) {
-      return ProblemIn(
-          path, readings->line,
-          absl::StrCat("control.readings is a whole number from 1 to ", kMostReadings));
-    }
-    count = static_cast<int>(*number);
-  }
-  std::string table = name + "\n";
-  for (int i = 1; i <= count; ++i) table += fmt::format("{:.17g}\n", *end * i / count);
-  const std::string file =
-      absl::StrCat("control-", campaign::Sha256Hex(table).substr(0, 16), ".csv");
-  campaign::YamlAt(experiment, "data") = campaign::YamlMap(
-      {{"file", campaign::YamlScalar(file)}, {"strain", campaign::YamlScalar("logarithmic")}});
-  campaign::YamlAt(experiment, "control") = campaign::YamlScalar(name);
-  files[file] = table;
-  return absl::OkStatus();
-}
 
 // Draws of the posterior, row by row, with the sample each run is to be like.
 struct Draws {
@@ -136,16 +68,13 @@ struct Level {
 };
 
 absl::StatusOr<std::vector<Level>> ReadLevels(const std::vector<std::string>& texts,
-                                              const campaign::Campaign& predicted) {
-  std::vector<std::string> known;
-  for (const campaign::Experiment& e : predicted.experiments) {
-    for (const campaign::MeasuredObservable& o : e.observables) known.push_back(o.name);
-  }
+                                              const std::set<std::string>& observables) {
+  const std::vector<std::string> known(observables.begin(), observables.end());
   std::vector<Level> levels;
   for (const std::string& text : texts) {
     const std::size_t equals = text.find('=');
     const std::string name = text.substr(0, equals);
-    if (equals == std::string::npos || std::find(known.begin(), known.end(), name) == known.end()) {
+    if (equals == std::string::npos || !observables.contains(name)) {
       return absl::InvalidArgumentError(
           absl::StrCat("--exceed ", campaign::Quoted(text),
                        " is not OBSERVABLE=LEVEL with an observable of the test: ",
@@ -195,11 +124,6 @@ RunsOfObservable Collect(const report::CampaignView& view, const campaign::Exper
     runs.values.row(runs.values.rows() - 1) = row;
   }
   return runs;
-}
-
-std::string UnitOf(const std::string& observable) {
-  const dem::ObservableInfo* info = dem::FindObservable(observable);
-  return info != nullptr ? info->unit : "1";
 }
 
 // What the model is known to miss where it was calibrated.
@@ -252,136 +176,12 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
   return absl::OkStatus();
 }
 
-Json At(const Eigen::VectorXd& values, Index k) {
-  return k < values.size() ? Json(values[k]) : Json(nullptr);
-}
-
-Json OrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-}  // namespace
-
-absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path,
-                                         const report::CampaignView& parent) {
-  const auto text = ReadText(path);
-  if (!text.ok()) return text.status();
-  campaign::YamlParse parse = campaign::ParseYaml(*text);
-  if (parse.error) return ProblemIn(path, parse.error->line, parse.error->message);
-  if (parse.root->kind != Kind::kMap) {
-    return ProblemIn(path, 1, "is no map; one experiment, or a map with experiments, is expected");
-  }
-  PredictedTests tests;
-  YamlNode list;
-  if (const YamlNode* given = campaign::YamlFind(*parse.root, "experiments"); given != nullptr) {
-    if (given->kind != Kind::kSequence || given->items.empty()) {
-      return ProblemIn(path, given->line, "experiments is no list with at least one experiment");
-    }
-    list = *given;
-  } else if (campaign::YamlFind(*parse.root, "test") != nullptr) {
-    list = campaign::YamlList({*parse.root});
-  } else {
-    return ProblemIn(
-        path, 1, "has neither the key test (of one experiment) nor experiments (a list of them)");
-  }
-  campaign::YamlParse own = campaign::ParseYaml(parent.source.campaign_file());
-  const YamlNode* first = own.error ? nullptr : campaign::YamlFind(*own.root, "experiments");
-  for (YamlNode& experiment : list.items) {
-    if (experiment.kind != Kind::kMap) return ProblemIn(path, experiment.line, "is no experiment");
-    campaign::YamlErase(experiment, "role");
-    if (auto spelled = SpellOutControl(path, experiment, tests.files); !spelled.ok()) {
-      return spelled;
-    }
-    for (const char* key : {"packing", "realizations"}) {
-      const YamlNode* inherited = first != nullptr && !first->items.empty()
-                                      ? campaign::YamlFind(first->items.front(), key)
-                                      : nullptr;
-      const bool has_packing =
-          campaign::YamlFind(experiment, "packing") != nullptr && std::string(key) == "packing";
-      if (has_packing) break;
-      if (inherited != nullptr && campaign::YamlFind(experiment, key) == nullptr) {
-        campaign::YamlAt(experiment, key) = *inherited;
-      }
-    }
-  }
-  tests.experiments = list.items;
-  // Whatever the experiments name is read once, so that problems are found here and files travel.
-  const auto derived =
-      campaign::Derive(parent.source.campaign_file(),
-                       {.name = "prediction",
-                        .lineage = {.parent = parent.status.campaign(), .purpose = "prediction"},
-                        .experiments = tests.experiments,
-                        .rows = {{.like = 0, .values = [&parent] {
-                                    std::map<std::string, double> values;
-                                    for (const auto& p : parent.campaign.parameters) {
-                                      values[p.name] = p.prior.Quantile(0.5);
-                                    }
-                                    return values;
-                                  }()}}});
-  if (!derived.ok()) return derived.status();
-  const campaign::FileReader disk = campaign::DiskReader(path);
-  std::map<std::string, std::string>& files = tests.files;
-  const campaign::FileReader reader = [&](const std::string& name) -> absl::StatusOr<std::string> {
-    if (const auto known = files.find(name); known != files.end()) return known->second;
-    auto content = disk(name);
-    if (content.ok()) files[name] = *content;
-    const auto inherited = parent.source.files().find(name);
-    if (!content.ok() && inherited != parent.source.files().end()) {
-      return client.GetBlob(inherited->second);
-    }
-    return content;
-  };
-  const campaign::ReadOutcome outcome = campaign::ReadCampaign(*derived, path, reader);
-  std::vector<std::string> lines;
-  for (campaign::Problem problem : outcome.problems) {
-    problem.line = 0;  // of a text the user has not written
-    lines.push_back(campaign::ToString(problem));
-  }
-  if (!lines.empty()) return absl::InvalidArgumentError(absl::StrJoin(lines, "\n"));
-  return tests;
-}
-
-absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::CampaignView& parent,
-                                   const PredictedTests& tests, const PredictionOptions& options) {
-  const std::string& id = parent.status.campaign();
-  if (parent.campaign.precomputed) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "the runs of ", id, " were made elsewhere: there is no model to run another test with"));
-  }
-  if (parent.posterior.posterior_from().empty() || parent.posterior.posterior_from() == "none") {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "campaign ", id, " has no posterior to predict from: see `calibctl posterior ", id, "`"));
-  }
-  const Draws draws = DrawsOf(parent, options.draws);
-  campaign::Derivation derivation{.name = absl::StrCat(parent.campaign.name, ": prediction"),
-                                  .lineage = {.parent = id, .purpose = "prediction"},
-                                  .experiments = tests.experiments};
-  for (Index i = 0; i < draws.parameters.rows(); ++i) {
-    campaign::Derivation::Row row{.like = draws.like[static_cast<std::size_t>(i)], .values = {}};
-    for (std::size_t j = 0; j < parent.campaign.parameters.size(); ++j) {
-      row.values[parent.campaign.parameters[j].name] = draws.parameters(i, static_cast<Index>(j));
-    }
-    derivation.rows.push_back(std::move(row));
-  }
-  const auto text = campaign::Derive(parent.source.campaign_file(), derivation);
-  if (!text.ok()) return text.status();
-  const auto view = laboratory.Run(parent, *text, "prediction", tests.files);
-  if (!view.ok()) return view.status();
-  const auto levels = ReadLevels(options.exceed, view->campaign);
-  if (!levels.ok()) return levels.status();
-
-  Prediction prediction;
-  prediction.parent = id;
-  prediction.campaign = view->status.campaign();
-  const Misfit misfit{
-      .parent = &parent,
-      .discrepancies = report::FitDiscrepancies(parent, report::PredictReadings(parent))};
+void AddNotes(const report::CampaignView& view, const Misfit& misfit, Prediction& prediction) {
   bool errors = true;
-  bool separated = true;
-  for (const campaign::Experiment& experiment : view->campaign.experiments) {
-    if (auto added = AddExperiment(*view, experiment, *levels, misfit, prediction); !added.ok()) {
-      return added;
-    }
+  for (const campaign::Experiment& experiment : view.campaign.experiments) {
     for (const auto& observable : experiment.observables) errors &= !observable.sd.empty();
   }
+  bool separated = true;
   for (const PredictedObservable& o : prediction.observables) separated &= o.quantity.separated;
   if (!errors) {
     prediction.notes.emplace_back(
@@ -402,7 +202,7 @@ absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::Campaig
           absl::StrCat(d.observable,
                        ": the model misses the fitted measurements by a smooth misfit beyond noise "
                        "and scatter (see `calibctl compare ",
-                       id, "`); it is carried as model error here."));
+                       prediction.parent, "`); it is carried as model error here."));
     }
   }
   if (!separated) {
@@ -411,79 +211,55 @@ absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::Campaig
         "use more --draws.");
   }
   if (prediction.failed > 0) {
-    prediction.notes.push_back(absl::StrCat(prediction.failed, " of ", view->samples.size(),
+    prediction.notes.push_back(absl::StrCat(prediction.failed, " of ", view.samples.size(),
                                             " runs did not finish and are left out."));
   }
+}
+
+}  // namespace
+
+absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::CampaignView& parent,
+                                   const PredictedTests& tests, const PredictionOptions& options) {
+  const std::string& id = parent.status.campaign();
+  if (parent.campaign.precomputed) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the runs of ", id, " were made elsewhere: there is no model to run another test with"));
+  }
+  if (parent.posterior.posterior_from().empty() || parent.posterior.posterior_from() == "none") {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "campaign ", id, " has no posterior to predict from: see `calibctl posterior ", id, "`"));
+  }
+  const auto levels = ReadLevels(options.exceed, tests.observables);
+  if (!levels.ok()) return levels.status();
+  const Draws draws = DrawsOf(parent, options.draws);
+  campaign::Derivation derivation{.name = absl::StrCat(parent.campaign.name, ": prediction"),
+                                  .lineage = {.parent = id, .purpose = "prediction"},
+                                  .experiments = tests.experiments};
+  for (Index i = 0; i < draws.parameters.rows(); ++i) {
+    campaign::Derivation::Row row{.like = draws.like[static_cast<std::size_t>(i)], .values = {}};
+    for (std::size_t j = 0; j < parent.campaign.parameters.size(); ++j) {
+      row.values[parent.campaign.parameters[j].name] = draws.parameters(i, static_cast<Index>(j));
+    }
+    derivation.rows.push_back(std::move(row));
+  }
+  const auto text = campaign::Derive(parent.source.campaign_file(), derivation);
+  if (!text.ok()) return text.status();
+  const auto view = laboratory.Run(parent, *text, "prediction", tests.files);
+  if (!view.ok()) return view.status();
+
+  Prediction prediction;
+  prediction.parent = id;
+  prediction.campaign = view->status.campaign();
+  const Misfit misfit{
+      .parent = &parent,
+      .discrepancies = report::FitDiscrepancies(parent, report::PredictReadings(parent))};
+  for (const campaign::Experiment& experiment : view->campaign.experiments) {
+    if (auto added = AddExperiment(*view, experiment, *levels, misfit, prediction); !added.ok()) {
+      return added;
+    }
+  }
+  AddNotes(*view, misfit, prediction);
   return prediction;
-}
-
-std::string PredictionJson(const Prediction& prediction) {
-  Json observables = Json::array();
-  for (const PredictedObservable& o : prediction.observables) {
-    Json points = Json::array();
-    for (std::size_t i = 0; i < o.control.size(); ++i) {
-      const auto k = static_cast<Index>(i);
-      points.push_back({{"load_step", i},
-                        {"control", o.control[i]},
-                        {"mean", o.quantity.mean[k]},
-                        {"sd", o.quantity.sd[k]},
-                        {"q05", o.quantity.q05[k]},
-                        {"q50", o.quantity.q50[k]},
-                        {"q95", o.quantity.q95[k]},
-                        {"sd_parameters", OrNull(o.quantity.sd_parameters[k])},
-                        {"sd_model_error", OrNull(o.quantity.sd_model[k])},
-                        {"sd_discrepancy", At(o.discrepancy.rms, k)},
-                        {"discrepancy_mean", At(o.discrepancy.mean, k)},
-                        {"measured", o.measured.empty() ? Json(nullptr) : Json(o.measured[i])}});
-    }
-    Json exceedance = Json::array();
-    for (const auto& e : o.exceedance) {
-      exceedance.push_back(
-          {{"level", e.level},
-           {"probability", std::vector<double>(e.probability.begin(), e.probability.end())},
-           {"anywhere", e.anywhere}});
-    }
-    observables.push_back({{"experiment", o.experiment},
-                           {"observable", o.observable},
-                           {"unit", UnitOf(o.observable)},
-                           {"control", o.control_name},
-                           {"points", points},
-                           {"exceedance", exceedance}});
-  }
-  return Json{{"campaign", prediction.parent},
-              {"prediction", prediction.campaign},
-              {"runs", prediction.runs},
-              {"predictions", observables},
-              {"notes", prediction.notes}}
-             .dump(2) +
-         "\n";
-}
-
-std::string PredictionText(const Prediction& prediction) {
-  std::string text = fmt::format("Prediction {} from the posterior of {}: {} runs.\n",
-                                 prediction.campaign, prediction.parent, prediction.runs);
-  for (const PredictedObservable& o : prediction.observables) {
-    TextTable table({o.control_name, "mean", "5 %", "95 %", "± parameters", "± model", "measured"});
-    const std::string unit = UnitOf(o.observable);
-    const auto shown = [&](double value) {
-      return std::isfinite(value) ? report::NumberWithUnit(value, o.observable, unit, 4) : "–";
-    };
-    for (std::size_t i = 0; i < o.control.size(); ++i) {
-      const auto k = static_cast<Index>(i);
-      table.AddRow({report::NumberWithUnit(o.control[i], o.control_name, UnitOf(o.control_name), 4),
-                    shown(o.quantity.mean[k]), shown(o.quantity.q05[k]), shown(o.quantity.q95[k]),
-                    shown(o.quantity.sd_parameters[k]), shown(o.quantity.sd_model[k]),
-                    o.measured.empty() ? "–" : shown(o.measured[i])});
-    }
-    text += fmt::format("\n{}, {}\n{}", o.experiment, o.observable, table.ToString());
-    for (const auto& e : o.exceedance) {
-      text += fmt::format("Probability to exceed {}: at most {} at a reading, {} of the runs do.\n",
-                          shown(e.level), report::Number(e.probability.maxCoeff(), 3),
-                          report::Percent(e.anywhere, 3));
-    }
-  }
-  for (const std::string& note : prediction.notes) text += "! " + note + "\n";
-  return text;
 }
 
 }  // namespace calib::ctl

@@ -2,30 +2,16 @@
 // The posterior of a campaign propagated to another test: a table of runs at its draws, run by the
 // workers like any others, and what follows from them.
 
-#include <map>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "inference/discrepancy/discrepancy.h"
 #include "inference/prediction/prediction.h"
-#include "server/campaign/yaml_tree.h"
 #include "server/ctl/laboratory.h"
+#include "server/ctl/predicted_tests.h"
 
 namespace calib::ctl {
-
-/// The tests to predict as a list of experiments, with the files they name.
-struct PredictedTests {
-  std::vector<campaign::YamlNode> experiments;
-  std::map<std::string, std::string> files;  ///< path as written -> content
-};
-
-/// Reads a file that holds `experiments:` (the rest of it is passed over) or is one experiment. A
-/// test without data is given by `control: {column: NAME, to: VALUE, readings: N}`: that many
-/// readings, evenly spaced. Without `packing` a test takes that of the parent's first experiment.
-/// Errors: INVALID_ARGUMENT, a line per problem.
-absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path,
-                                         const report::CampaignView& parent);
 
 struct PredictionOptions {
   int draws = 20;                   ///< runs, of each test

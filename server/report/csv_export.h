@@ -15,7 +15,8 @@ std::string SamplesCsv(const CampaignView& view);
 std::string StatesCsv(const CampaignView& view);
 /// parameter,unit,mean,sd,cov,q05,q50,q95,at_bound
 std::string PosteriorCsv(const v1::Posterior& posterior);
-/// experiment,role,load_step,control,observable,measured,sd,predicted_mean,predicted_q05,predicted_q95,segment
+/// experiment,role,load_step,control,observable,measured,sd,
+/// predicted_mean,predicted_q05,predicted_q95,segment (one line)
 std::string FitCsv(const CampaignView& view, const std::vector<ExperimentPrediction>& predictions);
 
 }  // namespace calib::report

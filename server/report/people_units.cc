@@ -76,7 +76,7 @@ std::string NumberWithUnit(double value, const std::string& name, const std::str
                            int digits) {
   const DisplayUnit unit = UnitForPeople(name, si_unit, std::abs(value));
   const std::string number = Number(value * unit.factor, digits);
-  return unit.label.empty() ? number : number + (unit.label == "%" ? "" : " ") + unit.label;
+  return unit.label.empty() ? number : number + " " + unit.label;
 }
 
 std::string DateForPeople(std::int64_t unix_ms) {

@@ -37,7 +37,7 @@ TEST(CtlClient, AsksAgainWhenTheServerIsBack) {
   Client submitting = deployment.client();
   const auto id = submitting.SubmitCampaign(campaign.yaml, campaign.files, "r");
   ASSERT_TRUE(id.ok()) << id.status();
-  const auto paused = AcrossARestart(deployment, [&client] { return client.Pause("c1"); });
+  const auto paused = AcrossARestart(deployment, [&client, &id] { return client.Pause(*id); });
   ASSERT_TRUE(paused.ok()) << paused.status();
   EXPECT_EQ(paused->state(), "paused");
 }

@@ -366,7 +366,7 @@ TEST(BadCampaigns, PerPointNoiseHasToBePositive) {
             "data.txt:5: sd: a standard deviation has to be greater than 0\n");
 }
 
-TEST(BadCampaigns, ClumpsAreNone) {
+TEST(BadCampaigns, ClumpIdsInAPackingAreNoMistake) {
   auto files = GoodFiles();
   files["packing.txt"].replace(files["packing.txt"].rfind("-1"), 2, "1");
   EXPECT_EQ(ProblemsOf(GoodYaml(), files), "");

@@ -72,6 +72,10 @@ TEST_F(WidenedPosterior, TakesInWhatRefitsOfThePackingsDifferBy) {
               0.1 * after.parameters[1].sd);
   // The slope is no lift.
   EXPECT_NEAR(after.parameters[0].sd, before_.parameters[0].sd, 0.1 * before_.parameters[0].sd);
+  // What is added to the offset alone leaves its covariance with the slope.
+  EXPECT_NEAR(after.correlation(0, 1),
+              before_.correlation(0, 1) * before_.parameters[1].sd / after.parameters[1].sd, 0.12);
+  EXPECT_GT(std::abs(before_.correlation(0, 1)), 0.5);
   Posterior again = before_;
   EXPECT_EQ(WidenByRefits(priors_, data_, packings, iterations_, 3, again), widened);
 }

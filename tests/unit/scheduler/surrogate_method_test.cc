@@ -102,11 +102,14 @@ TEST(SurrogateCampaign, WithoutAnEmulatorTheBestRunIsGivenAndNoInterval) {
   EXPECT_TRUE(std::isnan(posterior.log_evidence()));
   ASSERT_GE(posterior.warnings_size(), 1);
   EXPECT_THAT(posterior.warnings(0), HasSubstr("optimiser"));
+  int best = 0;
   for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
     if (sample.log_weight != 0) continue;
+    ++best;
     EXPECT_EQ(posterior.parameters(0).mean(), sample.parameters[0]);
     EXPECT_EQ(posterior.parameters(1).mean(), sample.parameters[1]);
   }
+  EXPECT_EQ(best, 1);
   EXPECT_TRUE(std::isnan(posterior.parameters(0).sd()));
 }
 

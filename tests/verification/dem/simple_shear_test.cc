@@ -139,7 +139,9 @@ TEST(SimpleShear, LargeStrainsMissNoContact) {
     }
     EXPECT_EQ(assembly.contacts(), expected);
     // Sixty grains that were hardly settled: the order of friction, no more.
-    EXPECT_NEAR(assembly.shear_stress() / assembly.stress()[2], 0.35, 0.45);
+    const double ratio = assembly.shear_stress() / assembly.stress()[2];
+    EXPECT_LT(ratio, 0.8);
+    if (states > 1) EXPECT_GT(ratio, 0.05) << "state " << states;
     furthest = assembly.cell().displacement / assembly.cell().length[0];
     return absl::OkStatus();
   };

@@ -169,6 +169,21 @@ TEST(ExpectedImprovementOptimum, StaysWherePointsAreAdmissible) {
   }
 }
 
+// A slab that no draw over the cube and hardly one about the best point meets.
+TEST(ExpectedImprovementOptimum, FindsAPointWhereHardlyAnyIsAdmissible) {
+  ResponseSurfaceOptions options{.dimensions = 2, .max_evaluations = 10};
+  options.admissible = [](const Eigen::VectorXd& u) { return std::abs(u[0] - 0.3) < 1e-5; };
+  auto state = StartResponseSurface(options);
+  ASSERT_TRUE(state.ok()) << state.status();
+  for (int k = 0; k < options.max_evaluations; ++k) {
+    const auto next = NextByExpectedImprovement(options, *state);
+    ASSERT_TRUE(next.ok() && next->has_value()) << next.status();
+    ASSERT_EQ((*next)->size(), 2);
+    EXPECT_NEAR((**next)[0], 0.3, 1e-5);
+    ASSERT_TRUE(Report(options, k, Branin(**next), *state).ok());
+  }
+}
+
 // E[max(best - f, 0)] by quadrature.
 TEST(ExpectedImprovementOptimum, ClosedFormIsTheIntegral) {
   for (const double mean : {-1.0, 0.3, 2.5}) {

@@ -1,8 +1,6 @@
-#include "proto/rpc/retry.h"
+#include "proto/rpc/backoff.h"
 
 #include <algorithm>
-
-#include "proto/rpc/status.h"
 
 namespace calib::rpc {
 
@@ -20,21 +18,5 @@ std::chrono::milliseconds Backoff::Next() {
 }
 
 void Backoff::Reset() { ceiling_ms_ = static_cast<double>(options_.first.count()); }
-
-absl::Status CallWithRetry(int attempts, Backoff& backoff,
-                           const std::function<absl::Status()>& call,
-                           const std::function<void(std::chrono::milliseconds)>& sleep) {
-  absl::Status status;
-  for (int i = 0; i < attempts; ++i) {
-    if (i > 0) {
-      sleep(backoff.Next());
-    }
-    status = call();
-    if (status.ok() || !IsRetryable(status.code())) {
-      return status;
-    }
-  }
-  return status;
-}
 
 }  // namespace calib::rpc

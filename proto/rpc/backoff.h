@@ -1,11 +1,9 @@
 #pragma once
-// Waiting times between attempts at a call, and the loop that makes them.
+// Waiting times between attempts at a call.
 
 #include <chrono>
-#include <functional>
+#include <cstdint>
 #include <random>
-
-#include "absl/status/status.h"
 
 namespace calib::rpc {
 
@@ -29,12 +27,5 @@ class Backoff {
   std::minstd_rand random_;
   double ceiling_ms_;
 };
-
-/// Makes a call until it succeeds, fails for good (any code that IsRetryable() denies) or
-/// `attempts` are used up. `call` must use a fresh context each time; `sleep` is injected so that
-/// tests need no time.
-absl::Status CallWithRetry(int attempts, Backoff& backoff,
-                           const std::function<absl::Status()>& call,
-                           const std::function<void(std::chrono::milliseconds)>& sleep);
 
 }  // namespace calib::rpc

@@ -1,4 +1,4 @@
-#include "proto/rpc/retry.h"
+#include "proto/rpc/backoff.h"
 
 #include <gtest/gtest.h>
 
@@ -23,33 +23,6 @@ TEST(Backoff, WaitsGrowToTheLimitAndStartAgain) {
   EXPECT_GT(longest.count(), 800);
   backoff.Reset();
   EXPECT_LE(backoff.Next().count(), 100);
-}
-
-TEST(CallWithRetry, OnlyPassingTroubleIsTriedAgain) {
-  std::vector<milliseconds> slept;
-  const auto sleep = [&](milliseconds wait) { slept.push_back(wait); };
-  Backoff backoff({}, 1);
-  int calls = 0;
-  EXPECT_TRUE(
-      CallWithRetry(
-          5, backoff,
-          [&] { return ++calls < 3 ? absl::UnavailableError("starting") : absl::OkStatus(); },
-          sleep)
-          .ok());
-  EXPECT_EQ(calls, 3);
-  EXPECT_EQ(slept.size(), 2U);
-
-  calls = 0;
-  EXPECT_EQ(CallWithRetry(
-                5, backoff,
-                [&] {
-                  ++calls;
-                  return absl::NotFoundError("no such campaign");
-                },
-                sleep)
-                .code(),
-            absl::StatusCode::kNotFound);
-  EXPECT_EQ(calls, 1);
 }
 
 TEST(Status, CodesAndMessagesSurviveTheWire) {

@@ -1,0 +1,165 @@
+#include "server/ctl/predicted_tests.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "dem/catalog/catalog.h"
+#include "server/campaign/campaign_file.h"
+#include "server/campaign/derive.h"
+#include "server/campaign/quantity.h"
+#include "server/campaign/sha256.h"
+#include "server/campaign/yaml_text.h"
+
+namespace calib::ctl {
+namespace {
+
+using campaign::YamlNode;
+using Kind = YamlNode::Kind;
+
+constexpr int kMostReadings = 10000;
+
+absl::StatusOr<std::string> ReadText(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return absl::InvalidArgumentError(absl::StrCat(path, ": no such file"));
+  return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+absl::Status ProblemIn(const std::string& path, int line, const std::string& text) {
+  return absl::InvalidArgumentError(absl::StrCat(path, ":", line, ": ", text));
+}
+
+// control: {column, to, readings} as a table of its own.
+absl::Status SpellOutControl(const std::string& path, YamlNode& experiment,
+                             std::map<std::string, std::string>& files) {
+  const YamlNode* control = campaign::YamlFind(experiment, "control");
+  const YamlNode* to = control != nullptr ? campaign::YamlFind(*control, "to") : nullptr;
+  if (to == nullptr) return absl::OkStatus();
+  const YamlNode* column = campaign::YamlFind(*control, "column");
+  const YamlNode* readings = campaign::YamlFind(*control, "readings");
+  if (campaign::YamlFind(experiment, "data") != nullptr) {
+    return ProblemIn(path, control->line,
+                     "control.to stands for the readings of a file; give data or to, not both");
+  }
+  const std::string name = column != nullptr ? column->scalar : "";
+  const dem::ObservableInfo* info = dem::FindObservable(name);
+  if (info == nullptr) {
+    return ProblemIn(path, control->line,
+                     "control.column names what drives the test, e.g. axial_strain");
+  }
+  const auto end = campaign::ParseQuantity(to->scalar, info->unit);
+  if (!end.ok()) {
+    return ProblemIn(path, to->line,
+                     absl::StrCat("control.to: ", std::string(end.status().message())));
+  }
+  int count = 20;
+  if (readings != nullptr) {
+    const auto number = campaign::ParseQuantity(readings->scalar, "1");
+    if (!number.ok() || *number != std::floor(*number) || *number < 1 || *number > kMostReadings) {
+      return ProblemIn(
+          path, readings->line,
+          absl::StrCat("control.readings is a whole number from 1 to ", kMostReadings));
+    }
+    count = static_cast<int>(*number);
+  }
+  std::string table = name + "\n";
+  for (int i = 1; i <= count; ++i) table += fmt::format("{:.17g}\n", *end * i / count);
+  const std::string file =
+      absl::StrCat("control-", campaign::Sha256Hex(table).substr(0, 16), ".csv");
+  campaign::YamlAt(experiment, "data") = campaign::YamlMap(
+      {{"file", campaign::YamlScalar(file)}, {"strain", campaign::YamlScalar("logarithmic")}});
+  campaign::YamlAt(experiment, "control") = campaign::YamlScalar(name);
+  files[file] = table;
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path,
+                                         const report::CampaignView& parent) {
+  const auto text = ReadText(path);
+  if (!text.ok()) return text.status();
+  campaign::YamlParse parse = campaign::ParseYaml(*text);
+  if (parse.error) return ProblemIn(path, parse.error->line, parse.error->message);
+  if (parse.root->kind != Kind::kMap) {
+    return ProblemIn(path, 1, "is no map; one experiment, or a map with experiments, is expected");
+  }
+  PredictedTests tests;
+  YamlNode list;
+  if (const YamlNode* given = campaign::YamlFind(*parse.root, "experiments"); given != nullptr) {
+    if (given->kind != Kind::kSequence || given->items.empty()) {
+      return ProblemIn(path, given->line, "experiments is no list with at least one experiment");
+    }
+    list = *given;
+  } else if (campaign::YamlFind(*parse.root, "test") != nullptr) {
+    list = campaign::YamlList({*parse.root});
+  } else {
+    return ProblemIn(
+        path, 1, "has neither the key test (of one experiment) nor experiments (a list of them)");
+  }
+  campaign::YamlParse own = campaign::ParseYaml(parent.source.campaign_file());
+  const YamlNode* first = own.error ? nullptr : campaign::YamlFind(*own.root, "experiments");
+  for (YamlNode& experiment : list.items) {
+    if (experiment.kind != Kind::kMap) return ProblemIn(path, experiment.line, "is no experiment");
+    campaign::YamlErase(experiment, "role");
+    if (auto spelled = SpellOutControl(path, experiment, tests.files); !spelled.ok()) {
+      return spelled;
+    }
+    for (const char* key : {"packing", "realizations"}) {
+      const YamlNode* inherited = first != nullptr && !first->items.empty()
+                                      ? campaign::YamlFind(first->items.front(), key)
+                                      : nullptr;
+      const bool has_packing =
+          campaign::YamlFind(experiment, "packing") != nullptr && std::string(key) == "packing";
+      if (has_packing) break;
+      if (inherited != nullptr && campaign::YamlFind(experiment, key) == nullptr) {
+        campaign::YamlAt(experiment, key) = *inherited;
+      }
+    }
+  }
+  tests.experiments = list.items;
+  // Whatever the experiments name is read once, so that problems are found here and files travel.
+  const auto derived =
+      campaign::Derive(parent.source.campaign_file(),
+                       {.name = "prediction",
+                        .lineage = {.parent = parent.status.campaign(), .purpose = "prediction"},
+                        .experiments = tests.experiments,
+                        .rows = {{.like = 0, .values = [&parent] {
+                                    std::map<std::string, double> values;
+                                    for (const auto& p : parent.campaign.parameters) {
+                                      values[p.name] = p.prior.Quantile(0.5);
+                                    }
+                                    return values;
+                                  }()}}});
+  if (!derived.ok()) return derived.status();
+  const campaign::FileReader disk = campaign::DiskReader(path);
+  std::map<std::string, std::string>& files = tests.files;
+  const campaign::FileReader reader = [&](const std::string& name) -> absl::StatusOr<std::string> {
+    if (const auto known = files.find(name); known != files.end()) return known->second;
+    auto content = disk(name);
+    if (content.ok()) files[name] = *content;
+    const auto inherited = parent.source.files().find(name);
+    if (!content.ok() && inherited != parent.source.files().end()) {
+      return client.GetBlob(inherited->second);
+    }
+    return content;
+  };
+  const campaign::ReadOutcome outcome = campaign::ReadCampaign(*derived, path, reader);
+  std::vector<std::string> lines;
+  for (campaign::Problem problem : outcome.problems) {
+    problem.line = 0;  // of a text the user has not written
+    lines.push_back(campaign::ToString(problem));
+  }
+  if (!lines.empty()) return absl::InvalidArgumentError(absl::StrJoin(lines, "\n"));
+  for (const campaign::Experiment& e : outcome.campaign.experiments) {
+    for (const campaign::MeasuredObservable& o : e.observables) tests.observables.insert(o.name);
+  }
+  return tests;
+}
+
+}  // namespace calib::ctl

@@ -1,0 +1,31 @@
+#pragma once
+// The tests that `calibctl predict` is asked for: a campaign file, one experiment, or a control
+// path.
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/campaign/yaml_tree.h"
+#include "server/ctl/client.h"
+#include "server/report/campaign_view.h"
+
+namespace calib::ctl {
+
+/// The tests to predict as a list of experiments, with the files they name.
+struct PredictedTests {
+  std::vector<campaign::YamlNode> experiments;
+  std::map<std::string, std::string> files;  ///< path as written -> content
+  std::set<std::string> observables;         ///< of any of them
+};
+
+/// Reads a file that holds `experiments:` (the rest of it is passed over) or is one experiment. A
+/// test without data is given by `control: {column: NAME, to: VALUE, readings: N}`: that many
+/// readings, evenly spaced. Without `packing` a test takes that of the parent's first experiment.
+/// Errors: INVALID_ARGUMENT, a line per problem.
+absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path,
+                                         const report::CampaignView& parent);
+
+}  // namespace calib::ctl
