@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
   options.slots = 0;
   auto* server = app.add_option("--server", options.server, "the server, HOST:PORT");
   app.add_option("--slots", options.slots, "evaluations at a time [cores / threads per slot]")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, 1024));
   app.add_option("--threads-per-slot", options.threads_per_slot, "threads of one evaluation")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

@@ -109,6 +109,7 @@ struct ObservableInfo {
 struct ControlRange {
   double min = 0;
   double max = 0;
+  bool whole = false;  ///< only whole numbers are admissible
 };
 
 /// A piece of a test's boundary that a mesh of the user's may replace.

@@ -32,12 +32,10 @@ double NominalStep(const ContactModel& model, const ParticleArrays& p, double ov
   const double rotation = (block.tangential_stiffness[0] * p.radius[smallest] * p.radius[smallest] +
                            block.rolling_stiffness[0] + block.twisting_stiffness[0]) *
                           p.inverse_inertia[smallest];
-  const double translation_damping =
+  const double fastest = std::sqrt(std::max(translation, rotation));
+  const double damping =
       (block.normal_damping[0] + block.tangential_damping[0]) * p.inverse_mass[smallest];
-  const double rotation_damping = block.tangential_damping[0] * p.radius[smallest] *
-                                  p.radius[smallest] * p.inverse_inertia[smallest];
-  return 1.0 / std::max(DampedRate(std::sqrt(translation), translation_damping),
-                        DampedRate(std::sqrt(rotation), rotation_damping));
+  return 1.0 / DampedRate(fastest, damping);
 }
 
 }  // namespace

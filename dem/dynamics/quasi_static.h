@@ -135,7 +135,7 @@ class QuasiStatic {
   std::array<StressServo, 3> servo_;
   std::array<double, 3> modulus_ = {0, 0, 0};
   StrainingSpeed speed_;
-  bool straining_ = false;  ///< a strained stage loads, or was stopped or diverged in its loading
+  bool straining_ = false;  ///< a strained stage is loading; stays true if it stopped or diverged
   double dt_ = 0;
   std::int64_t since_inspection_ = 0;
   bool begun_ = false;

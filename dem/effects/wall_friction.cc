@@ -10,6 +10,13 @@ void Bound(const ParameterSet& parameters, WallProperties& walls) {
   walls.friction = parameters.Find("coefficient");
 }
 
+/// `collision` has one where its partner is a wall.
+std::vector<std::string> WhereWallsAre() {
+  std::vector<std::string> names = GravityTestNames();
+  names.emplace_back("collision");
+  return names;
+}
+
 }  // namespace
 
 EffectEntry WallFriction() {
@@ -40,7 +47,7 @@ EffectEntry WallFriction() {
                    .reference = "Samuelsson 2023, sec. 4.1, Table 4.1",
                    .two_sided = true,
                    .rays = {{.parameter = "ratio", .steps = {0.25, 0.5}}},
-                   .excited_by = GravityTestNames()},
+                   .excited_by = WhereWallsAre()},
           .kernels = {},
           .bound = &Bound};
 }

@@ -29,7 +29,7 @@ GravityTestEntry AngleOfRepose() {
                             "Samuelsson 2023, sec. 1",
                .poured = true,
                .separate_points = true,
-               .control_range = ControlRange{.min = 0, .max = 1e6}}};
+               .control_range = ControlRange{.min = 0, .max = 1e6, .whole = true}}};
 }
 
 }  // namespace calib::dem

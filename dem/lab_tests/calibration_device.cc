@@ -33,7 +33,7 @@ GravityTestEntry CalibrationDevice() {
           .reference = "Samuelsson 2023, sec. 4.1",
           .poured = true,
           .separate_points = true,
-          .control_range = ControlRange{.min = 0, .max = 1e6},
+          .control_range = ControlRange{.min = 0, .max = 1e6, .whole = true},
           .meshes = {{.name = "slide",
                       .description =
                           "replaces the plate. Origin: the middle of the plate's lower end as "

@@ -23,7 +23,9 @@ TestInfo Collision() {
   radius.min_open = true;
   radius.max = 10;
   radius.default_prior = {.kind = "log_uniform", .min = 1e-4, .max = 1};
-  ParameterInfo partner = Setting("partner_radius", "m", "of the body at rest; infinite: a wall");
+  ParameterInfo partner =
+      Setting("partner_radius", "m",
+              "of the body at rest, within a factor 10000 of radius; infinite: a wall");
   partner.min_open = true;
   partner.max = kInfinity;
   partner.default_prior = {.kind = "log_uniform", .min = 1e-4, .max = 1};
@@ -49,7 +51,8 @@ TestInfo Collision() {
           .description =
               "A sphere (or disk) hits a wall or another at rest, without gravity: impact_angle, "
               "impact_speed or impact_spin driven through the control path, one collision each. "
-              "Needs no packing. Fails when the bodies stick together",
+              "Needs no packing. Fails when the bodies stick together or overlap by more than half "
+              "the smaller radius",
           .settings = {radius, partner, thickness, angle, speed, spin},
           .observables = {"impact_angle", "impact_speed", "impact_spin", "normal_restitution",
                           "tangential_restitution", "energy_restitution", "rebound_angle",

@@ -20,6 +20,13 @@ ParameterInfo Setting(const std::string& name, const std::string& unit, const Se
   return info;
 }
 
+ParameterInfo Whole(const std::string& name, const SettingRange& range,
+                    const std::string& description) {
+  ParameterInfo info = Setting(name, "1", range, description);
+  info.whole = true;
+  return info;
+}
+
 ParameterInfo Chosen(const std::string& name, const std::string& unit,
                      const std::string& description) {
   return Setting(name, unit, {.value = 0, .min = 0, .max = 1000}, description);

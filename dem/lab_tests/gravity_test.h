@@ -16,8 +16,8 @@ std::vector<std::string> GravityTestNames();
 ParameterInfo Chosen(const std::string& name, const std::string& unit,
                      const std::string& description);
 
-/// `thickness` of tests in a plane: 0 leaves spheres, more makes disks of their radii, m = pi r^2 t
-/// rho, I = m r^2/2.
+/// `thickness` of tests in a plane: 0 leaves spheres, more makes disks of their radii,
+/// m = pi r^2 t rho, I = m r^2/2.
 ParameterInfo ThicknessOfDisks();
 
 /// A setting with a default of its own, in [min, max].
@@ -28,6 +28,10 @@ struct SettingRange {
 };
 ParameterInfo Setting(const std::string& name, const std::string& unit, const SettingRange& range,
                       const std::string& description);
+
+/// A switch or a number of things.
+ParameterInfo Whole(const std::string& name, const SettingRange& range,
+                    const std::string& description);
 
 /// The settings given, after gravity [m/s^2], local_damping [-] and drag [1/s], which every test
 /// has.

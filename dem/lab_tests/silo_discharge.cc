@@ -20,16 +20,16 @@ GravityTestEntry SiloDischarge() {
               "of what left. "
               "Fails when a grain escapes",
           .settings = WithCommonSettings(
-              {Setting("flat", "1", {.value = 0, .min = 0, .max = 1},
-                       "1: one plane of grains, x and z only, outlet a slot; 0: a cylinder, outlet "
-                       "a circle"),
+              {Whole("flat", {.value = 0, .min = 0, .max = 1},
+                     "1: one plane of grains, x and z only, outlet a slot; 0: a cylinder, outlet "
+                     "a circle"),
                ThicknessOfDisks(),
                Chosen("silo_width", "m",
                       "diameter, or width if flat; 0: twelve mean grain diameters, forty if flat"),
                Chosen("jam_time", "s",
                       "without a grain that tells an arch; 0: 20 sqrt(mean diameter / gravity)"),
-               Setting("avalanches", "1", {.value = 20, .min = 1, .max = 1e6},
-                       "arches after which the test ends"),
+               Whole("avalanches", {.value = 20, .min = 1, .max = 1e6},
+                     "arches after which the test ends"),
                Chosen("duration", "s",
                       "longest time of discharge; 0: 400 sqrt(mean diameter / gravity)")}),
           .observables = {"opening", "mass_flow_rate", "discharged_mass", "avalanche_size", "jams"},
@@ -44,7 +44,8 @@ GravityTestEntry SiloDischarge() {
                       .description =
                           "replaces the cylinder (not with flat, nor with silo_width): a vessel "
                           "open at the top, whose cross-sections are such that every place within "
-                          "sees wall along x and y in both directions. Origin: the middle of the "
+                          "sees wall along x and y in both directions, without holes in its "
+                          "wall. Origin: the middle of the "
                           "outlet in the level floor, on which it stands; z upwards"}}}};
 }
 

@@ -12,8 +12,8 @@ GravityTestEntry TransferChute() {
                                   "belt_speed. The funnel can be shifted along y and z "
                                   "and turned about the belt's direction. Flows are those between "
                                   "20 and 80 % of the grains that came through. "
-                                  "Fails when a grain escapes or when the funnel blocks (fewer "
-                                  "than half of the grains come through)",
+                                  "Fails when a grain escapes, when none meets the funnel or when "
+                                  "it blocks (fewer than half of the grains come through)",
                    .settings = WithCommonSettings(
                        {Setting("funnel_angle", "rad", {.value = 0, .min = -0.5, .max = 0.5},
                                 "of the funnel about the belt's direction"),

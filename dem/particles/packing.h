@@ -22,11 +22,11 @@ struct PackingProblem {
   std::string message;
 };
 
-/// Reads `##PERIODIC:: Lx Ly Lz` followed by `x y z r clump` per line (blank lines and # comments
-/// allowed) [m]. Appends everything wrong to problems (not a number, missing fields, radius <= 0 or
-/// too large for the cell, a grain outside the cell by more than half its length, fewer than two
-/// grains); centres outside by less belong to an image; the result is meaningful only if none was
-/// added.
+/// Reads `##PERIODIC:: Lx Ly Lz` followed by `x y z r clump` per line (blank lines, # comments and a
+/// byte order mark allowed) [m]. Appends everything wrong to problems (not a number, missing fields,
+/// radius <= 0 or too large for the cell, a grain outside the cell by more than half its length,
+/// fewer than two grains); centres outside by less belong to an image; the result is meaningful
+/// only if none was added.
 Packing ParsePacking(const std::string& text, std::vector<PackingProblem>& problems);
 
 /// The same text format, with 17 digits: ParsePacking() gives the same bits back.

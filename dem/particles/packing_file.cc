@@ -15,6 +15,7 @@ namespace calib::dem {
 namespace {
 
 constexpr const char* kHeader = "##PERIODIC::";
+constexpr const char* kByteOrderMark = "\xEF\xBB\xBF";  // of editors
 
 std::vector<std::string> Fields(const std::string& line) {
   return absl::StrSplit(line, absl::ByAnyChar(" \t\r,"), absl::SkipEmpty());
@@ -98,6 +99,9 @@ Packing ParsePacking(const std::string& text, std::vector<PackingProblem>& probl
   std::string line;
   bool header = false;
   for (int number = 1; std::getline(lines, line); ++number) {
+    if (number == 1 && line.rfind(kByteOrderMark, 0) == 0) {
+      line.erase(0, std::string(kByteOrderMark).size());
+    }
     line = std::string(absl::StripAsciiWhitespace(line));
     if (line.rfind(kHeader, 0) == 0) {
       if (header) {

@@ -18,6 +18,8 @@ namespace {
 
 constexpr double kStepsPerHalfPeriod = 5000;
 constexpr int kLongestInHalfPeriods = 200;  ///< bodies that touch for longer stick together
+constexpr double kDeepest = 0.5;            ///< smaller radii, as between grains of a specimen
+constexpr double kLargestRatio = 1e4;       ///< of radii: beyond, overlaps drown in rounding
 
 struct Body {
   double radius = 0;
@@ -46,6 +48,7 @@ struct Flight {
   double vix = 0, viy = 0, wi = 0;  ///< of the body
   double vjx = 0, vjy = 0, wj = 0;  ///< of the partner
   double peak = 0, begun = 0, ended = 0;
+  double too_deep = 0;  ///< overlap that ended it [m]
   bool touched = false, done = false;
 };
 
@@ -87,7 +90,7 @@ class CollisionRun {
     const double thickness = SettingOf(scenario, "thickness");
     body_ = MakeBody(SettingOf(scenario, "radius"), thickness, scenario.model.density);
     partner_ = MakeBody(SettingOf(scenario, "partner_radius"), thickness, scenario.model.density);
-    block_.sliding_friction = model_.sliding_friction();
+    block_.sliding_friction = IsWall() ? model_.wall_friction() : model_.sliding_friction();
     block_.wall = IsWall();
     block_.mass_factor = IsWall() ? 2.0 : 1.0;
   }
@@ -160,11 +163,25 @@ class CollisionRun {
   [[nodiscard]] bool separated(int lane) const {
     return flights_[static_cast<std::size_t>(lane)].done;
   }
+  /// Why a collision cannot be told, in a sentence; empty: it can.
+  [[nodiscard]] std::string DepthProblem(int lane) const {
+    const double overlap = flights_[static_cast<std::size_t>(lane)].too_deep;
+    if (!(overlap > 0)) {
+      return "";
+    }
+    return IsWall() ? absl::StrCat("the body overlaps the wall by ", overlap,
+                                   " m, more than half its radius")
+                    : absl::StrCat("the bodies overlap by ", overlap,
+                                   " m, more than half the smaller radius");
+  }
   [[nodiscard]] double time_step() const { return dt_; }
   [[nodiscard]] std::int64_t steps() const { return steps_; }
 
  private:
   [[nodiscard]] bool IsWall() const { return partner_.inverse_mass == 0; }
+  [[nodiscard]] double SmallerRadius() const {
+    return IsWall() ? body_.radius : std::min(body_.radius, partner_.radius);
+  }
 
   void Drift() {
     for (Flight& f : flights_) {
@@ -204,6 +221,11 @@ class CollisionRun {
       }
       const double overlap = block_.overlap[k];
       f.peak = std::max(f.peak, overlap);
+      if (overlap > kDeepest * SmallerRadius()) {
+        f.too_deep = overlap;
+        f.done = true;
+        continue;
+      }
       if (!(overlap > 0) && !(f.touched && block_.holds[k] > 0)) {
         if (f.touched) {
           f.ended = time;
@@ -315,12 +337,14 @@ Summary RunCollision(const Scenario& scenario, const StateSink& sink, std::stop_
       const State state = run.Observe(impact, k);
       const bool finite = std::all_of(state.values.begin(), state.values.end(),
                                       [](double v) { return std::isfinite(v); });
-      if (!run.separated(k) || !finite) {
+      const std::string too_deep = run.DepthProblem(k);
+      if (!run.separated(k) || !finite || !too_deep.empty()) {
         summary.outcome = Outcome::kDiverged;
-        summary.reason =
-            absl::StrCat("load step ", impact.load_step, " (angle ", impact.angle, ", speed ",
-                         impact.speed, ", spin ", impact.spin,
-                         "): ", finite ? "the bodies stick together" : "a velocity is not finite");
+        summary.reason = absl::StrCat("load step ", impact.load_step, " (angle ", impact.angle,
+                                      ", speed ", impact.speed, ", spin ", impact.spin, "): ",
+                                      !too_deep.empty() ? too_deep
+                                      : finite          ? "the bodies stick together"
+                                                        : "a velocity is not finite");
         return summary;
       }
       sink(state);
@@ -331,6 +355,16 @@ Summary RunCollision(const Scenario& scenario, const StateSink& sink, std::stop_
 
 std::vector<std::string> CollisionProblems(const Scenario& scenario) {
   std::vector<std::string> problems;
+  const double radius = SettingOf(scenario, "radius");
+  const double partner = SettingOf(scenario, "partner_radius");
+  if (std::isfinite(partner) && partner > kLargestRatio * radius) {
+    problems.push_back(absl::StrCat("partner_radius is ", partner, " m, more than ", kLargestRatio,
+                                    " times radius (", radius,
+                                    " m): leave it out, the partner is then a wall"));
+  } else if (radius > kLargestRatio * partner) {
+    problems.push_back(absl::StrCat("partner_radius is ", partner, " m, radius ", radius,
+                                    " m: allowed is at most ", kLargestRatio, " times as much"));
+  }
   for (const Impact& impact : ImpactsOf(scenario)) {
     if (impact.spin != 0 && impact.angle <= kSmallestImpactAngle) {
       problems.push_back(absl::StrCat(

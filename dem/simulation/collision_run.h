@@ -16,7 +16,7 @@ namespace calib::dem {
 /// order of the path. Precondition: ScenarioProblems() finds nothing wrong.
 Summary RunCollision(const Scenario& scenario, const StateSink& sink, std::stop_token stop);
 
-/// What CheckTest cannot see: spin at normal incidence, disks against spheres.
+/// What CheckTest cannot see: spin at normal incidence, bodies of too different sizes.
 std::vector<std::string> CollisionProblems(const Scenario& scenario);
 
 }  // namespace calib::dem

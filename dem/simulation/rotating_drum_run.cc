@@ -2,8 +2,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/lab_tests/rotating_drum.h"
 #include "dem/measure/free_surface.h"
 #include "dem/simulation/gravity_run.h"
 
@@ -13,7 +16,22 @@ namespace {
 constexpr int kSides = 48;
 constexpr double kFill = 0.33;           ///< share of the drum that a chosen diameter fills
 constexpr double kSolidFraction = 0.58;  ///< of the fill
+constexpr double kWider = 1.05;          ///< step of a chosen radius, until all grains find room
 constexpr double kMiddle = 0.6;          ///< share of the surface's width that is looked at
+
+/// The drum's grains, set loosely within a circle of that radius about (radius, radius).
+Packing Fill(const GravityRun& run, double radius, double length) {
+  const double inner = radius * std::cos(std::numbers::pi / kSides);
+  return LooseFill(
+      run.radii(),
+      {.low = {0, 0, 0},
+       .width = 2 * radius,
+       .depth = length,
+       .height = 2 * radius,
+       .holds = [&](const Vec3& c,
+                    double r) { return std::hypot(c.x - radius, c.z - radius) + r < inner; }},
+      run.seed());
+}
 
 StageEnd Turn(GravityRun& run, const Assembly& filled, const FlowOptions& options,
               const ControlPoint& point) {
@@ -59,23 +77,28 @@ StageEnd RunRotatingDrum(GravityRun& run) {
     solid += 4.0 / 3.0 * std::numbers::pi * r * r * r;
   }
   const double area = solid / kSolidFraction / length / kFill;
-  const double radius =
-      0.5 * run.SettingOr("drum_diameter", 2 * std::sqrt(area / std::numbers::pi));
-  const double inner = radius * std::cos(std::numbers::pi / kSides);
-  const Vec3 axis{radius, 0, radius};
-  Packing grains = LooseFill(
-      run.radii(),
-      {.low = {0, 0, 0},
-       .width = 2 * radius,
-       .depth = length,
-       .height = 2 * radius,
-       .holds = [&](const Vec3& c,
-                    double r) { return std::hypot(c.x - axis.x, c.z - axis.z) + r < inner; }},
-      run.seed());
+  const bool chosen = !(run.Setting("drum_diameter") > 0);
+  double radius = 0.5 * run.SettingOr("drum_diameter", 2 * std::sqrt(area / std::numbers::pi));
+  Packing grains = Fill(run, radius, length);
+  while (chosen && grains.x.size() < run.radii().size()) {
+    radius *= kWider;
+    grains = Fill(run, radius, length);
+  }
   if (grains.x.size() < run.radii().size()) {
     return run.Fail(absl::StrCat("a drum of ", 2 * radius, " m holds only ", grains.x.size(),
-                                 " of ", run.radii().size(), " grains"));
+                                 " of ", run.radii().size(),
+                                 " grains, set loosely into it: make drum_diameter or drum_length "
+                                 "larger, or take fewer grains"));
   }
+  double fastest = 0;
+  for (const ControlPoint& point : run.path()) {
+    fastest = std::max(fastest, point.target);
+  }
+  if (std::string problem = CentrifugeProblem(fastest, 2 * radius, run.gravity());
+      !problem.empty()) {
+    return run.Fail(std::move(problem));
+  }
+  const Vec3 axis{radius, 0, radius};
   grains.length[0] = grains.length[2] = 2 * radius;
   grains.length[1] = length;
   TriangleMesh side;

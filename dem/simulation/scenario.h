@@ -121,7 +121,7 @@ struct Recording {
   CheckpointSink checkpoint{};  ///< called after each point of the path, when its state has been
                                 ///< given to the sink; empty: no checkpoints. `collision` has none.
   std::string resume_from{};    ///< a checkpoint of this scenario: its states are given to the sink
-                              ///< again, and the run goes on from there; empty: from the beginning
+                                ///< again, and the run goes on from there; empty: from the start
 };
 
 /// Why a run of this scenario cannot go on from a checkpoint, in a sentence; empty: it can.

@@ -3,11 +3,13 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
 #include "dem/lab_tests/collision.h"
+#include "dem/lab_tests/rotating_drum.h"
 #include "dem/simulation/collision_run.h"
 #include "dem/simulation/scenario.h"
 #include "dem/simulation/test_meshes.h"
@@ -255,6 +257,26 @@ double Given(const Scenario& scenario, const std::string& setting) {
   return it != scenario.settings.end() ? it->second : 0.0;
 }
 
+/// Of a drum whose diameter is given; one that is chosen is looked at by the run.
+void CheckDrum(const Scenario& scenario, const TestInfo& test, Problems& problems) {
+  const double diameter = Given(scenario, "drum_diameter");
+  if (test.name != "rotating_drum" || !(diameter > 0) || scenario.path.empty()) {
+    return;
+  }
+  const auto gravity =
+      std::find_if(test.settings.begin(), test.settings.end(),
+                   [](const ParameterInfo& info) { return info.name == "gravity"; });
+  const double g = scenario.settings.contains("gravity") ? Given(scenario, "gravity")
+                                                         : gravity->default_value.value_or(0);
+  const auto fastest =
+      std::max_element(scenario.path.begin(), scenario.path.end(),
+                       [](const auto& a, const auto& b) { return a.target < b.target; });
+  if (std::string problem = CentrifugeProblem(fastest->target, diameter, g);
+      g > 0 && !problem.empty()) {
+    problems.push_back(std::move(problem));
+  }
+}
+
 void CheckTest(const Scenario& scenario, Problems& problems) {
   const TestInfo* test = FindTest(scenario.test);
   if (test == nullptr) {
@@ -282,6 +304,7 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
     problems.emplace_back(
         "thickness makes disks, which need a plane: set flat: 1, or leave thickness out");
   }
+  CheckDrum(scenario, *test, problems);
   const bool stress_driven = test->control == "mean_stress";
   const auto& range = test->control_range;
   const bool collision = test->name == "collision";
@@ -298,6 +321,11 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
     const bool sensible = range           ? point.target >= range->min && point.target <= range->max
                           : stress_driven ? point.target > 0 && std::isfinite(point.target)
                                           : std::abs(point.target) < kLargestStrain;
+    if (sensible && range && range->whole && point.target != std::round(point.target)) {
+      problems.push_back(absl::StrCat("path point ", k, ": ", test->control, " is ", point.target,
+                                      ", allowed are whole numbers from ", range->min, " to ",
+                                      range->max));
+    }
     if (!sensible && range) {
       problems.push_back(absl::StrCat("path point ", k, ": ", test->control, " is ", point.target,
                                       ", allowed is [", range->min, ", ", range->max, "]"));

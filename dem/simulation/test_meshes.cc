@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/geometry/triangle_mesh.h"
+#include "dem/geometry/vessel_gap.h"
 
 namespace calib::dem {
 namespace {
@@ -63,6 +64,10 @@ void CheckMeshes(const Scenario& scenario, const TestInfo& test,
                        " m, below its origin, the middle of its outlet: move it up"));
     }
     if (name == "silo") {
+      const std::string problem = bounds.high.z > 0 ? VesselProblem(mesh) : "";
+      if (!problem.empty()) {
+        problems.push_back(absl::StrCat("mesh silo ", problem));
+      }
       CheckSilo(scenario, problems);
     }
   }

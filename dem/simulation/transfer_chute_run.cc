@@ -22,6 +22,7 @@ constexpr double kFunnelHeight = 7;
 constexpr double kRidge = 6;           ///< height of the ridge
 constexpr double kRidgeHalfWidth = 5;  ///< at its foot: 50 degrees steep
 constexpr double kGap = 2;             ///< between ridge and funnel
+constexpr int kFunnel = 2;             ///< among the walls
 constexpr double kWidth = 40;          ///< of the whole, along y
 
 /// Turns a mesh about the line through `pivot` along x.
@@ -202,7 +203,14 @@ StageEnd Convey(GravityRun& run, const ControlPoint& point) {
                                    .low = {-kWidth * d, -kWidth * d, -10 * d},
                                    .high = {2 * kWidth * d, 2 * kWidth * d, 10 * fall}});
   flow.SetDrain(-d);
-  flow.SetBeforeStep([&](double time, double) { feed.Act(time, assembly); });
+  bool met = false;  // whether any grain has touched the funnel
+  flow.SetBeforeStep([&](double time, double) {
+    if (!met && time > 0) {
+      const Vec3 force = assembly.walls().ForceOn(kFunnel);
+      met = Dot(force, force) > 0;
+    }
+    feed.Act(time, assembly);
+  });
   const double feeding = mean_mass * static_cast<double>(run.radii().size()) / rate;
   const double longest = 3 * feeding + 60 * std::sqrt(fall / run.gravity());
   StageEnd end = StageEnd::kDone;
@@ -217,6 +225,12 @@ StageEnd Convey(GravityRun& run, const ControlPoint& point) {
   end = run.Close(end, flow, {}, absl::StrCat("belt_speed ", speed, " m/s"));
   if (end != StageEnd::kDone) {
     return end;
+  }
+  if (!met) {
+    return run.Fail(absl::StrCat("belt_speed ", speed,
+                                 " m/s: no grain met the funnel, which stands elsewhere: look at ",
+                                 "funnel_shift_y and funnel_shift_z",
+                                 run.Mesh("funnel") != nullptr ? " and at its mesh's origin" : ""));
   }
   const std::size_t through = flow.drained().size();
   if (2 * through < run.radii().size() || through < 10) {

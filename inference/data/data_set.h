@@ -39,10 +39,10 @@ struct GroupCovariance {
   Eigen::MatrixXd matrix;
 };
 
-/// Prior of the variance factor f of noise: inferred, inverse gamma: p(f) = rate^shape /
-/// Gamma(shape) f^(-shape-1) exp(-rate / f), shape > 0, rate > 0. The default weighs as much as one
-/// reading that lies one stated sd off: the stated sd is trusted within a factor of a few (f in
-/// [0.26, 254] with 90 %), and a handful of readings overrules it.
+/// Prior of the variance factor f of noise: inferred, inverse gamma:
+///   p(f) = rate^shape / Gamma(shape) f^(-shape-1) exp(-rate / f),  shape > 0, rate > 0.
+/// The default weighs as much as one reading that lies one stated sd off: the stated sd is trusted
+/// within a factor of a few (f in [0.26, 254] with 90 %), and a handful of readings overrules it.
 struct VarianceFactorPrior {
   double shape = 0.5;
   double rate = 0.5;

@@ -62,8 +62,8 @@ class GaussianLikelihood {
 
   /// The largest value LogLikelihood can still take once the predictions that are not finite yet
   /// arrive: those of a group from the first missing one on have zero residual given its past,
-  /// z = 0. N. Sound because each increment is largest at z = 0, and with kInferred the marginal falls
-  /// with every z^2.
+  /// z = 0. N. Sound because each increment is largest at z = 0, and with kInferred the marginal
+  /// falls with every z^2.
   Eigen::VectorXd LogLikelihoodBound(const Eigen::MatrixXd& predictions) const;
 
   /// kInferred: given x the variance factor of noise group g (NoiseGroupsOf) is inverse gamma of

@@ -23,6 +23,11 @@ absl::StatusOr<StateEmulator> StateEmulator::Fit(const Eigen::MatrixXd& inputs,
   StateEmulator emulator;
   emulator.components_ = FitPrincipalComponents(histories, weights, relevant, options);
   emulator.scores_ = emulator.components_.Scores(histories);
+  if (emulator.scores_.cols() == 0) {
+    return absl::FailedPreconditionError(
+        "the runs differ in no reading, or by more than numbers can hold beside the stated errors: "
+        "there is nothing to emulate.");
+  }
   for (Index k = 0; k < emulator.scores_.cols(); ++k) {
     auto process = GaussianProcess::Fit(inputs, emulator.scores_.col(k));
     if (!process.ok()) return process.status();

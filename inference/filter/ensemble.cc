@@ -46,6 +46,17 @@ absl::Status FindSigma(const DataSet& data, const FilterOptions& options,
   return absl::OkStatus();
 }
 
+Eigen::Index CountStrangers(const Ensemble& ensemble) {
+  Eigen::Index strangers = 0;
+  Eigen::Index row = 0;
+  for (const Iteration& iteration : ensemble.used) {
+    const auto start = ensemble.log_start.segment(row, iteration.parameters.rows());
+    if (!iteration.log_proposal) strangers += (start.array() == -kInfinity).count();
+    row += iteration.parameters.rows();
+  }
+  return strangers;
+}
+
 // Samples whose predictions are not all finite have weight zero. Their likelihood is zero, so that
 // only rows of zero likelihood need a look.
 void MarkDiverged(Ensemble& ensemble) {
@@ -60,6 +71,24 @@ void MarkDiverged(Ensemble& ensemble) {
       }
     }
   }
+}
+
+std::string NoWeight(const Ensemble& ensemble) {
+  const Eigen::Index n = ensemble.log_start.size();
+  std::string text =
+      absl::StrCat("no sample has a weight: of ", n, " samples ", ensemble.diverged,
+                   " did not come to their ends and ", ensemble.outside, " lie outside the prior");
+  const Eigen::Index impossible = n - ensemble.diverged - ensemble.outside;
+  if (impossible > 0) {
+    absl::StrAppend(&text, "; the other ", impossible,
+                    " are so far from the readings that their likelihood is zero: state larger "
+                    "errors");
+  } else if (ensemble.diverged > 0) {
+    absl::StrAppend(&text,
+                    "; `calibctl samples` says why each ended: narrow the priors to where the "
+                    "model runs");
+  }
+  return text + ".";
 }
 
 }  // namespace
@@ -142,14 +171,13 @@ absl::StatusOr<Ensemble> MakeEnsemble(const JointPrior& priors, const DataSet& d
   if (!likelihood.ok()) return likelihood.status();
   ensemble.increments = IncrementsOf(*likelihood, used, false);
   ensemble.log_likelihood = GaussianLikelihood::Sum(ensemble.increments);
+  ensemble.strangers = CountStrangers(ensemble);
   MarkDiverged(ensemble);
   for (Eigen::Index i = 0; i < n; ++i) {
     if (ensemble.log_start[i] > -kInfinity && ensemble.log_likelihood[i] > -kInfinity)
       return ensemble;
   }
-  return absl::FailedPreconditionError(absl::StrCat("no sample has a weight: of ", n, " samples ",
-                                                    ensemble.diverged, " diverged and ",
-                                                    ensemble.outside, " lie outside the prior."));
+  return absl::FailedPreconditionError(NoWeight(ensemble));
 }
 
 }  // namespace calib::inference

@@ -29,6 +29,9 @@ struct Ensemble {
   Eigen::VectorXd log_likelihood;  ///< N; -inf: diverged
   Eigen::Index diverged = 0;       ///< how many
   Eigen::Index outside = 0;        ///< undiverged samples outside the prior's support
+  /// Samples outside the prior's support of iterations without log_proposal, which count as draws
+  /// from the prior: a table made for a wider one.
+  Eigen::Index strangers = 0;
   std::optional<double> sigma;     ///< kEssTarget
   Tempering tempering;             ///< kEssTarget: how sigma was found (exponent = 1 / sigma)
 };

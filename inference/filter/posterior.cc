@@ -162,8 +162,9 @@ std::vector<std::string> Warnings(const FilterOptions& options, const Ensemble& 
                      "could not matter) and have weight zero."));
   }
   if (ensemble.outside > 0) {
-    warnings.push_back(absl::StrCat(ensemble.outside, " of ", total,
-                                    " samples lie outside the prior and have weight zero."));
+    warnings.push_back(absl::StrCat(
+        ensemble.outside, " of ", total, " samples lie outside the prior and have weight zero",
+        ensemble.strangers > 0 ? "; the others count as draws from it." : "."));
   }
   if (options.noise == NoiseMode::kEssTarget) {
     warnings.push_back(absl::StrCat("The noise level sigma = ", *posterior.sigma,
@@ -201,6 +202,21 @@ std::string Degeneracy(const FilterOptions& options, const Ensemble& ensemble,
       kLargestParetoIndex, ").");
 }
 
+// The weights that the evidence is the mean of: without those of strangers, which are zero.
+Eigen::VectorXd WithoutStrangers(const Ensemble& ensemble, const Eigen::VectorXd& log_weights) {
+  Eigen::VectorXd own(log_weights.size() - ensemble.strangers);
+  Eigen::Index left_out = 0;
+  Eigen::Index kept = 0;
+  for (const double weight : log_weights) {
+    if (weight == -kInfinity && left_out < ensemble.strangers) {
+      ++left_out;
+    } else {
+      own[kept++] = weight;
+    }
+  }
+  return own;
+}
+
 }  // namespace
 
 absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataSet& data,
@@ -221,7 +237,7 @@ absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataS
     posterior.parameters.push_back(Summarize(priors[j], log_weights, ensemble->parameters.col(j)));
   }
   posterior.correlation = CorrelationOf(covariance);
-  const EvidenceEstimate evidence = ImportanceEvidence(unnormalized);
+  const EvidenceEstimate evidence = ImportanceEvidence(WithoutStrangers(*ensemble, unnormalized));
   posterior.log_evidence = evidence.log_evidence;
   posterior.log_evidence_se = evidence.standard_error;
   posterior.ess = EffectiveSampleSize(log_weights);

@@ -11,8 +11,8 @@ namespace calib::inference {
 /// points of the Halton sequence. Deterministic; exact for diagonal L, else with a relative error
 /// of 5e-5, 2e-4 and 1e-3 in 2, 3 and 6 dimensions: root mean squares over 135 boxes, the largest
 /// is four times as much (box_probability_test).
-/// in:  cholesky lower triangular with positive diagonal; low, high relative to the mean, +-infinity
-///      allowed, low <= high
+/// in:  cholesky lower triangular with positive diagonal; low, high relative to the mean,
+///      +-infinity allowed, low <= high
 /// out: in [0, 1]
 double BoxProbability(const Eigen::MatrixXd& cholesky, const Eigen::VectorXd& low,
                       const Eigen::VectorXd& high);

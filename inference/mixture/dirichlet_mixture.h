@@ -35,10 +35,10 @@ struct DirichletMixture {
   /// Plug-in mixture: expected weights, means m_k, covariances C_k; the density proposals are drawn
   /// from. Components of weight below `negligible` are left out (their share goes to the others).
   std::vector<MixtureComponent> PlugIn(double negligible = 0) const;
-  /// The same with the covariances of the posterior predictive density, a Student t with nu_k + 1 -
-  /// d degrees of freedom: C_k nu_k (1 + 1/beta_k) / max(nu_k - d - 1, 1). Wider by what few
-  /// samples leave unknown about mean and covariance, hence safer to draw from.  [Bishop 2006,
-  /// Eq. 10.81-82]
+  /// The same with the covariances of the posterior predictive density, a Student t with
+  /// nu_k + 1 - d degrees of freedom: C_k nu_k (1 + 1/beta_k) / max(nu_k - d - 1, 1). Wider by what
+  /// few samples leave unknown about mean and covariance, hence safer to draw from.
+  /// [Bishop 2006, Eq. 10.81-82]
   std::vector<MixtureComponent> Predictive(double negligible = 0) const;
 };
 

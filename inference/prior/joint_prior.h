@@ -20,7 +20,7 @@ struct LinearConstraint {
 
 /// p(x) = c(z) prod_j p_j(x_j) [A x <= b] / mass, with z_j = Phi^-1(F_j(x_j)) the normal score of
 /// x_j in its marginal and c the density of the Gaussian copula,
-///   ln c(z) = -1/2 ln |R| - 1/2 z^T (R^-1 - I) z                                 [Song 2000, Eq. 5]
+///   ln c(z) = -1/2 ln |R| - 1/2 z^T (R^-1 - I) z                                [Song 2000, Eq. 5]
 /// `mass` is the share of the unconstrained prior inside the constraints. Normal and log-normal
 /// marginals without bounds make a multivariate normal (of ln x for the log kind) of correlation R;
 /// a constraint changes the marginals, R is that of the prior before the cut.

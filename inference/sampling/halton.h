@@ -6,8 +6,8 @@
 
 namespace calib::inference {
 
-/// Radical inverse of index >= 0 in base >= 2: its digits mirrored at the point, sum_k digit_k
-/// base^-(k+1), correctly rounded. In [0, 1).
+/// Radical inverse of index >= 0 in base >= 2: its digits mirrored at the point,
+/// sum_k digit_k base^-(k+1), correctly rounded. In [0, 1).
 double RadicalInverse(std::uint64_t index, std::uint32_t base);
 
 /// Points 1 ... n of the sequence in the first d primes as bases; n x d in (0, 1). Index 0, the

@@ -70,7 +70,7 @@ struct TmcmcState {
   bool finished() const { return exponent == 1 && proposals.rows() == 0; }
   /// Standard error of log_evidence: the variance of the product of mean weights is estimated from
   /// how many of the samples share an ancestor among the prior draws [Lee & Whiteley 2018, Eq. 8],
-  ///   V = 1 - (N / (N - 1))^(n + 1) (1 - sum_e (n_e / N)^2),   n stages, n_e descendants of draw e,
+  ///   V = 1 - (N / (N - 1))^(n + 1) (1 - sum_e (n_e / N)^2),  n stages, n_e descendants of draw e,
   /// which needs no independence within a stage, and not less than sum cv^2 / N, its value for
   /// perfect mixing.
   double LogEvidenceStandardError() const;

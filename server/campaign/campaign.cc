@@ -51,16 +51,24 @@ int MostBatches(const Campaign& campaign) {
 }
 
 std::vector<double> TravelledControl(const Experiment& experiment, double correlation_length) {
-  constexpr double kClosest = 0.01;
-  std::vector<double> travelled;
+  constexpr double kSame = 1e-9;     // of the whole path: readings so close are at one control
+  constexpr double kClosest = 0.01;  // in correlation lengths, of those
+  double whole = 0;
   double at = experiment.control_start;
+  for (const dem::ControlPoint& point : experiment.path) {
+    whole += std::abs(point.target - at);
+    at = point.target;
+  }
+  std::vector<double> travelled;
+  at = experiment.control_start;
   double length = 0;
   double piece = 0;  // since the last reading
   for (const dem::ControlPoint& point : experiment.path) {
     piece += std::abs(point.target - at);
     at = point.target;
     if (point.load_step < 0) continue;
-    length += travelled.empty() ? piece : std::max(piece, kClosest * correlation_length);
+    const bool same = !travelled.empty() && piece <= kSame * whole;
+    length += same ? kClosest * correlation_length : piece;
     piece = 0;
     travelled.push_back(length);
   }

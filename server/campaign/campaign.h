@@ -160,9 +160,9 @@ struct EarlyStopping {
   /// Shares of an experiment's load steps, increasing, within (0, 1): all samples come to the first
   /// rung, those that can still count go on to the next. Empty: every run goes to its end at once.
   std::vector<double> rungs{};
-  std::optional<double>
-      exponent{};  ///< of the likelihood in the weights that are bounded, (0, 1]:
-                   ///< 1 the posterior's own; empty: the one that guides proposals
+  /// Of the likelihood in the weights that are bounded, (0, 1]: 1 the posterior's own; empty: the
+  /// one that guides proposals.
+  std::optional<double> exponent{};
 };
 struct Failure {
   int attempts = 5;

@@ -77,6 +77,23 @@ void AskEngine(const MapReader& map, const Campaign& campaign) {
   }
 }
 
+// Errors that go together over very much more than the whole path are one number, and their
+// covariance is singular.
+void CheckCorrelationLengths(const MapReader& map, const Campaign& campaign) {
+  constexpr double kMost = 1e6;  // times the path
+  for (const Experiment& experiment : campaign.experiments) {
+    const std::vector<double> travelled = TravelledControl(experiment, 0);
+    const double path = travelled.empty() ? 0 : travelled.back();
+    for (const MeasuredObservable& observable : experiment.observables) {
+      if (!(observable.correlation_length > kMost * path) || !(path > 0)) continue;
+      map.Problem("experiments",
+                  absl::StrCat(experiment.name, ", ", observable.name,
+                               ": noise.correlation_length is ", observable.correlation_length,
+                               ", more than a million times the path of the readings, ", path));
+    }
+  }
+}
+
 }  // namespace
 
 FileReader DiskReader(const std::string& campaign_file_path) {
@@ -117,6 +134,8 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     const std::size_t before = problems.size();
     ReadExperiments(map, context, campaign);
     if (problems.size() == before) ReadNoiseGroups(map, campaign);
+    if (problems.size() == before) CheckCorrelationLengths(map, campaign);
+    if (!campaign.precomputed) CheckBudget(map, campaign);
     if (campaign.precomputed) {
       ReadPrecomputed(map, context, campaign);
       if (campaign.table || campaign.first_proposal) {

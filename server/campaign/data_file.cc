@@ -164,6 +164,10 @@ std::vector<double> DataTable::Column(const std::string& name,
         {header_line_, name, "is not a column of this file; " + Suggestion(name, columns_)});
     return values;
   }
+  if (std::count(columns_.begin(), columns_.end(), name) > 1) {
+    problems.push_back({header_line_, name, "is the name of more than one column"});
+    return values;
+  }
   int bad = 0;
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const Row& row = rows_[i];

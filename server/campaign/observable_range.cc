@@ -28,6 +28,8 @@ struct ObservableRange {
 
 constexpr const char* kPercent = "if the column is in percent, say so: units: {%s: percent}";
 constexpr const char* kDegrees = "if the column is in degrees, say so: units: {%s: deg}";
+constexpr const char* kRatio =
+    "it is axial over lateral stress, compression positive: see to column and sign";
 constexpr const char* kSign = "compression is positive here: see to its sign";
 
 // Restitution may exceed one, where spin turns into translation or by errors of measurement, but
@@ -36,7 +38,7 @@ constexpr std::array kRanges = {
     ObservableRange{"porosity", 0, 1, "between 0 and 1", kPercent},
     ObservableRange{"void_ratio", 0, 20, "between 0 and 20", kPercent},
     ObservableRange{"mean_stress", 0, kInfinity, "at least 0", kSign},
-    ObservableRange{"stress_ratio", 0, kInfinity, "at least 0", kSign},
+    ObservableRange{"stress_ratio", 0, 1000, "between 0 and 1000", kRatio},
     ObservableRange{"q_over_p", -1.5, 3, "between -1.5 (no axial stress) and 3 (no lateral one)",
                     kSign},
     ObservableRange{"normal_restitution", 0, 2, "between 0 and 2", kPercent},
@@ -85,6 +87,29 @@ void CheckRangeOf(const MeasuredObservable& observable, const LaboratoryTable& t
                                              others == 1 ? " later row)" : " later rows)")
                               : "",
                    "; it has to be ", range->allowed, "; ", WithName(range->usual_mistake, name)));
+}
+
+void CheckStressesOf(const Experiment& experiment, const LaboratoryTable& table,
+                     ReadContext& context) {
+  constexpr double kLeast = 1e-3;  // of the confining pressure
+  const auto pressure = experiment.settings.find("confining_pressure");
+  if (pressure == experiment.settings.end()) return;
+  for (const MeasuredObservable& observable : experiment.observables) {
+    if (observable.values.empty() ||
+        (observable.name != "axial_stress" && observable.name != "mean_stress")) {
+      continue;
+    }
+    double largest = 0;
+    for (const double value : observable.values) {
+      if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+    }
+    if (!(largest > 0 && largest < kLeast * pressure->second)) continue;
+    context.problems().AddIn(
+        table.path(), table.LineOf(0), table.ColumnOf(observable.name),
+        absl::StrCat("is at most ", largest, " Pa beside a confining pressure of ",
+                     pressure->second, " Pa; if the column is in another unit, say so, e.g. ",
+                     "units: {", observable.name, ": kPa}"));
+  }
 }
 
 }  // namespace calib::campaign

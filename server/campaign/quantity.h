@@ -24,8 +24,8 @@ struct Unit {
 /// sentence with the nearest one).
 absl::StatusOr<Unit> ParseUnit(const std::string& text);
 
-/// Whether both measure the same thing. Radians beside other units do not count: "N m" is "N
-/// m/rad".
+/// Whether both measure the same thing. Radians beside other units do not count: "N m" is
+/// "N m/rad".
 bool SameKind(const Dimension& a, const Dimension& b);
 
 /// The SI unit of a dimension by its usual name ("Pa", "kg/m^3"), else a product of base units

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "server/campaign/quantity.h"
 #include "server/campaign/read_measurements.h"
 #include "server/campaign/read_meshes.h"
 #include "server/campaign/read_specimen.h"
@@ -54,6 +55,19 @@ std::string ControlNameOf(MapReader& map) {
   return "";
 }
 
+// Pressures of a few Pa without a unit were meant in MPa or kPa.
+void CheckUnitOf(MapReader& map, const dem::ParameterInfo& setting, double value) {
+  constexpr double kFewest = 10;  // Pa
+  const YamlNode* node = map.Find(setting.name);
+  if (setting.unit != "Pa" || !(value > 0 && value < kFewest) || node == nullptr) return;
+  const auto written = SplitQuantity(node->scalar);
+  if (written.ok() && written->unit.empty()) {
+    map.Problem(setting.name,
+                absl::StrCat("is ", value, " Pa, for no unit stands there; write it, ", "e.g. ",
+                             value, " MPa"));
+  }
+}
+
 // Runs made elsewhere need no settings; what is given is read. What the test is driven along is
 // none.
 void ReadSettings(MapReader& map, const dem::TestInfo& test, bool needed, Experiment& experiment) {
@@ -66,8 +80,13 @@ void ReadSettings(MapReader& map, const dem::TestInfo& test, bool needed, Experi
       map.Ignore({setting.name});
       continue;
     }
-    const Range range{.min = setting.min, .max = setting.max, .min_open = setting.min_open};
+    const Range range{
+        .min = setting.min,
+        .max = setting.max,
+        .min_open = setting.min_open,
+        .infinite_allowed = setting.default_value && std::isinf(*setting.default_value)};
     if (const auto value = map.Quantity(setting.name, setting.unit, range)) {
+      CheckUnitOf(map, setting, *value);
       if (setting.whole && *value != std::round(*value)) {
         map.Problem(setting.name, absl::StrCat("is ", *value, ", allowed are whole numbers from ",
                                                setting.min, " to ", setting.max));

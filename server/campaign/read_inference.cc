@@ -405,4 +405,17 @@ void CheckSamples(MapReader& campaign_map, const Campaign& campaign) {
   }
 }
 
+void CheckBudget(const MapReader& campaign_map, const Campaign& campaign) {
+  if (!campaign.budget.model_evaluations || campaign.method == Method::kTable) return;
+  const auto fitted = std::count_if(campaign.experiments.begin(), campaign.experiments.end(),
+                                    [](const Experiment& e) { return e.role == Role::kCalibrate; });
+  const std::int64_t first = static_cast<std::int64_t>(campaign.samples) * fitted;
+  if (*campaign.budget.model_evaluations >= first) return;
+  campaign_map.Problem(
+      "budget", absl::StrCat("model_evaluations is ", *campaign.budget.model_evaluations,
+                             ", but the first iteration takes ", first, " (", campaign.samples,
+                             " samples, ", fitted, fitted == 1 ? " fitted test" : " fitted tests",
+                             "); allow more, or lower inference.samples"));
+}
+
 }  // namespace calib::campaign

@@ -13,4 +13,7 @@ void CheckSamples(MapReader& campaign_map, const Campaign& campaign);
 /// from.
 void ReadStart(MapReader& campaign_map, Campaign& campaign);
 
+/// The budget has to allow one iteration. To be called once the experiments are known.
+void CheckBudget(const MapReader& campaign_map, const Campaign& campaign);
+
 }  // namespace calib::campaign

@@ -120,11 +120,13 @@ void CheckRange(const LaboratoryTable& table, const dem::TestInfo& test, const C
                 const std::vector<double>& readings, ReadContext& context) {
   if (!test.control_range) return;
   for (std::size_t i = 0; i < readings.size(); ++i) {
-    if (readings[i] >= test.control_range->min && readings[i] <= test.control_range->max) continue;
+    const dem::ControlRange& range = *test.control_range;
+    const bool whole = !range.whole || readings[i] == std::round(readings[i]);
+    if (readings[i] >= range.min && readings[i] <= range.max && whole) continue;
     context.problems().AddIn(
         table.path(), table.LineOf(i), table.ColumnOf(control.name),
-        absl::StrCat("is ", readings[i], "; ", test.name, " allows ", test.control_range->min,
-                     " .. ", test.control_range->max));
+        absl::StrCat("is ", readings[i], "; ", test.name, " allows ",
+                     range.whole ? "whole numbers " : "", range.min, " .. ", range.max));
     return;
   }
 }
@@ -186,6 +188,7 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
     experiment.observables.push_back(std::move(observable));
   }
   if (!table) return;
+  CheckStressesOf(experiment, *table, context);
 
   const std::size_t readings = table->rows();
   const std::size_t before = context.problems().size();

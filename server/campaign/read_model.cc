@@ -60,6 +60,13 @@ Range AdmissibleRange(const dem::ParameterInfo& info) {
   return {.min = info.min, .max = info.max, .min_open = info.min_open, .infinite_allowed = true};
 }
 
+// Whether an effect can act together with the contact, if that is known.
+bool Joins(const dem::EffectInfo& effect, const std::string& contact) {
+  return effect.contacts.empty() || contact.empty() ||
+         std::find(effect.contacts.begin(), effect.contacts.end(), contact) !=
+             effect.contacts.end();
+}
+
 std::string UnknownParameter(const std::string& name, const dem::Model& model) {
   std::string message = absl::StrCat("is not a parameter of ", model.contact,
                                      model.effects.empty() ? "" : " with " + Listed(model.effects));
@@ -70,6 +77,13 @@ std::string UnknownParameter(const std::string& name, const dem::Model& model) {
     return absl::StrCat(message, "; add ", effect, " to model.effects to use it");
   }
   return absl::StrCat(message, "; ", Suggestion(name, NamesOf(ParametersOf(model))));
+}
+
+// An effect that cannot join the contact has been refused already, and asks for no values.
+bool OfRefusedEffect(const std::string& parameter, const dem::Model& model) {
+  const dem::EffectInfo* effect =
+      dem::FindEffect(model.user_effects, parameter.substr(0, parameter.find('.')));
+  return effect != nullptr && !Joins(*effect, model.contact);
 }
 
 void ReadEffects(MapReader& map, dem::Model& model) {
@@ -91,11 +105,10 @@ void ReadEffects(MapReader& map, dem::Model& model) {
       }
     } else if (std::find(model.effects.begin(), model.effects.end(), name) != model.effects.end()) {
       map.Problem("effects", absl::StrCat(name, " is named twice"));
-    } else if (!effect->contacts.empty() && !model.contact.empty() &&
-               std::find(effect->contacts.begin(), effect->contacts.end(), model.contact) ==
-                   effect->contacts.end()) {
+    } else if (!Joins(*effect, model.contact)) {
       map.Problem("effects", absl::StrCat(name, " cannot join the contact ", model.contact,
                                           "; it works with ", Listed(effect->contacts)));
+      model.effects.push_back(name);  // so that its parameters are no further problems
     } else {
       model.effects.push_back(name);
     }
@@ -188,7 +201,8 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
                            parameter.name + " is both calibrated and fixed; keep one of them");
     }
     if (std::find(said.begin(), said.end(), parameter.name) != said.end()) continue;
-    bool covered = given(parameter.name) || parameter.info->default_value;
+    bool covered = given(parameter.name) || parameter.info->default_value ||
+                   OfRefusedEffect(parameter.name, model);
     std::string or_others;
     for (const std::string& other : AlternativesOf(parameter, all)) {
       said.push_back(other);

@@ -182,6 +182,14 @@ void RefuseZeroReadings(const MapReader& experiment, const std::string& name,
   }
 }
 
+bool BelowRounding(const std::vector<double>& sd, const std::vector<double>& readings) {
+  constexpr double kRounding = 1e-14;
+  double largest = 0;
+  for (const double reading : readings) largest = std::max(largest, std::abs(reading));
+  return std::any_of(sd.begin(), sd.end(),
+                     [largest](double s) { return s > 0 && s < kRounding * largest; });
+}
+
 }  // namespace
 
 void ReadNoise(const MapReader& experiment, const std::string& name, const YamlNode* node,
@@ -221,6 +229,11 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
         }
       } else if (spec && readable) {
         observable.sd = StandardDeviations(*spec, *noise, name, *table, raw, context);
+        if (BelowRounding(observable.sd, raw)) {
+          context.problems().Add(node->line, path + ".noise",
+                                 "is smaller than what a number holds of the readings: no run can "
+                                 "come so close");
+        }
         for (std::size_t i = 0; i < observable.sd.size(); ++i) {
           observable.sd[i] *= table->Slope(name, raw[i]);
         }

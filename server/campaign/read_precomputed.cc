@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
@@ -119,6 +120,9 @@ class TableReader {
     }
     CheckNames(map_, "parameter_columns", description_.parameter_columns, parameters);
     CheckNames(map_, "parameter_units", description_.parameter_units, parameters);
+    NameMap absolute;
+    for (const std::string& name : description_.absolute) absolute.emplace_back(name, "");
+    CheckNames(map_, "absolute", absolute, parameters);
     CheckNames(map_, "state_columns", description_.state_columns, observables);
     CheckNames(map_, "state_units", description_.state_units, observables);
     if (const auto table =
@@ -259,14 +263,22 @@ class TableReader {
         std::minmax_element(rows.begin(), rows.end(),
                             [&steps](std::size_t a, std::size_t b) { return steps[a] < steps[b]; });
     const int first = steps[*low] == 1 && steps[*high] == static_cast<int>(readings) ? 1 : 0;
-    if (readings > 0 && steps[*high] - first + 1 != static_cast<int>(readings)) {
+    if (readings > 0 &&
+        (steps[*low] != first || steps[*high] - first + 1 != static_cast<int>(readings))) {
       context_.problems().AddIn(
           path, table.LineOf(*high), description_.step,
           absl::StrCat("the steps run from ", steps[*low], " to ", steps[*high], ", but ",
                        experiment.name, " has ", readings, " readings"));
       return states;
     }
+    std::set<std::pair<int, int>> seen;
     for (const std::size_t row : rows) {
+      if (!seen.emplace(samples[row], steps[row]).second) {
+        context_.problems().AddIn(path, table.LineOf(row), description_.step,
+                                  absl::StrCat("step ", steps[row], " of sample ", samples[row],
+                                               " stands here for the second time"));
+        return states;
+      }
       const auto sample = row_of_sample_.find(samples[row]);
       if (sample == row_of_sample_.end()) {
         context_.problems().AddIn(

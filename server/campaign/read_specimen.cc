@@ -1,8 +1,10 @@
 #include "server/campaign/read_specimen.h"
 
 #include <algorithm>
+#include <sstream>
 
 #include "absl/strings/str_cat.h"
+#include "dem/neighbor/packing_overlap.h"
 #include "dem/particles/packing.h"
 #include "server/campaign/sha256.h"
 #include "server/campaign/suggestion.h"
@@ -11,11 +13,40 @@ namespace calib::campaign {
 namespace {
 
 constexpr int kMostRealizations = 1000;
+constexpr int kFewestGrains = 20;
 constexpr std::size_t kMostProblems = 10;
 constexpr Range kPorosity{.min = 0.2, .max = 0.6, .min_open = true, .max_open = true};
 
+// Number of the line on which a grain stands.
+int LineOfGrain(const std::string& text, int grain) {
+  std::istringstream lines(text);
+  std::string line;
+  int number = 0;
+  for (int seen = -1; seen < grain && std::getline(lines, line); ++number) {
+    const std::size_t begin = line.find_first_not_of(" \t\r");
+    const bool holds_grain = begin != std::string::npos && line[begin] != '#' && number > 0;
+    seen += holds_grain ? 1 : 0;
+  }
+  return number;
+}
+
+// False after the problem.
+bool CheckOverlaps(const PackingFile& file, const std::string& text, ReadContext& context) {
+  const auto found = dem::DeepOverlap(file.packing);
+  if (!found) return true;
+  const int others = found->pairs - 1;
+  context.problems().AddIn(
+      file.path, LineOfGrain(text, found->second), "",
+      absl::StrCat("overlaps the grain of line ", LineOfGrain(text, found->first), " by ",
+                   found->overlap, " m, more than half the smaller radius",
+                   others == 0   ? ""
+                   : others == 1 ? ", as another pair does too"
+                                 : absl::StrCat(", as ", others, " other pairs do too")));
+  return false;
+}
+
 std::optional<Specimen> ReadFile(const MapReader& packing, const std::string& key,
-                                 const std::string& path, ReadContext& context) {
+                                 const std::string& path, bool poured, ReadContext& context) {
   const std::string* text = context.ReadNamedFile(packing, key, path);
   if (text == nullptr) return std::nullopt;
   std::vector<dem::PackingProblem> found;
@@ -29,14 +60,21 @@ std::optional<Specimen> ReadFile(const MapReader& packing, const std::string& ke
                              absl::StrCat("has ", found.size() - kMostProblems, " more problems"));
   }
   if (!found.empty()) return std::nullopt;
+  if (static_cast<int>(file.packing.x.size()) < kFewestGrains) {
+    context.problems().AddIn(path, 0, "",
+                             absl::StrCat("holds ", file.packing.x.size(), " grains, at least ",
+                                          kFewestGrains, " are needed"));
+    return std::nullopt;
+  }
+  if (!poured && !CheckOverlaps(file, *text, context)) return std::nullopt;
   return file;
 }
 
 std::optional<dem::PackingRecipe> ReadRecipe(MapReader& map, bool poured) {
   const std::size_t before = map.problems().size();
   dem::PackingRecipe recipe;
-  recipe.particles =
-      static_cast<int>(map.Integer("particles", 20, 1'000'000).value_or(recipe.particles));
+  recipe.particles = static_cast<int>(
+      map.Integer("particles", kFewestGrains, 1'000'000).value_or(recipe.particles));
   const auto porosity = map.Quantity("porosity", "1", kPorosity);
   const auto void_ratio = map.Quantity(
       "void_ratio", "1", {.min = 0.25, .max = 1.5, .min_open = true, .max_open = true});
@@ -71,7 +109,8 @@ std::optional<dem::PackingRecipe> ReadRecipe(MapReader& map, bool poured) {
 }
 
 std::vector<Specimen> ReadFiles(MapReader& experiment, MapReader& packing, const std::string& key,
-                                std::optional<std::int64_t> realizations, ReadContext& context) {
+                                std::optional<std::int64_t> realizations, bool poured,
+                                ReadContext& context) {
   std::vector<std::string> paths = packing.TextList(key).value_or(std::vector<std::string>{});
   if (paths.empty()) {
     packing.Problem(key, "names no file");
@@ -89,7 +128,7 @@ std::vector<Specimen> ReadFiles(MapReader& experiment, MapReader& packing, const
   if (realizations) paths.resize(static_cast<std::size_t>(*realizations));
   std::vector<Specimen> specimens;
   for (const std::string& path : paths) {
-    if (auto specimen = ReadFile(packing, key, path, context)) {
+    if (auto specimen = ReadFile(packing, key, path, poured, context)) {
       specimens.push_back(*std::move(specimen));
     }
   }
@@ -115,8 +154,10 @@ std::vector<Specimen> ReadSpecimens(MapReader& experiment, bool poured, ReadCont
     experiment.Problem("packing", "needs exactly one of file, files and generate");
     return {};
   }
-  if (packing->Has("file")) return ReadFiles(experiment, *packing, "file", realizations, context);
-  if (packing->Has("files")) return ReadFiles(experiment, *packing, "files", realizations, context);
+  if (packing->Has("file"))
+    return ReadFiles(experiment, *packing, "file", realizations, poured, context);
+  if (packing->Has("files"))
+    return ReadFiles(experiment, *packing, "files", realizations, poured, context);
   auto generate = packing->Map("generate");
   if (!generate) return {};
   auto recipe = ReadRecipe(*generate, poured);

@@ -2,8 +2,12 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
+#include <boost/locale/utf.hpp>
 #include <exception>
 #include <utility>
+
+#include "absl/strings/str_format.h"
 
 namespace calib::campaign {
 namespace {
@@ -71,10 +75,26 @@ std::string Explain(const std::string& remark) {
   return "is not YAML: " + remark;
 }
 
+std::optional<YamlError> FirstByteThatIsNoText(const std::string& text) {
+  namespace utf = boost::locale::utf;
+  for (auto at = text.begin(); at != text.end();) {
+    const auto from = at;
+    const utf::code_point point = utf::utf_traits<char>::decode(at, text.end());
+    if (point != utf::illegal && point != utf::incomplete) continue;
+    return YamlError{1 + static_cast<int>(std::count(text.begin(), from, '\n')),
+                     absl::StrFormat("holds the byte 0x%02X, which is not UTF-8: save the file as "
+                                     "UTF-8",
+                                     static_cast<unsigned char>(*from))};
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 YamlParse ParseYaml(const std::string& text) {
   YamlParse parse;
+  parse.error = FirstByteThatIsNoText(text);
+  if (parse.error) return parse;
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
     if (documents.empty() || documents.front().IsNull()) {

@@ -46,12 +46,16 @@ std::string PosteriorText(const v1::Posterior& posterior,
   }
   std::string text = table.ToString();
   text += fmt::format(
-      "\n{} after {} iteration{}; {} effective samples{}, log evidence {} ± {}, {} model "
+      "\n{} after {} iteration{}; {} effective samples{}, log evidence {} ± {}{}, {} model "
       "evaluations",
       posterior.converged() ? "Converged" : "Not converged", posterior.iterations(),
       posterior.iterations() == 1 ? "" : "s", Number(posterior.ess(), 3),
       posterior.posterior_from() == "emulator" ? ", posterior sampled on an emulator" : "",
       Number(posterior.log_evidence(), 5), Number(posterior.log_evidence_se(), 2),
+      posterior.posterior_from() == "emulator"
+          ? " (of its sampling; the emulator's own error is not "
+            "in it)"
+          : "",
       posterior.model_evaluations());
   if (posterior.stopped_early() > 0) {
     text += fmt::format(" ({} stopped early)", posterior.stopped_early());

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -59,15 +60,18 @@ absl::StatusOr<std::vector<double>> ApplyAssignments(const std::vector<std::stri
                                                      campaign::Campaign& campaign) {
   std::vector<std::string> problems;
   std::map<std::string, double> values;
+  std::set<std::string> refused;  // named with a value that cannot be: no second problem
   for (const std::string& assignment : assignments) {
     if (std::string problem = Apply(assignment, campaign, values); !problem.empty()) {
       problems.push_back(problem);
+      refused.insert(assignment.substr(0, assignment.find('=')));
     }
   }
   std::vector<double> calibrated;
   for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
     const auto value = values.find(parameter.name);
     if (value == values.end()) {
+      if (refused.contains(parameter.name)) continue;
       problems.push_back(absl::StrCat(
           parameter.name, " is calibrated in this campaign and needs a value: --set ",
           parameter.name, "=VALUE", parameter.unit == "1" ? "" : "[ " + parameter.unit + "]"));

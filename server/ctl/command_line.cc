@@ -1,8 +1,18 @@
 #include "server/ctl/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
 #include <cstdlib>
+#include <iostream>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "server/campaign/suggestion.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/verbs.h"
 
@@ -25,6 +35,31 @@ constexpr const char* kErrorMeans =
     "  of the best fit    of the point of the parameter space that comes closest (diagnose)\n"
     "  with an effect     of the best fit with it: by the screen, or refitted where a p says so\n"
     "  left out           of data that the model was not fitted to, part after part";
+
+// CLI11 wraps negative and too large numbers round.
+std::string WholeNumber(const std::string& text) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc() && end == text.data() + text.size()) return "";
+  return absl::StrCat("'", text, "' is not a whole number from 0 to 18446744073709551615");
+}
+
+// What stands where the verb should, if it is none; the values of options before it are passed
+// over.
+std::optional<std::string> UnknownVerb(const std::vector<std::string>& verbs, int argc,
+                                       const char* const* argv) {
+  const std::set<std::string> with_value = {"--server", "--state", "--workers"};
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (with_value.contains(word)) {
+      ++i;
+    } else if (!word.starts_with('-')) {
+      const bool known = std::find(verbs.begin(), verbs.end(), word) != verbs.end();
+      return known ? std::nullopt : std::optional(word);
+    }
+  }
+  return std::nullopt;
+}
 
 // Declares one verb after the other; options write into one Arguments.
 class Builder {
@@ -56,7 +91,8 @@ class Builder {
     sub->add_option("FILE", arguments().file, "campaign file (YAML)")->required();
   }
   void AddSeed(CLI::App* sub) {
-    sub->add_option("--seed", arguments().seed, "replaces the seed of the campaign file");
+    sub->add_option("--seed", arguments().seed, "replaces the seed of the campaign file")
+        ->check(WholeNumber);
   }
   Arguments& arguments() { return command_.arguments; }
 
@@ -124,12 +160,12 @@ void AddVerbsOnCampaigns(Builder& b) {
   b.AddOnCampaign("posterior", &Posterior, "Identified parameters with their uncertainty")
       ->add_option("--iteration", b.arguments().iteration,
                    "as known after this iteration, from 0 [the last complete one]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(WholeNumber);
   b.AddOnCampaign("samples", &Samples, "The ensemble with weights and status");
   b.AddOnCampaign("states", &States, "The state history of one sample", " 0")
       ->add_option("SAMPLE", b.arguments().sample, "index, as shown by `calibctl samples`")
       ->required()
-      ->check(CLI::NonNegativeNumber);
+      ->check(WholeNumber);
   Builder::ExplainError(b.AddOnCampaign(
       "compare", &Compare, "Model against measurements: where it fits and where it fails"));
   b.AddOnCampaign("sensitivity", &Sensitivity,
@@ -161,7 +197,7 @@ void AddVerbsOnCampaigns(Builder& b) {
           "--max-evaluations", b.arguments().max_evaluations,
           "model evaluations of all screens, refits and calibrations, those that diagnose "
           "has made already included; held-out tests of a calibration count and may exceed it")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(1, 1'000'000'000));
   auto* predict = b.AddOnCampaign(
       "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance",
       " --test other.yaml");
@@ -219,6 +255,13 @@ Parsed ParseCommandLine(int argc, const char* const* argv) {
   AddVerbsOnFiles(builder);
   AddVerbsOnCampaigns(builder);
   AddOtherVerbs(builder);
+  std::vector<std::string> verbs;
+  for (const CLI::App* verb : app.get_subcommands({})) verbs.push_back(verb->get_name());
+  if (const auto word = UnknownVerb(verbs, argc, argv)) {
+    std::cerr << "calibctl: " << campaign::Quoted(*word) << " is not a command; "
+              << campaign::Suggestion(*word, verbs) << "\n";
+    return {std::nullopt, kBadInput};
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

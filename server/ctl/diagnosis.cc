@@ -41,6 +41,7 @@ class Inquiry {
     diagnosis_.warnings = campaign::NoiseWarnings(base_.view().campaign);
     if (auto possible = CheckPossible(); !possible.ok()) return possible;
     const bool elsewhere = base_.view().campaign.precomputed.has_value();
+    WarnOfWeakSupport();
     if (!options_.only_adequacy && !elsewhere) {
       if (auto affordable = CheckBudget(); !affordable.ok()) return affordable;
       auto nuisance = screen_.MeasureNuisance();
@@ -95,6 +96,30 @@ class Inquiry {
       return absl::FailedPreconditionError(absl::StrCat("no sample of ", id, " has finished"));
     }
     return absl::OkStatus();
+  }
+
+  // What makes any verdict doubtful, whatever it is.
+  void WarnOfWeakSupport() {
+    constexpr std::size_t kPerParameter = 5;
+    const report::CampaignView& view = base_.view();
+    const std::size_t readings = base_.readings().of_mean.readings.size();
+    const std::size_t parameters = view.campaign.parameters.size();
+    if (readings < kPerParameter * (parameters + 1)) {
+      diagnosis_.warnings.push_back(
+          absl::StrCat("Only ", readings, " readings are fitted with ", parameters,
+                       " parameters: little can be seen with so few, neither a missing effect nor "
+                       "that there is none. Give longer curves or more tests."));
+    }
+    const auto& experiments = view.campaign.experiments;
+    const bool one_packing =
+        std::all_of(experiments.begin(), experiments.end(),
+                    [](const campaign::Experiment& e) { return e.specimens.size() <= 1; });
+    if (one_packing && !view.campaign.precomputed) {
+      diagnosis_.warnings.emplace_back(
+          "Every test is run on one packing: by how much another one differs is not in the errors, "
+          "and may be taken for a missing effect unless the packing is the measured one. "
+          "realizations: 4 or more show it.");
+    }
   }
 
   absl::Status CheckBudget() const {

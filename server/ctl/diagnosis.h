@@ -61,8 +61,8 @@ struct Diagnosis {
   double emulator_error = 0, scatter = 0;
   std::int64_t screen_evaluations = 0, warm_evaluations = 0;
   std::optional<NextExperiment> next_experiment;
-  bool only_adequacy = false;                  ///< no effect was tried
-  std::vector<std::string> warnings{};         ///< about the noise stated, a sentence each
+  bool only_adequacy = false;           ///< no effect was tried
+  std::vector<std::string> warnings{};  ///< about noise, readings and packings, a sentence each
   std::map<std::string, std::string> units{};  ///< SI, of the strengths of effects
 };
 

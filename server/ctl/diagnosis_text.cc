@@ -164,6 +164,27 @@ std::string Sentence(const Diagnosis& d) {
       d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
 }
 
+// Of the effects that are named together, where the screen has measured both.
+std::string GroupAngles(const Diagnosis& d) {
+  const CandidateEffect& first = d.candidates.front();
+  std::vector<std::string> group = first.confusable_with;
+  group.insert(group.begin(), first.effect);
+  std::vector<std::string> pairs;
+  for (const CandidateEffect& c : d.candidates) {
+    const auto at = std::find(group.begin(), group.end(), c.effect);
+    if (at == group.end()) continue;
+    for (auto other = group.begin(); other != at; ++other) {
+      const auto angle = c.angles.find(*other);
+      if (angle == c.angles.end()) continue;
+      pairs.push_back(fmt::format("{} and {} {}°", *other, c.effect, Number(angle->second, 2)));
+    }
+  }
+  if (pairs.empty()) return "";
+  return Wrapped(
+      fmt::format("Angle between what the tests see of them: {}.", fmt::join(pairs, ", ")), "",
+      "  ");
+}
+
 }  // namespace
 
 std::string DiagnosisJson(const Diagnosis& d) {
@@ -234,6 +255,7 @@ std::string DiagnosisText(const Diagnosis& d) {
                                 report::StrengthInWords(c.amplitude, d.units)),
                     "", "  ");
   }
+  if (d.verdict == "ambiguous") text += GroupAngles(d);
   for (const CandidateEffect& c : d.candidates) {
     const bool named = d.verdict == "ambiguous" && &c == &d.candidates.front();
     if (c.confusable_with.empty() || named) continue;

@@ -60,7 +60,8 @@ std::vector<double> OtherPorosities(const campaign::Experiment& pattern) {
                            ? nullptr
                            : std::get_if<dem::PackingRecipe>(&pattern.specimens.front());
   if (recipe == nullptr) return {};
-  return {recipe->porosity + kDensity, recipe->porosity - kDensity};
+  const auto rounded = [](double porosity) { return std::round(porosity * 1e6) / 1e6; };
+  return {rounded(recipe->porosity + kDensity), rounded(recipe->porosity - kDensity)};
 }
 
 }  // namespace

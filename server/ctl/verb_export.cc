@@ -3,6 +3,8 @@
 #include <system_error>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+#include "server/campaign/yaml_text.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/load_view.h"
 #include "server/ctl/session.h"
@@ -15,6 +17,14 @@
 namespace calib::ctl {
 namespace {
 
+// As it was run: with the seed of the command line, where one was given.
+std::string CampaignFile(const v1::CampaignSource& source) {
+  campaign::YamlParse parse = campaign::ParseYaml(source.campaign_file());
+  if (!source.has_seed() || !parse.root) return source.campaign_file();
+  campaign::YamlAt(*parse.root, "seed") = campaign::YamlScalar(absl::StrCat(source.seed()));
+  return campaign::ToYaml(*parse.root);
+}
+
 std::vector<std::pair<std::string, std::string>> Files(const report::CampaignView& view) {
   const auto predictions = report::PredictReadings(view);
   std::vector<std::string> names;
@@ -22,7 +32,7 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
     names.push_back(parameter.name);
   }
   const std::string& id = view.status.campaign();
-  return {{"campaign.yaml", view.source.campaign_file()},
+  return {{"campaign.yaml", CampaignFile(view.source)},
           {"status.json", report::StatusJson(view.status)},
           {"posterior.json", report::PosteriorJson(view.posterior)},
           {"posterior.csv", report::PosteriorCsv(view.posterior)},

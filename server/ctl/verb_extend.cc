@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iostream>
 
 #include "absl/strings/str_cat.h"
@@ -9,9 +10,32 @@
 #include "server/ctl/laboratory.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
+#include "server/report/people_units.h"
 #include "server/report/warnings.h"
 
 namespace calib::ctl {
+
+namespace {
+
+// The default priors of effects are dimensionless: what they are here depends on the parent.
+std::string NewPriors(const report::CampaignView& parent, const report::CampaignView& view) {
+  std::string text;
+  for (const v1::Posterior::Parameter& p : view.posterior.parameters()) {
+    const auto& old = parent.campaign.parameters;
+    if (std::any_of(old.begin(), old.end(), [&p](const auto& o) { return o.name == p.name(); })) {
+      continue;
+    }
+    const auto shown = [&p](double value) {
+      return report::NumberWithUnit(value, p.name(), p.unit(), 3);
+    };
+    absl::StrAppend(&text, "Prior of ", p.name(), ": ", shown(p.prior_min()), " to ",
+                    shown(p.prior_max()), " (the default at the stiffness of ",
+                    parent.status.campaign(), "); a campaign file can give another.\n");
+  }
+  return text;
+}
+
+}  // namespace
 
 int Extend(const Arguments& arguments) {
   CatchInterrupts();
@@ -39,7 +63,8 @@ int Extend(const Arguments& arguments) {
     std::cout << report::PosteriorJson(view->posterior);
     return kDone;
   }
-  std::cout << view->campaign.name << ": campaign " << view->status.campaign() << "\n\n"
+  std::cout << view->campaign.name << ": campaign " << view->status.campaign() << "\n"
+            << NewPriors(*parent, *view) << "\n"
             << PosteriorText(view->posterior, report::Warnings(*view)) << "\n"
             << ComparisonText(report::Compare(*view, report::PredictReadings(*view)));
   return kDone;

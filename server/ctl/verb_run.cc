@@ -54,9 +54,10 @@ absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& c
 }
 
 int PrintAnswer(Session& session, const std::string& campaign, bool json) {
-  const auto view = LoadView(session.client(), campaign);
+  auto view = LoadView(session.client(), campaign);
   if (!view.ok()) return Fail(view.status());
   if (json) {
+    view->posterior.set_campaign(campaign);  // a table has no posterior, but a name
     std::cout << report::PosteriorJson(view->posterior);
     return kDone;
   }

@@ -1,8 +1,10 @@
 // One model evaluation of each experiment at given parameters, by calib-worker processes, as many
 // at a time as cores.
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -84,6 +86,11 @@ class Simulation {
     return JoinStateTables(tables);
   }
 
+  bool HasStates() const {
+    return std::any_of(evaluations_.begin(), evaluations_.end(),
+                       [](const Evaluation& evaluation) { return evaluation.StatesSoFar() > 0; });
+  }
+
   // Prints what went wrong with single experiments; returns the exit code.
   int ReportFailures() {
     int code = kDone;
@@ -162,6 +169,12 @@ int Simulate(const Arguments& arguments) {
   }
   auto values = ApplyAssignments(arguments.set, campaign);
   if (!values.ok()) return Fail(values.status());
+  std::optional<OutputFile> output;
+  if (!arguments.output.empty()) {
+    auto opened = OutputFile::Open(arguments.output);
+    if (!opened.ok()) return Fail(opened.status());
+    output.emplace(*std::move(opened));
+  }
   const auto program = FindWorkerProgram();
   if (!program.ok()) return Fail(program.status());
   const auto folder = TemporaryFolder::Make();
@@ -170,8 +183,8 @@ int Simulate(const Arguments& arguments) {
   Simulation simulation(*source, campaign, *std::move(values), arguments);
   if (auto ran = simulation.RunAll(*program, folder->path()); !ran.ok()) return Fail(ran);
   const std::string table = simulation.Table();
-  if (!arguments.output.empty()) {
-    if (auto written = WriteFile(arguments.output, table); !written.ok()) return Fail(written);
+  if (output && simulation.HasStates()) {  // else an earlier table stays
+    if (auto written = output->Put(table); !written.ok()) return Fail(written);
   }
   if (arguments.json) {
     std::cout << report::StateTableJson(table);

@@ -151,11 +151,15 @@ std::string Verdict::WhyUnexplained() const {
                                      static_cast<int>(fits_.size()));
   const auto base = inference::TestAdequacy(base_);
   if (diagnosis_.best_partial.empty() && base.ok()) {
-    absl::StrAppendFormat(&text,
-                          ", and none comes clearly closer: with %s chi-squared is %.4g, without "
-                          "%.4g (clearly is below %.4g)",
-                          closest->first, closest->second.adequacy.chi2, base->chi2,
-                          kClearlyCloser * base->chi2);
+    const double share = closest->second.adequacy.chi2 / base->chi2;
+    if (share >= 1) {
+      absl::StrAppend(&text, ", and with none does it come closer than the model's own runs do");
+    } else {
+      absl::StrAppendFormat(&text,
+                            ", and none comes clearly closer: %s lowers chi-squared to %.0f %%, "
+                            "clearly is below %.0f %%",
+                            closest->first, 100 * share, 100 * kClearlyCloser);
+    }
   }
   return text;
 }

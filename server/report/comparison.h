@@ -86,9 +86,10 @@ struct Comparison {
   std::string note;  ///< why something is not given; may be empty
 };
 
-/// Errors are those stated in the campaign, correlated where a correlation length is given, and the
-/// scatter of packings that the posterior states, once for the measured specimen and, where no
-/// posterior could be given, once for the model's run. Without an independent scale of the errors (noise inferred or ess_target) nothing can be said about
+/// Errors are those stated in the campaign, correlated where a correlation length or covariance is
+/// given, and the scatter of packings that the posterior states, once for the measured specimen
+/// (its share of it) and, where no posterior could be given, once for the model's run. Without an
+/// independent scale of the errors (noise inferred or ess_target) nothing can be said about
 /// adequacy: z, p_value and reduced_chi2 stay empty.
 Comparison Compare(const CampaignView& view, const std::vector<ExperimentPrediction>& predictions);
 

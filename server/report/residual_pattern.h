@@ -35,8 +35,9 @@ struct ResidualPattern {
 /// readings or more, otherwise none.
 ResidualPattern PatternOf(const ResidualCurve& curve);
 
-/// Coordinates in which the errors are independent with unit variance: (u_i - c_i u_{i-1}) /
-/// sqrt(1 - c_i^2), u = x / sd. Errors correlated as exp(-distance / length) are such a chain.
+/// Coordinates in which the errors are independent with unit variance:
+///   (u_i - c_i u_{i-1}) / sqrt(1 - c_i^2),  u = x / sd.
+/// Errors correlated as exp(-distance / length) are such a chain.
 Eigen::VectorXd Whitened(const ResidualCurve& curve, const Eigen::VectorXd& x);
 
 }  // namespace calib::report

@@ -28,6 +28,9 @@ std::string ShapeInWords(const SegmentMisfit& m) {
     const bool grows = (p.size > 0) == (m.to > m.from);
     return fmt::format("model minus measurement {} along the stage", grows ? "grows" : "falls");
   }
+  if (p.name == "amplitude" && p.size <= -1) {
+    return "the model goes the other way than the measurement throughout";
+  }
   if (p.name == "amplitude") {
     return fmt::format("the model is {} by the factor {} throughout",
                        p.size > 0 ? "too large" : "too small", Number(1 + p.size, 3));

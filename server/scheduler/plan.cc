@@ -241,10 +241,11 @@ class Planner {
         inference::ViewOnline(definition_.data, campaign_.filter,
                               history_.iterations.back().predictions, history_.diverged.back());
     conclusion.posterior.set_best_misfit(view.best_rms);
+    const double evidence = conclusion.posterior.log_evidence();
     plan_.log.push_back(absl::StrCat(
         "iteration ", iteration, " complete: ", outcome.log, outcome.log.empty() ? "" : ", ",
         posterior.ess, " effective samples, posterior from ", conclusion.posterior.posterior_from(),
-        ", log evidence ", conclusion.posterior.log_evidence()));
+        std::isfinite(evidence) ? absl::StrCat(", log evidence ", evidence) : ""));
     plan_.conclusion = std::move(conclusion);
   }
 

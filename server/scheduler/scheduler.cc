@@ -234,6 +234,7 @@ void Scheduler::Delete(std::int64_t campaign, const store::Store::Job& also, con
   ports_.Write(
       [campaign, also](Transaction& transaction) {
         transaction.DeleteCampaign(campaign);
+        transaction.ForgetRequests(absl::StrCat("c", campaign));  // the same file may come again
         if (also) {
           also(transaction);
         }

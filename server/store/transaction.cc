@@ -40,6 +40,10 @@ void Transaction::PutRequest(const std::string& id, const RequestRecord& request
   });
 }
 
+void Transaction::ForgetRequests(const std::string& answer) {
+  Guard([&] { connection_.Run("DELETE FROM request WHERE answer = ?", answer); });
+}
+
 void Transaction::InsertCampaign(const NewCampaign& campaign,
                                  const std::map<std::string, std::string>& files) {
   Guard([&] {

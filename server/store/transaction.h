@@ -32,6 +32,8 @@ class Transaction {
   /// files: path -> digest of a stored blob.
   void InsertCampaign(const NewCampaign& campaign, const std::map<std::string, std::string>& files);
   void SetProgress(std::int64_t campaign, const CampaignProgress& progress);
+  /// Requests that were answered so are new again.
+  void ForgetRequests(const std::string& answer);
   /// With everything that belongs to it; blobs stay.
   void DeleteCampaign(std::int64_t campaign);
 

@@ -186,6 +186,10 @@ INSTANTIATE_TEST_SUITE_P(
                 "c.yaml:18: experiments[1].data.file: cannot read 'nowhere.txt': no such file; "
                 "relative paths start at "
                 "the folder of the campaign file"},
+        Mistake{
+            "PressureWithoutItsUnit", "confining_pressure: 0.2 MPa", "confining_pressure: 0.2",
+            "c.yaml:15: experiments[1].confining_pressure: is 0.2 Pa, for no unit stands there; "
+            "write it, e.g. 0.2 MPa"},
         Mistake{"PackingMissing", "{file: packing.txt}", "{file: no.txt}",
                 "c.yaml:16: experiments[1].packing.file: cannot read 'no.txt': no such file; "
                 "relative paths start at the "
@@ -255,6 +259,20 @@ INSTANTIATE_TEST_SUITE_P(
                 "method: surrogate_msrs, samples: 8",
                 "c.yaml:36: inference: samples is 8; surrogate_msrs starts from at least 9 for 4 "
                 "parameters (two each and one)"},
+        Mistake{"BudgetBelowOneIteration", "model_evaluations: 400", "model_evaluations: 19",
+                "c.yaml:39: budget: model_evaluations is 19, but the first iteration takes 20 (20 "
+                "samples, 1 "
+                "fitted test); allow more, or lower inference.samples"},
+        Mistake{"NoiseBelowRounding", "{relative: 0.02, floor: 0.01}", "{absolute: 1e-154}",
+                "c.yaml:23: experiments[1].observables.stress_ratio.noise: is smaller than what a "
+                "number holds of the readings: no run can come so close"},
+        Mistake{
+            "CorrelatedBeyondThePath", "correlation_length: 0.5 percent",
+            "correlation_length: 1e30",
+            "c.yaml:12: experiments: tx02, volumetric_strain: noise.correlation_length is 1e+30, "
+            "more than a million times the path of the readings, 0.127833"},
+        Mistake{"NotUtf8", "name: sand", "name: s\xfcnd",
+                "c.yaml:1: holds the byte 0xFC, which is not UTF-8: save the file as UTF-8"},
         Mistake{"NoneInFlight", "method: iterative_bayesian_filter, samples: 20",
                 "method: surrogate_msrs, samples: 20, in_flight: 0",
                 "c.yaml:36: inference.in_flight: '0' is not a whole number from 1 to 1000"},
@@ -316,6 +334,20 @@ TEST(BadCampaigns, UnknownEffectsAndParametersSayWhatThereIs) {
       "rolling_resistance; add twisting_resistance to model.effects to use it\n");
 }
 
+TEST(BadCampaigns, ParametersOfAnEffectThatCannotJoinAreNoFurtherProblems) {
+  std::string yaml = Spoiled("  contact: hertz_mindlin\n  effects: [rolling_resistance]",
+                             "  contact: linear\n  effects: [rolling_resistance, adhesion_jkr]");
+  const auto expect_one_line = [](const std::string& problems) {
+    EXPECT_THAT(problems,
+                StartsWith("c.yaml:4: model.effects: adhesion_jkr cannot join the contact linear"));
+    EXPECT_EQ(std::count(problems.begin(), problems.end(), '\n'), 1) << problems;
+  };
+  expect_one_line(ProblemsOf(yaml));
+  yaml.replace(yaml.find("poisson_ratio: 0.2"), 18,
+               "poisson_ratio: 0.2, adhesion_jkr.work_of_adhesion: 0.1");
+  expect_one_line(ProblemsOf(yaml));
+}
+
 TEST(BadCampaigns, EveryMistakeIsReportedAtOnce) {
   std::string yaml = Spoiled("min: 1e8 Pa", "min: 1e8 deg");
   yaml.replace(yaml.find("seed: 7"), 7, "sede: 7");
@@ -356,7 +388,38 @@ TEST(BadCampaigns, ProblemsInDataAndPackingCarryTheirOwnFileAndLine) {
   files["packing.txt"] += "0.001 0.001 0.001 -0.0005 -1\n";
   const std::string problems = ProblemsOf(GoodYaml(), files);
   EXPECT_THAT(problems, HasSubstr("data.txt:7: ratio: 'n/a' is not a number"));
-  EXPECT_THAT(problems, HasSubstr("packing.txt:5: "));
+  EXPECT_THAT(problems, HasSubstr("packing.txt:22: "));
+}
+
+TEST(BadCampaigns, OverlappingOrFewGrainsInAFileAreRefused) {
+  auto files = GoodFiles();
+  files["packing.txt"] += "# again\n0.0012 0.001 0.001 0.0005 -1\n";
+  EXPECT_EQ(ProblemsOf(GoodYaml(), files),
+            "packing.txt:23: overlaps the grain of line 2 by 0.0008 m, more than half the smaller "
+            "radius\n");
+  files = GoodFiles();
+  for (std::size_t at = 0; (at = files["packing.txt"].find("0.0005", at)) != std::string::npos;) {
+    files["packing.txt"].replace(at, 6, "0.0009");
+  }
+  EXPECT_THAT(ProblemsOf(GoodYaml(), files), HasSubstr("more than half the smaller radius, as 30 "
+                                                       "other pairs do too\n"));
+  files = GoodFiles();
+  files["packing.txt"].erase(files["packing.txt"].rfind("0.005"));
+  EXPECT_EQ(ProblemsOf(GoodYaml(), files),
+            "packing.txt: holds 19 grains, at least 20 are needed\n");
+}
+
+TEST(BadCampaigns, StressesFarBelowTheConfiningPressureAreInAnotherUnit) {
+  auto files = GoodFiles();
+  files["validation.csv"] = "axial_strain,axial_stress\n0.01,0.6\n0.02,0.8\n0.05,0.7\n";
+  const std::string yaml =
+      Spoiled("{q_over_p: {noise: {relative: 0.05}}}", "{axial_stress: {noise: {relative: 0.05}}}");
+  EXPECT_EQ(ProblemsOf(yaml, files),
+            "validation.csv:2: axial_stress: is at most 0.8 Pa beside a confining pressure of "
+            "500000 Pa; if the column is in another unit, say so, e.g. units: {axial_stress: "
+            "kPa}\n");
+  files["validation.csv"] = "axial_strain,axial_stress\n0.01,6e5\n0.02,8e5\n0.05,7e5\n";
+  EXPECT_EQ(ProblemsOf(yaml, files), "");
 }
 
 TEST(BadCampaigns, PerPointNoiseHasToBePositive) {

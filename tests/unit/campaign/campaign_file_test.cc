@@ -52,6 +52,36 @@ TEST(CampaignFile, ReadsEverySection) {
   EXPECT_THAT(outcome.files, ElementsAre("packing.txt", "data.txt", "validation.csv"));
 }
 
+TEST(CampaignFile, AnInfinitePartnerIsAWall) {
+  for (const char* radius : {"inf", ".inf", "2 cm"}) {
+    const std::string yaml = std::string(R"(name: impact
+model: {contact: hertz_mindlin, density: 2500, fixed: {poisson_ratio: 0.2}}
+parameters:
+  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
+  friction_coefficient: {prior: uniform, min: 0, max: 1}
+experiments:
+  - name: wall
+    test: collision
+    radius: 10 mm
+    impact_speed: 1 m/s
+    partner_radius: )") + radius +
+                             R"(
+    data: {file: impact.csv}
+    control: impact_angle
+    observables: {normal_restitution: {noise: {absolute: 0.01}}}
+inference: {samples: 10}
+)";
+    const ReadOutcome outcome = ReadCampaign(
+        yaml, "c.yaml", ReaderOf({{"impact.csv", "impact_angle,normal_restitution\n0.3,1\n"}}));
+    for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+    EXPECT_EQ(std::isinf(outcome.campaign.experiments.at(0).settings.at("partner_radius")),
+              radius != std::string("2 cm"));
+  }
+  EXPECT_EQ(ProblemsOf(Spoiled("confining_pressure: 0.2 MPa", "confining_pressure: .inf")),
+            "c.yaml:15: experiments[1].confining_pressure: '.inf' is outside what is allowed: "
+            "between 0 (excluded) and 1e+10 Pa\n");
+}
+
 TEST(CampaignFile, ConvertsEngineeringStrainAndItsNoise) {
   const Campaign c = Read(GoodYaml()).campaign;
   const Experiment& e = c.experiments[0];
@@ -103,13 +133,20 @@ TEST(CampaignFile, CorrelatedErrorsOfReadingsAtOneControlAreNotTheSame) {
               ElementsAre(DoubleEq(0.01), DoubleEq(0.011), DoubleEq(0.021)));
 }
 
+TEST(CampaignFile, ADenseCurveKeepsTheDistancesOfItsReadings) {
+  Experiment e;
+  for (int i = 0; i < 4; ++i) e.path.push_back({.target = 1e-5 * (i + 1), .load_step = i});
+  EXPECT_THAT(TravelledControl(e, 0.1),
+              ElementsAre(DoubleEq(1e-5), DoubleEq(2e-5), DoubleEq(3e-5), DoubleEq(4e-5)));
+}
+
 TEST(CampaignFile, MakesTheScenarioOfASample) {
   const Campaign c = Read(GoodYaml()).campaign;
   const dem::Scenario s = MakeScenario(c, c.experiments[0], {1e9, 0.5, 0.1, 0.2}, 3);
   EXPECT_DOUBLE_EQ(s.model.parameters.at("young_modulus"), 1e9);
   EXPECT_DOUBLE_EQ(s.model.parameters.at("poisson_ratio"), 0.2);
   EXPECT_DOUBLE_EQ(s.settings.at("confining_pressure"), 2e5);
-  EXPECT_THAT(s.packing.x, SizeIs(3));
+  EXPECT_THAT(s.packing.x, SizeIs(20));
   EXPECT_THAT(s.path, SizeIs(6));
   EXPECT_THAT(MakeScenario(c, c.experiments[1], {1e9, 0.5, 0.1, 0.2}, 0).packing.x, IsEmpty());
 }
@@ -232,6 +269,12 @@ TEST(CampaignFile, ReadingsOutsideWhatTheirObservableCanBe) {
   EXPECT_EQ(problems("q_over_p", {"-1.5", "3", "0"}), "");
   EXPECT_EQ(problems("mean_stress", {"1e3", "-2", "-300"}), "") << "liquefied, zeros drift";
   EXPECT_EQ(problems("porosity", {"0.4", "1.1"}), "") << "two of its errors";
+  for (const std::string wrong : {"-1.8", "200000"}) {
+    EXPECT_EQ(problems("stress_ratio", {"1.1", "1.8", wrong}),
+              "validation.csv:4: stress_ratio: is " + wrong +
+                  " here; it has to be between 0 and 1000; it is axial over lateral stress, "
+                  "compression positive: see to column and sign\n");
+  }
   EXPECT_EQ(problems("q_over_p", {"0.8", "-4", "-5"}),
             "validation.csv:3: q_over_p: is -4 here (and impossible in 1 later row); it has to be "
             "between -1.5 (no axial stress) and 3 (no lateral one); compression is positive here: "

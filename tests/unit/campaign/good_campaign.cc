@@ -5,6 +5,19 @@
 
 namespace calib::campaign::testing {
 
+namespace {
+
+std::string TwentyGrains() {
+  std::string text = "##PERIODIC:: 0.01 0.01 0.02\n";
+  for (int i = 0; i < 20; ++i) {
+    text += "0.00" + std::to_string(i % 5 + 1) + " 0.00" + std::to_string(i / 5 + 1) +
+            " 0.001 0.0005 -1\n";
+  }
+  return text;
+}
+
+}  // namespace
+
 std::map<std::string, std::string> GoodFiles() {
   return {{"data.txt",
            "# a drained triaxial test\n"
@@ -17,11 +30,7 @@ std::map<std::string, std::string> GoodFiles() {
            "-2.9\t12.0\t3.4\t0.06\n"
            "\n"},
           {"validation.csv", "axial_strain,q_over_p\n0.01,0.8\n0.02,1.0\n0.05,1.1\n"},
-          {"packing.txt",
-           "##PERIODIC:: 0.01 0.01 0.02\n"
-           "0.001 0.001 0.001 0.0005 -1\n"
-           "0.002 0.001 0.001 0.0005 -1\n"
-           "0.003 0.001 0.001 0.0005 -1\n"}};
+          {"packing.txt", TwentyGrains()}};
 }
 
 std::string GoodYaml() {

@@ -89,6 +89,69 @@ TEST(PouredCampaign, AMeshIsReadInItsUnit) {
   EXPECT_EQ(scenario.meshes.at("silo").size(), 8);
 }
 
+TEST(PouredCampaign, AVesselWithAHoleOrWithoutAnOutletIsRefused) {
+  auto files = Files();
+  const auto sides = calib::testing::FourSides({.lower = 20, .upper = 40, .height = 300});
+  const auto problems = [&](const std::vector<calib::testing::StlTriangle>& triangles) {
+    files["silo.stl"] = calib::testing::TextStl(triangles);
+    return ProblemsOf(WithMesh("{silo: {file: silo.stl, unit: mm}}"), files);
+  };
+  for (std::size_t missing = 0; missing < sides.size(); ++missing) {
+    auto holed = sides;
+    holed.erase(holed.begin() + static_cast<std::ptrdiff_t>(missing));
+    EXPECT_THAT(problems(holed), HasSubstr("c.yaml:10: experiments: outlet: mesh silo has a hole "
+                                           "near ("))
+        << missing;
+  }
+  EXPECT_THAT(problems(calib::testing::FourSides(
+                  {.lower = 20, .upper = 40, .height = 300, .middle_y = 100})),
+              HasSubstr("mesh silo does not stand around its origin, where the outlet is: it "
+                        "reaches from (-0.04, 0.06) to (0.04, 0.14) m"));
+  auto closed = sides;
+  closed.push_back({{{-20, -20, 0}, {20, -20, 0}, {20, 20, 0}}});
+  closed.push_back({{{-20, -20, 0}, {20, 20, 0}, {-20, 20, 0}}});
+  EXPECT_THAT(problems(closed), HasSubstr("mesh silo is closed at its origin"));
+  for (const double slope : {3e-3, 1e-5}) {  // the rim, not a hole
+    auto slanted = sides;
+    for (auto& triangle : slanted) {
+      for (auto& p : triangle) p[2] *= 1 + slope * p[0];
+    }
+    EXPECT_EQ(problems(slanted), "") << slope;
+  }
+}
+
+TEST(PouredCampaign, NumbersOfThingsAreWhole) {
+  EXPECT_THAT(
+      ProblemsOf(absl::StrReplaceAll(Yaml(), {{"silo_width: 10 cm", "flat: 0.5"}}), Files()),
+      HasSubstr("c.yaml:13: experiments[1].flat: is 0.5, allowed are whole numbers from 0 "
+                "to 1\n"));
+  const std::string heap =
+      absl::StrReplaceAll(Yaml(), {{"    silo_width: 10 cm\n", ""},
+                                   {"silo_discharge", "angle_of_repose"},
+                                   {"file: silo.csv, units: {opening: mm}", "file: heap.csv"},
+                                   {"control: opening", "control: repetition"},
+                                   {"mass_flow_rate:", "angle_of_repose:"}});
+  EXPECT_EQ(ProblemsOf(heap, {{"heap.csv", "repetition,angle_of_repose\n1,0.5\n2,0.5\n"}}), "");
+  EXPECT_EQ(ProblemsOf(heap, {{"heap.csv", "repetition,angle_of_repose\n1,0.5\n1.5,0.5\n"}}),
+            "heap.csv:3: repetition: is 1.5; angle_of_repose allows whole numbers 0 .. 1e+06\n");
+}
+
+TEST(PouredCampaign, ADrumThatCarriesItsGrainsAroundIsRefused) {
+  const std::string drum =
+      absl::StrReplaceAll(Yaml(), {{"silo_width: 10 cm", "drum_diameter: 80 mm"},
+                                   {"silo_discharge", "rotating_drum"},
+                                   {"file: silo.csv, units: {opening: mm}", "file: drum.csv"},
+                                   {"control: opening", "control: rotation_speed"},
+                                   {"mass_flow_rate:", "angle_of_repose:"}});
+  EXPECT_EQ(ProblemsOf(drum, {{"drum.csv", "rotation_speed,angle_of_repose\n2,0.5\n15,0.6\n"}}),
+            "");
+  EXPECT_EQ(
+      ProblemsOf(drum, {{"drum.csv", "rotation_speed,angle_of_repose\n2,0.5\n200,0.6\n"}}),
+      "c.yaml:10: experiments: outlet: rotation_speed 200 rad/s has a Froude number omega^2 R "
+      "/ g of 163.155 in a drum of 0.08 m, which carries the grains around from 1 on: have it "
+      "turn slower than 15.6578 rad/s\n");
+}
+
 TEST(PouredCampaign, WhatIsWrongWithAMeshIsSaidInOneLine) {
   auto files = Files();
   auto sides = calib::testing::FourSides({.lower = 20, .upper = 40, .height = 300});

@@ -86,10 +86,28 @@ TEST(Precomputed, SaysWhichTableIsWrong) {
   files["sta.csv"] = "sample,step,p_MPa,porosity\n0,0,1.1,0.4\n0,7,2.1,0.39\n";
   EXPECT_THAT(ProblemsOf(Yaml(), files),
               HasSubstr("the steps run from 0 to 7, but oedo has 3 readings"));
+  files["sta.csv"] = "sample,step,p_MPa,porosity\n0,1,1.1,0.4\n0,2,2.1,0.39\n";
+  EXPECT_THAT(ProblemsOf(Yaml(), files),
+              HasSubstr("the steps run from 1 to 2, but oedo has 3 readings"));
+  files["sta.csv"] =
+      "sample,step,p_MPa,porosity\n0,0,1.1,0.4\n0,1,2.1,0.39\n0,1,99,0.39\n0,2,1.4,0.393\n";
+  EXPECT_EQ(ProblemsOf(Yaml(), files),
+            "sta.csv:4: step: step 1 of sample 0 stands here for the second time\n");
+  files = Tables();
+  files["par.csv"] = "sample,E_GPa,km_nNm,E_GPa\n0,100,8000,1\n1,120,-5000,1\n";
+  EXPECT_EQ(ProblemsOf(Yaml(), files), "par.csv:1: E_GPa: is the name of more than one column\n");
   files = Tables();
   files["par.csv"] = "sample,E,km_nNm\n0,100,8000\n";
   EXPECT_THAT(ProblemsOf(Yaml(), files),
               HasSubstr("par.csv:1: E_GPa: is not a column of this file"));
+}
+
+TEST(Precomputed, AMisspeltNameIsNotPassedOver) {
+  std::string yaml = Yaml();
+  yaml.replace(yaml.find("[rolling_stiffness]"), 19, "[roling_stiffness]");
+  EXPECT_THAT(ProblemsOf(yaml, Tables()),
+              HasSubstr("absolute: 'roling_stiffness' is not used in this campaign; did you mean "
+                        "'rolling_stiffness'?"));
 }
 
 TEST(Precomputed, RefusesWhatOnlyASimulationNeeds) {

@@ -8,6 +8,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 campaign::Campaign Model() {
   campaign::Campaign c;
@@ -40,6 +41,12 @@ TEST(Assignments, EveryMistakeHasItsLine) {
   EXPECT_THAT(Error({"young_moduls=2"}), HasSubstr("did you mean 'young_modulus'?"));
   EXPECT_THAT(Error({"young_modulus"}), HasSubstr("is not NAME=VALUE"));
   EXPECT_THAT(Error({"poisson_ratio=0.9"}), HasSubstr("outside what is allowed"));
+  for (const char* refused :
+       {"friction_coefficient=-1", "friction_coefficient=0.3 m", "friction_coefficient=nan"}) {
+    const std::string error = Error({"young_modulus=1e9", refused});
+    EXPECT_THAT(error, HasSubstr("--set friction_coefficient: ")) << refused;
+    EXPECT_THAT(error, Not(HasSubstr("needs a value"))) << refused;
+  }
   EXPECT_THAT(Error({"young_modulus=1e9", "young_modulus=2e9"}), HasSubstr("is given twice"));
 }
 

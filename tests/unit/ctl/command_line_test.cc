@@ -42,6 +42,23 @@ TEST(CommandLine, BadUsageIsTwoAndHelpIsZero) {
   EXPECT_EQ(Parse({"run", "--help"}).exit_code, kDone);
 }
 
+TEST(CommandLine, AMistypedVerbIsNamed) {
+  ::testing::internal::CaptureStderr();
+  EXPECT_EQ(Parse({"--state", "list", "shw", "c1"}).exit_code, kBadInput);
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(),
+            "calibctl: 'shw' is not a command; did you mean 'show'?\n");
+}
+
+TEST(CommandLine, NumbersAreNotWrappedRound) {
+  for (const char* seed : {"-1", "99999999999999999999", "", "1e3", "0x1"}) {
+    EXPECT_EQ(Parse({"run", "a.yaml", "--seed", seed}).exit_code, kBadInput) << seed;
+  }
+  const Parsed parsed = Parse({"run", "a.yaml", "--seed", "18446744073709551615"});
+  ASSERT_TRUE(parsed.command.has_value());
+  EXPECT_EQ(parsed.command->arguments.seed, 18446744073709551615U);
+  EXPECT_EQ(Parse({"states", "c1", "-1"}).exit_code, kBadInput);
+}
+
 TEST(CommandLine, VerbsThatSpeakOfErrorsSayWhatTheyAre) {
   for (const char* verb : {"compare", "diagnose", "improve"}) {
     ::testing::internal::CaptureStdout();

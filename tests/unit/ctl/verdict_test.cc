@@ -68,7 +68,7 @@ TEST_F(VerdictTest, NothingThatExplainsAModelThatDoesNotFit) {
   EXPECT_EQ(diagnosis_.best_partial, "");  // no clear step
   EXPECT_EQ(diagnosis_.reason,
             "with none of the 1 effects that were refitted does it fit, and none comes clearly "
-            "closer: with rolling chi-squared is 360, without 400 (clearly is below 256)");
+            "closer: rolling lowers chi-squared to 90 %, clearly is below 64 %");
   EXPECT_EQ(diagnosis_.effect, "");
 }
 

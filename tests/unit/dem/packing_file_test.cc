@@ -3,6 +3,7 @@
 
 #include <stop_token>
 
+#include "dem/neighbor/packing_overlap.h"
 #include "dem/particles/packing.h"
 
 namespace calib::dem {
@@ -25,6 +26,33 @@ TEST(PackingFile, ReadsCommentsBlankLinesAndClumps) {
   EXPECT_EQ(p.length[2], 3);
   EXPECT_THAT(p.x, testing::ElementsAre(0.1, 0.5));
   EXPECT_THAT(p.clump, testing::ElementsAre(-1, 7));
+}
+
+TEST(PackingFile, AByteOrderMarkBeforeTheHeaderIsSkipped) {
+  std::vector<PackingProblem> problems;
+  const Packing packing = ParsePacking(
+      "\xEF\xBB\xBF##PERIODIC:: 1 2 3\n0.1 0.2 0.3 0.05 -1\n0.5 1.5 2.5 0.1 7\n", problems);
+  EXPECT_TRUE(problems.empty());
+  EXPECT_EQ(packing.x.size(), 2U);
+}
+
+TEST(DeepOverlap, TellsTheDeepestPairAndHowManyThereAre) {
+  Packing p{.length = {1, 1, 1},
+            .x = {0.02, 0.98, 0.5, 0.5, 0.5},
+            .y = {0.5, 0.5, 0.2, 0.2, 0.2},
+            .z = {0.5, 0.5, 0.1, 0.18, 0.5},
+            .radius = {0.1, 0.1, 0.05, 0.05, 0.05},
+            .clump = {-1, -1, -1, -1, -1}};
+  const auto found = DeepOverlap(p);  // 0 and 1 across the face x; 2 and 3 touch less deeply
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->first, 0);
+  EXPECT_EQ(found->second, 1);
+  EXPECT_NEAR(found->overlap, 0.16, 1e-12);
+  EXPECT_EQ(found->pairs, 1);
+  p.z[3] = 0.12;
+  EXPECT_EQ(DeepOverlap(p)->pairs, 2);
+  p.clump = {4, 4, 5, 5, -1};
+  EXPECT_FALSE(DeepOverlap(p));  // spheres of one clump may
 }
 
 TEST(PackingFile, EveryProblemHasItsLine) {

@@ -231,5 +231,16 @@ TEST(EmulatedPosterior, SaysWhatIsWrong) {
   EXPECT_EQ(code({}), absl::StatusCode::kInvalidArgument);  // two predictions for one reading
 }
 
+TEST(StateEmulator, RunsThatDifferInNothingAreNothingToEmulate) {
+  const Eigen::MatrixXd inputs = Eigen::MatrixXd::Random(20, 2);
+  std::vector<Index> all;
+  for (Index i = 0; i < 20; ++i) all.push_back(i);
+  for (const double value : {1.0, 1e200}) {
+    const auto emulator =
+        StateEmulator::Fit(inputs, Eigen::MatrixXd::Constant(20, 5, value), all, {});
+    EXPECT_EQ(emulator.status().code(), absl::StatusCode::kFailedPrecondition) << value;
+  }
+}
+
 }  // namespace
 }  // namespace calib::inference

@@ -126,6 +126,39 @@ TEST(FitProposalToDraws, NothingToFitTo) {
             absl::StatusCode::kInvalidArgument);
 }
 
+TEST(ComputePosterior, RowsMadeForAWiderPriorDoNotLowerTheEvidence) {
+  const FilterOptions options;
+  const Iteration all = FirstIteration(options, 400);
+  std::vector<Prior> narrow = Priors();
+  narrow[0].max = 0.5 * (narrow[0].min + narrow[0].max);
+  Iteration inside = all;
+  Eigen::Index kept = 0;
+  for (Eigen::Index i = 0; i < 400; ++i) {
+    if (all.parameters(i, 0) > narrow[0].max) continue;
+    inside.parameters.row(kept) = all.parameters.row(i);
+    inside.predictions.row(kept++) = all.predictions.row(i);
+  }
+  ASSERT_GT(kept, 100);
+  ASSERT_LT(kept, 300);
+  inside.parameters.conservativeResize(kept, Eigen::NoChange);
+  inside.predictions.conservativeResize(kept, Eigen::NoChange);
+  const auto one = ComputePosterior(narrow, Data(0.5), options, std::span(&all, 1));
+  const auto other = ComputePosterior(narrow, Data(0.5), options, std::span(&inside, 1));
+  ASSERT_TRUE(one.ok() && other.ok()) << one.status() << other.status();
+  EXPECT_NEAR(one->log_evidence, other->log_evidence, 1e-12);
+  EXPECT_NEAR(one->log_evidence_se, other->log_evidence_se, 1e-12);
+  // With the density they were drawn from, each is a draw, of no weight there.
+  Iteration known = all;
+  known.log_proposal = Eigen::VectorXd::Zero(400);
+  Iteration known_inside = inside;
+  known_inside.log_proposal = Eigen::VectorXd::Zero(kept);
+  const auto of_all = ComputePosterior(narrow, Data(0.5), options, std::span(&known, 1));
+  const auto of_inside = ComputePosterior(narrow, Data(0.5), options, std::span(&known_inside, 1));
+  ASSERT_TRUE(of_all.ok() && of_inside.ok());
+  EXPECT_NEAR(of_all->log_evidence,
+              of_inside->log_evidence + std::log(static_cast<double>(kept) / 400), 1e-12);
+}
+
 TEST(ComputePosterior, TinyNoiseStaysFinite) {
   const FilterOptions options;
   const Iteration iteration = FirstIteration(options, 100);
@@ -144,7 +177,7 @@ TEST(ComputePosterior, AllDivergedIsAnErrorThatSaysSo) {
   iteration.predictions.setConstant(NAN);
   const auto status = ComputePosterior(Priors(), Data(0.1), {}, std::span(&iteration, 1)).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(Message(status), HasSubstr("10 diverged"));
+  EXPECT_THAT(Message(status), HasSubstr("10 did not come to their ends"));
 }
 
 TEST(ComputePosterior, BadInputIsRefused) {

@@ -47,7 +47,7 @@ TEST(Plot, ABandThatTurnsBackComesInPieces) {
 TEST(PeopleUnits, ChooseWhatReadsWell) {
   EXPECT_EQ(NumberWithUnit(2e5, "mean_stress", "Pa"), "200 kPa");
   EXPECT_EQ(NumberWithUnit(4.1e9, "young_modulus", "Pa"), "4.1 GPa");
-  EXPECT_EQ(NumberWithUnit(0.0123, "axial_strain", "1"), "1.23%");
+  EXPECT_EQ(NumberWithUnit(0.0123, "axial_strain", "1"), "1.23 %");
   EXPECT_EQ(NumberWithUnit(M_PI / 6, "friction_angle", "rad"), "30 deg");
   EXPECT_EQ(NumberWithUnit(0.5, "poisson_ratio", "1"), "0.5");
   EXPECT_EQ(Number(std::nan("")), "–");

@@ -119,6 +119,20 @@ TEST_F(StoreTest, StateThatArrivesTwiceIsHarmlessAndOtherBitsAreLogged) {
   EXPECT_NE(reader.Events(1)->front().what.find("nondeterminism"), std::string::npos);
 }
 
+TEST_F(StoreTest, AForgottenRequestIsNewAgain) {
+  const RequestRecord one{.digest = "d", .answer = "c1"};
+  Write([&](Transaction& t) {
+    t.PutRequest("r1", one);
+    t.PutRequest("r2", {.digest = "d", .answer = "c2"});
+  });
+  ASSERT_TRUE(Read().Request("r1")->has_value());
+  Write([](Transaction& t) { t.ForgetRequests("c1"); });
+  EXPECT_FALSE(Read().Request("r1")->has_value());
+  EXPECT_TRUE(Read().Request("r2")->has_value());
+  Write([&](Transaction& t) { t.PutRequest("r1", one); });
+  EXPECT_TRUE(Read().Request("r1")->has_value());
+}
+
 TEST_F(StoreTest, AttemptNumbersAreNeverUsedAgain) {
   Write([](Transaction& t) {
     PutEvaluation(t);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "dem/catalog/catalog.h"
@@ -56,6 +57,49 @@ TEST(Collision, ElasticImpactOnAWallFollowsHertz) {
     EXPECT_NEAR(Value(state, "normal_restitution"), 1, 1e-6);
     EXPECT_NEAR(Value(state, "energy_restitution"), 1, 2e-6);
   }
+}
+
+TEST(Collision, AWallWithoutFrictionLeavesTheTangentialVelocityAlone) {
+  Scenario s = Steel("hertz_mindlin", {{"friction_coefficient", 0.5}});
+  s.settings["impact_angle"] = 0.8;
+  s = test::With(s, "wall_friction", {{"ratio", 0}});
+  const test::Run smooth = test::RunAll(s);
+  ASSERT_EQ(smooth.states.size(), 3U);
+  for (const State& state : smooth.states) {
+    EXPECT_NEAR(Value(state, "tangential_restitution"), 1, 1e-9);
+  }
+  s.model.parameters["wall_friction.ratio"] = 1;
+  const test::Run rough = test::RunAll(s);
+  EXPECT_LT(Value(rough.states.at(0), "tangential_restitution"), 0.9);
+  s.model.parameters["wall_friction.ratio"] = 0;  // not between grains
+  s.settings["partner_radius"] = kRadius;
+  EXPECT_LT(Value(test::RunAll(s).states.at(0), "tangential_restitution"), 0.9);
+}
+
+TEST(Collision, OverlapsBeyondHalfARadiusAreRefused) {
+  Scenario s = Steel("hertz_mindlin", {{"friction_coefficient", 0}});
+  s.model.parameters["young_modulus"] = 1e6;
+  s.path = {{.target = 0.1, .load_step = 0}, {.target = 20, .load_step = 1}};
+  const test::Run wall = test::RunAll(s);
+  EXPECT_EQ(wall.summary.outcome, Outcome::kDiverged);
+  EXPECT_THAT(wall.summary.reason,
+              ::testing::MatchesRegex("load step 1 \\(angle 1e-06, speed 20, spin 0\\): the body "
+                                      "overlaps the wall by 0.011[0-9]* m, more than half its "
+                                      "radius"));
+  EXPECT_EQ(wall.states.size(), 1U);
+  s.settings["partner_radius"] = 0.5 * kRadius;
+  EXPECT_THAT(test::RunAll(s).summary.reason, HasSubstr("the bodies overlap by 0.0055"));
+}
+
+TEST(Collision, BodiesOfFarTooDifferentSizesAreRefused) {
+  Scenario s = Steel("hertz_mindlin", {{"friction_coefficient", 0}});
+  s.settings["partner_radius"] = 1e300;
+  EXPECT_THAT(ScenarioProblems(s),
+              ElementsAre(HasSubstr("leave it out, the partner is then a wall")));
+  s.settings["partner_radius"] = 1e-300;
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("allowed is at most 10000 times")));
+  s.settings["partner_radius"] = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(ScenarioProblems(s), ::testing::IsEmpty());
 }
 
 // gamma = -sqrt(5) ln e/sqrt(ln^2 e + pi^2) sqrt(m k) [Antypov & Elliott 2011], any speed.

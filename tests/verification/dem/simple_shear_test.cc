@@ -141,7 +141,9 @@ TEST(SimpleShear, LargeStrainsMissNoContact) {
     // Sixty grains that were hardly settled: the order of friction, no more.
     const double ratio = assembly.shear_stress() / assembly.stress()[2];
     EXPECT_LT(ratio, 0.8);
-    if (states > 1) EXPECT_GT(ratio, 0.05) << "state " << states;
+    if (states > 1) {
+      EXPECT_GT(ratio, 0.05) << "state " << states;
+    }
     furthest = assembly.cell().displacement / assembly.cell().length[0];
     return absl::OkStatus();
   };

@@ -1,6 +1,6 @@
 #pragma once
-// A model with known answers: y = A theta + e, e ~ N(0, diag sd^2), theta ~ N(prior mean, diag
-// prior sd^2).
+// A model with known answers: y = A theta + e, e ~ N(0, diag sd^2),
+// theta ~ N(prior mean, diag prior sd^2).
 
 #include <Eigen/Dense>
 #include <cmath>
