@@ -41,11 +41,14 @@ std::string NewIdentity() {
 std::string IdentityOf(const std::string& folder) {
   const std::string path = folder + "/identity";
   const std::string own = absl::StrCat(path, ".", getpid());
+  if (std::string identity = ReadAll(path); !identity.empty()) return identity;
   std::ofstream file(own);
   file << NewIdentity();
   file.close();  // tells whether the disk has taken it
-  // Linking fails where there is an identity already, which then counts.
-  if (!file || (link(own.c_str(), path.c_str()) != 0 && errno != EEXIST)) return "";
+  if (file) {
+    // Fails where there is one already, which then counts.
+    [[maybe_unused]] const int linked = link(own.c_str(), path.c_str());
+  }
   std::error_code ignored;
   fs::remove(own, ignored);
   return ReadAll(path);

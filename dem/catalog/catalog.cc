@@ -298,6 +298,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "7"; }
+std::string EngineVersion() { return "8"; }
 
 }  // namespace calib::dem

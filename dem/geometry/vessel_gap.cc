@@ -1,7 +1,9 @@
 #include "dem/geometry/vessel_gap.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <numbers>
 #include <utility>
@@ -180,6 +182,7 @@ std::string VesselProblem(const TriangleMesh& mesh) {
   std::erase_if(levels, [&](double z) { return z < foot || z > top; });
   levels.push_back(top);
   std::vector<std::vector<Gap>> seen;
+  seen.reserve(levels.size());
   for (const double z : levels) {
     seen.push_back(GapsAt(mesh, z));
   }

@@ -32,9 +32,10 @@ std::optional<PackingOverlap> DeepOverlap(const Packing& packing) {
     const auto i = static_cast<std::size_t>(list.first[q]);
     const auto j = static_cast<std::size_t>(list.second[q]);
     const int code = list.image[q];
-    const double dx = p.x[j] - p.x[i] + (code % 3 - 1) * cell.length[0];
-    const double dy = p.y[j] - p.y[i] + (code / 3 % 3 - 1) * cell.length[1];
-    const double dz = p.z[j] - p.z[i] + (code / 9 - 1) * cell.length[2];
+    const int shift[3] = {code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1};
+    const double dx = p.x[j] - p.x[i] + shift[0] * cell.length[0];
+    const double dy = p.y[j] - p.y[i] + shift[1] * cell.length[1];
+    const double dz = p.z[j] - p.z[i] + shift[2] * cell.length[2];
     const double overlap = p.radius[i] + p.radius[j] - std::sqrt(dx * dx + dy * dy + dz * dz);
     const double share = overlap / std::min(p.radius[i], p.radius[j]);
     if (!(share > kDeepest)) {

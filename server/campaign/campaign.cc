@@ -51,25 +51,27 @@ int MostBatches(const Campaign& campaign) {
 }
 
 std::vector<double> TravelledControl(const Experiment& experiment, double correlation_length) {
-  constexpr double kSame = 1e-9;     // of the whole path: readings so close are at one control
+  constexpr double kSame = 1e-3;     // of the median: readings so close are at one control
   constexpr double kClosest = 0.01;  // in correlation lengths, of those
-  double whole = 0;
+  std::vector<double> pieces;
   double at = experiment.control_start;
-  for (const dem::ControlPoint& point : experiment.path) {
-    whole += std::abs(point.target - at);
-    at = point.target;
-  }
-  std::vector<double> travelled;
-  at = experiment.control_start;
-  double length = 0;
   double piece = 0;  // since the last reading
   for (const dem::ControlPoint& point : experiment.path) {
     piece += std::abs(point.target - at);
     at = point.target;
     if (point.load_step < 0) continue;
-    const bool same = !travelled.empty() && piece <= kSame * whole;
-    length += same ? kClosest * correlation_length : piece;
+    pieces.push_back(piece);
     piece = 0;
+  }
+  std::vector<double> sorted = pieces;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double near = sorted.empty() ? 0 : kSame * *middle;
+  std::vector<double> travelled;
+  double length = 0;
+  for (const double apart : pieces) {
+    const bool same = !travelled.empty() && apart <= near;
+    length += same ? std::max(apart, kClosest * correlation_length) : apart;
     travelled.push_back(length);
   }
   return travelled;

@@ -106,7 +106,8 @@ FileReader DiskReader(const std::string& campaign_file_path) {
 }
 
 ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name,
-                         const FileReader& reader, std::optional<std::uint64_t> seed_override) {
+                         const FileReader& reader, std::optional<std::uint64_t> seed_override,
+                         CampaignIs is) {
   ReadOutcome outcome;
   ProblemList problems(file_name);
   const YamlParse parse = ParseYaml(yaml_text);
@@ -116,7 +117,8 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     return outcome;
   }
   Campaign& campaign = outcome.campaign;
-  ReadContext context(reader, problems);
+  const bool is_new = is == CampaignIs::kNew;
+  ReadContext context(reader, problems, is_new);
   MapReader map(*parse.root, "", problems);
   if (parse.root->kind == YamlNode::Kind::kMap) {
     ReadName(map, campaign);
@@ -134,8 +136,8 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     const std::size_t before = problems.size();
     ReadExperiments(map, context, campaign);
     if (problems.size() == before) ReadNoiseGroups(map, campaign);
-    if (problems.size() == before) CheckCorrelationLengths(map, campaign);
-    if (!campaign.precomputed) CheckBudget(map, campaign);
+    if (is_new && problems.size() == before) CheckCorrelationLengths(map, campaign);
+    if (is_new && !campaign.precomputed) CheckBudget(map, campaign);
     if (campaign.precomputed) {
       ReadPrecomputed(map, context, campaign);
       if (campaign.table || campaign.first_proposal) {
@@ -143,7 +145,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
       }
     }
     map.Finish();
-    if (problems.size() == 0 && !campaign.precomputed) AskEngine(map, campaign);
+    if (is_new && problems.size() == 0 && !campaign.precomputed) AskEngine(map, campaign);
   }
   if (seed_override) campaign.seed = campaign.filter.seed = *seed_override;
   outcome.problems = problems.Sorted();

@@ -26,10 +26,15 @@ struct ReadOutcome {
   std::vector<std::string> files;  ///< paths the campaign names, as written, that could be read
 };
 
+/// A campaign that was accepted once, maybe by an earlier build, is not asked again what only says
+/// that its runs would be of no use (overlaps, holes, the budget of one iteration).
+enum class CampaignIs { kNew, kStored };
+
 /// Parses and validates everything `submit` checks. Never throws; reads files only through
 /// `reader`.
 ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name,
                          const FileReader& reader,
-                         std::optional<std::uint64_t> seed_override = std::nullopt);
+                         std::optional<std::uint64_t> seed_override = std::nullopt,
+                         CampaignIs is = CampaignIs::kNew);
 
 }  // namespace calib::campaign

@@ -15,8 +15,11 @@ namespace calib::campaign {
 
 class ReadContext {
  public:
-  ReadContext(const FileReader& reader, ProblemList& problems)
-      : reader_(reader), problems_(problems) {}
+  /// is_new: not accepted before, see CampaignIs.
+  ReadContext(const FileReader& reader, ProblemList& problems, bool is_new)
+      : reader_(reader), problems_(problems), is_new_(is_new) {}
+
+  bool is_new() const { return is_new_; }
 
   ProblemList& problems() { return problems_; }
 
@@ -34,6 +37,7 @@ class ReadContext {
  private:
   const FileReader& reader_;
   ProblemList& problems_;
+  bool is_new_;
   std::map<std::string, std::optional<std::string>> contents_;  // empty: could not be read
   std::vector<std::string> files_;
 };

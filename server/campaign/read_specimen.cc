@@ -60,6 +60,7 @@ std::optional<Specimen> ReadFile(const MapReader& packing, const std::string& ke
                              absl::StrCat("has ", found.size() - kMostProblems, " more problems"));
   }
   if (!found.empty()) return std::nullopt;
+  if (!context.is_new()) return file;
   if (static_cast<int>(file.packing.x.size()) < kFewestGrains) {
     context.problems().AddIn(path, 0, "",
                              absl::StrCat("holds ", file.packing.x.size(), " grains, at least ",

@@ -112,11 +112,18 @@ class Inquiry {
     }
     const auto& experiments = view.campaign.experiments;
     const bool one_packing =
-        std::all_of(experiments.begin(), experiments.end(),
-                    [](const campaign::Experiment& e) { return e.specimens.size() <= 1; });
-    if (one_packing && !view.campaign.precomputed) {
+        std::all_of(experiments.begin(), experiments.end(), [](const campaign::Experiment& e) {
+          return e.role != campaign::Role::kCalibrate || e.specimens.size() <= 1;
+        });
+    const bool has_grains =
+        std::none_of(experiments.begin(), experiments.end(), [](const campaign::Experiment& e) {
+          return !e.specimens.empty() &&
+                 std::holds_alternative<campaign::NoPacking>(e.specimens.front());
+        });
+    if (one_packing && has_grains && !view.campaign.precomputed) {
       diagnosis_.warnings.emplace_back(
-          "Every test is run on one packing: by how much another one differs is not in the errors, "
+          "Every fitted test is run on one packing: by how much another one differs is not in the "
+          "errors, "
           "and may be taken for a missing effect unless the packing is the measured one. "
           "realizations: 4 or more show it.");
     }

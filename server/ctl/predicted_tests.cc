@@ -57,7 +57,10 @@ absl::Status SpellOutControl(const std::string& path, YamlNode& experiment,
     return ProblemIn(path, to->line,
                      absl::StrCat("control.to: ", std::string(end.status().message())));
   }
-  int count = 20;
+  const YamlNode* test = campaign::YamlFind(experiment, "test");
+  const dem::TestInfo* of_test = test != nullptr ? dem::FindTest(test->scalar) : nullptr;
+  const bool whole = of_test != nullptr && of_test->control_range && of_test->control_range->whole;
+  int count = whole && *end >= 1 && *end <= kMostReadings ? static_cast<int>(*end) : 20;
   if (readings != nullptr) {
     const auto number = campaign::ParseQuantity(readings->scalar, "1");
     if (!number.ok() || *number != std::floor(*number) || *number < 1 || *number > kMostReadings) {

@@ -17,7 +17,7 @@ namespace calib::ctl {
 
 namespace {
 
-// The default priors of effects are dimensionless: what they are here depends on the parent.
+// Many default priors are multiples of a scale that depends on the parent's stiffness.
 std::string NewPriors(const report::CampaignView& parent, const report::CampaignView& view) {
   std::string text;
   for (const v1::Posterior::Parameter& p : view.posterior.parameters()) {
@@ -29,8 +29,8 @@ std::string NewPriors(const report::CampaignView& parent, const report::Campaign
       return report::NumberWithUnit(value, p.name(), p.unit(), 3);
     };
     absl::StrAppend(&text, "Prior of ", p.name(), ": ", shown(p.prior_min()), " to ",
-                    shown(p.prior_max()), " (the default at the stiffness of ",
-                    parent.status.campaign(), "); a campaign file can give another.\n");
+                    shown(p.prior_max()), ", the default for the model of ",
+                    parent.status.campaign(), "; a campaign file can give another.\n");
   }
   return text;
 }

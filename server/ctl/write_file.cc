@@ -38,12 +38,20 @@ absl::StatusOr<OutputFile> OutputFile::Open(const std::string& path) {
   if (exists && access(path.c_str(), W_OK) != 0) {
     return CannotWrite(path, std::generic_category().message(errno));
   }
-  if (exists && !std::filesystem::is_regular_file(path, error)) return OutputFile(path, "");
-  // A link stays one: what it points to is replaced.
-  const std::string real = exists ? std::filesystem::canonical(path, error).string() : path;
-  const std::string part = absl::StrCat(real, ".", getpid(), ".part");
-  if (auto made = Write(part, path, ""); !made.ok()) return made;
-  return OutputFile(real, part);
+  // Devices, pipes and links (/dev/stdout too) are written to themselves.
+  if (exists && (!std::filesystem::is_regular_file(path, error) ||
+                 std::filesystem::is_symlink(path, error))) {
+    return OutputFile(path, "");
+  }
+  const std::string part = absl::StrCat(path, ".", getpid(), ".part");
+  if (auto made = Write(part, path, ""); !made.ok()) {
+    return exists ? absl::StatusOr<OutputFile>(OutputFile(path, ""))  // in a folder that is closed
+                  : made;
+  }
+  if (exists) {
+    std::filesystem::permissions(part, std::filesystem::status(path, error).permissions(), error);
+  }
+  return OutputFile(path, part);
 }
 
 OutputFile::~OutputFile() {

@@ -113,8 +113,9 @@ absl::StatusOr<std::shared_ptr<const Definition>> LoadDefinition(
   if (!files.ok()) {
     return files.status();
   }
-  campaign::ReadOutcome outcome = campaign::ReadCampaign(
-      submitted.yaml, submitted.file_name, StoredFiles(reader, *files), submitted.seed);
+  campaign::ReadOutcome outcome =
+      campaign::ReadCampaign(submitted.yaml, submitted.file_name, StoredFiles(reader, *files),
+                             submitted.seed, campaign::CampaignIs::kStored);
   if (!outcome.problems.empty()) {
     return absl::FailedPreconditionError(
         absl::StrCat("this program refuses the campaign as submitted: ",

@@ -133,6 +133,25 @@ TEST(CampaignFile, CorrelatedErrorsOfReadingsAtOneControlAreNotTheSame) {
               ElementsAre(DoubleEq(0.01), DoubleEq(0.011), DoubleEq(0.021)));
 }
 
+TEST(CampaignFile, ReadingsThatDifferInTheLastDigitsAreAtOneControl) {
+  Experiment e;
+  e.path = {{.target = 0.01, .load_step = 0},
+            {.target = 0.02, .load_step = 1},
+            {.target = 0.02 + 1e-8, .load_step = 2},
+            {.target = 0.03, .load_step = 3}};
+  EXPECT_THAT(TravelledControl(e, 0.1),
+              ElementsAre(DoubleEq(0.01), DoubleEq(0.02), DoubleEq(0.021), DoubleEq(0.031 - 1e-8)));
+}
+
+TEST(CampaignFile, WhatWasAcceptedOnceIsNotAskedAgainWhetherItsRunsAreOfUse) {
+  const std::string yaml = Spoiled("model_evaluations: 400", "model_evaluations: 19");
+  const auto files = GoodFiles();
+  EXPECT_THAT(ReadCampaign(yaml, "c.yaml", ReaderOf(files)).problems, SizeIs(1));
+  EXPECT_THAT(
+      ReadCampaign(yaml, "c.yaml", ReaderOf(files), std::nullopt, CampaignIs::kStored).problems,
+      IsEmpty());
+}
+
 TEST(CampaignFile, ADenseCurveKeepsTheDistancesOfItsReadings) {
   Experiment e;
   for (int i = 0; i < 4; ++i) e.path.push_back({.target = 1e-5 * (i + 1), .load_step = i});
