@@ -28,6 +28,9 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
     EXPECT_TRUE(json.contains(field)) << field;
   }
   EXPECT_EQ(json["verdict"], "adequate") << first.out;
+  EXPECT_NE(json["warnings"].dump().find("Every fitted test is run on one packing"),
+            std::string::npos)
+      << json["warnings"];
   ASSERT_TRUE(json["detectable"].is_object());
   for (const auto& [effect, strength] : json["detectable"].items()) {
     for (const auto& [name, value] : strength.items()) EXPECT_TRUE(json["units"].contains(name));
@@ -107,6 +110,10 @@ TEST_F(Diagnosis, ExtendsAndRefusesInASentence) {
       << Read("out");
   const Answer again = Call("extend c1 --effect rolling_resistance --state s --json");
   EXPECT_EQ(again.out, extended.out);
+  EXPECT_NE(Call("extend c1 --effect rolling_resistance --state s")
+                .out.find("Prior of rolling_resistance.friction: "),
+            std::string::npos)
+      << Read("out");
   const Answer twice = Call("extend c2 --effect rolling_resistance --state s");
   EXPECT_NE(twice.code, 0);
 
@@ -121,6 +128,9 @@ TEST_F(Diagnosis, ExtendsAndRefusesInASentence) {
             std::string::npos)
       << Read("out");
   EXPECT_EQ(Call("delete c2 --state s --json").json()["deleted"], true) << "it has no children";
+  // What was deleted may come again.
+  EXPECT_EQ(Call("submit small.yaml --state s --json").json()["campaign"], "c3") << Read("err");
+  EXPECT_EQ(Call("list --state s --json").json().size(), 1U);
 }
 
 TEST_F(Diagnosis, DeletesACampaignWithAllThatComesFromIt) {

@@ -82,15 +82,22 @@ TEST(WarmPoints, AScreensRunCountsWhereItGivesEveryParameter) {
   EXPECT_EQ(table.histories(0, 1), 2);
 }
 
-// Every run keeps what it was run with and is read at a strength of its own.
-TEST(WarmPoints, RunsAreReadByLoadCellsOfEveryStrength) {
+// A campaign, and its extension by a parameter.
+std::pair<campaign::Campaign, campaign::Campaign> WithOnTop(const std::string& name, double min,
+                                                            double max) {
   campaign::Campaign parent = Square();
   parent.experiments[0].control = {0, 0.02};
   campaign::Campaign extended = parent;
   extended.parameters.push_back(
-      {.name = "load_cell_error.gain",
+      {.name = name,
        .unit = "1",
-       .prior = {.kind = inference::PriorKind::kUniform, .min = -0.3, .max = 0.3}});
+       .prior = {.kind = inference::PriorKind::kUniform, .min = min, .max = max}});
+  return {parent, extended};
+}
+
+// Every run keeps what it was run with and is read at a strength of its own.
+TEST(WarmPoints, RunsAreReadByLoadCellsOfEveryStrength) {
+  const auto [parent, extended] = WithOnTop("load_cell_error.gain", -0.3, 0.3);
   const report::RunTable runs = Runs(30);
   const inference::DataSet data = campaign::MakeDataSet(parent);
   const auto misread = RunsMisread(runs, parent, data, extended);
@@ -106,13 +113,7 @@ TEST(WarmPoints, RunsAreReadByLoadCellsOfEveryStrength) {
 }
 
 TEST(WarmPoints, WhatElseIsOnTopCannotBeReadIntoARun) {
-  campaign::Campaign parent = Square();
-  parent.experiments[0].control = {0, 0.02};
-  campaign::Campaign extended = parent;
-  extended.parameters.push_back(
-      {.name = "rolling_resistance.friction",
-       .unit = "1",
-       .prior = {.kind = inference::PriorKind::kUniform, .min = 0, .max = 1}});
+  const auto [parent, extended] = WithOnTop("rolling_resistance.friction", 0, 1);
   EXPECT_FALSE(RunsMisread(Runs(5), parent, campaign::MakeDataSet(parent), extended));
 }
 
