@@ -20,7 +20,7 @@
 namespace calib::ctl {
 namespace {
 
-constexpr std::size_t kWarmFits = 4;    // two batches each pick the few to continue from
+constexpr std::size_t kWarmFits = 4;    // to begin with: two batches each pick those to continue
 constexpr std::size_t kMostRivals = 3;  // that the next experiment is to separate
 // Of measurements that a right model makes one in a thousand is closer.
 constexpr double kTooGood = 0.999;
@@ -133,9 +133,10 @@ class Inquiry {
     if (!options_.max_evaluations) return absl::OkStatus();
     const std::int64_t screen = screen_.Planned(options_.without);
     if (screen + fits_.Least() <= *options_.max_evaluations) return absl::OkStatus();
-    return absl::ResourceExhaustedError(absl::StrCat(
-        "the screen of effects takes ", screen, " model evaluations and a refit ", fits_.Least(),
-        ", and ", std::max<std::int64_t>(0, *options_.max_evaluations), " are left"));
+    return absl::ResourceExhaustedError(
+        absl::StrCat("the screen of effects takes ", screen, " model evaluations and a refit ",
+                     fits_.Least(), ", and ", std::max<std::int64_t>(0, *options_.max_evaluations),
+                     " are left (what an earlier diagnosis has run counts too)"));
   }
 
   absl::Status JudgeBase() {
@@ -315,11 +316,30 @@ class Inquiry {
     return effects;
   }
 
+  // What the screen sees something of, by how much misfit it expects to be left.
+  std::vector<WarmFits::Prospect> FurtherThan(const std::vector<std::string>& first) const {
+    const inference::Adequacy& base = diagnosis_.adequacy;
+    std::vector<WarmFits::Prospect> others;
+    for (const CandidateEffect& candidate : diagnosis_.candidates) {
+      if (candidate.p_value >= options_.level ||
+          std::find(first.begin(), first.end(), candidate.effect) != first.end()) {
+        continue;
+      }
+      const double misfit = std::max(0.0, base.chi2 - base.degrees);
+      others.push_back(
+          {.effect = candidate.effect, .chi2 = base.chi2 - candidate.explained_fraction * misfit});
+    }
+    std::stable_sort(others.begin(), others.end(),
+                     [](const auto& a, const auto& b) { return a.chi2 < b.chi2; });
+    return others;
+  }
+
   absl::Status FitWarm(const inference::FittedModel& base) {
     if (!base_.view().campaign.precomputed) {
       std::optional<std::int64_t> most = options_.max_evaluations;
       if (most) *most -= screen_.evaluations();
-      if (auto status = fits_.Fit(WorthARefit(), most); !status.ok()) return status;
+      const std::vector<std::string> first = WorthARefit();
+      if (auto status = fits_.Fit(first, FurtherThan(first), most); !status.ok()) return status;
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (CandidateEffect& candidate : diagnosis_.candidates) Describe(candidate);

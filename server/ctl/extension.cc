@@ -30,10 +30,40 @@ double DiameterOf(const campaign::Experiment& experiment) {
   return 1e-3;
 }
 
+// Moduli that an extension may move to: a model that lacks an effect bends its modulus to hide it.
+struct Moduli {
+  double low = 0, high = 0;
+};
+
+Moduli ModuliOf(const report::CampaignView& view, double modulus) {
+  constexpr double kFurthest = 10;  // times the parent's
+  Moduli moduli{.low = modulus, .high = modulus};
+  for (const campaign::CalibratedParameter& parameter : view.campaign.parameters) {
+    if (parameter.name != "young_modulus") continue;
+    const inference::Prior& prior = parameter.prior;
+    moduli.low = std::min(modulus, std::max(prior.min, modulus / kFurthest));
+    moduli.high = std::max(modulus, std::min(prior.max, modulus * kFurthest));
+  }
+  return moduli;
+}
+
+// Wide enough whatever the modulus turns out to be once the effect is there.
+dem::DefaultPrior PriorOver(const Moduli& moduli, const dem::ParameterInfo& parameter,
+                            const std::string& contact, dem::ReferenceState state) {
+  state.modulus = moduli.low;
+  const dem::DefaultPrior soft = dem::PriorOf(parameter, contact, state);
+  state.modulus = moduli.high;
+  dem::DefaultPrior prior = dem::PriorOf(parameter, contact, state);
+  prior.min = std::min(prior.min, soft.min);
+  prior.max = std::max(prior.max, soft.max);
+  return prior;
+}
+
 // What is calibrated of an effect: everything without a default or with a null, alternatives once.
 std::map<std::string, dem::DefaultPrior> ParametersOf(const dem::EffectInfo& effect,
                                                       const std::string& contact,
-                                                      const dem::ReferenceState& state) {
+                                                      const dem::ReferenceState& state,
+                                                      const Moduli& moduli) {
   std::map<std::string, dem::DefaultPrior> chosen;
   std::vector<std::string> covered;
   const auto on_ray = [&effect](const std::string& name) {
@@ -54,7 +84,7 @@ std::map<std::string, dem::DefaultPrior> ParametersOf(const dem::EffectInfo& eff
       if (said) continue;
       covered.push_back(parameter.name);
       chosen[absl::StrCat(effect.name, ".", parameter.name)] =
-          dem::PriorOf(parameter, contact, state);
+          PriorOver(moduli, parameter, contact, state);
     }
   }
   return chosen;
@@ -122,6 +152,7 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
                      " is complete, so there is nothing to start from"));
   }
   const dem::ReferenceState state = ReferenceOf(parent);
+  const Moduli moduli = ModuliOf(parent, state.modulus);
   campaign::Derivation derivation{
       .name = absl::StrCat(parent.campaign.name, " + ", absl::StrJoin(plan.effects, " + ")),
       .lineage = {.parent = parent.status.campaign(), .purpose = plan.purpose},
@@ -141,7 +172,7 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
     }
     derivation.parameters.merge(
         ParametersOf(*dem::FindEffect(parent.campaign.model.user_effects, name),
-                     parent.campaign.model.contact, state));
+                     parent.campaign.model.contact, state, moduli));
   }
   for (int j = 0; j < parent.posterior.parameters_size(); ++j) {
     const v1::Posterior::Parameter& parameter = parent.posterior.parameters(j);

@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kClearlyCloser = 0.64;  // of the base model's chi-squared
 constexpr double kClearlyLess = 0.25;    // of the misfit explained
-constexpr double kFarOff = 4;            // times the chi-squared of the best: twice its rms
 constexpr std::size_t kMostNames = 3;
 constexpr double kNearlyAll = 0.9;  // of the misfit
 

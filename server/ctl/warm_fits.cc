@@ -22,6 +22,9 @@ constexpr int kMostIdle = 3;       // batches in a row that were not
 // Of the mean history at the point that a fit is judged by, sd of the readings.
 constexpr double kMostUnknown = 1;
 
+// Of another batch: what is left to explain, dearer with every batch that has been made.
+double PriceOf(double chi2, int batches) { return std::sqrt(chi2) * std::pow(kPatience, batches); }
+
 // Samples of a batch.
 int BatchOf(const FittedCampaign& base) {
   return std::max(kLeastSamples, static_cast<int>(base.runs().sample.size()) / kShares);
@@ -42,16 +45,37 @@ std::int64_t WarmFits::Least() const {
   return static_cast<std::int64_t>(kLeastBatches) * BatchOf(base_) * base_.fitted_experiments();
 }
 
-absl::Status WarmFits::Fit(std::vector<std::string> effects, std::optional<std::int64_t> most) {
-  if (effects.empty()) return absl::OkStatus();
+absl::Status WarmFits::Fit(std::vector<std::string> first, std::vector<Prospect> later,
+                           std::optional<std::int64_t> most) {
+  if (first.empty()) return absl::OkStatus();
   samples_ = BatchOf(base_);
   const int batch = samples_ * base_.fitted_experiments();
   int allowed = static_cast<int>(base_.runs().sample.size()) * base_.fitted_experiments();
   if (most) allowed = static_cast<int>(std::min<std::int64_t>(allowed, *most));
-  effects.resize(std::min(
-      effects.size(), static_cast<std::size_t>(std::max(1, allowed / (kLeastBatches * batch)))));
-  int spent = 0;
-  for (const std::string& effect : effects) {  // side by side
+  first.resize(std::min(first.size(),
+                        static_cast<std::size_t>(std::max(1, allowed / (kLeastBatches * batch)))));
+  if (auto status = Begin(first); !status.ok()) return status;
+  while (spent_ + batch <= allowed) {
+    const std::optional<Choice> next = Next();
+    const auto newcomer = Newcomer(later);
+    const bool begins = newcomer != later.end() &&
+                        (!next || PriceOf(newcomer->chi2, kLeastBatches) < next->price) &&
+                        spent_ + kLeastBatches * batch <= allowed;
+    if (begins) {
+      if (auto status = Begin({newcomer->effect}); !status.ok()) return status;
+      later.erase(newcomer);
+    } else if (next) {
+      if (auto status = Continue(next->effect); !status.ok()) return status;
+    } else {
+      break;
+    }
+  }
+  return absl::OkStatus();
+}
+
+// Side by side.
+absl::Status WarmFits::Begin(const std::vector<std::string>& effects) {
+  for (const std::string& effect : effects) {
     const auto text = FirstText(effect);
     if (!text.ok()) return text.status();
     if (auto status = base_.Announce(*text, effect); !status.ok()) return status;
@@ -59,47 +83,51 @@ absl::Status WarmFits::Fit(std::vector<std::string> effects, std::optional<std::
   for (int first = 0; first < kLeastBatches; ++first) {
     for (const std::string& effect : effects) {
       if (auto status = Continue(effect); !status.ok()) return status;
-      spent += batch;
     }
   }
-  while (spent + batch <= allowed) {
-    const std::string* next = Next(effects);
-    if (next == nullptr) break;
-    if (auto status = Continue(*next); !status.ok()) return status;
-    spent += batch;
-  }
+  begun_.insert(begun_.end(), effects.begin(), effects.end());
   return absl::OkStatus();
+}
+
+double WarmFits::Chi2(const std::string& effect) const {
+  const WarmFit& fit = fits_.at(effect);
+  return fit.model.histories.rows() > 0 ? fit.adequacy.chi2
+                                        : std::numeric_limits<double>::infinity();
+}
+
+const WarmFit& WarmFits::Closest() const {
+  return fits_.at(*std::min_element(
+      begun_.begin(), begun_.end(),
+      [this](const std::string& a, const std::string& b) { return Chi2(a) < Chi2(b); }));
 }
 
 // The one that promises most; the best comes last once it is as close as noise and scatter allow:
 // it is its rivals that are not known yet.
-const std::string* WarmFits::Next(const std::vector<std::string>& effects) const {
-  const auto chi2 = [this](const std::string& effect) {
-    const WarmFit& fit = fits_.at(effect);
-    return fit.model.histories.rows() > 0 ? fit.adequacy.chi2
-                                          : std::numeric_limits<double>::infinity();
-  };
-  const std::string& best = *std::min_element(
-      effects.begin(), effects.end(),
-      [&chi2](const std::string& a, const std::string& b) { return chi2(a) < chi2(b); });
+std::optional<WarmFits::Choice> WarmFits::Next() const {
+  const WarmFit& best = Closest();
   // Without the effect it is the base model: a fit that is further off has merely not been found.
   const auto adequacy = inference::TestAdequacy(Base());
   const double base = adequacy.ok() ? adequacy->chi2 : std::numeric_limits<double>::infinity();
-  const std::string* next = nullptr;
-  double lowest = 0;
-  for (const std::string& effect : effects) {
+  std::optional<Choice> next;
+  for (const std::string& effect : begun_) {
     const WarmFit& fit = fits_.at(effect);
     if (fit.stalled || fit.runs.histories.rows() == 0) continue;
-    const double price =
-        effect == best && fit.Satisfied()
-            ? std::numeric_limits<double>::infinity()
-            : std::sqrt(std::min(chi2(effect), base)) * std::pow(kPatience, fit.iterations);
-    if (next == nullptr || price < lowest) {
-      next = &effect;
-      lowest = price;
-    }
+    const double price = &fit == &best && fit.Satisfied()
+                             ? std::numeric_limits<double>::infinity()
+                             : PriceOf(std::min(Chi2(effect), base), fit.iterations);
+    if (!next || price < next->price) next = Choice{.effect = effect, .price = price};
   }
   return next;
+}
+
+// What the screen cannot tell from an effect need not be like it where the model is refitted. Once
+// one fits, others that could are worth more than better figures of those that are further off.
+std::vector<WarmFits::Prospect>::iterator WarmFits::Newcomer(std::vector<Prospect>& later) const {
+  const WarmFit& best = Closest();
+  if (!best.Satisfied()) return Next() ? later.end() : later.begin();
+  return std::find_if(later.begin(), later.end(), [&best](const Prospect& prospect) {
+    return prospect.chi2 <= kFarOff * std::max(best.adequacy.chi2, best.adequacy.degrees);
+  });
 }
 
 const WarmFit* WarmFits::Find(const std::string& effect) const {
@@ -130,6 +158,7 @@ absl::StatusOr<std::string> WarmFits::FirstText(const std::string& effect) const
 absl::Status WarmFits::Continue(const std::string& effect) {
   WarmFit& fit = fits_[effect];
   if (fit.stalled) return absl::OkStatus();
+  spent_ += samples_ * base_.fitted_experiments();
   const std::string what = absl::StrCat("warm fit with ", effect, ", batch ", fit.iterations + 1);
   const double rms = fit.rms;
   const double chi2 = fit.adequacy.chi2;

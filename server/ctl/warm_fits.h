@@ -30,10 +30,19 @@ class WarmFits {
   WarmFits(const FittedCampaign& base, const EffectScreen& screen, const Response& response)
       : base_(base), screen_(screen), response_(response) {}
 
-  /// Two batches of each, as far as they go; then the most promising go on, until each has stalled
-  /// or as many evaluations have been made as the campaign has, or as `most` allows; Least() in any
-  /// case. Errors: those of the runs.
-  absl::Status Fit(std::vector<std::string> effects, std::optional<std::int64_t> most = {});
+  /// What the screen says of an effect that may be refitted.
+  struct Prospect {
+    std::string effect;
+    double chi2 = 0;  ///< expected with it
+  };
+
+  /// Two batches of each of `first`, as far as they go; then the most promising go on, until each
+  /// has stalled or as many evaluations have been made as the campaign has, or as `most` allows;
+  /// Least() in any case. Those of `later`, best first, are begun with what is left: all of them
+  /// where every fit has stalled, and once one fits the readings those that may do so too. Errors:
+  /// those of the runs.
+  absl::Status Fit(std::vector<std::string> first, std::vector<Prospect> later,
+                   std::optional<std::int64_t> most = {});
   /// Model evaluations of two batches of one effect.
   std::int64_t Least() const;
 
@@ -56,9 +65,19 @@ class WarmFits {
 
  private:
   absl::StatusOr<std::string> FirstText(const std::string& effect) const;
+  absl::Status Begin(const std::vector<std::string>& effects);
   absl::Status Continue(const std::string& effect);
-  /// nullptr when every fit has stalled.
-  const std::string* Next(const std::vector<std::string>& effects) const;
+  double Chi2(const std::string& effect) const;
+  /// The begun fit that comes closest.
+  const WarmFit& Closest() const;
+  struct Choice {
+    std::string effect;
+    double price = 0;  ///< of another batch of it
+  };
+  /// Empty when every fit has stalled.
+  std::optional<Choice> Next() const;
+  /// Of those that have not been begun, the best that may be now.
+  std::vector<Prospect>::iterator Newcomer(std::vector<Prospect>& later) const;
   absl::StatusOr<Eigen::MatrixXd> PointsFor(const std::string& effect) const;
   report::RunTable RunsFor(const std::string& effect) const;
   void Judge(const std::string& effect);
@@ -69,6 +88,8 @@ class WarmFits {
   const EffectScreen& screen_;
   const Response& response_;
   int samples_ = 0;  // of a batch
+  int spent_ = 0;    // evaluations of the batches, reused ones too
+  std::vector<std::string> begun_;
   std::int64_t evaluations_ = 0;
   std::map<std::string, WarmFit> fits_;
 };

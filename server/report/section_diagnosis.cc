@@ -57,14 +57,19 @@ std::string CandidateTable(const StoredDiagnosis& d) {
         "<tr><td>{}{}{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
         "<td class=\"l wide\">{}</td><td class=\"l wide\">{}</td></tr>\n",
         named ? "<strong>" : "", Escape(NameForPeople(tried.effect)), named ? "</strong>" : "",
-        Number(tried.p_value, 2), Percent(tried.explained_fraction, 2),
+        Number(tried.p_value, 2),
+        // Without the effect it is the base model: a refit further off has merely not been found.
+        tried.refit_chi2 && *tried.refit_chi2 >= d.chi2 ? "not found"
+                                                        : Percent(tried.explained_fraction, 2),
         Number(tried.predicted_rms_error, 3), OrDash(tried.refit_p_value, 2),
         OrDash(tried.left_out_error, 3),
         Escape(OwnStrength(tried.effect, tried.amplitude, d.units)), Escape(Alike(tried)));
   }
   html +=
       "</table></div>\n<p class=\"sub\">Best first. Explains: share of the misfit beyond noise "
-      "and scatter. Error: root mean square of residual over the sd of a measurement. Refitted: "
+      "and scatter; not found where the refit came no closer than the model without the effect "
+      "before its runs were used up. Error: root mean square of residual over the sd of a "
+      "measurement. Refitted: "
       "with all parameters free; a dash, where only the screen judged. Left out: error on data "
       "it was not fitted to";
   if (d.left_out_error) html += fmt::format(", {} without any", Number(*d.left_out_error, 3));

@@ -23,7 +23,7 @@ struct TriedEffect {
       amplitude{};  ///< dotted parameter -> strength [StoredDiagnosis::units]
   std::vector<std::string> confusable_with{};
   std::map<std::string, double> angles{};  ///< to the other effects [degrees]
-  std::optional<double> refit_p_value{}, left_out_error{};
+  std::optional<double> refit_p_value{}, refit_chi2{}, left_out_error{};
 };
 
 struct StoredDiagnosis {

@@ -5,6 +5,7 @@
 namespace calib::ctl {
 namespace {
 
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -20,6 +21,26 @@ TEST(DiagnosisText, AGroupComesWithTheAnglesBetweenItsEffects) {
   const std::string text = DiagnosisText(diagnosis);
   EXPECT_THAT(text, HasSubstr("rolling_resistance and twisting_resistance 7°"));
   EXPECT_THAT(text, Not(HasSubstr("61")));
+}
+
+TEST(DiagnosisText, ARefitThatIsFurtherOffThanItsOwnBaseModelHasFoundNothing) {
+  ctl::Diagnosis diagnosis;
+  diagnosis.verdict = "unexplained";
+  diagnosis.adequacy.chi2 = 300;
+  diagnosis.candidates = {
+      {.effect = "adhesion_dmt", .campaign = "c2", .refit_p_value = 0, .refit_chi2 = 420},
+      {.effect = "twisting_resistance",
+       .explained_fraction = 0.5,
+       .campaign = "c3",
+       .refit_p_value = 0,
+       .refit_chi2 = 200}};
+  const std::string text = DiagnosisText(diagnosis);
+  EXPECT_THAT(text, ContainsRegex("adhesion_dmt +1 +not found"));
+  EXPECT_THAT(text, HasSubstr("came no closer than the model without the effect"));
+  EXPECT_THAT(text, Not(HasSubstr("adhesion_dmt comes closest")));
+  EXPECT_THAT(text, HasSubstr("twisting_resistance comes closest"));
+  diagnosis.candidates.erase(diagnosis.candidates.begin());
+  EXPECT_THAT(DiagnosisText(diagnosis), Not(HasSubstr("not found")));
 }
 
 }  // namespace
