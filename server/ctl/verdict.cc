@@ -1,7 +1,8 @@
 #include "server/ctl/verdict.h"
 
 #include <algorithm>
-#include <iterator>
+#include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -79,6 +80,15 @@ bool Verdict::Excluded(const CandidateEffect& other, const CandidateEffect& firs
          (outweighed || fit.runs.histories.rows() == 0);
 }
 
+// At an angle to what the first explains a share of that is left.
+double Verdict::Chi2OfDouble(const std::string& other, const CandidateEffect& first) const {
+  const double best = Find(first.effect)->adequacy.chi2;
+  const auto angle = first.angles.find(other);
+  if (angle == first.angles.end()) return best;
+  const double sine = std::sin(angle->second * std::numbers::pi / 180);
+  return best + sine * sine * std::max(0.0, diagnosis_.adequacy.chi2 - best);
+}
+
 void Verdict::Conclude(bool base_fits) {
   if (diagnosis_.candidates.empty() || !Explains(diagnosis_.candidates.front())) {
     diagnosis_.verdict = base_fits ? "adequate" : "unexplained";
@@ -94,26 +104,29 @@ void Verdict::Conclude(bool base_fits) {
     diagnosis_.verdict = "adequate";  // a hint that depends on the prior of its strength
     return;
   }
-  // Those that do as well; those that the screen cannot tell from it, which were not fitted for
-  // that reason; those of which it is not known yet how well they can do.
-  std::vector<std::string> as_good;
+  // Those that do as well, and those that the screen cannot tell from it, which were not fitted for
+  // that reason; then those of which it is not known yet how well they can do.
+  std::vector<std::pair<double, std::string>> as_good;  // chi-squared, measured or expected
   std::vector<const CandidateEffect*> unknown;
   for (const CandidateEffect& other : diagnosis_.candidates) {
     const WarmFit* fit = Find(other.effect);
     if (fit == nullptr || fit == &best || Excluded(other, first)) continue;
     if (Explains(other)) {
-      as_good.push_back(other.effect);
+      as_good.emplace_back(fit->adequacy.chi2, other.effect);
     } else {
       unknown.push_back(&other);
     }
   }
+  for (const std::string& other : first.confusable_with) {
+    if (Find(other) == nullptr) as_good.emplace_back(Chi2OfDouble(other, first), other);
+  }
+  std::stable_sort(as_good.begin(), as_good.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
   // How close those have come is luck so far; the screen knows more of them.
   std::stable_sort(unknown.begin(), unknown.end(),
                    [](const auto* a, const auto* b) { return a->p_value < b->p_value; });
-  std::vector<std::string> rivals = as_good;
-  std::copy_if(first.confusable_with.begin(), first.confusable_with.end(),
-               std::back_inserter(rivals),
-               [this](const std::string& other) { return Find(other) == nullptr; });
+  std::vector<std::string> rivals;
+  for (const auto& [chi2, other] : as_good) rivals.push_back(other);
   for (const CandidateEffect* other : unknown) rivals.push_back(other->effect);
   rivals.resize(std::min(rivals.size(), kMostNames - 1));
   if (rivals.empty()) {

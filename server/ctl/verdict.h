@@ -32,6 +32,7 @@ class Verdict {
   bool Settles(const CandidateEffect& candidate, const WarmFit& fit) const;
   bool Excluded(const CandidateEffect& other, const CandidateEffect& first) const;
   bool IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const;
+  double Chi2OfDouble(const std::string& other, const CandidateEffect& first) const;
   std::string Closest() const;
   std::string WhyUnexplained() const;
   std::string WhyNotBetter(const WarmFit& fit) const;

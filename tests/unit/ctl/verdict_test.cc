@@ -140,6 +140,20 @@ TEST_F(VerdictTest, ARefitIsComparedWithTheBestAfterAsManyBatches) {
   EXPECT_EQ(Concluded(), "ambiguous") << "after three the best was no closer";
 }
 
+TEST_F(VerdictTest, OneThatTheScreenCannotTellFromItComesBeforeOneThatExplainsLess) {
+  for (const double angle : {5.0, 40.0}) {
+    diagnosis_ = {};
+    diagnosis_.adequacy.chi2 = kAway;
+    Refit("adhesion", kClose);
+    Refit("jkr", 1.01 * kClose);
+    Refit("twisting", 1.3 * kClose);
+    diagnosis_.candidates.front().confusable_with = {"capillary"};
+    diagnosis_.candidates.front().angles = {{"capillary", angle}};
+    EXPECT_EQ(Concluded(), "ambiguous");
+    EXPECT_EQ(Group(), (Names{"jkr", angle < 25 ? "capillary" : "twisting"}));
+  }
+}
+
 TEST_F(VerdictTest, WhatTheScreenCannotTellFromItIsNamedUnlessItWasFitted) {
   Refit("rolling", kClose);
   Refit("twisting", 0.5 * kAway);
