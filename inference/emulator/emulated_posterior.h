@@ -48,7 +48,7 @@ struct EmulatedResult {
   std::vector<ParameterSummary> parameters;
   Eigen::MatrixXd correlation;       ///< d x d
   double log_evidence = 0;           ///< ln p(data), emulator error included
-  double log_evidence_se = 0;        ///< of the sampling alone
+  double log_evidence_se = 0;        ///< of the sampling alone; SplitHalf has the emulator's
   Eigen::VectorXd variance_factors;  ///< kInferred: posterior median of f per noise group
                                      ///< (NoiseGroupsOf)
   Eigen::MatrixXd noise_scale;       ///< kInferred: quantiles of sqrt(f), groups x 3 (5, 50, 95 %)

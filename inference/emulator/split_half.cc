@@ -30,27 +30,31 @@ std::vector<Iteration> HalfOf(std::span<const Iteration> iterations, int parity)
 
 }  // namespace
 
-Eigen::VectorXd SplitHalfOfEmulator(const JointPrior& priors, const DataSet& data,
-                                    const EmulatorOptions& options,
-                                    std::span<const Iteration> iterations,
-                                    const EmulatedResult& whole, const std::stop_token& stop) {
+SplitHalf SplitHalfOfEmulator(const JointPrior& priors, const DataSet& data,
+                              const EmulatorOptions& options, std::span<const Iteration> iterations,
+                              const EmulatedResult& whole, const std::stop_token& stop) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const auto d = static_cast<Index>(whole.parameters.size());
-  Eigen::VectorXd difference =
-      Eigen::VectorXd::Constant(d, std::numeric_limits<double>::quiet_NaN());
+  SplitHalf split{.difference = Eigen::VectorXd::Constant(d, kNone), .log_evidence_error = kNone};
   EmulatorOptions of_half = options;
   of_half.draws = kDraws;
   of_half.replicates.reset();  // they move draws, not means
   Eigen::MatrixXd means(2, d);
+  double log_evidence[2];
   for (int parity = 0; parity < 2; ++parity) {
     const auto half = EmulatedPosterior(priors, data, of_half, HalfOf(iterations, parity), stop);
-    if (!half.ok() || half->draws.rows() == 0) return difference;
+    if (!half.ok() || half->draws.rows() == 0) return split;
     means.row(parity) = half->draws.colwise().mean();
+    log_evidence[parity] = half->log_evidence;
   }
   for (Index j = 0; j < d; ++j) {
-    difference[j] =
+    split.difference[j] =
         std::abs(means(0, j) - means(1, j)) / whole.parameters[static_cast<std::size_t>(j)].sd;
   }
-  return difference;
+  split.log_evidence_error =
+      std::hypot((log_evidence[0] - log_evidence[1]) / 2,
+                 (log_evidence[0] + log_evidence[1]) / 2 - whole.log_evidence);
+  return split;
 }
 
 }  // namespace calib::inference

@@ -74,7 +74,7 @@ std::vector<std::string> Warnings(const std::vector<RivalModel>& rivals) {
   if (!emulated.empty()) {
     warnings.push_back(
         absl::StrCat("Evidence from an emulator of the runs: ", emulated,
-                     "; its standard error is that of the sampling, not of the emulator."));
+                     "; its standard error holds what halves of the runs differ by."));
   }
   return warnings;
 }

@@ -1,5 +1,6 @@
 #include "server/scheduler/answer.h"
 
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -62,8 +63,16 @@ void AskEmulator(const Definition& definition, std::span<const inference::Iterat
   if (emulated.ok()) {
     if (emulated->adequate) {
       answer.scatter = ScatterOfEmulator(definition, *emulated);
-      emulated->split_half =
+      const inference::SplitHalf split =
           inference::SplitHalfOfEmulator(definition.priors, data, options, iterations, *emulated);
+      emulated->split_half = split.difference;
+      if (std::isfinite(split.log_evidence_error)) {
+        emulated->log_evidence_se = std::hypot(emulated->log_evidence_se, split.log_evidence_error);
+      } else {
+        answer.warnings.emplace_back(
+            "Half of the runs give no emulated posterior: the error of the log evidence is that of "
+            "the sampling alone, what the emulator does not know comes on top.");
+      }
     }
     answer.emulated = *std::move(emulated);
     ExplainEmulator(answer, answer.warnings);

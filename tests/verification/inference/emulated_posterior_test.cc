@@ -148,15 +148,15 @@ TEST(SplitHalfOfEmulator, OfTwinsIsZeroAndOfOppositesIsWhatTheyDifferBy) {
   const EmulatorOptions options{.seed = 1};
   const auto of_twins = EmulatedPosterior(model.priors, model.Data(), options, {&twins, 1});
   ASSERT_TRUE(of_twins.ok()) << of_twins.status();
-  const Eigen::VectorXd zero =
+  const SplitHalf zero =
       SplitHalfOfEmulator(model.priors, model.Data(), options, {&twins, 1}, *of_twins);
-  EXPECT_EQ(zero, Eigen::Vector2d(0, 0));
+  EXPECT_EQ(zero.difference, Eigen::Vector2d(0, 0));
 
   const Iteration runs = PriorRuns(model, 60);
   const auto right = EmulatedPosterior(model.priors, model.Data(), options, {&runs, 1});
   ASSERT_TRUE(right.ok()) << right.status();
   const Eigen::VectorXd agree =
-      SplitHalfOfEmulator(model.priors, model.Data(), options, {&runs, 1}, *right);
+      SplitHalfOfEmulator(model.priors, model.Data(), options, {&runs, 1}, *right).difference;
   EXPECT_LT(agree.maxCoeff(), 0.3);  // sampling alone: 500 draws each
 
   constexpr double kOff = 0.2;
@@ -167,7 +167,7 @@ TEST(SplitHalfOfEmulator, OfTwinsIsZeroAndOfOppositesIsWhatTheyDifferBy) {
     opposites.predictions.row(i) = model.Predict(moved);
   }
   const Eigen::VectorXd differ =
-      SplitHalfOfEmulator(model.priors, model.Data(), options, {&opposites, 1}, *right);
+      SplitHalfOfEmulator(model.priors, model.Data(), options, {&opposites, 1}, *right).difference;
   EXPECT_NEAR(differ[0] * right->parameters[0].sd, kOff, 0.1 * kOff);
 }
 
