@@ -21,6 +21,9 @@ struct FittedModel {
   /// run; the measurement is judged by `covariance`.
   std::vector<int> group{};                ///< S
   std::vector<Eigen::MatrixXd> without{};  ///< T x T each
+  /// T x q each, q < T: shapes along the path that the misfit of a missing effect may have. The part
+  /// of the residual in their span is judged beside all of it; needs draws.
+  std::vector<Eigen::MatrixXd> shapes{};
 };
 
 }  // namespace calib::inference

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include "inference/diagnosis/whitened.h"
@@ -127,6 +128,22 @@ double SquareOfEffect(const std::vector<Eigen::VectorXd>& differences,
   return sum / pairs * strengths.back() * strengths.back();
 }
 
+// Orthonormal, in the model's coordinates.
+Eigen::MatrixXd SpanOf(const Eigen::MatrixXd& shapes, const Whitened& model) {
+  const Eigen::MatrixXd whitened = model.factor.matrixL().solve(shapes);
+  return Eigen::HouseholderQR<Eigen::MatrixXd>(whitened).householderQ() *
+         Eigen::MatrixXd::Identity(shapes.rows(), shapes.cols());
+}
+
+// Of the gamma law with the mean and the variance of `drawn`; empty where they do not vary.
+std::optional<double> TailAmong(double square, const Eigen::VectorXd& drawn) {
+  const double mean = drawn.mean();
+  const double variance =
+      (drawn.array() - mean).square().sum() / static_cast<double>(drawn.size() - 1);
+  if (!(variance > 0)) return std::nullopt;
+  return boost::math::gamma_q(mean * mean / variance, square * mean / variance);
+}
+
 }  // namespace
 
 absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
@@ -136,25 +153,45 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   adequacy.chi2 = whitened->squares.minCoeff(&adequacy.best);
   if (model.draws.rows() == 0) {
     adequacy.degrees = static_cast<double>(model.histories.cols() - model.parameters);
-    adequacy.p_value = adequacy.degrees > 0
-                           ? boost::math::gamma_q(0.5 * adequacy.degrees, 0.5 * adequacy.chi2)
-                           : 1;
+    adequacy.p_chi2 = adequacy.degrees > 0
+                          ? boost::math::gamma_q(0.5 * adequacy.degrees, 0.5 * adequacy.chi2)
+                          : 1;
+    adequacy.p_value = adequacy.p_chi2;
     return adequacy;
+  }
+  for (const Eigen::MatrixXd& shapes : model.shapes) {
+    if (shapes.rows() != model.histories.cols() || shapes.cols() >= shapes.rows()) {
+      return absl::InvalidArgumentError("diagnosis: shapes do not fit the histories");
+    }
   }
   const auto groups = DrawsOf(model);
   if (!groups.ok()) return groups.status();
-  const Index draws = model.draws.rows();
-  Eigen::VectorXd chi2(draws);
+  Eigen::VectorXd chi2(model.draws.rows());
+  // Of the residual's part in the span of each set of shapes.
+  Eigen::MatrixXd in_shapes(model.draws.rows(), static_cast<Index>(model.shapes.size()));
   for (const DrawnGroup& group : *groups) {
-    chi2(group.number) =
-        SmallestFrom(group.model, group.draws.colwise() - group.model.points.col(adequacy.best));
+    const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.points.col(adequacy.best);
+    const Nearest nearest = NearestTo(group.model, offsets);
+    chi2(group.number) = nearest.squares;
+    const Eigen::MatrixXd residuals = group.model.points(Eigen::all, nearest.points) + offsets;
+    for (std::size_t k = 0; k < model.shapes.size(); ++k) {
+      in_shapes(group.number, static_cast<Index>(k)) =
+          (SpanOf(model.shapes[k], group.model).transpose() * residuals).colwise().squaredNorm();
+    }
   }
   adequacy.degrees = chi2.mean();
-  const double variance =
-      (chi2.array() - adequacy.degrees).square().sum() / static_cast<double>(draws - 1);
-  if (!(variance > 0)) return absl::InvalidArgumentError("diagnosis: the draws do not vary");
-  adequacy.p_value = boost::math::gamma_q(adequacy.degrees * adequacy.degrees / variance,
-                                          adequacy.chi2 * adequacy.degrees / variance);
+  const auto p_chi2 = TailAmong(adequacy.chi2, chi2);
+  if (!p_chi2) return absl::InvalidArgumentError("diagnosis: the draws do not vary");
+  adequacy.p_chi2 = *p_chi2;
+  for (std::size_t k = 0; k < model.shapes.size(); ++k) {
+    const double square =
+        (SpanOf(model.shapes[k], *whitened).transpose() * whitened->points.col(adequacy.best))
+            .squaredNorm();
+    const double p = TailAmong(square, in_shapes.col(static_cast<Index>(k))).value_or(1);
+    adequacy.p_shapes = std::min(adequacy.p_shapes.value_or(1), p);
+  }
+  adequacy.p_value = std::min(1.0, static_cast<double>(1 + model.shapes.size()) *
+                                       std::min(adequacy.p_chi2, adequacy.p_shapes.value_or(1)));
   return adequacy;
 }
 
@@ -293,8 +330,8 @@ absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedM
   std::vector<double> gains;
   for (const DrawnGroup& group : *groups) {
     const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.points.col(best);
-    const Eigen::VectorXd own =
-        SmallestFrom(group.model, offsets) - SmallestFrom(in_coordinates_of(group.model), offsets);
+    const Eigen::VectorXd own = NearestTo(group.model, offsets).squares -
+                                NearestTo(in_coordinates_of(group.model), offsets).squares;
     for (const double gain : own) gains.push_back(std::max(0.0, gain));
   }
   const Whitened larger = in_coordinates_of(*whitened);

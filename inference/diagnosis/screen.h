@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,8 +30,13 @@ struct Adequacy {
   double chi2 = 0;  ///< smallest |W history|^2 over the points, W W^T = covariance^-1
   /// Its expectation were the model right: T - parameters, or the mean over the model's draws.
   double degrees = 0;
-  /// Of a chi-squared as large; with draws the tail of the gamma law of their mean and variance.
+  /// The smaller of the two below, times how many were judged: chi-squared and every entry of
+  /// FittedModel::shapes.
   double p_value = 1;
+  /// Of a chi-squared as large; with draws the tail of the gamma law of their mean and variance.
+  double p_chi2 = 1;
+  /// The smallest of the shapes', each of the residual's square in its span as above; none without.
+  std::optional<double> p_shapes{};
   Eigen::Index best = 0;  ///< the point
 };
 

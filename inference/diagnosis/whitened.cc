@@ -76,18 +76,20 @@ Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& o
          offset.squaredNorm();
 }
 
-Eigen::VectorXd SmallestFrom(const Whitened& whitened, const Eigen::MatrixXd& offsets) {
+Nearest NearestTo(const Whitened& whitened, const Eigen::MatrixXd& offsets) {
   constexpr Index kAtOnce = 32;  // the products stay in the cache
-  Eigen::VectorXd smallest(offsets.cols());
+  Nearest nearest{.squares = Eigen::VectorXd(offsets.cols()),
+                  .points = std::vector<Index>(static_cast<std::size_t>(offsets.cols()))};
   for (Index s = 0; s < offsets.cols(); s += kAtOnce) {
     const auto some = offsets.middleCols(s, std::min(kAtOnce, offsets.cols() - s));
     const Eigen::MatrixXd along = whitened.points.transpose() * some;
     for (Index k = 0; k < some.cols(); ++k) {
-      smallest[s + k] =
-          (whitened.squares + 2 * along.col(k)).minCoeff() + some.col(k).squaredNorm();
+      nearest.squares[s + k] = (whitened.squares + 2 * along.col(k))
+                                   .minCoeff(&nearest.points[static_cast<std::size_t>(s + k)]) +
+                               some.col(k).squaredNorm();
     }
   }
-  return smallest;
+  return nearest;
 }
 
 }  // namespace calib::inference

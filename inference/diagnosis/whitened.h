@@ -33,7 +33,13 @@ absl::StatusOr<std::vector<DrawnGroup>> DrawsOf(const FittedModel& model);
 /// |point + offset|^2 of every point, G; offset: T, whitened.
 Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& offset);
 
-/// Smallest |point + offset|^2 for each column of offsets, T x S.
-Eigen::VectorXd SmallestFrom(const Whitened& whitened, const Eigen::MatrixXd& offsets);
+/// Of each column of offsets the point with the smallest |point + offset|^2.
+struct Nearest {
+  Eigen::VectorXd squares;           ///< S
+  std::vector<Eigen::Index> points;  ///< S
+};
+
+/// offsets: T x S, whitened.
+Nearest NearestTo(const Whitened& whitened, const Eigen::MatrixXd& offsets);
 
 }  // namespace calib::inference

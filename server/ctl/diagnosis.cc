@@ -148,7 +148,7 @@ class Inquiry {
     diagnosis_.adequacy = *adequacy;
     diagnosis_.emulator_error = response_.emulator_error;
     diagnosis_.scatter = response_.scatter;
-    if (adequacy->p_value > kTooGood) {
+    if (adequacy->p_chi2 > kTooGood) {
       diagnosis_.warnings.emplace_back(
           "The model is closer to the readings than the stated errors and the scatter explain: "
           "they seem too large, and an effect can hide in them.");

@@ -207,6 +207,8 @@ std::string DiagnosisJson(const Diagnosis& d) {
                 {{"chi2", d.adequacy.chi2},
                  {"degrees", d.adequacy.degrees},
                  {"p_value", d.adequacy.p_value},
+                 {"p_chi2", d.adequacy.p_chi2},
+                 {"p_stages", OrNull(d.adequacy.p_shapes)},
                  {"rms", d.rms},
                  {"left_out_error", OrNull(d.left_out_error)},
                  {"emulator_error", d.emulator_error},
@@ -229,11 +231,13 @@ std::string DiagnosisJson(const Diagnosis& d) {
 
 std::string DiagnosisText(const Diagnosis& d) {
   std::string text = Wrapped(Sentence(d), "", "");
-  text += Wrapped(fmt::format("Error of the best fit: {} sd; chi-squared {}, of "
-                              "a right model {} are expected (p = {}).",
-                              Number(d.rms, 3), Number(d.adequacy.chi2, 4),
-                              Number(d.adequacy.degrees, 4), Number(d.adequacy.p_value, 2)),
-                  "", "  ");
+  text += Wrapped(
+      fmt::format(
+          "Error of the best fit: {} sd; chi-squared {}, of a right model {} are expected "
+          "({}).",
+          Number(d.rms, 3), Number(d.adequacy.chi2, 4), Number(d.adequacy.degrees, 4),
+          report::PValuesInWords(d.adequacy.p_value, d.adequacy.p_chi2, d.adequacy.p_shapes)),
+      "", "  ");
   for (const std::string& warning : d.warnings) text += Wrapped(warning, "! ", "  ");
   if (!d.candidates.empty()) {
     TextTable table(

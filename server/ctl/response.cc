@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
+#include "server/ctl/stage_shapes.h"
 
 namespace calib::ctl {
 namespace {
@@ -77,8 +78,12 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
   for (Index i = 0; i < n; ++i) {
     for (Index j = 0; j < d; ++j) draws(i, j) = posterior.draws(static_cast<int>(i * d + j));
   }
-  return RespondTo(base, {.campaign = base.view().campaign, .runs = base.runs(), .draws = draws},
-                   nuisance);
+  auto response = RespondTo(
+      base, {.campaign = base.view().campaign, .runs = base.runs(), .draws = draws}, nuisance);
+  if (response.ok()) {
+    response->model.shapes = StageShapes(base.view().campaign, base.readings().of_mean);
+  }
+  return response;
 }
 
 absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedModel& model,

@@ -131,8 +131,9 @@ std::string DiagnosisSection(const ReportData& data) {
                      Escape(d->sentence.empty() ? d->verdict : d->sentence) + "</strong></p>\n";
   html += fmt::format(
       "<p>Error of the best fit: {} sd; chi-squared {}, of a right model {} are expected "
-      "(p = {}).{}</p>\n",
-      Number(d->rms, 3), Number(d->chi2, 4), Number(d->degrees, 4), Number(d->p_value, 2),
+      "({}).{}</p>\n",
+      Number(d->rms, 3), Number(d->chi2, 4), Number(d->degrees, 4),
+      PValuesInWords(d->p_value, d->p_chi2, d->p_stages),
       d->only_adequacy ? " Whether an effect would fit better was not asked." : "");
   for (const std::string& warning : d->warnings) html += "<p>" + Escape(warning) + "</p>\n";
   html += CandidateTable(*d) + Detectable(*d) + Reasons("Not to be detected", d->undetectable) +

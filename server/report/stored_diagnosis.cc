@@ -100,6 +100,8 @@ absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& text) {
     Read(*adequacy, "chi2", d.chi2);
     Read(*adequacy, "degrees", d.degrees);
     Read(*adequacy, "p_value", d.p_value);
+    Read(*adequacy, "p_chi2", d.p_chi2);
+    Read(*adequacy, "p_stages", d.p_stages);
     Read(*adequacy, "left_out_error", d.left_out_error);
   }
   if (const auto candidates = json.find("candidates");
@@ -152,6 +154,13 @@ absl::StatusOr<std::vector<std::string>> ReadImprovedCampaigns(const std::string
     if (!campaign.empty()) campaigns.push_back(std::move(campaign));
   }
   return campaigns;
+}
+
+std::string PValuesInWords(double p_value, std::optional<double> p_chi2,
+                           std::optional<double> p_stages) {
+  if (!p_chi2 || !p_stages) return fmt::format("p = {}", Number(p_value, 2));
+  return fmt::format("p = {}; of means and trends of the stages {}; together {}",
+                     Number(*p_chi2, 2), Number(*p_stages, 2), Number(p_value, 2));
 }
 
 std::string StrengthInWords(const std::map<std::string, double>& amplitude,

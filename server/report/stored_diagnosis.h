@@ -36,6 +36,7 @@ struct StoredDiagnosis {
   bool only_adequacy = false;  ///< no effect was tried
   double rms = 0;              ///< of the best fit, in sd of a measurement
   double chi2 = 0, degrees = 0, p_value = 1;
+  std::optional<double> p_chi2{}, p_stages{};  ///< p_value is of both together
   std::optional<double> left_out_error{};
   std::vector<TriedEffect> candidates{};  ///< best first
   std::map<std::string, std::string> units{};
@@ -59,6 +60,11 @@ const StoredDiagnosis* LatestOf(const std::vector<StoredDiagnosis>& diagnoses,
 /// Campaigns of an improvement in order, base first, of the JSON document of `calibctl improve`.
 /// Errors as above.
 absl::StatusOr<std::vector<std::string>> ReadImprovedCampaigns(const std::string& json);
+
+/// "p = 0.42", or with what it is made of: "p = 0.03; of means and trends of the stages 0.002;
+/// together 0.006".
+std::string PValuesInWords(double p_value, std::optional<double> p_chi2,
+                           std::optional<double> p_stages);
 
 /// "stiffness = 8.2 kN m/rad, friction = 0.1", in the units given by dotted parameter.
 std::string StrengthInWords(const std::map<std::string, double>& amplitude,

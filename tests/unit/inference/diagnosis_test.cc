@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iostream>
 
 #include "inference/diagnosis/screen.h"
 #include "inference/sampling/philox.h"
@@ -57,6 +58,41 @@ TEST(Diagnosis, NothingMissingIsAdequateAtTheStatedRate) {
   }
   EXPECT_GE(adequate, 96);
   EXPECT_LE(flagged, 12);
+}
+
+// A misfit that lasts is a small part of all that scatters, and the whole of what lasts.
+TEST(Diagnosis, AMisfitInAKnownShapeIsSeenBeforeItIsLargeAmongAllReadings) {
+  constexpr int kDraws = 100;
+  constexpr double kSize = 1.4;  // sd of a reading, over a quarter of them
+  Eigen::MatrixXd quarters = Eigen::MatrixXd::Zero(kReadings, 4);
+  for (int k = 0; k < kReadings; ++k) quarters(k, 4 * k / kReadings) = 1;
+  int found[2] = {0, 0};
+  int alarms = 0;
+  for (int seed = 0; seed < kDraws; ++seed) {
+    for (const bool shaped : {false, true}) {
+      for (const bool wrong : {false, true}) {
+        FittedModel model =
+            Line(12 * Curve(0) + (wrong ? kSize : 0) * quarters.col(1) + Noise(seed));
+        model.draws.resize(200, kReadings);
+        for (int s = 0; s < 200; ++s) model.draws.row(s) = Noise(1000 + s);
+        if (shaped) model.shapes = {quarters};
+        const auto adequacy = TestAdequacy(model);
+        ASSERT_TRUE(adequacy.ok()) << adequacy.status();
+        EXPECT_EQ(adequacy->p_shapes.has_value(), shaped);
+        const bool rejected = adequacy->p_value < 0.01;
+        if (wrong) found[shaped ? 1 : 0] += rejected ? 1 : 0;
+        if (!wrong && shaped) alarms += rejected ? 1 : 0;
+      }
+    }
+  }
+  std::cout << "found " << found[0] << " of " << kDraws << " by all readings, " << found[1]
+            << " with the shapes; " << alarms << " false alarms\n";
+  EXPECT_GE(found[1], found[0] + 25);
+  EXPECT_LE(alarms, 4);
+  FittedModel model = Line(12 * Curve(0));
+  model.draws = Eigen::MatrixXd::Random(50, kReadings);
+  model.shapes = {Eigen::MatrixXd::Ones(kReadings - 1, 1)};
+  EXPECT_FALSE(TestAdequacy(model).ok());
 }
 
 // The errors of the measurements have standard deviation `sd`, the covariance says one.
