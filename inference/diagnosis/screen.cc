@@ -7,7 +7,6 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
-#include <optional>
 #include <set>
 
 #include "inference/diagnosis/whitened.h"
@@ -135,13 +134,36 @@ Eigen::MatrixXd SpanOf(const Eigen::MatrixXd& shapes, const Whitened& model) {
          Eigen::MatrixXd::Identity(shapes.rows(), shapes.cols());
 }
 
-// Of the gamma law with the mean and the variance of `drawn`; empty where they do not vary.
-std::optional<double> TailAmong(double square, const Eigen::VectorXd& drawn) {
-  const double mean = drawn.mean();
-  const double variance =
-      (drawn.array() - mean).square().sum() / static_cast<double>(drawn.size() - 1);
-  if (!(variance > 0)) return std::nullopt;
-  return boost::math::gamma_q(mean * mean / variance, square * mean / variance);
+// The gamma law with the mean and the variance of what was drawn.
+class GammaTail {
+ public:
+  explicit GammaTail(const Eigen::VectorXd& drawn) : mean_(drawn.mean()) {
+    variance_ = (drawn.array() - mean_).square().sum() / static_cast<double>(drawn.size() - 1);
+  }
+  bool varies() const { return variance_ > 0; }
+  double operator()(double square) const {
+    return varies() ? boost::math::gamma_q(mean_ * mean_ / variance_, square * mean_ / variance_)
+                    : 1;
+  }
+
+ private:
+  double mean_, variance_;
+};
+
+// How many independent judgements the columns of `squares` (draws in rows) amount to: by how much
+// oftener than one of them their smallest p value is below a tenth.
+double IndependentJudgements(const Eigen::MatrixXd& squares, const std::vector<GammaTail>& tails) {
+  constexpr double kSmall = 0.1;
+  double below = 0;
+  for (Index s = 0; s < squares.rows(); ++s) {
+    double smallest = 1;
+    for (Index k = 0; k < squares.cols(); ++k) {
+      smallest = std::min(smallest, tails[static_cast<std::size_t>(k)](squares(s, k)));
+    }
+    below += smallest < kSmall ? 1 : 0;
+  }
+  return std::clamp(below / (kSmall * static_cast<double>(squares.rows())), 1.0,
+                    static_cast<double>(squares.cols()));
 }
 
 }  // namespace
@@ -166,31 +188,31 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   }
   const auto groups = DrawsOf(model);
   if (!groups.ok()) return groups.status();
-  Eigen::VectorXd chi2(model.draws.rows());
-  // Of the residual's part in the span of each set of shapes.
-  Eigen::MatrixXd in_shapes(model.draws.rows(), static_cast<Index>(model.shapes.size()));
+  // Of each draw: chi-squared, and that of the residual's part in the span of each set of shapes.
+  Eigen::MatrixXd squares(model.draws.rows(), static_cast<Index>(1 + model.shapes.size()));
   for (const DrawnGroup& group : *groups) {
     const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.points.col(adequacy.best);
     const Nearest nearest = NearestTo(group.model, offsets);
-    chi2(group.number) = nearest.squares;
+    squares(group.number, 0) = nearest.squares;
     const Eigen::MatrixXd residuals = group.model.points(Eigen::all, nearest.points) + offsets;
     for (std::size_t k = 0; k < model.shapes.size(); ++k) {
-      in_shapes(group.number, static_cast<Index>(k)) =
+      squares(group.number, static_cast<Index>(k + 1)) =
           (SpanOf(model.shapes[k], group.model).transpose() * residuals).colwise().squaredNorm();
     }
   }
-  adequacy.degrees = chi2.mean();
-  const auto p_chi2 = TailAmong(adequacy.chi2, chi2);
-  if (!p_chi2) return absl::InvalidArgumentError("diagnosis: the draws do not vary");
-  adequacy.p_chi2 = *p_chi2;
-  for (std::size_t k = 0; k < model.shapes.size(); ++k) {
-    const double square =
-        (SpanOf(model.shapes[k], *whitened).transpose() * whitened->points.col(adequacy.best))
-            .squaredNorm();
-    const double p = TailAmong(square, in_shapes.col(static_cast<Index>(k))).value_or(1);
-    adequacy.p_shapes = std::min(adequacy.p_shapes.value_or(1), p);
+  std::vector<GammaTail> tails;
+  for (Index k = 0; k < squares.cols(); ++k) tails.emplace_back(squares.col(k));
+  if (!tails.front().varies()) {
+    return absl::InvalidArgumentError("diagnosis: the draws do not vary");
   }
-  adequacy.p_value = std::min(1.0, static_cast<double>(1 + model.shapes.size()) *
+  adequacy.degrees = squares.col(0).mean();
+  adequacy.p_chi2 = tails.front()(adequacy.chi2);
+  const Eigen::VectorXd residual = whitened->points.col(adequacy.best);
+  for (std::size_t k = 0; k < model.shapes.size(); ++k) {
+    const double square = (SpanOf(model.shapes[k], *whitened).transpose() * residual).squaredNorm();
+    adequacy.p_shapes = std::min(adequacy.p_shapes.value_or(1), tails[k + 1](square));
+  }
+  adequacy.p_value = std::min(1.0, IndependentJudgements(squares, tails) *
                                        std::min(adequacy.p_chi2, adequacy.p_shapes.value_or(1)));
   return adequacy;
 }

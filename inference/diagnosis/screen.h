@@ -30,8 +30,8 @@ struct Adequacy {
   double chi2 = 0;  ///< smallest |W history|^2 over the points, W W^T = covariance^-1
   /// Its expectation were the model right: T - parameters, or the mean over the model's draws.
   double degrees = 0;
-  /// The smaller of the two below, times how many were judged: chi-squared and every entry of
-  /// FittedModel::shapes.
+  /// The smaller of the two below, times how many independent judgements it is the smallest of: 1 up
+  /// to 1 + the number of FittedModel::shapes, as the draws show.
   double p_value = 1;
   /// Of a chi-squared as large; with draws the tail of the gamma law of their mean and variance.
   double p_chi2 = 1;
