@@ -271,6 +271,7 @@ class Inquiry {
         {.effect = score.name,
          .p_value = score.adjusted,
          .explained_fraction = score.explained,
+         .screen_explained = score.explained,
          .amplitude =
              StrengthOf(score.name, static_cast<std::size_t>(score.difference), score.amplitude),
          .predicted_rms_error = score.rms,
@@ -316,22 +317,21 @@ class Inquiry {
     return effects;
   }
 
-  // What the screen sees something of, by how much misfit it expects to be left.
-  std::vector<WarmFits::Prospect> FurtherThan(const std::vector<std::string>& first) const {
-    const inference::Adequacy& base = diagnosis_.adequacy;
-    std::vector<WarmFits::Prospect> others;
+  // The others that the screen sees something of, by how much it expects of them.
+  std::vector<std::string> FurtherThan(const std::vector<std::string>& first) const {
+    std::vector<const CandidateEffect*> others;
     for (const CandidateEffect& candidate : diagnosis_.candidates) {
-      if (candidate.p_value >= options_.level ||
-          std::find(first.begin(), first.end(), candidate.effect) != first.end()) {
-        continue;
+      if (candidate.p_value < options_.level &&
+          std::find(first.begin(), first.end(), candidate.effect) == first.end()) {
+        others.push_back(&candidate);
       }
-      const double misfit = std::max(0.0, base.chi2 - base.degrees);
-      others.push_back(
-          {.effect = candidate.effect, .chi2 = base.chi2 - candidate.explained_fraction * misfit});
     }
-    std::stable_sort(others.begin(), others.end(),
-                     [](const auto& a, const auto& b) { return a.chi2 < b.chi2; });
-    return others;
+    std::stable_sort(others.begin(), others.end(), [](const auto* a, const auto* b) {
+      return a->explained_fraction > b->explained_fraction;
+    });
+    std::vector<std::string> names;
+    for (const CandidateEffect* other : others) names.push_back(other->effect);
+    return names;
   }
 
   absl::Status FitWarm(const inference::FittedModel& base) {

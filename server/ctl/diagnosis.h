@@ -20,6 +20,7 @@ struct CandidateEffect {
   std::string effect{};
   double p_value = 1;             ///< of the screen, adjusted for the number of candidates
   double explained_fraction = 0;  ///< of the misfit beyond noise and scatter
+  double screen_explained = 0;    ///< the same before the refit
   std::map<std::string, double> amplitude{};  ///< parameter -> strength that explains it best [SI]
   double predicted_rms_error = 0;             ///< with the effect, as Diagnosis::rms
   std::vector<std::string> confusable_with{};

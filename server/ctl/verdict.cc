@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kClearlyCloser = 0.64;  // of the base model's chi-squared
 constexpr double kClearlyLess = 0.25;    // of the misfit explained
+constexpr double kFarOff = 4;            // times the chi-squared of the best: twice its rms
 constexpr std::size_t kMostNames = 3;
 constexpr double kNearlyAll = 0.9;  // of the misfit
 
@@ -58,11 +59,15 @@ bool Verdict::Settles(const CandidateEffect& candidate, const WarmFit& fit) cons
 }
 
 // Explains clearly less than the best does, and is far off from where the best was after as many
-// batches, or one more.
+// batches, or one more. Further off than the base model, which it contains, it has merely not been
+// found: what it can explain the screen knows better.
 bool Verdict::IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const {
   const WarmFit& fit = *Find(other.effect);
   const WarmFit& best = *Find(first.effect);
   if (fit.chi2_after.empty() || best.chi2_after.empty()) return false;
+  if (fit.adequacy.chi2 >= diagnosis_.adequacy.chi2) {
+    return other.screen_explained < first.screen_explained - kClearlyLess;
+  }
   const std::size_t batches = std::min(fit.chi2_after.size() + 1, best.chi2_after.size());
   return other.explained_fraction < first.explained_fraction - kClearlyLess &&
          fit.adequacy.chi2 >

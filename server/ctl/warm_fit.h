@@ -14,10 +14,6 @@
 
 namespace calib::ctl {
 
-/// Times the chi-squared of the best fit, or of a right model: twice its rms. What is further away is
-/// no rival of it.
-inline constexpr double kFarOff = 4;
-
 struct WarmFit {
   report::CampaignView view{};  ///< its first batch, a campaign of the extended model
   report::RunTable runs{};      ///< of all batches

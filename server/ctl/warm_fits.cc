@@ -45,7 +45,7 @@ std::int64_t WarmFits::Least() const {
   return static_cast<std::int64_t>(kLeastBatches) * BatchOf(base_) * base_.fitted_experiments();
 }
 
-absl::Status WarmFits::Fit(std::vector<std::string> first, std::vector<Prospect> later,
+absl::Status WarmFits::Fit(std::vector<std::string> first, const std::vector<std::string>& later,
                            std::optional<std::int64_t> most) {
   if (first.empty()) return absl::OkStatus();
   samples_ = BatchOf(base_);
@@ -55,17 +55,12 @@ absl::Status WarmFits::Fit(std::vector<std::string> first, std::vector<Prospect>
   first.resize(std::min(first.size(),
                         static_cast<std::size_t>(std::max(1, allowed / (kLeastBatches * batch)))));
   if (auto status = Begin(first); !status.ok()) return status;
+  auto newcomer = later.begin();
   while (spent_ + batch <= allowed) {
-    const std::optional<Choice> next = Next();
-    const auto newcomer = Newcomer(later);
-    const bool begins = newcomer != later.end() &&
-                        (!next || PriceOf(newcomer->chi2, kLeastBatches) < next->price) &&
-                        spent_ + kLeastBatches * batch <= allowed;
-    if (begins) {
-      if (auto status = Begin({newcomer->effect}); !status.ok()) return status;
-      later.erase(newcomer);
-    } else if (next) {
-      if (auto status = Continue(next->effect); !status.ok()) return status;
+    if (const std::optional<std::string> next = Next()) {
+      if (auto status = Continue(*next); !status.ok()) return status;
+    } else if (newcomer != later.end() && spent_ + kLeastBatches * batch <= allowed) {
+      if (auto status = Begin({*newcomer++}); !status.ok()) return status;
     } else {
       break;
     }
@@ -103,31 +98,25 @@ const WarmFit& WarmFits::Closest() const {
 
 // The one that promises most; the best comes last once it is as close as noise and scatter allow:
 // it is its rivals that are not known yet.
-std::optional<WarmFits::Choice> WarmFits::Next() const {
+std::optional<std::string> WarmFits::Next() const {
   const WarmFit& best = Closest();
   // Without the effect it is the base model: a fit that is further off has merely not been found.
   const auto adequacy = inference::TestAdequacy(Base());
   const double base = adequacy.ok() ? adequacy->chi2 : std::numeric_limits<double>::infinity();
-  std::optional<Choice> next;
+  std::optional<std::string> next;
+  double lowest = 0;
   for (const std::string& effect : begun_) {
     const WarmFit& fit = fits_.at(effect);
     if (fit.stalled || fit.runs.histories.rows() == 0) continue;
     const double price = &fit == &best && fit.Satisfied()
                              ? std::numeric_limits<double>::infinity()
                              : PriceOf(std::min(Chi2(effect), base), fit.iterations);
-    if (!next || price < next->price) next = Choice{.effect = effect, .price = price};
+    if (!next || price < lowest) {
+      next = effect;
+      lowest = price;
+    }
   }
   return next;
-}
-
-// What the screen cannot tell from an effect need not be like it where the model is refitted. Once
-// one fits, others that could are worth more than better figures of those that are further off.
-std::vector<WarmFits::Prospect>::iterator WarmFits::Newcomer(std::vector<Prospect>& later) const {
-  const WarmFit& best = Closest();
-  if (!best.Satisfied()) return Next() ? later.end() : later.begin();
-  return std::find_if(later.begin(), later.end(), [&best](const Prospect& prospect) {
-    return prospect.chi2 <= kFarOff * std::max(best.adequacy.chi2, best.adequacy.degrees);
-  });
 }
 
 const WarmFit* WarmFits::Find(const std::string& effect) const {

@@ -30,18 +30,11 @@ class WarmFits {
   WarmFits(const FittedCampaign& base, const EffectScreen& screen, const Response& response)
       : base_(base), screen_(screen), response_(response) {}
 
-  /// What the screen says of an effect that may be refitted.
-  struct Prospect {
-    std::string effect;
-    double chi2 = 0;  ///< expected with it
-  };
-
   /// Two batches of each of `first`, as far as they go; then the most promising go on, until each
   /// has stalled or as many evaluations have been made as the campaign has, or as `most` allows;
-  /// Least() in any case. Those of `later`, best first, are begun with what is left: all of them
-  /// where every fit has stalled, and once one fits the readings those that may do so too. Errors:
-  /// those of the runs.
-  absl::Status Fit(std::vector<std::string> first, std::vector<Prospect> later,
+  /// Least() in any case. Once all have stalled, those of `later` are begun with what is left, in
+  /// their order. Errors: those of the runs.
+  absl::Status Fit(std::vector<std::string> first, const std::vector<std::string>& later,
                    std::optional<std::int64_t> most = {});
   /// Model evaluations of two batches of one effect.
   std::int64_t Least() const;
@@ -70,14 +63,8 @@ class WarmFits {
   double Chi2(const std::string& effect) const;
   /// The begun fit that comes closest.
   const WarmFit& Closest() const;
-  struct Choice {
-    std::string effect;
-    double price = 0;  ///< of another batch of it
-  };
   /// Empty when every fit has stalled.
-  std::optional<Choice> Next() const;
-  /// Of those that have not been begun, the best that may be now.
-  std::vector<Prospect>::iterator Newcomer(std::vector<Prospect>& later) const;
+  std::optional<std::string> Next() const;
   absl::StatusOr<Eigen::MatrixXd> PointsFor(const std::string& effect) const;
   report::RunTable RunsFor(const std::string& effect) const;
   void Judge(const std::string& effect);

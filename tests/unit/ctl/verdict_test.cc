@@ -26,7 +26,10 @@ inference::FittedModel Model(double chi2) {
 
 class VerdictTest : public testing::Test {
  protected:
-  VerdictTest() { diagnosis_.left_out_error = 3; }
+  VerdictTest() {
+    diagnosis_.left_out_error = 3;
+    diagnosis_.adequacy.chi2 = kAway;
+  }
 
   // A refit, at its end unless told otherwise.
   WarmFit& Refit(const std::string& effect, double chi2, double explained = 0.9) {
@@ -126,6 +129,18 @@ TEST_F(VerdictTest, ARefitThatHasNotEndedIsNotExcluded) {
 TEST_F(VerdictTest, ARefitThatIsFarOffAndPromisedLessIsExcluded) {
   Refit("rolling", kClose);
   Refit("twisting", 5 * kClose, 0.5).stalled = false;
+  EXPECT_EQ(Concluded(), "missing_effect");
+}
+
+TEST_F(VerdictTest, ARefitThatCameNoCloserThanTheBaseModelIsJudgedByTheScreen) {
+  Refit("twisting", kClose);
+  Refit("rolling", 2 * kAway, 0).stalled = false;
+  diagnosis_.candidates[0].screen_explained = 0.8;
+  diagnosis_.candidates[1].screen_explained = 0.9;
+  EXPECT_EQ(Concluded(), "ambiguous");
+  EXPECT_EQ(diagnosis_.unfinished, Names{"rolling"});
+  diagnosis_.candidates.front().confusable_with.clear();
+  diagnosis_.candidates[1].screen_explained = 0.3;
   EXPECT_EQ(Concluded(), "missing_effect");
 }
 
