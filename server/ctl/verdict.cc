@@ -131,6 +131,7 @@ void Verdict::Conclude(bool base_fits) {
   std::stable_sort(unknown.begin(), unknown.end(),
                    [](const auto* a, const auto* b) { return a->p_value < b->p_value; });
   std::vector<std::string> rivals;
+  rivals.reserve(as_good.size() + unknown.size());
   for (const auto& [chi2, other] : as_good) rivals.push_back(other);
   for (const CandidateEffect* other : unknown) rivals.push_back(other->effect);
   rivals.resize(std::min(rivals.size(), kMostNames - 1));
