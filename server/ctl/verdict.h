@@ -33,6 +33,7 @@ class Verdict {
   bool Excluded(const CandidateEffect& other, const CandidateEffect& first) const;
   bool IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const;
   double Chi2OfDouble(const std::string& other, const CandidateEffect& first) const;
+  bool WorseLeftOut(const WarmFit& fit) const;
   std::string Closest() const;
   std::string WhyUnexplained() const;
   std::string WhyNotBetter(const WarmFit& fit) const;

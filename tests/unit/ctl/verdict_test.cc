@@ -177,6 +177,14 @@ TEST_F(VerdictTest, WhatTheScreenCannotTellFromItIsNamedUnlessItWasFitted) {
   EXPECT_EQ(Group(), Names{"membrane"});
 }
 
+TEST_F(VerdictTest, AnErrorOfOneSdOnDataLeftOutIsAsExpected) {
+  diagnosis_.left_out_error = 0.98;
+  Refit("adhesion", kClose).left_out_error = 0.99;
+  EXPECT_EQ(Concluded(), "missing_effect");
+  fits_["adhesion"].left_out_error = 1.2;
+  EXPECT_EQ(Concluded(), "unexplained");
+}
+
 TEST_F(VerdictTest, AFitThatPredictsOtherReadingsWorseExplainsNothing) {
   Refit("rolling", kClose).left_out_error = 4;
   EXPECT_EQ(Concluded(), "unexplained");
