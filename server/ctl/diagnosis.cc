@@ -379,7 +379,7 @@ class Inquiry {
     if (fits_.Find(candidate.effect) == nullptr) return;
     const WarmFit& fit = *fits_.Find(candidate.effect);
     candidate.campaign = fit.view.status.campaign();
-    candidate.predicted_rms_error = fit.rms;
+    if (fit.Found()) candidate.predicted_rms_error = fit.rms;
     for (const auto& [name, value] : fit.best) {
       if (name.starts_with(candidate.effect + ".")) candidate.amplitude[name] = value;
     }

@@ -165,9 +165,7 @@ std::string Sentence(const Diagnosis& d) {
 }
 
 // Without the effect it is the base model: a refit that is further off has merely not been found.
-bool NotFound(const CandidateEffect& c, const Diagnosis& d) {
-  return c.refit_p_value >= 0 && c.refit_chi2 >= d.adequacy.chi2;
-}
+bool NotFound(const CandidateEffect& c) { return c.refit_p_value >= 0 && c.over_base.nats <= 0; }
 
 // Of the effects that are named together, where the screen has measured both.
 std::string GroupAngles(const Diagnosis& d) {
@@ -244,14 +242,13 @@ std::string DiagnosisText(const Diagnosis& d) {
         {"<effect", "p (screen)", "explains", "error with it", "refitted p", "left out"});
     for (const CandidateEffect& c : d.candidates) {
       table.AddRow({c.effect, Number(c.p_value, 2),
-                    NotFound(c, d) ? "not found" : report::Percent(c.explained_fraction, 2),
+                    NotFound(c) ? "not found" : report::Percent(c.explained_fraction, 2),
                     Number(c.predicted_rms_error, 3),
                     c.refit_p_value < 0 ? "–" : Number(c.refit_p_value, 2),
                     c.left_out_error ? Number(*c.left_out_error, 3) : "–"});
     }
     text += "\n" + table.ToString();
-    if (std::any_of(d.candidates.begin(), d.candidates.end(),
-                    [&d](const CandidateEffect& c) { return NotFound(c, d); })) {
+    if (std::any_of(d.candidates.begin(), d.candidates.end(), &NotFound)) {
       text += Wrapped(
           "Not found: the refit came no closer than the model without the effect, which it "
           "contains, before its runs were used up; more samples tell.",
@@ -267,7 +264,7 @@ std::string DiagnosisText(const Diagnosis& d) {
     }
   }
   for (const CandidateEffect& c : d.candidates) {
-    if (c.refit_p_value < 0 || NotFound(c, d)) continue;
+    if (c.refit_p_value < 0 || NotFound(c)) continue;
     text += Wrapped(fmt::format("{} comes closest at {}.", c.effect,
                                 report::StrengthInWords(c.amplitude, d.units)),
                     "", "  ");

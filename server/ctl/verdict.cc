@@ -70,7 +70,7 @@ bool Verdict::IsFarOff(const CandidateEffect& other, const CandidateEffect& firs
   const WarmFit& fit = *Find(other.effect);
   const WarmFit& best = *Find(first.effect);
   if (fit.chi2_after.empty() || best.chi2_after.empty()) return false;
-  if (fit.adequacy.chi2 >= diagnosis_.adequacy.chi2) {
+  if (!fit.Found()) {
     return other.screen_explained < first.screen_explained - kClearlyLess;
   }
   const std::size_t batches = std::min(fit.chi2_after.size() + 1, best.chi2_after.size());

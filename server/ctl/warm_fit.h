@@ -2,6 +2,7 @@
 // The model refitted with one effect more, and how it was judged.
 
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -24,7 +25,8 @@ struct WarmFit {
   std::map<std::string, double> best{};  ///< parameters of the point with the smallest chi2, SI
   double rms = 0;                        ///< smallest of a point, residual over noise sd
   inference::FittedModel model{};        ///< runs, or mean histories, as points
-  inference::Adequacy adequacy{};
+  /// As of a model that fits nowhere until it has been judged.
+  inference::Adequacy adequacy{.chi2 = std::numeric_limits<double>::infinity(), .p_value = 0};
   inference::Advantage over_base{};
   /// Chance of such a gain over the base model were that right; none where judged by runs.
   std::optional<double> gain_p_value{};
@@ -32,6 +34,10 @@ struct WarmFit {
   std::optional<double> left_out_error{};
   /// None before WeighEvidence, or where the emulator does not know the runs well enough.
   std::optional<ScaledEvidence> evidence{};
+
+  /// Closer than the base model, which it contains: judged by the same errors. One that is not has
+  /// merely not been found.
+  bool Found() const { return over_base.nats > 0; }
 
   /// As close as noise and scatter allow: more runs are better spent on its rivals.
   bool Satisfied() const { return adequacy.degrees > 0 && adequacy.chi2 <= adequacy.degrees; }

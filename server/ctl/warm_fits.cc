@@ -250,13 +250,7 @@ void WarmFits::Judge(const std::string& effect) {
                                .draws = fit.runs.parameters,
                                .most_unknown = kMostUnknown},
                               response_.nuisance);
-    if (!response.ok()) {  // not known yet, or no more than before
-      if (fit.iterations == 1) {
-        fit.adequacy.chi2 = std::numeric_limits<double>::infinity();
-        fit.adequacy.p_value = 0;
-      }
-      return;
-    }
+    if (!response.ok()) return;  // not known yet, or no more than before
     fit.model = std::move(response->model);
     points = std::move(response->points);
   }

@@ -59,8 +59,8 @@ std::string CandidateTable(const StoredDiagnosis& d) {
         named ? "<strong>" : "", Escape(NameForPeople(tried.effect)), named ? "</strong>" : "",
         Number(tried.p_value, 2),
         // Without the effect it is the base model: a refit further off has merely not been found.
-        tried.refit_chi2 && *tried.refit_chi2 >= d.chi2 ? "not found"
-                                                        : Percent(tried.explained_fraction, 2),
+        tried.advantage_nats && *tried.advantage_nats <= 0 ? "not found"
+                                                           : Percent(tried.explained_fraction, 2),
         Number(tried.predicted_rms_error, 3), OrDash(tried.refit_p_value, 2),
         OrDash(tried.left_out_error, 3),
         Escape(OwnStrength(tried.effect, tried.amplitude, d.units)), Escape(Alike(tried)));

@@ -73,7 +73,7 @@ TriedEffect ReadTried(const Json& json) {
   const auto fit = json.find("warm_fit");
   if (fit != json.end() && fit->is_object()) {
     Read(*fit, "p_value", tried.refit_p_value);
-    Read(*fit, "chi2", tried.refit_chi2);
+    Read(*fit, "advantage_nats", tried.advantage_nats);
     Read(*fit, "left_out_error", tried.left_out_error);
   }
   return tried;

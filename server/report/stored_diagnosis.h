@@ -23,7 +23,8 @@ struct TriedEffect {
       amplitude{};  ///< dotted parameter -> strength [StoredDiagnosis::units]
   std::vector<std::string> confusable_with{};
   std::map<std::string, double> angles{};  ///< to the other effects [degrees]
-  std::optional<double> refit_p_value{}, refit_chi2{}, left_out_error{};
+  std::optional<double> refit_p_value{}, left_out_error{};
+  std::optional<double> advantage_nats{};  ///< of the refit over the model without the effect
 };
 
 struct StoredDiagnosis {

@@ -26,14 +26,13 @@ TEST(DiagnosisText, AGroupComesWithTheAnglesBetweenItsEffects) {
 TEST(DiagnosisText, ARefitThatIsFurtherOffThanItsOwnBaseModelHasFoundNothing) {
   ctl::Diagnosis diagnosis;
   diagnosis.verdict = "unexplained";
-  diagnosis.adequacy.chi2 = 300;
   diagnosis.candidates = {
-      {.effect = "adhesion_dmt", .campaign = "c2", .refit_p_value = 0, .refit_chi2 = 420},
+      {.effect = "adhesion_dmt", .campaign = "c2", .refit_p_value = 0, .over_base = {.nats = -60}},
       {.effect = "twisting_resistance",
        .explained_fraction = 0.5,
        .campaign = "c3",
        .refit_p_value = 0,
-       .refit_chi2 = 200}};
+       .over_base = {.nats = 50}}};
   const std::string text = DiagnosisText(diagnosis);
   EXPECT_THAT(text, ContainsRegex("adhesion_dmt +1 +not found"));
   EXPECT_THAT(text, HasSubstr("came no closer than the model without the effect"));

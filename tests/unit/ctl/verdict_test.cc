@@ -177,6 +177,23 @@ TEST_F(VerdictTest, WhatTheScreenCannotTellFromItIsNamedUnlessItWasFitted) {
   EXPECT_EQ(Group(), Names{"membrane"});
 }
 
+// Not one of its runs has come to an end.
+TEST_F(VerdictTest, ARefitWithoutRunsExplainsNothing) {
+  diagnosis_.adequacy.p_value = 1e-50;
+  WarmFit none;
+  none.stalled = true;
+  none.iterations = 1;
+  fits_["crushing"] = none;
+  CandidateEffect& candidate = diagnosis_.candidates.emplace_back();
+  candidate.effect = "crushing";
+  candidate.campaign = "c9";
+  candidate.refit_chi2 = none.adequacy.chi2;
+  candidate.explained_fraction = 1;  // as the screen says
+  EXPECT_EQ(Concluded(), "unexplained");
+  EXPECT_EQ(diagnosis_.best_partial, "");
+  EXPECT_EQ(diagnosis_.reason, "no effect could be refitted");
+}
+
 TEST_F(VerdictTest, AnErrorOfOneSdOnDataLeftOutIsAsExpected) {
   diagnosis_.left_out_error = 0.98;
   Refit("adhesion", kClose).left_out_error = 0.99;
