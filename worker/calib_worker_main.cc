@@ -14,6 +14,8 @@
 #include <iostream>
 #include <thread>
 
+#include "dem/catalog/catalog.h"
+#include "proto/rpc/digest.h"
 #include "worker/once.h"
 #include "worker/throughput.h"
 #include "worker/worker.h"
@@ -68,6 +70,11 @@ int main(int argc, char** argv) {
   int parent = -1;
   double checkpoints_gib = 4;
   options.slots = 0;
+  // Read by `calibctl doctor`.
+  app.set_version_flag("--version",
+                       "calib-worker mechanics " + calib::dem::EngineVersion() + " catalogue " +
+                           calib::rpc::Sha256Hex(calib::dem::CatalogText()),
+                       "print what determines the bits of a run, and leave");
   auto* server = app.add_option("--server", options.server, "the server, HOST:PORT");
   app.add_option("--slots", options.slots, "evaluations at a time [cores / threads per slot]")
       ->check(CLI::Range(1, 1024));

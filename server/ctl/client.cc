@@ -250,4 +250,8 @@ absl::StatusOr<v1::WorkerInfo> Client::DrainWorker(const std::string& worker) {
   return Call<v1::WorkerInfo>(*impl_->stub, &Stub::DrainWorker, request);
 }
 
+absl::StatusOr<v1::ServerReport> Client::Examine() {
+  return Call<v1::ServerReport>(*impl_->stub, &Stub::Examine, v1::ExamineRequest());
+}
+
 }  // namespace calib::ctl

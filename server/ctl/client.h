@@ -49,6 +49,7 @@ class Client {
   absl::Status Delete(const std::string& campaign);
   absl::StatusOr<std::vector<v1::WorkerInfo>> ListWorkers();
   absl::StatusOr<v1::WorkerInfo> DrainWorker(const std::string& worker);
+  absl::StatusOr<v1::ServerReport> Examine();
 
  private:
   struct Impl;

@@ -232,6 +232,9 @@ void AddVerbsOnCampaigns(Builder& b) {
 
 void AddOtherVerbs(Builder& b) {
   b.Add("workers", &Workers, "Nodes, slots, speed, running samples", "workers");
+  b.Add("doctor", &Doctor,
+        "Checks this node, and a server: build, clock, file systems, time step, certificates",
+        "doctor --server node1:7443");
   b.Add("drain", &Drain, "Let a worker finish what it does and leave", "drain node1-4711")
       ->add_option("WORKER", b.arguments().worker, "name, as shown by `calibctl workers`")
       ->required();

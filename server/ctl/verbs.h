@@ -26,6 +26,7 @@ int Report(const Arguments& arguments);
 int Export(const Arguments& arguments);
 int Workers(const Arguments& arguments);
 int Drain(const Arguments& arguments);
+int Doctor(const Arguments& arguments);
 int Effects(const Arguments& arguments);
 int Tests(const Arguments& arguments);
 int Contacts(const Arguments& arguments);

@@ -22,6 +22,8 @@ namespace {
 
 using campaign::Role;
 
+constexpr double kMostEvaluations = 1e15;
+
 constexpr const char* kDecidedAtOnce =
     "Decisions were taken at once, by what had arrived (inference.decisions: immediate): not "
     "reproducible, the same campaign run again may choose other samples or stop others.";
@@ -207,7 +209,8 @@ class Planner {
       return Validate(outcome->answer);
     }
     if (!outcome->next.has_value()) {
-      if (!outcome->converged && BudgetSpent()) {
+      const bool last = static_cast<int>(history_.iterations.size()) >= campaign_.max_iterations;
+      if (!outcome->converged && !last && BudgetSpent()) {
         plan_.log.emplace_back("no further iteration: it would exceed the budget");
       }
       const int count = Replicates();
@@ -330,12 +333,21 @@ class Planner {
 
   /// How many samples more would not.
   std::int64_t Affordable() const {
-    if (Exceeds(Calibrated()) || !campaign_.budget.model_evaluations.has_value()) {
-      return Exceeds(Calibrated()) ? 0 : std::numeric_limits<std::int64_t>::max();
+    if (Exceeds(Calibrated())) {
+      return 0;
     }
-    return (*campaign_.budget.model_evaluations - history_.effort.model_evaluations -
-            history_.open) /
-           Calibrated();
+    std::int64_t evaluations = std::numeric_limits<std::int64_t>::max();
+    if (campaign_.budget.model_evaluations.has_value()) {
+      evaluations =
+          *campaign_.budget.model_evaluations - history_.effort.model_evaluations - history_.open;
+    }
+    if (const double seconds = SecondsOfOne(); campaign_.budget.core_hours && seconds > 0) {
+      const double left = *campaign_.budget.core_hours * 3600 - history_.effort.core_seconds;
+      evaluations = std::min(
+          evaluations,
+          static_cast<std::int64_t>(std::min(left / seconds, kMostEvaluations)) - history_.open);
+    }
+    return evaluations / Calibrated();
   }
 
   /// Evaluations of one sample.
@@ -343,13 +355,24 @@ class Planner {
     return static_cast<std::int64_t>(definition_.ExperimentsOf(Role::kCalibrate).size());
   }
 
-  /// True when so many evaluations, beside those under way, would exceed it.
+  /// Core seconds of one evaluation, those stopped early and repeated among them, in the mean over
+  /// what has been asked for so far; 0 while nothing has.
+  double SecondsOfOne() const {
+    const std::int64_t asked =
+        static_cast<std::int64_t>(history_.samples.size()) * Calibrated() - history_.open;
+    return asked > 0 ? history_.effort.core_seconds / static_cast<double>(asked) : 0;
+  }
+
+  /// True when so many evaluations, beside those under way, would exceed it, core hours as those so
+  /// far took them.
   bool Exceeds(std::int64_t next) const {
     const campaign::Budget& budget = campaign_.budget;
     return (budget.model_evaluations.has_value() &&
             history_.effort.model_evaluations + history_.open + next > *budget.model_evaluations) ||
            (budget.core_hours.has_value() &&
-            history_.effort.core_seconds > *budget.core_hours * 3600);
+            history_.effort.core_seconds +
+                    SecondsOfOne() * static_cast<double>(history_.open + next) >
+                *budget.core_hours * 3600);
   }
 
   /// The rows that a table campaign runs.

@@ -60,6 +60,9 @@ class Scheduler {
   /// NOT_FOUND: no such worker.
   absl::StatusOr<v1::WorkerInfo> Drain(const std::string& worker);
   std::vector<v1::WorkerInfo> Workers() const;
+  /// Workers that were turned away by Connected() and have not come back since; the last time of
+  /// each name, of the sixteen names that came last.
+  std::vector<v1::RefusedWorker> Refused() const { return refused_; }
   /// Gives up leases that have run out. Call a few times per lease.
   void Tick();
 
@@ -89,6 +92,10 @@ class Scheduler {
   CampaignRun* FindRun(std::int64_t campaign);
   /// FindRun(), or replies that the campaign is over.
   CampaignRun* LiveRun(std::int64_t campaign, const Reply& reply);
+
+  // Workers (scheduler_workers.cc)
+  /// Why a worker may not join; OK when it may.
+  static absl::Status Admit(const v1::Hello& hello);
 
   // Work (scheduler_workers.cc)
   void Dispatch();
@@ -132,6 +139,7 @@ class Scheduler {
   std::set<std::int64_t>
       ending_;  // attempts whose end is on its way to the disk: neither held nor refused
   WorkerTable workers_;
+  std::vector<v1::RefusedWorker> refused_;                     // oldest first
   std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over
   std::set<store::EvaluationKey> queue_;                       // waiting, of leasable campaigns
   std::set<std::int64_t> computing_;  // campaigns with a plan in the making

@@ -33,7 +33,7 @@ std::string NameOf(const CampaignRun& run, const EvaluationKey& key) {
 
 }  // namespace
 
-absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) {
+absl::Status Scheduler::Admit(const v1::Hello& hello) {
   if (hello.name().empty() || hello.slots() < 1) {
     return absl::InvalidArgumentError("a worker must have a name and at least one slot");
   }
@@ -46,6 +46,23 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
     return absl::FailedPreconditionError(
         absl::StrCat("worker ", hello.name(),
                      " offers other contacts, effects or tests than the server: update the node"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) {
+  constexpr std::size_t kRemembered = 16;
+  std::erase_if(refused_,
+                [&](const v1::RefusedWorker& worker) { return worker.name() == hello.name(); });
+  if (absl::Status admitted = Admit(hello); !admitted.ok()) {
+    if (refused_.size() == kRemembered) {
+      refused_.erase(refused_.begin());
+    }
+    v1::RefusedWorker& worker = refused_.emplace_back();
+    worker.set_name(hello.name());
+    worker.set_reason(std::string(admitted.message()));
+    worker.set_unix_ms(ports_.UnixMs());
+    return admitted;
   }
   const Clock::time_point now = ports_.Now();
   if (const std::int64_t before = workers_.Connect(hello, session, now); before != 0) {

@@ -1,11 +1,15 @@
 #include "server/service/campaigns_service.h"
 
+#include <chrono>
 #include <memory>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
 #include "proto/rpc/status.h"
+#include "server/campaign/sha256.h"
 #include "server/service/blob_stream.h"
+#include "server/service/folder_report.h"
 #include "server/service/queries.h"
 #include "server/service/stream_reactor.h"
 #include "server/service/submission.h"
@@ -13,6 +17,8 @@
 
 namespace calib::service {
 namespace {
+
+constexpr std::chrono::seconds kLookingThroughTheFile{10};
 
 /// Streams what `load` reads of a campaign.
 template <typename Message, typename Load>
@@ -381,6 +387,31 @@ grpc::ServerUnaryReactor* CampaignsService::DrainWorker(Context* context,
       *reply = *std::move(worker);
     }
     reactor->Finish(rpc::ToGrpc(worker.status()));
+  });
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* CampaignsService::Examine(Context* context,
+                                                    const v1::ExamineRequest* /*request*/,
+                                                    v1::ServerReport* reply) {
+  Unary* reactor = context->DefaultReactor();
+  reply->set_unix_ms(core_.UnixMs());
+  core_.Post([this, reply, reactor] {
+    for (v1::RefusedWorker& worker : core_.scheduler().Refused()) {
+      *reply->add_refused() = std::move(worker);
+    }
+    core_.Query([this, reply, reactor] {
+      reply->set_engine_version(dem::EngineVersion());
+      reply->set_catalog_digest(campaign::Sha256Hex(dem::CatalogText()));
+      reply->set_listen(site_.listen);
+      *reply->mutable_state_folder() = ExamineFolder(site_.state_folder);
+      auto reader = core_.Read();
+      const auto check = reader.ok() ? reader->CheckFile(kLookingThroughTheFile)
+                                     : absl::StatusOr<store::Reader::FileCheck>(reader.status());
+      reply->set_database(check.ok() ? check->fault : std::string(check.status().message()));
+      reply->set_database_in_full(check.ok() && check->in_full);
+      reactor->Finish(grpc::Status::OK);
+    });
   });
   return reactor;
 }

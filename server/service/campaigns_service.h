@@ -3,6 +3,8 @@
 // strand.
 
 #include <functional>
+#include <string>
+#include <utility>
 
 #include "calib/v1/campaign.grpc.pb.h"
 #include "server/service/core.h"
@@ -12,7 +14,12 @@ namespace calib::service {
 
 class CampaignsService final : public v1::Campaigns::CallbackService {
  public:
-  explicit CampaignsService(Core& core) : core_(core) {}
+  /// Where the server is, for those who ask.
+  struct Site {
+    std::string state_folder;
+    std::string listen;  ///< HOST:PORT as it was told
+  };
+  CampaignsService(Core& core, Site site) : core_(core), site_(std::move(site)) {}
 
   using Context = grpc::CallbackServerContext;
   using Unary = grpc::ServerUnaryReactor;
@@ -38,6 +45,7 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   Unary* Delete(Context*, const v1::ControlRequest*, v1::DeleteReply*) override;
   Unary* ListWorkers(Context*, const v1::ListWorkersRequest*, v1::WorkerList*) override;
   Unary* DrainWorker(Context*, const v1::DrainRequest*, v1::WorkerInfo*) override;
+  Unary* Examine(Context*, const v1::ExamineRequest*, v1::ServerReport*) override;
 
  private:
   using Act = std::function<void(std::int64_t campaign, const store::Store::Job& also,
@@ -57,6 +65,7 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
                            const Act& act);
 
   Core& core_;
+  const Site site_;
   Requests requests_;  // the strand's
 };
 

@@ -97,7 +97,9 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
           on_failure(status);
         }
       });
-  impl->campaigns = std::make_unique<CampaignsService>(*impl->core);
+  impl->campaigns = std::make_unique<CampaignsService>(
+      *impl->core,
+      CampaignsService::Site{.state_folder = options.state_dir, .listen = options.listen});
   impl->workers = std::make_unique<WorkerLinkService>(*impl->core);
   std::promise<absl::Status> loaded;
   impl->core->Post([&] { loaded.set_value(impl->core->Start()); });

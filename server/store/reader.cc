@@ -1,6 +1,11 @@
 #include "server/store/reader.h"
 
+#include <sqlite3.h>
+
 #include <bit>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -348,6 +353,44 @@ absl::StatusOr<std::vector<FindingRecord>> Reader::Findings(std::int64_t campaig
     }
     return findings;
   });
+}
+
+absl::StatusOr<Reader::FileCheck> Reader::CheckFile(std::chrono::milliseconds at_most) {
+  // SQLite looks at interrupts on every page, at a progress handler between instructions only, of
+  // which the whole of a large table may be one.
+  std::mutex mutex;
+  std::condition_variable change;
+  bool ended = false;
+  std::thread alarm([&, file = connection_->database().getHandle()] {
+    std::unique_lock lock(mutex);
+    if (!change.wait_for(lock, at_most, [&] { return ended; })) {
+      sqlite3_interrupt(file);
+    }
+  });
+  auto check = Guard([&] {
+    FileCheck found;
+    try {
+      SQLite::Statement& row = connection_->Bind("PRAGMA quick_check(1)");
+      found.fault = row.executeStep() ? row.getColumn(0).getString() : "";
+      row.reset();
+      found.in_full = true;
+    } catch (const SQLite::Exception& error) {
+      if (error.getErrorCode() != SQLITE_INTERRUPT) {
+        throw;
+      }
+    }
+    if (found.fault == "ok") {
+      found.fault.clear();
+    }
+    return found;
+  });
+  {
+    const std::lock_guard lock(mutex);
+    ended = true;
+  }
+  change.notify_one();
+  alarm.join();
+  return check;
 }
 
 }  // namespace calib::store

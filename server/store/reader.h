@@ -2,6 +2,7 @@
 // What may be asked of the store. A Reader is one consistent picture of it, taken at its first
 // query.
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -56,6 +57,13 @@ class Reader {
   absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);
   /// In the order in which they were first put.
   absl::StatusOr<std::vector<FindingRecord>> Findings(std::int64_t campaign);
+
+  /// Looks through the whole file, at most this long.
+  struct FileCheck {
+    std::string fault;     ///< the first thing SQLite finds wrong; empty: nothing
+    bool in_full = false;  ///< false: the time was up first
+  };
+  absl::StatusOr<FileCheck> CheckFile(std::chrono::milliseconds at_most);
 
  private:
   /// Runs `read`; SQLite's exceptions end here.

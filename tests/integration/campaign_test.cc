@@ -182,6 +182,15 @@ TEST(Worker, OfAnotherBuildIsToldToUpdate) {
   FakeWorker worker(deployment.address(), hello);
   EXPECT_FALSE(worker.Receive(kLong).has_value());
   EXPECT_EQ(worker.Finish().code(), absl::StatusCode::kFailedPrecondition);
+  Client client = deployment.client();
+  const auto report = client.Examine();
+  ASSERT_TRUE(report.ok()) << report.status();
+  ASSERT_EQ(report->refused_size(), 1);
+  EXPECT_EQ(report->refused(0).name(), "old");
+  EXPECT_NE(report->refused(0).reason().find("mechanics version 0"), std::string::npos);
+  FakeWorker updated(deployment.address(), MatchingHello("old", 1));
+  EXPECT_TRUE(updated.Receive(kLong).has_value());
+  EXPECT_EQ(client.Examine()->refused_size(), 0) << "it has come back";
 }
 
 TEST(Server, SecondOneOnTheSameFolderIsToldWhoServesIt) {

@@ -157,6 +157,10 @@ absl::StatusOr<v1::WorkerInfo> Client::Drain(const std::string& worker) {
   return impl_->Call(&v1::Campaigns::Stub::DrainWorker, request);
 }
 
+absl::StatusOr<v1::ServerReport> Client::Examine() {
+  return impl_->Call(&v1::Campaigns::Stub::Examine, v1::ExamineRequest());
+}
+
 absl::StatusOr<v1::CampaignStatus> Client::Pause(const v1::ControlRequest& request) {
   return impl_->Call(&v1::Campaigns::Stub::Pause, request);
 }

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 
 #include <chrono>
+#include <fstream>
+#include <map>
 
 #include "tests/integration/ctl/calibctl_fixture.h"
 
@@ -138,6 +140,43 @@ TEST_F(Calibctl, CataloguesNeedNoServer) {
     EXPECT_TRUE(Call(verb + " --json").json().is_array());
     EXPECT_EQ(Call(verb).code, 0);
   }
+}
+
+TEST_F(Calibctl, DoctorLooksAtANodeAndAtAServer) {
+  const Answer node = Call("doctor --json");
+  ASSERT_EQ(node.code, 0) << node.out << node.err;
+  const Json seen = node.json();
+  EXPECT_TRUE(seen["healthy"]);
+  std::map<std::string, std::string> health;
+  for (const Json& check : seen["checks"]) {
+    health[check["name"].get<std::string>() + ", " + check["subject"].get<std::string>()] =
+        check["health"];
+  }
+  EXPECT_EQ(health["time_step, this node"], "ok") << node.out;
+  EXPECT_EQ(health["file_system, temporary folder"], "ok") << node.out;
+  EXPECT_EQ(health.count("clock, this node"), 1U);
+
+  EXPECT_EQ(Call("doctor --server 127.0.0.1:9").code, 3);
+  const Answer fresh = Call("doctor --state new");
+  EXPECT_EQ(fresh.code, 0) << fresh.out;
+  EXPECT_THAT(fresh.out, HasSubstr("It holds no campaigns yet."));
+  EXPECT_FALSE(std::filesystem::exists(work_ / "new")) << "looking makes nothing";
+
+  ASSERT_EQ(Call("run good.yaml --state state --workers 2").code, 0);
+  const Answer used = Call("doctor --state state");
+  EXPECT_EQ(used.code, 0) << used.out;
+  EXPECT_THAT(used.out, HasSubstr("SQLite finds no fault."));
+  // Damaged in its middle.
+  const auto path = work_ / "state" / "calib.db";
+  const auto size = std::filesystem::file_size(path);
+  {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(size / 4));
+    file << std::string(size / 2, 'x');
+  }
+  const Answer damaged = Call("doctor --state state");
+  EXPECT_EQ(damaged.code, 1) << damaged.out;
+  EXPECT_THAT(damaged.out, HasSubstr("problem"));
 }
 
 }  // namespace

@@ -184,6 +184,28 @@ TEST(Realizations, BudgetAllows) {
   EXPECT_LE(run.evaluations, 125 + 20);  // held-out draws are not counted in advance
 }
 
+// A minute each: an hour for the first iteration, and another one for the second.
+TEST(Budget, AnIterationThatWouldExceedTheCoreHoursIsNotBegun) {
+  for (const bool enough : {false, true}) {
+    SimulatedService service("core_hours");
+    service.core_seconds = 60;
+    service.Submit(
+        Campaign(1, enough ? "budget: {core_hours: 2.5}\n" : "budget: {core_hours: 1.5}\n"));
+    service.RunToEnd(1, true);
+    const auto samples = Value(service.Read().Samples(1));
+    const auto of_second = std::count_if(samples.begin(), samples.end(), [](const auto& sample) {
+      return sample.iteration == 1 && sample.sample < 2 * kSamples;
+    });
+    EXPECT_EQ(of_second == kSamples, enough) << of_second;
+    const auto log = Value(service.Read().Events(1));
+    EXPECT_EQ(std::any_of(log.begin(), log.end(),
+                          [](const auto& event) {
+                            return event.what.find("exceed the budget") != std::string::npos;
+                          }),
+              !enough);
+  }
+}
+
 TEST(Realizations, OtherMethodsKeepTheirPosteriorAndStateTheScatter) {
   testing::SmallCampaign campaign = testing::MakeSmallCampaign({.samples = 20,
                                                                 .max_iterations = 40,

@@ -163,6 +163,7 @@ void SimulatedService::SendEnd(std::int64_t session, std::int64_t attempt,
   finished.set_attempt(attempt);
   finished.set_outcome(outcome);
   finished.set_reason(reason);
+  finished.set_core_seconds(core_seconds);
   scheduler_->Receive(session, finished);
   ports_->Run();
 }

@@ -86,6 +86,8 @@ class SimulatedService {
   double packing_scatter = 0;
   /// The same between parameters that differ in digits that nobody knows, from -1 to 1 times this.
   double repeat_scatter = 0;
+  /// That every run is said to have taken.
+  double core_seconds = 0;
   /// Load steps that workers of RunToEnd() had to compute: without those of a checkpoint.
   int computed = 0;
 

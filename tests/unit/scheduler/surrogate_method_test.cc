@@ -146,6 +146,16 @@ TEST(SurrogateCampaign, TheBudgetOfModelEvaluationsEndsIt) {
   EXPECT_EQ(Value(service.Read().Evaluations(1)).size(), 30U);
 }
 
+TEST(SurrogateCampaign, TheBudgetOfCoreHoursEndsIt) {
+  SimulatedService service("surrogate_core_hours");
+  service.core_seconds = 60;
+  service.Submit(Campaign(10, 100, 0.02, "budget: {core_hours: 0.5}\n"));
+  service.RunToEnd(1, true);
+  const double used = Value(service.Read().EffortOf(1)).core_seconds;  // points cut short cost less
+  EXPECT_LE(used, 1800);
+  EXPECT_GT(used, 1800 - 2 * 60);
+}
+
 std::string InFlight(int points, const char* decisions = "reproducible") {
   return "  termination: off\n  in_flight: " + std::to_string(points) +
          "\n  decisions: " + decisions + "\n";

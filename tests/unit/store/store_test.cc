@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 
 namespace calib::store {
@@ -235,6 +236,30 @@ TEST_F(StoreTest, FindingsAreKeptOnceAndGoWithTheirCampaign) {
   EXPECT_EQ((*findings)[1].kind, "improvement");
   Write([](Transaction& t) { t.DeleteCampaign(1); });
   EXPECT_TRUE(Read().Findings(1)->empty());
+}
+
+TEST_F(StoreTest, AFileIsLookedThroughAndItsDamageFound) {
+  Write([](Transaction& t) {
+    PutEvaluation(t);
+    for (int i = 0; i < 200; ++i) {
+      t.PutBlob("digest" + std::to_string(i), std::string(4000, 'b'));
+    }
+  });
+  const auto whole = Read().CheckFile(std::chrono::seconds(10));
+  ASSERT_TRUE(whole.ok()) << whole.status();
+  EXPECT_TRUE(whole->in_full);
+  EXPECT_EQ(whole->fault, "");
+
+  store_.reset();  // everything is in the file now
+  const auto size = std::filesystem::file_size(path_);
+  {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(size / 2));
+    file << std::string(size / 4, 'x');
+  }
+  Open({});
+  const auto damaged = Read().CheckFile(std::chrono::seconds(10));
+  EXPECT_TRUE(!damaged.ok() || !damaged->fault.empty());
 }
 
 }  // namespace

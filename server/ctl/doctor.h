@@ -1,0 +1,70 @@
+#pragma once
+// What `calibctl doctor` concludes from what it has seen of a node and a server. Nothing here asks:
+// the judgements are functions of reports.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/v1/campaign.pb.h"
+
+namespace calib::ctl {
+
+enum class Health { kOk, kUnknown, kWarning, kProblem };
+std::string ToString(Health health);  ///< "ok", "unknown", "warning", "problem"
+
+/// One thing that was looked at.
+struct Check {
+  std::string name;  ///< build | clock | file_system | time_step | certificates | server | workers
+  std::string subject{};  ///< of what
+  Health health = Health::kOk;
+  std::string found{};   ///< a sentence or two
+  std::string advice{};  ///< what to do; empty when nothing is to be done
+};
+
+/// What must be the same wherever runs of one campaign are made: the mechanics, and the contacts,
+/// effects and tests on offer (SHA-256).
+struct Build {
+  std::string engine_version;
+  std::string catalog_digest;
+};
+Build OwnBuild();
+Check JudgeBuild(const std::string& subject, const Build& own, const Build& other);
+
+/// What the kernel says of this machine's clock.
+struct NodeClock {
+  bool known = false;  ///< false: the kernel would not say
+  bool synchronised = false;
+  double largest_error = 0;  ///< [s], as the kernel estimates it
+};
+Check JudgeClock(const NodeClock& clock);
+/// ahead: of the server's clock over this one [s]; uncertainty: half of the round trip [s].
+Check JudgeClockOffset(double ahead, double uncertainty);
+
+enum class FolderUse { kState, kCheckpoints, kTemporary };
+Check JudgeFolder(const v1::FolderReport& folder, FolderUse use);
+Check JudgeDatabase(const v1::ServerReport& server);
+
+/// address: by which the server was reached; listen: what the server was told, if known.
+Check JudgeConnection(const std::string& address, const std::optional<std::string>& listen);
+/// Empty folder of workers and refused ones included. now: [ms] of the server's clock.
+std::vector<Check> JudgeWorkers(const std::vector<v1::WorkerInfo>& workers,
+                                const v1::ServerReport& server);
+
+/// A collision and an assembly that a worker has made, beside what is known of them.
+struct TrialRuns {
+  double restitution = 0;   ///< of an elastic Hertz collision; 1
+  double peak_overlap = 0;  ///< [m]
+  double duration = 0;      ///< [s]
+  double mean_stress = 0;   ///< [Pa] of 64 grains compressed to `TrialStress()`
+  std::string digest;       ///< of all digits of both tables
+  std::string failure{};    ///< why there is none of this; empty: there is
+};
+Check JudgeTimeStep(const TrialRuns& runs);
+
+/// Every check stands for itself; a node is healthy without a problem.
+bool IsHealthy(const std::vector<Check>& checks);
+std::string DoctorText(const std::vector<Check>& checks);
+std::string DoctorJson(const std::vector<Check>& checks);
+
+}  // namespace calib::ctl

@@ -1,0 +1,178 @@
+#include "server/ctl/doctor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "server/ctl/trial_runs.h"
+
+namespace calib::ctl {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr std::int64_t kGiB = std::int64_t{1} << 30;
+
+v1::FolderReport Disk() {
+  v1::FolderReport folder;
+  folder.set_path("/srv/calib");
+  folder.set_file_system("ext");
+  folder.set_free_bytes(100 * kGiB);
+  folder.set_total_bytes(200 * kGiB);
+  folder.set_sync_seconds(0.004);
+  return folder;
+}
+
+TrialRuns RightRuns() {
+  const TrialCollision hertz;
+  return {.restitution = 1,
+          .peak_overlap = hertz.PeakOverlap(),
+          .duration = hertz.Duration(),
+          .mean_stress = TrialStress(),
+          .digest = "0123456789abcdef"};
+}
+
+TEST(Doctor, ALocalDiskIsFit) {
+  const Check check = JudgeFolder(Disk(), FolderUse::kState);
+  EXPECT_EQ(check.health, Health::kOk);
+  EXPECT_EQ(check.found, "/srv/calib (ext): 100 GiB free, a file is safe after 4 ms.");
+  EXPECT_EQ(check.advice, "");
+}
+
+TEST(Doctor, CampaignsDoNotBelongOnANetworkOrInMemory) {
+  v1::FolderReport folder = Disk();
+  folder.set_is_remote(true);
+  EXPECT_EQ(JudgeFolder(folder, FolderUse::kState).health, Health::kProblem);
+  EXPECT_EQ(JudgeFolder(folder, FolderUse::kTemporary).health, Health::kOk);
+  folder = Disk();
+  folder.set_is_volatile(true);
+  EXPECT_EQ(JudgeFolder(folder, FolderUse::kState).health, Health::kWarning);
+  EXPECT_EQ(JudgeFolder(folder, FolderUse::kCheckpoints).health, Health::kOk);
+}
+
+TEST(Doctor, TheGraverOfTwoFindingsCounts) {
+  v1::FolderReport folder = Disk();
+  folder.set_free_bytes(kGiB);
+  EXPECT_EQ(JudgeFolder(folder, FolderUse::kState).health, Health::kWarning);
+  folder.set_is_remote(true);
+  EXPECT_THAT(JudgeFolder(folder, FolderUse::kState).advice, HasSubstr("network"));
+  folder.set_free_bytes(0);
+  EXPECT_THAT(JudgeFolder(folder, FolderUse::kState).advice, HasSubstr("full"));
+}
+
+TEST(Doctor, AFolderThatCannotBeWrittenIsAProblemForAnyUse) {
+  v1::FolderReport folder = Disk();
+  folder.set_problem("no file can be made: Permission denied");
+  for (const auto use : {FolderUse::kState, FolderUse::kCheckpoints, FolderUse::kTemporary}) {
+    const Check check = JudgeFolder(folder, use);
+    EXPECT_EQ(check.health, Health::kProblem);
+    EXPECT_EQ(check.found, "/srv/calib: no file can be made: Permission denied.");
+  }
+}
+
+TEST(Doctor, ClocksMayDifferByWhatIsNotKnown) {
+  EXPECT_EQ(JudgeClockOffset(0.4, 0.01).health, Health::kOk);
+  EXPECT_EQ(JudgeClockOffset(1.5, 1.0).health, Health::kOk);
+  const Check behind = JudgeClockOffset(-40, 0.01);
+  EXPECT_EQ(behind.health, Health::kWarning);
+  EXPECT_THAT(behind.found, HasSubstr("40 s behind"));
+  EXPECT_THAT(JudgeClockOffset(40, 0.01).found, HasSubstr("40 s ahead of"));
+  EXPECT_EQ(JudgeClock({}).health, Health::kUnknown);
+  EXPECT_EQ(JudgeClock({.known = true}).health, Health::kWarning);
+  EXPECT_EQ(JudgeClock({.known = true, .synchronised = true}).health, Health::kOk);
+}
+
+TEST(Doctor, BuildsMustBeTheSameInMechanicsAndCatalogue) {
+  const Build own{"7", "abc"};
+  EXPECT_EQ(JudgeBuild("server", own, own).health, Health::kOk);
+  EXPECT_EQ(JudgeBuild("server", own, {"6", "abc"}).health, Health::kProblem);
+  EXPECT_EQ(JudgeBuild("server", own, {"7", "abd"}).health, Health::kProblem);
+}
+
+TEST(Doctor, OnlyAnOpenPortIsWarnedOf) {
+  EXPECT_EQ(JudgeConnection("127.0.0.1:7443", std::nullopt).health, Health::kOk);
+  EXPECT_EQ(JudgeConnection("[::1]:7443", std::nullopt).health, Health::kOk);
+  EXPECT_EQ(JudgeConnection("127.0.0.1:7443", "0.0.0.0:7443").health, Health::kWarning)
+      << "reached here, but open to others";
+  EXPECT_EQ(JudgeConnection("node1:7443", "127.0.0.1:7443").health, Health::kOk)
+      << "through a tunnel";
+}
+
+TEST(Doctor, WorkersThatWereTurnedAwayAreNamed) {
+  v1::ServerReport server;
+  server.set_unix_ms(1'000'000);
+  EXPECT_EQ(JudgeWorkers({}, server).front().health, Health::kWarning) << "nobody works";
+  v1::WorkerInfo ready;
+  ready.set_name("node1-1");
+  ready.set_slots(2);
+  ready.set_connected(true);
+  v1::WorkerInfo silent;
+  silent.set_name("node2-1");
+  silent.set_seconds_since_heard(90);
+  v1::RefusedWorker& refused = *server.add_refused();
+  refused.set_name("node3-1");
+  refused.set_reason("worker node3-1 has mechanics version 6, the server 7: update the node");
+  refused.set_unix_ms(970'000);
+  const auto checks = JudgeWorkers({ready, silent}, server);
+  ASSERT_EQ(checks.size(), 3U);
+  EXPECT_EQ(checks[0].found, "2 slots of connected workers.");
+  EXPECT_EQ(checks[1].health, Health::kWarning);
+  EXPECT_EQ(checks[2].health, Health::kProblem);
+  EXPECT_THAT(checks[2].found, HasSubstr("30 s ago: worker node3-1 has mechanics version 6"));
+}
+
+TEST(Doctor, TrialRunsAreHeldAgainstHertz) {
+  // Johnson 1985, sec. 11.4, with m/2 = 0.016336 kg and 4/3 E* sqrt(R*) = 1.08786e10 N/m^1.5.
+  const TrialCollision hertz;
+  EXPECT_NEAR(hertz.PeakOverlap(), 2.03890e-5, 1e-9);
+  EXPECT_NEAR(hertz.Duration(), 6.00105e-5, 1e-9);
+  EXPECT_EQ(JudgeTimeStep(RightRuns()).health, Health::kOk);
+  TrialRuns lossy = RightRuns();
+  lossy.restitution = 0.99;
+  TrialRuns slow = RightRuns();
+  slow.duration *= 1.01;
+  TrialRuns soft = RightRuns();
+  soft.mean_stress *= 0.9;
+  TrialRuns none = RightRuns();
+  none.peak_overlap = std::nan("");
+  TrialRuns failed = RightRuns();
+  failed.failure = "killed";
+  for (const TrialRuns& wrong : {lossy, slow, soft, none, failed}) {
+    EXPECT_EQ(JudgeTimeStep(wrong).health, Health::kProblem);
+  }
+}
+
+TEST(Doctor, ADamagedFileIsAProblem) {
+  v1::ServerReport server;
+  server.set_database_in_full(true);
+  EXPECT_EQ(JudgeDatabase(server).health, Health::kOk);
+  server.set_database_in_full(false);
+  EXPECT_THAT(JudgeDatabase(server).found, HasSubstr("ten seconds"));
+  server.set_database("Page 7 is never used");
+  EXPECT_EQ(JudgeDatabase(server).health, Health::kProblem);
+}
+
+TEST(Doctor, TextAndJsonSayTheSame) {
+  const std::vector<Check> checks = {
+      {.name = "file_system", .subject = "state folder", .found = "Fine."},
+      {.name = "clock",
+       .subject = "this node",
+       .health = Health::kWarning,
+       .found = "It is not synchronised.",
+       .advice = "Run chrony."}};
+  EXPECT_EQ(DoctorText(checks),
+            "ok       file system (state folder): Fine.\n"
+            "warning  clock (this node): It is not synchronised.\n"
+            "         -> Run chrony.\n");
+  const auto json = nlohmann::json::parse(DoctorJson(checks));
+  EXPECT_TRUE(json["healthy"]) << "a warning is no problem";
+  EXPECT_EQ(json["checks"][1]["name"], "clock");
+  EXPECT_EQ(json["checks"][1]["health"], "warning");
+  EXPECT_EQ(json["checks"][1]["advice"], "Run chrony.");
+}
+
+}  // namespace
+}  // namespace calib::ctl
