@@ -4,6 +4,7 @@
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -97,19 +98,24 @@ void Holm(std::vector<Score>& scores) {
   }
 }
 
-// Chance of a fall at least as large: counted where the simulations reach, the tail of one degree
-// of freedom per difference beyond them, as wide as the simulations are on average.
-double TailOf(double gain, const std::vector<double>& simulated, std::size_t differences) {
+// Chance of a fall at least as large: counted where the simulations reach, beyond the tenth largest
+// of them the tail of a chi-squared that meets them there. freedom: of what the fall is the largest
+// over; of differences of one effect, which are all but parallel, one.
+double TailOf(double gain, std::vector<double> simulated, int freedom) {
   const auto n = static_cast<double>(simulated.size());
-  const auto above = static_cast<double>(
-      std::count_if(simulated.begin(), simulated.end(), [&](double s) { return s >= gain; }));
-  constexpr double kEnough = 10;
-  if (above >= kEnough) return (1 + above) / (1 + n);
-  const double mean = std::accumulate(simulated.begin(), simulated.end(), 0.0) / n;
-  const double width = std::max(1.0, mean / static_cast<double>(differences));
-  const double tail = static_cast<double>(differences) *
-                      boost::math::gamma_q(0.5, 0.5 * std::max(gain, 0.0) / width);
-  return std::min((1 + above) / (1 + n), std::max(tail, std::numeric_limits<double>::min()));
+  constexpr std::size_t kEnough = 10;
+  const auto above =
+      std::count_if(simulated.begin(), simulated.end(), [&](double s) { return s >= gain; });
+  const double counted = (1 + static_cast<double>(above)) / (1 + n);
+  if (static_cast<std::size_t>(above) >= kEnough || simulated.size() < 2 * kEnough) return counted;
+  std::nth_element(simulated.begin(), simulated.begin() + (kEnough - 1), simulated.end(),
+                   std::greater<>());
+  const double anchor = simulated[kEnough - 1];
+  if (!(anchor > 0)) return counted;
+  const double shape = 0.5 * freedom;
+  const double width = anchor / (2 * boost::math::gamma_q_inv(shape, (1.0 + kEnough) / (1 + n)));
+  const double tail = boost::math::gamma_q(shape, 0.5 * gain / width);
+  return std::max(tail, std::numeric_limits<double>::min());
 }
 
 // Square of what an effect changes, without what chance adds to differences of single runs: from
@@ -284,7 +290,7 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
           fit.amplitude * candidates[c].differences[static_cast<std::size_t>(fit.difference)];
       score.rms = std::sqrt(left.squaredNorm() / static_cast<double>(t));
     }
-    score.p_value = TailOf(score.gain, simulated[c], candidates[c].differences.size());
+    score.p_value = TailOf(score.gain, simulated[c], 1);
     std::vector<Eigen::VectorXd> rests;  // that the parameters do not imitate
     for (const Direction& direction : directions[c]) {
       // The point that imitates the effect best, seen from the fitted one.
@@ -358,7 +364,7 @@ absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedM
   }
   const Whitened larger = in_coordinates_of(*whitened);
   return TailOf(std::max(0.0, chi2 - larger.squares.minCoeff()), gains,
-                static_cast<std::size_t>(extended.parameters - base.parameters));
+                std::max(1, extended.parameters - base.parameters));
 }
 
 absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, int block) {
@@ -376,16 +382,22 @@ absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, in
     return absl::InvalidArgumentError("diagnosis: the models describe different readings");
   }
   const Eigen::VectorXd difference = terms[1] - terms[0];
+  constexpr Index kFewestBlocks = 8;
+  const Index length =
+      std::min<Index>(block, std::max<Index>(1, difference.size() / kFewestBlocks));
   std::vector<double> sums;
-  for (Index k = 0; k < difference.size(); k += block) {
-    sums.push_back(difference.segment(k, std::min<Index>(block, difference.size() - k)).sum());
+  for (Index k = 0; k < difference.size(); k += length) {
+    sums.push_back(difference.segment(k, std::min(length, difference.size() - k)).sum());
+  }
+  if (sums.size() < 2) {  // one reading says nothing of its own chance
+    return Advantage{.nats = difference.sum(), .sd = std::numeric_limits<double>::infinity()};
   }
   // Resampling n blocks with replacement: the standard deviation of the sum in closed form.
   const auto n = static_cast<double>(sums.size());
   const double mean = std::accumulate(sums.begin(), sums.end(), 0.0) / n;
   double square = 0;
   for (const double sum : sums) square += (sum - mean) * (sum - mean);
-  return Advantage{.nats = difference.sum(), .sd = std::sqrt(square)};
+  return Advantage{.nats = difference.sum(), .sd = std::sqrt(square * n / (n - 1))};
 }
 
 absl::StatusOr<double> LeftOutError(const FittedModel& model, const std::vector<int>& group) {

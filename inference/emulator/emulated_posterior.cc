@@ -4,7 +4,9 @@
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -86,6 +88,48 @@ Eigen::MatrixXd Factors(const std::vector<NoiseGroup>& groups, const Eigen::Matr
   }
   return factors;
 }
+
+// The noise group of each reading; no entries without groups.
+std::vector<Index> GroupOfReadings(const std::vector<NoiseGroup>& groups, const DataSet& data) {
+  std::map<std::pair<int, int>, Index> of_curve;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    for (const auto& member : groups[g].members) of_curve[member] = static_cast<Index>(g);
+  }
+  std::vector<Index> group;
+  if (groups.empty()) return group;
+  for (const Reading& reading : data.readings) {
+    group.push_back(of_curve.at({reading.experiment, reading.observable}));
+  }
+  return group;
+}
+
+// What the emulator does not know of the mean history at each point, the sum over readings of its
+// variance in units of the noise there: q variances of scores in each row of sd, and factors of the
+// noise variance (none: as stated).
+class Ignorance {
+ public:
+  Ignorance(const PrincipalComponents& components, const std::vector<Index>& group)
+      : shares_(Eigen::MatrixXd::Zero(1, components.basis.cols())) {
+    for (const Index g : group) {
+      if (g >= shares_.rows()) {
+        shares_.conservativeResizeLike(Eigen::MatrixXd::Zero(g + 1, shares_.cols()));
+      }
+    }
+    for (Index k = 0; k < components.basis.rows(); ++k) {
+      const Index g = group.empty() ? 0 : group[static_cast<std::size_t>(k)];
+      shares_.row(g) += components.basis.row(k).cwiseAbs2();
+    }
+  }
+
+  Eigen::VectorXd operator()(const Eigen::MatrixXd& sd, const Eigen::MatrixXd& factors) const {
+    const Eigen::MatrixXd by_group = sd.cwiseAbs2() * shares_.transpose();
+    return factors.cols() == 0 ? Eigen::VectorXd(by_group.rowwise().sum())
+                               : Eigen::VectorXd(by_group.cwiseQuotient(factors).rowwise().sum());
+  }
+
+ private:
+  Eigen::MatrixXd shares_;  // groups x q: squares of the basis, summed over the group's readings
+};
 
 // The columns that are sampled, and the held values in their places.
 struct Held {
@@ -197,14 +241,19 @@ double PredictiveP(const EmulatedLikelihood& likelihood, const ScorePrediction& 
   return sum / static_cast<double>(misfit.size());
 }
 
-// The errors in units of the noise sd, the inferred one with kInferred.
-void StateErrors(const TrainedEmulator& trained, double noise_variance, EmulatedResult& result) {
+// The errors in units of the noise sd of each reading, with kInferred sqrt(variance) times that
+// stated; T variances.
+void StateErrors(const TrainedEmulator& trained, const Eigen::VectorXd& variance,
+                 EmulatedResult& result) {
   const CrossValidation& check = trained.emulator.cross_validation();
-  const double unit = std::sqrt(noise_variance);
-  result.cross_validated_error = check.rms / unit;
-  result.reading_error =
-      check.error.colwise().norm() / (unit * std::sqrt(static_cast<double>(check.error.rows())));
-  result.scatter = check.scatter_rms / unit;
+  const auto runs = static_cast<double>(check.error.rows());
+  const Eigen::ArrayXd square = check.error.colwise().squaredNorm().transpose().array() / runs;
+  const Eigen::ArrayXd in_units = square / variance.array();
+  result.reading_error = in_units.sqrt();
+  result.cross_validated_error = std::sqrt(in_units.mean());
+  // Its share of the errors' square is known for all readings together.
+  result.scatter =
+      check.scatter_rms * (check.rms > 0 ? result.cross_validated_error / check.rms : 1);
   result.calibration = check.calibration;
   result.runs = trained.runs;
   result.components = static_cast<int>(trained.emulator.components().basis.cols());
@@ -215,7 +264,8 @@ void StateErrors(const TrainedEmulator& trained, double noise_variance, Emulated
 EmulatedResult KnowsNothing(const EmulatorOptions& options, const TrainedEmulator& trained) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   EmulatedResult result;
-  StateErrors(trained, 1, result);
+  StateErrors(trained, Eigen::VectorXd::Ones(trained.emulator.cross_validation().error.cols()),
+              result);
   result.log_evidence = result.log_evidence_se = result.emulator_sd = kNone;
   result.reason = absl::StrFormat(
       "Nowhere in the prior does an emulator of %d runs know the mean history of the model to "
@@ -321,6 +371,8 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
     }
     sampled = sampled.With(scales);
   }
+  const std::vector<Index> group = GroupOfReadings(groups, data);
+  const Ignorance ignorance(trained->emulator.components(), group);
   const TmcmcOptions sampler{.samples = options.draws,
                              .target_cv = options.target_cv,
                              .steps = options.steps,
@@ -330,14 +382,15 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
       [&](const Eigen::MatrixXd& points) {
         const ScorePrediction prediction =
             trained->emulator.Predict(ToStandard(priors, held.Complete(points)));
-        Eigen::VectorXd values =
-            likelihood->LogLikelihood(prediction, Factors(groups, points, free));
+        const Eigen::MatrixXd factors = Factors(groups, points, free);
+        Eigen::VectorXd values = likelihood->LogLikelihood(prediction, factors);
+        const Eigen::VectorXd unknown = ignorance(prediction.sd, factors);
         // Where no run has been, nothing can be said: a model that fits nowhere would otherwise
         // prefer the corner of which the emulator knows least.
         const double most =
             options.max_error * options.max_error * static_cast<double>(data.readings.size());
         for (Index i = 0; i < values.size(); ++i) {
-          if (prediction.sd.row(i).squaredNorm() > most) {
+          if (unknown[i] > most) {
             values[i] = -std::numeric_limits<double>::infinity();
           } else {
             ++known;
@@ -357,7 +410,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   result.log_evidence = state->log_evidence;
   result.log_evidence_se = state->LogEvidenceStandardError();
   ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, result.draws));
-  const double unknown = prediction.sd.squaredNorm();
+  const double unknown = ignorance(prediction.sd, Factors(groups, state->samples, free)).sum();
   if (options.noise == NoiseMode::kGiven) {
     result.predictive_p = PredictiveP(*likelihood, prediction, data.readings.size());
   }
@@ -380,7 +433,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   }
   result.correlation = CorrelationOf(
       WeightedCovariance(log_weights, result.draws, WeightedMean(log_weights, result.draws)));
-  double noise_variance = 1;
+  Eigen::VectorXd variance = Eigen::VectorXd::Ones(static_cast<Index>(data.readings.size()));
   if (options.noise == NoiseMode::kInferred) {
     const Eigen::MatrixXd factors = Factors(groups, state->samples, free);
     result.variance_factors.resize(factors.cols());
@@ -393,12 +446,13 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
             std::sqrt(WeightedQuantile(log_weights, factors.col(g), kQuantiles[k]));
       }
     }
-    noise_variance = result.variance_factors.mean();
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      variance[static_cast<Index>(k)] = result.variance_factors[group[k]];
+    }
   }
-  StateErrors(*trained, noise_variance, result);
+  StateErrors(*trained, variance, result);
   result.emulator_sd =
-      std::sqrt(unknown / (static_cast<double>(n) * static_cast<double>(data.readings.size()))) /
-      std::sqrt(noise_variance);
+      std::sqrt(unknown / (static_cast<double>(n) * static_cast<double>(data.readings.size())));
   AddScatter(data, trained->emulator, result);
   AddPredictive(data, trained->emulator, prediction, options.seed, result);
   Judge(options, result);

@@ -4,6 +4,8 @@
 #include <limits>
 #include <vector>
 
+#include "inference/sampling/shuffle.h"
+
 namespace calib::inference {
 namespace {
 
@@ -11,14 +13,19 @@ using Eigen::Index;
 
 constexpr int kDraws = 500;  // the mean of so many is known to 0.05 sd
 
-// Of the undiverged runs those with this parity, all iterations counted through.
-std::vector<Iteration> HalfOf(std::span<const Iteration> iterations, int parity) {
+// Of the undiverged runs one half, all iterations counted through.
+std::vector<Iteration> HalfOf(std::span<const Iteration> iterations, int which) {
+  Index runs = 0;
+  for (const Iteration& iteration : iterations) runs += iteration.predictions.rows();
+  const std::vector<int> half_of_run = Halves(runs);
   std::vector<Iteration> half;
-  int run = 0;
+  std::size_t run = 0;
   for (const Iteration& iteration : iterations) {
     std::vector<Index> rows;
     for (Index i = 0; i < iteration.predictions.rows(); ++i) {
-      if (iteration.predictions.row(i).allFinite() && run++ % 2 == parity) rows.push_back(i);
+      if (iteration.predictions.row(i).allFinite() && half_of_run[run++] == which) {
+        rows.push_back(i);
+      }
     }
     half.push_back({.proposal = iteration.proposal,
                     .parameters = iteration.parameters(rows, Eigen::all),
@@ -41,11 +48,11 @@ SplitHalf SplitHalfOfEmulator(const JointPrior& priors, const DataSet& data,
   of_half.replicates.reset();  // they move draws, not means
   Eigen::MatrixXd means(2, d);
   double log_evidence[2];
-  for (int parity = 0; parity < 2; ++parity) {
-    const auto half = EmulatedPosterior(priors, data, of_half, HalfOf(iterations, parity), stop);
+  for (int which = 0; which < 2; ++which) {
+    const auto half = EmulatedPosterior(priors, data, of_half, HalfOf(iterations, which), stop);
     if (!half.ok() || half->draws.rows() == 0) return split;
-    means.row(parity) = half->draws.colwise().mean();
-    log_evidence[parity] = half->log_evidence;
+    means.row(which) = half->draws.colwise().mean();
+    log_evidence[which] = half->log_evidence;
   }
   for (Index j = 0; j < d; ++j) {
     split.difference[j] =

@@ -14,7 +14,7 @@ namespace calib::inference {
 
 struct SplitHalf {
   /// Difference of the means of two posteriors over the sd of `whole`, d entries: each is sampled
-  /// on an emulator of every second undiverged run, `whole` on one of all runs of the same
+  /// on an emulator of one of each pair of runs, `whole` on one of all runs of the same
   /// iterations. Pessimistic, as half of the runs teach an emulator less. NaN for parameters that
   /// are held, and for all where half of the runs give no posterior at all.
   Eigen::VectorXd difference;

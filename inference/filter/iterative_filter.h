@@ -123,7 +123,7 @@ struct Posterior {
   /// 95 %): by how much the errors are larger than stated.
   Eigen::MatrixXd noise_scale;
   std::vector<std::optional<double>> frozen;  ///< of the last proposal: what all this is given
-  /// Split-half agreement, d: difference of the means of every second sample over the posterior sd,
+  /// Split-half agreement, d: difference of the means of two halves of the samples over the posterior sd,
   /// NaN for what is held. About 2 / sqrt(ess) where the weights are enough.
   Eigen::VectorXd split_half;
   /// kGiven: posterior predictive p-value of the misfit, sum_i w_i P(chi^2_T >= chi^2(y, x_i)):

@@ -17,6 +17,7 @@
 #include "inference/filter/sequential_filter.h"
 #include "inference/filter/weighted_moments.h"
 #include "inference/sampling/halton.h"
+#include "inference/sampling/shuffle.h"
 
 namespace calib::inference {
 namespace {
@@ -119,17 +120,19 @@ double PredictiveP(const DataSet& data, const Ensemble& ensemble,
   return p;
 }
 
-// Differences of the means of every second sample over sd.
+// Differences of the means of two halves of the samples over sd.
 Eigen::VectorXd SplitHalf(const Ensemble& ensemble, const Eigen::VectorXd& log_weights,
                           const std::vector<ParameterSummary>& parameters) {
   const Eigen::Index d = ensemble.parameters.cols();
+  const std::vector<int> half = Halves(log_weights.size());
   double mass[2] = {0, 0};
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(2, d);
   for (Eigen::Index i = 0; i < log_weights.size(); ++i) {
     const double weight = std::exp(log_weights[i]);
-    mass[i % 2] += weight;
+    const int own = half[static_cast<std::size_t>(i)];
+    mass[own] += weight;
     for (Eigen::Index j = 0; j < d; ++j)
-      sums(i % 2, j) += weight * (ensemble.parameters(i, j) - parameters[j].mean);
+      sums(own, j) += weight * (ensemble.parameters(i, j) - parameters[j].mean);
   }
   Eigen::VectorXd difference(d);
   for (Eigen::Index j = 0; j < d; ++j) {

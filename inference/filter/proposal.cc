@@ -12,6 +12,7 @@
 #include "inference/sampling/halton.h"
 #include "inference/sampling/latin_hypercube.h"
 #include "inference/sampling/philox.h"
+#include "inference/sampling/shuffle.h"
 #include "inference/sampling/sobol.h"
 
 namespace calib::inference {
@@ -59,9 +60,27 @@ PhiloxStream DrawStream(const FilterOptions& options, int iteration, int sample)
                        .sample = static_cast<std::uint64_t>(sample)});
 }
 
+// Rows shuffled within blocks (sampling/shuffle.h): sample i runs on packing i mod R, which in the
+// order of a sequence would be a digit of a parameter. Whole blocks do not depend on the number of
+// rows, so that a larger campaign finds the runs of a smaller one.
+Eigen::MatrixXd InAnOrderOfItsOwn(const Eigen::MatrixXd& samples, std::uint64_t seed) {
+  constexpr Eigen::Index kRows = 64;
+  Eigen::MatrixXd shuffled(samples.rows(), samples.cols());
+  for (Eigen::Index first = 0; first < samples.rows(); first += kRows) {
+    const Eigen::Index rows = std::min(kRows, samples.rows() - first);
+    const std::vector<Eigen::Index> order =
+        Shuffled(rows, PhiloxStream({.seed = seed,
+                                     .purpose = StreamPurpose::kDesignOrder,
+                                     .iteration = 0,
+                                     .sample = static_cast<std::uint64_t>(first)}));
+    shuffled.middleRows(first, rows) = samples.middleRows(first, rows)(order, Eigen::all);
+  }
+  return shuffled;
+}
+
 // The points of a design that meet the constraints. A sequence goes on past those that do not, so
-// that row i is the i-th one that does, whatever n; a Latin hypercube has no further points, and a
-// draw from the prior takes the place of each.
+// that it is the same whatever n; a Latin hypercube has no further points, and a draw from the
+// prior takes the place of each.
 absl::StatusOr<Eigen::MatrixXd> FirstSamples(const JointPrior& priors, const FilterOptions& options,
                                              int n) {
   const auto d = static_cast<int>(priors.size());
@@ -82,7 +101,7 @@ absl::StatusOr<Eigen::MatrixXd> FirstSamples(const JointPrior& priors, const Fil
       }
       samples.row(filled++) = x;
     }
-    if (filled == n) return samples;
+    if (filled == n) return InAnOrderOfItsOwn(samples, options.seed);
   }
 }
 

@@ -1,6 +1,8 @@
 #include "inference/prediction/prediction.h"
 
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 
@@ -40,13 +42,17 @@ double Quantile(const QuantityPrediction& prediction, Index t, double p) {
 
 void SetQuantiles(QuantityPrediction& result) {
   const Index t = result.mean.size();
+  constexpr double kTail = 0.95;
+  const double stretch = boost::math::quantile(boost::math::students_t(result.freedom), kTail) /
+                         boost::math::quantile(boost::math::normal(), kTail) *
+                         std::sqrt(1 + 1 / static_cast<double>(result.conditional_mean.rows()));
   result.q05.resize(t);
   result.q50.resize(t);
   result.q95.resize(t);
   for (Index k = 0; k < t; ++k) {
-    result.q05[k] = Quantile(result, k, 0.05);
-    result.q50[k] = Quantile(result, k, 0.5);
-    result.q95[k] = Quantile(result, k, 0.95);
+    const double middle = result.q50[k] = Quantile(result, k, 0.5);
+    result.q05[k] = middle + stretch * (Quantile(result, k, 0.05) - middle);
+    result.q95[k] = middle + stretch * (Quantile(result, k, 0.95) - middle);
   }
 }
 
@@ -78,8 +84,10 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
   result.separated = n >= d + 4;
   result.sd = (variance + error_sd.array().square()).sqrt();
   result.sd_parameters = result.sd_model = Eigen::VectorXd::Constant(t, kNone);
-  result.conditional_mean = runs;
-  result.conditional_sd = error_sd;
+  // Too few to tell the parts apart: one normal law about their mean.
+  result.conditional_mean = result.mean.transpose().replicate(n, 1);
+  result.conditional_sd = result.sd;
+  result.freedom = static_cast<double>(n - 1);
   if (result.separated) {
     const Eigen::MatrixXd centred = parameters.rowwise() - parameters.colwise().mean();
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> regression(centred);
@@ -91,6 +99,7 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
     const Eigen::ArrayXd raw =
         fitted.colwise().squaredNorm().transpose().array() / static_cast<double>(n - 1);
     const Eigen::ArrayXd own = (raw - scatter * rank / static_cast<double>(n - 1)).max(0);
+    result.freedom = static_cast<double>(n - 1) - rank;
     result.sd_parameters = own.sqrt();
     result.sd_model = scatter.sqrt();
     result.sd = (own + scatter + error_sd.array().square()).sqrt();

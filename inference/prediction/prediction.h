@@ -13,9 +13,12 @@ struct QuantityPrediction {
   Eigen::VectorXd sd;             ///< T, of Q: both parts and the error of a reading       [Eq. 15]
   Eigen::VectorXd sd_parameters;  ///< T, of mu over the posterior; NaN where not separated
   Eigen::VectorXd sd_model;       ///< T, of a run about mu: scatter of packings; NaN likewise
-  Eigen::VectorXd q05, q50, q95;  ///< T, of Q, from the mixture over draws                 [Eq. 12]
+  /// T, of Q, from the mixture over draws [Eq. 12], stretched about the median by what is not known
+  /// of the mean and the scatter of so few runs (Student's t).
+  Eigen::VectorXd q05, q50, q95;
   /// False: too few runs (fewer than d + 4) to tell the two parts apart; sd holds both.
   bool separated = false;
+  double freedom = 1;  ///< degrees of freedom from which the scatter is known
 
   Eigen::MatrixXd conditional_mean;  ///< N x T: mu at each draw
   Eigen::VectorXd conditional_sd;    ///< T: of Q there

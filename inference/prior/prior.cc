@@ -178,6 +178,12 @@ double Prior::FromNormalScore(double z) const {
 
 double Prior::StandardDeviation() const {
   if (!IsLog(kind)) return PlainScaling(*this).width;
+  if (IsNormal(kind)) {
+    const auto [a, b] = NormalBounds(*this);
+    if (a == -kInfinity && b == kInfinity) {
+      return std::exp(mean + 0.5 * sd * sd) * std::sqrt(std::expm1(sd * sd));
+    }
+  }
   // Midpoint rule over equally probable strips.
   constexpr int kStrips = 2048;
   double sum = 0;

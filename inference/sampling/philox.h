@@ -25,6 +25,8 @@ enum class StreamPurpose : std::uint64_t {
   kDiagnosisDraws = 24,
   kRefitSpread = 25,
   kAudit = 26,
+  kDesignOrder = 27,
+  kHalves = 28,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "inference/emulator/gaussian_process.h"
+#include "inference/sampling/shuffle.h"
 #include "inference/sampling/sobol.h"
 
 namespace calib::inference {
@@ -46,6 +49,20 @@ double Correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   const Eigen::ArrayXd y = b.array() - b.mean();
   const double scale = std::sqrt(x.square().sum() * y.square().sum());
   return scale > 0 ? (x * y).sum() / scale : kNone;
+}
+
+// Of rows that were drawn with replacement from weighted ones: m^2 over the sum of squares of how
+// often each stands there.
+double EffectiveNumber(const Eigen::MatrixXd& points) {
+  std::map<std::vector<double>, double> times;
+  for (Index i = 0; i < points.rows(); ++i) {
+    const Eigen::VectorXd row = points.row(i);
+    times[{row.begin(), row.end()}] += 1;
+  }
+  double squares = 0;
+  for (const auto& [row, count] : times) squares += count * count;
+  const auto m = static_cast<double>(points.rows());
+  return m * m / squares;
 }
 
 Eigen::MatrixXd ToStandard(const JointPrior& priors, const Eigen::MatrixXd& parameters) {
@@ -159,13 +176,19 @@ absl::StatusOr<std::vector<OutputSensitivity>> AnalyseSensitivity(
                                                       parameters.rows(), "."));
   }
   const Index used = std::min<Index>(parameters.rows(), options.max_runs);
-  std::vector<Index> rows;  // evenly chosen
-  for (Index i = 0; i < used; ++i) rows.push_back(i * parameters.rows() / used);
+  // By chance: the order of the runs may be that of a grid or a sequence.
+  std::vector<Index> rows =
+      Shuffled(parameters.rows(), PhiloxStream({.seed = options.sobol.seed,
+                                                .purpose = StreamPurpose::kSensitivity,
+                                                .iteration = 0,
+                                                .sample = 0}));
+  rows.resize(static_cast<std::size_t>(used));
   const Eigen::MatrixXd inputs = ToStandard(priors, parameters(rows, Eigen::all));
   const Eigen::MatrixXd values = outputs(rows, Eigen::all);
   const Eigen::MatrixXd standard_points = ToStandard(priors, points);
   std::vector<Eigen::VectorXd> ranks;
   for (Index j = 0; j < d; ++j) ranks.push_back(Ranks(points.col(j)));
+  const double effective = EffectiveNumber(points);
   // The jackknife needs differences between emulators alone, at the same points.
   SobolOptions coarse = options.sobol;
   coarse.replicates = 2;
@@ -214,7 +237,7 @@ absl::StatusOr<std::vector<OutputSensitivity>> AnalyseSensitivity(
       out.indices.total_error = join(total, out.indices.total_error);
     }
     const Eigen::VectorXd sampling =
-        (1 - out.correlation.array().square()) / std::sqrt(static_cast<double>(points.rows() - 1));
+        (1 - out.correlation.array().square()) / std::sqrt(std::max(1.0, effective - 1));
     out.correlation_error = join(correlation, sampling);
   }
   return all;

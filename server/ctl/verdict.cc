@@ -27,13 +27,14 @@ bool ClearlyBetter(const WarmFit& a, const WarmFit& b, const Eigen::MatrixXd& er
   return advantage.ok() && advantage->nats > 2 * advantage->sd && advantage->nats > 0;
 }
 
-// Whatever the width of the prior on the strengths. An evidence is unknown where the emulator
-// does not know what the model can do: nothing is favoured over that.
+// Whatever the width of the prior on the strengths, by more than two standard errors. An evidence
+// is unknown where the emulator does not know what the model can do: nothing is favoured over that.
 bool EvidenceFavours(const std::optional<ScaledEvidence>& a,
                      const std::optional<ScaledEvidence>& b) {
-  return a && b &&
-         std::equal(a->log_evidence.begin(), a->log_evidence.end(), b->log_evidence.begin(),
-                    [](double x, double y) { return x > y; });
+  if (!a || !b) return false;
+  const double margin = 2 * std::hypot(a->standard_error, b->standard_error);
+  return std::equal(a->log_evidence.begin(), a->log_evidence.end(), b->log_evidence.begin(),
+                    [margin](double x, double y) { return x - y > margin; });
 }
 
 }  // namespace
@@ -45,7 +46,7 @@ const WarmFit* Verdict::Find(const std::string& effect) const {
 
 bool Verdict::Explains(const CandidateEffect& candidate) const {
   const WarmFit* fit = Find(candidate.effect);
-  return fit != nullptr && (fit->Explains(level_, fits_.size()) || Settles(candidate, *fit)) &&
+  return fit != nullptr && (fit->Explains(level_, fits_.size()) || Settles(*fit)) &&
          !WorseLeftOut(*fit);
 }
 
@@ -56,11 +57,14 @@ bool Verdict::WorseLeftOut(const WarmFit& fit) const {
 }
 
 // The model without it is wrong beyond doubt, and with it adequate and rid of nearly all the
-// misfit. The advantage in nats of a misfit that sits in one stage of loading is never twice its
-// bootstrapped deviation.
-bool Verdict::Settles(const CandidateEffect& candidate, const WarmFit& fit) const {
-  return fit.adequacy.p_value >= level_ && candidate.explained_fraction >= kNearlyAll &&
-         diagnosis_.adequacy.p_value * static_cast<double>(fits_.size()) < level_ * level_;
+// misfit, by the errors of the model without it (its own hold what its emulator does not know). The
+// advantage in nats of a misfit that sits in one stage of loading is never twice its bootstrapped
+// deviation.
+bool Verdict::Settles(const WarmFit& fit) const {
+  const inference::Adequacy& base = diagnosis_.adequacy;
+  const double misfit = std::max(1.0, base.chi2 - base.degrees);
+  return fit.adequacy.p_value >= level_ && 2 * fit.over_base.nats >= kNearlyAll * misfit &&
+         base.p_value * static_cast<double>(fits_.size()) < level_ * level_;
 }
 
 // Explains clearly less than the best does, and is far off from where the best was after as many
@@ -69,25 +73,32 @@ bool Verdict::Settles(const CandidateEffect& candidate, const WarmFit& fit) cons
 bool Verdict::IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const {
   const WarmFit& fit = *Find(other.effect);
   const WarmFit& best = *Find(first.effect);
+  if (!fit.Judged() || !fit.Found()) return PromisesLess(other, first);
   if (fit.chi2_after.empty() || best.chi2_after.empty()) return false;
-  if (!fit.Found()) {
-    return other.screen_explained < first.screen_explained - kClearlyLess;
-  }
   const std::size_t batches = std::min(fit.chi2_after.size() + 1, best.chi2_after.size());
   return other.explained_fraction < first.explained_fraction - kClearlyLess &&
          fit.adequacy.chi2 >
              kFarOff * std::max(best.chi2_after[batches - 1], best.adequacy.degrees);
 }
 
-// Beaten, at its end or with the evidence against it. A fit that was made without runs has no
-// evidence and needs none: all its points are known.
+// Beaten, at its end or with the evidence against it. One that was never judged, or never found,
+// has no end: the screen knows more of it. A fit that was made without runs has no evidence and
+// needs none: all its points are known.
 bool Verdict::Excluded(const CandidateEffect& other, const CandidateEffect& first) const {
   const WarmFit& best = *Find(first.effect);
   const WarmFit& fit = *Find(other.effect);
   const bool outweighed = EvidenceFavours(best.evidence, fit.evidence);
-  if (!Explains(other)) return fit.stalled || outweighed || IsFarOff(other, first);
+  if (!Explains(other)) {
+    const bool ended = fit.stalled && fit.Judged() && fit.Found();
+    return ended || outweighed || IsFarOff(other, first);
+  }
   return ClearlyBetter(best, fit, base_.covariance) &&
          (outweighed || fit.runs.histories.rows() == 0);
+}
+
+// To the screen, clearly.
+bool Verdict::PromisesLess(const CandidateEffect& other, const CandidateEffect& first) {
+  return other.screen_explained < first.screen_explained - kClearlyLess;
 }
 
 // At an angle to what the first explains a share of that is left.
@@ -120,7 +131,15 @@ void Verdict::Conclude(bool base_fits) {
   std::vector<const CandidateEffect*> unknown;
   for (const CandidateEffect& other : diagnosis_.candidates) {
     const WarmFit* fit = Find(other.effect);
-    if (fit == nullptr || fit == &best || Excluded(other, first)) continue;
+    if (fit == nullptr) {  // there were no runs left for it
+      const auto& alike = first.confusable_with;
+      const bool named = std::find(alike.begin(), alike.end(), other.effect) != alike.end();
+      if (!named && other.p_value < level_ && !PromisesLess(other, first)) {
+        unknown.push_back(&other);
+      }
+      continue;
+    }
+    if (fit == &best || Excluded(other, first)) continue;
     if (Explains(other)) {
       as_good.emplace_back(fit->adequacy.chi2, other.effect);
     } else {
@@ -209,7 +228,8 @@ std::string Verdict::Closest() const {
   if (!base.ok()) return name;
   double lowest = kClearlyCloser * base->chi2;
   for (const CandidateEffect& candidate : diagnosis_.candidates) {
-    if (candidate.campaign.empty() || candidate.refit_chi2 >= lowest) continue;
+    const WarmFit* fit = Find(candidate.effect);
+    if (fit == nullptr || !fit->Judged() || candidate.refit_chi2 >= lowest) continue;
     name = candidate.effect;
     lowest = candidate.refit_chi2;
   }

@@ -29,9 +29,10 @@ class Verdict {
 
  private:
   const WarmFit* Find(const std::string& effect) const;
-  bool Settles(const CandidateEffect& candidate, const WarmFit& fit) const;
+  bool Settles(const WarmFit& fit) const;
   bool Excluded(const CandidateEffect& other, const CandidateEffect& first) const;
   bool IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const;
+  static bool PromisesLess(const CandidateEffect& other, const CandidateEffect& first);
   double Chi2OfDouble(const std::string& other, const CandidateEffect& first) const;
   bool WorseLeftOut(const WarmFit& fit) const;
   std::string Closest() const;

@@ -1,6 +1,7 @@
 #pragma once
 // The model refitted with one effect more, and how it was judged.
 
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <map>
@@ -34,6 +35,9 @@ struct WarmFit {
   std::optional<double> left_out_error{};
   /// None before WeighEvidence, or where the emulator does not know the runs well enough.
   std::optional<ScaledEvidence> evidence{};
+
+  /// False as long as its emulator knows too little of it, or not one run has ended.
+  bool Judged() const { return std::isfinite(adequacy.chi2); }
 
   /// Closer than the base model, which it contains: judged by the same errors. One that is not has
   /// merely not been found.

@@ -96,9 +96,11 @@ TEST_F(VerdictTest, AMisfitInOneStageThatGoesIsExplained) {
     diagnosis_ = {};
     diagnosis_.adequacy.p_value = beyond_doubt ? 1e-50 : 1e-3;
     Refit("plasticity", kClose, 0.95);
-    fits_["plasticity"].over_base = {.nats = 500, .sd = 300};
+    diagnosis_.adequacy.chi2 = kAway;
+    fits_["plasticity"].over_base = {.nats = 0.46 * kAway, .sd = kAway};
     EXPECT_EQ(Concluded(), beyond_doubt ? "missing_effect" : "unexplained");
-    diagnosis_.candidates.front().explained_fraction = 0.8;
+    // Adequate since the emulator knows little: by the base model's errors it is not near.
+    fits_["plasticity"].over_base.nats = 0.4 * kAway;
     diagnosis_.effect = "";
     EXPECT_EQ(Concluded(), "unexplained");
   }
@@ -177,6 +179,42 @@ TEST_F(VerdictTest, WhatTheScreenCannotTellFromItIsNamedUnlessItWasFitted) {
   EXPECT_EQ(Group(), Names{"membrane"});
 }
 
+TEST_F(VerdictTest, ARefitThatEndedWithoutBeingFoundIsJudgedByTheScreen) {
+  Refit("rolling", kClose);
+  WarmFit& lost = Refit("twisting", 2 * kAway, 0);  // at its end
+  lost.adequacy = WarmFit().adequacy;
+  diagnosis_.candidates[0].screen_explained = 0.8;
+  for (const bool judged : {true, false}) {
+    diagnosis_.candidates[0].confusable_with.clear();
+    diagnosis_.unfinished.clear();
+    if (judged) lost.adequacy = *inference::TestAdequacy(lost.model);
+    diagnosis_.candidates[1].screen_explained = 0.7;
+    EXPECT_EQ(Concluded(), "ambiguous") << judged;
+    EXPECT_EQ(diagnosis_.unfinished, Names{"twisting"});
+    diagnosis_.candidates[0].confusable_with.clear();
+    diagnosis_.candidates[1].screen_explained = 0.3;
+    EXPECT_EQ(Concluded(), "missing_effect") << judged;
+    lost.adequacy = WarmFit().adequacy;
+  }
+}
+
+TEST_F(VerdictTest, OneThatTheScreenSawAndNobodyRefittedIsNotExcluded) {
+  Refit("rolling", kClose);
+  CandidateEffect& other = diagnosis_.candidates.emplace_back();
+  other.effect = "capillary";
+  other.p_value = 1e-9;
+  other.screen_explained = 0.9;
+  diagnosis_.candidates.front().screen_explained = 0.8;
+  EXPECT_EQ(Concluded(), "ambiguous");
+  EXPECT_EQ(diagnosis_.unfinished, Names{"capillary"});
+  diagnosis_.candidates.front().confusable_with.clear();
+  diagnosis_.candidates[1].p_value = 0.3;
+  EXPECT_EQ(Concluded(), "missing_effect");
+  diagnosis_.candidates[1].p_value = 1e-9;
+  diagnosis_.candidates[1].screen_explained = 0.5;
+  EXPECT_EQ(Concluded(), "missing_effect");
+}
+
 // Not one of its runs has come to an end.
 TEST_F(VerdictTest, ARefitWithoutRunsExplainsNothing) {
   diagnosis_.adequacy.p_value = 1e-50;
@@ -241,6 +279,10 @@ TEST_F(VerdictTest, AWorseFitThatEvidenceDoesNotOutweighStaysInTheGroup) {
   EXPECT_EQ(Concluded(), "ambiguous");  // not for every width
   diagnosis_.candidates.front().confusable_with.clear();
   fits_["twisting"].evidence->log_evidence = {1, 1, 1};
+  fits_["twisting"].evidence->standard_error = 5;
+  EXPECT_EQ(Concluded(), "ambiguous") << "within two standard errors";
+  diagnosis_.candidates.front().confusable_with.clear();
+  fits_["twisting"].evidence->standard_error = 3;
   EXPECT_EQ(Concluded(), "missing_effect");
 }
 

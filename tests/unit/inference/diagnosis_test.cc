@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iostream>
+#include <map>
+#include <string>
 
 #include "inference/diagnosis/screen.h"
 #include "inference/sampling/philox.h"
@@ -322,6 +325,45 @@ TEST(Diagnosis, GainOfAnExtensionIsAsRareAsItsPValueSays) {
   EXPECT_LT(*SignificanceOfGain(LineWithDraws(measured, 2), LineAndSine(measured)), 1e-4);
   EXPECT_FALSE(SignificanceOfGain(Line(measured), LineAndSine(measured)).ok());  // no draws
   EXPECT_FALSE(SignificanceOfGain(LineWithDraws(measured, 2), Line(measured)).ok());
+}
+
+// Measurements that scatter twice as far as their covariance says, without any effect: beyond what
+// the simulations can count, too, small p values have to be as rare as they say.
+TEST(Diagnosis, SmallPValuesOfTheScreenAreAsRareAsTheySay) {
+  constexpr int kMeasurements = 300;
+  const std::vector<Signature> candidates = {{"one side", {2 * Curve(2)}, false},
+                                             {"both sides", {2 * Curve(2), 5 * Curve(2)}, true}};
+  std::map<std::string, std::array<int, 2>> below;  // 0.01, 0.001
+  for (int seed = 0; seed < kMeasurements; ++seed) {
+    const auto scores =
+        Screen(LineWithDraws(12 * Curve(0) + 2 * Noise(5000 + seed), 2), candidates);
+    ASSERT_TRUE(scores.ok());
+    for (const Score& score : *scores) {
+      below[score.name][0] += score.p_value < 0.01 ? 1 : 0;
+      below[score.name][1] += score.p_value < 0.001 ? 1 : 0;
+    }
+  }
+  for (const auto& [name, count] : below) {
+    EXPECT_LE(count[0], 10) << name;  // four standard deviations above three, and above a third:
+    EXPECT_LE(count[1], 3) << name;
+    EXPECT_GE(count[0], 1) << name;
+  }
+}
+
+TEST(Diagnosis, AFewReadingsSayLittleOfTheirOwnChance) {
+  FittedModel one = Line(12 * Curve(0));
+  one.histories = Eigen::MatrixXd::Constant(1, 6, 1.0);
+  one.covariance = Eigen::MatrixXd::Identity(6, 6);
+  FittedModel other = one;
+  other.histories << 3, 1, 2, 1, 1.5, 1;
+  const auto advantage = Compare(one, other);
+  ASSERT_TRUE(advantage.ok());
+  // Terms 4, 0, 1.5, 0, 0.625, 0: their sum and sqrt(n) times their standard deviation.
+  EXPECT_DOUBLE_EQ(advantage->nats, 6.125);
+  EXPECT_NEAR(advantage->sd, 3.8556, 1e-4);
+  one.histories = other.histories = Eigen::MatrixXd::Constant(1, 1, 1.0);
+  one.covariance = other.covariance = Eigen::MatrixXd::Identity(1, 1);
+  EXPECT_TRUE(std::isinf(Compare(one, other)->sd));
 }
 
 TEST(Diagnosis, LeftOutReadingsAreMissedByAWrongModel) {

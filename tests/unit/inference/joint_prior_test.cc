@@ -58,10 +58,29 @@ TEST(JointPrior, ADesignPassesOverWhatViolatesAConstraint) {
       JointPrior::Create(Unit(2), {}, {{.coefficients = Eigen::Vector2d(1, 1), .limit = 0.5}})
           .value();
   const FilterOptions options{.design = Design::kSobol, .seed = 1};
-  const Eigen::MatrixXd few = DrawSamples({}, prior, options, 0, 20).value();
+  const Eigen::MatrixXd few = DrawSamples({}, prior, options, 0, 64).value();
   const Eigen::MatrixXd many = DrawSamples({}, prior, options, 0, 200).value();
-  EXPECT_EQ(few, many.topRows(20)) << "row i does not depend on the number of rows";
+  EXPECT_EQ(few, many.topRows(64)) << "a whole block does not depend on the number of rows";
   EXPECT_LE(many.rowwise().sum().maxCoeff(), 0.5);
+}
+
+// Sample i of a campaign runs on packing i mod R: no packing may have parameters of its own.
+TEST(JointPrior, RowsOfADesignGoByNoParameter) {
+  constexpr int kRows = 240;
+  for (const Design design : {Design::kHalton, Design::kSobol}) {
+    const FilterOptions options{.design = design, .seed = 1};
+    const Eigen::MatrixXd rows = DrawSamples({}, JointPrior(Unit(3)), options, 0, kRows).value();
+    for (const int packings : {2, 3, 4, 5, 8, 10}) {
+      for (int j = 0; j < 3; ++j) {
+        Eigen::VectorXd mean = Eigen::VectorXd::Zero(packings);
+        for (int i = 0; i < kRows; ++i) mean[i % packings] += rows(i, j) * packings / kRows;
+        // Of the variance 1/12 the packings' means have 1/kRows each by chance; in the order of the
+        // sequence up to all of it.
+        const double share = 12 * (mean.array() - mean.mean()).square().mean();
+        EXPECT_LT(share, 6.0 * packings / kRows) << packings << " packings, parameter " << j;
+      }
+    }
+  }
 }
 
 TEST(JointPrior, FurtherParametersAreIndependent) {

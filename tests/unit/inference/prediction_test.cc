@@ -72,7 +72,23 @@ TEST(Prediction, FewRunsAreNotTakenApart) {
   EXPECT_TRUE(std::isnan(p->sd_parameters[0]));
   EXPECT_TRUE(std::isfinite(p->sd[0]));
   EXPECT_LE(p->q05[0], p->q95[0]);
-  EXPECT_GE(p->q05[0], sample.runs.minCoeff() - 1e-9);
+}
+
+// One run more, at another draw, lies between them nine times in ten.
+TEST(Prediction, QuantilesOfFewRunsHoldWhatComesNext) {
+  constexpr int kTimes = 2000;
+  for (const Index n : {2, 5, 8, 20}) {
+    int held = 0;
+    for (int k = 0; k < kTimes; ++k) {
+      const Sample sample = Draw(n + 1, 1.5, 1000 + static_cast<std::uint64_t>(k));
+      const auto p = PredictQuantity(sample.parameters.topRows(n), sample.runs.topRows(n),
+                                     Eigen::VectorXd::Zero(1));
+      ASSERT_TRUE(p.ok());
+      const double next = sample.runs(n, 0);
+      held += next >= p->q05[0] && next <= p->q95[0] ? 1 : 0;
+    }
+    EXPECT_NEAR(held / static_cast<double>(kTimes), 0.9, 0.035) << n << " runs";
+  }
 }
 
 TEST(Prediction, RefusesWhatDoesNotFit) {

@@ -6,10 +6,37 @@
 
 #include "inference/sampling/halton.h"
 #include "inference/sampling/philox.h"
+#include "inference/sampling/shuffle.h"
 #include "inference/sampling/sobol.h"
 
 namespace calib::inference {
 namespace {
+
+TEST(Shuffled, EveryOrderAsOften) {
+  int first_of[4] = {};
+  constexpr int kDraws = 4000;
+  for (std::uint64_t k = 0; k < kDraws; ++k) {
+    const auto order =
+        Shuffled(4, PhiloxStream({.seed = 1, .purpose = StreamPurpose::kTest, .sample = k}));
+    ++first_of[order.front()];
+    std::vector<Eigen::Index> sorted = order;
+    std::sort(sorted.begin(), sorted.end());
+    ASSERT_EQ(sorted, (std::vector<Eigen::Index>{0, 1, 2, 3}));
+  }
+  for (const int count : first_of)
+    EXPECT_NEAR(count, kDraws / 4, 4 * std::sqrt(kDraws * 0.25 * 0.75));
+  EXPECT_TRUE(Shuffled(0, PhiloxStream({})).empty());
+}
+
+TEST(Halves, OneOfEachPair) {
+  const auto half = Halves(1001);
+  int firsts = 0;
+  for (std::size_t k = 0; k + 1 < half.size(); k += 2) {
+    ASSERT_EQ(half[k] + half[k + 1], 1);
+    firsts += half[k];
+  }
+  EXPECT_NEAR(firsts, 250, 4 * std::sqrt(500 * 0.25));
+}
 
 TEST(Halton, FirstPointsAreTheKnownFractions) {
   const Eigen::MatrixXd points = Halton(4, 3);

@@ -11,6 +11,7 @@
 
 #include "inference/emulator/split_half.h"
 #include "inference/sampling/halton.h"
+#include "inference/sampling/shuffle.h"
 #include "inference/sampling/sobol.h"
 #include "tests/verification/inference/linear_model.h"
 #include "tests/verification/inference/toy_curve.h"
@@ -86,6 +87,34 @@ TEST(EmulatedPosterior, InfersTheNoise) {
   }
 }
 
+// Noise that is stated 20 times too small for one of two curves: errors of the emulator are in units
+// of the noise as inferred for each, and where it is good enough is judged by that too.
+TEST(EmulatedPosterior, EachCurveHasTheUnitsOfItsOwnNoise) {
+  LinearModel model(60, 3, 0.3, 5);
+  Iteration runs = PriorRuns(model, 80);
+  for (Eigen::Index i = 0; i < runs.predictions.rows(); ++i) {  // nothing that could be learned
+    for (Eigen::Index k = 0; k < 60; ++k) {
+      runs.predictions(i, k) += 0.3 * std::sin(1e4 * static_cast<double>(i * 60 + k));
+    }
+  }
+  DataSet data = model.Data();
+  const auto as_it_is = EmulatedPosterior(model.priors, data, {.seed = 2}, {&runs, 1});
+  for (std::size_t k = 0; k < data.readings.size(); ++k) {
+    data.readings[k].observable = k < 30 ? 0 : 1;
+    data.readings[k].sd /= k < 30 ? 1 : 20;
+  }
+  const auto result =
+      EmulatedPosterior(model.priors, data, {.noise = NoiseMode::kInferred, .seed = 2}, {&runs, 1});
+  ASSERT_TRUE(as_it_is.ok() && result.ok()) << as_it_is.status() << result.status();
+  for (const Eigen::Index first : {0, 30}) {
+    EXPECT_NEAR(result->reading_error.segment(first, 30).norm() /
+                    as_it_is->reading_error.segment(first, 30).norm(),
+                1, 0.4)
+        << first;
+  }
+  EXPECT_NEAR(result->cross_validated_error / as_it_is->cross_validated_error, 1, 0.4);
+}
+
 TEST(EmulatedPosterior, SameSeedSameBitsAndDivergedRunsAreLeftOut) {
   const LinearModel model(20, 2, 0.3, 3);
   Iteration runs = PriorRuns(model, 40);
@@ -137,7 +166,7 @@ TEST(EmulatedPosterior, PredictiveProbabilityIsTheExactOneAndTellsAWrongModel) {
   }
 }
 
-// Twins: each run twice, so that both halves are the same. Then every second run comes from a model
+// Twins: each run twice, so that both halves are the same. Then those of one half come from a model
 // whose first parameter is off by a fifth of the prior's sd: the halves say so.
 TEST(SplitHalfOfEmulator, OfTwinsIsZeroAndOfOppositesIsWhatTheyDifferBy) {
   const LinearModel model(30, 2, 0.2, 77);
@@ -161,7 +190,9 @@ TEST(SplitHalfOfEmulator, OfTwinsIsZeroAndOfOppositesIsWhatTheyDifferBy) {
 
   constexpr double kOff = 0.2;
   Iteration opposites = runs;
-  for (Eigen::Index i = 1; i < 60; i += 2) {
+  const std::vector<int> half = Halves(60);
+  for (Eigen::Index i = 0; i < 60; ++i) {
+    if (half[static_cast<std::size_t>(i)] == 0) continue;
     Eigen::MatrixXd moved = runs.parameters.row(i);
     moved(0, 0) += kOff;
     opposites.predictions.row(i) = model.Predict(moved);

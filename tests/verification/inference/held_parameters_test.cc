@@ -10,6 +10,7 @@
 
 #include "inference/data/gaussian_likelihood.h"
 #include "inference/emulator/emulated_posterior.h"
+#include "inference/sampling/halton.h"
 #include "tests/verification/inference/linear_model.h"
 
 namespace calib::inference {
@@ -214,13 +215,27 @@ TEST(SplitHalf, OfTwinsIsZeroAndOfOppositesIsLarge) {
   Iteration twins;
   twins.parameters = Eigen::Vector4d(0.2, 0.2, 0.8, 0.8);
   twins.predictions = Eigen::Vector4d(0.1, 0.1, 0.4, 0.4);
-  Iteration opposites = twins;
-  opposites.parameters = Eigen::Vector4d(0.2, 0.8, 0.2, 0.8);
-  opposites.predictions.setZero();
+  Iteration opposites;  // one each
+  opposites.parameters = Eigen::Vector2d(0.2, 0.8);
+  opposites.predictions = Eigen::Vector2d::Zero();
   EXPECT_NEAR(ComputePosterior(priors, data, {}, std::vector<Iteration>{twins})->split_half[0], 0,
               1e-12);
   EXPECT_NEAR(ComputePosterior(priors, data, {}, std::vector<Iteration>{opposites})->split_half[0],
               2, 1e-12);
+}
+
+// Every second point of Halton's sequence lies above the middle of the first parameter.
+TEST(SplitHalf, OfASequenceIsThatOfChance) {
+  constexpr int kSamples = 4000;
+  DataSet data;
+  data.readings.push_back({.value = 0.5, .sd = 0.1});
+  const std::vector<Prior> priors(2, {.kind = PriorKind::kUniform, .min = 0, .max = 1});
+  Iteration sequence;
+  sequence.parameters = Halton(kSamples, 2);
+  sequence.predictions = sequence.parameters.col(0);
+  const auto posterior = ComputePosterior(priors, data, {}, std::vector<Iteration>{sequence});
+  ASSERT_TRUE(posterior.ok()) << posterior.status();
+  EXPECT_LT(posterior->split_half.maxCoeff(), 4 * 2 / std::sqrt(posterior->ess));
 }
 
 }  // namespace

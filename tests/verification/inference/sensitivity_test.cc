@@ -87,6 +87,35 @@ TEST(SobolIndices, FromAnEmulatorOfAHundredRunsWithTheirError) {
   }
 }
 
+// The emulator learns from 120 runs at most. Every second one of Halton's points lies above the
+// middle of the first parameter, where this function hardly moves.
+TEST(SobolIndices, OfMoreRunsThanAreUsedWhateverTheirOrder) {
+  constexpr int kRuns = 240;
+  const std::vector<Prior> marginals(2, Prior{.kind = PriorKind::kUniform, .min = 0, .max = 1});
+  const Eigen::MatrixXd unit = Halton(kRuns, 2);
+  Eigen::MatrixXd outputs(kRuns, 1);
+  for (Eigen::Index i = 0; i < kRuns; ++i) {
+    outputs(i, 0) = 3 * std::exp(-8 * unit(i, 0)) + 0.3 * unit(i, 1);
+  }
+  const auto result = AnalyseSensitivity(marginals, unit, outputs, unit, {});
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_NEAR(result->front().indices.first[0], 0.98, 0.03);
+  EXPECT_NEAR(result->front().indices.first[1], 0.02, 0.03);
+}
+
+// Points that stand there several times, as of a posterior of weights, count once.
+TEST(SobolIndices, RepeatedPointsDoNotMakeCorrelationsMoreCertain) {
+  const std::vector<Prior> marginals(2, Prior{.kind = PriorKind::kUniform, .min = 0, .max = 1});
+  const Eigen::MatrixXd unit = Halton(60, 2);
+  Eigen::MatrixXd outputs(60, 1);
+  for (Eigen::Index i = 0; i < 60; ++i) outputs(i, 0) = unit(i, 0) + std::pow(unit(i, 1), 2);
+  const Eigen::MatrixXd repeated = unit.replicate(8, 1);
+  const auto once = AnalyseSensitivity(marginals, unit, outputs, unit, {});
+  const auto often = AnalyseSensitivity(marginals, unit, outputs, repeated, {});
+  ASSERT_TRUE(once.ok() && often.ok());
+  EXPECT_NEAR(often->front().correlation_error[0], once->front().correlation_error[0], 0.01);
+}
+
 TEST(SobolIndices, RanksTellTheDirectionAndTiedPriorsHaveCorrelationsOnly) {
   const std::vector<Prior> marginals(2, Prior{.kind = PriorKind::kUniform, .min = 0, .max = 1});
   const JointPrior priors =
