@@ -52,7 +52,7 @@ std::vector<ParameterInfo> MomentParameters(const std::string& motion) {
   stiffness.name = "stiffness";
   stiffness.unit = "N m/rad";
   stiffness.unit_by_contact = {{"hertz_mindlin", "N m/rad"}, {"linear", "1"}};
-  stiffness.max = kInfinity;
+  stiffness.max = 1e9;  // far above ks r^2 of rocks; infinite ones leave no time step
   stiffness.default_prior = {.kind = "uniform", .min = 0, .max = 1};
   stiffness.description =
       motion +
@@ -64,7 +64,7 @@ std::vector<ParameterInfo> MomentParameters(const std::string& motion) {
   ParameterInfo ratio;
   ratio.name = "stiffness_ratio";
   ratio.unit = "1";
-  ratio.max = kInfinity;
+  ratio.max = 1e6;
   ratio.default_prior = {.kind = "uniform", .min = 0, .max = 1};
   ratio.alternative_to = "stiffness";
   ratio.description = motion + " stiffness over r1 r2 ks with the current ks, for any contact law";

@@ -55,6 +55,7 @@ TriangleMesh ParseText(const std::string& content, double scale,
   TriangleMesh mesh;
   int line_number = 0;
   int corners = 0;
+  bool ended = false;  // by an endsolid that nothing follows
   for (const auto line : absl::StrSplit(content, '\n')) {
     ++line_number;
     const std::vector<std::string> words =
@@ -63,6 +64,7 @@ TriangleMesh ParseText(const std::string& content, double scale,
       continue;
     }
     const std::string word = absl::AsciiStrToLower(words[0]);
+    ended = word == "endsolid";
     if (word == "vertex") {
       Vec3 v;
       if (words.size() != 4 || !absl::SimpleAtod(words[1], &v.x) ||
@@ -88,6 +90,10 @@ TriangleMesh ParseText(const std::string& content, double scale,
   }
   if (corners != 0) {
     problems.push_back({line_number, "the file ends within a facet"});
+  } else if (!ended) {
+    problems.push_back({line_number,
+                        "the file ends without endsolid after its last facet: it was cut off, or "
+                        "its last line is missing"});
   }
   return mesh;
 }

@@ -71,6 +71,20 @@ TEST(ScenarioProblems, RollingStiffnessAndRatioExcludeEachOther) {
               ElementsAre(HasSubstr("rolling_resistance.stiffness is missing")));
 }
 
+TEST(ScenarioProblems, StiffnessesOfMomentsAreFinite) {
+  for (const char* effect : {"rolling_resistance", "twisting_resistance"}) {
+    for (const char* parameter : {".stiffness", ".stiffness_ratio"}) {
+      for (const double value : {std::numeric_limits<double>::infinity(), 1e300}) {
+        Scenario s = Good();
+        s.model.effects = {effect};
+        s.model.parameters[effect + std::string(parameter)] = value;
+        s.model.parameters[effect + std::string(".friction")] = 0.1;
+        EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr(", allowed is [0, 1e+")));
+      }
+    }
+  }
+}
+
 TEST(ScenarioProblems, ClumpsMustLieTogetherAndDoNotCrush) {
   Scenario s = Good();
   s.packing.clump[0] = s.packing.clump[1] = 3;

@@ -100,6 +100,14 @@ TEST(StlFile, WhatIsNoStlSaysWhy) {
             "4: a vertex line is: vertex x y z, with three numbers");
   EXPECT_THAT(FirstProblem("solid a\nvertex 1 2 3\nendloop\n", false),
               testing::HasSubstr("3: a facet has 1 vertices"));
+  const std::string whole = Text(Tetrahedron());
+  const std::size_t last = whole.rfind("facet normal");
+  EXPECT_EQ(FirstProblem(whole.substr(0, last), false),
+            "23: the file ends without endsolid after its last facet: it was cut off, or its last "
+            "line is missing");
+  EXPECT_EQ(FirstProblem(whole + whole.substr(0, last), false),
+            "53: the file ends without endsolid after its last facet: it was cut off, or its last "
+            "line is missing");
   EXPECT_EQ(FirstProblem("solid a\nendsolid a\n", false), "0: the mesh has no triangles");
   EXPECT_THAT(FirstProblem(Text({{Vec3{0, 0, 0}, Vec3{1e300 * 1e10, 0, 0}, Vec3{0, 1, 0}}}), false),
               testing::HasSubstr("not a finite number"));
