@@ -298,6 +298,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "8"; }
+std::string EngineVersion() { return "9"; }
 
 }  // namespace calib::dem

@@ -13,9 +13,9 @@ struct LinearModuli {
 
 CALIB_DEM_CLONES void EvaluateLinear(const LinearModuli moduli, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
-    const double kn = moduli.normal * b.effective_radius[k];  // Eq. 3
-    const double u = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
-    b.normal_force[k] = kn * u;  // Eq. 1
+    const bool on = b.overlap[k] > 0;  // a bridge may hold a contact across a gap
+    const double kn = on ? moduli.normal * b.effective_radius[k] : 0.0;  // Eq. 3
+    b.normal_force[k] = kn * (on ? b.overlap[k] : 0.0);                  // Eq. 1
     b.normal_stiffness[k] = kn;
     b.tangential_stiffness[k] = moduli.ratio * kn;  // Eq. 4
   }

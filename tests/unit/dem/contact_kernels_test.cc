@@ -64,6 +64,26 @@ TEST(Linear, StiffnessesGrowWithTheRadii) {
   EXPECT_NEAR(b.tangential_stiffness[0], 0.6 * kn, 1e-9 * kn);
 }
 
+// Held across a gap, as by a liquid bridge: no spring is there, and no dashpot beside it.
+TEST(Linear, NothingActsAcrossAGap) {
+  Model damped = test::LinearModel();
+  damped.effects = {"viscous_damping"};
+  damped.parameters["viscous_damping.ratio"] = 1;
+  for (const Model& m : {damped, test::LinearModel(), test::HertzModel()}) {
+    const ContactModel model(m);
+    ContactBlock b = Block(1e-3);
+    for (int k = 0; k < kBlock; ++k) {
+      b.dx[k] = kRadiusI + kRadiusJ + kOverlap;
+      b.vx[k] = -0.1;
+    }
+    model.Evaluate(b);
+    EXPECT_EQ(b.normal_force[0], 0);
+    EXPECT_EQ(b.normal_stiffness[0], 0);
+    EXPECT_EQ(b.tangential_stiffness[0], 0);
+    EXPECT_EQ(b.normal_damping[0], 0);
+  }
+}
+
 TEST(Sliding, ForceStaysOnCoulombLimit) {
   for (const Model& m : {test::HertzModel(), test::LinearModel()}) {
     const ContactModel model(m);
