@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -24,6 +25,10 @@ constexpr double kRidgeHalfWidth = 5;  ///< at its foot: 50 degrees steep
 constexpr double kGap = 2;             ///< between ridge and funnel
 constexpr int kFunnel = 2;             ///< among the walls
 constexpr double kWidth = 40;          ///< of the whole, along y
+
+constexpr double kPitch = 1.1;      ///< between the places of a row that is fed
+constexpr double kRowLength = 1.2;  ///< until a row has made room for the next
+constexpr auto kPlaces = static_cast<std::size_t>((kBeltWidth - 1) / kPitch);
 
 /// Turns a mesh about the line through `pivot` along x.
 void TurnAboutX(double angle, const Vec3& pivot, TriangleMesh& mesh) {
@@ -123,16 +128,15 @@ class Feed {
   void Act(double time, Assembly& assembly) {
     std::vector<NewGrain> row;
     const double d = chute_.d;
-    const double pitch = 1.1 * d;
-    const auto places = static_cast<std::size_t>((kBeltWidth - 1) * d / pitch);
+    const double pitch = kPitch * d;
     if (done() || time < ready_ || rate_ * time < fed_) {
       return;
     }
-    for (std::size_t k = 0; k < places && !done(); ++k) {
+    for (std::size_t k = 0; k < kPlaces && !done(); ++k) {
       const double r = radii_[next_];
       const auto u = Uniform(seed_, kFeedDraw, static_cast<int>(next_), 0);
       const double y = chute_.middle +
-                       (static_cast<double>(k) - 0.5 * static_cast<double>(places - 1)) * pitch +
+                       (static_cast<double>(k) - 0.5 * static_cast<double>(kPlaces - 1)) * pitch +
                        0.04 * d * (2 * u[0] - 1);
       row.push_back({.centre = {1.0 * d + 0.02 * d * (2 * u[1] - 1), y, chute_.belt_z + r},
                      .velocity = {speed_, 0, 0},
@@ -140,7 +144,7 @@ class Feed {
       fed_ += density_ * 4.0 / 3.0 * std::numbers::pi * r * r * r;
       ++next_;
     }
-    ready_ = time + 1.2 * d / speed_;  // until the row has moved on by its own length
+    ready_ = time + kRowLength * d / speed_;
     assembly.Insert(row);
   }
 
@@ -154,16 +158,20 @@ class Feed {
   double ready_ = 0;
 };
 
-/// Flow through one side between 20 and 80 % of what came through [kg/s].
-std::array<double, 2> Sides(const std::vector<Drained>& drained, double middle) {
-  const std::size_t begin = drained.size() / 5;
-  const std::size_t end = drained.size() - begin;
+/// Flow through one side between 20 and 80 % of what came through [kg/s]; empty where that came
+/// all at once. The first grain begins the time in which the others follow.
+std::optional<std::array<double, 2>> Sides(const std::vector<Drained>& drained, double middle) {
+  const std::size_t first = drained.size() / 5;
+  const std::size_t end = drained.size() - first;
   std::array<double, 2> mass = {0, 0};
-  for (std::size_t k = begin; k < end; ++k) {
+  for (std::size_t k = first + 1; k < end; ++k) {
     mass[drained[k].y < middle ? 0 : 1] += drained[k].mass;
   }
-  const double time = drained[end - 1].time - drained[begin].time;
-  return {mass[0] / time, mass[1] / time};
+  const double time = drained[end - 1].time - drained[first].time;
+  if (!(time > 0)) {
+    return std::nullopt;
+  }
+  return std::array<double, 2>{mass[0] / time, mass[1] / time};
 }
 
 StageEnd Convey(GravityRun& run, const ControlPoint& point) {
@@ -181,6 +189,13 @@ StageEnd Convey(GravityRun& run, const ControlPoint& point) {
   }
   mean_mass /= static_cast<double>(run.radii().size());
   const double rate = run.SettingOr("feed_rate", kBeltWidth / 3 * mean_mass * speed / d);
+  const double largest_rate = static_cast<double>(kPlaces) * mean_mass * speed / (kRowLength * d);
+  if (rate > largest_rate) {
+    return run.Fail(absl::StrCat("belt_speed ", speed, " m/s: feed_rate is ", rate,
+                                 " kg/s, the belt carries at most ", largest_rate,
+                                 " kg/s, a row of ", kPlaces, " grains every ", kRowLength,
+                                 " of the largest diameter"));
+  }
   // The smallest and the largest grain stand far below as patterns for skin and step; they drain.
   const auto [smallest, largest] = std::minmax_element(run.radii().begin(), run.radii().end());
   Packing patterns;
@@ -236,7 +251,13 @@ StageEnd Convey(GravityRun& run, const ControlPoint& point) {
     return run.Fail(absl::StrCat("belt_speed ", speed, " m/s: only ", through, " of ",
                                  run.radii().size(), " grains came through, the funnel blocks"));
   }
-  const auto [left, right] = Sides(flow.drained(), chute.middle);
+  const auto sides = Sides(flow.drained(), chute.middle);
+  if (!sides) {
+    return run.Fail(absl::StrCat("belt_speed ", speed,
+                                 " m/s: all grains between 20 and 80 % came through in one step, "
+                                 "no flow can be told"));
+  }
+  const auto [left, right] = *sides;
   return run.Report(point, {speed, left, right, std::abs(left - right)}, assembly);
 }
 

@@ -185,6 +185,32 @@ TEST(TransferChute, AFunnelShiftedToTheRightFeedsTheRight) {
   EXPECT_DOUBLE_EQ(Value(run, "transfer_chute", "mass_flow_difference", 0), std::abs(left - right));
 }
 
+TEST(TransferChute, CarriesItsFeedRateAndNoMore) {
+  Scenario chute = Pour("transfer_chute", 250, {1.0});
+  double d = 0;
+  double mass = 0;
+  for (const double r : chute.packing.radius) {
+    d = std::max(d, 2 * r);
+    mass += 2500 * 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  }
+  const double largest = 8 * mass / 250 * 1.0 / (1.2 * d);  // rows of eight, one behind another
+  const auto through = [&chute](double rate) {
+    chute.settings = {{"feed_rate", rate}};
+    const test::Run run = test::RunAll(chute);
+    return Value(run, "transfer_chute", "mass_flow_left", 0) +
+           Value(run, "transfer_chute", "mass_flow_right", 0);
+  };
+  const double slow = through(0.3 * largest);
+  const double half = through(0.5 * largest);
+  std::printf("chute: fed 0.3 and 0.5 of %.4f kg/s, through %.4f and %.4f\n", largest, slow, half);
+  EXPECT_NEAR(slow, 0.3 * largest, 0.1 * slow);
+  EXPECT_GT(half, 1.3 * slow);
+  chute.settings = {{"feed_rate", 1.01 * largest}};
+  const test::Run run = test::RunAll(chute);
+  EXPECT_EQ(run.summary.outcome, Outcome::kDiverged);
+  EXPECT_THAT(run.summary.reason, ::testing::HasSubstr(" kg/s, the belt carries at most "));
+}
+
 TEST(TransferChute, AFunnelThatNoGrainMeetsIsNoChute) {
   Scenario chute = Pour("transfer_chute", 250, {1.0});
   chute.settings = {{"funnel_shift_y", 1.0}};
