@@ -35,6 +35,10 @@ class ContactKernel {
   /// on touching only.
   [[nodiscard]] virtual double Reach(double /*largest_radius*/) const { return 0; }
 
+  /// Largest factor by which what contacts remember may stiffen the normal force beyond what Apply
+  /// tells of an empty memory; bounds the step of contacts that are about to form.
+  [[nodiscard]] virtual double Stiffening() const { return 1; }
+
   /// Acts on all kBlock lanes. `first` is the kernel's first history column. With block.dt = 0
   /// increments vanish and the call only evaluates: the engine uses it to read stiffnesses.
   virtual void Apply(ContactBlock& block, int first) const = 0;

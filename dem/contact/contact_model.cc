@@ -112,6 +112,14 @@ double ContactModel::Reach(double largest_radius) const {
   return reach;
 }
 
+double ContactModel::Stiffening() const {
+  double factor = 1;
+  for (const Link& link : chain_) {
+    factor *= link.kernel->Stiffening();
+  }
+  return factor;
+}
+
 void ContactModel::Evaluate(ContactBlock& block) const {
   if (block.wall) {
     ComputeWallKinematics(block);

@@ -25,6 +25,9 @@ class ContactModel {
   /// Largest gap at which a contact of grains up to this radius may still act [m].
   [[nodiscard]] double Reach(double largest_radius) const;
 
+  /// Largest factor by which memories may stiffen a normal contact, >= 1.
+  [[nodiscard]] double Stiffening() const;
+
   /// tan(phi_mu) of the model itself; consolidation may put another one into the block.
   [[nodiscard]] double sliding_friction() const { return sliding_friction_; }
 

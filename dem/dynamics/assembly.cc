@@ -54,6 +54,7 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model,
   largest_radius_ = *std::max_element(particles_.radius.begin(), particles_.radius.end());
   reach_ = model_.Reach(largest_radius_);
   skin_ = surroundings.skin * mean_diameter_ + reach_;
+  wall_reach_ = walls_.empty() ? 0 : model_.Reach(2 * largest_radius_);
   nominal_critical_step_ = CriticalStepAt(1e-4);
 }
 

@@ -81,7 +81,8 @@ class Assembly {
   /// the grain or the axis (see NeighborSearch).
   absl::Status EvaluateForces();
 
-  /// One leapfrog step of grains and cell under the loads of the last EvaluateForces.
+  /// One leapfrog step of grains and cell under the loads of the last EvaluateForces. Precondition:
+  /// no grain has joined or left since.
   void Move(const Motion& motion);
 
   /// Sets one cell length exactly, after a Move that reached it up to rounding.
@@ -159,7 +160,7 @@ class Assembly {
     archive(cell_, p.x, p.y, p.z, p.vx, p.vy, p.vz, p.wx, p.wy, p.wz, p.fx, p.fy, p.fz, p.tx, p.ty,
             p.tz, p.radius, p.inverse_mass, p.inverse_inertia, p.id, p.body);
     archive(sliding_friction_, viscous_, gravity_, density_, thickness_, next_id_, planar_, walls_,
-            stale_, reach_, last_dt_);
+            stale_, loads_fit_, reach_, wall_reach_, last_dt_);
     archive(list_.skin, list_.row, list_.first, list_.second, list_.image, list_.place_row,
             list_.place_i, list_.place_j, order_, lanes_.first, lanes_.second, lanes_.place_i,
             lanes_.place_j, lanes_.image, records_);
@@ -212,8 +213,10 @@ class Assembly {
   int next_id_ = 0;
   bool planar_ = false;
   WallContacts walls_;
-  bool stale_ = false;  ///< the list must be made anew
-  double reach_ = 0;    ///< gap up to which formed contacts may act [m]
+  bool stale_ = false;     ///< the list must be made anew
+  bool loads_fit_ = true;  ///< are those of the grains as they are numbered now
+  double reach_ = 0;       ///< gap up to which formed contacts may act [m]
+  double wall_reach_ = 0;  ///< the same at walls, whose r* is that of two grains twice as large [m]
   double last_dt_ = 0;
 
   NeighborList list_;

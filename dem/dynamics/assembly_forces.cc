@@ -14,6 +14,7 @@ absl::Status Assembly::EvaluateForces() {
       return s;
     }
   }
+  loads_fit_ = true;
   SetShifts();
   PackAllGrains();
   ForEachChunk(static_cast<int>(sums_.size()), threads_,
@@ -46,7 +47,7 @@ absl::Status Assembly::EvaluateForces() {
     if (auto s = walls_.Evaluate(particles_, model_,
                                  {.dt = last_dt_,
                                   .viscous = viscous_,
-                                  .reach = reach_,
+                                  .reach = wall_reach_,
                                   .moved = moved_,
                                   .threads = threads_});
         !s.ok()) {

@@ -48,6 +48,7 @@ void Assembly::Renumber(const std::vector<int>& to) {
   order_.resize(kept);
   walls_.Renumber(to);
   stale_ = true;
+  loads_fit_ = false;
 }
 
 void Assembly::Remove(const std::vector<int>& grains) {
@@ -91,6 +92,7 @@ void Assembly::Insert(const std::vector<NewGrain>& grains) {
     solid_volume_ += inertia.mass / density_;
   }
   stale_ = true;
+  loads_fit_ = false;
 }
 
 }  // namespace calib::dem

@@ -1,5 +1,6 @@
 // One leapfrog step of grains and cell under the loads that the contacts have left.
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "dem/contact/simd.h"
@@ -92,6 +93,7 @@ double Assembly::LargestShift2OfChunk(int chunk) const {
 }
 
 void Assembly::Move(const Motion& motion) {
+  assert(loads_fit_ || particles_.size() == 0);
   cell_.shear = motion.shear;
   cell_.displacement +=
       motion.dt * (motion.stretch[0] * cell_.displacement + motion.shear * cell_.length[2]);

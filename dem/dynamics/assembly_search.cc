@@ -46,7 +46,7 @@ absl::Status Assembly::SearchNeighbors() {
   moved_ = 0;
   stale_ = false;
   if (!walls_.empty()) {
-    walls_.Search(particles_, skin_);
+    walls_.Search(particles_, skin_ + (wall_reach_ - reach_));
   }
   ArrangeLanes();
   CarryMemory();

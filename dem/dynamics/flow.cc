@@ -28,7 +28,8 @@ double StepOfImpact(const Assembly& assembly, double speed) {
 Flow::Flow(Assembly& assembly, const FlowOptions& options, std::stop_token stop)
     : assembly_(&assembly), options_(options), stop_(std::move(stop)) {
   const double g = Length(assembly.gravity());
-  largest_dt_ = kSafety * StepOfImpact(assembly, std::sqrt(2 * g * options.drop_height));
+  largest_dt_ = kSafety * StepOfImpact(assembly, std::sqrt(2 * g * options.drop_height)) /
+                std::sqrt(assembly.model().Stiffening());
   dt_ = largest_dt_;
 }
 

@@ -32,7 +32,7 @@ struct Drained {
 class Flow {
  public:
   /// The step is this share of sqrt(m/K), K of two of the smallest grains that meet at the speed of
-  /// the largest fall: about ten steps in the shortest collision.
+  /// the largest fall, unloading included: about ten steps in the shortest collision.
   static constexpr double kSafety = 0.3;
 
   Flow(Assembly& assembly, const FlowOptions& options, std::stop_token stop);

@@ -22,6 +22,7 @@ class PlasticityKernel final : public ContactKernel {
  public:
   explicit PlasticityKernel(double stiffer) : stiffer_(stiffer) {}
   [[nodiscard]] int HistorySize() const override { return 1; }
+  [[nodiscard]] double Stiffening() const override { return 1.0 + stiffer_; }
   void Apply(ContactBlock& block, int first) const override { Yield(stiffer_, block, first); }
 
  private:

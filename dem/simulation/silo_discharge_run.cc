@@ -61,16 +61,20 @@ std::vector<int> AboveOutlet(const ParticleArrays& p, const Silo& silo, double o
   return above;
 }
 
-/// Takes the lowest grain of an arch out and sets it on top of the others.
-void BreakArch(int lowest, Assembly& assembly) {
+/// Takes the lowest grain of an arch out, where there still is one, and sets it on top of the
+/// others. EvaluateForces has to follow.
+void BreakArch(const std::vector<int>& arch, Assembly& assembly) {
+  if (arch.empty()) {
+    return;
+  }
   const ParticleArrays& p = assembly.particles();
-  const auto q = static_cast<std::size_t>(lowest);
+  const auto q = static_cast<std::size_t>(arch.front());
   double top = 0;
   for (std::size_t g = 0; g < p.z.size(); ++g) {
     top = std::max(top, p.z[g] + p.radius[g]);
   }
   const NewGrain grain{.centre = {p.x[q], p.y[q], top + 1.1 * p.radius[q]}, .radius = p.radius[q]};
-  assembly.Remove({lowest});
+  assembly.Remove({arch.front()});
   assembly.Insert({grain});
 }
 
@@ -121,6 +125,13 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
   assembly.SearchAgain();
   Flow flow = run.Drive(assembly, options);
   flow.SetDrain(-2 * run.largest_diameter());
+  bool jammed = false;
+  flow.SetBeforeStep([&](double, double) {  // forces follow for the grains as they then are
+    if (jammed) {
+      jammed = false;
+      BreakArch(AboveOutlet(assembly.particles(), silo, opening), assembly);
+    }
+  });
   StageEnd end = StageEnd::kDone;
   int jams = 0;
   std::size_t seen = 0;
@@ -136,14 +147,13 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
     if (end != StageEnd::kDone || flow.time() - since < jam_time) {
       continue;
     }
-    const std::vector<int> arch = AboveOutlet(assembly.particles(), silo, opening);
-    if (arch.empty()) {
+    if (AboveOutlet(assembly.particles(), silo, opening).empty()) {
       break;  // it has run empty
     }
     if (++jams >= most) {
       break;
     }
-    BreakArch(arch.front(), assembly);
+    jammed = true;
     since = flow.time();
   }
   end = run.Close(end, flow, first, absl::StrCat("opening ", opening, " m"));

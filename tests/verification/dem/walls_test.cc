@@ -229,6 +229,52 @@ TEST(Bounce, RestitutionOfViscousDampingIsThatOfTheGrainsMass) {
   EXPECT_NEAR(wall.grain().vz[0] / 0.5, of_pair, 1e-2);  // steps per contact differ
 }
 
+/// Largest gap at which a grain that has touched the floor still pulls on it, when it is lifted in
+/// steps.
+double GapAtWall(const Model& model, double step) {
+  Ball run(model, {0, 0, kRadius - step}, {.walls = {Floor()}});
+  const auto pulls = [&run] {
+    EXPECT_TRUE(run.assembly.EvaluateForces().ok());
+    return run.assembly.walls().ForceOn(0).z != 0;
+  };
+  double gap = -step;
+  while (pulls()) {
+    gap += step;
+    run.grain().z[0] += step;
+    run.assembly.SearchAgain();
+  }
+  return gap - step;
+}
+
+// R* = r and R = 2 r at a wall, twice those of two such grains.
+TEST(Wall, AdhesionAndBridgesHoldToTheirGapThere) {
+  constexpr double kWork = 2;
+  const double modulus = 1e9 / (2 * (1 - 0.25 * 0.25));
+  const double smallest = std::cbrt(std::numbers::pi * kWork * kRadius * kRadius / (8 * modulus));
+  const double breaking = 3 * smallest * smallest / kRadius;
+  EXPECT_NEAR(
+      GapAtWall(With(Hard(0.4), "adhesion_jkr", {{"work_of_adhesion", kWork}}), 1e-3 * breaking),
+      breaking, 2e-3 * breaking);
+  const double rupture = std::cbrt(1e-3) * 2 * kRadius;
+  EXPECT_NEAR(GapAtWall(With(Hard(0.4), "capillary_bridges",
+                             {{"surface_tension", 0.073}, {"volume_ratio", 1e-3}}),
+                        1e-3 * rupture),
+              rupture, 2e-3 * rupture);
+}
+
+// Unloading is stiffer than anything that an empty memory shows.
+TEST(Flow, StepIsThatOfUnloadingPlasticContacts) {
+  const auto step = [](const Model& model) {
+    Ball run(model, {0, 0, kRadius + 1e-3}, {.gravity = {0, 0, -kGravity}, .walls = {Floor()}});
+    const Flow flow(run.assembly, {.drop_height = 0.1}, {});
+    return flow.time_step();
+  };
+  const double plain = step(Hard(0.4));
+  EXPECT_EQ(step(With(Hard(0.4), "contact_plasticity", {{"stiffness_ratio", 1}})), plain);
+  EXPECT_NEAR(step(With(Hard(0.4), "contact_plasticity", {{"stiffness_ratio", 16}})), plain / 4,
+              1e-9 * plain);
+}
+
 TEST(Conveyor, BeltCarriesAGrainToItsSpeed) {
   // Sliding until v = V(1 - 2/7): a sphere dropped without spin ends rolling on the belt.
   Wall belt = Floor();
