@@ -16,6 +16,11 @@ constexpr double kTempered = 10;  // times the parent's standard deviation
 constexpr double kPriorShare = 0.5;
 constexpr double kNear = 0.2;  // times a value that is known to be good
 
+double SettingOr(const campaign::Experiment& experiment, const std::string& name, double other) {
+  const auto found = experiment.settings.find(name);
+  return found != experiment.settings.end() ? found->second : other;
+}
+
 double DiameterOf(const campaign::Experiment& experiment) {
   for (const campaign::Specimen& specimen : experiment.specimens) {
     if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
@@ -27,7 +32,48 @@ double DiameterOf(const campaign::Experiment& experiment) {
     for (const double r : file->packing.radius) sum += r;
     return 2 * sum / static_cast<double>(file->packing.radius.size());
   }
-  return 1e-3;
+  return 2 * SettingOr(experiment, "radius", 0.5e-3);  // of a collision
+}
+
+double GrainsOf(const campaign::Experiment& experiment) {
+  if (experiment.specimens.empty()) return 1;
+  if (const auto* recipe = std::get_if<dem::PackingRecipe>(&experiment.specimens.front())) {
+    return recipe->particles;
+  }
+  const auto* file = std::get_if<campaign::PackingFile>(&experiment.specimens.front());
+  return file != nullptr ? static_cast<double>(file->packing.radius.size()) : 1;
+}
+
+// Geometric mean of the speeds of a collision [m/s].
+double SpeedOf(const campaign::Experiment& experiment) {
+  const double given = SettingOr(experiment, "impact_speed", 0);
+  if (given > 0) return given;
+  double sum = 0;
+  int count = 0;
+  for (const dem::ControlPoint& point : experiment.path) {
+    if (experiment.control_name != "impact_speed" || !(point.target > 0)) continue;
+    sum += std::log(point.target);
+    ++count;
+  }
+  return count > 0 ? std::exp(sum / count) : 0;
+}
+
+// Contact forces over d^2: the pressure of a specimen, the weight of a filling rho g d N^(1/3), the
+// peak (rho v^2)^(3/5) E^(2/5) of a Hertzian impact (Johnson, Contact Mechanics, sec. 11.4). 0: the
+// experiment has none.
+double PressureOf(const campaign::Experiment& experiment, double density, double modulus) {
+  for (const char* name : {"confining_pressure", "start_pressure", "pressure"}) {
+    if (const double pressure = SettingOr(experiment, name, 0); pressure > 0) return pressure;
+  }
+  const dem::TestInfo* const test = dem::FindTest(experiment.test);
+  if (test == nullptr) return 0;
+  if (!test->needs_packing) {
+    const double speed = SpeedOf(experiment);
+    return std::pow(density * speed * speed, 0.6) * std::pow(modulus, 0.4);
+  }
+  if (!test->poured) return 0;
+  return density * SettingOr(experiment, "gravity", 9.80665) * DiameterOf(experiment) *
+         std::cbrt(GrainsOf(experiment));
 }
 
 // Moduli that an extension may move to: a model that lacks an effect bends its modulus to hide it.
@@ -94,25 +140,23 @@ std::map<std::string, dem::DefaultPrior> ParametersOf(const dem::EffectInfo& eff
 
 dem::ReferenceState ReferenceOf(const report::CampaignView& view) {
   dem::ReferenceState state{.pressure = 1e5, .diameter = 1e-3, .modulus = 1e9};
+  const dem::Model& model = view.campaign.model;
+  const auto fixed = model.parameters.find("young_modulus");
+  if (fixed != model.parameters.end()) state.modulus = fixed->second;
+  for (const auto& parameter : view.posterior.parameters()) {
+    if (parameter.name() == "young_modulus") state.modulus = parameter.mean();
+  }
   double sum = 0;
   int count = 0;
   for (const campaign::Experiment& experiment : view.campaign.experiments) {
     if (experiment.role != campaign::Role::kCalibrate) continue;
     state.diameter = DiameterOf(experiment);
-    for (const char* name : {"confining_pressure", "start_pressure", "pressure"}) {
-      const auto found = experiment.settings.find(name);
-      if (found == experiment.settings.end() || !(found->second > 0)) continue;
-      sum += std::log(found->second);
-      ++count;
-      break;
-    }
+    const double pressure = PressureOf(experiment, model.density, state.modulus);
+    if (!(pressure > 0)) continue;
+    sum += std::log(pressure);
+    ++count;
   }
   if (count > 0) state.pressure = std::exp(sum / count);
-  const auto fixed = view.campaign.model.parameters.find("young_modulus");
-  if (fixed != view.campaign.model.parameters.end()) state.modulus = fixed->second;
-  for (const auto& parameter : view.posterior.parameters()) {
-    if (parameter.name() == "young_modulus") state.modulus = parameter.mean();
-  }
   return state;
 }
 

@@ -13,7 +13,9 @@
 
 namespace calib::ctl {
 
-/// Pressure, grain size and stiffness that make strengths of effects comparable.
+/// Pressure, grain size and stiffness that make strengths of effects comparable; of tests without a
+/// pressure, what the weight of their grains or their impact amounts to. Geometric mean of the
+/// calibrated experiments.
 dem::ReferenceState ReferenceOf(const report::CampaignView& view);
 
 /// Why an effect cannot join the model of a campaign, in a sentence; empty: it can.

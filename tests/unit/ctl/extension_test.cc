@@ -23,6 +23,39 @@ TEST(Extension, SaysWhatIsPossibleWithRunsThatWereMadeElsewhere) {
   EXPECT_THAT(WhyNotJoin(campaign, "magic"), HasSubstr("there is no effect magic"));
 }
 
+// Strengths are in units of the forces that the test's own contacts carry.
+TEST(Extension, TestsWithoutAPressureHaveThatOfTheirWeightOrImpact) {
+  report::CampaignView view;
+  view.campaign.model.contact = "hertz_mindlin";
+  view.campaign.model.density = 2500;
+  view.campaign.model.parameters["young_modulus"] = 1e7;
+  campaign::Experiment silo;
+  silo.test = "silo_discharge";
+  silo.specimens = {dem::PackingRecipe{.particles = 1000, .mean_radius = 2e-3}};
+  view.campaign.experiments = {silo};
+  EXPECT_NEAR(ReferenceOf(view).pressure, 2500 * 9.80665 * 4e-3 * 10, 1e-6);
+  EXPECT_DOUBLE_EQ(ReferenceOf(view).diameter, 4e-3);
+  view.campaign.experiments[0].settings["gravity"] = 1.62;
+  EXPECT_NEAR(ReferenceOf(view).pressure, 2500 * 1.62 * 4e-3 * 10, 1e-6);
+
+  campaign::Experiment impact;
+  impact.test = "collision";
+  impact.settings = {{"radius", 1e-2}, {"impact_angle", 0}};
+  impact.specimens = {campaign::NoPacking{}};
+  impact.control_name = "impact_speed";
+  impact.path = {{.target = 0.5, .load_step = 0}, {.target = 2, .load_step = 1}};
+  view.campaign.experiments = {impact};
+  EXPECT_NEAR(ReferenceOf(view).pressure, std::pow(2500, 0.6) * std::pow(1e7, 0.4), 1e-6);
+  EXPECT_DOUBLE_EQ(ReferenceOf(view).diameter, 2e-2);
+
+  campaign::Experiment triaxial;
+  triaxial.test = "triaxial_drained";
+  triaxial.settings = {{"confining_pressure", 2e5}};
+  triaxial.specimens = silo.specimens;
+  view.campaign.experiments = {triaxial};
+  EXPECT_NEAR(ReferenceOf(view).pressure, 2e5, 1e-6);
+}
+
 // A model that lacks an effect bends its modulus, by which strengths are scaled.
 TEST(Extension, PriorsOfStrengthsAreWideEnoughForEveryModulusThatItMayMoveTo) {
   report::CampaignView view;
