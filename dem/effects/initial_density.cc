@@ -1,5 +1,7 @@
 #include "dem/effects/initial_density.h"
 
+#include "dem/lab_tests/element_test.h"
+
 namespace calib::dem {
 namespace {
 
@@ -31,7 +33,7 @@ EffectEntry InitialDensity() {
                    .reference = "Cheng et al. 2018, sec. 2.2",
                    .two_sided = true,
                    .rays = {{.parameter = "densification", .steps = {0.5, 1.5}}},
-                   .excited_by = {}},
+                   .excited_by = ElementTestNames()},
           .prepare = &Prepare};
 }
 

@@ -1,5 +1,7 @@
 #include "dem/effects/initial_fabric.h"
 
+#include "dem/lab_tests/element_test.h"
+
 namespace calib::dem {
 namespace {
 
@@ -29,7 +31,7 @@ EffectEntry InitialFabric() {
                        "Oda, Soils Found. 12 (1972) 1; Yimsiri & Soga, Geotechnique 60 (2010) 699",
                    .two_sided = true,
                    .rays = {{.parameter = "stress_anisotropy", .steps = {0.2, 0.5}}},
-                   .excited_by = {}},
+                   .excited_by = ElementTestNames()},
           .prepare = &Prepare};
 }
 

@@ -1,5 +1,7 @@
 #include "dem/effects/nonspherical_shape.h"
 
+#include "dem/lab_tests/element_test.h"
+
 namespace calib::dem {
 namespace {
 
@@ -29,7 +31,8 @@ EffectEntry NonsphericalShape() {
                    .reference = "Favier et al., Eng. Comput. 16 (1999) 467; Ng, J. Eng. Mech. 130 "
                                 "(2004) 193",
                    .two_sided = false,
-                   .rays = {{.parameter = "aspect", .steps = {0.1, 0.3}}}},
+                   .rays = {{.parameter = "aspect", .steps = {0.1, 0.3}}},
+                   .excited_by = ElementTestNames()},
           .prepare = &Prepare};
 }
 

@@ -1,5 +1,7 @@
 #include "dem/effects/particle_crushing.h"
 
+#include "dem/lab_tests/element_test.h"
+
 namespace calib::dem {
 namespace {
 
@@ -61,7 +63,8 @@ EffectEntry ParticleCrushing() {
                    .two_sided = false,
                    .rays = {{.parameter = "weakness",
                              .steps = {0.2, 0.3},
-                             .held = {{"reference_diameter", 1}}}}},
+                             .held = {{"reference_diameter", 1}}}},
+                   .excited_by = ElementTestNames()},
           .prepare = &Prepare};
 }
 

@@ -2,6 +2,10 @@
 
 namespace calib::dem {
 
+std::vector<std::string> ElementTestNames() {
+  return {"triaxial_drained", "triaxial_undrained", "oedometric", "isotropic", "simple_shear"};
+}
+
 std::vector<std::string> ElementObservables() {
   return {"axial_strain",   "volumetric_strain", "lateral_strain",    "axial_stress",
           "lateral_stress", "mean_stress",       "deviatoric_stress", "stress_ratio",

@@ -42,6 +42,10 @@ enum class RigLoad {
   kAxial,       ///< the axial stress; volume follows from the axial strain
 };
 
+/// Names of the tests of one specimen in the periodic cell, where effects of its grains' shape and
+/// strength and of its preparation act.
+std::vector<std::string> ElementTestNames();
+
 /// Observables that every element test produces, in the order of their states.
 std::vector<std::string> ElementObservables();
 

@@ -88,6 +88,10 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
   bool excited = false;
   bool moving = false;
   for (const campaign::Experiment& e : campaign.experiments) {
+    const dem::TestInfo* const test = dem::FindTest(e.test);
+    if (effect.kind == "particle" && test != nullptr && test->poured) {
+      return absl::StrCat("test ", e.test, " pours single spheres, which it leaves whole");
+    }
     if (e.role != campaign::Role::kCalibrate) continue;
     const auto pressure = e.settings.find("confining_pressure");
     if (pressure != e.settings.end()) pressures.insert(pressure->second);

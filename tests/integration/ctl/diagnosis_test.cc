@@ -78,6 +78,47 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
   EXPECT_EQ(Evaluations(), evaluations);
 }
 
+// Two openings of a silo of twenty disks.
+TEST_F(Diagnosis, APouredTestIsScreenedForWhatItCanHave) {
+  Write("silo.dat", "opening discharged_mass\n0.02 0.001\n0.03 0.0012\n");
+  Write("silo.yaml", R"(name: silo
+model:
+  contact: linear
+  density: 2500 kg/m^3
+  fixed: {young_modulus: 1e6 Pa, poisson_ratio: 0.25}
+parameters:
+  friction_coefficient: {prior: uniform, min: 0.05, max: 0.9}
+experiments:
+  - name: s
+    test: silo_discharge
+    flat: 1
+    silo_width: 40 mm
+    duration: 0.3 s
+    local_damping: 0.3
+    packing: {generate: {particles: 20, radii: {mean: 2 mm, spread: 0.2}, seed: 1}}
+    data: {file: silo.dat}
+    control: opening
+    observables: {discharged_mass: {noise: {relative: 0.2, floor: 0.0001}}}
+inference: {method: iterative_bayesian_filter, samples: 12, max_iterations: 1}
+seed: 1
+)");
+  ASSERT_EQ(Call("run silo.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  const Answer answer = Call("diagnose c1 --state s --workers 2 --json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  std::map<std::string, std::string> why;
+  const Json json = answer.json();
+  for (const Json& effect : json["not_excitable"]) {
+    why[effect["effect"]] = effect["reason"];
+  }
+  for (const char* effect : {"nonspherical_shape", "particle_crushing"}) {
+    EXPECT_EQ(why[effect], "test silo_discharge pours single spheres, which it leaves whole");
+  }
+  for (const char* effect : {"initial_density", "initial_fabric"}) {
+    EXPECT_EQ(why[effect], "none of the fitted tests can show it");
+  }
+  EXPECT_FALSE(json["candidates"].empty());
+}
+
 TEST_F(Diagnosis, ExtendsAndRefusesInASentence) {
   ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
   const Answer unknown = Call("extend c1 --effect magic --state s");

@@ -67,6 +67,35 @@ TEST(PouredCampaign, RefusesWhatHasNoMeaningThere) {
   EXPECT_THAT(ProblemsOf(Yaml(), files), HasSubstr("silo.csv:3: opening: is -0.02"));
 }
 
+// Their parameters could only come back as their priors.
+TEST(PouredCampaign, AnEffectThatNoTestHasIsRefused) {
+  for (const char* effect : {"initial_density.densification", "initial_fabric.stress_anisotropy"}) {
+    const std::string name(effect, std::string(effect).find('.'));
+    const std::string yaml = absl::StrReplaceAll(
+        Yaml(), {{"effects: [wall_friction]", "effects: [" + name + "]"},
+                 {"wall_friction.coefficient: {prior: uniform, min: 0.2, max: 0.9}",
+                  std::string(effect) + ": {prior: uniform, min: -0.01, max: 0.01}"}});
+    EXPECT_THAT(ProblemsOf(yaml, Files()),
+                HasSubstr("c.yaml:2: model: effect " + name +
+                          " has no part in any of the experiments: it acts in triaxial_drained, "
+                          "triaxial_undrained, oedometric, isotropic, simple_shear\n"));
+  }
+  const std::string impacts = absl::StrReplaceAll(
+      Yaml(),
+      {{"effects: [wall_friction]", "effects: [nonspherical_shape]"},
+       {"wall_friction.coefficient: {prior: uniform, min: 0.2, max: 0.9}",
+        "nonspherical_shape.aspect: {prior: uniform, min: 1, max: 2}"},
+       {"silo_discharge", "collision"},
+       {"    silo_width: 10 cm\n", "    radius: 2 mm\n    impact_angle: 0\n"},
+       {"    packing: {generate: {particles: 200, radii: {mean: 2 mm, spread: 0.1}, seed: 4}}\n",
+        ""},
+       {", units: {opening: mm}", ""},
+       {"control: opening", "control: impact_speed"},
+       {"mass_flow_rate:", "normal_restitution:"}});
+  EXPECT_THAT(ProblemsOf(impacts, {{"silo.csv", "impact_speed,normal_restitution\n1,0.9\n"}}),
+              HasSubstr("effect nonspherical_shape has no part in any of the experiments"));
+}
+
 std::string WithMesh(const std::string& meshes) {
   return absl::StrReplaceAll(Yaml(), {{"    silo_width: 10 cm\n", "    meshes: " + meshes + "\n"}});
 }

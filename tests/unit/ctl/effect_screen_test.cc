@@ -50,5 +50,27 @@ TEST(SecondStep, IsAdmissible) {
   }
 }
 
+// The engine refuses shapes and crushing wherever a test pours spheres: no run of a screen may ask
+// for them.
+TEST(WhyNotShown, GrainsOfAPouredTestKeepTheirShape) {
+  campaign::Campaign campaign;
+  campaign.experiments.resize(1);
+  campaign.experiments[0].test = "silo_discharge";
+  const auto why = [&campaign](const char* effect) {
+    return WhyNotShown(campaign, *dem::FindEffect(effect));
+  };
+  EXPECT_NE(why("initial_density"), "");
+  EXPECT_NE(why("initial_fabric"), "");
+  EXPECT_EQ(why("wall_friction"), "");
+  campaign.experiments.resize(2);
+  campaign.experiments[1].test = "triaxial_drained";
+  EXPECT_EQ(why("initial_density"), "") << "of the triaxial specimen";
+  for (const char* effect : {"nonspherical_shape", "particle_crushing"}) {
+    EXPECT_EQ(why(effect), "test silo_discharge pours single spheres, which it leaves whole");
+  }
+  campaign.experiments[0].test = "collision";
+  EXPECT_EQ(why("particle_crushing"), "");
+}
+
 }  // namespace
 }  // namespace calib::ctl
