@@ -51,8 +51,8 @@ TestInfo Collision() {
           .description =
               "A sphere (or disk) hits a wall or another at rest, without gravity: impact_angle, "
               "impact_speed or impact_spin driven through the control path, one collision each. "
-              "Needs no packing. Fails when the bodies stick together or overlap by more than half "
-              "the smaller radius",
+              "Needs no packing. Fails when the bodies stick together, overlap by more than half "
+              "the smaller radius, or gain energy though no user's formula acts",
           .settings = {radius, partner, thickness, angle, speed, spin},
           .observables = {"impact_angle", "impact_speed", "impact_spin", "normal_restitution",
                           "tangential_restitution", "energy_restitution", "rebound_angle",

@@ -17,9 +17,12 @@ namespace calib::dem {
 namespace {
 
 constexpr double kStepsPerHalfPeriod = 5000;
-constexpr int kLongestInHalfPeriods = 200;  ///< bodies that touch for longer stick together
-constexpr double kDeepest = 0.5;            ///< smaller radii, as between grains of a specimen
-constexpr double kLargestRatio = 1e4;       ///< of radii: beyond, overlaps drown in rounding
+constexpr double kStepsPerRelaxation = 200;  ///< of the fastest motion that a dashpot slows
+constexpr double kMostSteps = 2e6;           ///< of a block of collisions
+constexpr double kRoundedEnergy = 1e-3;      ///< that steps may seem to add
+constexpr int kLongestInHalfPeriods = 200;   ///< bodies that touch for longer stick together
+constexpr double kDeepest = 0.5;             ///< smaller radii, as between grains of a specimen
+constexpr double kLargestRatio = 1e4;        ///< of radii: beyond, overlaps drown in rounding
 
 struct Body {
   double radius = 0;
@@ -111,9 +114,11 @@ class CollisionRun {
     for (auto& column : block_.own_history) {
       std::fill(std::begin(column), std::end(column), 0.0);
     }
-    const double half_period = ShortestHalfPeriod();
-    dt_ = half_period / kStepsPerHalfPeriod;
-    const auto longest = static_cast<std::int64_t>(kStepsPerHalfPeriod) * kLongestInHalfPeriods;
+    const Rates rates = FastestRates();
+    const double half_period = std::numbers::pi / rates.elastic;
+    dt_ = std::min(half_period / kStepsPerHalfPeriod, 1 / (kStepsPerRelaxation * rates.damped));
+    const auto longest =
+        static_cast<std::int64_t>(std::min(kMostSteps, kLongestInHalfPeriods * half_period / dt_));
     block_.dt = dt_;
     for (std::int64_t step = 0; step < longest; ++step) {
       if (step % 1024 == 0 && stop_.stop_requested()) {
@@ -160,6 +165,7 @@ class CollisionRun {
                        std::atan2(tangential, normal), f.wi, f.ended - f.begun, f.peak}};
   }
 
+  [[nodiscard]] static double EnergyRestitution(const State& state) { return state.values[5]; }
   [[nodiscard]] bool separated(int lane) const {
     return flights_[static_cast<std::size_t>(lane)].done;
   }
@@ -260,9 +266,15 @@ class CollisionRun {
            block_.mz[k];
   }
 
-  /// pi sqrt(m/k) of the stiffest oscillation of any lane, at the overlap where the elastic force
-  /// has taken up the energy of the normal motion. Memories stay empty: block.dt is zero.
-  double ShortestHalfPeriod() {
+  /// Of the stiffest oscillation of any lane, up to the overlap where the elastic force has taken up
+  /// the energy of the normal motion.
+  struct Rates {
+    double elastic = 0;  ///< w = sqrt(k/m) [1/s]
+    double damped = 0;   ///< c/m + sqrt((c/m)^2 + w^2), what an explicit step has to follow [1/s]
+  };
+
+  /// Memories stay empty: block.dt is zero.
+  Rates FastestRates() {
     const double mass = 1.0 / (body_.inverse_mass + partner_.inverse_mass);
     double energy = 0;
     for (const Flight& f : flights_) {
@@ -287,17 +299,22 @@ class CollisionRun {
         break;
       }
     }
-    double rate2 = 0;
+    const double inertia = body_.radius * body_.radius * body_.inverse_inertia;
+    const double across = 1.0 / mass + 2 * inertia;  // over the mass of a slip
+    Rates rates;
+    const auto take = [&rates](double w2, double damping) {
+      rates.elastic = std::max(rates.elastic, std::sqrt(w2));
+      rates.damped = std::max(rates.damped, damping + std::sqrt(damping * damping + w2));
+    };
     for (int k = 0; k < kBlock; ++k) {
-      const double inertia = body_.radius * body_.radius * body_.inverse_inertia;
-      const double turning = block_.rolling_stiffness[k] * body_.inverse_inertia;
-      rate2 = std::max({rate2, block_.normal_stiffness[k] / mass, turning,
-                        block_.tangential_stiffness[k] * (1.0 / mass + 2 * inertia)});
+      take(block_.normal_stiffness[k] / mass, block_.normal_damping[k] / mass);
+      take(block_.rolling_stiffness[k] * body_.inverse_inertia, 0);
+      take(block_.tangential_stiffness[k] * across, block_.tangential_damping[k] * across);
     }
     for (auto& column : block_.own_history) {
       std::fill(std::begin(column), std::end(column), 0.0);
     }
-    return std::numbers::pi / std::sqrt(rate2);
+    return rates;
   }
 
   ContactModel model_;
@@ -316,6 +333,12 @@ Summary RunCollision(const Scenario& scenario, const StateSink& sink, std::stop_
   const std::vector<Impact> impacts = ImpactsOf(scenario);
   CollisionRun run(scenario, std::move(stop));
   Summary summary;
+  const auto& effects = scenario.model.effects;
+  const bool formulas = std::any_of(
+      scenario.model.user_effects.begin(), scenario.model.user_effects.end(),
+      [&effects](const UserEffect& effect) {
+        return std::find(effects.begin(), effects.end(), effect.info.name) != effects.end();
+      });
   for (std::size_t first = 0; first < impacts.size(); first += kBlock) {
     const int count = static_cast<int>(std::min<std::size_t>(kBlock, impacts.size() - first));
     const bool finished = run.Run(&impacts[first], count);
@@ -338,13 +361,21 @@ Summary RunCollision(const Scenario& scenario, const StateSink& sink, std::stop_
       const bool finite = std::all_of(state.values.begin(), state.values.end(),
                                       [](double v) { return std::isfinite(v); });
       const std::string too_deep = run.DepthProblem(k);
-      if (!run.separated(k) || !finite || !too_deep.empty()) {
+      const double energy = run.EnergyRestitution(state);
+      const bool gains = !formulas && energy > 1 + kRoundedEnergy;
+      if (!run.separated(k) || !finite || gains || !too_deep.empty()) {
         summary.outcome = Outcome::kDiverged;
-        summary.reason = absl::StrCat("load step ", impact.load_step, " (angle ", impact.angle,
-                                      ", speed ", impact.speed, ", spin ", impact.spin, "): ",
-                                      !too_deep.empty() ? too_deep
-                                      : finite          ? "the bodies stick together"
-                                                        : "a velocity is not finite");
+        summary.reason = absl::StrCat(
+            "load step ", impact.load_step, " (angle ", impact.angle, ", speed ", impact.speed,
+            ", spin ", impact.spin, "): ",
+            !too_deep.empty() ? too_deep
+            : !finite         ? "a velocity is not finite"
+            : !run.separated(k)
+                ? "the bodies stick together"
+                : absl::StrCat(
+                      "the collision leaves ", energy,
+                      " times the energy it began with, which no contact of "
+                      "this model gives: its stiffness or damping is too large to be followed"));
         return summary;
       }
       sink(state);

@@ -282,6 +282,40 @@ TEST(Collision, NeverGainsEnergy) {
   }
 }
 
+// A dashpot far above critical sets the step, not the spring: the motion dies away, or the bodies
+// stick together; no law of the catalogue gives energy back.
+TEST(Collision, StrongDashpotsAreFollowed) {
+  const auto outcome = [](const std::string& contact, double radius,
+                          std::map<std::string, double> parameters) {
+    parameters["friction_coefficient"] = 0.1;
+    parameters["tangential_stiffness"] = 1e8;
+    Scenario s = Steel(contact, std::move(parameters));
+    s.settings = {{"radius", radius}, {"impact_speed", 1}};
+    s.path = {{.target = 0, .load_step = 0}};
+    return test::RunAll(s);
+  };
+  for (const test::Run& run :
+       {outcome("tsuji", 1e-4, {{"damping", 1e9}}),
+        outcome("extended_viscoelastic", 2e-5, {{"damping", 1.5e5}, {"damping_exponent", 0.15}})}) {
+    if (run.summary.outcome == Outcome::kDiverged) {
+      EXPECT_THAT(run.summary.reason, HasSubstr("the bodies stick together"));
+      continue;
+    }
+    ASSERT_EQ(run.states.size(), 1U);
+    EXPECT_LT(Value(run.states[0], "normal_restitution"), 0.1);
+    EXPECT_LT(Value(run.states[0], "energy_restitution"), 0.01);
+  }
+}
+
+// A formula may give energy; a law that seems to is not followed.
+TEST(Collision, EnergyComesFromFormulasOnly) {
+  Scenario s = Steel("hertz_mindlin", {{"friction_coefficient", 0}});
+  s.model = test::Joined(s.model, test::Formula("normal_force", "-c * closing_velocity"), {300});
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.states.size(), 3U) << run.summary.reason;
+  EXPECT_GT(Value(run.states[0], "energy_restitution"), 1.01);
+}
+
 TEST(Collision, RefusesWhatCannotBe) {
   Scenario s = Steel("tsuji", {{"friction_coefficient", 0}, {"damping", 0}});
   s.settings["radius"] = -1;
