@@ -29,10 +29,20 @@ std::string ToText(const dem::Staging& staging) {
       " unbalanced=", staging.unbalanced.value_or(0), staging.adaptive ? " adaptive" : "");
 }
 
-v1::Finished Ended(v1::Finished::Outcome outcome, const absl::Status& status) {
+// A specimen that cannot be made as asked for is a result like a model that diverges: another
+// attempt ends the same way.
+v1::Finished Ended(const absl::Status& status) {
   v1::Finished finished;
-  finished.set_outcome(status.code() == absl::StatusCode::kCancelled ? v1::Finished::OUTCOME_STOPPED
-                                                                     : outcome);
+  switch (status.code()) {
+    case absl::StatusCode::kCancelled:
+      finished.set_outcome(v1::Finished::OUTCOME_STOPPED);
+      break;
+    case absl::StatusCode::kOutOfRange:
+      finished.set_outcome(v1::Finished::OUTCOME_DIVERGED);
+      break;
+    default:
+      finished.set_outcome(v1::Finished::OUTCOME_FAILED);
+  }
   finished.set_reason(std::string(status.message()));
   return finished;
 }
@@ -48,7 +58,7 @@ v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const d
   };
   const auto specimen = specimens.Get(spec, stop);
   if (!specimen.ok()) {
-    v1::Finished finished = Ended(v1::Finished::OUTCOME_FAILED, specimen.status());
+    v1::Finished finished = Ended(specimen.status());
     finished.set_core_seconds(core_seconds(1));
     return finished;
   }
@@ -69,11 +79,7 @@ v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const d
     finished.set_contact_updates(summary->contact_updates);
     finished.set_staging(ToText(summary->staging));
   } else {
-    // These parameters cannot reach the porosity asked for: a result of the model.
-    finished = Ended(summary.status().code() == absl::StatusCode::kOutOfRange
-                         ? v1::Finished::OUTCOME_DIVERGED
-                         : v1::Finished::OUTCOME_FAILED,
-                     summary.status());
+    finished = Ended(summary.status());
   }
   finished.set_states(states);
   finished.set_core_seconds(core_seconds(scenario.threads));

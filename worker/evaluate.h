@@ -11,8 +11,8 @@
 namespace calib::worker {
 
 /// Runs a spec; sink gets every state as soon as it is reached. Never fails: what went wrong is the
-/// outcome (OUTCOME_FAILED: not the model's fault) with its reason. finished.attempt is left to the
-/// caller.
+/// outcome with its reason. OUTCOME_DIVERGED: the model cannot do it, or there is no such specimen;
+/// OUTCOME_FAILED: neither is to blame. finished.attempt is left to the caller.
 v1::Finished Evaluate(const v1::AttemptSpec& spec, Specimens& specimens, const dem::StateSink& sink,
                       std::stop_token stop, const dem::Recording& recording = {});
 

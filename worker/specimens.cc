@@ -44,7 +44,11 @@ absl::StatusOr<std::shared_ptr<const Specimen>> Specimens::Get(const v1::Attempt
   });
   absl::MutexLock lock(&mutex_);
   std::shared_ptr<Entry>& slot = entries_[KeyOf(spec)];
-  if (slot == nullptr || (slot->ready && !slot->result.ok())) {
+  // A recipe that leads to no packing never does.
+  const auto transient = [](const Entry& entry) {
+    return !entry.result.ok() && entry.result.status().code() != absl::StatusCode::kOutOfRange;
+  };
+  if (slot == nullptr || (slot->ready && transient(*slot))) {
     slot = std::make_shared<Entry>();
     // The maker is joined by whoever drops the last owner of its entry, so it must not own it
     // itself.

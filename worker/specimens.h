@@ -38,7 +38,7 @@ class Specimens {
   Specimens& operator=(const Specimens&) = delete;
 
   /// What a spec names. Errors: CANCELLED (stop), INVALID_ARGUMENT (unreadable content), those of
-  /// the fetch, and OUT_OF_RANGE of dem::GeneratePacking. Failures are not remembered.
+  /// the fetch, and OUT_OF_RANGE of dem::GeneratePacking, which alone is remembered.
   absl::StatusOr<std::shared_ptr<const Specimen>> Get(const v1::AttemptSpec& spec,
                                                       std::stop_token stop);
 

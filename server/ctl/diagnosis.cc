@@ -66,7 +66,12 @@ class Inquiry {
     if (auto status = FitWarm(base); !status.ok()) return status;
     Verdict(diagnosis_, fits_.all(), base, options_.level).Conclude(fits);
     if (options_.next_experiment && !elsewhere && diagnosis_.verdict != "adequate") {
-      if (auto status = PlanNext(); !status.ok()) return status;
+      if (auto status = PlanNext(); absl::IsCancelled(status)) {
+        return status;
+      } else if (!status.ok()) {
+        diagnosis_.warnings.push_back(absl::StrCat(
+            "The verdict stands; the next experiment could not be planned: ", status.message()));
+      }
     }
     return diagnosis_;
   }
@@ -401,7 +406,7 @@ class Inquiry {
     std::vector<Rival> rivals;
     for (const CandidateEffect& candidate : diagnosis_.candidates) {
       const WarmFit* fit = fits_.Find(candidate.effect);
-      if (fit == nullptr || rivals.size() >= kMostRivals) continue;
+      if (fit == nullptr || fit->best.empty() || rivals.size() >= kMostRivals) continue;
       const auto& group = diagnosis_.candidates.front().confusable_with;
       const bool named = diagnosis_.verdict != "ambiguous" || rivals.empty() ||
                          std::find(group.begin(), group.end(), candidate.effect) != group.end();

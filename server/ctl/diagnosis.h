@@ -79,7 +79,7 @@ struct DiagnosisOptions {
 
 /// Errors: FAILED_PRECONDITION with a sentence when nothing can be said (no posterior, noise not
 /// given independently, runs made elsewhere); RESOURCE_EXHAUSTED when max_evaluations does not
-/// suffice; those of the runs.
+/// suffice; those of the runs. Where the next experiment alone cannot be planned, a warning.
 absl::StatusOr<Diagnosis> Diagnose(Laboratory& laboratory, const report::CampaignView& view,
                                    const DiagnosisOptions& options = {});
 

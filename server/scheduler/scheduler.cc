@@ -259,7 +259,7 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
   return live;
 }
 
-void Scheduler::PauseIfTooManyDiverged(CampaignRun& run) {
+void Scheduler::PauseIfTooManyDiverged(CampaignRun& run, const std::string& last) {
   const campaign::Failure& failure = run.definition().campaign.failure;
   const int samples = run.record().submitted.samples;
   const int diverged = run.Diverged();
@@ -270,7 +270,8 @@ void Scheduler::PauseIfTooManyDiverged(CampaignRun& run) {
   SetState(run, CampaignEvent::kPause,
            absl::StrCat(diverged, " of ", samples,
                         " samples diverged, more than failure.pause_above = ", failure.pause_above,
-                        " allows; see the reasons of the samples, then resume or cancel"),
+                        " allows, last: ", last,
+                        "; see the reasons of the samples, then resume or cancel"),
            nullptr, [](const absl::Status&) {});
 }
 

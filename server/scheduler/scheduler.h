@@ -124,7 +124,8 @@ class Scheduler {
   void TakeUp(std::int64_t campaign, store::Reader& reader);
   /// Puts waiting evaluations into the queue, or takes them out, as the campaign's state demands.
   void Enqueue(CampaignRun& run);
-  void PauseIfTooManyDiverged(CampaignRun& run);
+  /// last: why the run that ended now did.
+  void PauseIfTooManyDiverged(CampaignRun& run, const std::string& last);
   /// Changes the state, writes it with `also`, then replies.
   void SetState(CampaignRun& run, CampaignEvent event, const std::string& reason,
                 const store::Store::Job& also, const Reply& reply);

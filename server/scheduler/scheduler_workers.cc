@@ -337,7 +337,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
         Advance(lease.key.campaign);
       });
   if (diverged) {
-    PauseIfTooManyDiverged(run);
+    PauseIfTooManyDiverged(run, finished.reason());
   }
 }
 

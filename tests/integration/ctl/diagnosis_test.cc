@@ -1,4 +1,6 @@
 // diagnose, extend and improve as a user meets them, on a calibration of 64 grains.
+#include <algorithm>
+
 #include "tests/integration/ctl/calibctl_fixture.h"
 
 namespace calib::ctl {
@@ -182,6 +184,58 @@ TEST_F(Diagnosis, DeletesACampaignWithAllThatComesFromIt) {
   ASSERT_EQ(gone.code, 0) << gone.err;
   EXPECT_EQ(gone.json()["campaigns"], 2);
   EXPECT_TRUE(Call("list --state s --json").json().empty());
+}
+
+// Errors so small that the model misses, at a porosity that cannot be 0.02 higher.
+class Misfit : public Diagnosis {
+ protected:
+  Misfit() {
+    Write("small.yaml",
+          calib::testing::SixtyFourGrains("{q_over_p: {noise: {absolute: 0.02}}, "
+                                          "volumetric_strain: {noise: {absolute: 0.0001}}}",
+                                          12, 2));
+  }
+  static bool Warns(const Json& diagnosis, const std::string& what) {
+    return diagnosis["warnings"].dump().find(what) != std::string::npos;
+  }
+};
+
+TEST_F(Misfit, ATestThatCannotBePreparedIsLeftOutOfTheNextOnes) {
+  ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  const Answer answer = Call("diagnose c1 --state s --workers 2 --json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const Json json = answer.json();
+  EXPECT_NE(json["verdict"], "adequate");
+  ASSERT_TRUE(json["next_experiment"].is_object()) << json["warnings"];
+  const Json& considered = json["next_experiment"]["considered"];
+  EXPECT_GE(considered.size(), 3U) << considered;
+  for (const Json& planned : considered) {
+    EXPECT_NE(planned["settings"].value("porosity", 0.0), 0.44) << considered;
+  }
+}
+
+TEST_F(Misfit, ItsVerdictIsKeptWhenNoNextExperimentCanBePlanned) {
+  ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  // Somebody cancels the planning as soon as it begins.
+  Write("cancel.sh", R"sh(
+("$1" diagnose c1 --state s --workers 1 --json >first 2>said; echo $? >code) &
+until test -e code; do
+  id=$("$1" list --state s | awk '/next_experiment/ && !/finished/ {print $1}')
+  test -n "$id" && "$1" cancel $id --state s && break
+done
+wait
+)sh");
+  CallWith("sh cancel.sh", "");
+  EXPECT_EQ(Read("code"), "0\n") << Read("said");
+  const Json json = Json::parse(Read("first"), nullptr, false);
+  ASSERT_TRUE(json.is_object()) << Read("said");
+  EXPECT_NE(json["verdict"], "adequate");
+  EXPECT_TRUE(json["next_experiment"].is_null());
+  EXPECT_TRUE(Warns(json, "The verdict stands; the next experiment could not be planned: campaign"))
+      << json["warnings"];
+  EXPECT_EQ(Call("report c1 --state s -o r.html").code, 0);
+  EXPECT_NE(Read("r.html").find(json["sentence"].get<std::string>().substr(0, 20)),
+            std::string::npos);
 }
 
 // No verdict without support: two readings for two parameters.

@@ -255,6 +255,7 @@ TEST(SurrogateCampaign, PausesWhenItsLastPointsDiverge) {
   const store::CampaignProgress progress = service.Campaign().progress;
   EXPECT_EQ(progress.state, "paused");
   EXPECT_THAT(progress.reason, HasSubstr("6 of 10 samples diverged"));
+  EXPECT_THAT(progress.reason, HasSubstr(", last: "));
 }
 
 TEST(SurrogateCampaign, DecidedAtOnceItSaysSoAndEndsRunsByTheBestOfTheMoment) {

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "tests/support/stl_text.h"
+#include "worker/evaluate.h"
 
 namespace calib::worker {
 namespace {
@@ -67,6 +68,29 @@ TEST(Specimens, FailureIsNotRemembered) {
   });
   EXPECT_FALSE(specimens.Get(Named("a"), {}).ok());
   EXPECT_TRUE(specimens.Get(Named("a"), {}).ok());
+}
+
+// Another attempt would end the same way: neither the workplace's fault nor worth the time.
+TEST(Specimens, OneThatCannotBeMadeIsAResultOfTheModel) {
+  Specimens specimens([](const std::string&, std::stop_token) -> absl::StatusOr<std::string> {
+    return absl::UnavailableError("nothing to fetch");
+  });
+  v1::AttemptSpec spec;
+  spec.set_test("triaxial_drained");
+  v1::PackingRecipe& recipe = *spec.mutable_recipe();
+  recipe.set_particles(64);
+  recipe.set_porosity(0.55);
+  recipe.set_mean_radius(1e-3);
+  recipe.set_radius_spread(0.2);
+  recipe.set_aspect(1);
+  recipe.set_pressure(1e5);
+  const v1::Finished first = Evaluate(spec, specimens, [](const dem::State&) {}, {});
+  EXPECT_EQ(first.outcome(), v1::Finished::OUTCOME_DIVERGED);
+  EXPECT_NE(first.reason().find("porosity 0.55 cannot be reached"), std::string::npos)
+      << first.reason();
+  const v1::Finished again = Evaluate(spec, specimens, [](const dem::State&) {}, {});
+  EXPECT_EQ(again.reason(), first.reason());
+  EXPECT_LT(again.core_seconds(), 0.5 * first.core_seconds()) << "it is not tried again";
 }
 
 TEST(Specimens, UnreadableContentNamesItsLine) {
