@@ -55,7 +55,7 @@ class Reader {
   absl::StatusOr<std::map<int, int>> AttemptsBySample(std::int64_t campaign);
   absl::StatusOr<Effort> EffortOf(std::int64_t campaign);
   absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);
-  /// In the order in which they were first put.
+  /// In the order in which they were last put.
   absl::StatusOr<std::vector<FindingRecord>> Findings(std::int64_t campaign);
 
   /// Looks through the whole file, at most this long.

@@ -246,7 +246,8 @@ void Transaction::PutFinding(std::int64_t campaign, const FindingRecord& finding
     connection_.Run(
         "INSERT INTO finding(campaign, kind, digest, created_unix_ms) "
         "SELECT campaign.id, ?, blob.digest, ? FROM campaign, blob "
-        "WHERE campaign.id = ? AND blob.digest = ? ON CONFLICT DO NOTHING",
+        "WHERE campaign.id = ? AND blob.digest = ? "
+        "ON CONFLICT DO UPDATE SET id = 1 + (SELECT max(id) FROM finding)",
         finding.kind, finding.created_unix_ms, campaign, finding.digest);
   });
 }

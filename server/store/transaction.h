@@ -66,8 +66,8 @@ class Transaction {
   /// nondeterminism.
   void PutState(const StateRecord& state, std::int64_t unix_ms);
 
-  /// A document that was put as a blob speaks of the campaign; said again it changes nothing, nor
-  /// does it where one of them is gone.
+  /// A document that was put as a blob speaks of the campaign; said again it is the last one again,
+  /// with its first date. Changes nothing where one of them is gone.
   void PutFinding(std::int64_t campaign, const FindingRecord& finding);
 
   /// campaign 0: concerns the server as a whole.

@@ -238,6 +238,26 @@ TEST_F(StoreTest, FindingsAreKeptOnceAndGoWithTheirCampaign) {
   EXPECT_TRUE(Read().Findings(1)->empty());
 }
 
+TEST_F(StoreTest, AFindingThatIsPutAgainIsTheLast) {
+  Write([&](Transaction& t) {
+    PutEvaluation(t);
+    t.PutBlob("all", "{}");
+    t.PutBlob("fewer", "{}");
+    t.PutFinding(1, {.kind = "diagnosis", .digest = "all", .created_unix_ms = 5});
+    t.PutFinding(1, {.kind = "diagnosis", .digest = "fewer", .created_unix_ms = 6});
+  });
+  EXPECT_EQ(Read().Findings(1)->back().digest, "fewer");
+  Write([](Transaction& t) {
+    t.PutFinding(1, {.kind = "diagnosis", .digest = "all", .created_unix_ms = 7});
+    t.PutFinding(1, {.kind = "diagnosis", .digest = "all", .created_unix_ms = 8});
+  });
+  const auto findings = Read().Findings(1);
+  ASSERT_EQ(findings->size(), 2U);
+  EXPECT_EQ(findings->front().digest, "fewer");
+  EXPECT_EQ(findings->back().digest, "all");
+  EXPECT_EQ(findings->back().created_unix_ms, 5) << "when it was concluded first";
+}
+
 TEST_F(StoreTest, AFileIsLookedThroughAndItsDamageFound) {
   Write([](Transaction& t) {
     PutEvaluation(t);
