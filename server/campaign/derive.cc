@@ -4,6 +4,7 @@
 #include <cctype>
 #include <utility>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/yaml_text.h"
@@ -95,6 +96,33 @@ YamlNode Rows(const Derivation& derivation) {
   return YamlList(std::move(rows));
 }
 
+// A batch of runs about a place is no calibration: what steers the parent's would refuse it, or not
+// look at that place.
+void MakeBatch(YamlNode& root) {
+  YamlNode batch = YamlMap({{"method", YamlScalar("iterative_bayesian_filter")}});
+  if (const YamlNode* parent = YamlFind(root, "inference"); parent != nullptr) {
+    if (const YamlNode* design = YamlFind(*parent, "design"); design != nullptr) {
+      YamlAt(batch, "design") = *design;
+    }
+  }
+  YamlAt(root, "inference") = std::move(batch);
+  YamlErase(root, "early_stopping");
+}
+
+// The samples that surrogate_msrs starts from grow with the parameters.
+void RaiseSamples(YamlNode& root) {
+  YamlNode& inference = YamlAt(root, "inference");
+  const YamlNode* method = YamlFind(inference, "method");
+  const YamlNode* samples = YamlFind(inference, "samples");
+  int given = 0;
+  if (method == nullptr || method->scalar != "surrogate_msrs" || samples == nullptr ||
+      !absl::SimpleAtoi(samples->scalar, &given)) {
+    return;
+  }
+  const int fewest = 2 * static_cast<int>(YamlAt(root, "parameters").entries.size()) + 1;
+  if (given < fewest) YamlAt(inference, "samples") = YamlScalar(absl::StrCat(fewest));
+}
+
 void ChangeInference(const Derivation& derivation, YamlNode& root) {
   if (!derivation.rows.empty()) {
     YamlAt(root, "inference") =
@@ -103,10 +131,12 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
     YamlErase(root, "budget");
     return;
   }
+  if (derivation.lineage.purpose == "warm_fit") MakeBatch(root);
   YamlNode& inference = YamlAt(root, "inference");
   if (derivation.samples) {
     YamlAt(inference, "samples") = YamlScalar(absl::StrCat(*derivation.samples));
   }
+  if (!derivation.parameters.empty()) RaiseSamples(root);
   if (derivation.max_iterations) {
     YamlAt(inference, "max_iterations") = YamlScalar(absl::StrCat(*derivation.max_iterations));
   }

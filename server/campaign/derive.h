@@ -1,7 +1,9 @@
 #pragma once
 // The text of a campaign that follows from another one: the same experiments, model and settings,
 // with what is said here changed. Pure: the same parent and changes give the same text, by which it
-// is recognised when it is asked for again. However many runs diverge, it is not paused.
+// is recognised when it is asked for again. However many runs diverge, it is not paused. With the
+// purpose warm_fit it is a batch of runs: iterative_bayesian_filter whatever the parent's method,
+// none stopped early. An extension of surrogate_msrs gets the samples that its parameters ask for.
 
 #include <cstdint>
 #include <map>

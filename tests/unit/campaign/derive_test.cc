@@ -46,12 +46,72 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
       "experiments: [{name: x, staging: {rate: 0.4}}]\n"
       "lineage: {parent: c1, purpose: warm_fit}\n"
       "inference:\n"
+      "  method: iterative_bayesian_filter\n"
       "  samples: 12\n"
       "  replicates: 0\n"
       "  first_proposal: {prior_share: 0.5, young_modulus: {center: 1e+09, sd: 1e+07}}\n"
       "failure: {pause_above: 1}\n")
       << *text;
 }
+
+// Every documented way to calibrate, with what steers it.
+class DerivedFrom : public ::testing::TestWithParam<const char*> {
+ protected:
+  static std::string Parent() {
+    std::string yaml = testing::GoodYaml();
+    const std::size_t at = yaml.find("\ninference:");
+    EXPECT_NE(at, std::string::npos);
+    yaml.replace(at, yaml.find('\n', at + 1) - at, std::string("\ninference: ") + GetParam());
+    EXPECT_EQ(testing::ProblemsOf(yaml), "");
+    return yaml;
+  }
+  static const inline std::map<std::string, dem::DefaultPrior> kNew = {
+      {"twisting_resistance.friction", {.kind = "uniform", .min = 0, .max = 1}},
+      {"twisting_resistance.stiffness_ratio", {.kind = "uniform", .min = 0.1, .max = 1}}};
+};
+
+TEST_P(DerivedFrom, AWarmFitIsABatchAboutItsPlace) {
+  const auto text =
+      Derive(Parent(), {.name = "fit",
+                        .lineage = {.parent = "c1", .purpose = "warm_fit"},
+                        .effects = {"twisting_resistance"},
+                        .parameters = kNew,
+                        .samples = 6,
+                        .max_iterations = 1,
+                        .first_proposal = FirstProposal{.prior_share = 0.5, .places = {}},
+                        .replicates = 0});
+  ASSERT_TRUE(text.ok()) << text.status();
+  EXPECT_EQ(testing::ProblemsOf(*text), "") << *text;
+  const Campaign fit =
+      ReadCampaign(*text, "c.yaml", testing::ReaderOf(testing::GoodFiles())).campaign;
+  EXPECT_EQ(fit.method, Method::kIterativeBayesianFilter);
+  EXPECT_EQ(fit.samples, 6);
+  EXPECT_TRUE(fit.first_proposal.has_value());
+  EXPECT_FALSE(fit.early_stopping.has_value());
+  EXPECT_TRUE(fit.freeze.empty());
+}
+
+TEST_P(DerivedFrom, AnExtensionIsCalibratedAsItsParent) {
+  const std::string parent = Parent();
+  const auto text = Derive(parent, {.name = "extension",
+                                    .lineage = {.parent = "c1", .purpose = "extension"},
+                                    .effects = {"twisting_resistance"},
+                                    .parameters = kNew,
+                                    .first_proposal = FirstProposal{}});
+  ASSERT_TRUE(text.ok()) << text.status();
+  EXPECT_EQ(testing::ProblemsOf(*text), "") << *text;
+  const FileReader files = testing::ReaderOf(testing::GoodFiles());
+  EXPECT_EQ(ReadCampaign(*text, "c.yaml", files).campaign.method,
+            ReadCampaign(parent, "c.yaml", files).campaign.method);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Methods, DerivedFrom,
+    ::testing::Values("{method: iterative_bayesian_filter, samples: 12, max_iterations: 3, "
+                      "freeze: {2: [young_modulus]}, design: sobol}",
+                      "{method: sqmc, samples: 24}", "{method: tmcmc, samples: 20, steps: 2}",
+                      "{method: surrogate_msrs, samples: 9, in_flight: 2, termination: 16}",
+                      "{method: surrogate_msrs, samples: 12, decisions: immediate}"));
 
 TEST(Derive, ABudgetTakesThePlaceOfTheParents) {
   const std::string parent = "name: a\nbudget: {model_evaluations: 400, core_hours: 2}\n";
