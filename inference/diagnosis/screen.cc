@@ -271,11 +271,13 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   std::vector<Score> scores;
   std::vector<Eigen::VectorXd> visible;  // what no choice of the parameters imitates
   const double excess = std::max(adequacy->chi2 - adequacy->degrees, 1.0);
-  const boost::math::normal normal;
-  const double reach =
-      boost::math::quantile(normal, 1 - options.level / static_cast<double>(std::max<std::size_t>(
-                                                            1, candidates.size()))) +
-      boost::math::quantile(normal, 0.9);
+  // In sd along a direction: either sign of every difference of every candidate is a chance.
+  const auto reach = [&](std::size_t differences) {
+    const boost::math::normal normal;
+    const auto chances = static_cast<double>(2 * candidates.size() * differences);
+    return boost::math::quantile(normal, 1 - options.level / chances) +
+           boost::math::quantile(normal, 0.9);
+  };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     Score score{.name = candidates[c].name};
     const Fit fit = BestFit(directions[c], whitened->squares, nullptr, candidates[c].two_sided,
@@ -307,8 +309,11 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
     visible.push_back(length > 0 ? Eigen::VectorXd(strongest / length) : strongest);
     const double sd = std::sqrt(VarianceAlong(visible.back(), *whitened, *groups));
     const double square = SquareOfEffect(rests, candidates[c].strengths, length);
-    score.detectable =
-        square > 0 ? reach * sd / std::sqrt(square) : std::numeric_limits<double>::infinity();
+    score.detectable = square > 0 ? reach(rests.size()) * sd / std::sqrt(square)
+                                  : std::numeric_limits<double>::infinity();
+    const bool on_one_ray = candidates[c].strengths.size() > 1;
+    score.detectable_difference = static_cast<int>(
+        on_one_ray ? rests.size() - 1 : static_cast<std::size_t>(longest - rests.begin()));
     scores.push_back(std::move(score));
   }
   constexpr double kClose = 25;  // degrees

@@ -51,9 +51,11 @@ struct Score {
   int difference = 0;    ///< which one that is
   double rms = 0;        ///< of the history left, in noise sd
   /// Smallest amplitude of the strongest (the last where strengths are given) difference found with
-  /// 90 % power at this test's level; infinite when the parameters imitate the effect completely,
-  /// or differences at two strengths or more have nothing in common.
+  /// 90 % power at this test's level, which is two-sided and shared by all differences of all
+  /// candidates; infinite when the parameters imitate the effect completely, or differences at two
+  /// strengths or more have nothing in common.
   double detectable = 0;
+  int detectable_difference = 0;  ///< which one that is
   /// Signatures less than 25 degrees away, nearest first.
   std::vector<std::string> confusable_with{};
   /// Between what no choice of the parameters imitates of this signature and of each other one, by

@@ -266,10 +266,6 @@ class Inquiry {
     const ReadingEffect& step = *found->second[which];
     return {{step.parameter, step.unit * multiple}};
   }
-  std::size_t DifferencesOf(const std::string& effect) const {
-    const auto found = steps_on_readings_.find(effect);
-    return found == steps_on_readings_.end() ? screen_.DifferencesOf(effect) : found->second.size();
-  }
 
   void AddCandidate(const inference::Score& score) {
     diagnosis_.candidates.push_back(
@@ -299,8 +295,8 @@ class Inquiry {
           "the parameters imitate it, or what it changes is another at another strength");
       return;
     }
-    const std::map<std::string, double> strength =
-        StrengthOf(score.name, DifferencesOf(score.name) - 1, score.detectable);
+    const std::map<std::string, double> strength = StrengthOf(
+        score.name, static_cast<std::size_t>(score.detectable_difference), score.detectable);
     const std::string why = WhyNotAdmissible(effect, model.contact, strength);
     if (why.empty()) {
       diagnosis_.detectable[score.name] = strength;

@@ -52,7 +52,6 @@ class EffectScreen {
   /// strength holds constant is part of it.
   std::map<std::string, double> StrengthOf(const std::string& effect, std::size_t which,
                                            double multiple) const;
-  std::size_t DifferencesOf(const std::string& effect) const { return tried_.at(effect).size(); }
 
   /// Effects that could not be judged, and why.
   const std::vector<std::pair<std::string, std::string>>& not_excitable() const {
