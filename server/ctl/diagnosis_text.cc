@@ -164,8 +164,13 @@ std::string Sentence(const Diagnosis& d) {
       d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
 }
 
-// Without the effect it is the base model: a refit that is further off has merely not been found.
-bool NotFound(const CandidateEffect& c) { return c.refit_p_value >= 0 && c.over_base.nats <= 0; }
+bool ComesCloser(const CandidateEffect& c) { return c.refit_p_value >= 0 && c.over_base.nats > 0; }
+
+// Without the effect it is the base model: a refit that is further off has merely not been found. One
+// that is calculated has been looked for at every strength.
+bool NotFound(const CandidateEffect& c) {
+  return !c.campaign.empty() && c.refit_p_value >= 0 && !ComesCloser(c);
+}
 
 // Of the effects that are named together, where the screen has measured both.
 std::string GroupAngles(const Diagnosis& d) {
@@ -264,7 +269,7 @@ std::string DiagnosisText(const Diagnosis& d) {
     }
   }
   for (const CandidateEffect& c : d.candidates) {
-    if (c.refit_p_value < 0 || NotFound(c)) continue;
+    if (!ComesCloser(c)) continue;
     text += Wrapped(fmt::format("{} comes closest at {}.", c.effect,
                                 report::StrengthInWords(c.amplitude, d.units)),
                     "", "  ");

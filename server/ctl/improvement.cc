@@ -93,6 +93,10 @@ absl::Status Improvement::From(report::CampaignView view) {
       if (step.reason.empty()) step.reason = diagnosis->reason;
       break;
     }
+    if (const std::string why = WhyNotJoin(view.campaign, next); !why.empty()) {
+      step.reason = absl::StrCat(next, " would be added, but cannot be: ", why, ".");
+      break;
+    }
     auto extended = Extended(view, {next}, ClosestRunWith(next, *diagnosis));
     if (absl::IsResourceExhausted(extended.status())) {
       step.reason = absl::StrCat(next, " would be added, but --max-evaluations forbids it: ",

@@ -42,5 +42,16 @@ TEST(DiagnosisText, ARefitThatIsFurtherOffThanItsOwnBaseModelHasFoundNothing) {
   EXPECT_THAT(DiagnosisText(diagnosis), Not(HasSubstr("not found")));
 }
 
+// What needs no runs has none that could be used up.
+TEST(DiagnosisText, ACalculatedEffectThatHelpsNothingExplainsNothing) {
+  ctl::Diagnosis diagnosis;
+  diagnosis.verdict = "unexplained";
+  diagnosis.candidates = {{.effect = "strain_offset", .refit_p_value = 0, .over_base = {}}};
+  const std::string text = DiagnosisText(diagnosis);
+  EXPECT_THAT(text, ContainsRegex("strain_offset +1 +0 %"));
+  EXPECT_THAT(text, Not(HasSubstr("more samples tell")));
+  EXPECT_THAT(text, Not(HasSubstr("comes closest")));
+}
+
 }  // namespace
 }  // namespace calib::ctl
