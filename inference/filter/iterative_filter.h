@@ -123,8 +123,8 @@ struct Posterior {
   /// 95 %): by how much the errors are larger than stated.
   Eigen::MatrixXd noise_scale;
   std::vector<std::optional<double>> frozen;  ///< of the last proposal: what all this is given
-  /// Split-half agreement, d: difference of the means of two halves of the samples over the posterior sd,
-  /// NaN for what is held. About 2 / sqrt(ess) where the weights are enough.
+  /// Split-half agreement, d: difference of the means of two halves of the samples over the
+  /// posterior sd, NaN for what is held. About 2 / sqrt(ess) where the weights are enough.
   Eigen::VectorXd split_half;
   /// kGiven: posterior predictive p-value of the misfit, sum_i w_i P(chi^2_T >= chi^2(y, x_i)):
   /// the share of data sets replicated from the posterior that fit no better [Gelman et al. 1996].

@@ -20,8 +20,7 @@
 namespace calib::ctl {
 namespace {
 
-constexpr std::size_t kWarmFits = 4;    // to begin with: two batches each pick those to continue
-constexpr std::size_t kMostRivals = 3;  // that the next experiment is to separate
+constexpr std::size_t kWarmFits = 4;  // to begin with: two batches each pick those to continue
 // Of measurements that a right model makes one in a thousand is closer.
 constexpr double kTooGood = 0.999;
 constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
@@ -348,7 +347,7 @@ class Inquiry {
     WeighEvidence(verdict);
     // Those that explain the readings, by how well; then the other fits, by how close they come.
     const auto rank = [&verdict](const CandidateEffect& c) {
-      return verdict.Explains(c) ? 0 : (c.campaign.empty() ? 2 : 1);
+      return verdict.Explains(c) ? 0 : (c.refit_p_value < 0 ? 2 : 1);
     };
     std::stable_sort(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
                      [&rank](const CandidateEffect& a, const CandidateEffect& b) {
@@ -385,6 +384,7 @@ class Inquiry {
       if (name.starts_with(candidate.effect + ".")) candidate.amplitude[name] = value;
     }
     candidate.closest = fit.best;
+    if (!fit.Judged()) return;  // the screen knows more
     candidate.refit_p_value = fit.adequacy.p_value;
     candidate.refit_chi2 = fit.adequacy.chi2;
     candidate.over_base = fit.over_base;
@@ -396,26 +396,68 @@ class Inquiry {
                    0.0, 1.0);
   }
 
-  // The named effect, or the best, against what comes next; the base model where there is no
-  // second.
-  absl::Status PlanNext() {
+  // Its refit where it came closest; of an effect without one the base model joined by it, as
+  // strong as the screen expects. None where it has neither.
+  std::optional<Rival> RivalOf(const CandidateEffect& candidate) const {
+    const WarmFit* fit = fits_.Find(candidate.effect);
+    if (fit != nullptr && !fit->best.empty() && !candidate.campaign.empty()) {
+      return Rival{.name = candidate.effect, .view = &fit->view, .values = fit->best};
+    }
+    const dem::Model& model = base_.view().campaign.model;
+    const dem::EffectInfo& effect = *dem::FindEffect(model.user_effects, candidate.effect);
+    if (fit != nullptr || !(candidate.screen_explained > 0) ||
+        !WhyNotAdmissible(effect, model.contact, candidate.amplitude).empty()) {
+      return std::nullopt;
+    }
+    Rival rival = BaseRival();
+    rival.name = candidate.effect;
+    rival.effects = {candidate.effect};
+    rival.fixed = candidate.amplitude;
+    return rival;
+  }
+  Rival BaseRival() const {
+    return {.name = "base",
+            .view = &base_.view(),
+            .values = PointOf(base_.view(), response_.points, diagnosis_.adequacy.best)};
+  }
+
+  // The group that is named together.
+  std::vector<Rival> RivalsOfGroup() {
+    const CandidateEffect& first = diagnosis_.candidates.front();
+    const auto& group = first.confusable_with;
     std::vector<Rival> rivals;
     for (const CandidateEffect& candidate : diagnosis_.candidates) {
-      const WarmFit* fit = fits_.Find(candidate.effect);
-      if (fit == nullptr || fit->best.empty() || rivals.size() >= kMostRivals) continue;
-      const auto& group = diagnosis_.candidates.front().confusable_with;
-      const bool named = diagnosis_.verdict != "ambiguous" || rivals.empty() ||
-                         std::find(group.begin(), group.end(), candidate.effect) != group.end();
-      if (!named) continue;
-      rivals.push_back({.name = candidate.effect, .view = &fit->view, .values = fit->best});
-      if (diagnosis_.verdict != "ambiguous" && rivals.size() == 2) break;
+      if (&candidate != &first &&
+          std::find(group.begin(), group.end(), candidate.effect) == group.end()) {
+        continue;
+      }
+      if (auto rival = RivalOf(candidate)) {
+        rivals.push_back(*std::move(rival));
+      } else {
+        diagnosis_.warnings.push_back(absl::StrCat(
+            "The next experiment does not separate ", candidate.effect,
+            " from the others: no run is known at which it comes close. More samples tell."));
+      }
     }
-    if (rivals.size() == 1) {
-      rivals.push_back(
-          {.name = "base",
-           .view = &base_.view(),
-           .values = PointOf(base_.view(), response_.points, diagnosis_.adequacy.best)});
+    return rivals;
+  }
+
+  // The named effect, or the best, against what comes next; the base model where there is no
+  // second.
+  std::vector<Rival> BestTwo() const {
+    std::vector<Rival> rivals;
+    for (const CandidateEffect& candidate : diagnosis_.candidates) {
+      if (fits_.Find(candidate.effect) == nullptr) continue;
+      if (auto rival = RivalOf(candidate)) rivals.push_back(*std::move(rival));
+      if (rivals.size() == 2) return rivals;
     }
+    if (rivals.size() == 1) rivals.push_back(BaseRival());
+    return rivals;
+  }
+
+  absl::Status PlanNext() {
+    const std::vector<Rival> rivals =
+        diagnosis_.verdict == "ambiguous" ? RivalsOfGroup() : BestTwo();
     const auto like = static_cast<std::size_t>(base_.BestRuns(1).front());
     auto next =
         PlanNextExperiment(laboratory_, rivals, base_.runs().sample[like], response_.scatter);

@@ -46,7 +46,7 @@ Json CandidateJson(const CandidateEffect& c) {
   if (!c.campaign.empty()) {
     json["warm_fit"] = {{"campaign", c.campaign},
                         {"p_value", c.refit_p_value < 0 ? Json(nullptr) : Json(c.refit_p_value)},
-                        {"chi2", c.refit_chi2},
+                        {"chi2", c.refit_p_value < 0 ? Json(nullptr) : Json(c.refit_chi2)},
                         {"left_out_error", OrNull(c.left_out_error)},
                         {"advantage_nats", c.over_base.nats},
                         {"advantage_sd", c.over_base.sd},
@@ -156,7 +156,9 @@ std::string Sentence(const Diagnosis& d) {
         alike == first.effect ? "" : fmt::format(" These tests do not tell {} apart.", alike),
         open.empty()
             ? ""
-            : fmt::format(" Not excluded, since the refit has not come to an end: {}.", open));
+            : fmt::format(
+                  " Not excluded, since no refit has come to an end that shows what it can do: {}.",
+                  open));
   }
   return fmt::format(
       "Unexplained: the model misses the data, and {}{}",

@@ -179,9 +179,13 @@ absl::StatusOr<report::CampaignView> Improvement::Extended(const report::Campaig
   const auto fitted =
       std::count_if(view.campaign.experiments.begin(), view.campaign.experiments.end(),
                     [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
-  const std::int64_t least = static_cast<std::int64_t>(view.campaign.samples) * fitted;
+  // One iteration, whatever is asked for: as much again is as many samples.
+  const bool by_samples = view.campaign.method == campaign::Method::kSqmc;
   absl::StatusOr<report::CampaignView> extended = absl::UnknownError("not run");
   for (const int times : {1, 2}) {
+    const std::int64_t samples =
+        static_cast<std::int64_t>(view.campaign.samples) * (by_samples ? times : 1);
+    const std::int64_t least = samples * fitted;
     std::optional<std::int64_t> budget = Left();
     if (budget && *budget < least) {
       if (times > 1) break;
@@ -197,9 +201,11 @@ absl::StatusOr<report::CampaignView> Improvement::Extended(const report::Campaig
         view, {.effects = effects,
                .purpose = "extension",
                .near = closest.values,
-               .samples = std::nullopt,
-               .iterations = times == 1 ? std::nullopt
-                                        : std::optional<int>(times * view.campaign.max_iterations),
+               .samples = times > 1 && by_samples ? std::optional<int>(static_cast<int>(samples))
+                                                  : std::nullopt,
+               .iterations = times > 1 && !by_samples
+                                 ? std::optional<int>(times * view.campaign.max_iterations)
+                                 : std::nullopt,
                .replicates = std::nullopt,
                .model_evaluations = budget});
     if (!text.ok()) return text.status();

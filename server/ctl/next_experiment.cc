@@ -57,21 +57,18 @@ std::vector<Eigen::VectorXd> CurvesOf(const report::CampaignView& view, const st
   return curves;
 }
 
-// Mahalanobis distance under 1 + 3 scatter^2 1 1^T per curve: scatter of the measurement and of
-// both runs.
-double Distance(const std::vector<Eigen::VectorXd>& a, const std::vector<Eigen::VectorXd>& b,
-                const campaign::Experiment& pattern, double scatter) {
-  double square = 0;
+// Differences of two runs over the noise, curve by curve.
+std::vector<Eigen::VectorXd> DeparturesOf(const std::vector<Eigen::VectorXd>& a,
+                                          const std::vector<Eigen::VectorXd>& b,
+                                          const campaign::Experiment& pattern) {
+  std::vector<Eigen::VectorXd> departures;
   for (std::size_t j = 0; j < a.size(); ++j) {
-    Eigen::VectorXd u = a[j] - b[j];
+    Eigen::VectorXd& u = departures.emplace_back(a[j] - b[j]);
     for (Index i = 0; i < u.size(); ++i) {
       u[i] /= ErrorAt(pattern.observables[j], 0.5 * (a[j][i] + b[j][i]));
     }
-    const double s = 3 * scatter * scatter;
-    const auto n = static_cast<double>(u.size());
-    square += u.squaredNorm() - s / (1 + s * n) * u.sum() * u.sum();  // Sherman-Morrison
   }
-  return std::sqrt(std::max(0.0, square));
+  return departures;
 }
 
 constexpr const char* kSnippetHead =
@@ -80,6 +77,22 @@ constexpr const char* kSnippetHead =
     "  # columns named as our observables, SI units unless `units:` says otherwise.\n";
 
 }  // namespace
+
+double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter) {
+  const double half = 0.5 * scatter * scatter;  // of the variance of one run
+  double square = 0;
+  double of_chance = 0;  // its mean between two runs of one model
+  for (const Eigen::VectorXd& u : departures) {
+    const auto n = static_cast<double>(u.size());
+    // Covariance of a reading among three of a kind (the measurement, both runs) and of their mean.
+    const double single = 1 + 3 * half;
+    const double whole = single + 3 * half * n;
+    const double along = u.sum() * u.sum() / n;
+    square += along / whole + (u.squaredNorm() - along) / single;
+    of_chance += 2 * half * (1 + n) / whole + 2 * half * (n - 1) / single;
+  }
+  return std::max(0.0, square - of_chance);
+}
 
 absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& laboratory,
                                                                  const std::vector<Rival>& rivals,
@@ -114,6 +127,8 @@ absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& lab
         rival.view->source.campaign_file(),
         {.name = fmt::format("{}: next experiment", rival.view->campaign.name),
          .lineage = {.parent = base.status.campaign(), .purpose = "next_experiment"},
+         .effects = rival.effects,
+         .fixed = rival.fixed,
          .experiments = entries,
          .rows = {{.like = like, .values = rival.values}}});
     if (!text.ok()) return text.status();
@@ -142,7 +157,9 @@ absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& lab
       for (std::size_t b = 0; b < a; ++b) {
         closest = curves[a][p].empty() || curves[b][p].empty()
                       ? std::numeric_limits<double>::quiet_NaN()
-                      : std::min(closest, Distance(curves[a][p], curves[b][p], pattern, scatter));
+                      : std::min(closest,
+                                 std::sqrt(SeparationOf(
+                                     DeparturesOf(curves[a][p], curves[b][p], pattern), scatter)));
       }
     }
     if (!std::isfinite(closest)) continue;

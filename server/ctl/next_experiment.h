@@ -2,6 +2,7 @@
 // Which test to do next: among the tests of this build and a grid of their settings, the one in
 // which the models still in the race differ most.
 
+#include <Eigen/Core>
 #include <map>
 #include <optional>
 #include <string>
@@ -16,10 +17,18 @@ namespace calib::ctl {
 
 /// A model in the race at its best point. The view must outlive it.
 struct Rival {
-  std::string name;  ///< of the effect; "base": the campaign's own model
+  std::string name{};  ///< of the effect; "base": the campaign's own model
   const report::CampaignView* view = nullptr;
-  std::map<std::string, double> values;  ///< calibrated parameters, SI
+  std::map<std::string, double> values{};  ///< calibrated parameters, SI
+  std::vector<std::string> effects{};      ///< that join the model of the view, and
+  std::map<std::string, double> fixed{};   ///< their parameters, SI
 };
+
+/// What two runs differ by beyond what two runs of one model do, as a squared distance in units of
+/// what a measurement and both runs scatter by; 0 where it is no more. departures: per curve, the
+/// difference of the runs over the noise. scatter s of a single run in units of the noise: half of
+/// its variance shifts a curve as a whole, half is from reading to reading.
+double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter);
 
 struct NextExperiment {
   PlannedExperiment best;
@@ -33,8 +42,8 @@ struct NextExperiment {
 
 /// Runs every rival once in every planned test, from the specimen and seed of sample `like`. Errors
 /// of a measurement: the noise that the campaign states for the observables at values of their
-/// size, and `scatter` (of a single run, in units of that noise) for the measurement and both runs,
-/// fully correlated along each curve. Empty: fewer than two rivals, no known size of the errors, or
+/// size, and `scatter` (of a single run, in units of that noise) for the measurement and both runs:
+/// see SeparationOf(). Empty: fewer than two rivals, no known size of the errors, or
 /// nothing that all rivals finish. Errors: those of the runs.
 absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& laboratory,
                                                                  const std::vector<Rival>& rivals,

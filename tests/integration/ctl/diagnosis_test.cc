@@ -238,6 +238,23 @@ wait
             std::string::npos);
 }
 
+// Its one iteration cannot be two.
+TEST_F(Misfit, AParentOfOneIterationIsImprovedToo) {
+  std::string yaml = Read("small.yaml");
+  const std::size_t at = yaml.find("\ninference:");
+  yaml.replace(at, yaml.find("\nseed") - at, "\ninference: {method: sqmc, samples: 24}");
+  Write("small.yaml", yaml);
+  ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  const Answer improved = Call("improve c1 --state s --workers 2 --max-effects 1 --json");
+  ASSERT_EQ(improved.code, 0) << improved.err;
+  EXPECT_EQ(improved.json()["steps"].size(), 2U) << improved.out;
+  int most_samples = 0;
+  for (const Json& c : Call("list --state s --json").json()) {
+    if (c["purpose"] == "extension") most_samples = std::max(most_samples, c["samples"].get<int>());
+  }
+  EXPECT_EQ(most_samples, 48) << improved.out;
+}
+
 // No verdict without support: two readings for two parameters.
 TEST_F(Diagnosis, SaysWhatCannotBeJudged) {
   Write("data.csv", "axial_strain,q_over_p,volumetric_strain\n0.005,0.8,0.0012\n");

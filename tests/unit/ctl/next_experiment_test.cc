@@ -1,0 +1,52 @@
+#include "server/ctl/next_experiment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "inference/sampling/philox.h"
+
+namespace calib::ctl {
+namespace {
+
+constexpr double kScatter = 5;  // of a single run, in units of the noise
+constexpr int kReadings = 28;
+
+// Two runs of one model: half of the variance of each shifts the curve.
+std::vector<Eigen::VectorXd> TwoRunsOfOneModel(std::uint64_t seed) {
+  inference::PhiloxStream stream(
+      {.seed = seed, .purpose = inference::StreamPurpose::kTest, .iteration = 0, .sample = 0});
+  std::vector<Eigen::VectorXd> curves;
+  for (int curve = 0; curve < 2; ++curve) {
+    const double shift = kScatter * stream.Normal();  // sqrt(2 / 2) times
+    Eigen::VectorXd& u = curves.emplace_back(kReadings);
+    for (double& reading : u) reading = shift + kScatter * stream.Normal();
+  }
+  return curves;
+}
+
+TEST(NextExperiment, RunsOfOneModelAreNotApart) {
+  constexpr int kPairs = 200;
+  double mean = 0;
+  int apart = 0;
+  for (std::uint64_t seed = 1; seed <= kPairs; ++seed) {
+    const double separation = SeparationOf(TwoRunsOfOneModel(seed), kScatter);
+    mean += separation / kPairs;
+    apart += separation > 36 ? 1 : 0;
+  }
+  EXPECT_LT(mean, 5);
+  EXPECT_LE(apart, 2);
+}
+
+TEST(NextExperiment, WhatIsFarApartIsInUnitsOfTheErrors) {
+  const std::vector<Eigen::VectorXd> tenth = {Eigen::VectorXd::Constant(9, 0.1)};
+  EXPECT_NEAR(SeparationOf(tenth, 0), 0.09, 1e-12);  // noise alone
+  Eigen::VectorXd bump = Eigen::VectorXd::Zero(kReadings);
+  bump[3] = 200;
+  bump[4] = -200;
+  // 80 000 over 1 + 1.5 s^2, less the mean of chance.
+  EXPECT_NEAR(SeparationOf({bump}, kScatter), 80000 / 38.5, 20);
+}
+
+}  // namespace
+}  // namespace calib::ctl
