@@ -70,7 +70,7 @@ TEST(Specimens, FailureIsNotRemembered) {
   EXPECT_TRUE(specimens.Get(Named("a"), {}).ok());
 }
 
-// Another attempt would end the same way: neither the workplace's fault nor worth the time.
+// Another attempt would end the same way: neither the node's fault nor worth the time.
 TEST(Specimens, OneThatCannotBeMadeIsAResultOfTheModel) {
   Specimens specimens([](const std::string&, std::stop_token) -> absl::StatusOr<std::string> {
     return absl::UnavailableError("nothing to fetch");
