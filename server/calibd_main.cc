@@ -6,16 +6,12 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "server/service/address.h"
 #include "server/service/server.h"
 
 namespace {
 
 constexpr std::chrono::seconds kShutdown{5};
-
-bool IsLoopback(const std::string& address) {
-  const std::string host = address.substr(0, address.rfind(':'));
-  return host == "localhost" || host == "[::1]" || host.rfind("127.", 0) == 0;
-}
 
 // Empty: HOST:PORT. gRPC takes a port above 65535 modulo 65536.
 std::string ProblemOfAddress(const std::string& address) {
@@ -66,7 +62,7 @@ int main(int argc, char** argv) {
   }
   options.lease = std::chrono::milliseconds(lease_ms);
   options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
-  if (!IsLoopback(options.listen)) {
+  if (!calib::service::IsLoopback(options.listen)) {
     std::cerr << "warning: " << options.listen
               << " can be reached from other machines, and there is no authentication yet\n";
   }

@@ -70,11 +70,12 @@ int main(int argc, char** argv) {
   int parent = -1;
   double checkpoints_gib = 4;
   options.slots = 0;
-  // Read by `calibctl doctor`.
+  // Read by `calibctl doctor`, line by line.
   app.set_version_flag("--version",
-                       "calib-worker mechanics " + calib::dem::EngineVersion() + " catalogue " +
-                           calib::rpc::Sha256Hex(calib::dem::CatalogText()),
-                       "print what determines the bits of a run, and leave");
+                       "mechanics " + calib::dem::EngineVersion() + "\ncatalogue " +
+                           calib::rpc::Sha256Hex(calib::dem::CatalogText()) + "\ncheckpoints " +
+                           DefaultCheckpoints(),
+                       "print what determines the bits of a run and where it rests, and leave");
   auto* server = app.add_option("--server", options.server, "the server, HOST:PORT");
   app.add_option("--slots", options.slots, "evaluations at a time [cores / threads per slot]")
       ->check(CLI::Range(1, 1024));

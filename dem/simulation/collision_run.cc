@@ -120,6 +120,7 @@ class CollisionRun {
     const auto longest =
         static_cast<std::int64_t>(std::min(kMostSteps, kLongestInHalfPeriods * half_period / dt_));
     block_.dt = dt_;
+    followed_ = static_cast<double>(longest) * dt_ / half_period;
     for (std::int64_t step = 0; step < longest; ++step) {
       if (step % 1024 == 0 && stop_.stop_requested()) {
         return false;
@@ -165,6 +166,15 @@ class CollisionRun {
                        std::atan2(tangential, normal), f.wi, f.ended - f.begun, f.peak}};
   }
 
+  /// Why bodies that have not parted are given up.
+  [[nodiscard]] std::string StillTouching() const {
+    constexpr double kRounding = 0.99;
+    return followed_ > kRounding * kLongestInHalfPeriods
+               ? "the bodies stick together"
+               : absl::StrCat("the bodies still touch after ", followed_,
+                              " half periods of their elastic contact, as long as so strong a "
+                              "dashpot is followed");
+  }
   [[nodiscard]] static double EnergyRestitution(const State& state) { return state.values[5]; }
   [[nodiscard]] bool separated(int lane) const {
     return flights_[static_cast<std::size_t>(lane)].done;
@@ -323,6 +333,7 @@ class CollisionRun {
   ContactBlock block_{};
   std::array<Flight, kBlock> flights_{};
   double dt_ = 0;
+  double followed_ = 0;  ///< half periods that the bodies are given to part
   int impacts_ = 0;
   std::int64_t steps_ = 0;
 };
@@ -371,7 +382,7 @@ Summary RunCollision(const Scenario& scenario, const StateSink& sink, std::stop_
             !too_deep.empty() ? too_deep
             : !finite         ? "a velocity is not finite"
             : !run.separated(k)
-                ? "the bodies stick together"
+                ? run.StillTouching()
                 : absl::StrCat(
                       "the collision leaves ", energy,
                       " times the energy it began with, which no contact of "

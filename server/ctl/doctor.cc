@@ -4,7 +4,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "dem/catalog/catalog.h"
@@ -12,6 +11,7 @@
 #include "server/ctl/text_table.h"
 #include "server/ctl/trial_runs.h"
 #include "server/report/people_units.h"
+#include "server/service/address.h"
 
 namespace calib::ctl {
 namespace {
@@ -69,11 +69,6 @@ void Worsen(Check& check, Health health, const std::string& advice) {
     check.health = health;
     check.advice = advice;
   }
-}
-
-bool IsOnThisMachine(const std::string& address) {
-  const std::string host = address.substr(0, address.rfind(':'));
-  return host == "localhost" || host == "[::1]" || absl::StartsWith(host, "127.");
 }
 
 bool IsNear(double value, double expected, double tolerance) {
@@ -208,7 +203,7 @@ Check JudgeDatabase(const v1::ServerReport& server) {
 
 Check JudgeConnection(const std::string& address, const std::optional<std::string>& listen) {
   Check check{.name = "certificates", .subject = "connection"};
-  if (IsOnThisMachine(listen.value_or(address))) {
+  if (service::IsLoopback(listen.value_or(address))) {
     check.found = absl::StrCat(listen.value_or(address),
                                " is reached from this machine only; no certificate is needed.");
     return check;
@@ -276,13 +271,14 @@ Check JudgeTimeStep(const TrialRuns& runs) {
   const auto off = [](double value, double expected) {
     return absl::StrFormat("%.3f %%", 100.0 * std::abs(value / expected - 1.0));
   };
-  check.found = absl::StrCat(
-      "An elastic collision at the engine's time step: restitution ",
-      report::Number(runs.restitution, 6), " (1), overlap ",
-      off(runs.peak_overlap, hertz.PeakOverlap()), " and duration ",
-      off(runs.duration, hertz.Duration()), " off Hertz; 64 grains compressed to ",
-      report::Number(1e-3 * runs.mean_stress, 4), " kPa (", report::Number(1e-3 * TrialStress(), 4),
-      "). Their digits are ", Short(runs.digest), " on every node of this build.");
+  check.found =
+      absl::StrCat("An elastic collision at the engine's time step: restitution ",
+                   report::Number(runs.restitution, 6), " (1), overlap ",
+                   off(runs.peak_overlap, hertz.PeakOverlap()), " and duration ",
+                   off(runs.duration, hertz.Duration()), " off Hertz; 64 grains compressed to ",
+                   report::Number(1e-3 * runs.mean_stress, 4), " kPa (",
+                   report::Number(1e-3 * TrialStress(), 4), "). Digits ", Short(runs.digest),
+                   ": the same on every node of this build, or one of them is faulty.");
   if (!right) {
     check.health = Health::kProblem;
     check.advice =

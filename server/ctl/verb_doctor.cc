@@ -1,12 +1,15 @@
 // What a node and a server stand on: every check is made, then all are printed.
 #include <sys/timex.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "server/ctl/child_process.h"
@@ -35,37 +38,36 @@ std::string TemporaryPlace() {
   return named != nullptr && *named != '\0' ? named : "/tmp";
 }
 
-/// Where a calib-worker of this user keeps checkpoints unless told otherwise; empty: nowhere.
-std::string CheckpointPlace() {
-  const auto below = [](const char* variable, const char* rest) {
-    const char* const value = std::getenv(variable);
-    return value != nullptr && *value != '\0' ? absl::StrCat(value, rest) : std::string();
-  };
-  const std::string cache = below("XDG_CACHE_HOME", "/calib/checkpoints");
-  return cache.empty() ? below("HOME", "/.cache/calib/checkpoints") : cache;
-}
-
-/// What `calib-worker --version` prints: three words on a line, the last two its build.
-Build BuildOf(const std::string& program) {
+/// What `calib-worker --version` prints: a name and a value on each line.
+struct Worker {
+  Build build{"unknown", "unknown"};
+  std::string checkpoints{};  ///< folder of this user's; empty: none
+};
+Worker AskWorker(const std::string& program) {
+  Worker worker;
   const auto folder = TemporaryFolder::Make();
-  if (!folder.ok()) return {};
+  if (!folder.ok()) return worker;
   const std::string log = folder->path() + "/version";
   auto process = ChildProcess::Start(program, {"--version"}, log);
-  if (!process.ok() || process->Wait() != 0) return {"unknown", "unknown"};
+  if (!process.ok() || process->Wait() != 0) return worker;
   std::ifstream file(log);
-  std::string word;
-  Build build;
-  while (file >> word) {
-    if (word == "mechanics") file >> build.engine_version;
-    if (word == "catalogue") file >> build.catalog_digest;
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t blank = std::min(line.find(' '), line.size());
+    const std::string name = line.substr(0, blank);
+    const std::string value = blank < line.size() ? line.substr(blank + 1) : "";
+    if (name == "mechanics") worker.build.engine_version = value;
+    if (name == "catalogue") worker.build.catalog_digest = value;
+    if (name == "checkpoints") worker.checkpoints = value;
   }
-  return build;
+  return worker;
 }
 
 void ExamineNode(std::vector<Check>& checks) {
   const auto program = FindWorkerProgram();
+  Worker worker;
   if (program.ok()) {
-    checks.push_back(JudgeBuild(*program, OwnBuild(), BuildOf(*program)));
+    worker = AskWorker(*program);
+    checks.push_back(JudgeBuild(*program, OwnBuild(), worker.build));
     checks.push_back(JudgeTimeStep(MakeTrialRuns(*program)));
   } else {
     checks.push_back({.name = "build",
@@ -76,8 +78,9 @@ void ExamineNode(std::vector<Check>& checks) {
   }
   checks.push_back(JudgeClock(ReadClock()));
   checks.push_back(JudgeFolder(service::ExamineFolder(TemporaryPlace()), FolderUse::kTemporary));
-  if (const std::string place = CheckpointPlace(); !place.empty()) {
-    checks.push_back(JudgeFolder(service::ExamineFolder(place), FolderUse::kCheckpoints));
+  if (!worker.checkpoints.empty()) {
+    checks.push_back(
+        JudgeFolder(service::ExamineFolder(worker.checkpoints), FolderUse::kCheckpoints));
   }
 }
 

@@ -4,6 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <string>
+#include <vector>
+
+#include "dem/lab_tests/element_test.h"
+#include "dem/lab_tests/gravity_test.h"
 
 namespace calib::dem {
 namespace {
@@ -103,6 +108,19 @@ TEST(Catalog, ParametersBelongToTheModelThatHasThem) {
   EXPECT_NE(FindParameter("linear", {}, "friction_angle"), nullptr);
   EXPECT_EQ(FindParameter("linear", {}, "rolling_resistance.stiffness"), nullptr);
   EXPECT_EQ(FindParameter("nothing", {}, "friction_angle"), nullptr);
+}
+
+// The two lists by which effects say where they act.
+TEST(Catalog, NamesOfTestsByKindAreComplete) {
+  std::set<std::string> element;
+  std::set<std::string> gravity;
+  for (const TestInfo& test : Tests()) {
+    if (test.needs_packing) (test.poured ? gravity : element).insert(test.name);
+  }
+  const std::vector<std::string> elements = ElementTestNames();
+  const std::vector<std::string> gravities = GravityTestNames();
+  EXPECT_EQ(std::set<std::string>(elements.begin(), elements.end()), element);
+  EXPECT_EQ(std::set<std::string>(gravities.begin(), gravities.end()), gravity);
 }
 
 TEST(Catalog, TextNamesEveryEntryOnce) {
