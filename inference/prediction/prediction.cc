@@ -1,12 +1,11 @@
 #include "inference/prediction/prediction.h"
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "inference/scatter/student_ratio.h"
 
 namespace calib::inference {
 namespace {
@@ -42,9 +41,7 @@ double Quantile(const QuantityPrediction& prediction, Index t, double p) {
 
 void SetQuantiles(QuantityPrediction& result) {
   const Index t = result.mean.size();
-  constexpr double kTail = 0.95;
-  const double stretch = boost::math::quantile(boost::math::students_t(result.freedom), kTail) /
-                         boost::math::quantile(boost::math::normal(), kTail) *
+  const double stretch = StudentRatio(result.freedom) *
                          std::sqrt(1 + 1 / static_cast<double>(result.conditional_mean.rows()));
   result.q05.resize(t);
   result.q50.resize(t);

@@ -1,9 +1,9 @@
 #include "inference/scatter/refit_spread.h"
 
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cassert>
 #include <cmath>
+
+#include "inference/scatter/student_ratio.h"
 
 namespace calib::inference {
 
@@ -37,9 +37,7 @@ Eigen::MatrixXd SpreadOfRefits(const Eigen::MatrixXd& draws, const Eigen::Matrix
   const Eigen::MatrixXd gain = factor.solve(h.transpose() * z / n).transpose();  // d x T
   const Eigen::MatrixXd shifts = gain * replicates.departures.transpose();       // d x R
   const auto freedom = static_cast<double>(count - 1);
-  constexpr double kQuantile = 0.95;
-  const double ratio = boost::math::quantile(boost::math::students_t(freedom), kQuantile) /
-                       boost::math::quantile(boost::math::normal(), kQuantile);
+  const double ratio = StudentRatio(freedom);
   const Eigen::MatrixXd beyond = ratio * ratio / freedom * (shifts * shifts.transpose()) -
                                  gain * replicates.scatter * gain.transpose();
   // Its positive part, in coordinates in which the posterior is a unit sphere.
