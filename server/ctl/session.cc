@@ -3,8 +3,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -15,6 +17,7 @@ namespace calib::ctl {
 namespace {
 
 constexpr std::chrono::seconds kShutdown{3};
+constexpr std::chrono::milliseconds kBetweenTries{100};
 
 bool HoldsState(const std::string& folder) {
   std::error_code error;
@@ -45,24 +48,12 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Arguments& argument
           " holds no state of a server; `calibctl run` and `calibctl submit` make one"));
     }
     session->state_ = arguments.state;
-    service::ServerOptions options;
-    options.state_dir = arguments.state;
-    options.log_file = (std::filesystem::path(arguments.state) / "server.log").string();
-    auto server = service::Server::Start(options);
-    if (server.ok()) {
-      session->server_ = *std::move(server);
-      session->address_ = session->server_->address();
-    } else if (absl::IsAlreadyExists(server.status())) {
-      auto address = service::ServingAddress(arguments.state);
-      if (!address.ok()) return address.status();
-      session->address_ = *std::move(address);
-    } else {
-      return server.status();
-    }
+    if (auto status = session->ServeOrJoin(); !status.ok()) return status;
+  } else {
+    auto client = Client::Connect(session->address_);
+    if (!client.ok()) return client.status();
+    session->client_ = *std::move(client);
   }
-  auto client = Client::Connect(session->address_);
-  if (!client.ok()) return client.status();
-  session->client_ = *std::move(client);
   if (arguments.workers.value_or(0) > 0) {
     if (arguments.state.empty()) {
       return absl::InvalidArgumentError(
@@ -71,6 +62,37 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Arguments& argument
     if (auto started = session->StartWorkers(*arguments.workers); !started.ok()) return started;
   }
   return session;
+}
+
+absl::Status Session::ServeOrJoin() {
+  constexpr int kTries = 5;
+  service::ServerOptions options;
+  options.state_dir = state_;
+  options.log_file = (std::filesystem::path(state_) / "server.log").string();
+  absl::Status last;
+  for (int i = 0; i < kTries; ++i) {
+    auto server = service::Server::Start(options);
+    if (server.ok()) {
+      server_ = *std::move(server);
+      address_ = server_->address();
+    } else if (!absl::IsAlreadyExists(server.status())) {
+      return server.status();
+    } else if (auto address = service::ServingAddress(state_); address.ok()) {
+      address_ = *std::move(address);
+    } else {
+      last = address.status();
+      std::this_thread::sleep_for(kBetweenTries);
+      continue;
+    }
+    auto client = Client::Connect(address_);
+    if (client.ok()) {
+      client_ = *std::move(client);
+      return absl::OkStatus();
+    }
+    last = client.status();
+    if (server_ != nullptr) break;
+  }
+  return last;
 }
 
 Session::~Session() {

@@ -41,6 +41,8 @@ class Session {
 
  private:
   Session();
+  /// Serves the folder, or joins who does; whoever is starting or ending just now is tried again.
+  absl::Status ServeOrJoin();
   bool AllEnded();
   std::string Checkpoints() const;  ///< of local workers
 

@@ -219,6 +219,7 @@ TEST_F(Misfit, ItsVerdictIsKeptWhenNoNextExperimentCanBePlanned) {
   // Somebody cancels the planning as soon as it begins.
   Write("cancel.sh", R"sh(
 ("$1" diagnose c1 --state s --workers 1 --json >first 2>said; echo $? >code) &
+until test -e code || test -e s/server.json; do sleep 0.05; done  # who looks is its guest
 until test -e code; do
   id=$("$1" list --state s | awk '/next_experiment/ && !/finished/ {print $1}')
   test -n "$id" && "$1" cancel $id --state s && break
