@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <random>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -24,64 +25,108 @@ constexpr std::chrono::minutes kLongestStream{10};
 /// is asked again, so that hours of a diagnosis do not end with one late answer. Every call may be
 /// made twice: those that change something carry a request_id.
 constexpr int kLateAnswers = 10;
-constexpr int kLostConnections = 2;  // each waits for the next one up to the call's deadline
+constexpr int kLostConnections = 2;
+constexpr std::chrono::minutes kReturn{1};       // of a server that was lost
+constexpr std::chrono::milliseconds kLull{100};  // until a channel knows that it is broken
 
 using Stub = v1::Campaigns::Stub;
 
+struct Connection {
+  std::string address;
+  std::shared_ptr<grpc::Channel> channel;
+  std::unique_ptr<Stub> stub;
+  Client::FindServer find_server;
+
+  void Open(const std::string& where) {
+    address = where;
+    channel = rpc::OpenChannel(address);
+    stub = v1::Campaigns::NewStub(channel);
+  }
+
+  /// After the server was lost: true once it, or who took its place, can be asked.
+  bool Return() {
+    const auto end = std::chrono::system_clock::now() + kReturn;
+    do {
+      std::this_thread::sleep_for(kLull);
+      if (find_server) {
+        const std::string found = find_server();
+        if (found.empty()) return false;
+        if (found != address) Open(found);
+      }
+      if (channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) return true;
+    } while (std::chrono::system_clock::now() < end);
+    return false;
+  }
+};
+
 absl::Status NoAnswer(const grpc::Status& last) {
-  const std::string why = last.error_code() == grpc::StatusCode::UNAVAILABLE
-                              ? "the connection to the server was lost"
-                              : "the server has not answered for minutes";
-  return {static_cast<absl::StatusCode>(last.error_code()),
+  const bool is_late = last.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
+  const std::string why =
+      is_late ? "the server has not answered for minutes" : "the connection to the server was lost";
+  return {is_late ? absl::StatusCode::kDeadlineExceeded : absl::StatusCode::kUnavailable,
           absl::StrCat(why, " (", last.error_message(),
                        "); what was submitted goes on there, and the same command again goes on "
                        "from what is done")};
 }
 
-// One unary call, asked again when its deadline passes or the connection is lost.
-template <typename Reply, typename Request>
-absl::StatusOr<Reply> Call(Stub& stub,
-                           grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
-                                                        Reply*),
-                           const Request& request) {
+// Calls ask(stub, context), which returns a grpc::Status, again when its deadline passes or the
+// connection is lost.
+template <typename Ask>
+absl::Status Insist(Connection& connection, std::optional<std::chrono::milliseconds> deadline,
+                    const Ask& ask) {
   int late = 0;
   int lost = 0;
   while (true) {
     grpc::ClientContext context;
-    context.set_wait_for_ready(lost > 0);
-    rpc::SetDeadline(context, rpc::kUnaryDeadline);
-    Reply reply;
-    const grpc::Status status = (stub.*method)(&context, request, &reply);
-    if (status.ok()) return reply;
-    const bool is_late = status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
-    const bool is_lost = status.error_code() == grpc::StatusCode::UNAVAILABLE;
-    if (!is_late && !is_lost) return rpc::FromGrpc(status);
-    late += is_late ? 1 : 0;
-    if (is_lost) {
-      ++lost;
-      late = 0;  // a connection that does not come back is late from then on
-    }
-    if (lost > kLostConnections || late >= (lost > 0 ? kLostConnections : kLateAnswers)) {
-      return NoAnswer(status);
+    if (deadline) rpc::SetDeadline(context, *deadline);
+    const grpc::Status status = ask(*connection.stub, context);
+    switch (status.error_code()) {
+      case grpc::StatusCode::OK:
+        return absl::OkStatus();
+      case grpc::StatusCode::DEADLINE_EXCEEDED:
+        if (++late >= kLateAnswers) return NoAnswer(status);
+        break;
+      case grpc::StatusCode::CANCELLED:  // by a server that ends
+      case grpc::StatusCode::UNAVAILABLE:
+        if (++lost > kLostConnections || !connection.Return()) return NoAnswer(status);
+        break;
+      default:
+        return rpc::FromGrpc(status);
     }
   }
+}
+
+template <typename Reply, typename Request>
+absl::StatusOr<Reply> Call(Connection& connection,
+                           grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                        Reply*),
+                           const Request& request) {
+  Reply reply;
+  auto answered =
+      Insist(connection, rpc::kUnaryDeadline, [&](Stub& stub, grpc::ClientContext& context) {
+        reply.Clear();
+        return (stub.*method)(&context, request, &reply);
+      });
+  if (!answered.ok()) return answered;
+  return reply;
 }
 
 // All messages of one stream.
 template <typename Message, typename Request>
 absl::StatusOr<std::vector<Message>> Collect(
-    Stub& stub,
+    Connection& connection,
     std::unique_ptr<grpc::ClientReader<Message>> (Stub::*method)(grpc::ClientContext*,
                                                                  const Request&),
     const Request& request) {
-  grpc::ClientContext context;
-  rpc::SetDeadline(context, kLongestStream);
-  const auto reader = (stub.*method)(&context, request);
   std::vector<Message> messages;
-  Message message;
-  while (reader->Read(&message)) messages.push_back(message);
-  const grpc::Status status = reader->Finish();
-  if (!status.ok()) return rpc::FromGrpc(status);
+  auto answered = Insist(connection, kLongestStream, [&](Stub& stub, grpc::ClientContext& context) {
+    messages.clear();
+    const auto reader = (stub.*method)(&context, request);
+    Message message;
+    while (reader->Read(&message)) messages.push_back(message);
+    return reader->Finish();
+  });
+  if (!answered.ok()) return answered;
   return messages;
 }
 
@@ -109,8 +154,7 @@ v1::ControlRequest ControlOf(const std::string& campaign) {
 }  // namespace
 
 struct Client::Impl {
-  std::shared_ptr<grpc::Channel> channel;
-  std::unique_ptr<Stub> stub;
+  Connection connection;
 };
 
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -118,33 +162,37 @@ Client::~Client() = default;
 
 absl::StatusOr<std::unique_ptr<Client>> Client::Connect(const std::string& address) {
   auto impl = std::make_unique<Impl>();
-  impl->channel = rpc::OpenChannel(address);
-  if (!impl->channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) {
+  impl->connection.Open(address);
+  if (!impl->connection.channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) {
     return absl::UnavailableError(
         absl::StrCat("no server answers at ", address,
                      "; start one with `calibd --state DIR`, name another with --server HOST:PORT, "
                      "or work on a folder with --state DIR"));
   }
-  impl->stub = v1::Campaigns::NewStub(impl->channel);
   return std::unique_ptr<Client>(new Client(std::move(impl)));
 }
 
+void Client::OnLoss(FindServer find_server) {
+  impl_->connection.find_server = std::move(find_server);
+}
+
 absl::Status Client::PutBlob(const std::string& content) {
-  grpc::ClientContext context;
-  rpc::SetDeadline(context, rpc::kBlobDeadline);
-  v1::BlobReceipt receipt;
-  const auto writer = impl_->stub->PutBlob(&context, &receipt);
-  for (const v1::BlobChunk& chunk : rpc::ToChunks(content)) {
-    if (!writer->Write(chunk)) break;  // Finish() says why
-  }
-  writer->WritesDone();
-  return rpc::FromGrpc(writer->Finish());
+  return Insist(impl_->connection, rpc::kBlobDeadline,
+                [&content](Stub& stub, grpc::ClientContext& context) {
+                  v1::BlobReceipt receipt;
+                  const auto writer = stub.PutBlob(&context, &receipt);
+                  for (const v1::BlobChunk& chunk : rpc::ToChunks(content)) {
+                    if (!writer->Write(chunk)) break;  // Finish() says why
+                  }
+                  writer->WritesDone();
+                  return writer->Finish();
+                });
 }
 
 absl::StatusOr<std::string> Client::GetBlob(const std::string& digest) {
   v1::BlobByDigest request;
   request.set_digest(digest);
-  const auto chunks = Collect(*impl_->stub, &Stub::GetBlob, request);
+  const auto chunks = Collect(impl_->connection, &Stub::GetBlob, request);
   if (!chunks.ok()) return chunks.status();
   rpc::BlobAssembler assembler;
   for (const v1::BlobChunk& chunk : *chunks) {
@@ -154,26 +202,27 @@ absl::StatusOr<std::string> Client::GetBlob(const std::string& digest) {
 }
 
 absl::StatusOr<v1::SubmitReply> Client::Submit(const v1::SubmitRequest& request) {
-  return Call<v1::SubmitReply>(*impl_->stub, &Stub::Submit, request);
+  return Call<v1::SubmitReply>(impl_->connection, &Stub::Submit, request);
 }
 
 absl::StatusOr<std::vector<v1::CampaignStatus>> Client::List() {
-  const auto reply = Call<v1::ListReply>(*impl_->stub, &Stub::List, v1::ListRequest());
+  const auto reply = Call<v1::ListReply>(impl_->connection, &Stub::List, v1::ListRequest());
   if (!reply.ok()) return reply.status();
   return std::vector<v1::CampaignStatus>(reply->campaigns().begin(), reply->campaigns().end());
 }
 
 absl::StatusOr<v1::CampaignStatus> Client::Show(const std::string& campaign) {
-  return Call<v1::CampaignStatus>(*impl_->stub, &Stub::Show, Of(campaign));
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::Show, Of(campaign));
 }
 
 absl::Status Client::Watch(const std::string& campaign,
                            const std::function<void(const v1::CampaignStatus&)>& seen) {
-  grpc::ClientContext context;
-  const auto reader = impl_->stub->Watch(&context, Of(campaign));
-  v1::CampaignStatus status;
-  while (reader->Read(&status)) seen(status);
-  return rpc::FromGrpc(reader->Finish());
+  return Insist(impl_->connection, std::nullopt, [&](Stub& stub, grpc::ClientContext& context) {
+    const auto reader = stub.Watch(&context, Of(campaign));
+    v1::CampaignStatus status;
+    while (reader->Read(&status)) seen(status);
+    return reader->Finish();
+  });
 }
 
 absl::StatusOr<v1::Posterior> Client::GetPosterior(const std::string& campaign,
@@ -181,11 +230,11 @@ absl::StatusOr<v1::Posterior> Client::GetPosterior(const std::string& campaign,
   v1::PosteriorRequest request;
   request.set_campaign(campaign);
   if (iteration) request.set_iteration(*iteration);
-  return Call<v1::Posterior>(*impl_->stub, &Stub::GetPosterior, request);
+  return Call<v1::Posterior>(impl_->connection, &Stub::GetPosterior, request);
 }
 
 absl::StatusOr<std::vector<v1::Sample>> Client::GetSamples(const std::string& campaign) {
-  return Collect(*impl_->stub, &Stub::GetSamples, Of(campaign));
+  return Collect(impl_->connection, &Stub::GetSamples, Of(campaign));
 }
 
 absl::StatusOr<std::vector<v1::SampleStates>> Client::GetStates(const std::string& campaign,
@@ -193,15 +242,15 @@ absl::StatusOr<std::vector<v1::SampleStates>> Client::GetStates(const std::strin
   v1::StatesRequest request;
   request.set_campaign(campaign);
   if (sample) request.set_sample(*sample);
-  return Collect(*impl_->stub, &Stub::GetStates, request);
+  return Collect(impl_->connection, &Stub::GetStates, request);
 }
 
 absl::StatusOr<v1::CampaignSource> Client::GetSource(const std::string& campaign) {
-  return Call<v1::CampaignSource>(*impl_->stub, &Stub::GetSource, Of(campaign));
+  return Call<v1::CampaignSource>(impl_->connection, &Stub::GetSource, Of(campaign));
 }
 
 absl::StatusOr<std::vector<v1::LogEntry>> Client::GetLog(const std::string& campaign) {
-  return Collect(*impl_->stub, &Stub::GetLog, Of(campaign));
+  return Collect(impl_->connection, &Stub::GetLog, Of(campaign));
 }
 
 absl::Status Client::AddFinding(const std::string& campaign, const std::string& kind,
@@ -211,34 +260,34 @@ absl::Status Client::AddFinding(const std::string& campaign, const std::string& 
   request.set_campaign(campaign);
   request.set_kind(kind);
   request.set_digest(rpc::Sha256Hex(document));
-  return Call<v1::Finding>(*impl_->stub, &Stub::AddFinding, request).status();
+  return Call<v1::Finding>(impl_->connection, &Stub::AddFinding, request).status();
 }
 
 absl::StatusOr<std::vector<v1::Finding>> Client::Findings(const std::string& campaign) {
-  const auto list = Call<v1::FindingList>(*impl_->stub, &Stub::ListFindings, Of(campaign));
+  const auto list = Call<v1::FindingList>(impl_->connection, &Stub::ListFindings, Of(campaign));
   if (!list.ok()) return list.status();
   return std::vector<v1::Finding>(list->findings().begin(), list->findings().end());
 }
 
 absl::StatusOr<v1::CampaignStatus> Client::Pause(const std::string& campaign) {
-  return Call<v1::CampaignStatus>(*impl_->stub, &Stub::Pause, ControlOf(campaign));
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::Pause, ControlOf(campaign));
 }
 
 absl::StatusOr<v1::CampaignStatus> Client::Resume(const std::string& campaign) {
-  return Call<v1::CampaignStatus>(*impl_->stub, &Stub::Resume, ControlOf(campaign));
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::Resume, ControlOf(campaign));
 }
 
 absl::StatusOr<v1::CampaignStatus> Client::Cancel(const std::string& campaign) {
-  return Call<v1::CampaignStatus>(*impl_->stub, &Stub::Cancel, ControlOf(campaign));
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::Cancel, ControlOf(campaign));
 }
 
 absl::Status Client::Delete(const std::string& campaign) {
-  return Call<v1::DeleteReply>(*impl_->stub, &Stub::Delete, ControlOf(campaign)).status();
+  return Call<v1::DeleteReply>(impl_->connection, &Stub::Delete, ControlOf(campaign)).status();
 }
 
 absl::StatusOr<std::vector<v1::WorkerInfo>> Client::ListWorkers() {
   const auto reply =
-      Call<v1::WorkerList>(*impl_->stub, &Stub::ListWorkers, v1::ListWorkersRequest());
+      Call<v1::WorkerList>(impl_->connection, &Stub::ListWorkers, v1::ListWorkersRequest());
   if (!reply.ok()) return reply.status();
   return std::vector<v1::WorkerInfo>(reply->workers().begin(), reply->workers().end());
 }
@@ -247,11 +296,11 @@ absl::StatusOr<v1::WorkerInfo> Client::DrainWorker(const std::string& worker) {
   v1::DrainRequest request;
   request.set_worker(worker);
   request.set_request_id(NewRequestId());
-  return Call<v1::WorkerInfo>(*impl_->stub, &Stub::DrainWorker, request);
+  return Call<v1::WorkerInfo>(impl_->connection, &Stub::DrainWorker, request);
 }
 
 absl::StatusOr<v1::ServerReport> Client::Examine() {
-  return Call<v1::ServerReport>(*impl_->stub, &Stub::Examine, v1::ExamineRequest());
+  return Call<v1::ServerReport>(impl_->connection, &Stub::Examine, v1::ExamineRequest());
 }
 
 }  // namespace calib::ctl

@@ -19,6 +19,10 @@ class Client {
  public:
   /// UNAVAILABLE when nothing answers at the address within about two seconds.
   static absl::StatusOr<std::unique_ptr<Client>> Connect(const std::string& address);
+  /// How to find the server again when the connection is lost: its address, or "" when that is
+  /// hopeless. Without it the same address is tried.
+  using FindServer = std::function<std::string()>;
+  void OnLoss(FindServer find_server);
   ~Client();
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;

@@ -127,10 +127,8 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
     if (!status.ok()) return status.status();
   }
   if (!IsOver(status->state())) {
-    if (!workers_started_ && !arguments_.workers && !arguments_.state.empty() &&
-        !session_.is_guest()) {
-      const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-      if (auto started = session_.StartWorkers(cores); !started.ok()) return started;
+    if (!workers_started_ && !arguments_.workers && !arguments_.state.empty()) {
+      if (auto started = session_.UseWorkers(std::nullopt); !started.ok()) return started;
     }
     workers_started_ = true;
   }

@@ -18,6 +18,7 @@ namespace {
 
 constexpr std::chrono::seconds kShutdown{3};
 constexpr std::chrono::milliseconds kBetweenTries{100};
+constexpr const char* kAnyPort = "127.0.0.1:0";
 
 bool HoldsState(const std::string& folder) {
   std::error_code error;
@@ -59,40 +60,65 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Arguments& argument
       return absl::InvalidArgumentError(
           "--workers goes with --state DIR; workers of a remote server are calib-worker --server");
     }
-    if (auto started = session->StartWorkers(*arguments.workers); !started.ok()) return started;
+    if (auto started = session->UseWorkers(arguments.workers); !started.ok()) return started;
   }
   return session;
 }
 
-absl::Status Session::ServeOrJoin() {
+absl::StatusOr<std::string> Session::ServeOrFind(const std::string& listen) {
   constexpr int kTries = 5;
   service::ServerOptions options;
   options.state_dir = state_;
+  options.listen = listen;
   options.log_file = (std::filesystem::path(state_) / "server.log").string();
   absl::Status last;
   for (int i = 0; i < kTries; ++i) {
     auto server = service::Server::Start(options);
     if (server.ok()) {
       server_ = *std::move(server);
-      address_ = server_->address();
-    } else if (!absl::IsAlreadyExists(server.status())) {
-      return server.status();
-    } else if (auto address = service::ServingAddress(state_); address.ok()) {
-      address_ = *std::move(address);
-    } else {
-      last = address.status();
-      std::this_thread::sleep_for(kBetweenTries);
-      continue;
+      return server_->address();
     }
+    if (!absl::IsAlreadyExists(server.status())) return server.status();
+    auto address = service::ServingAddress(state_);
+    if (address.ok()) return address;
+    last = address.status();
+    std::this_thread::sleep_for(kBetweenTries);
+  }
+  return last;
+}
+
+absl::Status Session::ServeOrJoin() {
+  constexpr int kTries = 3;
+  absl::Status last;
+  for (int i = 0; i < kTries && client_ == nullptr; ++i) {
+    auto address = ServeOrFind(kAnyPort);
+    if (!address.ok()) return address.status();
+    address_ = *std::move(address);
     auto client = Client::Connect(address_);
-    if (client.ok()) {
-      client_ = *std::move(client);
-      return absl::OkStatus();
-    }
+    if (client.ok()) client_ = *std::move(client);
     last = client.status();
     if (server_ != nullptr) break;
   }
+  if (client_ != nullptr) {
+    client_->OnLoss([this] { return Succeed(); });
+  }
   return last;
+}
+
+std::string Session::Succeed() {
+  if (server_ != nullptr) return address_;  // it is not gone, only slow
+  auto address = ServeOrFind(address_);     // where its workers look for it
+  if (absl::IsUnavailable(address.status())) address = ServeOrFind(kAnyPort);
+  if (!address.ok()) return "";
+  if (*address != address_ && !workers_.empty()) {
+    const int count = static_cast<int>(workers_.size());
+    workers_.clear();
+    address_ = *address;
+    if (!StartWorkers(count).ok()) return "";
+  }
+  address_ = *std::move(address);
+  if (server_ != nullptr && workers_.empty() && !StartWorkers(workers_as_host_).ok()) return "";
+  return address_;
 }
 
 Session::~Session() {
@@ -120,7 +146,15 @@ std::string Session::Checkpoints() const {
   return (std::filesystem::path(state_) / "checkpoints").string();
 }
 
+absl::Status Session::UseWorkers(std::optional<int> count) {
+  if (!count) {
+    workers_as_host_ = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  }
+  return StartWorkers(count.value_or(is_guest() ? 0 : workers_as_host_));
+}
+
 absl::Status Session::StartWorkers(int count) {
+  if (count == 0) return absl::OkStatus();
   const auto program = FindWorkerProgram();
   if (!program.ok()) return program.status();
   for (int i = 1; i <= count; ++i) {

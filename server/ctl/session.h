@@ -3,6 +3,7 @@
 // state folder, with local workers beside it.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,18 +32,27 @@ class Session {
 
   Client& client() { return *client_; }
   const std::string& address() const { return address_; }  ///< HOST:PORT of its server
-  /// The folder is served by another process, to which this session is connected.
+  /// The folder is served by another process, to which this session is connected. When that ends,
+  /// this one serves the folder.
   bool is_guest() const { return server_ == nullptr; }
 
-  /// Starts `count` single-slot workers; each logs to worker-N.log in the state folder.
-  absl::Status StartWorkers(int count);
+  /// Starts `count` single-slot workers; each logs to worker-N.log in the state folder. Without a
+  /// count: one per core when this process serves the folder, now or once it takes over.
+  absl::Status UseWorkers(std::optional<int> count);
+  int workers() const { return static_cast<int>(workers_.size()); }
   /// FAILED_PRECONDITION, with the end of the log, when all local workers have ended.
   absl::Status CheckWorkers();
 
  private:
   Session();
-  /// Serves the folder, or joins who does; whoever is starting or ending just now is tried again.
+  /// Serves the folder, or joins who does.
   absl::Status ServeOrJoin();
+  /// The address of who serves the folder, this process if nobody does. Whoever is starting or
+  /// ending just now is tried again.
+  absl::StatusOr<std::string> ServeOrFind(const std::string& listen);
+  /// After the process that served the folder has ended: ServeOrFind for the client, "" on failure.
+  std::string Succeed();
+  absl::Status StartWorkers(int count);
   bool AllEnded();
   std::string Checkpoints() const;  ///< of local workers
 
@@ -51,6 +61,7 @@ class Session {
   std::unique_ptr<service::Server> server_;  // nullptr: somebody else's
   std::unique_ptr<Client> client_;
   std::vector<ChildProcess> workers_;
+  int workers_as_host_ = 0;
 };
 
 }  // namespace calib::ctl

@@ -89,15 +89,13 @@ int Run(const Arguments& given) {
   auto status = (*session)->client().Show(*campaign);
   if (!status.ok()) return Fail(status.status());
   if (!IsOver(*status)) {
-    const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-    const int workers = given.workers.value_or((*session)->is_guest() ? 0 : cores);
-    const bool needed = !source->outcome.campaign.precomputed && workers > 0;
-    if (auto started = needed ? (*session)->StartWorkers(workers) : absl::OkStatus();
-        !started.ok()) {
-      return Fail(started);
+    if (!source->outcome.campaign.precomputed) {
+      if (auto started = (*session)->UseWorkers(given.workers); !started.ok()) {
+        return Fail(started);
+      }
     }
     std::cerr << "campaign " << *campaign << " in " << arguments.state << " with "
-              << (needed ? workers : 0) << " worker(s)\n";
+              << (*session)->workers() << " worker(s)\n";
     status = Follow(**session, *campaign);
     if (!status.ok()) return Fail(status.status());
   }
