@@ -223,6 +223,10 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   return adequacy;
 }
 
+double ExplainableMisfit(const Adequacy& base) {
+  return std::max(base.chi2 - base.degrees, std::sqrt(2 * base.degrees));
+}
+
 absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
                                           const std::vector<Signature>& candidates,
                                           const ScreenOptions& options) {
@@ -270,7 +274,7 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   }
   std::vector<Score> scores;
   std::vector<Eigen::VectorXd> visible;  // what no choice of the parameters imitates
-  const double excess = std::max(adequacy->chi2 - adequacy->degrees, 1.0);
+  const double excess = ExplainableMisfit(*adequacy);
   // In sd along a direction: either sign of every difference of every candidate is a chance.
   const auto reach = [&](std::size_t differences) {
     const boost::math::normal normal;
@@ -317,6 +321,9 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
     scores.push_back(std::move(score));
   }
   constexpr double kClose = 25;  // degrees
+  // Times the chi-squared of a right model: what a rival at an angle to the truth leaves is beyond
+  // doubt when it is more.
+  constexpr double kToldApart = 4;
   for (std::size_t a = 0; a < scores.size(); ++a) {
     for (std::size_t b = 0; b < scores.size(); ++b) {
       if (a == b) continue;
@@ -326,7 +333,11 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
           std::acos(std::clamp(either_sign ? std::abs(cosine) : cosine, -1.0, 1.0)) * 180 /
           std::numbers::pi;
       scores[a].angles[scores[b].name] = angle;
-      if (angle < kClose) scores[a].confusable_with.push_back(scores[b].name);
+      const double sine = std::sin(angle * std::numbers::pi / 180);
+      const double left = sine * sine * std::max(scores[a].gain, scores[b].gain);
+      if (angle < kClose && left < kToldApart * adequacy->degrees) {
+        scores[a].confusable_with.push_back(scores[b].name);
+      }
     }
     std::stable_sort(scores[a].confusable_with.begin(), scores[a].confusable_with.end(),
                      [&angles = scores[a].angles](const std::string& x, const std::string& y) {

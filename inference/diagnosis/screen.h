@@ -46,7 +46,7 @@ struct Score {
   double gain = 0;       ///< fall of chi2 when the effect may join, all parameters refitted
   double p_value = 1;    ///< of such a fall without the effect
   double adjusted = 1;   ///< p_value by Holm over all candidates
-  double explained = 0;  ///< share of the excess chi2 - degrees that goes
+  double explained = 0;  ///< share of ExplainableMisfit() that goes
   double amplitude = 0;  ///< in units of the difference that fits best
   int difference = 0;    ///< which one that is
   double rms = 0;        ///< of the history left, in noise sd
@@ -56,7 +56,8 @@ struct Score {
   /// strengths or more have nothing in common.
   double detectable = 0;
   int detectable_difference = 0;  ///< which one that is
-  /// Signatures less than 25 degrees away, nearest first.
+  /// Signatures less than 25 degrees away, nearest first, unless the misfit is so large that the
+  /// readings tell them apart all the same.
   std::vector<std::string> confusable_with{};
   /// Between what no choice of the parameters imitates of this signature and of each other one, by
   /// name [degrees], 0 to 90 where either effect is two-sided, else to 180.
@@ -72,6 +73,10 @@ struct ScreenOptions {
 
 /// Errors: INVALID_ARGUMENT for shapes that do not fit, a covariance that is not positive definite.
 absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model);
+
+/// What of the base model's chi2 an effect may explain: its excess over what a right model has, at
+/// least the chance scatter of that (so that nothing explains a misfit that is none).
+double ExplainableMisfit(const Adequacy& base);
 
 /// Scores in the order of p_value, then of gain. Deterministic. Errors as above.
 absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,

@@ -85,6 +85,11 @@ std::optional<dem::StrengthRay> ReadRay(MapReader& map, const dem::ParameterInfo
       map.Problem("steps", absl::StrCat(value, " is outside what its sign allows"));
       return std::nullopt;
     }
+    if (value < prior.min || value > prior.max) {
+      map.Problem("steps", absl::StrCat(value, " is outside its prior, ", prior.min, " to ",
+                                        prior.max, ": a fit could not take that strength"));
+      return std::nullopt;
+    }
   }
   std::sort(values.begin(), values.end(),
             [null](double a, double b) { return std::abs(a - null) < std::abs(b - null); });

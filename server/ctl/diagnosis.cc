@@ -390,10 +390,9 @@ class Inquiry {
     candidate.over_base = fit.over_base;
     candidate.gain_p_value = fit.gain_p_value;
     candidate.left_out_error = fit.left_out_error;
-    candidate.explained_fraction =
-        std::clamp((diagnosis_.adequacy.chi2 - fit.adequacy.chi2) /
-                       std::max(1.0, diagnosis_.adequacy.chi2 - diagnosis_.adequacy.degrees),
-                   0.0, 1.0);
+    candidate.explained_fraction = std::clamp((diagnosis_.adequacy.chi2 - fit.adequacy.chi2) /
+                                                  inference::ExplainableMisfit(diagnosis_.adequacy),
+                                              0.0, 1.0);
   }
 
   // Its refit where it came closest; of an effect without one the base model joined by it, as
@@ -463,6 +462,10 @@ class Inquiry {
         PlanNextExperiment(laboratory_, rivals, base_.runs().sample[like], response_.scatter);
     if (!next.ok()) return next.status();
     diagnosis_.next_experiment = *std::move(next);
+    const std::string why = diagnosis_.next_experiment ? "" : WhyNoPlans(base_.view().campaign);
+    if (rivals.size() >= 2 && !why.empty()) {
+      diagnosis_.warnings.push_back(absl::StrCat("No next experiment is planned: ", why, "."));
+    }
     return absl::OkStatus();
   }
 

@@ -20,6 +20,17 @@ using report::Number;
 Json OrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
+bool ComesCloser(const CandidateEffect& c) { return c.refit_p_value >= 0 && c.over_base.nats > 0; }
+
+// Without the effect it is the base model: a refit that is further off has merely not been found. One
+// that is calculated has been looked for at every strength.
+bool NotFound(const CandidateEffect& c) {
+  return !c.campaign.empty() && c.refit_p_value >= 0 && !ComesCloser(c);
+}
+
+// Tenths are more than their errors allow to tell.
+std::string Nats(double value) { return fmt::format("{:.1f}", value); }
+
 Json EvidenceJson(const std::optional<ScaledEvidence>& evidence) {
   if (!evidence) return nullptr;
   return {{"strength_prior_scale", kStrengthScales},
@@ -41,6 +52,7 @@ Json CandidateJson(const CandidateEffect& c) {
                {"explained_fraction", c.explained_fraction},
                {"amplitude", c.amplitude},
                {"predicted_rms_error", c.predicted_rms_error},
+               {"predicted_by", c.campaign.empty() || NotFound(c) ? "screen" : "refit"},
                {"confusable_with", c.confusable_with},
                {"angles", c.angles}};
   if (!c.campaign.empty()) {
@@ -166,14 +178,6 @@ std::string Sentence(const Diagnosis& d) {
       d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
 }
 
-bool ComesCloser(const CandidateEffect& c) { return c.refit_p_value >= 0 && c.over_base.nats > 0; }
-
-// Without the effect it is the base model: a refit that is further off has merely not been found. One
-// that is calculated has been looked for at every strength.
-bool NotFound(const CandidateEffect& c) {
-  return !c.campaign.empty() && c.refit_p_value >= 0 && !ComesCloser(c);
-}
-
 // Of the effects that are named together, where the screen has measured both.
 std::string GroupAngles(const Diagnosis& d) {
   const CandidateEffect& first = d.candidates.front();
@@ -249,10 +253,10 @@ std::string DiagnosisText(const Diagnosis& d) {
         {"<effect", "p (screen)", "explains", "error with it", "refitted p", "left out"});
     for (const CandidateEffect& c : d.candidates) {
       table.AddRow({c.effect, Number(c.p_value, 2),
-                    NotFound(c) ? "not found" : report::Percent(c.explained_fraction, 2),
+                    NotFound(c) ? "not found" : report::ShareExplained(c.explained_fraction),
                     Number(c.predicted_rms_error, 3),
-                    c.refit_p_value < 0 ? "–" : Number(c.refit_p_value, 2),
-                    c.left_out_error ? Number(*c.left_out_error, 3) : "–"});
+                    c.refit_p_value < 0 || NotFound(c) ? "–" : Number(c.refit_p_value, 2),
+                    c.left_out_error && !NotFound(c) ? Number(*c.left_out_error, 3) : "–"});
     }
     text += "\n" + table.ToString();
     if (std::any_of(d.candidates.begin(), d.candidates.end(), &NotFound)) {
@@ -289,7 +293,7 @@ std::string DiagnosisText(const Diagnosis& d) {
     text += Wrapped(
         fmt::format("Log Bayes factor of {} over the model without it: {}, {}, {} where the prior "
                     "of its strength is a quarter, once and four times as wide.",
-                    c.effect, Number(nats[0], 3), Number(nats[1], 3), Number(nats[2], 3)),
+                    c.effect, Nats(nats[0]), Nats(nats[1]), Nats(nats[2])),
         "", "");
   }
   if (d.verdict == "adequate" && !d.detectable.empty()) {

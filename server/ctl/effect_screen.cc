@@ -12,6 +12,7 @@ namespace {
 
 using Eigen::Index;
 
+constexpr double kNothing = 1e-8;      // of the square of a reading's sd, per reading
 constexpr int kMostRuns = 4;           // of one effect, or
 constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all effects
 // A second strength is to change three times what two runs differ by chance: of what a measurement
@@ -192,14 +193,21 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
       if (auto status = Measure(*effects[e], *pair++, signatures[e]); !status.ok()) return status;
     }
   }
+  const auto changes_nothing = [&square_of](const inference::Signature& signature) {
+    return std::all_of(signature.differences.begin(), signature.differences.end(),
+                       [&square_of](const auto& d) { return square_of(d) < kNothing; });
+  };
   for (const inference::Signature& signature : signatures) {
     if (signature.differences.empty()) {
-      not_excitable_.emplace_back(signature.name, "runs with it diverge");
+      const std::string& why = diverged_[signature.name];
+      not_excitable_.emplace_back(signature.name, why.empty()
+                                                      ? "runs with it diverge"
+                                                      : "runs with it diverge (" + why + ")");
+    } else if (changes_nothing(signature)) {
+      not_excitable_.emplace_back(signature.name, "it changes nothing in these tests");
     }
   }
-  signatures.erase(std::remove_if(signatures.begin(), signatures.end(),
-                                  [](const auto& s) { return s.differences.empty(); }),
-                   signatures.end());
+  std::erase_if(signatures, changes_nothing);  // of no differences too
   return signatures;
 }
 
@@ -224,7 +232,10 @@ absl::Status EffectScreen::Measure(const dem::EffectInfo& effect, const Pair& pa
   if (!view.ok()) return view.status();
   evaluations_ += base_.fitted_experiments();
   const report::RunTable with = report::RunsOf(*view, base_.readings().of_mean);
-  if (with.sample.empty()) return absl::OkStatus();
+  if (with.sample.empty()) {
+    for (const v1::Sample& sample : view->samples) diverged_[effect.name] = sample.reason();
+    return absl::OkStatus();
+  }
   signature.differences.emplace_back(
       (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
   if (effect.rays.size() == 1) signature.strengths.push_back(pair.step.step);

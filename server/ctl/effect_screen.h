@@ -95,6 +95,7 @@ class EffectScreen {
   const FittedCampaign& base_;
   std::map<std::string, std::vector<Step>> tried_;
   std::map<std::string, std::vector<EffectRun>> runs_with_;
+  std::map<std::string, std::string> diverged_;  // by effect: why its last run did
   std::vector<std::pair<std::string, std::string>> not_excitable_;
   std::int64_t evaluations_ = 0;
 };

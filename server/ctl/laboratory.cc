@@ -87,7 +87,7 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
     if (Interrupted()) {
       return absl::CancelledError("stopped; nothing is lost, the same command goes on from here");
     }
-    if (auto alive = session_.CheckWorkers(); !alive.ok()) return alive;
+    if (auto alive = session_.Check(); !alive.ok()) return alive;
     std::this_thread::sleep_for(kPollServer);
   }
 }

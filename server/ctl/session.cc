@@ -71,6 +71,10 @@ absl::StatusOr<std::string> Session::ServeOrFind(const std::string& listen) {
   options.state_dir = state_;
   options.listen = listen;
   options.log_file = (std::filesystem::path(state_) / "server.log").string();
+  options.on_failure = [failure = failure_](const absl::Status& status) {
+    absl::MutexLock lock(&failure->mutex);
+    failure->status = status;
+  };
   absl::Status last;
   for (int i = 0; i < kTries; ++i) {
     auto server = service::Server::Start(options);
@@ -106,6 +110,7 @@ absl::Status Session::ServeOrJoin() {
 }
 
 std::string Session::Succeed() {
+  if (!failure_->Get().ok()) return "";
   if (server_ != nullptr) return address_;  // it is not gone, only slow
   auto address = ServeOrFind(address_);     // where its workers look for it
   if (absl::IsUnavailable(address.status())) address = ServeOrFind(kAnyPort);
@@ -171,7 +176,8 @@ absl::Status Session::StartWorkers(int count) {
   return absl::OkStatus();
 }
 
-absl::Status Session::CheckWorkers() {
+absl::Status Session::Check() {
+  if (auto failure = failure_->Get(); !failure.ok()) return failure;
   if (workers_.empty()) return absl::OkStatus();
   for (ChildProcess& worker : workers_) {
     if (!worker.Poll()) return absl::OkStatus();

@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "absl/base/thread_annotations.h"
 #include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
 #include "server/ctl/arguments.h"
 #include "server/ctl/child_process.h"
 #include "server/ctl/client.h"
@@ -40,8 +42,9 @@ class Session {
   /// count: one per core when this process serves the folder, now or once it takes over.
   absl::Status UseWorkers(std::optional<int> count);
   int workers() const { return static_cast<int>(workers_.size()); }
-  /// FAILED_PRECONDITION, with the end of the log, when all local workers have ended.
-  absl::Status CheckWorkers();
+  /// Why nothing will happen any more: RESOURCE_EXHAUSTED or the like, the served folder cannot be
+  /// written; FAILED_PRECONDITION, with the end of the log, all local workers have ended.
+  absl::Status Check();
 
  private:
   Session();
@@ -56,8 +59,19 @@ class Session {
   bool AllEnded();
   std::string Checkpoints() const;  ///< of local workers
 
+  /// What ended the service of the folder; set on another thread.
+  struct Failure {
+    absl::Mutex mutex;
+    absl::Status status ABSL_GUARDED_BY(mutex);
+    absl::Status Get() {
+      absl::MutexLock lock(&mutex);
+      return status;
+    }
+  };
+
   std::string state_;
   std::string address_;
+  std::shared_ptr<Failure> failure_ = std::make_shared<Failure>();
   std::unique_ptr<service::Server> server_;  // nullptr: somebody else's
   std::unique_ptr<Client> client_;
   std::vector<ChildProcess> workers_;

@@ -54,6 +54,23 @@ std::string DataText(const campaign::Experiment& pattern, const std::vector<doub
   return text;
 }
 
+// Over which the errors of a covariance fall to 1/e, along neighbouring readings; 0: independent.
+double CorrelationLength(const std::vector<double>& control,
+                         const campaign::MeasuredObservable& observable) {
+  const Eigen::MatrixXd& c = observable.covariance;
+  if (c.rows() == 0) return observable.correlation_length;
+  double decay = 0;
+  double way = 0;
+  for (Eigen::Index i = 1; i < c.rows(); ++i) {
+    const double correlation = c(i, i - 1) / std::sqrt(c(i, i) * c(i - 1, i - 1));
+    if (!(correlation > 0)) return 0;
+    decay -= std::log(std::min(1.0, correlation));
+    way +=
+        std::abs(control[static_cast<std::size_t>(i)] - control[static_cast<std::size_t>(i - 1)]);
+  }
+  return decay > 0 ? way / decay : 0;
+}
+
 // Looser and denser specimens than the pattern's, where they are generated.
 std::vector<double> OtherPorosities(const campaign::Experiment& pattern) {
   const auto* recipe = pattern.specimens.empty()
@@ -71,6 +88,26 @@ const campaign::Experiment& PatternOf(const campaign::Campaign& campaign) {
                        [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
 }
 
+std::string WhyNoPlans(const campaign::Campaign& campaign) {
+  const campaign::Experiment& pattern = PatternOf(campaign);
+  const auto pressure = pattern.settings.find("confining_pressure");
+  if (pressure == pattern.settings.end() || !(pressure->second > 0) ||
+      pattern.control_name != "axial_strain" || pattern.control.empty()) {
+    return "tests are planned that are driven by axial_strain under a confining pressure, and the "
+           "first fitted one is not; other settings of it and observables that were not read "
+           "(`calibctl tests`) are for you to choose";
+  }
+  if (pattern.loading_rate) {
+    return "tests without a loading_rate are planned, and the first fitted one has one; another "
+           "rate, a quarter or four times it, shows what depends on it";
+  }
+  if (pattern.initial_stress) {
+    return "tests that start from an isotropic stress are planned, and the first fitted one has "
+           "an initial_stress";
+  }
+  return "";
+}
+
 std::vector<TestPlan> PlansFor(const campaign::Campaign& campaign) {
   const campaign::Experiment& pattern = PatternOf(campaign);
   std::set<double> pressures;
@@ -79,10 +116,7 @@ std::vector<TestPlan> PlansFor(const campaign::Campaign& campaign) {
     if (found != e.settings.end() && found->second > 0) pressures.insert(found->second);
   }
   std::vector<TestPlan> plans;
-  if (pressures.empty() || pattern.control_name != "axial_strain" || pattern.loading_rate ||
-      pattern.initial_stress || pattern.control.empty()) {
-    return plans;
-  }
+  if (!WhyNoPlans(campaign).empty()) return plans;
   const double low = *pressures.begin();
   const double high = *pressures.rbegin();
   const double strain = *std::max_element(pattern.control.begin(), pattern.control.end());
@@ -151,11 +185,18 @@ YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
     // Errors given reading by reading belong to the old readings.
     const YamlNode* noise = campaign::YamlFind(observables, o.name);
     const YamlNode* inner = noise != nullptr ? campaign::YamlFind(*noise, "noise") : nullptr;
-    if (inner == nullptr || campaign::YamlFind(*inner, "column") == nullptr) continue;
+    if (inner == nullptr || (campaign::YamlFind(*inner, "column") == nullptr &&
+                             campaign::YamlFind(*inner, "covariance") == nullptr)) {
+      continue;
+    }
     double sum = 0;
     for (const double sd : o.sd) sum += sd / static_cast<double>(o.sd.size());
-    campaign::YamlAt(observables, o.name) = campaign::YamlMap(
-        {{"noise", campaign::YamlMap({{"absolute", campaign::YamlNumber(sum)}})}});
+    YamlNode& mean = campaign::YamlAt(campaign::YamlAt(observables, o.name), "noise");
+    campaign::YamlErase(mean, "column");
+    campaign::YamlErase(mean, "covariance");
+    campaign::YamlAt(mean, "absolute") = campaign::YamlNumber(sum);
+    const double length = CorrelationLength(pattern.control, o);
+    if (length > 0) campaign::YamlAt(mean, "correlation_length") = campaign::YamlNumber(length);
   }
   return entry;
 }

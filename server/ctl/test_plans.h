@@ -36,6 +36,8 @@ const campaign::Experiment& PatternOf(const campaign::Campaign& campaign);
 /// looser and denser by 0.02 in porosity. None for campaigns without a confining pressure, at a
 /// real loading rate, from an initial stress, or not driven by the axial strain. Rates are no part
 /// of the grid: stages are quasi-static.
+/// A clause: why there are none; empty where there may be.
+std::string WhyNoPlans(const campaign::Campaign& campaign);
 std::vector<TestPlan> PlansFor(const campaign::Campaign& campaign);
 
 /// The pattern's entry in the campaign file with another test, settings and measurement.

@@ -48,7 +48,7 @@ absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& c
                   kMilestones * status->samples_done() / std::max(1, status->samples()));
     if (IsOver(*status) || status->state() == "paused" || Interrupted()) return status;
     notice.Look(*status);
-    if (auto alive = session.CheckWorkers(); !alive.ok()) return alive;
+    if (auto alive = session.Check(); !alive.ok()) return alive;
     std::this_thread::sleep_for(kPollCampaign);
   }
 }

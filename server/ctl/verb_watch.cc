@@ -26,7 +26,10 @@ int Watch(const Arguments& arguments) {
                                                                     std::max(1, status.samples()));
     });
   }
-  if (!ended.ok()) return Fail(ended);
+  if (!ended.ok()) {
+    const absl::Status why = (*session)->Check();
+    return Fail(why.ok() ? ended : why);
+  }
   if (last && arguments.json) std::cout << report::StatusJson(*last);
   const bool good = last && last->state() == "finished";
   if (last && !arguments.json) {

@@ -147,7 +147,12 @@ void Verdict::Conclude(bool base_fits) {
     }
   }
   for (const std::string& other : first.confusable_with) {
-    if (Find(other) == nullptr) as_good.emplace_back(Chi2OfDouble(other, first), other);
+    const auto seen = std::find_if(diagnosis_.candidates.begin(), diagnosis_.candidates.end(),
+                                   [&other](const auto& c) { return c.effect == other; });
+    const bool refuted = seen != diagnosis_.candidates.end() && PromisesLess(*seen, first);
+    if (Find(other) == nullptr && !refuted) {
+      as_good.emplace_back(Chi2OfDouble(other, first), other);
+    }
   }
   std::stable_sort(as_good.begin(), as_good.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });

@@ -60,8 +60,9 @@ struct ObservableDiscrepancy {
   bool heldout = false;          ///< expected of it from the fitted experiments
   double probability = 0;        ///< that there is one
   double log_bayes_factor = 0;   ///< for one, of all experiments of the observable together
-  double amplitude = 0;          ///< typical size if there is one
+  double amplitude = 0;          ///< root mean square of `mean`
   double length = 0;             ///< of the control, over which it changes
+  bool throughout = false;       ///< that is more than the whole path
   int experiments = 1;           ///< from which it is known
   double alike = 0;              ///< correlation between their discrepancies, [0, 1)
   std::vector<double> mean, sd;  ///< one per reading

@@ -13,6 +13,16 @@ namespace {
 using Eigen::Index;
 
 // The size of a curve, to which discrepancies are relative.
+// From the least value of the control to the largest.
+double PathOf(const std::vector<double>& control) {
+  const auto [least, most] = std::minmax_element(control.begin(), control.end());
+  return *most - *least;
+}
+
+double RootMeanSquare(const Eigen::VectorXd& values) {
+  return std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
+}
+
 double SizeOf(const Eigen::VectorXd& model) {
   return std::sqrt(model.squaredNorm() / static_cast<double>(std::max<Index>(1, model.size())));
 }
@@ -127,8 +137,9 @@ void AddDiscrepancies(const CampaignView& view,
            .heldout = experiment.role == campaign::Role::kValidate,
            .probability = found->fit.probability(),
            .log_bayes_factor = found->fit.log_bayes_factor(),
-           .amplitude = std::exp(found->fit.log_amplitude().mean) * SizeOf(model),
+           .amplitude = RootMeanSquare(band.mean),
            .length = std::exp(found->fit.log_length().mean),
+           .throughout = std::exp(found->fit.log_length().mean) >= PathOf(experiment.control),
            .experiments = static_cast<int>(found->experiments.size()),
            .alike = found->fit.alike().mean,
            .mean = {band.mean.begin(), band.mean.end()},

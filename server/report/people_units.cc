@@ -91,6 +91,11 @@ std::string Percent(double share, int digits) {
   return std::isnan(share) ? Number(share) : Number(100 * share, digits) + " %";
 }
 
+std::string ShareExplained(double share) {
+  constexpr double kLeast = 1e-3;
+  return share > 0 && share < kLeast ? "< 0.1 %" : Percent(share, 2);
+}
+
 std::string Duration(double seconds) {
   if (!(seconds >= 0)) return "–";
   const auto whole = static_cast<long>(std::llround(seconds));

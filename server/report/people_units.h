@@ -30,6 +30,8 @@ std::string DateForPeople(std::int64_t unix_ms);
 
 /// A share in percent: "4.1 %"; "–" for NaN.
 std::string Percent(double share, int digits);
+/// Percent with two digits, "< 0.1 %" where less is chance.
+std::string ShareExplained(double share);
 
 /// Number with its display unit: "4.1 GPa".
 std::string NumberWithUnit(double value, const std::string& name, const std::string& si_unit,

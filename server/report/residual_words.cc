@@ -77,14 +77,15 @@ std::string DiscrepancySentence(const ObservableDiscrepancy& d) {
   const auto along = [&](double value) {
     return NumberWithUnit(value, d.control_name, control != nullptr ? control->unit : "1", 2);
   };
+  const std::string way = d.throughout ? "is much the same along the whole path"
+                                       : fmt::format("changes over about {} of {}", along(d.length),
+                                                     NameForPeople(d.control_name));
   std::string text = fmt::format(
-      "{}, {}: beyond noise and scatter a smooth misfit of about {} stays, which changes over "
-      "about "
-      "{} of {}; it is largest at {} ({}), where the model is too {} by {} ± {}",
-      d.experiment, NameForPeople(d.observable), Shown(d.amplitude, d.observable), along(d.length),
-      NameForPeople(d.control_name), along(d.largest_at), NameForPeople(d.segment),
-      d.mean[d.largest] > 0 ? "high" : "low", Shown(std::abs(d.mean[d.largest]), d.observable),
-      Shown(d.sd[d.largest], d.observable));
+      "{}, {}: beyond noise and scatter a smooth misfit of about {} stays, which {}; it is largest "
+      "at {} ({}), where the model is too {} by {} ± {}",
+      d.experiment, NameForPeople(d.observable), Shown(d.amplitude, d.observable), way,
+      along(d.largest_at), NameForPeople(d.segment), d.mean[d.largest] > 0 ? "high" : "low",
+      Shown(std::abs(d.mean[d.largest]), d.observable), Shown(d.sd[d.largest], d.observable));
   if (d.experiments > 1 && d.alike > kAlike) text += ", much the same in all experiments";
   if (d.experiments > 1 && d.alike < 1 - kAlike) text += ", another in each experiment";
   return text + ".";

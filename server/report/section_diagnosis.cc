@@ -53,16 +53,16 @@ std::string CandidateTable(const StoredDiagnosis& d) {
       "<th class=\"l\">like (angle)</th></tr>\n";
   for (const TriedEffect& tried : d.candidates) {
     const bool named = tried.effect == d.effect;
+    // Without the effect it is the base model: a refit further off has merely not been found.
+    const bool not_found = tried.advantage_nats && *tried.advantage_nats <= 0;
     html += fmt::format(
         "<tr><td>{}{}{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
         "<td class=\"l wide\">{}</td><td class=\"l wide\">{}</td></tr>\n",
         named ? "<strong>" : "", Escape(NameForPeople(tried.effect)), named ? "</strong>" : "",
         Number(tried.p_value, 2),
-        // Without the effect it is the base model: a refit further off has merely not been found.
-        tried.advantage_nats && *tried.advantage_nats <= 0 ? "not found"
-                                                           : Percent(tried.explained_fraction, 2),
-        Number(tried.predicted_rms_error, 3), OrDash(tried.refit_p_value, 2),
-        OrDash(tried.left_out_error, 3),
+        not_found ? "not found" : ShareExplained(tried.explained_fraction),
+        Number(tried.predicted_rms_error, 3), not_found ? "–" : OrDash(tried.refit_p_value, 2),
+        not_found ? "–" : OrDash(tried.left_out_error, 3),
         Escape(OwnStrength(tried.effect, tried.amplitude, d.units)), Escape(Alike(tried)));
   }
   html +=

@@ -36,8 +36,9 @@ ReadingIndex::ReadingIndex(const campaign::Campaign& campaign, const inference::
   }
 }
 
-void ReadingIndex::Place(int experiment, int load_step, std::span<const double> observables,
-                         Eigen::Ref<Eigen::RowVectorXd> predictions) const {
+void ReadingIndex::Place(
+    int experiment, int load_step, std::span<const double> observables,
+    Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>> predictions) const {
   const auto found = columns_.find({experiment, load_step});
   if (found == columns_.end()) {
     return;

@@ -27,7 +27,7 @@ class ReadingIndex {
 
   /// Copies what was measured at this load step out of a state's observables.
   void Place(int experiment, int load_step, std::span<const double> observables,
-             Eigen::Ref<Eigen::RowVectorXd> predictions) const;
+             Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>> predictions) const;
 
  private:
   struct Column {

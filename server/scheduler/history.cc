@@ -22,9 +22,8 @@ std::set<store::EvaluationKey> WithStatus(const std::vector<store::EvaluationRec
 
 void PlaceState(const Definition& definition, const store::StateRecord& state, Eigen::Index row,
                 Eigen::MatrixXd& predictions) {
-  Eigen::RowVectorXd values = predictions.row(row);
-  definition.readings.Place(state.key.experiment, state.load_step, state.observables, values);
-  predictions.row(row) = values;
+  definition.readings.Place(state.key.experiment, state.load_step, state.observables,
+                            predictions.row(row));
 }
 
 /// Rows of parameters, predictions still unknown, one matrix per iteration.
@@ -134,7 +133,14 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
   }
   AddEnds(*evaluations, place, first_iterations.has_value(), history);
   const auto finished = WithStatus(*evaluations, store::EvaluationStatus::kFinished);
-  const auto stopped = WithStatus(*evaluations, store::EvaluationStatus::kStoppedEarly);
+  auto stopped = WithStatus(*evaluations, store::EvaluationStatus::kStoppedEarly);
+  std::set<int> without_weight;  // whatever their other experiments would come to
+  for (const auto& key : WithStatus(*evaluations, store::EvaluationStatus::kDiverged)) {
+    without_weight.insert(key.sample);
+  }
+  std::erase_if(stopped, [&without_weight](const store::EvaluationKey& key) {
+    return without_weight.count(key.sample) > 0;
+  });
   std::set<int> stopped_samples;
   std::set<int> begun;  // of those: the others were rejected without a run
   for (const store::EvaluationKey& key : stopped) {
@@ -156,8 +162,7 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
   }
   history.stopped_keys = {stopped.begin(), stopped.end()};
   for (const store::EvaluationRecord& evaluation : *evaluations) {
-    if (evaluation.status == store::EvaluationStatus::kStoppedEarly &&
-        evaluation.rest_after.has_value()) {
+    if (stopped.count(evaluation.key) > 0 && evaluation.rest_after.has_value()) {
       history.resting[evaluation.key] = *evaluation.rest_after;
     }
   }

@@ -18,7 +18,10 @@ absl::Status Requests::Calibrate(const store::SampleRecord& sample, bool refused
   }
   if (!refused) {
     const std::size_t first = plan_.evaluations.size();
-    absl::Status status = Run(sample, definition_.ExperimentsOf(Role::kCalibrate));
+    // Where runs may rest or stop, what has ended decides what goes on: a run that is there to its
+    // end already, of another campaign, would change the answer.
+    const bool may_stop = RestsAtRungs(definition_) || !std::isnan(sample.stop_below);
+    absl::Status status = Request(sample, definition_.ExperimentsOf(Role::kCalibrate), !may_stop);
     for (std::size_t i = first; i < plan_.evaluations.size(); ++i) {
       plan_.evaluations[i].rest_after = FirstRung(definition_, plan_.evaluations[i].key.experiment);
     }
@@ -34,17 +37,24 @@ absl::Status Requests::Calibrate(const store::SampleRecord& sample, bool refused
 }
 
 absl::Status Requests::Run(const store::SampleRecord& sample, const std::vector<int>& experiments) {
+  return Request(sample, experiments, /*reuse=*/true);
+}
+
+absl::Status Requests::Request(const store::SampleRecord& sample,
+                               const std::vector<int>& experiments, bool reuse) {
   for (const int experiment : experiments) {
     store::EvaluationRecord evaluation{
         .key = {id_, sample.sample, experiment},
         .digest =
             SpecDigest(SpecOf(definition_.campaign, experiment, sample.parameters, sample.sample))};
-    const auto equal = reader_.FindEqual(evaluation.digest);
-    if (!equal.ok()) {
-      return equal.status();
-    }
-    if (equal->has_value()) {
-      plan_.reused.emplace_back(**equal, evaluation.key);
+    if (reuse) {
+      const auto equal = reader_.FindEqual(evaluation.digest);
+      if (!equal.ok()) {
+        return equal.status();
+      }
+      if (equal->has_value()) {
+        plan_.reused.emplace_back(**equal, evaluation.key);
+      }
     }
     plan_.evaluations.push_back(std::move(evaluation));
   }

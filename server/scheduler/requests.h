@@ -18,12 +18,15 @@ class Requests {
       : definition_(definition), id_(campaign), reader_(reader), plan_(plan) {}
 
   /// The calibrated experiments, up to their first rung where samples rest at rungs. refused: by
-  /// the proposal, outside the prior; nothing is run. Errors: those of the store.
+  /// the proposal, outside the prior; nothing is run. What was run before is reused where no run
+  /// can rest or be stopped. Errors: those of the store.
   absl::Status Calibrate(const store::SampleRecord& sample, bool refused);
   /// These experiments to their ends, reusing what was run before. Errors: those of the store.
   absl::Status Run(const store::SampleRecord& sample, const std::vector<int>& experiments);
 
  private:
+  absl::Status Request(const store::SampleRecord& sample, const std::vector<int>& experiments,
+                       bool reuse);
   void TakeFromTables(const store::SampleRecord& sample);
 
   const Definition& definition_;

@@ -1,6 +1,7 @@
 // Campaigns: taking them up, their states, and what they do next. Workers: scheduler_workers.cc.
 #include "server/scheduler/scheduler.h"
 
+#include <new>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -16,6 +17,25 @@ namespace {
 /// Too few samples say nothing about the share that fails.
 constexpr int kFewestDoneToPause = 4;
 
+/// Of the store: out of files, a lock, a disk that is full for a while. What is stored is whole.
+bool MayPass(const absl::Status& error) {
+  return absl::IsUnavailable(error) || absl::IsResourceExhausted(error);
+}
+
+// One campaign that asks for too much must not end the service, now and at each start.
+absl::StatusOr<Plan> ReadAndPlan(Ports& ports, const Definition& definition,
+                                 const store::CampaignRecord& record) {
+  try {
+    auto reader = ports.Read();
+    if (!reader.ok()) return reader.status();
+    return PlanNext(definition, record, *reader);
+  } catch (const std::bad_alloc&) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "what follows from ", record.submitted.samples, " samples of ",
+        definition.data.readings.size(),
+        " readings needs more memory than this machine has: fewer of either, or a larger one"));
+  }
+}
 }  // namespace
 
 absl::Status Scheduler::Load() {
@@ -61,6 +81,10 @@ void Scheduler::TakeUp(std::int64_t campaign, store::Reader& reader) {
     runs_[campaign] = *std::move(run);
     return;
   }
+  if (MayPass(run.status())) {
+    again_[campaign] = [this, campaign] { TakeUpNow(campaign); };
+    return;
+  }
   // One campaign that cannot be read must not keep the others from going on.
   const store::CampaignProgress failed{.state = ToString(CampaignState::kFailed),
                                        .reason = std::string(run.status().message())};
@@ -70,6 +94,36 @@ void Scheduler::TakeUp(std::int64_t campaign, store::Reader& reader) {
         transaction.Log(campaign, now, absl::StrCat("failed: ", failed.reason));
       },
       [](const absl::Status&) {});
+}
+
+void Scheduler::TakeUpNow(std::int64_t campaign) {
+  auto reader = ports_.Read();
+  if (!reader.ok()) {
+    again_[campaign] = [this, campaign] { TakeUpNow(campaign); };
+    return;
+  }
+  TakeUp(campaign, *reader);
+  if (CampaignRun* run = FindRun(campaign); run != nullptr) {
+    Enqueue(*run);
+    Advance(campaign);
+    Dispatch();
+  }
+  ++version_;
+}
+
+void Scheduler::TakeIn(std::int64_t campaign, bool at_rest) {
+  CampaignRun* run = FindRun(campaign);
+  if (run == nullptr) {
+    return;
+  }
+  auto reader = ports_.Read();
+  if (!reader.ok() || !(at_rest ? run->Reload(*reader) : run->Extend(*reader)).ok()) {
+    again_[campaign] = [this, campaign, at_rest] { TakeIn(campaign, at_rest); };
+    return;
+  }
+  Enqueue(*run);
+  Advance(campaign);
+  Dispatch();
 }
 
 CampaignRun* Scheduler::FindRun(std::int64_t campaign) {
@@ -117,11 +171,7 @@ void Scheduler::Submit(store::NewCampaign submitted, std::map<std::string, std::
           return;
         }
         reply(answer);
-        if (auto reader = ports_.Read(); reader.ok()) {
-          TakeUp(id, *reader);
-          Advance(id);
-        }
-        ++version_;
+        TakeUpNow(id);
       });
 }
 
@@ -137,11 +187,11 @@ void Scheduler::SetState(CampaignRun& run, CampaignEvent event, const std::strin
       [id = run.id(), progress = run.progress(), now = ports_.UnixMs(), also,
        line = reason.empty() ? absl::StrCat(ToString(event))
                              : absl::StrCat(ToString(event), ": ", reason)](Transaction& t) {
-        t.SetProgress(id, progress);
-        t.Log(id, now, line);
         if (also) {
           also(t);
         }
+        t.SetProgress(id, progress);
+        t.Log(id, now, line);
       },
       [this, id = run.id(), reply](const absl::Status& status) {
         reply(status);
@@ -259,20 +309,18 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
   return live;
 }
 
-void Scheduler::PauseIfTooManyDiverged(CampaignRun& run, const std::string& last) {
+std::string Scheduler::TooManyDiverged(CampaignRun& run, const std::string& last) {
   const campaign::Failure& failure = run.definition().campaign.failure;
   const int samples = run.record().submitted.samples;
   const int diverged = run.Diverged();
   if (run.progress().pause_waived || !IsLeasable(run.state()) || run.Done() < kFewestDoneToPause ||
       diverged <= failure.pause_above * samples) {
-    return;
+    return "";
   }
-  SetState(run, CampaignEvent::kPause,
-           absl::StrCat(diverged, " of ", samples,
-                        " samples diverged, more than failure.pause_above = ", failure.pause_above,
-                        " allows, last: ", last,
-                        "; see the reasons of the samples, then resume or cancel"),
-           nullptr, [](const absl::Status&) {});
+  return absl::StrCat(diverged, " of ", samples,
+                      " samples diverged, more than failure.pause_above = ", failure.pause_above,
+                      " allows, last: ", last,
+                      "; see the reasons of the samples, then resume or cancel");
 }
 
 void Scheduler::Advance(std::int64_t campaign) {
@@ -298,10 +346,7 @@ void Scheduler::Advance(std::int64_t campaign) {
 void Scheduler::ComputePlan(CampaignRun& run) {
   ports_.Compute([this, id = run.id(), definition = run.shared_definition(),
                   record = run.record()]() -> std::function<void()> {
-    auto reader = ports_.Read();
-    auto plan =
-        std::make_shared<absl::StatusOr<Plan>>(reader.ok() ? PlanNext(*definition, record, *reader)
-                                                           : absl::StatusOr<Plan>(reader.status()));
+    auto plan = std::make_shared<absl::StatusOr<Plan>>(ReadAndPlan(ports_, *definition, record));
     return [this, id, plan] { Adopt(id, *plan); };
   });
 }
@@ -310,6 +355,12 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
   CampaignRun* run = FindRun(campaign);
   if (run == nullptr) {  // cancelled meanwhile
     computing_.erase(campaign);
+    return;
+  }
+  if (MayPass(computed.status())) {
+    computing_.erase(campaign);
+    run->Planned(true);
+    again_[campaign] = [this, campaign] { Advance(campaign); };
     return;
   }
   Plan plan;
@@ -354,36 +405,29 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
   }
   // Where runs are under way memory may be ahead of the disk in them.
   const bool at_rest = run->AllTerminal();
-  ports_.Write(
-      [plan, campaign, progress, now = ports_.UnixMs()](Transaction& t) {
-        scheduler::Write(plan, campaign, progress, now, t);
-      },
-      [this, campaign, over, at_rest, begins,
-       stop_below = plan.stop_below](const absl::Status& status) {
-        computing_.erase(campaign);
-        ++version_;
-        CampaignRun* planned = FindRun(campaign);
-        if (!status.ok() || planned == nullptr) {
-          return;
-        }
-        if (over) {
-          runs_.erase(campaign);
-          Dispatch();
-          return;
-        }
-        if (at_rest || begins) {
-          durations_.erase(campaign);
-        }
-        for (const auto& [sample, threshold] : stop_below) {
-          planned->SetStopBelow(sample, threshold);
-        }
-        auto reader = ports_.Read();
-        if (reader.ok() && (at_rest ? planned->Reload(*reader) : planned->Extend(*reader)).ok()) {
-          Enqueue(*planned);
-          Advance(campaign);
-          Dispatch();
-        }
-      });
+  ports_.Write([plan, campaign, progress, now = ports_.UnixMs()](
+                   Transaction& t) { scheduler::Write(plan, campaign, progress, now, t); },
+               [this, campaign, over, at_rest, begins,
+                stop_below = plan.stop_below](const absl::Status& status) {
+                 computing_.erase(campaign);
+                 ++version_;
+                 CampaignRun* planned = FindRun(campaign);
+                 if (!status.ok() || planned == nullptr) {
+                   return;
+                 }
+                 if (over) {
+                   runs_.erase(campaign);
+                   Dispatch();
+                   return;
+                 }
+                 if (at_rest || begins) {
+                   durations_.erase(campaign);
+                 }
+                 for (const auto& [sample, threshold] : stop_below) {
+                   planned->SetStopBelow(sample, threshold);
+                 }
+                 TakeIn(campaign, at_rest);
+               });
 }
 
 }  // namespace calib::scheduler

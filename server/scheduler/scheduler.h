@@ -122,11 +122,17 @@ class Scheduler {
 
   // Campaigns (scheduler.cc)
   void TakeUp(std::int64_t campaign, store::Reader& reader);
+  /// TakeUp, then what follows from it; again with the next Tick when the store cannot be read now.
+  void TakeUpNow(std::int64_t campaign);
+  /// What a plan has added to the store, then what follows from it; again with the next Tick when
+  /// the store cannot be read now. at_rest: nothing ran when it was written.
+  void TakeIn(std::int64_t campaign, bool at_rest);
   /// Puts waiting evaluations into the queue, or takes them out, as the campaign's state demands.
   void Enqueue(CampaignRun& run);
-  /// last: why the run that ended now did.
-  void PauseIfTooManyDiverged(CampaignRun& run, const std::string& last);
-  /// Changes the state, writes it with `also`, then replies.
+  /// Why a campaign must pause that has too many diverged samples; empty: it need not. last: why
+  /// the run that ended now did.
+  static std::string TooManyDiverged(CampaignRun& run, const std::string& last);
+  /// Changes the state, writes it after `also`, then replies.
   void SetState(CampaignRun& run, CampaignEvent event, const std::string& reason,
                 const store::Store::Job& also, const Reply& reply);
   /// Computes the next plan when everything planned so far has ended. Only after a commit.
@@ -143,7 +149,8 @@ class Scheduler {
   std::vector<v1::RefusedWorker> refused_;                     // oldest first
   std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over
   std::set<store::EvaluationKey> queue_;                       // waiting, of leasable campaigns
-  std::set<std::int64_t> computing_;  // campaigns with a plan in the making
+  std::set<std::int64_t> computing_;                     // campaigns with a plan in the making
+  std::map<std::int64_t, std::function<void()>> again_;  // by campaign: what the next Tick retries
   std::map<std::int64_t, std::pair<double, int>>
       durations_;  // seconds and number of ended attempts
   std::int64_t last_attempt_ = 0;

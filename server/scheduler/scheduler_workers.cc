@@ -309,35 +309,39 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   const bool diverged = status == EvaluationStatus::kDiverged;
   const bool resting = status == EvaluationStatus::kStoppedEarly;
   ending_.insert(lease.attempt);
-  ports_.Write(
-      [key = lease.key, status, failures, diverged, resting, held_in, now = ports_.UnixMs(),
-       name = NameOf(run, lease.key),
-       end = ToRecord(finished, diverged  ? "diverged"
-                                : resting ? "resting"
-                                          : "completed")](Transaction& t) {
-        t.EndAttempt(end);
-        t.SetEvaluation(key, status, end.reason, failures);
-        if (resting) {
-          t.SetHeldIn(key, held_in);
-        }
-        if (diverged) {
-          t.Log(key.campaign, now, absl::StrCat(name, " diverged: ", end.reason));
-        }
-      },
-      [this, session, lease, states = finished.states()](const absl::Status& committed) {
-        ending_.erase(lease.attempt);
-        if (!committed.ok()) {
-          return;
-        }
-        v1::ServerMessage ack;
-        ack.mutable_ack()->set_attempt(lease.attempt);
-        ack.mutable_ack()->set_up_to(states);
-        ack.mutable_ack()->set_finished(true);
-        ports_.Send(session, std::move(ack));
-        Advance(lease.key.campaign);
-      });
-  if (diverged) {
-    PauseIfTooManyDiverged(run, finished.reason());
+  const store::Store::Job end = [key = lease.key, status, failures, diverged, resting, held_in,
+                                 now = ports_.UnixMs(), name = NameOf(run, lease.key),
+                                 end =
+                                     ToRecord(finished, diverged  ? "diverged"
+                                                        : resting ? "resting"
+                                                                  : "completed")](Transaction& t) {
+    t.EndAttempt(end);
+    t.SetEvaluation(key, status, end.reason, failures);
+    if (resting) {
+      t.SetHeldIn(key, held_in);
+    }
+    if (diverged) {
+      t.Log(key.campaign, now, absl::StrCat(name, " diverged: ", end.reason));
+    }
+  };
+  const Reply then = [this, session, lease,
+                      states = finished.states()](const absl::Status& committed) {
+    ending_.erase(lease.attempt);
+    if (!committed.ok()) {
+      return;
+    }
+    v1::ServerMessage ack;
+    ack.mutable_ack()->set_attempt(lease.attempt);
+    ack.mutable_ack()->set_up_to(states);
+    ack.mutable_ack()->set_finished(true);
+    ports_.Send(session, std::move(ack));
+    Advance(lease.key.campaign);
+  };
+  const std::string too_many = diverged ? TooManyDiverged(run, finished.reason()) : "";
+  if (too_many.empty()) {
+    ports_.Write(end, then);
+  } else {  // with its cause or not at all
+    SetState(run, CampaignEvent::kPause, too_many, end, then);
   }
 }
 
@@ -356,22 +360,23 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how,
   const bool too_often = failures >= run->definition().campaign.failure.attempts;
   const auto status = too_often ? EvaluationStatus::kFailed : EvaluationStatus::kWaiting;
   run->SetStatus(lease.key, status, failures);
-  ports_.Write(
-      [key = lease.key, status, failures, now = ports_.UnixMs(), name = NameOf(*run, lease.key),
-       end = ToRecord(finished, outcome)](Transaction& t) {
-        t.EndAttempt(end);
-        t.SetEvaluation(key, status, end.reason, failures);
-        t.Log(key.campaign, now,
-              absl::StrCat(name, ": attempt ", end.id, " ", end.outcome, ": ", end.reason));
-      },
-      [](const absl::Status&) {});
-  Enqueue(*run);
-  if (too_often && IsLeasable(run->state())) {
+  const store::Store::Job end = [key = lease.key, status, failures, now = ports_.UnixMs(),
+                                 name = NameOf(*run, lease.key),
+                                 end = ToRecord(finished, outcome)](Transaction& t) {
+    t.EndAttempt(end);
+    t.SetEvaluation(key, status, end.reason, failures);
+    t.Log(key.campaign, now,
+          absl::StrCat(name, ": attempt ", end.id, " ", end.outcome, ": ", end.reason));
+  };
+  if (too_often && IsLeasable(run->state())) {  // with its cause or not at all
     SetState(*run, CampaignEvent::kPause,
              absl::StrCat(NameOf(*run, lease.key), " failed ", failures, " times, last: ",
                           finished.reason(), "; resume to try again once the cause is removed"),
-             nullptr, [](const absl::Status&) {});
+             end, [](const absl::Status&) {});
+    return;
   }
+  ports_.Write(end, [](const absl::Status&) {});
+  Enqueue(*run);
 }
 
 void Scheduler::Dispatch() {
@@ -454,6 +459,9 @@ void Scheduler::Tick() {
     }
   }
   workers_.ForgetGone(now - kRemembered);
+  for (const auto& [campaign, task] : std::exchange(again_, {})) {
+    task();
+  }
   Dispatch();
 }
 

@@ -9,8 +9,8 @@
 namespace calib::service {
 namespace {
 
-/// One for the long computations between iterations, one so that questions are answered meanwhile.
-constexpr int kPoolThreads = 2;
+constexpr int kPlanThreads = 2;  // the long computations between iterations
+constexpr int kPoolThreads = 2;  // so that questions are answered meanwhile
 
 }  // namespace
 
@@ -20,6 +20,7 @@ Core::Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions opti
       on_failure_(std::move(on_failure)),
       keep_running_(strand_.get_executor()),
       tick_(strand_),
+      plans_(kPlanThreads),
       pool_(kPoolThreads),
       store_(std::move(store)),
       scheduler_(*this, options),
@@ -27,6 +28,7 @@ Core::Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions opti
 
 Core::~Core() {
   BeginShutdown();
+  plans_.join();
   pool_.join();
   keep_running_.reset();
   thread_.join();
@@ -91,7 +93,7 @@ void Core::Fail(const absl::Status& status) {
 }
 
 void Core::Compute(std::function<std::function<void()>()> work) {
-  Query([this, work = std::move(work)] { Post(work()); });
+  boost::asio::post(plans_, [this, work = std::move(work)] { Post(work()); });
 }
 
 void Core::Send(std::int64_t session, v1::ServerMessage message) {

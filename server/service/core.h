@@ -71,6 +71,7 @@ class Core final : public scheduler::Ports {
   boost::asio::io_context strand_;
   boost::asio::executor_work_guard<boost::asio::io_context::executor_type> keep_running_;
   boost::asio::steady_timer tick_;
+  boost::asio::thread_pool plans_;
   boost::asio::thread_pool pool_;
   std::unique_ptr<store::Store> store_;
   scheduler::Scheduler scheduler_;

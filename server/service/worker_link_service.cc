@@ -42,7 +42,12 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
         Close(status);
         return;
       }
-      StartRead(&incoming_);
+      // Once the end is decided Finish may have been called, and after it OnDone: the call is then
+      // no longer gRPC's to read from.
+      absl::MutexLock lock(&mutex_);
+      if (!end_.has_value()) {
+        StartRead(&incoming_);
+      }
     });
   }
 
@@ -93,7 +98,8 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
   }
 
  private:
-  static absl::Status Down() { return absl::UnavailableError("the server takes no work now"); }
+  /// On the strand: why no work is taken.
+  absl::Status Down() const { return absl::UnavailableError(core_.health().message()); }
 
   /// On the strand: what a message means.
   absl::Status Take() {

@@ -16,6 +16,7 @@ namespace {
 
 /// Bounds how long one transaction keeps earlier acknowledgements waiting.
 constexpr std::size_t kLargestGroup = 512;
+constexpr int kBusyTries = 24;  // each waits for the busy timeout of a connection, 5 s
 
 }  // namespace
 
@@ -70,9 +71,21 @@ class Store::Writer {
     }
   }
 
+  /// While somebody else holds the file's lock (a backup, a shell), waits; nothing is begun by then.
+  std::unique_ptr<SQLite::Transaction> Begin() {
+    for (int i = 1;; ++i) {
+      try {
+        return std::make_unique<SQLite::Transaction>(connection_->database(),
+                                                     SQLite::TransactionBehavior::IMMEDIATE);
+      } catch (const SQLite::Exception& error) {
+        if (!absl::IsUnavailable(ToStatus(error)) || i == kBusyTries) throw;
+      }
+    }
+  }
+
   absl::Status Commit(std::vector<Entry>& group) {
     try {
-      SQLite::Transaction scope(connection_->database(), SQLite::TransactionBehavior::IMMEDIATE);
+      const std::unique_ptr<SQLite::Transaction> scope = Begin();
       Transaction transaction(*connection_);
       for (Entry& entry : group) {
         entry.job(transaction);
@@ -85,7 +98,7 @@ class Store::Writer {
           return status;
         }
       }
-      scope.commit();
+      scope->commit();
     } catch (const SQLite::Exception& error) {
       return ToStatus(error);
     }

@@ -41,6 +41,38 @@ TEST(WorkerLost, KilledTenTimesAtRandomMoments) {
   ExpectUndisturbed(deployment);
 }
 
+// Their last words and their ends come in together once the server goes on.
+TEST(WorkerLost, AllAtOnceWhileTheServerIsFrozen) {
+  constexpr int kWorkers = 4;
+  Deployment deployment({.name = "frozen-server", .heartbeat_ms = 10});
+  ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+  Client client = deployment.client();
+  for (int round = 0; round < 10; ++round) {
+    for (int i = 0; i < kWorkers; ++i) deployment.StartWorker();
+    ASSERT_TRUE(Eventually(kLong, [&] {
+      const auto workers = client.Workers();
+      return workers.ok() && std::count_if(workers->workers().begin(), workers->workers().end(),
+                                           [](const auto& w) { return w.connected(); }) == kWorkers;
+    })) << deployment.Logs();
+    deployment.server().Signal(SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    for (int i = 0; i < kWorkers; ++i) {
+      deployment.workers().back().Kill();
+      deployment.workers().pop_back();
+    }
+    deployment.server().Signal(SIGCONT);
+    ASSERT_TRUE(Eventually(
+        kLong,
+        [&] {
+          const auto workers = client.Workers();
+          return workers.ok() && std::none_of(workers->workers().begin(), workers->workers().end(),
+                                              [](const auto& w) { return w.connected(); });
+        }))
+        << "round " << round << "\n"
+        << deployment.Logs();
+  }
+}
+
 TEST(WorkerLost, FrozenPastItsLeaseAndWoken) {
   Deployment deployment({.name = "frozen", .lease_ms = 300, .heartbeat_ms = 50});
   ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();

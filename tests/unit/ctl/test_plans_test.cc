@@ -127,5 +127,28 @@ observables:
   EXPECT_NE(text.find("absolute: 0.1666"), std::string::npos) << text;
 }
 
+TEST(TestPlans, ACovarianceOfOldReadingsBecomesItsMeanAndLength) {
+  constexpr double kLength = 0.02;
+  campaign::Campaign campaign = Measured();
+  campaign::Experiment& pattern = campaign.experiments[0];
+  const auto n = static_cast<Eigen::Index>(pattern.control.size());
+  Eigen::MatrixXd covariance(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      covariance(i, j) = std::exp(-std::abs(pattern.control[static_cast<std::size_t>(i)] -
+                                            pattern.control[static_cast<std::size_t>(j)]) /
+                                  kLength);
+    }
+  }
+  for (auto& observable : pattern.observables) observable.covariance = covariance;
+  const auto original =
+      campaign::ParseYaml("name: a\nobservables:\n  q_over_p: {noise: {covariance: c.txt}}\n");
+  ASSERT_TRUE(original.root);
+  const std::string text =
+      campaign::ToYaml(EntryFor(PlansFor(campaign).front(), pattern, *original.root));
+  EXPECT_EQ(text.find("c.txt"), std::string::npos) << text;
+  EXPECT_NE(text.find("correlation_length: 0.02"), std::string::npos) << text;
+}
+
 }  // namespace
 }  // namespace calib::ctl

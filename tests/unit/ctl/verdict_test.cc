@@ -179,6 +179,14 @@ TEST_F(VerdictTest, WhatTheScreenCannotTellFromItIsNamedUnlessItWasFitted) {
   EXPECT_EQ(Group(), Names{"membrane"});
 }
 
+TEST_F(VerdictTest, WhatTheScreenHasRefutedIsNotNamedForItsAngle) {
+  Refit("damping", kClose);
+  diagnosis_.candidates.front().screen_explained = 1;
+  diagnosis_.candidates.front().confusable_with = {"cohesion"};
+  diagnosis_.candidates.emplace_back().effect = "cohesion";
+  EXPECT_EQ(Concluded(), "missing_effect");
+}
+
 TEST_F(VerdictTest, ARefitThatEndedWithoutBeingFoundIsJudgedByTheScreen) {
   Refit("rolling", kClose);
   WarmFit& lost = Refit("twisting", 2 * kAway, 0);  // at its end

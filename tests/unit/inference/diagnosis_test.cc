@@ -229,6 +229,22 @@ TEST(Diagnosis, ParallelSignaturesAreConfusable) {
   EXPECT_NE(scores->front().confusable_with.front(), "sine");
 }
 
+TEST(Diagnosis, ParallelSignaturesAreToldApartByALargeMisfit) {
+  const auto scores = Screen(Line(12 * Curve(0) + 30000 * Curve(1) + Noise(3)), kCandidates,
+                             {.max_amplitude = 1e5});
+  ASSERT_EQ(scores->size(), 3U);
+  EXPECT_TRUE(scores->front().confusable_with.empty());
+}
+
+TEST(Diagnosis, NothingIsExplainedWhereNothingIsMissing) {
+  double most = 0;
+  for (int seed = 0; seed < 20; ++seed) {
+    const auto scores = Screen(Line(12 * Curve(0) + Noise(seed)), kCandidates);
+    for (const Score& score : *scores) most = std::max(most, score.explained);
+  }
+  EXPECT_LT(most, 0.9);  // of any chance
+}
+
 TEST(Diagnosis, TheNearestOfConfusableSignaturesComesFirst) {
   std::vector<Signature> candidates = {{"wavy", {5 * Curve(1) + 0.1 * Curve(2)}, false}};
   candidates.insert(candidates.end(), kCandidates.begin(), kCandidates.end());

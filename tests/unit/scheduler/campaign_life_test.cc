@@ -88,6 +88,44 @@ TEST(CampaignLife, CancelStopsWhatRuns) {
   EXPECT_TRUE(service.Next(worker, Kind::kAck).ack().refused());
 }
 
+// Whatever is on the disk when the server is killed: the failure and the pause that follows from
+// it, or neither.
+TEST(CampaignLife, AFailureThatPausesIsWrittenWithItsPauseOrNotAtAll) {
+  for (const auto outcome : {v1::Finished::OUTCOME_FAILED, v1::Finished::OUTCOME_DIVERGED}) {
+    for (int writes = 0; writes < 3; ++writes) {
+      SCOPED_TRACE(writes);
+      SimulatedService service("failed");
+      testing::SmallCampaign campaign =
+          testing::MakeSmallCampaign({.samples = 4, .failure_attempts = 1});
+      const std::string pause = "pause_above: 0.5";
+      campaign.yaml.replace(campaign.yaml.find(pause), pause.size(), "pause_above: 0.01");
+      service.Submit(campaign);
+      const std::int64_t worker = service.Connect("w", 1);
+      for (int i = 0; i < 3; ++i) {
+        const v1::Lease done = service.Next(worker, Kind::kLease).lease();
+        service.SendStates(worker, done, 0, 4);
+        service.SendEnd(worker, done.attempt(), v1::Finished::OUTCOME_COMPLETED);
+      }
+      v1::Finished finished;
+      finished.set_attempt(service.Next(worker, Kind::kLease).lease().attempt());
+      finished.set_outcome(outcome);
+      finished.set_reason("no such thing");
+      service.scheduler().Receive(worker, finished);
+      for (int i = 0; i < writes; ++i) service.ports().RunOne();
+      service.Restart();
+      int ended = 0;
+      for (const auto& evaluation : Value(service.Read().Evaluations(1))) {
+        ended += evaluation.status == store::EvaluationStatus::kFailed ||
+                         evaluation.status == store::EvaluationStatus::kDiverged
+                     ? 1
+                     : 0;
+      }
+      EXPECT_EQ(ended, writes == 0 ? 0 : 1);
+      EXPECT_EQ(service.Campaign().progress.state, ended > 0 ? "paused" : "running");
+    }
+  }
+}
+
 TEST(CampaignLife, SameBitsWhateverGoesWrong) {
   SimulatedService calm("calm");
   calm.Submit(Small());

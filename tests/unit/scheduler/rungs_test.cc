@@ -101,6 +101,26 @@ TEST(Rungs, SameBitsWhateverGoesWrong) {
   }
 }
 
+// What another campaign has run to its end would not rest, and change what goes on.
+TEST(Rungs, SameBitsWhateverTheFolderHolds) {
+  const testing::SmallCampaign campaign = Campaign(kAtRungs, "iterative_bayesian_filter");
+  SimulatedService service("rungs_after_another");
+  service.Submit(Campaign("discard_at_most: 1e-3", "iterative_bayesian_filter"));
+  service.RunToEnd(1, true);
+  service.Submit(campaign);
+  service.RunToEnd(1, true);
+  SimulatedService alone("rungs_alone");
+  alone.Submit(campaign);
+  alone.RunToEnd(1, true);
+  const auto expected = Value(alone.Read().Samples(1));
+  const auto samples = Value(service.Read().Samples(2));
+  ASSERT_EQ(samples.size(), expected.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(samples[i].parameters, expected[i].parameters);
+    EXPECT_EQ(samples[i].log_weight, expected[i].log_weight);
+  }
+}
+
 TEST(Rungs, ARestingRunGoesOnWhereItsCheckpointIs) {
   SimulatedService service("rungs_home");
   service.Submit(Campaign(kAtRungs, "sqmc"));

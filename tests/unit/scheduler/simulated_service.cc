@@ -40,12 +40,23 @@ std::string Bytes(const std::vector<double>& values) {
 
 }  // namespace
 
+void SimulatedPorts::RunOne() {
+  if (tasks_.empty()) return;
+  const auto task = std::move(tasks_.front());
+  tasks_.pop_front();
+  task();
+}
+
 void SimulatedPorts::Run() {
-  while (!tasks_.empty()) {
-    const auto task = std::move(tasks_.front());
-    tasks_.pop_front();
-    task();
+  while (!tasks_.empty()) RunOne();
+}
+
+absl::StatusOr<store::Reader> SimulatedPorts::Read() {
+  if (unreadable > 0) {
+    --unreadable;
+    return absl::ResourceExhaustedError("no file can be opened");
   }
+  return store_.Read();
 }
 
 void SimulatedPorts::Write(store::Store::Job job, std::function<void(const absl::Status&)> then) {
@@ -252,6 +263,8 @@ void SimulatedService::RunToEnd(unsigned seed, bool calm) {
         scheduler_->Receive(worker.session, v1::Heartbeat());
       }
       ports_->Run();
+    } else if (trouble == 4) {  // the store cannot be read for a while
+      ports_->unreadable = 3;
     } else if (trouble == 3) {  // the server is killed
       Restart();
       for (std::size_t k = 0; k < workers.size(); ++k) {

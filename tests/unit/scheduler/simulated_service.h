@@ -30,9 +30,11 @@ class SimulatedPorts final : public Ports {
 
   /// Until nothing is left to be done.
   void Run();
+  /// The first thing that is to be done, if there is any.
+  void RunOne();
 
   void Write(store::Store::Job job, std::function<void(const absl::Status&)> then) override;
-  absl::StatusOr<store::Reader> Read() override { return store_.Read(); }
+  absl::StatusOr<store::Reader> Read() override;
   void Compute(std::function<std::function<void()>()> work) override;
   void Send(std::int64_t session, v1::ServerMessage message) override;
   void Close(std::int64_t session, const absl::Status& status) override;
@@ -42,6 +44,7 @@ class SimulatedPorts final : public Ports {
   std::chrono::steady_clock::time_point now{};
   std::map<std::int64_t, std::deque<v1::ServerMessage>> inbox;  ///< by session
   std::vector<std::int64_t> closed;
+  int unreadable = 0;  ///< so many reads fail, as when no file can be opened
 
  private:
   store::Store& store_;
