@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "server/scheduler/attempt_spec.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
 
@@ -124,6 +125,25 @@ absl::Status CampaignRun::Apply(CampaignEvent event, const std::string& reason) 
 CampaignRun::Evaluation* CampaignRun::Find(const EvaluationKey& key) {
   const auto found = evaluations_.find(key);
   return found == evaluations_.end() ? nullptr : &found->second;
+}
+
+std::map<EvaluationKey, std::string> CampaignRun::OfOtherMechanics() const {
+  std::map<EvaluationKey, std::string> others;
+  for (const auto& [key, evaluation] : evaluations_) {
+    if (store::IsTerminal(evaluation.status) || evaluation.digest.empty()) continue;
+    const std::string digest = SpecDigest(
+        SpecOf(definition_->campaign, key.experiment, parameters_.at(key.sample), key.sample));
+    if (digest != evaluation.digest) others[key] = digest;
+  }
+  return others;
+}
+
+void CampaignRun::BeginAnew(const EvaluationKey& key, const std::string& digest) {
+  const auto steps = definition_->LoadSteps(key.experiment);
+  Evaluation& evaluation = evaluations_[key];
+  evaluation.missing = {steps.begin(), steps.end()};
+  evaluation.held_in.clear();
+  evaluation.digest = digest;
 }
 
 std::vector<EvaluationKey> CampaignRun::With(EvaluationStatus status) const {

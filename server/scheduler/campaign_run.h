@@ -61,6 +61,10 @@ class CampaignRun {
   /// Whether a plan may have something to say: everything has ended, or the campaign decides while
   /// runs are under way (decisions.h) and something has ended that no plan has seen.
   bool WantsPlan() const;
+  /// What is open and was planned by a program with other mechanics, with its digest by this one.
+  std::map<store::EvaluationKey, std::string> OfOtherMechanics() const;
+  /// Forgets what has been computed of it.
+  void BeginAnew(const store::EvaluationKey& key, const std::string& digest);
   /// A plan is made of what is known now. again: and one more after it, whatever it says.
   void Planned(bool again);
   const std::vector<double>& Parameters(int sample) const { return parameters_.at(sample); }

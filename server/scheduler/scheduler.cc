@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
 
 namespace calib::scheduler {
 
@@ -69,10 +70,23 @@ absl::Status Scheduler::Load() {
     }
   }
   for (auto& [id, run] : runs_) {
+    PauseIfOfOtherMechanics(*run);
     Enqueue(*run);
     Advance(id);
   }
   return absl::OkStatus();
+}
+
+void Scheduler::PauseIfOfOtherMechanics(CampaignRun& run) {
+  if (!IsLeasable(run.state()) || run.OfOtherMechanics().empty()) {
+    return;
+  }
+  SetState(run, CampaignEvent::kPause,
+           absl::StrCat("begun by a program with other mechanics than this one's, version ",
+                        dem::EngineVersion(),
+                        ": resume runs what is open with these, so that the ensemble is of both; "
+                        "cancel keeps what there is"),
+           nullptr, [](const absl::Status&) {});
 }
 
 void Scheduler::TakeUp(std::int64_t campaign, store::Reader& reader) {
@@ -220,7 +234,12 @@ void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, con
     run->progress().pause_waived = run->progress().pause_waived || run->Diverged() > 0;
   }
   std::vector<EvaluationKey> again;
+  std::map<EvaluationKey, std::string> anew;
   if (run->state() == CampaignState::kPaused) {
+    anew = run->OfOtherMechanics();
+    for (const auto& [key, digest] : anew) {
+      run->BeginAnew(key, digest);
+    }
     again = run->With(EvaluationStatus::kFailed);
     for (const EvaluationKey& key : again) {
       run->SetStatus(key, EvaluationStatus::kWaiting, 0);
@@ -228,9 +247,12 @@ void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, con
   }
   SetState(
       *run, CampaignEvent::kResume, "",
-      [again, also](Transaction& transaction) {
+      [again, anew, also](Transaction& transaction) {
         if (also) {
           also(transaction);
+        }
+        for (const auto& [key, digest] : anew) {
+          transaction.BeginAnew(key, digest);
         }
         for (const EvaluationKey& key : again) {
           transaction.SetEvaluation(key, EvaluationStatus::kWaiting, "", 0);

@@ -122,6 +122,7 @@ class Scheduler {
 
   // Campaigns (scheduler.cc)
   void TakeUp(std::int64_t campaign, store::Reader& reader);
+  void PauseIfOfOtherMechanics(CampaignRun& run);
   /// TakeUp, then what follows from it; again with the next Tick when the store cannot be read now.
   void TakeUpNow(std::int64_t campaign);
   /// What a plan has added to the store, then what follows from it; again with the next Tick when

@@ -178,6 +178,17 @@ void Transaction::SetEvaluation(const EvaluationKey& key, EvaluationStatus statu
   });
 }
 
+void Transaction::BeginAnew(const EvaluationKey& key, const std::string& digest) {
+  Guard([&] {
+    connection_.Run("DELETE FROM state WHERE campaign = ? AND sample = ? AND experiment = ?",
+                    key.campaign, key.sample, key.experiment);
+    connection_.Run(
+        "UPDATE evaluation SET digest = ?, held_in = '' "
+        "WHERE campaign = ? AND sample = ? AND experiment = ?",
+        digest, key.campaign, key.sample, key.experiment);
+  });
+}
+
 void Transaction::ReuseEvaluation(const EvaluationKey& from, const EvaluationKey& to) {
   Guard([&] {
     connection_.Run(

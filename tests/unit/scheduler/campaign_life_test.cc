@@ -88,6 +88,27 @@ TEST(CampaignLife, CancelStopsWhatRuns) {
   EXPECT_TRUE(service.Next(worker, Kind::kAck).ack().refused());
 }
 
+TEST(CampaignLife, WhatOtherMechanicsHaveBegunWaitsForAWord) {
+  SimulatedService service("upgraded");
+  service.Submit(Small());
+  const store::EvaluationKey key{1, 0, 0};
+  const auto digest = [&service] { return Value(service.Read().Evaluations(1)).front().digest; };
+  const std::string own = digest();
+  service.Write([key](store::Transaction& t) { t.BeginAnew(key, "of another version"); });
+  service.Restart();
+  EXPECT_EQ(service.Campaign().progress.state, "paused");
+  EXPECT_NE(service.Campaign().progress.reason.find("other mechanics"), std::string::npos);
+  service.scheduler().Resume(
+      1, nullptr, [](const absl::Status& status) { EXPECT_TRUE(status.ok()) << status; });
+  service.ports().Run();
+  EXPECT_EQ(digest(), own);
+  service.RunToEnd(1, true);
+  SimulatedService calm("not_upgraded");
+  calm.Submit(Small());
+  calm.RunToEnd(1, true);
+  EXPECT_EQ(service.Fingerprint(), calm.Fingerprint());
+}
+
 // Whatever is on the disk when the server is killed: the failure and the pause that follows from
 // it, or neither.
 TEST(CampaignLife, AFailureThatPausesIsWrittenWithItsPauseOrNotAtAll) {

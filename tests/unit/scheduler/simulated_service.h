@@ -2,6 +2,8 @@
 // The scheduler with everything around it simulated: time, threads, streams and workers. Only the
 // store is real.
 
+#include <gtest/gtest.h>
+
 #include <deque>
 #include <functional>
 #include <map>
@@ -97,6 +99,7 @@ class SimulatedService {
   SimulatedPorts& ports() { return *ports_; }
   Scheduler& scheduler() { return *scheduler_; }
   store::Reader Read() { return *store_->Read(); }
+  void Write(const store::Store::Job& job) { EXPECT_TRUE(store_->WriteNow(job).ok()); }
 
  private:
   struct Busy {
