@@ -51,8 +51,10 @@ absl::StatusOr<v1::AttemptSpec> ReadSpec(const std::string& path) {
 
 /// The packing file and the meshes that a single evaluation needs, told apart by their digests.
 Fetch FromFiles(const v1::AttemptSpec& spec, const OnceOptions& options) {
-  return [packing = spec.packing_digest(), options](
-             const std::string& digest, std::stop_token) -> absl::StatusOr<std::string> {
+  const std::string packing =
+      spec.has_recipe() ? spec.recipe().sizes_digest() : spec.packing_digest();
+  return [packing, options](const std::string& digest,
+                            std::stop_token) -> absl::StatusOr<std::string> {
     const bool mesh = digest != packing;
     const std::vector<std::string> paths = mesh ? options.meshes
                                            : options.packing.empty()

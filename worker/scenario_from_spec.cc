@@ -83,13 +83,20 @@ dem::Scenario ScenarioFromSpec(const v1::AttemptSpec& spec) {
 }
 
 dem::PackingRecipe RecipeFromMessage(const v1::PackingRecipe& message) {
-  return {.particles = message.particles(),
-          .porosity = message.porosity(),
-          .mean_radius = message.mean_radius(),
-          .radius_spread = message.radius_spread(),
-          .aspect = message.aspect(),
-          .pressure = message.pressure(),
-          .seed = message.seed()};
+  dem::PackingRecipe recipe{.particles = message.particles(),
+                            .porosity = message.porosity(),
+                            .mean_radius = message.mean_radius(),
+                            .radius_spread = message.radius_spread(),
+                            .aspect = message.aspect(),
+                            .pressure = message.pressure(),
+                            .seed = message.seed()};
+  if (message.has_depth_ratio()) {
+    recipe.depth_ratio = message.depth_ratio();
+  }
+  for (const v1::GradingPoint& point : message.grading()) {
+    recipe.grading.push_back({.radius = point.radius(), .finer = point.finer()});
+  }
+  return recipe;
 }
 
 }  // namespace calib::worker

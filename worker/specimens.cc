@@ -67,13 +67,29 @@ absl::StatusOr<std::shared_ptr<const Specimen>> Specimens::Get(const v1::Attempt
   return entry->ready ? entry->result : Result(absl::CancelledError("stopped"));
 }
 
+absl::StatusOr<dem::Packing> Specimens::Generate(const v1::AttemptSpec& spec,
+                                                 std::stop_token stop) const {
+  dem::PackingRecipe recipe = RecipeFromMessage(spec.recipe());
+  if (!spec.recipe().sizes_digest().empty()) {
+    const auto text = fetch_(spec.recipe().sizes_digest(), stop);
+    if (!text.ok()) {
+      return text.status();
+    }
+    auto like = ReadPacking(*text);
+    if (!like.ok()) {
+      return like.status();
+    }
+    recipe.radii = std::move(like->radius);
+  }
+  const dem::TestInfo* test = dem::FindTest(spec.test());
+  return test != nullptr && test->poured ? dem::GenerateSizes(recipe)
+                                         : dem::GeneratePacking(recipe, 1, stop);
+}
+
 Specimens::Result Specimens::Make(const v1::AttemptSpec& spec, std::stop_token stop) const {
   absl::StatusOr<dem::Packing> packing;
   if (spec.has_recipe()) {
-    const dem::TestInfo* test = dem::FindTest(spec.test());
-    packing = test != nullptr && test->poured
-                  ? dem::GenerateSizes(RecipeFromMessage(spec.recipe()))
-                  : dem::GeneratePacking(RecipeFromMessage(spec.recipe()), 1, stop);
+    packing = Generate(spec, stop);
   } else if (spec.packing_digest().empty()) {
     packing = dem::Packing{};  // the test makes its bodies from its settings
   } else {

@@ -50,6 +50,7 @@ class Specimens {
     std::jthread maker{};
   };
 
+  absl::StatusOr<dem::Packing> Generate(const v1::AttemptSpec& spec, std::stop_token stop) const;
   Result Make(const v1::AttemptSpec& spec, std::stop_token stop) const;
 
   const Fetch fetch_;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "dem/particles/grading.h"
 
 namespace calib::dem {
 
@@ -36,17 +37,30 @@ std::string FormatPacking(const Packing& packing);
 /// the target porosity holds at the pressure [Cheng 2018, sec. 2.2].
 struct PackingRecipe {
   int particles = 1000;        ///< 20 .. 1e6
-  double porosity = 0.4;       ///< target, in (0.2, 0.6)
+  double porosity = 0.4;       ///< target, in (0.2, 0.6), or of a cloud, [0.7, 1)
   double mean_radius = 1e-3;   ///< [m] > 0
   double radius_spread = 0.3;  ///< uniform in mean*(1 -/+ spread), 0 <= spread < 1
-  double aspect = 1.0;         ///< cell height / width, 0.2 .. 5
+  double aspect = 1.0;         ///< cell height / width (z / x), 0.2 .. 5
   double pressure = 1e4;       ///< [Pa] > 0 during generation
   std::uint64_t seed = 1;
+  double depth_ratio = 1.0;  ///< of the cell, y / x, 0.2 .. 5
+  /// Sizes by a grading curve in place of mean and spread, the same for every seed.
+  Grading grading{};
+  /// [m], of every grain, in place of all that; `particles` of them.
+  std::vector<double> radii{};
 };
 
 /// Grains of the recipe's sizes, thrown loosely into a cell, for tests that pour them themselves;
 /// its porosity and pressure are not used. Errors as GeneratePacking.
 absl::StatusOr<Packing> GenerateSizes(const PackingRecipe& recipe);
+
+/// The recipe of another packing of the grains of `packing`, which has single spheres only: its
+/// radii, its porosity and the shape of its cell. Compressed by other random places, the cell ends
+/// near that shape.
+PackingRecipe RecipeLike(const Packing& packing);
+
+/// 1 - volume of all spheres / volume of the cell.
+double PorosityOf(const Packing& packing);
 
 /// Generates a packing; the same recipe gives the same bits on every thread count. Independent of
 /// the model's parameters, so that all samples of a campaign start from the same specimen. Errors:

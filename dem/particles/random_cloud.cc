@@ -80,21 +80,35 @@ class PlacedGrains {
   std::vector<std::vector<int>> cells_;
 };
 
+std::vector<double> RadiiOf(const PackingRecipe& recipe) {
+  if (!recipe.radii.empty()) {
+    return recipe.radii;
+  }
+  if (!recipe.grading.empty()) {
+    return GradedRadii(recipe.grading, recipe.particles);
+  }
+  std::vector<double> radii;
+  for (int i = 0; i < recipe.particles; ++i) {
+    const double u = Uniform(recipe.seed, kRadiusDraw, i, 0)[0];
+    radii.push_back(recipe.mean_radius * (1 + recipe.radius_spread * (2 * u - 1)));
+  }
+  return radii;
+}
+
 }  // namespace
 
 absl::StatusOr<Packing> RandomCloud(const PackingRecipe& recipe, double solid_fraction) {
   Packing packing;
   const int n = recipe.particles;
+  packing.radius = RadiiOf(recipe);
   double solid = 0;
-  for (int i = 0; i < n; ++i) {
-    const double u = Uniform(recipe.seed, kRadiusDraw, i, 0)[0];
-    const double r = recipe.mean_radius * (1 + recipe.radius_spread * (2 * u - 1));
-    packing.radius.push_back(r);
+  for (const double r : packing.radius) {
     solid += 4.0 / 3.0 * std::numbers::pi * r * r * r;
   }
   std::sort(packing.radius.begin(), packing.radius.end(), std::greater<>());
-  const double width = std::cbrt(solid / solid_fraction / recipe.aspect);
-  packing.length[0] = packing.length[1] = width;
+  const double width = std::cbrt(solid / solid_fraction / recipe.aspect / recipe.depth_ratio);
+  packing.length[0] = width;
+  packing.length[1] = recipe.depth_ratio * width;
   packing.length[2] = recipe.aspect * width;
   packing.clump.assign(static_cast<std::size_t>(n), -1);
 

@@ -6,11 +6,14 @@
 
 namespace calib::dem {
 
-/// Radii uniform in mean_radius (1 -/+ radius_spread), placed by random sequential addition,
-/// largest first, in a cell of the recipe's aspect with the given solid fraction (0 < fraction <=
-/// 0.3 leaves every grain a place quickly). Deterministic: Philox with key = seed, counter = draw
-/// [Salmon et al. 2011]. Errors: RESOURCE_EXHAUSTED when a grain finds no place in 100 000
-/// attempts.
+/// The densest cloud that leaves every grain a place quickly.
+inline constexpr double kCloudPorosity = 0.7;
+
+/// The recipe's radii (given one by one, by a grading curve, or uniform in mean_radius (1 -/+
+/// radius_spread)), placed by random sequential addition, largest first, in a cell of the recipe's
+/// shape with the given solid fraction (0 < fraction <= 1 - kCloudPorosity).
+/// Deterministic: Philox with key = seed, counter = draw [Salmon et al. 2011]. Errors:
+/// RESOURCE_EXHAUSTED when a grain finds no place in 100 000 attempts.
 absl::StatusOr<Packing> RandomCloud(const PackingRecipe& recipe, double solid_fraction);
 
 }  // namespace calib::dem

@@ -27,6 +27,8 @@ constexpr double kDensity = 2650;
 /// end.
 constexpr double kInertialNumber = 1e-2;
 
+bool IsCloud(const PackingRecipe& r) { return r.porosity >= kCloudPorosity && r.porosity < 1; }
+
 std::vector<std::string> RecipeProblems(const PackingRecipe& r) {
   std::vector<std::string> problems;
   const auto check = [&](bool ok, const char* name, double value, const char* allowed) {
@@ -35,12 +37,22 @@ std::vector<std::string> RecipeProblems(const PackingRecipe& r) {
     }
   };
   check(r.particles >= 20 && r.particles <= 1'000'000, "particles", r.particles, "20 .. 1e6");
-  check(r.porosity > 0.2 && r.porosity < 0.6, "porosity", r.porosity, "(0.2, 0.6)");
+  check((r.porosity > 0.2 && r.porosity < 0.6) || IsCloud(r), "porosity", r.porosity,
+        "(0.2, 0.6), of a cloud [0.7, 1)");
   check(r.mean_radius > 0 && std::isfinite(r.mean_radius), "mean_radius", r.mean_radius,
         "positive [m]");
   check(r.radius_spread >= 0 && r.radius_spread < 1, "radius_spread", r.radius_spread, "[0, 1)");
   check(r.aspect >= 0.2 && r.aspect <= 5, "aspect", r.aspect, "0.2 .. 5");
+  check(r.depth_ratio >= 0.2 && r.depth_ratio <= 5, "depth_ratio", r.depth_ratio, "0.2 .. 5");
   check(r.pressure > 0 && std::isfinite(r.pressure), "pressure", r.pressure, "positive [Pa]");
+  const auto given = static_cast<int>(r.radii.size());
+  check(given == 0 || given == r.particles, "the number of radii", given, "that of particles");
+  for (const double radius : r.radii) {
+    check(radius > 0 && std::isfinite(radius), "a radius", radius, "positive [m]");
+  }
+  if (!r.grading.empty() && !IsGrading(r.grading)) {
+    problems.emplace_back("grading is no curve that rises from 0 to 1");
+  }
   return problems;
 }
 
@@ -77,6 +89,9 @@ absl::StatusOr<Packing> GeneratePacking(const PackingRecipe& recipe, int threads
                                         std::stop_token stop) {
   if (const auto problems = RecipeProblems(recipe); !problems.empty()) {
     return absl::InvalidArgumentError(absl::StrJoin(problems, "; "));
+  }
+  if (IsCloud(recipe)) {
+    return RandomCloud(recipe, 1 - recipe.porosity);
   }
   auto cloud = RandomCloud(recipe, kCloudFraction);
   if (!cloud.ok()) {

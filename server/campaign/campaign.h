@@ -55,10 +55,18 @@ struct PackingFile {
   std::string digest;  ///< SHA-256 of the text
   dem::Packing packing;
 };
+/// Another packing of a packing file's grains, for realizations beyond the files.
+struct PackingLike {
+  std::string path;    ///< of the file
+  std::string digest;  ///< SHA-256 of its text
+  /// radii empty: the worker takes them from the file. The seed follows from the digest and the
+  /// number of the realization.
+  dem::PackingRecipe recipe;
+};
 /// Of tests that make their bodies from their settings.
 struct NoPacking {};
 
-using Specimen = std::variant<PackingFile, dem::PackingRecipe, NoPacking>;
+using Specimen = std::variant<PackingFile, dem::PackingRecipe, NoPacking, PackingLike>;
 
 /// An STL file in place of a piece of the test's boundary.
 struct MeshFile {
@@ -73,7 +81,8 @@ struct Experiment {
   std::string test;  ///< may be empty when precomputed
   std::map<std::string, double> settings;
   Role role = Role::kCalibrate;
-  /// Realizations: sample i uses specimen i mod size. Empty when precomputed.
+  /// Realizations: sample i uses specimen i mod size. A PackingLike stands behind all files. Empty
+  /// when precomputed.
   std::vector<Specimen> specimens;
   /// Of the specimen that was measured; empty: unknown, taken for as few as the model's.
   std::optional<double> specimen_grains;

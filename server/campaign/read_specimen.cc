@@ -4,18 +4,18 @@
 #include <sstream>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "dem/neighbor/packing_overlap.h"
 #include "dem/particles/packing.h"
+#include "dem/particles/random_cloud.h"
+#include "server/campaign/read_recipe.h"
 #include "server/campaign/sha256.h"
-#include "server/campaign/suggestion.h"
 
 namespace calib::campaign {
 namespace {
 
 constexpr int kMostRealizations = 1000;
-constexpr int kFewestGrains = 20;
 constexpr std::size_t kMostProblems = 10;
-constexpr Range kPorosity{.min = 0.2, .max = 0.6, .min_open = true, .max_open = true};
 
 // Number of the line on which a grain stands.
 int LineOfGrain(const std::string& text, int grain) {
@@ -45,8 +45,8 @@ bool CheckOverlaps(const PackingFile& file, const std::string& text, ReadContext
   return false;
 }
 
-std::optional<Specimen> ReadFile(const MapReader& packing, const std::string& key,
-                                 const std::string& path, bool poured, ReadContext& context) {
+std::optional<PackingFile> ReadFile(const MapReader& packing, const std::string& key,
+                                    const std::string& path, bool poured, ReadContext& context) {
   const std::string* text = context.ReadNamedFile(packing, key, path);
   if (text == nullptr) return std::nullopt;
   std::vector<dem::PackingProblem> found;
@@ -71,42 +71,64 @@ std::optional<Specimen> ReadFile(const MapReader& packing, const std::string& ke
   return file;
 }
 
-std::optional<dem::PackingRecipe> ReadRecipe(MapReader& map, bool poured) {
-  const std::size_t before = map.problems().size();
-  dem::PackingRecipe recipe;
-  recipe.particles = static_cast<int>(
-      map.Integer("particles", kFewestGrains, 1'000'000).value_or(recipe.particles));
-  const auto porosity = map.Quantity("porosity", "1", kPorosity);
-  const auto void_ratio = map.Quantity(
-      "void_ratio", "1", {.min = 0.25, .max = 1.5, .min_open = true, .max_open = true});
+// Why no other packing can be made of a file's grains; empty: one can.
+std::string NoOtherLike(const PackingFile& file) {
+  for (const int clump : file.packing.clump) {
+    if (clump >= 0) return absl::StrCat(file.path, " holds clumps, which are not thrown anew");
+  }
+  const dem::PackingRecipe recipe = dem::RecipeLike(file.packing);
+  if (!kRecipePorosity.Contains(recipe.porosity) && !(recipe.porosity >= dem::kCloudPorosity)) {
+    return absl::StrFormat(
+        "the porosity of %s is %.3g, neither that of a packing (%s) nor that of a cloud (%.3g or "
+        "more)",
+        file.path, recipe.porosity, kRecipePorosity.Describe(), dem::kCloudPorosity);
+  }
+  for (const double ratio : {recipe.aspect, recipe.depth_ratio}) {
+    if (!kRecipeAspect.Contains(ratio)) {
+      return absl::StrFormat(
+          "the cell of %s is %.3g times as wide in one direction as in another, and cells are made "
+          "with a ratio %s",
+          file.path, ratio, kRecipeAspect.Describe());
+    }
+  }
+  return "";
+}
+
+// A test that pours takes the sizes alone.
+PackingLike OtherLike(const PackingFile& file, std::int64_t realization, bool poured) {
+  PackingLike like{
+      .path = file.path, .digest = file.digest, .recipe = dem::RecipeLike(file.packing)};
   if (poured) {
-    for (const char* key : {"porosity", "void_ratio", "aspect", "pressure"}) {
-      if (map.Has(key)) map.Problem(key, "has no meaning here: the test pours the grains itself");
-    }
-  } else if (map.Has("porosity") == map.Has("void_ratio")) {
-    map.Problem("porosity", map.Has("porosity")
-                                ? "and void_ratio say the same thing; give one of them"
-                                : "is missing; give porosity or void_ratio");
+    like.recipe = {.particles = like.recipe.particles,
+                   .mean_radius = like.recipe.mean_radius,
+                   .radius_spread = 0};
   }
-  if (porosity) recipe.porosity = *porosity;
-  if (void_ratio) recipe.porosity = *void_ratio / (1 + *void_ratio);
-  if (map.Require("radii", "e.g. {mean: 1 mm, spread: 0.3}") != nullptr) {
-    if (auto radii = map.Map("radii")) {
-      radii->Require("mean", "the mean radius of the grains, e.g. 1 mm");
-      recipe.mean_radius = radii->Quantity("mean", "m", {.min = 0, .max = 10, .min_open = true})
-                               .value_or(recipe.mean_radius);
-      recipe.radius_spread = radii->Quantity("spread", "1", {.min = 0, .max = 1, .max_open = true})
-                                 .value_or(recipe.radius_spread);
-      radii->Finish();
+  like.recipe.radii.clear();
+  const std::string drawn = Sha256Hex(absl::StrCat(file.digest, " realization ", realization));
+  like.recipe.seed = std::stoull(drawn.substr(0, 16), nullptr, 16);
+  return like;
+}
+
+// Realizations beyond the files are other packings of the files' grains, of each in turn.
+void AddOthers(const MapReader& experiment, std::int64_t realizations, bool poured,
+               std::vector<Specimen>& specimens) {
+  const std::size_t files = specimens.size();
+  specimens.reserve(static_cast<std::size_t>(realizations));
+  for (std::size_t i = files; i < static_cast<std::size_t>(realizations); ++i) {
+    const auto& file = std::get<PackingFile>(specimens[i % files]);
+    const std::string why_not = poured ? "" : NoOtherLike(file);
+    if (!why_not.empty()) {
+      experiment.Problem(
+          "realizations",
+          absl::StrCat(
+              "is ", realizations, ", but ",
+              files == 1 ? "one packing file is" : absl::StrCat(files, " packing files are"),
+              " given, and ", why_not,
+              "; name one file per realization in packing.files, or generate them"));
+      return;
     }
+    specimens.emplace_back(OtherLike(file, static_cast<std::int64_t>(i) + 1, poured));
   }
-  recipe.aspect = map.Quantity("aspect", "1", {.min = 0.2, .max = 5}).value_or(recipe.aspect);
-  recipe.pressure =
-      map.Quantity("pressure", "Pa", {.min = 0, .min_open = true}).value_or(recipe.pressure);
-  recipe.seed = map.Seed("seed").value_or(recipe.seed);
-  map.Finish();
-  if (map.problems().size() > before) return std::nullopt;
-  return recipe;
 }
 
 std::vector<Specimen> ReadFiles(MapReader& experiment, MapReader& packing, const std::string& key,
@@ -117,22 +139,15 @@ std::vector<Specimen> ReadFiles(MapReader& experiment, MapReader& packing, const
     packing.Problem(key, "names no file");
     return {};
   }
-  if (realizations && *realizations > static_cast<std::int64_t>(paths.size())) {
-    experiment.Problem(
-        "realizations",
-        absl::StrCat("is ", *realizations, ", but ",
-                     paths.size() == 1 ? "one packing file is"
-                                       : absl::StrCat(paths.size(), " packing files are"),
-                     " given; name one file per realization in packing.files, or generate them"));
-    return {};
-  }
-  if (realizations) paths.resize(static_cast<std::size_t>(*realizations));
+  const std::int64_t count = realizations.value_or(static_cast<std::int64_t>(paths.size()));
+  paths.resize(std::min(paths.size(), static_cast<std::size_t>(count)));
   std::vector<Specimen> specimens;
   for (const std::string& path : paths) {
     if (auto specimen = ReadFile(packing, key, path, poured, context)) {
       specimens.push_back(*std::move(specimen));
     }
   }
+  if (specimens.size() == paths.size()) AddOthers(experiment, count, poured, specimens);
   return specimens;
 }
 

@@ -1,6 +1,7 @@
 #include <iostream>
 
 #include "server/campaign/noise_check.h"
+#include "server/campaign/specimen_notes.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/source_files.h"
 #include "server/ctl/text_table.h"
@@ -14,8 +15,9 @@ int Validate(const Arguments& arguments) {
   if (!source) return kBadInput;
   const campaign::Campaign& campaign = source->outcome.campaign;
   const std::vector<std::string> warnings = campaign::NoiseWarnings(campaign);
+  const std::vector<std::string> notes = campaign::SpecimenNotes(campaign);
   if (arguments.json) {
-    std::cout << report::ProblemsJson({}, warnings);
+    std::cout << report::ProblemsJson({}, warnings, notes);
     return kDone;
   }
   std::size_t readings = 0;
@@ -26,6 +28,7 @@ int Validate(const Arguments& arguments) {
             << campaign.experiments.size() << " experiment(s), " << readings
             << " measured numbers, " << campaign.samples << " samples in each of at most "
             << campaign.max_iterations << " iteration(s).\n";
+  for (const std::string& note : notes) std::cout << Wrapped(note, "  ", "  ");
   for (const std::string& warning : warnings) std::cout << Wrapped(warning, "! ", "  ");
   return kDone;
 }

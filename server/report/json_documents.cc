@@ -411,12 +411,14 @@ std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers) {
 }
 
 std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
-                         const std::vector<std::string>& warnings) {
+                         const std::vector<std::string>& warnings,
+                         const std::vector<std::string>& notes) {
   Json list = Json::array();
   for (const campaign::Problem& p : problems) {
     list.push_back({{"file", p.file}, {"line", p.line}, {"key", p.key}, {"message", p.message}});
   }
-  return Dump({{"valid", problems.empty()}, {"problems", list}, {"warnings", warnings}});
+  return Dump(
+      {{"valid", problems.empty()}, {"problems", list}, {"warnings", warnings}, {"notes", notes}});
 }
 
 std::string DataJson(const campaign::Campaign& campaign) {

@@ -32,9 +32,10 @@ std::string StatesJson(const std::string& campaign, int sample,
 /// A table of states (experiment,load_step,...) row by row.
 std::string StateTableJson(const std::string& csv);
 std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers);
-/// warnings: of a campaign that is valid.
+/// warnings, and notes on what follows without being said: of a campaign that is valid.
 std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
-                         const std::vector<std::string>& warnings = {});
+                         const std::vector<std::string>& warnings = {},
+                         const std::vector<std::string>& notes = {});
 /// The measurements as compared: SI, logarithmic strains, standard deviations.
 std::string DataJson(const campaign::Campaign& campaign);
 

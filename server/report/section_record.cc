@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "dem/catalog/catalog.h"
+#include "server/campaign/specimen_notes.h"
 #include "server/report/html.h"
 #include "server/report/people_units.h"
 #include "server/report/sections.h"
@@ -34,7 +35,9 @@ std::string NoiseSentence(const campaign::Campaign& campaign) {
 std::string SpecimenSentence(const campaign::Experiment& experiment) {
   if (experiment.specimens.empty()) return "runs made elsewhere";
   if (const auto* file = std::get_if<campaign::PackingFile>(&experiment.specimens.front())) {
-    return fmt::format("packing {} ({} grains)", file->path, file->packing.x.size());
+    const std::string others = campaign::GeneratedFromFile(experiment);
+    return fmt::format("packing {} ({} grains){}", file->path, file->packing.x.size(),
+                       others.empty() ? "" : "; " + others);
   }
   if (const auto* recipe = std::get_if<dem::PackingRecipe>(&experiment.specimens.front())) {
     return fmt::format("{} generated packing(s) of {} grains, porosity {}",

@@ -26,6 +26,17 @@ void SetSpecimen(const dem::PackingRecipe& recipe, v1::AttemptSpec& spec) {
   message.set_aspect(recipe.aspect);
   message.set_pressure(recipe.pressure);
   message.set_seed(recipe.seed);
+  if (recipe.depth_ratio != 1) message.set_depth_ratio(recipe.depth_ratio);
+  for (const dem::GradingPoint& point : recipe.grading) {
+    v1::GradingPoint& added = *message.add_grading();
+    added.set_radius(point.radius);
+    added.set_finer(point.finer);
+  }
+}
+
+void SetSpecimen(const campaign::PackingLike& like, v1::AttemptSpec& spec) {
+  SetSpecimen(like.recipe, spec);
+  spec.mutable_recipe()->set_sizes_digest(like.digest);
 }
 
 void SetSpecimen(const campaign::NoPacking& /*none*/, v1::AttemptSpec& /*spec*/) {}

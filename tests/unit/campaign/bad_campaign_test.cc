@@ -241,11 +241,41 @@ INSTANTIATE_TEST_SUITE_P(
             "c.yaml:25: experiments[1].role: 'calibration' is unknown; did you mean 'calibrate'?"},
         Mistake{"SameName", "name: tx05", "name: tx02",
                 "c.yaml:26: experiments[2].name: 'tx02' is the name of two experiments"},
-        Mistake{"FileCannotBeManyPackings", "    packing: {file: packing.txt}\n",
-                "    packing: {file: packing.txt}\n    realizations: 4\n",
-                "c.yaml:17: experiments[1].realizations: is 4, but one packing file is given; name "
-                "one file per "
-                "realization in packing.files, or generate them"},
+        Mistake{"SizesTwice", "radii: {mean: 1 mm, spread: 0.2}",
+                "radii: {mean: 1 mm}, diameters: {mean: 2 mm}",
+                "c.yaml:29: experiments[2].packing.generate.diameters: and radii say the same "
+                "thing; give one of them"},
+        Mistake{"SizesInTwoForms", "{mean: 1 mm, spread: 0.2}", "{mean: 1 mm, median: 1 mm}",
+                "c.yaml:29: experiments[2].packing.generate.radii: needs exactly one of mean (and "
+                "spread), cumulative, and median (and log_sd)"},
+        Mistake{"GradingIsNoList", "{mean: 1 mm, spread: 0.2}", "{cumulative: {1 mm: 0}}",
+                "c.yaml:29: experiments[2].packing.generate.radii.cumulative: is no list of two or "
+                "more points [size, share of the mass that is finer], e.g. [[0.5 mm, 0], [1 mm, "
+                "0.4], [2 mm, 1]]"},
+        Mistake{"GradingInPercentWithoutSayingSo", "{mean: 1 mm, spread: 0.2}",
+                "{cumulative: [[1 mm, 0], [2 mm, 100]]}",
+                "c.yaml:29: experiments[2].packing.generate.radii.cumulative[2]: '100' is outside "
+                "what is allowed: between 0 and 1"},
+        Mistake{"GradingInDisorder", "{mean: 1 mm, spread: 0.2}",
+                "{cumulative: [[1 mm, 0], [3 mm, 0.5], [2 mm, 1]]}",
+                "c.yaml:29: experiments[2].packing.generate.radii.cumulative: point 3 is no larger "
+                "than point 2; sizes have to increase"},
+        Mistake{"GradingFalls", "{mean: 1 mm, spread: 0.2}",
+                "{cumulative: [[1 mm, 0], [2 mm, 0.5], [3 mm, 0.4], [4 mm, 1]]}",
+                "c.yaml:29: experiments[2].packing.generate.radii.cumulative: less is finer than "
+                "point 3 than is finer than point 2; shares of the mass that is finer cannot fall"},
+        Mistake{"GradingWithoutSmallest", "{mean: 1 mm, spread: 0.2}",
+                "{cumulative: [[1 mm, 0.05], [2 mm, 1]]}",
+                "c.yaml:29: experiments[2].packing.generate.radii.cumulative: has to begin at a "
+                "size that nothing is finer than (0) and to end at one that all is finer than (1)"},
+        Mistake{"GradingTooWide", "{mean: 1 mm, spread: 0.2}",
+                "{cumulative: [[0.1 mm, 0], [2 mm, 1]]}",
+                "c.yaml:29: experiments[2].packing.generate.radii: 100 grains cannot follow the "
+                "curve: the largest alone would hold 49 % of the mass, allowed is 5 %; take 14538 "
+                "grains or more, or cut the curve off"},
+        Mistake{"LogNormalWithoutWidth", "{mean: 1 mm, spread: 0.2}", "{median: 1 mm}",
+                "c.yaml:29: experiments[2].packing.generate.radii.log_sd: is missing; the standard "
+                "deviation of the logarithm of the size, e.g. 0.3"},
         Mistake{"ImpossiblePorosity", "void_ratio: 0.68", "porosity: 0.9",
                 "c.yaml:29: experiments[2].packing.generate.porosity: '0.9' is outside what is "
                 "allowed: between 0.2 "

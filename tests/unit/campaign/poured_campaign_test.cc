@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "absl/strings/str_replace.h"
+#include "server/campaign/specimen_notes.h"
 #include "tests/support/stl_text.h"
 #include "tests/unit/campaign/good_campaign.h"
 
@@ -52,6 +53,34 @@ TEST(PouredCampaign, TakesSizesOnlyAndReadingsInAnyOrder) {
     EXPECT_EQ(experiment.path[k].load_step, static_cast<int>(k));
     EXPECT_EQ(experiment.segment[k], "initial_loading");
   }
+}
+
+TEST(PouredCampaign, RealizationsOfAFilePourItsGrainsAnew) {
+  auto files = Files();
+  files["packing.txt"] = testing::GoodFiles().at("packing.txt");
+  const std::string yaml = absl::StrReplaceAll(
+      Yaml(), {{"{generate: {particles: 200, radii: {mean: 2 mm, spread: 0.1}, seed: 4}}\n",
+                "{file: packing.txt}\n    realizations: 2\n"}});
+  const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(files));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
+  const auto& specimens = outcome.campaign.experiments[0].specimens;
+  ASSERT_EQ(specimens.size(), 2U);
+  EXPECT_EQ(std::get<PackingLike>(specimens[1]).recipe.particles, 20);
+  EXPECT_EQ(
+      SpecimenNotes(outcome.campaign),
+      (std::vector<std::string>{"outlet: realization 2 pours the 20 grains of packing.txt anew."}));
+}
+
+TEST(PouredCampaign, TakesAGradingCurve) {
+  const std::string yaml = absl::StrReplaceAll(
+      Yaml(), {{"radii: {mean: 2 mm, spread: 0.1}", "diameters: {median: 4 mm, log_sd: 0.2}"}});
+  const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(Files()));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
+  const auto& recipe =
+      std::get<dem::PackingRecipe>(outcome.campaign.experiments[0].specimens.at(0));
+  EXPECT_TRUE(dem::IsGrading(recipe.grading));
 }
 
 TEST(PouredCampaign, RefusesWhatHasNoMeaningThere) {

@@ -97,7 +97,7 @@ TEST(PackingFile, WritesWhatItReads) {
 
 TEST(GeneratePacking, RefusesImpossibleRecipes) {
   const auto packing =
-      GeneratePacking({.particles = 5, .porosity = 0.9, .radius_spread = 1}, 1, {});
+      GeneratePacking({.particles = 5, .porosity = 0.65, .radius_spread = 1}, 1, {});
   EXPECT_EQ(packing.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(
       std::string(packing.status().message()),

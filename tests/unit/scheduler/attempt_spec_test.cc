@@ -37,6 +37,17 @@ TEST(SpecDigest, NamesWhatDeterminesTheStatesAndNothingElse) {
   EXPECT_NE(SpecDigest(other), digest);
 }
 
+TEST(ToSpec, ARealizationBeyondTheFilesNamesTheFileOfItsSizes) {
+  const campaign::PackingLike like{
+      .path = "p.txt", .digest = "abc", .recipe = {.particles = 70, .porosity = 0.41, .seed = 8}};
+  const v1::AttemptSpec spec = ToSpec(dem::Scenario{}, like, "tx");
+  EXPECT_EQ(spec.recipe().sizes_digest(), "abc");
+  EXPECT_EQ(spec.recipe().particles(), 70);
+  EXPECT_EQ(spec.recipe().porosity(), 0.41);
+  EXPECT_EQ(spec.recipe().seed(), 8U);
+  EXPECT_NE(SpecDigest(spec), SpecDigest(ToSpec(dem::Scenario{}, like.recipe, "tx")));
+}
+
 TEST(SpecDigest, DoesNotDependOnTheOrderInWhichMapsWereFilled) {
   v1::AttemptSpec forward;
   v1::AttemptSpec backward;

@@ -29,7 +29,11 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
                       .adaptive = true};
   scenario.path = {{.target = 0.01, .load_step = 0}, {.target = 0.005, .load_step = -1}};
   scenario.seed = 18446744073709551615U;
-  const dem::PackingRecipe recipe{.particles = 321, .porosity = 0.4, .seed = 9};
+  const dem::PackingRecipe recipe{.particles = 321,
+                                  .porosity = 0.4,
+                                  .seed = 9,
+                                  .depth_ratio = 1.1,
+                                  .grading = {{1e-3, 0}, {2e-3, 1}}};
 
   const v1::AttemptSpec spec = scheduler::ToSpec(scenario, recipe, "oedo");
   const dem::Scenario back = ScenarioFromSpec(spec);
@@ -49,6 +53,8 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
   EXPECT_EQ(back.path[1].load_step, -1);
   EXPECT_EQ(back.seed, scenario.seed);
   EXPECT_EQ(RecipeFromMessage(spec.recipe()).particles, 321);
+  EXPECT_EQ(RecipeFromMessage(spec.recipe()).depth_ratio, 1.1);
+  EXPECT_EQ(RecipeFromMessage(spec.recipe()).grading[1].radius, 2e-3);
   // Going round once more changes nothing.
   EXPECT_EQ(scheduler::SpecDigest(scheduler::ToSpec(back, RecipeFromMessage(spec.recipe()), "x")),
             scheduler::SpecDigest(spec));

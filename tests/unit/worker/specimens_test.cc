@@ -93,6 +93,42 @@ TEST(Specimens, OneThatCannotBeMadeIsAResultOfTheModel) {
   EXPECT_LT(again.core_seconds(), 0.5 * first.core_seconds()) << "it is not tried again";
 }
 
+// Of the packing file it takes the sizes, of the recipe the rest.
+TEST(Specimens, ARecipeMayTakeItsSizesFromAFile) {
+  const auto file = dem::GenerateSizes({.particles = 30, .radius_spread = 0.5, .seed = 5});
+  ASSERT_TRUE(file.ok()) << file.status();
+  std::string asked;
+  Specimens specimens([&](const std::string& digest, std::stop_token) {
+    asked = digest;
+    return absl::StatusOr<std::string>(dem::FormatPacking(*file));
+  });
+  v1::AttemptSpec spec;
+  v1::PackingRecipe& recipe = *spec.mutable_recipe();
+  recipe.set_particles(30);
+  recipe.set_porosity(0.4);
+  recipe.set_mean_radius(1e-3);
+  recipe.set_aspect(1);
+  recipe.set_pressure(1e4);
+  recipe.set_seed(6);
+  recipe.set_sizes_digest("f");
+  const auto specimen = specimens.Get(spec, {});
+  ASSERT_TRUE(specimen.ok()) << specimen.status();
+  EXPECT_EQ(asked, "f");
+  EXPECT_EQ((*specimen)->packing.radius, file->radius);
+  EXPECT_NEAR(dem::PorosityOf((*specimen)->packing), 0.4, 2e-4);
+  recipe.set_seed(7);
+  const auto other = specimens.Get(spec, {});
+  ASSERT_TRUE(other.ok()) << other.status();
+  EXPECT_NE((*other)->packing.x, (*specimen)->packing.x);
+  spec.set_test("silo_discharge");  // pours them itself
+  const auto sizes = specimens.Get(spec, {});
+  ASSERT_TRUE(sizes.ok()) << sizes.status();
+  EXPECT_EQ((*sizes)->packing.radius, file->radius);
+  EXPECT_GT(dem::PorosityOf((*sizes)->packing), 0.7);
+  recipe.set_particles(31);
+  EXPECT_EQ(specimens.Get(spec, {}).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
 TEST(Specimens, UnreadableContentNamesItsLine) {
   Specimens specimens([](const std::string&, std::stop_token) -> absl::StatusOr<std::string> {
     return "##PERIODIC:: 1 1 1\n0.5 0.5 x 0.1 -1\n";

@@ -1,22 +1,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <vector>
 
 #include "dem/dynamics/assembly.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
 namespace {
-
-double PorosityOf(const Packing& p) {
-  double solid = 0;
-  for (const double r : p.radius) {
-    solid += 4.0 / 3.0 * std::numbers::pi * r * r * r;
-  }
-  return 1 - solid / (p.length[0] * p.length[1] * p.length[2]);
-}
 
 TEST(GeneratePacking, HitsPorosityAndPressure) {
   const PackingRecipe recipe{.particles = 300,
@@ -51,6 +44,50 @@ TEST(GeneratePacking, SameRecipeSameBitsOnAnyThreads) {
   const auto different = GeneratePacking(other, 1, {});
   ASSERT_TRUE(different.ok());
   EXPECT_NE(FormatPacking(*one), FormatPacking(*different));
+}
+
+std::vector<double> Sorted(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+TEST(GeneratePacking, AnotherPackingOfTheSameGrainsIsAsDense) {
+  const auto file = GeneratePacking({.particles = 300,
+                                     .porosity = 0.40,
+                                     .aspect = 1.5,
+                                     .seed = 3,
+                                     .depth_ratio = 1.2,
+                                     .grading = {{1e-3, 0}, {1.5e-3, 0.4}, {2e-3, 1}}},
+                                    1, {});
+  ASSERT_TRUE(file.ok()) << file.status();
+  PackingRecipe recipe = RecipeLike(*file);
+  std::vector<Packing> others;
+  for (const std::uint64_t seed : {11, 12, 11}) {
+    recipe.seed = seed;
+    const auto other = GeneratePacking(recipe, 1, {});
+    ASSERT_TRUE(other.ok()) << other.status();
+    EXPECT_EQ(Sorted(other->radius), Sorted(file->radius));
+    EXPECT_NEAR(PorosityOf(*other), PorosityOf(*file), 1e-3);
+    EXPECT_NEAR(other->length[2] / other->length[0], file->length[2] / file->length[0], 0.2);
+    EXPECT_NEAR(other->length[1] / other->length[0], file->length[1] / file->length[0], 0.2);
+    others.push_back(*other);
+  }
+  EXPECT_EQ(FormatPacking(others[2]), FormatPacking(others[0]));
+  EXPECT_NE(others[1].x, others[0].x);
+  EXPECT_NE(others[0].x, file->x);
+}
+
+TEST(GeneratePacking, AnotherCloudIsACloud) {
+  const auto file = GenerateSizes({.particles = 200, .radius_spread = 0.4, .aspect = 2, .seed = 3});
+  ASSERT_TRUE(file.ok()) << file.status();
+  PackingRecipe recipe = RecipeLike(*file);
+  recipe.seed = 4;
+  const auto other = GeneratePacking(recipe, 1, {});
+  ASSERT_TRUE(other.ok()) << other.status();
+  EXPECT_EQ(other->radius, file->radius);
+  EXPECT_NEAR(PorosityOf(*other), PorosityOf(*file), 1e-12);
+  EXPECT_NEAR(other->length[2], file->length[2], 1e-12);
+  EXPECT_NE(other->x, file->x);
 }
 
 TEST(GeneratePacking, SaysWhichPorositiesAreAttainable) {
