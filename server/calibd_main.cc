@@ -1,31 +1,17 @@
 // calibd: the service.
 #include <CLI/CLI.hpp>
 #include <atomic>
-#include <charconv>
 #include <csignal>
 #include <cstdlib>
 #include <iostream>
 
+#include "proto/rpc/address.h"
 #include "server/service/address.h"
 #include "server/service/server.h"
 
 namespace {
 
 constexpr std::chrono::seconds kShutdown{5};
-
-// Empty: HOST:PORT. gRPC takes a port above 65535 modulo 65536.
-std::string ProblemOfAddress(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  int port = -1;
-  if (colon != std::string::npos && colon > 0) {
-    const char* const end = address.data() + address.size();
-    const auto [at, error] = std::from_chars(address.data() + colon + 1, end, port);
-    if (error != std::errc() || at != end) port = -1;
-  }
-  return port >= 0 && port <= 65535
-             ? ""
-             : "'" + address + "' is not HOST:PORT with a port from 0 to 65535";
-}
 
 }  // namespace
 
@@ -41,7 +27,7 @@ int main(int argc, char** argv) {
       ->required();
   app.add_option("--listen", options.listen,
                  "HOST:PORT, port 0 for a free one (DIR/server.json tells which)")
-      ->check(ProblemOfAddress)
+      ->check([](const std::string& address) { return calib::rpc::ProblemOfAddress(address, 0); })
       ->capture_default_str();
   app.add_option("--lease-ms", lease_ms,
                  "an evaluation is handed to another worker after this silence")

@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "dem/catalog/catalog.h"
+#include "proto/rpc/address.h"
 #include "proto/rpc/digest.h"
 #include "worker/once.h"
 #include "worker/throughput.h"
@@ -23,6 +24,8 @@
 namespace {
 
 constexpr std::chrono::milliseconds kBenchmark{300};
+constexpr double kFewestGib = 0.001;
+constexpr double kMostGib = 1e6;
 
 std::string CpuModel() {
   std::ifstream info("/proc/cpuinfo");
@@ -76,18 +79,20 @@ int main(int argc, char** argv) {
                            calib::rpc::Sha256Hex(calib::dem::CatalogText()) + "\ncheckpoints " +
                            DefaultCheckpoints(),
                        "print what determines the bits of a run and where it rests, and leave");
-  auto* server = app.add_option("--server", options.server, "the server, HOST:PORT");
+  auto* server =
+      app.add_option("--server", options.server, "the server, HOST:PORT")
+          ->check([](const std::string& address) { return calib::rpc::ProblemOfAddress(address); });
   app.add_option("--slots", options.slots, "evaluations at a time [cores / threads per slot]")
       ->check(CLI::Range(1, 1024));
   app.add_option("--threads-per-slot", options.threads_per_slot, "threads of one evaluation")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   app.add_option("--name", options.name, "unique name [host name and process id]");
   app.add_option("--checkpoints", options.checkpoints,
                  "folder for runs that rest in breadth-first campaigns, shared by the workers of a "
                  "machine [calib/checkpoints in $XDG_CACHE_HOME or ~/.cache]");
   app.add_option("--checkpoints-gib", checkpoints_gib, "its size at most")
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(kFewestGib, kMostGib))
       ->capture_default_str();
   app.add_option("--exit-with-parent", parent,
                  "end when the parent process, of this id (0: whichever), ends");

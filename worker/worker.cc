@@ -14,6 +14,7 @@
 #include "dem/catalog/catalog.h"
 #include "proto/rpc/backoff.h"
 #include "proto/rpc/digest.h"
+#include "proto/rpc/random_id.h"
 #include "worker/checkpoints.h"
 #include "worker/held_attempt.h"
 #include "worker/server_link.h"
@@ -27,6 +28,7 @@ namespace asio = boost::asio;
 /// After these the server would say the same again.
 bool IsFinal(const absl::Status& status) {
   return status.code() == absl::StatusCode::kFailedPrecondition ||
+         status.code() == absl::StatusCode::kAlreadyExists ||
          status.code() == absl::StatusCode::kInvalidArgument;
 }
 
@@ -79,6 +81,7 @@ class Worker::Impl {
   void Connect() {
     v1::Hello hello;
     hello.set_name(options_.name);
+    hello.set_instance(instance_);
     hello.set_slots(options_.slots);
     hello.set_threads_per_slot(options_.threads_per_slot);
     hello.set_contact_updates_per_second(options_.contact_updates_per_second);
@@ -339,6 +342,7 @@ class Worker::Impl {
   }
 
   const WorkerOptions options_;
+  const std::string instance_ = rpc::RandomId();  // the same in every reconnect
   asio::io_context io_;
   asio::signal_set signals_;
   asio::steady_timer heartbeat_;

@@ -158,6 +158,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     if (problems.size() == before) ReadNoiseGroups(map, campaign);
     if (is_new && problems.size() == before) CheckCorrelationLengths(map, campaign);
     if (is_new && !campaign.precomputed) CheckBudget(map, campaign);
+    if (is_new) CheckReplicates(map, campaign);
     if (campaign.precomputed) {
       ReadPrecomputed(map, context, campaign);
       if (campaign.table || campaign.first_proposal) {

@@ -1,6 +1,7 @@
 #include "server/campaign/data_file.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -50,6 +51,37 @@ std::optional<double> ParseNumber(std::string_view field) {
   const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
   if (error != std::errc() || end != field.data() + field.size()) return std::nullopt;
   return value;
+}
+
+// 0,25 or -1,5e3
+bool HasDecimalComma(std::string_view word) {
+  const std::size_t comma = word.find(',');
+  if (comma == std::string_view::npos || word.find(',', comma + 1) != std::string_view::npos) {
+    return false;
+  }
+  std::string pointed(word);
+  pointed[comma] = '.';
+  const auto digit = [&](std::size_t at) {
+    return at < word.size() && std::isdigit(static_cast<unsigned char>(word[at])) != 0;
+  };
+  return comma > 0 && digit(comma - 1) && digit(comma + 1) && ParseNumber(pointed).has_value();
+}
+
+// How spreadsheets write tables where the decimal sign is a comma; empty: not so. A row of fields
+// that commas separate holds no two words of numbers without one between them.
+std::string ForeignFormat(std::string_view line) {
+  if (line.find(';') != std::string_view::npos) {
+    return "separates its fields by ';': save the file with fields separated by tabs or commas and "
+           "a point as the decimal sign";
+  }
+  const std::vector<std::string_view> words = SplitWords(line);
+  const bool comma_ends_a_field = std::any_of(
+      words.begin(), words.end(),
+      [](std::string_view word) { return word.starts_with(',') || word.ends_with(','); });
+  const auto decimal = std::find_if(words.begin(), words.end(), HasDecimalComma);
+  if (words.size() < 2 || comma_ends_a_field || decimal == words.end()) return "";
+  return absl::StrCat("has ", Quoted(std::string(*decimal)),
+                      ", a number with a comma: save the file with a point as the decimal sign");
 }
 
 std::string ColumnName(std::string_view field) {
@@ -114,6 +146,10 @@ DataTable::DataTable(std::string text, const std::vector<std::string>& wanted,
       continue;
     }
     content = Trimmed(content.substr(0, content.find('#')));
+    if (const std::string problem = ForeignFormat(content); !problem.empty()) {
+      problems.push_back({line, "", problem});
+      return;
+    }
     std::vector<std::string_view> fields = SplitFields(content);
     if (fields.empty()) continue;
     if (rows_.empty() && header_line_ == 0 && !ParseNumber(fields.front())) {

@@ -123,6 +123,12 @@ std::optional<double> ReadQuantity(const YamlNode& node, const std::string& path
     problems.Add(node.line, path, std::string(value.status().message()));
     return std::nullopt;
   }
+  if (std::isinf(*value) && !range.infinite_allowed) {
+    problems.Add(
+        node.line, path,
+        absl::StrCat(Quoted(node.scalar), " is not finite; allowed: ", range.Describe(si_unit)));
+    return std::nullopt;
+  }
   if (!range.Contains(*value)) {
     problems.Add(node.line, path,
                  absl::StrCat(Quoted(node.scalar),
@@ -212,7 +218,7 @@ std::optional<MapReader> MapReader::Map(const std::string& key) {
 }
 
 void MapReader::Ignore(const std::vector<std::string>& keys) {
-  known_.insert(known_.end(), keys.begin(), keys.end());
+  for (const std::string& key : keys) Find(key);
 }
 
 void MapReader::Finish() {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <map>
@@ -223,6 +224,10 @@ absl::StatusOr<Quantity> SplitQuantity(const std::string& text) {
   }
   if (error != std::errc() || std::isnan(quantity.value)) {
     return absl::InvalidArgumentError(absl::StrCat(Quoted(text), " is not a number"));
+  }
+  if (end - rest > 1 && *rest == ',' && std::isdigit(static_cast<unsigned char>(rest[1])) != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(Quoted(text), " has a comma in its number: write a decimal point"));
   }
   quantity.unit = std::string(absl::StripAsciiWhitespace(std::string(rest, end)));
   return quantity;

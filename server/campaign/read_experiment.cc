@@ -25,7 +25,7 @@ std::vector<std::string> TestNames() {
 }
 
 // Names stand in tables, file names and on the command line.
-std::string ReadName(MapReader& map, const Campaign& campaign) {
+std::string ReadName(MapReader& map, const ReadContext& context, const Campaign& campaign) {
   std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
   const auto plain = [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '+';
@@ -35,6 +35,10 @@ std::string ReadName(MapReader& map, const Campaign& campaign) {
       (name.empty() || name.size() > kLongest || !std::all_of(name.begin(), name.end(), plain))) {
     map.Problem("name",
                 absl::StrCat(Quoted(name), " is not a short word of letters, digits and _ - . +"));
+  }
+  const unsigned char first = name.empty() ? 'a' : static_cast<unsigned char>(name.front());
+  if (context.is_new() && std::isalnum(first) == 0 && first != '_') {  // a folder of this name: ..
+    map.Problem("name", absl::StrCat(Quoted(name), " has to begin with a letter, a digit or _"));
   }
   for (const Experiment& other : campaign.experiments) {
     if (!name.empty() && other.name == name) {
@@ -197,7 +201,7 @@ void RefusePreparationKeys(MapReader& map, const dem::TestInfo& test) {
 
 void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   Experiment experiment;
-  experiment.name = ReadName(map, campaign);
+  experiment.name = ReadName(map, context, campaign);
   const dem::TestInfo* test = ReadTest(map, campaign, experiment);
   if (test != nullptr) ReadSettings(map, *test, !campaign.precomputed, experiment);
   experiment.role =

@@ -131,9 +131,9 @@ void ReadFilterOptions(MapReader& map, Campaign& campaign) {
 // freeze: {2: [young_modulus], 3: converged}; the names are looked at once the parameters are
 // known.
 void ReadFreeze(MapReader& inference, Campaign& campaign) {
+  inference.Ignore({"freeze"});
   if (!inference.Has("freeze")) return;
   if (campaign.method != Method::kIterativeBayesianFilter || campaign.precomputed) {
-    inference.Ignore({"freeze"});
     inference.Problem("freeze",
                       "belongs to method: iterative_bayesian_filter with runs still to be made");
     return;
@@ -157,6 +157,25 @@ void ReadFreeze(MapReader& inference, Campaign& campaign) {
     campaign.freeze[iteration] = std::move(freeze);
   }
   map->Finish();
+}
+
+// Keys that this method does not read.
+void RefuseKeysOfOthers(MapReader& map, Method method) {
+  const auto refuse = [&map](const std::vector<std::string>& keys, const std::string& owner) {
+    map.Ignore(keys);
+    for (const std::string& key : keys) {
+      if (map.Has(key)) map.Problem(key, "belongs to " + owner + "; remove it");
+    }
+  };
+  if (!IsFilter(method)) {
+    refuse({"tolerance", "ess_target", "design", "defensive_share", "max_components",
+            "concentration", "mixture", "reversed_path"},
+           "method: iterative_bayesian_filter and sqmc");
+  }
+  if (method != Method::kSurrogateMsrs) {
+    refuse({"surrogate", "termination", "in_flight"}, "method: surrogate_msrs");
+  }
+  if (method != Method::kTmcmc) refuse({"steps", "target_cv"}, "method: tmcmc");
 }
 
 void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
@@ -189,6 +208,7 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
     }
     ReadDecisions(*map, campaign);
     if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
+    RefuseKeysOfOthers(*map, campaign.method);
     map->Ignore({"rows", "first_proposal"});  // read once the parameters are known
     if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&
         campaign.max_iterations != 1) {
@@ -233,10 +253,15 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
   }
   auto map = campaign_map.Map("early_stopping");
   if (!map) return;
+  const YamlNode* discard = map->Find("discard_at_most");
+  const bool off =
+      discard != nullptr && discard->kind == YamlNode::Kind::kScalar && discard->scalar == "off";
   EarlyStopping stopping;
   map->Require("discard_at_most", "the posterior mass that stopping early may lose, e.g. 1e-3");
-  stopping.discard_at_most =
-      map->Quantity("discard_at_most", "1", kFraction).value_or(stopping.discard_at_most);
+  if (!off) {
+    stopping.discard_at_most =
+        map->Quantity("discard_at_most", "1", kFraction).value_or(stopping.discard_at_most);
+  }
   stopping.rungs = ReadRungs(*map);
   stopping.exponent = map->Quantity("exponent", "1", {.min = 0, .max = 1, .min_open = true});
   if (!stopping.rungs.empty() && !IsFilter(campaign.method)) {
@@ -251,7 +276,7 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
   map->Finish();
   // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing
   // to stop; the surrogate would take a bound for a value.
-  if (campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed &&
+  if (!off && campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed &&
       campaign.method != Method::kSurrogateMsrs) {
     campaign.early_stopping = stopping;
   }
@@ -403,6 +428,13 @@ void CheckSamples(MapReader& campaign_map, const Campaign& campaign) {
                                                    fewest, " for ", campaign.parameters.size(),
                                                    " parameters (two each and one)"));
   }
+}
+
+void CheckReplicates(const MapReader& campaign_map, const Campaign& campaign) {
+  if (campaign.replicates != 1 || campaign.lineage) return;
+  campaign_map.Problem("inference",
+                       "replicates is 1, but one run shows no scatter; allowed: 0 (not measured) "
+                       "or 2 to 1000");
 }
 
 void CheckBudget(const MapReader& campaign_map, const Campaign& campaign) {

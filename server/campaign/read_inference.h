@@ -13,6 +13,8 @@ void CheckSamples(MapReader& campaign_map, const Campaign& campaign);
 /// from.
 void ReadStart(MapReader& campaign_map, Campaign& campaign);
 
+/// One replicate measures no scatter.
+void CheckReplicates(const MapReader& campaign_map, const Campaign& campaign);
 /// The budget has to allow one iteration. To be called once the experiments are known.
 void CheckBudget(const MapReader& campaign_map, const Campaign& campaign);
 

@@ -253,6 +253,7 @@ std::optional<std::vector<LinearConstraint>> ReadConstraints(MapReader& map,
 }  // namespace
 
 void ReadJointPrior(MapReader& campaign_map, Campaign& campaign) {
+  campaign_map.Ignore({"prior_correlation", "constraints"});
   const bool given = campaign_map.Has("prior_correlation") || campaign_map.Has("constraints");
   if (!given) return;
   const std::size_t before = campaign_map.problems().size();

@@ -201,7 +201,25 @@ class TableReader {
       campaign_.precomputed->log_proposal = Eigen::Map<const Eigen::VectorXd>(
           column.data(), static_cast<Eigen::Index>(column.size()));
     }
-    campaign_.samples = static_cast<int>(table.rows());
+    samples_ = parameters.rows();
+    campaign_.samples = static_cast<int>(samples_);
+    if (context_.is_new()) RefuseOneSet(path);
+  }
+
+  // One run told many times says nothing of any other parameters.
+  void RefuseOneSet(const std::string& path) {
+    const Eigen::MatrixXd& rows = campaign_.precomputed->parameters;
+    if (rows.rows() < 2 || !rows.allFinite() || (rows.rowwise() - rows.row(0)).any()) return;
+    std::string set;
+    for (std::size_t k = 0; k < campaign_.parameters.size(); ++k) {
+      const CalibratedParameter& parameter = campaign_.parameters[k];
+      absl::StrAppend(&set, k == 0 ? "" : ", ", parameter.name, " ",
+                      rows(0, static_cast<Eigen::Index>(k)),
+                      parameter.unit == "1" ? "" : absl::StrCat(" ", parameter.unit));
+    }
+    context_.problems().AddIn(path, 0, "",
+                              absl::StrCat("all ", rows.rows(), " rows hold the same parameters: ",
+                                           set, "; a calibration needs runs at different ones"));
   }
 
   void ReadStates(const DataTable& table) {
@@ -241,7 +259,7 @@ class TableReader {
     const std::string& path = description_.states;
     const std::size_t readings = experiment.control.size();
     const std::size_t width = experiment.observables.size();
-    std::vector<std::vector<double>> states(row_of_sample_.size(),
+    std::vector<std::vector<double>> states(static_cast<std::size_t>(samples_),
                                             std::vector<double>(readings * width, std::nan("")));
     if (rows.empty()) {
       context_.problems().AddIn(path, 0, description_.experiment,
@@ -298,6 +316,7 @@ class TableReader {
   ReadContext& context_;
   Campaign& campaign_;
   Description description_;
+  Eigen::Index samples_ = 0;  // rows of the parameter table
   std::map<int, Eigen::Index> row_of_sample_;
 };
 
@@ -309,6 +328,23 @@ void ReadPrecomputed(MapReader& campaign_map, ReadContext& context, Campaign& ca
   auto map = model->Map("precomputed");
   if (!map) return;
   TableReader(*map, context, campaign).Read();
+}
+
+std::vector<std::string> RepeatedRunWarnings(const Campaign& campaign) {
+  if (!campaign.precomputed) return {};
+  const Eigen::MatrixXd& rows = campaign.precomputed->parameters;
+  std::set<std::vector<double>> different;
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    const Eigen::VectorXd row = rows.row(i);
+    different.emplace(row.begin(), row.end());
+  }
+  const Eigen::Index repeats = rows.rows() - static_cast<Eigen::Index>(different.size());
+  if (repeats == 0) return {};
+  return {absl::StrCat(repeats, " of the ", rows.rows(),
+                       " runs made elsewhere repeat the parameters of another one. Each counts as "
+                       "a draw of its own: the intervals are narrower and the effective samples "
+                       "more than the ",
+                       different.size(), " different sets tell.")};
 }
 
 }  // namespace calib::campaign

@@ -3,11 +3,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <boost/locale/utf.hpp>
 #include <exception>
 #include <utility>
 
 #include "absl/strings/str_format.h"
+#include "server/campaign/utf8.h"
 
 namespace calib::campaign {
 namespace {
@@ -22,7 +22,8 @@ class Converter {
 
   YamlNode Convert(const YAML::Node& node, int line, int depth) {
     YamlNode tree;
-    tree.line = node.Mark().line >= 0 ? node.Mark().line + 1 : line;
+    // yaml-cpp marks an empty value where the next token stands.
+    tree.line = node.Mark().line >= 0 && !node.IsNull() ? node.Mark().line + 1 : line;
     if (depth > kDeepest || ++nodes_ > kMostNodes) {
       error = YamlError{tree.line, "is nested too deeply or too large for a campaign file"};
       return tree;
@@ -75,16 +76,29 @@ std::string Explain(const std::string& remark) {
   return "is not YAML: " + remark;
 }
 
-std::optional<YamlError> FirstByteThatIsNoText(const std::string& text) {
-  namespace utf = boost::locale::utf;
-  for (auto at = text.begin(); at != text.end();) {
-    const auto from = at;
-    const utf::code_point point = utf::utf_traits<char>::decode(at, text.end());
-    if (point != utf::illegal && point != utf::incomplete) continue;
-    return YamlError{1 + static_cast<int>(std::count(text.begin(), from, '\n')),
+// line: from 0.
+bool IsIndentedByTab(const std::string& text, int line) {
+  std::size_t at = 0;
+  for (int i = 0; i < line && at != std::string::npos; ++i) {
+    at = text.find('\n', at);
+    if (at != std::string::npos) ++at;
+  }
+  if (at == std::string::npos) return false;
+  const std::size_t end = text.find_first_not_of(" \t", at);
+  return text.substr(at, end == std::string::npos ? end : end - at).find('\t') != std::string::npos;
+}
+
+// What makes a text no YAML before its grammar is asked.
+std::optional<YamlError> NotText(const std::string& text) {
+  const auto line_of = [&text](std::size_t at) {
+    const auto byte = text.begin() + static_cast<std::ptrdiff_t>(at);
+    return 1 + static_cast<int>(std::count(text.begin(), byte, '\n'));
+  };
+  if (const std::size_t at = FirstByteThatIsNoUtf8(text); at != std::string::npos) {
+    return YamlError{line_of(at),
                      absl::StrFormat("holds the byte 0x%02X, which is not UTF-8: save the file as "
                                      "UTF-8",
-                                     static_cast<unsigned char>(*from))};
+                                     static_cast<unsigned char>(text[at]))};
   }
   return std::nullopt;
 }
@@ -93,7 +107,7 @@ std::optional<YamlError> FirstByteThatIsNoText(const std::string& text) {
 
 YamlParse ParseYaml(const std::string& text) {
   YamlParse parse;
-  parse.error = FirstByteThatIsNoText(text);
+  parse.error = NotText(text);
   if (parse.error) return parse;
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
@@ -115,7 +129,11 @@ YamlParse ParseYaml(const std::string& text) {
       parse.root = std::move(root);
     }
   } catch (const YAML::Exception& e) {
-    parse.error = YamlError{e.mark.line >= 0 ? e.mark.line + 1 : 1, Explain(e.msg)};
+    const int line = std::max(0, e.mark.line);
+    parse.error = YamlError{line + 1, IsIndentedByTab(text, line)
+                                          ? "is indented by a tab, which YAML does not allow; "
+                                            "indent by blanks"
+                                          : Explain(e.msg)};
   } catch (const std::exception& e) {
     parse.error = YamlError{1, std::string("is not YAML: ") + e.what()};
   }

@@ -4,15 +4,16 @@
 #include <grpcpp/client_context.h>
 
 #include <chrono>
-#include <random>
 #include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "calib/v1/campaign.grpc.pb.h"
+#include "proto/rpc/address.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/client_options.h"
 #include "proto/rpc/digest.h"
+#include "proto/rpc/random_id.h"
 #include "proto/rpc/status.h"
 
 namespace calib::ctl {
@@ -136,18 +137,10 @@ v1::CampaignRequest Of(const std::string& campaign) {
   return request;
 }
 
-// A name that no other request bears.
-std::string NewRequestId() {
-  std::random_device device;
-  std::string id;
-  for (int word = 0; word < 4; ++word) absl::StrAppend(&id, absl::Hex(device(), absl::kZeroPad8));
-  return id;
-}
-
 v1::ControlRequest ControlOf(const std::string& campaign) {
   v1::ControlRequest request;
   request.set_campaign(campaign);
-  request.set_request_id(NewRequestId());
+  request.set_request_id(rpc::RandomId());
   return request;
 }
 
@@ -161,6 +154,9 @@ Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Client::~Client() = default;
 
 absl::StatusOr<std::unique_ptr<Client>> Client::Connect(const std::string& address) {
+  if (const std::string problem = rpc::ProblemOfAddress(address); !problem.empty()) {
+    return absl::InvalidArgumentError(problem);  // of $CALIB_SERVER: options are checked before
+  }
   auto impl = std::make_unique<Impl>();
   impl->connection.Open(address);
   if (!impl->connection.channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) {
@@ -295,7 +291,7 @@ absl::StatusOr<std::vector<v1::WorkerInfo>> Client::ListWorkers() {
 absl::StatusOr<v1::WorkerInfo> Client::DrainWorker(const std::string& worker) {
   v1::DrainRequest request;
   request.set_worker(worker);
-  request.set_request_id(NewRequestId());
+  request.set_request_id(rpc::RandomId());
   return Call<v1::WorkerInfo>(impl_->connection, &Stub::DrainWorker, request);
 }
 

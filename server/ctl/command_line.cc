@@ -11,8 +11,11 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "proto/rpc/address.h"
 #include "server/campaign/suggestion.h"
+#include "server/campaign/utf8.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/verbs.h"
 
@@ -111,6 +114,7 @@ void AddCommonOptions(CLI::App& app, Arguments& a) {
         a.server_given = true;
       },
       "HOST:PORT of calibd [$CALIB_SERVER or 127.0.0.1:7443]");
+  server->check([](const std::string& address) { return rpc::ProblemOfAddress(address); });
   app.add_option("--state", a.state,
                  "work on this state folder with an embedded server instead of --server")
       ->excludes(server);
@@ -248,6 +252,13 @@ void AddOtherVerbs(Builder& b) {
 }  // namespace
 
 Parsed ParseCommandLine(int argc, const char* const* argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (campaign::FirstByteThatIsNoUtf8(word) == std::string::npos) continue;
+    std::cerr << "calibctl: '" << absl::CHexEscape(word)
+              << "' is not UTF-8, as names of files and ids have to be\n";
+    return {std::nullopt, kBadInput};
+  }
   Command command;
   CLI::App app{kDescription, "calibctl"};
   app.require_subcommand(1);

@@ -227,6 +227,7 @@ std::vector<Check> JudgeWorkers(const std::vector<v1::WorkerInfo>& workers,
       slots += worker.slots();
       continue;
     }
+    if (worker.left()) continue;
     checks.push_back(
         {.name = "workers",
          .subject = worker.name(),
@@ -236,12 +237,12 @@ std::vector<Check> JudgeWorkers(const std::vector<v1::WorkerInfo>& workers,
   }
   for (const v1::RefusedWorker& worker : server.refused()) {
     const double ago = 1e-3 * static_cast<double>(server.unix_ms() - worker.unix_ms());
-    checks.push_back({.name = "build",
+    checks.push_back({.name = "workers",
                       .subject = worker.name().empty() ? "a worker" : worker.name(),
                       .health = Health::kProblem,
                       .found = absl::StrCat("Turned away ", report::Duration(std::max(0.0, ago)),
                                             " ago: ", worker.reason(), "."),
-                      .advice = "Install the server's build on that node and start it again."});
+                      .advice = "Do so on that node and start it again."});
   }
   const bool any = slots > 0;
   checks.insert(

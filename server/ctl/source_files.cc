@@ -52,6 +52,12 @@ std::optional<SourceFiles> ReadSourceFiles(const Arguments& arguments) {
   return source;
 }
 
+absl::Status CancelledBefore(const std::string& campaign) {
+  return absl::AbortedError(absl::StrCat(campaign,
+                                         ", the same file, is cancelled; `calibctl delete ",
+                                         campaign, "` or another --seed starts it anew"));
+}
+
 absl::StatusOr<std::string> SubmitSource(Client& client, const SourceFiles& source,
                                          std::optional<std::uint64_t> seed,
                                          const std::string& file) {

@@ -32,4 +32,7 @@ absl::StatusOr<std::string> SubmitSource(Client& client, const SourceFiles& sour
                                          std::optional<std::uint64_t> seed,
                                          const std::string& file);
 
+/// For a file whose campaign was cancelled: it would never run.
+absl::Status CancelledBefore(const std::string& campaign);
+
 }  // namespace calib::ctl

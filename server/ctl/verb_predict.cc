@@ -1,5 +1,6 @@
 #include <iostream>
 
+#include "absl/strings/str_cat.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/interrupt.h"
 #include "server/ctl/prediction.h"
@@ -14,6 +15,11 @@ int Predict(const Arguments& arguments) {
   Laboratory laboratory(**session, arguments);
   const auto view = laboratory.Finished(arguments.campaign);
   if (!view.ok()) return Fail(view.status());
+  if (view->campaign.precomputed) {  // before its tests are held against a model
+    return Fail(absl::FailedPreconditionError(
+        absl::StrCat("the runs of ", arguments.campaign,
+                     " were made elsewhere: there is no model to run another test with")));
+  }
   const auto tests = ReadTests((*session)->client(), arguments.test, *view);
   if (!tests.ok()) return Fail(tests.status());
   const auto prediction =

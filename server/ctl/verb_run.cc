@@ -88,6 +88,7 @@ int Run(const Arguments& given) {
   if (auto taken = TakeUp((*session)->client(), *campaign); !taken.ok()) return Fail(taken);
   auto status = (*session)->client().Show(*campaign);
   if (!status.ok()) return Fail(status.status());
+  const bool cancelled_before = status->state() == "cancelled";
   if (!IsOver(*status)) {
     if (!source->outcome.campaign.precomputed) {
       if (auto started = (*session)->UseWorkers(given.workers); !started.ok()) {
@@ -100,6 +101,7 @@ int Run(const Arguments& given) {
     if (!status.ok()) return Fail(status.status());
   }
   if (status->state() == "finished") return PrintAnswer(**session, *campaign, arguments.json);
+  if (cancelled_before) return Fail(CancelledBefore(*campaign));
   if (Interrupted()) {
     return Fail(absl::CancelledError(absl::StrCat("stopped; nothing is lost. `calibctl run ",
                                                   arguments.file, " --state ", arguments.state,

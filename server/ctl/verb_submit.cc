@@ -15,9 +15,10 @@ int Submit(const Arguments& arguments) {
   if (!session.ok()) return Fail(session.status());
   const auto campaign = SubmitSource((*session)->client(), *source, arguments.seed, arguments.file);
   if (!campaign.ok()) return Fail(campaign.status());
+  const auto status = (*session)->client().Show(*campaign);
+  if (!status.ok()) return Fail(status.status());
+  if (status->state() == "cancelled") return Fail(CancelledBefore(*campaign));
   if (arguments.json) {
-    const auto status = (*session)->client().Show(*campaign);
-    if (!status.ok()) return Fail(status.status());
     std::cout << report::StatusJson(*status);
   } else {
     std::cout << *campaign << "\n";

@@ -1,6 +1,7 @@
 #include <iostream>
 
 #include "server/campaign/noise_check.h"
+#include "server/campaign/read_precomputed.h"
 #include "server/campaign/specimen_notes.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/source_files.h"
@@ -14,8 +15,11 @@ int Validate(const Arguments& arguments) {
   const auto source = ReadSourceFiles(arguments);
   if (!source) return kBadInput;
   const campaign::Campaign& campaign = source->outcome.campaign;
-  const std::vector<std::string> warnings = campaign::NoiseWarnings(campaign);
   const std::vector<std::string> notes = campaign::SpecimenNotes(campaign);
+  std::vector<std::string> warnings = campaign::NoiseWarnings(campaign);
+  for (std::string& warning : campaign::RepeatedRunWarnings(campaign)) {
+    warnings.push_back(std::move(warning));
+  }
   if (arguments.json) {
     std::cout << report::ProblemsJson({}, warnings, notes);
     return kDone;

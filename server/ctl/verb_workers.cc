@@ -8,6 +8,16 @@
 #include "server/report/people_units.h"
 
 namespace calib::ctl {
+namespace {
+
+std::string State(const v1::WorkerInfo& w) {
+  const std::string since = report::Duration(w.seconds_since_heard());
+  if (w.left()) return (w.draining() ? "drained " : "left ") + since + " ago";
+  if (!w.connected()) return "silent for " + since;
+  return w.draining() ? "draining" : "ready";
+}
+
+}  // namespace
 
 int Workers(const Arguments& arguments) {
   const auto session = Session::Open(arguments);
@@ -26,10 +36,7 @@ int Workers(const Arguments& arguments) {
     std::string running;
     for (const std::string& what : w.running()) running += (running.empty() ? "" : " ") + what;
     table.AddRow({w.name(), std::to_string(w.busy()), std::to_string(w.slots()),
-                  report::Number(w.contact_updates_per_second() / 1e6, 3),
-                  !w.connected() ? "silent for " + report::Duration(w.seconds_since_heard())
-                                 : (w.draining() ? "draining" : "ready"),
-                  running});
+                  report::Number(w.contact_updates_per_second() / 1e6, 3), State(w), running});
   }
   std::cout << table.ToString();
   return kDone;

@@ -46,8 +46,8 @@ table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:14px;
 th,td{padding:5px 10px;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
 th{color:var(--soft);font-weight:600;font-size:13px}th:first-child,td:first-child{text-align:left}td.l,th.l{text-align:left}
 td.wide{white-space:normal;min-width:150px}td.bad{color:var(--warn);font-weight:600}td.good{color:var(--good)}
-.grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(320px,1fr));gap:16px}
-figure{margin:0}.fit{grid-template-columns:repeat(auto-fit,minmax(440px,1fr))}figcaption{font-size:13px;color:var(--soft)}
+.grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(320px,100%),1fr));gap:16px}
+figure{margin:0}.fit{grid-template-columns:repeat(auto-fit,minmax(min(440px,100%),1fr))}figcaption{font-size:13px;color:var(--soft)}
 svg{display:block;max-width:100%;height:auto}svg text{fill:var(--ink);font-size:12px}svg .tick{fill:var(--soft);font-size:11px}
 .axis{stroke:var(--soft);fill:none;stroke-width:1}.gridline{stroke:var(--grid);stroke-width:1}.zero{stroke:var(--soft);stroke-dasharray:3 3}
 .band{fill:var(--band);fill-opacity:.2;stroke:none}.mean{stroke:var(--model);fill:none;stroke-width:2}

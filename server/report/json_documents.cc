@@ -26,6 +26,9 @@ Json Numbers(const Values& values) {
   return array;
 }
 
+// Neither a misfit nor a number of effective samples is zero: nothing is known of it yet.
+Json PositiveOrNull(double value) { return value > 0 ? Json(value) : Json(nullptr); }
+
 Json Status(const v1::CampaignStatus& s) {
   return {{"campaign", s.campaign()},
           {"name", s.name()},
@@ -41,8 +44,8 @@ Json Status(const v1::CampaignStatus& s) {
           {"samples_resting", s.samples_resting()},
           {"samples_stopped_early", s.samples_stopped_early()},
           {"samples_diverged", s.samples_diverged()},
-          {"effective_sample_size", s.effective_sample_size()},
-          {"best_misfit", s.best_misfit()},
+          {"effective_sample_size", PositiveOrNull(s.effective_sample_size())},
+          {"best_misfit", PositiveOrNull(s.best_misfit())},
           {"eta_seconds", s.eta_seconds() < 0 ? Json(nullptr) : Json(s.eta_seconds())},
           {"model_evaluations", s.model_evaluations()},
           {"core_hours", s.core_hours()},
@@ -403,6 +406,7 @@ std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers) {
                     {"cpu", w.cpu()},
                     {"draining", w.draining()},
                     {"connected", w.connected()},
+                    {"left", w.left()},
                     {"seconds_since_heard", w.seconds_since_heard()},
                     {"running", running},
                     {"engine_version", w.engine_version()}});

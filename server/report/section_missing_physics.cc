@@ -142,7 +142,7 @@ std::string ErrorChart(const Story& story) {
       all.push_back(held.back());
     }
   }
-  Plot plot({}, Axis("effects added", 0, x.back(), static_cast<int>(steps.size())),
+  Plot plot({}, Axis("effects added", 0, x.back(), static_cast<int>(steps.size()) - 1),
             Axis::Covering("error, sd", all, 5));
   plot.AddHorizontal(1);
   plot.AddLine(x, fitted, "mean");

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "absl/strings/str_cat.h"
+#include "server/campaign/read_precomputed.h"
 #include "server/scheduler/answer.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
@@ -233,6 +234,9 @@ class Planner {
     conclusion.posterior.set_stopped_early(history_.stopped_early);
     if (DecidesAtOnce(definition_)) {
       conclusion.posterior.add_warnings(kDecidedAtOnce);
+    }
+    for (std::string& warning : campaign::RepeatedRunWarnings(campaign_)) {
+      conclusion.posterior.add_warnings(std::move(warning));
     }
     conclusion.posterior.set_stated_loss(stated_loss_);
     if (audit_.samples > 0) {

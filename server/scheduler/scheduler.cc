@@ -331,6 +331,14 @@ std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
   return live;
 }
 
+std::map<std::int64_t, LiveStatus> Scheduler::AllLive() {
+  std::map<std::int64_t, LiveStatus> all;
+  for (const auto& [campaign, run] : runs_) {
+    all.emplace(campaign, *Live(campaign));
+  }
+  return all;
+}
+
 std::string Scheduler::TooManyDiverged(CampaignRun& run, const std::string& last) {
   const campaign::Failure& failure = run.definition().campaign.failure;
   const int samples = run.record().submitted.samples;

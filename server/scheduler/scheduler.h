@@ -50,7 +50,8 @@ class Scheduler {
 
   // ---- workers (scheduler_workers.cc) ----
   /// FAILED_PRECONDITION when the worker's mechanics or catalogue are not the server's;
-  /// INVALID_ARGUMENT for a Hello without name or slots.
+  /// INVALID_ARGUMENT for a Hello without name or slots; ALREADY_EXISTS when another process is
+  /// connected under its name (WorkerTable::IsAnother).
   absl::Status Connected(std::int64_t session, const v1::Hello& hello);
   void Disconnected(std::int64_t session);
   void Receive(std::int64_t session, const v1::StateBatch& batch);
@@ -83,6 +84,8 @@ class Scheduler {
   void Delete(std::int64_t campaign, const store::Store::Job& also, const Reply& reply);
   /// Empty when the campaign is not live.
   std::optional<LiveStatus> Live(std::int64_t campaign);
+  /// Of every campaign that is not over.
+  std::map<std::int64_t, LiveStatus> AllLive();
   /// Grows whenever something changed that a status shows.
   std::uint64_t version() const { return version_; }
   /// Campaigns that are not over.
@@ -95,7 +98,7 @@ class Scheduler {
 
   // Workers (scheduler_workers.cc)
   /// Why a worker may not join; OK when it may.
-  static absl::Status Admit(const v1::Hello& hello);
+  absl::Status Admit(const v1::Hello& hello) const;
 
   // Work (scheduler_workers.cc)
   void Dispatch();

@@ -33,7 +33,7 @@ std::string NameOf(const CampaignRun& run, const EvaluationKey& key) {
 
 }  // namespace
 
-absl::Status Scheduler::Admit(const v1::Hello& hello) {
+absl::Status Scheduler::Admit(const v1::Hello& hello) const {
   if (hello.name().empty() || hello.slots() < 1) {
     return absl::InvalidArgumentError("a worker must have a name and at least one slot");
   }
@@ -46,6 +46,14 @@ absl::Status Scheduler::Admit(const v1::Hello& hello) {
     return absl::FailedPreconditionError(
         absl::StrCat("worker ", hello.name(),
                      " offers other contacts, effects or tests than the server: update the node"));
+  }
+  const Clock::time_point now = ports_.Now();
+  if (workers_.IsAnother(hello, now - options_.lease)) {
+    const Clock::duration silence = now - workers_.all().at(hello.name()).heard;
+    return absl::AlreadyExistsError(
+        absl::StrCat("a worker ", hello.name(), " is connected already and was heard ",
+                     std::chrono::duration_cast<std::chrono::seconds>(silence).count(),
+                     " s ago: give this one another --name"));
   }
   return absl::OkStatus();
 }
@@ -492,6 +500,7 @@ std::vector<v1::WorkerInfo> Scheduler::Workers() const {
     info.set_engine_version(entry.hello.engine_version());
     info.set_draining(entry.draining);
     info.set_connected(entry.session != 0);
+    info.set_left(entry.leaving && entry.session == 0);
     info.set_seconds_since_heard(std::chrono::duration<double>(ports_.Now() - entry.heard).count());
     for (const LeaseEntry& lease : leases_.OfWorker(name)) {
       const auto run = runs_.find(lease.key.campaign);

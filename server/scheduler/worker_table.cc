@@ -25,6 +25,17 @@ std::int64_t WorkerTable::Connect(const v1::Hello& hello, std::int64_t session,
   return before;
 }
 
+bool WorkerTable::IsAnother(const v1::Hello& hello, Clock::time_point heard_since) const {
+  const auto found = workers_.find(hello.name());
+  if (found == workers_.end() || hello.instance().empty()) {
+    return false;
+  }
+  const WorkerEntry& entry = found->second;
+  const std::string& instance = entry.hello.instance();
+  return !instance.empty() && instance != hello.instance() && entry.session != 0 &&
+         !entry.leaving && entry.heard >= heard_since;
+}
+
 void WorkerTable::Disconnect(std::int64_t session) {
   if (WorkerEntry* entry = OfSession(session); entry != nullptr) {
     entry->session = 0;

@@ -25,6 +25,9 @@ class WorkerTable {
  public:
   /// Enters a worker with its new stream; returns the session of the stream it had before, or 0.
   std::int64_t Connect(const v1::Hello& hello, std::int64_t session, Clock::time_point now);
+  /// Whether another process is connected under this name, was heard since then and has not said
+  /// that it leaves. False where one of the two does not tell its instance.
+  bool IsAnother(const v1::Hello& hello, Clock::time_point heard_since) const;
   void Disconnect(std::int64_t session);
   /// Forgets those that are gone and were not heard since then.
   void ForgetGone(Clock::time_point heard_since);

@@ -85,22 +85,19 @@ grpc::ServerUnaryReactor* CampaignsService::Show(Context* context,
 grpc::ServerUnaryReactor* CampaignsService::List(Context* context,
                                                  const v1::ListRequest* /*request*/,
                                                  v1::ListReply* reply) {
-  return Ask<v1::ListReply>(context, reply,
-                            [](store::Reader& reader) -> absl::StatusOr<v1::ListReply> {
-                              const auto campaigns = reader.Campaigns();
-                              if (!campaigns.ok()) {
-                                return campaigns.status();
-                              }
-                              v1::ListReply list;
-                              for (const store::CampaignRecord& record : *campaigns) {
-                                auto status = StatusOf(reader, record.submitted.id, std::nullopt);
-                                if (!status.ok()) {
-                                  return status.status();
-                                }
-                                *list.add_campaigns() = *std::move(status);
-                              }
-                              return list;
-                            });
+  Unary* reactor = context->DefaultReactor();
+  core_.Post([this, reactor, reply] {
+    core_.Query([this, reactor, reply, live = core_.scheduler().AllLive()] {
+      auto reader = core_.Read();
+      auto list =
+          reader.ok() ? ListOf(*reader, live) : absl::StatusOr<v1::ListReply>(reader.status());
+      if (list.ok()) {
+        *reply = *std::move(list);
+      }
+      reactor->Finish(rpc::ToGrpc(list.status()));
+    });
+  });
+  return reactor;
 }
 
 grpc::ServerUnaryReactor* CampaignsService::GetPosterior(Context* context,

@@ -174,6 +174,26 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   return status;
 }
 
+absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
+                                     const std::map<std::int64_t, scheduler::LiveStatus>& live) {
+  const auto campaigns = reader.Campaigns();
+  if (!campaigns.ok()) {
+    return campaigns.status();
+  }
+  v1::ListReply list;
+  for (const store::CampaignRecord& record : *campaigns) {
+    const std::int64_t id = record.submitted.id;
+    const auto known = live.find(id);
+    auto status = StatusOf(reader, id,
+                           known == live.end() ? std::nullopt : std::make_optional(known->second));
+    if (!status.ok()) {
+      return status.status();
+    }
+    *list.add_campaigns() = *std::move(status);
+  }
+  return list;
+}
+
 absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t campaign,
                                           std::optional<int> iteration) {
   const auto record = reader.Campaign(campaign);

@@ -2,6 +2,7 @@
 // Answers to what users ask, from one Reader. Pure functions of the store and of what the scheduler
 // said.
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,9 @@ absl::StatusOr<std::int64_t> ParseCampaign(const std::string& id);
 
 absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t campaign,
                                             const std::optional<scheduler::LiveStatus>& live);
+/// Of all campaigns, in the order of their ids.
+absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
+                                     const std::map<std::int64_t, scheduler::LiveStatus>& live);
 absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t campaign,
                                           std::optional<int> iteration);
 absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::int64_t campaign);

@@ -22,7 +22,10 @@ absl::Status ToStatus(const SQLite::Exception& error) {
       return absl::UnavailableError(text);
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
-      return absl::DataLossError(text);
+      return absl::DataLossError(absl::StrCat(
+          text,
+          "; it is damaged: put a copy of calib.db back in its place, or move it away and "
+          "start with an empty state"));
     case SQLITE_IOERR:
     case SQLITE_READONLY:
     case SQLITE_CANTOPEN:

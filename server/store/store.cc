@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
 #include "server/store/connection.h"
 #include "server/store/migrations.h"
@@ -117,15 +118,23 @@ class Store::Writer {
   std::thread thread_;  // last: starts when everything above is there
 };
 
+namespace {
+
+absl::Status At(const std::string& path, const absl::Status& status) {
+  return {status.code(), absl::StrCat(path, ": ", status.message())};
+}
+
+}  // namespace
+
 absl::StatusOr<std::unique_ptr<Store>> Store::Open(const std::string& path, StoreHooks hooks) {
   std::unique_ptr<Connection> connection;
   try {
     connection = std::make_unique<Connection>(path, /*writable=*/true);
   } catch (const SQLite::Exception& error) {
-    return ToStatus(error);
+    return At(path, ToStatus(error));
   }
   if (absl::Status status = Migrate(*connection); !status.ok()) {
-    return status;
+    return At(path, status);
   }
   return std::unique_ptr<Store>(
       new Store(path, std::make_unique<Writer>(std::move(connection), std::move(hooks))));

@@ -193,6 +193,38 @@ TEST(Worker, OfAnotherBuildIsToldToUpdate) {
   EXPECT_EQ(client.Examine()->refused_size(), 0) << "it has come back";
 }
 
+TEST(Worker, UnderANameThatIsTakenIsToldToTakeAnother) {
+  Deployment deployment({.name = "name"});
+  ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
+  v1::Hello hello = MatchingHello("w1", 1);
+  hello.set_instance("1");
+  FakeWorker first(deployment.address(), hello);
+  ASSERT_TRUE(first.Receive(kLong).has_value());
+  const auto start_w1 = [&] {
+    return Process({Program("calib-worker"), "--server", deployment.address(), "--name", "w1"},
+                   deployment.folder() + "/worker-of-the-name.log");
+  };
+  EXPECT_EQ(start_w1().Wait(kLong), 1);
+  EXPECT_NE(deployment.Logs().find("a worker w1 is connected already"), std::string::npos);
+  Client client = deployment.client();
+  const auto report = client.Examine();
+  ASSERT_TRUE(report.ok()) << report.status();
+  ASSERT_EQ(report->refused_size(), 1);
+  EXPECT_NE(report->refused(0).reason().find("another --name"), std::string::npos);
+  ASSERT_EQ(client.Workers()->workers_size(), 1);
+  EXPECT_TRUE(client.Workers()->workers(0).connected()) << "the first is left alone";
+
+  first.Cut();  // as by a kill
+  ASSERT_TRUE(Eventually(kLong, [&] { return !client.Workers()->workers(0).connected(); }));
+  Process next = start_w1();
+  EXPECT_TRUE(Eventually(kLong, [&] { return client.Workers()->workers(0).connected(); }))
+      << "its name is free at once";
+  EXPECT_EQ(client.Examine()->refused_size(), 0);
+  ASSERT_TRUE(client.Drain("w1").ok());
+  EXPECT_EQ(next.Wait(kLong), 0);
+  EXPECT_TRUE(Eventually(kLong, [&] { return client.Workers()->workers(0).left(); }));
+}
+
 TEST(Server, SecondOneOnTheSameFolderIsToldWhoServesIt) {
   Deployment deployment({.name = "second"});
   ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();

@@ -60,6 +60,24 @@ TEST_F(Calibctl, SimulateWritesARowPerLoadStep) {
   EXPECT_TRUE(std::filesystem::exists(work_ / "grains" / "tx" / "contacts_0002.vtp"));
 }
 
+TEST_F(Calibctl, AFileWhoseCampaignWasCancelledIsSaidToBe) {
+  EXPECT_EQ(Call("submit good.yaml --state s").out, "c1\n");
+  const Json shown = Call("show c1 --state s --json").json();
+  EXPECT_TRUE(shown["best_misfit"].is_null()) << "nothing has run";
+  EXPECT_TRUE(shown["effective_sample_size"].is_null());
+  const Json listed = Call("list --state s --json").json();
+  for (const auto& [key, value] : listed[0].items()) EXPECT_EQ(value, shown[key]) << key;
+  ASSERT_EQ(Call("cancel c1 --state s").code, 0);
+  for (const char* verb : {"submit", "run"}) {
+    const Answer again = Call(std::string(verb) + " good.yaml --state s");
+    EXPECT_EQ(again.code, 1) << verb;
+    EXPECT_THAT(again.err, HasSubstr("c1, the same file, is cancelled; `calibctl delete c1` or "
+                                     "another --seed starts it anew"));
+    EXPECT_EQ(again.out, "");
+  }
+  EXPECT_EQ(Call("submit good.yaml --state s --seed 9").out, "c2\n");
+}
+
 TEST_F(Calibctl, ACalibrationFromEndToEnd) {
   const Answer run = Call("run good.yaml --workers 2 --state s --json");
   ASSERT_EQ(run.code, 0) << run.err;

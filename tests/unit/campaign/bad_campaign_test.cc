@@ -332,6 +332,39 @@ INSTANTIATE_TEST_SUITE_P(
                 "iterative_bayesian_filter, tmcmc, surrogate_msrs, table"},
         Mistake{"HalfASample", "samples: 20", "samples: 20.5",
                 "c.yaml:36: inference.samples: '20.5' is not a whole number from 2 to 1000000"},
+        Mistake{"OneReplicate", "max_iterations: 3}", "max_iterations: 3, replicates: 1}",
+                "c.yaml:36: inference: replicates is 1, but one run shows no scatter; allowed: 0 "
+                "(not measured) or 2 to 1000"},
+        Mistake{"KeyOfTheOptimiser", "max_iterations: 3}", "max_iterations: 3, in_flight: 4}",
+                "c.yaml:36: inference.in_flight: belongs to method: surrogate_msrs; remove it"},
+        Mistake{"KeyOfTheChains", "max_iterations: 3}", "max_iterations: 3, steps: 4}",
+                "c.yaml:36: inference.steps: belongs to method: tmcmc; remove it"},
+        Mistake{"KeyOfTheFilters", "iterative_bayesian_filter, samples: 20, max_iterations: 3}",
+                "tmcmc, samples: 20, design: sobol}",
+                "c.yaml:36: inference.design: belongs to method: iterative_bayesian_filter and "
+                "sqmc; remove it"},
+        Mistake{"NearlyFreeze", "max_iterations: 3}", "max_iterations: 3, freez: {}}",
+                "c.yaml:36: inference.freez: is an unknown key; did you mean 'freeze'?"},
+        Mistake{"NearlyConstraints", "noise: given", "constraint: [a < b]\nnoise: given",
+                "c.yaml:35: constraint: is an unknown key; did you mean 'constraints'?"},
+        Mistake{"NearlyACorrelation", "noise: given", "prior_corelation: []\nnoise: given",
+                "c.yaml:35: prior_corelation: is an unknown key; did you mean "
+                "'prior_correlation'?"},
+        Mistake{"FolderAboveAsName", "name: tx05", "name: ..",
+                "c.yaml:26: experiments[2].name: '..' has to begin with a letter, a digit or _"},
+        Mistake{"OptionAsName", "name: tx05", "name: -o",
+                "c.yaml:26: experiments[2].name: '-o' has to begin with a letter, a digit or _"},
+        Mistake{"EmptyValue", "failure: {attempts: 5, pause_above: 0.25}", "failure:\n\n# none",
+                "c.yaml:38: failure: is nothing, expected a map of key: value"},
+        Mistake{"DecimalComma", "confining_pressure: 0.5 MPa", "confining_pressure: 0,5 MPa",
+                "c.yaml:28: experiments[2].confining_pressure: '0,5 MPa' has a comma in its "
+                "number: write a decimal point, expected a pressure (Pa, kPa, MPa, GPa)"},
+        Mistake{"IndentedByTab", "  contact: hertz_mindlin", "\tcontact: hertz_mindlin",
+                "c.yaml:3: is indented by a tab, which YAML does not allow; indent by blanks"},
+        Mistake{"InfiniteCorrelation", "correlation_length: 0.5 percent",
+                "correlation_length: .inf",
+                "c.yaml:24: experiments[1].observables.volumetric_strain.noise.correlation_length: "
+                "'.inf' is not finite; allowed: at least 0"},
         Mistake{"DiscardTooMuch", "discard_at_most: 1e-3", "discard_at_most: 2",
                 "c.yaml:37: early_stopping.discard_at_most: '2' is outside what is allowed: "
                 "between 0 (excluded) and 1 "

@@ -78,7 +78,7 @@ inference: {samples: 10}
               radius != std::string("2 cm"));
   }
   EXPECT_EQ(ProblemsOf(Spoiled("confining_pressure: 0.2 MPa", "confining_pressure: .inf")),
-            "c.yaml:15: experiments[1].confining_pressure: '.inf' is outside what is allowed: "
+            "c.yaml:15: experiments[1].confining_pressure: '.inf' is not finite; allowed: "
             "between 0 (excluded) and 1e+10 Pa\n");
 }
 

@@ -37,6 +37,23 @@ TEST(DataFile, ReadsWhatLaboratoriesWrite) {
   }
 }
 
+TEST(DataFile, SaysOnceHowASpreadsheetHasToSave) {
+  for (const auto& [text, line, message] : {
+           std::tuple("a;b\n1,5;2\n2,5;3\n", 1, "separates its fields by ';'"),
+           std::tuple("# made; in 2018\na b\n1.5;2\n", 3, "separates its fields by ';'"),
+           std::tuple("a\tb\n1.5\t2\n2,5\t3,5\n4,5\t5\n", 3, "has '2,5', a number with a comma"),
+       }) {
+    std::vector<TableProblem> problems;
+    Column(text, "b", problems);
+    ASSERT_THAT(problems, SizeIs(1)) << text;
+    EXPECT_EQ(problems[0].line, line);
+    EXPECT_THAT(problems[0].message, HasSubstr(message));
+  }
+  std::vector<TableProblem> problems;
+  EXPECT_THAT(Column("a,b\n1,2\n3, 4\n5 ,6\n", "b", problems), ElementsAre(2, 4, 6));
+  EXPECT_THAT(problems, IsEmpty());
+}
+
 TEST(DataFile, PointsToTheLineOfEveryBadField) {
   std::vector<TableProblem> problems;
   Column("a b\n1 2\n1 x\n1 nan\n1\n1 inf\n", "b", problems);

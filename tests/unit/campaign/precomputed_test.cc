@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "server/campaign/read_precomputed.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
@@ -100,6 +101,33 @@ TEST(Precomputed, SaysWhichTableIsWrong) {
   files["par.csv"] = "sample,E,km_nNm\n0,100,8000\n";
   EXPECT_THAT(ProblemsOf(Yaml(), files),
               HasSubstr("par.csv:1: E_GPa: is not a column of this file"));
+}
+
+TEST(Precomputed, ARepeatedSampleBesideOthersIsNamedToo) {
+  auto files = Tables();
+  files["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n0,120,-5000\n1,130,4000\n";
+  EXPECT_EQ(ProblemsOf(Yaml(), files),
+            "par.csv:3: sample: sample 0 stands here for the second time\n");
+}
+
+TEST(Precomputed, OneSetOfParametersIsNoSample) {
+  auto files = Tables();
+  files["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n1,100,-8000\n";
+  EXPECT_EQ(ProblemsOf(Yaml(), files),
+            "par.csv: all 2 rows hold the same parameters: young_modulus 1e+11 Pa, "
+            "rolling_stiffness 8e-06 N m/rad; a calibration needs runs at different ones\n");
+}
+
+TEST(Precomputed, RepeatedSetsAreWarnedOf) {
+  EXPECT_THAT(RepeatedRunWarnings(ReadCampaign(Yaml(), "c.yaml", ReaderOf(Tables())).campaign),
+              IsEmpty());
+  auto files = Tables();
+  files["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n1,100,8000\n2,120,5000\n3,100,8000\n";
+  const auto outcome = ReadCampaign(Yaml(), "c.yaml", ReaderOf(files));
+  ASSERT_THAT(outcome.problems, IsEmpty());
+  EXPECT_THAT(RepeatedRunWarnings(outcome.campaign),
+              ::testing::ElementsAre(
+                  HasSubstr("2 of the 4 runs made elsewhere repeat the parameters of another")));
 }
 
 TEST(Precomputed, AMisspeltNameIsNotPassedOver) {

@@ -55,6 +55,9 @@ TEST(Quantity, RefusesWhatIsNoNumberOrUnit) {
   EXPECT_THAT(Error("lots", "Pa"), HasSubstr("'lots' is not a number"));
   EXPECT_THAT(Error("", "Pa"), HasSubstr("is not a number"));
   EXPECT_THAT(Error("nan", "Pa"), HasSubstr("is not a number"));
+  EXPECT_EQ(Error("0,2 MPa", "Pa"),
+            "'0,2 MPa' has a comma in its number: write a decimal point, expected a pressure (Pa, "
+            "kPa, MPa, GPa)");
   EXPECT_THAT(Error("1e999 Pa", "Pa"), HasSubstr("too large"));
   EXPECT_THAT(Error("3 MPA", "Pa"), HasSubstr("unknown unit 'MPA'; did you mean 'MPa'?"));
   EXPECT_THAT(Error("3 kg/m^x", "kg/m^3"), HasSubstr("exponent"));

@@ -32,6 +32,20 @@ TEST(CommandLine, ASettingMayHoldBlanks) {
   EXPECT_EQ(parsed.command->arguments.output, "x.csv");
 }
 
+TEST(CommandLine, AServerIsHostAndPort) {
+  EXPECT_TRUE(Parse({"list", "--server", "node1:7443"}).command.has_value());
+  for (const char* bad :
+       {"", "foo", "127.0.0.1", "127.0.0.1:99999", "http://node1:7443", "127.0.0.1:7543/x"}) {
+    EXPECT_EQ(Parse({"list", "--server", bad}).exit_code, kBadInput) << bad;
+  }
+}
+
+TEST(CommandLine, WhatIsNotUtf8IsRefused) {
+  EXPECT_TRUE(Parse({"show", "c\xC3\xA4"}).command.has_value());
+  EXPECT_EQ(Parse({"show", "c\xE4"}).exit_code, kBadInput);
+  EXPECT_EQ(Parse({"validate", "s\xE4nd.yaml"}).exit_code, kBadInput);
+}
+
 TEST(CommandLine, BadUsageIsTwoAndHelpIsZero) {
   EXPECT_EQ(Parse({}).exit_code, kBadInput);
   EXPECT_EQ(Parse({"frobnicate"}).exit_code, kBadInput);

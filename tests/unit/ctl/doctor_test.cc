@@ -116,7 +116,10 @@ TEST(Doctor, WorkersThatWereTurnedAwayAreNamed) {
   refused.set_name("node3-1");
   refused.set_reason("worker node3-1 has mechanics version 6, the server 7: update the node");
   refused.set_unix_ms(970'000);
-  const auto checks = JudgeWorkers({ready, silent}, server);
+  v1::WorkerInfo drained;
+  drained.set_name("node4-1");
+  drained.set_left(true);
+  const auto checks = JudgeWorkers({ready, silent, drained}, server);
   ASSERT_EQ(checks.size(), 3U);
   EXPECT_EQ(checks[0].found, "2 slots of connected workers.");
   EXPECT_EQ(checks[1].health, Health::kWarning);

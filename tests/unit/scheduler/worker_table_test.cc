@@ -52,6 +52,28 @@ TEST(WorkerTable, NewStreamReplacesTheOldOne) {
   EXPECT_EQ(workers.OfSession(1), nullptr);
 }
 
+TEST(WorkerTable, AnotherProcessOfTheNameOfOneThatIsConnectedIsAnother) {
+  const auto of = [](const std::string& instance) {
+    v1::Hello hello = Hello("a", 1);
+    hello.set_instance(instance);
+    return hello;
+  };
+  WorkerTable workers;
+  EXPECT_FALSE(workers.IsAnother(of("1"), kStart)) << "nobody bears the name";
+  workers.Connect(of("1"), 1, kStart);
+  EXPECT_FALSE(workers.IsAnother(of("1"), kStart)) << "its own reconnect";
+  EXPECT_TRUE(workers.IsAnother(of("2"), kStart));
+  EXPECT_FALSE(workers.IsAnother(of(""), kStart)) << "an older build does not tell";
+  EXPECT_FALSE(workers.IsAnother(of("2"), kStart + seconds(1))) << "it is silent for too long";
+  workers.Find("a")->leaving = true;
+  EXPECT_FALSE(workers.IsAnother(of("2"), kStart)) << "it has said that it leaves";
+  workers.Find("a")->leaving = false;
+  workers.Disconnect(1);
+  EXPECT_FALSE(workers.IsAnother(of("2"), kStart)) << "killed, its stream is closed";
+  workers.Connect(Hello("a", 1), 3, kStart);
+  EXPECT_FALSE(workers.IsAnother(of("2"), kStart)) << "the one there is of an older build";
+}
+
 TEST(WorkerTable, DrainedWorkerThatIsStartedAgainWorks) {
   WorkerTable workers;
   workers.Connect(Hello("a", 1), 1, kStart);

@@ -1,0 +1,35 @@
+#include "proto/rpc/address.h"
+
+#include <charconv>
+
+#include "absl/strings/str_cat.h"
+
+namespace calib::rpc {
+namespace {
+
+bool IsHost(const std::string& host) {
+  if (host.starts_with('[')) {
+    return host.size() > 2 &&
+           host.find_first_not_of("0123456789abcdefABCDEF:.%", 1) == host.size() - 1 &&
+           host.back() == ']';
+  }
+  return !host.empty() && host.find_first_of(":/[]@ \t\r\n") == std::string::npos;
+}
+
+}  // namespace
+
+// gRPC looks up a host that is none, and takes a port above 65535 modulo 65536.
+std::string ProblemOfAddress(const std::string& address, int least_port) {
+  const std::size_t colon = address.rfind(':');
+  int port = -1;
+  if (colon != std::string::npos && IsHost(address.substr(0, colon))) {
+    const char* const end = address.data() + address.size();
+    const auto [at, error] = std::from_chars(address.data() + colon + 1, end, port);
+    if (error != std::errc() || at != end) port = -1;
+  }
+  if (port >= least_port && port <= 65535) return "";
+  return absl::StrCat("'", address, "' is not HOST:PORT with a port from ", least_port,
+                      " to 65535");
+}
+
+}  // namespace calib::rpc
