@@ -93,7 +93,7 @@ struct ParameterSummary {
   double q05 = 0, q50 = 0, q95 = 0;
   double prior_sd = 0;  ///< standard deviation of the prior, the scale of a mean near zero
   /// More than a tenth of the posterior lies in the outer 2 % of the prior's probability at one
-  /// end.
+  /// end that has a bound; InTail [parameter_summary.h] says it of an end that has none.
   bool at_bound = false;
 };
 

@@ -40,10 +40,22 @@ ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weight
   summary.q50 = quantiles[1];
   summary.q95 = quantiles[2];
   summary.prior_sd = prior.StandardDeviation();
+  const double low = prior.Quantile(kOuterShare);
+  const double high = prior.Quantile(1 - kOuterShare);
   summary.at_bound =
-      MassWhere(log_weights, values, -kInfinity, prior.Quantile(kOuterShare)) > kBoundShare ||
-      MassWhere(log_weights, values, prior.Quantile(1 - kOuterShare), kInfinity) > kBoundShare;
+      (std::isfinite(prior.min) && MassWhere(log_weights, values, -kInfinity, low) > kBoundShare) ||
+      (std::isfinite(prior.max) && MassWhere(log_weights, values, high, kInfinity) > kBoundShare);
   return summary;
+}
+
+bool InTail(const Prior& prior, const ParameterSummary& summary) {
+  constexpr double kTenth = 1.2816 / 1.6449;  // normal quantiles of 10 % over those of 5 %
+  if (std::isnan(summary.q05) || std::isnan(summary.q50) || std::isnan(summary.q95)) return false;
+  const double middle = prior.ToStandard(summary.q50);
+  const double low = middle + kTenth * (prior.ToStandard(summary.q05) - middle);
+  const double high = middle + kTenth * (prior.ToStandard(summary.q95) - middle);
+  return (!std::isfinite(prior.min) && low < prior.ToStandard(prior.Quantile(kOuterShare))) ||
+         (!std::isfinite(prior.max) && high > prior.ToStandard(prior.Quantile(1 - kOuterShare)));
 }
 
 }  // namespace calib::inference

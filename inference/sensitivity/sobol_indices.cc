@@ -72,7 +72,13 @@ Eigen::MatrixXd ToStandard(const JointPrior& priors, const Eigen::MatrixXd& para
   return standard;
 }
 
-// What one emulator says of one output.
+// Whether a variance is no more than what rounding leaves of numbers of this size.
+bool IsRounding(double variance, double size) {
+  constexpr double kRelative = 1e-13;
+  return !(variance > kRelative * kRelative * size * size);
+}
+
+// What one emulator says of one output; indices and correlation zero where it is constant.
 struct Analysed {
   SobolIndices indices;
   double mean = 0, sd = 0;
@@ -84,7 +90,14 @@ Analysed Analyse(const GaussianProcess& process, const JointPrior& priors,
                  bool indices, const SobolOptions& options) {
   const auto d = static_cast<int>(priors.size());
   Analysed result;
-  if (indices && priors.is_independent() && !priors.is_constrained()) {
+  const bool indexed = indices && priors.is_independent() && !priors.is_constrained();
+  if (process.constant()) {
+    result.mean = process.Predict(standard_points.topRows(1)).mean[0];
+    result.correlation = Eigen::VectorXd::Zero(d);
+    if (indexed) result.indices.first = result.indices.total = Eigen::VectorXd::Zero(d);
+    return result;
+  }
+  if (indexed) {
     const auto f = [&](const Eigen::MatrixXd& unit) -> Eigen::MatrixXd {
       Eigen::MatrixXd standard(unit.rows(), unit.cols());
       for (Index i = 0; i < unit.rows(); ++i)
@@ -104,6 +117,8 @@ Analysed Analyse(const GaussianProcess& process, const JointPrior& priors,
 }
 
 }  // namespace
+
+bool OutputSensitivity::Explains() const { return explained >= kLeastExplained; }
 
 std::vector<SobolIndices> EstimateSobolIndices(int dimensions, const SobolOptions& options,
                                                const UnitFunction& f) {
@@ -152,7 +167,8 @@ std::vector<SobolIndices> EstimateSobolIndices(int dimensions, const SobolOption
     const auto column = static_cast<Index>(o);
     indices.mean = means.col(column).mean();
     indices.variance = variances.col(column).mean();
-    const double scale = indices.variance > 0 ? indices.variance : kNone;
+    const double scale =
+        IsRounding(indices.variance, std::abs(indices.mean)) ? kNone : indices.variance;
     indices.first = first[o].colwise().mean() / scale;
     indices.total = total[o].colwise().mean() / scale;
     indices.first_error = ErrorOfMean(first[o]) / scale;
@@ -200,15 +216,18 @@ absl::StatusOr<std::vector<OutputSensitivity>> AnalyseSensitivity(
     Analysed whole =
         Analyse(*process, priors, standard_points, ranks, options.indices, options.sobol);
     OutputSensitivity& out = all.emplace_back();
+    const double average = values.col(o).mean();
+    const double variance = (values.col(o).array() - average).square().mean();
+    const double missed = process->leave_one_out().error.squaredNorm() / static_cast<double>(used);
     out.mean = whole.mean;
-    out.sd = whole.sd;
-    const Eigen::ArrayXd centred = values.col(o).array() - values.col(o).mean();
-    const double spread = centred.square().sum();
-    out.explained = spread > 0 ? 1 - process->leave_one_out().error.squaredNorm() / spread : kNone;
+    out.sd = std::hypot(whole.sd, std::sqrt(missed));
+    out.explained = IsRounding(variance, std::abs(average)) ? kNone : 1 - missed / variance;
+    if (process->constant() || !out.Explains()) continue;
     out.correlation = std::move(whole.correlation);
     const bool indexed = whole.indices.first.size() > 0;
     out.indices = std::move(whole.indices);
 
+    const auto none_is_zero = [](double v) { return std::isfinite(v) ? v : 0.0; };
     Eigen::MatrixXd first(options.folds, d);
     Eigen::MatrixXd total(options.folds, d);
     Eigen::MatrixXd correlation(options.folds, d);
@@ -222,10 +241,10 @@ absl::StatusOr<std::vector<OutputSensitivity>> AnalyseSensitivity(
       const Analysed left_out =
           Analyse(*part, priors, standard_points, ranks, options.indices, coarse);
       if (indexed) {
-        first.row(fold) = left_out.indices.first;
-        total.row(fold) = left_out.indices.total;
+        first.row(fold) = left_out.indices.first.unaryExpr(none_is_zero);
+        total.row(fold) = left_out.indices.total.unaryExpr(none_is_zero);
       }
-      correlation.row(fold) = left_out.correlation;
+      correlation.row(fold) = left_out.correlation.unaryExpr(none_is_zero);
     }
     const double inflation = options.folds - 1;  // of ErrorOfMean to the delete-a-group jackknife
     const auto join = [&](const Eigen::MatrixXd& parts, const Eigen::VectorXd& sampling) {

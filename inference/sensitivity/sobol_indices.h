@@ -38,12 +38,23 @@ std::vector<SobolIndices> EstimateSobolIndices(int dimensions, const SobolOption
 
 /// An output of a model that was run N times, emulated.
 struct OutputSensitivity {
-  SobolIndices indices;  ///< over the prior; empty where the prior's parameters are not independent
-  double explained = 0;  ///< 1 - mean square leave-one-out error / variance of the runs
-  double mean = 0, sd = 0;            ///< of the emulated output over the points
-  Eigen::VectorXd correlation;        ///< d, of its rank with each parameter's, over the points
+  /// Over the prior; empty where the prior's parameters are not independent or nothing is explained.
+  SobolIndices indices;
+  /// 1 - mean square leave-one-out error / variance of the runs; NaN where all runs are equal.
+  double explained = 0;
+  double mean = 0;  ///< of the emulated output over the points
+  double sd = 0;    ///< likewise, and the emulator's leave-one-out error in quadrature
+  /// d, of the output's rank with each parameter's, over the points; empty where nothing is
+  /// explained, NaN for a parameter that does not vary over them.
+  Eigen::VectorXd correlation;
   Eigen::VectorXd correlation_error;  ///< d
+
+  /// Whether the emulator tells enough of the output to say what moves it.
+  bool Explains() const;
 };
+
+/// Share of the runs' variance below which an emulator explains nothing.
+constexpr double kLeastExplained = 0.05;
 
 struct SensitivityOptions {
   SobolOptions sobol;
@@ -56,7 +67,7 @@ struct SensitivityOptions {
 /// in standardised parameters, its Sobol indices over the prior, and the rank correlations with the
 /// parameters over points (m x d, e.g. draws of the posterior). Errors join the sampling's and the
 /// emulator's: the latter by a jackknife over `folds` parts of the runs [Efron & Tibshirani 1993,
-/// ch. 11]. Errors: INVALID_ARGUMENT for shapes; FAILED_PRECONDITION with fewer than max(20, 3 d)
+/// ch. 11]; a part whose emulator is constant says that nothing moves the output, 0. Errors: INVALID_ARGUMENT for shapes; FAILED_PRECONDITION with fewer than max(20, 3 d)
 /// runs.
 absl::StatusOr<std::vector<OutputSensitivity>> AnalyseSensitivity(
     const JointPrior& priors, const Eigen::MatrixXd& parameters, const Eigen::MatrixXd& outputs,

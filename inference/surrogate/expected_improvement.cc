@@ -27,8 +27,8 @@ constexpr double kFirstStep = 0.05;
 // points show would otherwise be put down to scatter, and left.
 constexpr GaussianProcessOptions kProcess{.may_be_constant = false, .max_scatter = 1e-4};
 
-// Evaluations with a value, ln of it where all are positive.
-void ValuesDone(const ResponseSurfaceState& state, Eigen::MatrixXd& points,
+// Evaluations with a value, ln of it where all are positive; whether it is the ln.
+bool ValuesDone(const ResponseSurfaceState& state, Eigen::MatrixXd& points,
                 Eigen::VectorXd& values) {
   const auto done = static_cast<Index>(state.completed.size());
   points.resize(done, state.design.cols());
@@ -42,16 +42,28 @@ void ValuesDone(const ResponseSurfaceState& state, Eigen::MatrixXd& points,
     positive = positive && evaluation.value > 0;
   }
   if (positive) values = values.array().log();
+  return positive;
 }
 
-Eigen::MatrixXd PointsWithoutValue(const ResponseSurfaceState& state) {
-  std::vector<Eigen::VectorXd> others;
+// Pending and terminated evaluations: their points, and what is the least to believe of each (-inf:
+// the prediction alone).
+void PointsWithoutValue(const ResponseSurfaceState& state, double best, bool logarithmic,
+                        Eigen::MatrixXd& points, Eigen::VectorXd& least) {
+  const auto count = static_cast<Index>(state.evaluations.size() - state.completed.size());
+  points.resize(count, state.design.cols());
+  least = Eigen::VectorXd::Constant(count, -std::numeric_limits<double>::infinity());
+  Index i = 0;
   for (const Evaluation& evaluation : state.evaluations) {
-    if (evaluation.status != EvaluationStatus::kDone) others.push_back(evaluation.point);
+    if (evaluation.status == EvaluationStatus::kDone) continue;
+    if (evaluation.status == EvaluationStatus::kTerminated) {
+      least[i] = best;
+      if (evaluation.at_least && (!logarithmic || *evaluation.at_least > 0)) {
+        const double bound = *evaluation.at_least;
+        least[i] = std::max(best, logarithmic ? std::log(bound) : bound);
+      }
+    }
+    points.row(i++) = evaluation.point;
   }
-  Eigen::MatrixXd points(static_cast<Index>(others.size()), state.design.cols());
-  for (std::size_t i = 0; i < others.size(); ++i) points.row(static_cast<Index>(i)) = others[i];
-  return points;
 }
 
 struct Candidate {
@@ -81,17 +93,19 @@ absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
 
   Eigen::MatrixXd done;
   Eigen::VectorXd values;
-  ValuesDone(state, done, values);
+  const bool logarithmic = ValuesDone(state, done, values);
   auto process = GaussianProcess::Fit(done, values, kProcess);
   if (!process.ok()) return process.status();
   const Eigen::VectorXd at_done = process->Predict(done).mean;
   const double best = at_done.minCoeff();
-  const Eigen::MatrixXd others = PointsWithoutValue(state);
+  Eigen::MatrixXd others;
+  Eigen::VectorXd least;
+  PointsWithoutValue(state, best, logarithmic, others, least);
   if (others.rows() > 0) {
     Eigen::MatrixXd all(done.rows() + others.rows(), d);
     all << done, others;
     Eigen::VectorXd believed(all.rows());
-    believed << values, process->Predict(others).mean;
+    believed << values, process->Predict(others).mean.cwiseMax(least);
     process = GaussianProcess::Fit(all, believed, kProcess);
     if (!process.ok()) return process.status();
   }

@@ -15,9 +15,11 @@ double ExpectedImprovement(double best, double mean, double sd);
 
 /// The admissible point of the unit cube with the largest expected improvement, recorded as
 /// pending; before that the initial design. The process is fitted to the values of all evaluations
-/// done (to their logarithms where all are positive: misfits span decades); pending ones, and those
-/// that were terminated, count with the process's own prediction there [kriging believer,
-/// Ginsbourger et al. 2010], so that points chosen together lie apart. The process passes within a
+/// done (to their logarithms where all are positive: misfits span decades); pending ones count
+/// with the process's own prediction there [kriging believer, Ginsbourger et al. 2010], so that
+/// points chosen together lie apart; terminated ones with that prediction, but no less than the
+/// value they were known to exceed and than `best`: a place that was tried promises nothing more.
+/// The process passes within a
 /// hundredth of the values' spread of each of them. best: the smallest mean at a
 /// point done, for values that scatter. The maximum is looked for among 2^11 scrambled Sobol points
 /// of the cube and as many perturbations of the best point, and refined by ever smaller

@@ -189,19 +189,20 @@ std::optional<Eigen::VectorXd> NextPoint(const ResponseSurfaceOptions& options,
 }
 
 absl::Status Report(const ResponseSurfaceOptions& options, int id, std::optional<double> value,
-                    ResponseSurfaceState& state) {
+                    ResponseSurfaceState& state, std::optional<double> at_least) {
   if (id < 0 || id >= static_cast<int>(state.evaluations.size()) ||
       state.evaluations[static_cast<std::size_t>(id)].status != EvaluationStatus::kPending) {
     return absl::InvalidArgumentError(
         absl::StrCat("surrogate_msrs: evaluation ", id, " is not pending."));
   }
-  if (value.has_value() && !std::isfinite(*value)) {
+  if (!std::isfinite(value.value_or(0)) || !std::isfinite(at_least.value_or(0))) {
     return absl::InvalidArgumentError(
         absl::StrCat("surrogate_msrs: the value of evaluation ", id, " is not finite."));
   }
   Evaluation& evaluation = state.evaluations[static_cast<std::size_t>(id)];
   evaluation.status = value.has_value() ? EvaluationStatus::kDone : EvaluationStatus::kTerminated;
   evaluation.value = value.value_or(0);
+  if (!value.has_value()) evaluation.at_least = at_least;
   const bool improved =
       value.has_value() &&
       (state.best < 0 || *value < state.evaluations[static_cast<std::size_t>(state.best)].value);

@@ -54,6 +54,8 @@ struct Evaluation {
   Eigen::VectorXd point;  ///< in [0, 1]^d
   EvaluationStatus status = EvaluationStatus::kPending;
   double value = 0;  ///< once done
+  /// Terminated: what the value would have been at least, where that is known.
+  std::optional<double> at_least = {};
 };
 
 /// Everything an optimisation is at one moment; plain values, to be stored and resumed. The
@@ -84,11 +86,12 @@ std::optional<Eigen::VectorXd> NextPoint(const ResponseSurfaceOptions& options,
                                          ResponseSurfaceState& state, CubicRbf& surrogate);
 
 /// Takes the result of a pending evaluation: its value, or nullopt when it was stopped early or
-/// failed. Adapts the step: doubled after C_success improvements in a row, halved after C_fail
+/// failed; at_least: what the value of one stopped early would have been at least. Adapts the step: doubled after C_success improvements in a row, halved after C_fail
 /// evaluations in a row without one (terminated ones among them); the initial design does not
-/// count. Errors: INVALID_ARGUMENT for an id that is not pending or a value that is not finite.
+/// count. Errors: INVALID_ARGUMENT for an id that is not pending or a value or
+/// bound that is not finite.
 absl::Status Report(const ResponseSurfaceOptions& options, int id, std::optional<double> value,
-                    ResponseSurfaceState& state);
+                    ResponseSurfaceState& state, std::optional<double> at_least = {});
 
 /// The bound c f* above which the early error of a running evaluation ends it [Samuelsson 2023,
 /// Eq. 3.4]; +inf for the initial design and while nothing is done. Not a rigorous bound unless the

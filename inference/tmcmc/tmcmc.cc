@@ -201,7 +201,9 @@ absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
     if ((finite.array() > -kInfinity).count() < 2) {
       return absl::FailedPreconditionError(
           absl::StrCat("tmcmc: fewer than two of ", n,
-                       " draws from the prior have a likelihood: all others diverged."));
+                       " draws from the prior have a likelihood, all others did not come to their "
+                       "ends; `calibctl samples` says why each ended: narrow the priors to where "
+                       "the model runs."));
     }
     next.samples = next.proposals;
     next.log_likelihood = finite;

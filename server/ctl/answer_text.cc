@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "dem/catalog/catalog.h"
@@ -28,6 +29,27 @@ std::string Verdict(double rms, const std::optional<double>& p_value) {
   return "fits within its errors";
 }
 
+// Whether halves of an emulator's runs gave a posterior each, so that they could be compared.
+bool HalvesGiveOne(const v1::Posterior& posterior) {
+  return std::any_of(posterior.parameters().begin(), posterior.parameters().end(),
+                     [](const auto& p) { return std::isfinite(p.split_half()); });
+}
+
+// What an emulator of the runs tells of a quantity, a sentence.
+std::string Explained(const report::Quantity& q) {
+  if (std::isnan(q.prior.explained)) {
+    return fmt::format("{} runs, which all give {}.", q.runs,
+                       report::NumberWithUnit(q.prior.mean, q.name, q.unit, 4));
+  }
+  if (!q.prior.Explains()) {
+    return fmt::format(
+        "{} runs, of whose variance an emulator explains {}: what moves it cannot be told.", q.runs,
+        q.prior.explained > 0 ? report::Percent(q.prior.explained, 2) : "none");
+  }
+  return fmt::format("{} runs, of whose variance an emulator predicts {} left out.", q.runs,
+                     report::Percent(q.prior.explained, 3));
+}
+
 }  // namespace
 
 std::string PosteriorText(const v1::Posterior& posterior,
@@ -52,10 +74,9 @@ std::string PosteriorText(const v1::Posterior& posterior,
       posterior.iterations() == 1 ? "" : "s", Number(posterior.ess(), 3),
       posterior.posterior_from() == "emulator" ? ", posterior sampled on an emulator" : "",
       Number(posterior.log_evidence(), 5), Number(posterior.log_evidence_se(), 2),
-      posterior.posterior_from() == "emulator"
-          ? " (of its sampling; the emulator's own error is not "
-            "in it)"
-          : "",
+      posterior.posterior_from() != "emulator" ? ""
+      : HalvesGiveOne(posterior) ? " (what halves of the emulator's runs differ by is in it)"
+                                 : " (of its sampling; the emulator's own error is not known)",
       posterior.model_evaluations());
   if (posterior.stopped_early() > 0) {
     text += fmt::format(" ({} stopped early)", posterior.stopped_early());
@@ -77,6 +98,17 @@ std::string PosteriorText(const v1::Posterior& posterior,
   }
   for (const std::string& warning : warnings) text += Wrapped(warning, "! ", "  ");
   return text;
+}
+
+std::string TableText(const v1::CampaignStatus& status) {
+  const std::string diverged =
+      status.samples_diverged() > 0 ? fmt::format(" ({} diverged)", status.samples_diverged()) : "";
+  return fmt::format(
+      "{} rows run{}, {} model evaluations, nothing inferred.\nSee `calibctl samples {}`, "
+      "`calibctl "
+      "states {}` and `calibctl export {}`.\n",
+      status.samples_done(), diverged, status.model_evaluations(), status.campaign(),
+      status.campaign(), status.campaign());
 }
 
 std::string ComparisonText(const report::Comparison& comparison) {
@@ -151,14 +183,17 @@ std::string ModelsText(const report::ModelComparison& comparison) {
 
 std::string SensitivityText(const report::Sensitivity& sensitivity) {
   const auto with_error = [](const Eigen::VectorXd& values, const Eigen::VectorXd& errors, int j) {
-    if (j >= values.size()) return std::string("–");
-    return fmt::format("{:.2f} ± {:.2f}", values[j], errors[j]);
+    if (j >= values.size() || !std::isfinite(values[j])) return std::string("–");
+    return fmt::format("{:.2f} ± {}", values[j],
+                       std::isfinite(errors[j]) ? fmt::format("{:.2f}", errors[j]) : "–");
   };
   std::string text;
   for (const report::Quantity& q : sensitivity.quantities) {
-    text += fmt::format("{}, {}: {} runs, of whose variance an emulator predicts {} left out.\n",
-                        q.experiment, report::NameForPeople(q.name), q.runs,
-                        report::Percent(q.prior.explained, 3));
+    text += fmt::format("{}, {}: {}\n", q.experiment, report::NameForPeople(q.name), Explained(q));
+    if (!q.prior.Explains()) {
+      text += "\n";
+      continue;
+    }
     if (q.posterior.correlation.size() > 0) {
       text += fmt::format("Posterior: {} ± {}.\n",
                           report::NumberWithUnit(q.posterior.mean, q.name, q.unit, 4),

@@ -157,6 +157,7 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
                             .control_name = experiment.control_name,
                             .control = experiment.control,
                             .quantity = *std::move(quantity),
+                            .sd_noise = observable.sd.empty() ? Eigen::VectorXd() : error,
                             .measured = observable.values,
                             .discrepancy = std::move(discrepancy),
                             .exceedance = {}};

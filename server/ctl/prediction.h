@@ -22,7 +22,10 @@ struct PredictedObservable {
   std::string experiment, observable, control_name;
   std::vector<double> control;             ///< at each reading, SI
   inference::QuantityPrediction quantity;  ///< at each reading, SI
-  std::vector<double> measured;            ///< SI; empty: not measured
+  /// Of the measurement that is predicted, at each reading; part of quantity.sd, of its quantiles
+  /// and of the exceedance. Empty: the test states none.
+  Eigen::VectorXd sd_noise{};
+  std::vector<double> measured;  ///< SI; empty: not measured
   /// Of the model, learnt where it was calibrated (model - measurement); part of quantity.sd_model.
   /// Empty: nothing is known of it.
   inference::DiscrepancyBand discrepancy{};

@@ -1,6 +1,7 @@
 // A prediction as JSON and as text.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -43,6 +44,7 @@ std::string PredictionJson(const Prediction& prediction) {
                         {"q95", o.quantity.q95[k]},
                         {"sd_parameters", OrNull(o.quantity.sd_parameters[k])},
                         {"sd_model_error", OrNull(o.quantity.sd_model[k])},
+                        {"sd_noise", At(o.sd_noise, k)},
                         {"sd_discrepancy", At(o.discrepancy.rms, k)},
                         {"discrepancy_mean", At(o.discrepancy.mean, k)},
                         {"measured", o.measured.empty() ? Json(nullptr) : Json(o.measured[i])}});
@@ -74,7 +76,8 @@ std::string PredictionText(const Prediction& prediction) {
   std::string text = fmt::format("Prediction {} from the posterior of {}: {} runs.\n",
                                  prediction.campaign, prediction.parent, prediction.runs);
   for (const PredictedObservable& o : prediction.observables) {
-    TextTable table({o.control_name, "mean", "5 %", "95 %", "± parameters", "± model", "measured"});
+    TextTable table(
+        {o.control_name, "mean", "5 %", "95 %", "± parameters", "± model", "± noise", "measured"});
     const std::string unit = UnitOf(o.observable);
     const auto shown = [&](double value) {
       return std::isfinite(value) ? report::NumberWithUnit(value, o.observable, unit, 4) : "–";
@@ -84,6 +87,7 @@ std::string PredictionText(const Prediction& prediction) {
       table.AddRow({report::NumberWithUnit(o.control[i], o.control_name, UnitOf(o.control_name), 4),
                     shown(o.quantity.mean[k]), shown(o.quantity.q05[k]), shown(o.quantity.q95[k]),
                     shown(o.quantity.sd_parameters[k]), shown(o.quantity.sd_model[k]),
+                    i < static_cast<std::size_t>(o.sd_noise.size()) ? shown(o.sd_noise[k]) : "–",
                     o.measured.empty() ? "–" : shown(o.measured[i])});
     }
     text += fmt::format("\n{}, {}\n{}", o.experiment, o.observable, table.ToString());
@@ -92,6 +96,12 @@ std::string PredictionText(const Prediction& prediction) {
                           shown(e.level), report::Number(e.probability.maxCoeff(), 3),
                           report::Percent(e.anywhere, 3));
     }
+  }
+  const bool noisy = std::any_of(prediction.observables.begin(), prediction.observables.end(),
+                                 [](const auto& o) { return o.sd_noise.size() > 0; });
+  if (noisy) {
+    text +=
+        "\nThe band and the probability at a reading are those of a measurement with its noise.\n";
   }
   for (const std::string& note : prediction.notes) text += "! " + note + "\n";
   return text;

@@ -34,7 +34,9 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
   const std::string& id = view.status.campaign();
   return {{"campaign.yaml", CampaignFile(view.source)},
           {"status.json", report::StatusJson(view.status)},
-          {"posterior.json", report::PosteriorJson(view.posterior)},
+          {"posterior.json", view.status.method() == "table"
+                                 ? report::TablePosteriorJson(view.status)
+                                 : report::PosteriorJson(view.posterior, view.campaign.parameters)},
           {"posterior.csv", report::PosteriorCsv(view.posterior)},
           {"samples.json", report::SamplesJson(id, names, view.samples)},
           {"samples.csv", report::SamplesCsv(view)},

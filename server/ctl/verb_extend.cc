@@ -60,7 +60,7 @@ int Extend(const Arguments& arguments) {
   const auto view = laboratory.Run(*parent, *text, "extension of " + arguments.campaign);
   if (!view.ok()) return Fail(view.status());
   if (arguments.json) {
-    std::cout << report::PosteriorJson(view->posterior);
+    std::cout << report::PosteriorJson(view->posterior, view->campaign.parameters);
     return kDone;
   }
   std::cout << view->campaign.name << ": campaign " << view->status.campaign() << "\n"

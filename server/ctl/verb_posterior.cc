@@ -2,6 +2,7 @@
 
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/load_view.h"
 #include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
@@ -14,7 +15,11 @@ int Posterior(const Arguments& arguments) {
   const auto posterior = (*session)->client().GetPosterior(arguments.campaign, arguments.iteration);
   if (!posterior.ok()) return Fail(posterior.status());
   if (arguments.json) {
-    std::cout << report::PosteriorJson(*posterior);
+    const auto source = (*session)->client().GetSource(arguments.campaign);
+    if (!source.ok()) return Fail(source.status());
+    const auto campaign = LoadCampaign((*session)->client(), *source);
+    if (!campaign.ok()) return Fail(campaign.status());
+    std::cout << report::PosteriorJson(*posterior, campaign->parameters);
   } else {
     std::cout << PosteriorText(*posterior,
                                {posterior->warnings().begin(), posterior->warnings().end()});

@@ -56,9 +56,12 @@ absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& c
 int PrintAnswer(Session& session, const std::string& campaign, bool json) {
   auto view = LoadView(session.client(), campaign);
   if (!view.ok()) return Fail(view.status());
+  if (view->status.method() == "table") {
+    std::cout << (json ? report::TablePosteriorJson(view->status) : TableText(view->status));
+    return kDone;
+  }
   if (json) {
-    view->posterior.set_campaign(campaign);  // a table has no posterior, but a name
-    std::cout << report::PosteriorJson(view->posterior);
+    std::cout << report::PosteriorJson(view->posterior, view->campaign.parameters);
     return kDone;
   }
   const report::Comparison comparison = report::Compare(*view, report::PredictReadings(*view));

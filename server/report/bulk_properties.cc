@@ -106,4 +106,21 @@ std::vector<BulkProperty> BulkProperties(const campaign::Experiment& experiment,
           {"critical_friction_angle", "rad", count > 0 ? FrictionAngle(sum / count) : kNone}};
 }
 
+std::string WhyNoBulkProperty(const campaign::Experiment& experiment, const StateHistory& history,
+                              const std::string& name) {
+  const Point last =
+      history.states.empty() ? Point{} : PointOf(experiment, history, history.states.back());
+  const bool secant = name == "secant_modulus" || name == "secant_poisson_ratio";
+  if (std::isnan(last.axial_strain) && name != "peak_friction_angle") {
+    return "no axial_strain is among its observables";
+  }
+  if (std::isnan(last.volumetric_strain) && secant) {
+    return "no volumetric_strain is among its observables";
+  }
+  if (std::isnan(last.deviatoric_stress) && name != "secant_poisson_ratio") {
+    return "none of deviatoric_stress, stress_ratio and q_over_p is among its observables";
+  }
+  return secant ? "no run reaches a deviatoric strain of 1 %" : "the curves do not tell";
+}
+
 }  // namespace calib::report

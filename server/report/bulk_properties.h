@@ -26,4 +26,9 @@ struct BulkProperty {
 std::vector<BulkProperty> BulkProperties(const campaign::Experiment& experiment,
                                          const StateHistory& history);
 
+/// Why a run to its end does not have the property `name` of an experiment, as a clause: "no
+/// volumetric_strain is among its observables".
+std::string WhyNoBulkProperty(const campaign::Experiment& experiment, const StateHistory& history,
+                              const std::string& name);
+
 }  // namespace calib::report

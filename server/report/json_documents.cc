@@ -109,10 +109,16 @@ Json Drift(const ParameterDrift& d) {
   return json;
 }
 
-}  // namespace
-
-std::string PosteriorJson(const v1::Posterior& p) {
+Json PosteriorFields(const v1::Posterior& p,
+                     std::span<const campaign::CalibratedParameter> campaign_parameters) {
   Json parameters = Json::object();
+  const auto bound = [&](const std::string& name, double inference::Prior::*end,
+                         double shown) -> Json {
+    for (const campaign::CalibratedParameter& one : campaign_parameters) {
+      if (one.name == name && !std::isfinite(one.prior.*end)) return nullptr;
+    }
+    return shown;
+  };
   for (const auto& q : p.parameters()) {
     parameters[q.name()] = {{"mean", q.mean()},
                             {"sd", q.sd()},
@@ -122,8 +128,8 @@ std::string PosteriorJson(const v1::Posterior& p) {
                             {"q95", q.q95()},
                             {"unit", q.unit()},
                             {"at_bound", q.at_bound()},
-                            {"prior_min", q.prior_min()},
-                            {"prior_max", q.prior_max()},
+                            {"prior_min", bound(q.name(), &inference::Prior::min, q.prior_min())},
+                            {"prior_max", bound(q.name(), &inference::Prior::max, q.prior_max())},
                             {"conditioned_on", q.conditioned_on()},
                             {"split_half", q.split_half()}};
   }
@@ -144,32 +150,50 @@ std::string PosteriorJson(const v1::Posterior& p) {
   }
   Json warnings = Json::array();
   for (const std::string& warning : p.warnings()) warnings.push_back(warning);
-  return Dump({{"campaign", p.campaign()},
-               {"iteration", p.iteration()},
-               {"iterations", p.iterations()},
-               {"converged", p.converged()},
-               {"log_evidence", p.log_evidence()},
-               {"log_evidence_se", p.log_evidence_se()},
-               {"parameters", parameters},
-               {"correlation", correlation},
-               {"ess", p.ess()},
-               {"pareto_k", p.pareto_k()},
-               {"posterior_from", p.posterior_from()},
-               {"emulator", Emulator(p)},
-               {"sigma", p.has_sigma() ? Json(p.sigma()) : Json(nullptr)},
-               {"noise", p.noise()},
-               {"noise_scale", noise_scale},
-               {"predictive_p", p.has_predictive_p() ? Json(p.predictive_p()) : Json(nullptr)},
-               {"path", Path(p.path())},
-               {"reversed_path", Path(p.reversed_path())},
-               {"model_evaluations", p.model_evaluations()},
-               {"stopped_early", p.stopped_early()},
-               {"stated_loss", p.stated_loss()},
-               {"audited", p.audited()},
-               {"audited_bound", p.has_audited_bound() ? Json(p.audited_bound()) : Json(nullptr)},
-               {"measured_loss", p.has_measured_loss() ? Json(p.measured_loss()) : Json(nullptr)},
-               {"core_hours", p.core_hours()},
-               {"warnings", warnings}});
+  return {{"campaign", p.campaign()},
+          {"iteration", p.iteration()},
+          {"iterations", p.iterations()},
+          {"converged", p.converged()},
+          {"log_evidence", p.log_evidence()},
+          {"log_evidence_se", p.log_evidence_se()},
+          {"parameters", parameters},
+          {"correlation", correlation},
+          {"ess", p.ess()},
+          {"pareto_k", p.pareto_k()},
+          {"posterior_from", p.posterior_from()},
+          {"emulator", Emulator(p)},
+          {"sigma", p.has_sigma() ? Json(p.sigma()) : Json(nullptr)},
+          {"noise", p.noise()},
+          {"noise_scale", noise_scale},
+          {"predictive_p", p.has_predictive_p() ? Json(p.predictive_p()) : Json(nullptr)},
+          {"path", Path(p.path())},
+          {"reversed_path", Path(p.reversed_path())},
+          {"model_evaluations", p.model_evaluations()},
+          {"stopped_early", p.stopped_early()},
+          {"stated_loss", p.stated_loss()},
+          {"audited", p.audited()},
+          {"audited_bound", p.has_audited_bound() ? Json(p.audited_bound()) : Json(nullptr)},
+          {"measured_loss", p.has_measured_loss() ? Json(p.measured_loss()) : Json(nullptr)},
+          {"core_hours", p.core_hours()},
+          {"warnings", warnings}};
+}
+
+}  // namespace
+
+std::string PosteriorJson(const v1::Posterior& posterior,
+                          std::span<const campaign::CalibratedParameter> parameters) {
+  return Dump(PosteriorFields(posterior, parameters));
+}
+
+std::string TablePosteriorJson(const v1::CampaignStatus& status) {
+  Json json = PosteriorFields({}, {});
+  for (auto& [name, value] : json.items()) {
+    if (value.is_primitive()) value = nullptr;
+  }
+  json["campaign"] = status.campaign();
+  json["model_evaluations"] = status.model_evaluations();
+  json["core_hours"] = status.core_hours();
+  return Dump(json);
 }
 
 std::string SensitivityJson(const std::string& campaign, const Sensitivity& s) {

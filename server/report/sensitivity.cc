@@ -77,6 +77,15 @@ Eigen::MatrixXd PosteriorPoints(const CampaignView& view) {
   return points.topRows(filled);
 }
 
+// Why none of the complete runs has an output.
+std::string WhyNone(const campaign::Experiment& experiment, const StateHistory& history,
+                    const std::string& name) {
+  constexpr std::string_view kFinal = "final_";
+  const bool is_final = name.rfind(kFinal, 0) == 0;
+  return is_final ? absl::StrCat("no run gives ", name.substr(kFinal.size()))
+                  : WhyNoBulkProperty(experiment, history, name);
+}
+
 struct Column {
   std::vector<int> samples;  // positions in view.samples
   std::vector<double> values;
@@ -108,6 +117,7 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
   for (const campaign::Experiment& experiment : view.campaign.experiments) {
     std::vector<BulkProperty> names;
     std::vector<Column> columns;
+    const StateHistory* complete = nullptr;  // the first
     for (std::size_t i = 0; i < view.samples.size(); ++i) {
       const auto found = view.states.find({experiment.name, view.samples[i].index()});
       if (found == view.states.end() || !IsComplete(experiment, found->second)) continue;
@@ -115,6 +125,7 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
       if (names.empty()) {
         names = outputs;
         columns.resize(outputs.size());
+        complete = &found->second;
       }
       for (std::size_t k = 0; k < outputs.size(); ++k) {
         if (!std::isfinite(outputs[k].value)) continue;
@@ -124,6 +135,12 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
     }
     for (std::size_t k = 0; k < names.size(); ++k) {
       const auto n = static_cast<Index>(columns[k].values.size());
+      if (n == 0) {
+        result.left_out.push_back(absl::StrCat(experiment.name, ": ", names[k].name, ": ",
+                                               WhyNone(experiment, *complete, names[k].name)));
+        last = absl::FailedPreconditionError(result.left_out.back());
+        continue;
+      }
       Eigen::MatrixXd parameters(n, d);
       Eigen::MatrixXd outputs(n, 1);
       for (Index i = 0; i < n; ++i) {
@@ -146,7 +163,7 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
       quantity.unit = names[k].unit;
       quantity.runs = static_cast<int>(n);
       quantity.prior = std::move(over_prior->front());
-      if (result.points_from == "none") continue;
+      if (result.points_from == "none" || !quantity.prior.Explains()) continue;
       auto over_posterior =
           inference::AnalyseSensitivity(priors, parameters, outputs, posterior_points,
                                         {.sobol = options.sobol, .indices = false});

@@ -19,7 +19,7 @@ struct Quantity {
   int runs = 0;                        ///< finished ones that have it
   inference::OutputSensitivity prior;  ///< over the prior
   inference::OutputSensitivity
-      posterior;  ///< correlations, mean and sd over the posterior; empty: none
+      posterior;  ///< correlations, mean and sd over the posterior; empty: none, or nothing explained
 };
 
 struct Sensitivity {

@@ -31,10 +31,13 @@ constexpr const char* kDecidedAtOnce =
 
 class Planner {
  public:
-  /// scatter: measured on replicates, and part of the definition's errors where it belongs there.
-  Planner(const Definition& definition, const store::CampaignRecord& record, store::Reader& reader,
-          bool replicating, std::vector<ObservableScatter> scatter)
+  /// scatter: measured on replicates, and part of the definition's errors where it belongs there;
+  /// stated: the definition without it.
+  Planner(const Definition& definition, const Definition& stated,
+          const store::CampaignRecord& record, store::Reader& reader, bool replicating,
+          std::vector<ObservableScatter> scatter)
       : definition_(definition),
+        stated_(stated),
         campaign_(definition.campaign),
         record_(record),
         reader_(reader),
@@ -185,7 +188,7 @@ class Planner {
                          " samples stopped early go on to their ends to see what stopping loses"));
         return absl::OkStatus();
       }
-      const auto audit = AuditOf(definition_, history_);
+      const auto audit = AuditOf(stated_, history_);
       if (!audit.ok()) {
         return Fail(audit.status());
       }
@@ -461,6 +464,7 @@ class Planner {
   }
 
   const Definition& definition_;
+  const Definition& stated_;
   const campaign::Campaign& campaign_;
   const store::CampaignRecord& record_;
   store::Reader& reader_;
@@ -487,14 +491,14 @@ absl::StatusOr<Plan> PlanNext(const Definition& definition, const store::Campaig
       std::any_of(iterations->begin(), iterations->end(),
                   [](const store::IterationRecord& i) { return i.proposal == kReplicates; });
   if (!replicating) {
-    return Planner(definition, campaign, reader, false, {}).Next();
+    return Planner(definition, definition, campaign, reader, false, {}).Next();
   }
   auto scatter = MeasureScatter(definition, campaign.submitted.id, reader);
   if (!scatter.ok()) {
     return scatter.status();
   }
   const Definition with = DefinitionWith(definition, *scatter);
-  return Planner(with, campaign, reader, true, std::move(scatter->observables)).Next();
+  return Planner(with, definition, campaign, reader, true, std::move(scatter->observables)).Next();
 }
 
 }  // namespace calib::scheduler

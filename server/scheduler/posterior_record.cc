@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/filter/parameter_summary.h"
 
 namespace calib::scheduler {
 namespace {
@@ -55,6 +56,19 @@ void AddParameters(const Definition& definition, const Answer& answer, v1::Poste
                            : std::numeric_limits<double>::quiet_NaN());
     out.set_prior_min(std::isfinite(prior.min) ? prior.min : prior.Quantile(kTail));
     out.set_prior_max(std::isfinite(prior.max) ? prior.max : prior.Quantile(1 - kTail));
+  }
+}
+
+// Parameters that the data push out where their prior has no bound.
+void AddTails(const Definition& definition, const Answer& answer, v1::Posterior& message) {
+  const std::vector<inference::ParameterSummary> summaries = answer.Parameters();
+  for (std::size_t i = 0; answer.HasIntervals() && i < summaries.size(); ++i) {
+    const campaign::CalibratedParameter& parameter = definition.campaign.parameters[i];
+    if (!inference::InTail(parameter.prior, summaries[i])) continue;
+    message.add_warnings(absl::StrCat(
+        parameter.name,
+        " lies in the tail of its prior, which has no bound there: prior and data disagree. Widen "
+        "the prior if it was a guess, or look for a missing effect."));
   }
 }
 
@@ -219,6 +233,7 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
     message.set_predictive_p(*predictive_p);
   }
   message.mutable_warnings()->Add(answer.warnings.begin(), answer.warnings.end());
+  AddTails(definition, answer, message);
   message.set_noise(ToString(definition.campaign.filter.noise));
   return message;
 }

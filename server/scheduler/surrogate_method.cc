@@ -91,7 +91,7 @@ class SurrogateMethod final : public Method {
       outcome.answer.warnings.push_back(outcome.answer.weighted.degeneracy);
     } else {
       AskEmulator(definition_, history.iterations, outcome.answer);
-      outcome.converged = outcome.answer.FromEmulator();
+      outcome.converged = outcome.answer.FromEmulator() && HalvesGiveOne(outcome.answer);
     }
     return outcome;
   }
@@ -164,8 +164,15 @@ class SurrogateMethod final : public Method {
   /// Of one point.
   struct Result {
     bool ended = false;
-    std::optional<double> value{};  ///< chi-squared per reading; empty: none, or not yet
+    std::optional<double> value{};     ///< chi-squared per reading; empty: none, or not yet
+    std::optional<double> at_least{};  ///< what it would have been at least, of one stopped early
   };
+
+  /// An emulator of few runs may be adequate by its own account where half of them give no posterior
+  /// at all: nothing then says how far the other half has settled it.
+  static bool HalvesGiveOne(const Answer& answer) {
+    return answer.emulated->split_half.array().isFinite().any();
+  }
 
   int MostEvaluations() const {
     const auto most = static_cast<std::int64_t>(campaign_.samples) * campaign_.max_iterations;
@@ -229,12 +236,19 @@ class SurrogateMethod final : public Method {
     }
     std::vector<Result> results;
     for (std::size_t k = 0; k < batches->size(); ++k) {
+      const auto highest =
+          inference::LogLikelihoodBound(definition_.data, campaign_.filter, history.stopped[k]);
+      if (!highest.ok()) {
+        return highest.status();
+      }
       for (Eigen::Index i = 0; i < (*batches)[k].size(); ++i) {
         Result& result = results.emplace_back();
         result.ended = history.ended[k][static_cast<std::size_t>(i)] != 0;
         const double value = (*batches)[k](i);
         if (result.ended && std::isfinite(value)) {
           result.value = 2 * (*perfect - value) / Readings();
+        } else if (result.ended && std::isfinite((*highest)(i)) && (*highest)(i) < *perfect) {
+          result.at_least = 2 * (*perfect - (*highest)(i)) / Readings();
         }
       }
     }
@@ -279,8 +293,8 @@ class SurrogateMethod final : public Method {
       if (!result.ended) {
         continue;
       }
-      if (absl::Status status =
-              inference::Report(options_, static_cast<int>(i), result.value, *state);
+      if (absl::Status status = inference::Report(options_, static_cast<int>(i), result.value,
+                                                  *state, result.at_least);
           !status.ok()) {
         return status;
       }
@@ -301,8 +315,9 @@ class SurrogateMethod final : public Method {
         if (reported >= results.size() || !results[reported].ended) {
           return Point{};
         }
+        const Result& result = results[reported];
         if (absl::Status status = inference::Report(options_, static_cast<int>(reported),
-                                                    results[reported].value, state);
+                                                    result.value, state, result.at_least);
             !status.ok()) {
           return status;
         }

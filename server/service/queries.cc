@@ -214,6 +214,11 @@ absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t ca
       }
     }
   }
+  if (found == nullptr && record->submitted.method == "table") {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "campaign c", campaign,
+        " runs the rows of its table and infers nothing: see samples, states and export"));
+  }
   if (found == nullptr) {
     return absl::FailedPreconditionError(
         complete == 0 ? absl::StrCat("campaign c", campaign, " has no complete iteration yet")
@@ -224,6 +229,10 @@ absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t ca
   if (posterior.ok()) {
     posterior->set_iterations(complete);
     posterior->set_core_hours(effort->core_seconds / 3600);
+    // Held-out runs come after the last posterior and are part of what it has cost.
+    if (record->progress.phase != "calibrating" && posterior->iteration() + 1 == complete) {
+      posterior->set_model_evaluations(effort->model_evaluations);
+    }
   }
   return posterior;
 }

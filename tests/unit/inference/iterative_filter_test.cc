@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "inference/filter/parameter_summary.h"
 #include "inference/sampling/philox.h"
 
 namespace calib::inference {
@@ -227,6 +228,27 @@ TEST(ComputePosterior, AtBoundWhenTheDataPullOutOfThePrior) {
   const auto posterior = ComputePosterior(Priors(), data, options, std::span(&iteration, 1));
   EXPECT_TRUE(posterior->parameters[0].at_bound);
   EXPECT_FALSE(posterior->parameters[1].at_bound);
+}
+
+// A normal prior has no bound that could be pressed against: the posterior lies in its tail.
+TEST(Summarize, WhereThePriorHasNoBoundThePosteriorLiesInItsTail) {
+  const Prior open{.kind = PriorKind::kNormal, .mean = 2, .sd = 0.5};
+  const Prior cut{.kind = PriorKind::kNormal, .min = 0, .max = 3.5, .mean = 2, .sd = 0.5};
+  const Eigen::VectorXd weights = Eigen::VectorXd::Constant(101, -std::log(101.0));
+  const auto at = [&](const Prior& prior, double middle) {
+    return Summarize(prior, weights, Eigen::VectorXd::LinSpaced(101, middle - 0.2, middle + 0.2));
+  };
+  for (const double middle : {0.9, 3.2}) {
+    EXPECT_FALSE(at(open, middle).at_bound);
+    EXPECT_TRUE(InTail(open, at(open, middle)));
+    EXPECT_TRUE(at(cut, middle).at_bound);
+    EXPECT_FALSE(InTail(cut, at(cut, middle)));
+  }
+  EXPECT_FALSE(InTail(open, at(open, 2.2)));
+  EXPECT_FALSE(at(cut, 2.2).at_bound);
+  const Prior log{.kind = PriorKind::kLogNormal, .max = 9, .mean = 0, .sd = 0.5};
+  EXPECT_TRUE(InTail(log, at(log, 0.3)));
+  EXPECT_FALSE(InTail(log, at(log, 1)));
 }
 
 TEST(MeansConverged, RelativeToTheMeanOrToTheScaleOfThePrior) {

@@ -93,5 +93,29 @@ TEST(BulkProperties, OfAnotherTestAreNone) {
   EXPECT_TRUE(BulkProperties(run.experiment, run.history).empty());
 }
 
+// Where a curve does not tell, the observable that is missing is named.
+TEST(BulkProperties, SaysWhichObservableIsMissing) {
+  KnownRun known(Reported::kRatioOfInvariants);
+  const auto why = [&known](const char* name) {
+    return WhyNoBulkProperty(known.experiment, known.history, name);
+  };
+  known.history.observables[0] = "void_ratio";
+  EXPECT_EQ(why("secant_modulus"), "no volumetric_strain is among its observables");
+  EXPECT_EQ(why("secant_poisson_ratio"), "no volumetric_strain is among its observables");
+  known.history.observables = {"volumetric_strain", "porosity"};
+  for (const char* name : {"secant_modulus", "peak_friction_angle", "critical_friction_angle"}) {
+    EXPECT_EQ(why(name),
+              "none of deviatoric_stress, stress_ratio and q_over_p is among its observables");
+  }
+  known.experiment.control_name = "deviatoric_strain";
+  EXPECT_EQ(why("critical_friction_angle"), "no axial_strain is among its observables");
+
+  KnownRun brief(Reported::kStrainAndStress);
+  brief.history.states.resize(3);
+  EXPECT_TRUE(std::isnan(BulkProperties(brief.experiment, brief.history)[0].value));
+  EXPECT_EQ(WhyNoBulkProperty(brief.experiment, brief.history, "secant_modulus"),
+            "no run reaches a deviatoric strain of 1 %");
+}
+
 }  // namespace
 }  // namespace calib::report

@@ -26,6 +26,31 @@ TEST(Json, PosteriorHasTheFieldsOfTheInterface) {
   EXPECT_EQ(p["mean"].get<double>(), view.posterior.parameters(0).mean());  // bit for bit
 }
 
+TEST(Json, ABoundThatThePriorDoesNotHaveIsNull) {
+  CampaignView view = testing::ExampleView("x");
+  view.campaign.parameters[0].prior.max = HUGE_VAL;
+  const Json p = Json::parse(
+      PosteriorJson(view.posterior, view.campaign.parameters))["parameters"]["young_modulus"];
+  EXPECT_TRUE(p["prior_max"].is_null());
+  EXPECT_EQ(p["prior_min"].get<double>(), view.posterior.parameters(0).prior_min());
+}
+
+// Rows were run and nothing was inferred: no zero stands for what there is not.
+TEST(Json, ATableHasItsCostAndNoPosterior) {
+  v1::CampaignStatus status;
+  status.set_campaign("c7");
+  status.set_model_evaluations(728);
+  const Json json = Json::parse(TablePosteriorJson(status));
+  EXPECT_EQ(json["campaign"], "c7");
+  EXPECT_EQ(json["model_evaluations"], 728);
+  for (const char* field : {"iterations", "converged", "log_evidence", "log_evidence_se", "ess",
+                            "stopped_early", "posterior_from"}) {
+    ASSERT_TRUE(json.contains(field)) << field;
+    EXPECT_TRUE(json[field].is_null()) << field;
+  }
+  EXPECT_EQ(json["parameters"], Json::object());
+}
+
 TEST(Json, WhatIsNotKnownIsNull) {
   v1::Posterior posterior;
   posterior.set_log_evidence(std::nan(""));

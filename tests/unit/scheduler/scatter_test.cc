@@ -10,6 +10,7 @@
 
 #include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
+#include "server/service/queries.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {
@@ -162,6 +163,28 @@ TEST(Realizations, ASpecimenOfManyGrainsSharesLittleOfTheScatterAndIsKnownBetter
   EXPECT_GT(like.posterior.emulator().widened(), 1);
   // Stiffness: friction leans on the bound of its prior here, whatever the errors.
   EXPECT_GT(like.posterior.parameters(0).cov(), 1.2 * run.posterior.parameters(0).cov());
+}
+
+// The scatter joins the errors when the audited have long been chosen by the errors stated.
+TEST(Realizations, TheAuditOfEarlyStoppingHoldsBoundAndShareByTheSameErrors) {
+  const Ended run = RunCampaign("realizations_audit",
+                                Campaign(4, "early_stopping: {discard_at_most: 1e-2}\n"), 0.2);
+  EXPECT_GE(run.posterior.audited(), 1);
+  EXPECT_LE(run.posterior.measured_loss(), run.posterior.audited_bound());
+}
+
+// What a finished answer has cost is what the campaign has: held-out runs come after the posterior.
+TEST(Realizations, AFinishedPosteriorCountsItsHeldOutRuns) {
+  SimulatedService simulated("realizations_count");
+  simulated.Submit(Campaign(4));
+  simulated.RunToEnd(1, true);
+  store::Reader reader = simulated.Read();
+  const auto total = Value(service::StatusOf(reader, 1, std::nullopt)).model_evaluations();
+  const v1::Posterior stored = *PosteriorFromJson(*Value(reader.Iterations(1))[1].posterior);
+  EXPECT_GT(total, stored.model_evaluations());
+  EXPECT_EQ(Value(service::PosteriorOf(reader, 1, std::nullopt)).model_evaluations(), total);
+  EXPECT_EQ(Value(service::PosteriorOf(reader, 1, 1)).model_evaluations(), total);
+  EXPECT_EQ(Value(service::PosteriorOf(reader, 1, 0)).model_evaluations(), kSamples);
 }
 
 TEST(Realizations, TroubleChangesNoBit) {

@@ -126,6 +126,17 @@ TEST(SurrogateCampaign, AnAdequateEmulatorOfItsRunsGivesThePosterior) {
   EXPECT_EQ(Posterior(service, 0).posterior_from(), "none") << "asked at the end alone";
 }
 
+// Fourteen runs teach an emulator, seven of them none: nothing says how far that is settled.
+TEST(SurrogateCampaign, HasNotConvergedWhereHalfOfItsRunsGiveNoPosterior) {
+  SimulatedService service("surrogate_few");
+  service.Submit(Campaign(14, 1, 0.05));
+  service.RunToEnd(1, true);
+  const v1::Posterior posterior = Posterior(service, 0);
+  EXPECT_EQ(posterior.posterior_from(), "emulator");
+  EXPECT_TRUE(std::isnan(posterior.parameters(0).split_half()));
+  EXPECT_FALSE(posterior.converged());
+}
+
 TEST(SurrogateCampaign, SameBitsWhateverGoesWrong) {
   SimulatedService calm("surrogate_calm");
   calm.Submit(Campaign(10, 3, 0.02));

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "inference/sampling/halton.h"
+#include "inference/sampling/philox.h"
 #include "inference/sensitivity/sobol_indices.h"
 
 namespace calib::inference {
@@ -129,6 +130,76 @@ TEST(SobolIndices, RanksTellTheDirectionAndTiedPriorsHaveCorrelationsOnly) {
   EXPECT_EQ(result->front().indices.first.size(), 0);
   EXPECT_GT(result->front().correlation[0], 0.9);
   EXPECT_LT(result->front().correlation[1], 0);
+}
+
+// y = signal * x_0 + scatter of sd 1 at Halton's points.
+Eigen::MatrixXd Scattering(const Eigen::MatrixXd& unit, double signal, std::uint64_t seed) {
+  Eigen::MatrixXd y(unit.rows(), 1);
+  PhiloxStream stream({.seed = seed});
+  for (Eigen::Index i = 0; i < y.rows(); ++i) y(i, 0) = signal * unit(i, 0) + stream.Normal();
+  return y;
+}
+
+const std::vector<Prior> kSquare(2, Prior{.kind = PriorKind::kUniform, .min = 0, .max = 1});
+
+TEST(SobolIndices, NothingIsSaidWhereTheEmulatorExplainsNothing) {
+  const Eigen::MatrixXd unit = Halton(60, 2);
+  int withheld = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Eigen::MatrixXd scatter = Scattering(unit, 0, seed);
+    const auto result = AnalyseSensitivity(kSquare, unit, scatter, unit, {});
+    ASSERT_TRUE(result.ok()) << result.status();
+    const OutputSensitivity& y = result->front();
+    EXPECT_LT(y.explained, 0.3);
+    const double sd = std::sqrt((scatter.array() - scatter.mean()).square().mean());
+    EXPECT_NEAR(y.sd, sd, 0.15 * sd) << "the runs differ all the same";
+    if (y.Explains()) continue;
+    ++withheld;
+    EXPECT_EQ(y.indices.first.size(), 0);
+    EXPECT_EQ(y.correlation.size(), 0);
+  }
+  EXPECT_GE(withheld, 4);
+
+  const Eigen::MatrixXd equal = Eigen::MatrixXd::Constant(60, 1, 0.1);  // its mean is not, quite
+  const auto result = AnalyseSensitivity(kSquare, unit, equal, unit, {});
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_TRUE(std::isnan(result->front().explained));
+  EXPECT_FALSE(result->front().Explains());
+  EXPECT_EQ(result->front().indices.first.size(), 0);
+  EXPECT_NEAR(result->front().mean, 0.1, 1e-12);
+  EXPECT_LT(result->front().sd, 1e-12);
+}
+
+// Of a weak signal some emulators of seven eighths of the runs are constant: that is uncertainty,
+// not the end of the jackknife.
+TEST(SobolIndices, AConstantPartOfTheJackknifeWidensErrorsAndLeavesThemFinite) {
+  const Eigen::MatrixXd unit = Halton(30, 2);
+  int told = 0;
+  double widest = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const auto result = AnalyseSensitivity(kSquare, unit, Scattering(unit, 3, seed), unit, {});
+    ASSERT_TRUE(result.ok()) << result.status();
+    const OutputSensitivity& y = result->front();
+    if (!y.Explains()) continue;
+    ++told;
+    EXPECT_TRUE(y.indices.first_error.allFinite()) << "seed " << seed;
+    EXPECT_TRUE(y.indices.total_error.allFinite()) << "seed " << seed;
+    EXPECT_TRUE(y.correlation_error.allFinite()) << "seed " << seed;
+    widest = std::max(widest, y.indices.first_error[0]);
+  }
+  EXPECT_GE(told, 5);
+  EXPECT_GT(widest, 0.3) << "none of the parts was constant";
+}
+
+// The sd of an output over a narrow posterior is not that of a well-known mean.
+TEST(SobolIndices, TheSpreadOfAnOutputHoldsWhatTheEmulatorMisses) {
+  const Eigen::MatrixXd unit = Halton(60, 2);
+  Eigen::MatrixXd narrow = Halton(50, 2);
+  narrow.array() = 0.5 + 1e-3 * narrow.array();
+  const auto result = AnalyseSensitivity(kSquare, unit, Scattering(unit, 6, 1), narrow, {});
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_GT(result->front().explained, 0.5);
+  EXPECT_NEAR(result->front().sd, 1, 0.25);  // of the scatter, from 60 runs
 }
 
 TEST(SobolIndices, TooFewRunsAreRefused) {
