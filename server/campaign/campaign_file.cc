@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "absl/strings/str_cat.h"
+#include "dem/simulation/test_meshes.h"
 #include "server/campaign/excitation.h"
 #include "server/campaign/map_reader.h"
 #include "server/campaign/read_context.h"
@@ -55,6 +56,19 @@ void ReadName(MapReader& map, Campaign& campaign) {
   }
 }
 
+// Of the grains in all specimens [m]; 0 where there are none.
+double LargestDiameter(const Experiment& experiment) {
+  double largest = 0;
+  for (const Specimen& specimen : experiment.specimens) {
+    if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
+      largest = std::max(largest, 2 * recipe->mean_radius * (1 + recipe->radius_spread));
+    } else if (const auto* file = std::get_if<PackingFile>(&specimen)) {
+      for (const double radius : file->packing.radius) largest = std::max(largest, 2 * radius);
+    }
+  }
+  return largest;
+}
+
 // What the engine itself would refuse. Asked last, at the middle of the priors, where only rare
 // things are left.
 void AskEngine(const MapReader& map, const Campaign& campaign) {
@@ -74,6 +88,11 @@ void AskEngine(const MapReader& map, const Campaign& campaign) {
     }
     for (const std::string& problem : dem::ScenarioProblems(scenario)) {
       map.Problem("experiments", experiment.name + ": " + problem);
+    }
+    if (const double grain = LargestDiameter(experiment); grain > 0) {
+      if (const std::string problem = dem::MeshSizeProblem(scenario, grain); !problem.empty()) {
+        map.Problem("experiments", experiment.name + ": " + problem);
+      }
     }
   }
 }
