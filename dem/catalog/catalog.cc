@@ -298,6 +298,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "9"; }
+std::string EngineVersion() { return "10"; }
 
 }  // namespace calib::dem

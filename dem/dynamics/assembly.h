@@ -26,6 +26,9 @@ namespace calib::dem {
 struct StiffnessEstimate {
   double critical_step =
       0;  ///< min over grains of sqrt(m/K), translation and rotation [s]; 0: no contact
+  double elastic_step = 0;    ///< the same without dashpots [s]
+  double step_by_forces = 0;  ///< the same without moment stiffness either [s]
+  bool by_twisting = false;  ///< of the moment stiffnesses twisting is larger than rolling
   std::array<double, 3> modulus = {0, 0, 0};    ///< affine (Voigt) stiffness of each axis [Pa]
   std::array<double, 3> viscosity = {0, 0, 0};  ///< the same of the dashpots [Pa s]
 };
@@ -101,6 +104,17 @@ class Assembly {
 
   /// The same at any overlap, in radii > 0.
   [[nodiscard]] double CriticalStepAt(double overlap) const;
+
+  /// How many times shorter the step is than without the moment stiffness of contacts, which are
+  /// taken for no softer than at an overlap of 1e-4 radii [-].
+  [[nodiscard]] double MomentDelay(const StiffnessEstimate& estimate) const;
+
+  /// The same in words, naming the effect.
+  [[nodiscard]] std::string MomentStepText(const StiffnessEstimate& estimate) const;
+
+  /// Beyond this delay no run ends: the 200 000 steps in which a specimen has to settle
+  /// (StageOptions) are then fewer than 70 of those that the forces would allow.
+  static constexpr double kLongestMomentDelay = 3000;
 
   /// Mean net force of the loaded grains over mean contact force [-]; 0 without contacts, infinite
   /// when not finite.
@@ -254,6 +268,9 @@ class Assembly {
   int bodies_ = 0;
   double solid_volume_ = 0;
   double mean_diameter_ = 0;
+  /// NominalCriticalStep() if contacts had no moment stiffness [s].
+  [[nodiscard]] double NominalStepByForces() const;
+
   double nominal_critical_step_ = 0;
   std::int64_t steps_ = 0;
   std::int64_t contact_updates_ = 0;

@@ -17,8 +17,14 @@ double DampedRate(double w, double damping) {
   return damping > 0 ? damping + std::sqrt(damping * damping + w * w) : w;
 }
 
+/// Where new contacts are judged, in radii.
+constexpr double kNominalOverlap = 1e-4;
+
+enum class Moments { kWith, kWithout };
+
 /// sqrt(m/K) of the smallest grain, held by one like it at an overlap given in radii.
-double NominalStep(const ContactModel& model, const ParticleArrays& p, double overlap) {
+double NominalStep(const ContactModel& model, const ParticleArrays& p, double overlap,
+                   Moments moments) {
   const auto smallest = static_cast<std::size_t>(
       std::min_element(p.radius.begin(), p.radius.end()) - p.radius.begin());
   ContactBlock block{};
@@ -27,6 +33,9 @@ double NominalStep(const ContactModel& model, const ParticleArrays& p, double ov
     block.dx[k] = (2.0 - overlap) * p.radius[smallest];
   }
   model.Evaluate(block);
+  if (moments == Moments::kWithout) {
+    block.rolling_stiffness[0] = block.twisting_stiffness[0] = 0.0;
+  }
   const double translation =
       (block.normal_stiffness[0] + block.tangential_stiffness[0]) * p.inverse_mass[smallest];
   const double rotation = (block.tangential_stiffness[0] * p.radius[smallest] * p.radius[smallest] +
@@ -41,7 +50,11 @@ double NominalStep(const ContactModel& model, const ParticleArrays& p, double ov
 }  // namespace
 
 double Assembly::CriticalStepAt(double overlap) const {
-  return NominalStep(model_, particles_, overlap);
+  return NominalStep(model_, particles_, overlap, Moments::kWith);
+}
+
+double Assembly::NominalStepByForces() const {
+  return NominalStep(model_, particles_, kNominalOverlap, Moments::kWithout);
 }
 
 absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
@@ -49,6 +62,9 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
   const auto n = p.x.size();
   std::vector<std::array<double, 6>> stiffness(n, {0, 0, 0, 0, 0, 0});  // translation, rotation
   std::vector<std::array<double, 6>> damping;  // as stiffness; empty without dashpots
+  std::vector<std::array<double, 3>> moments;  // part of the rotation's; empty without any
+  double rolling = 0;                          // sum over contacts [N m/rad]
+  double twisting = 0;
   std::array<double, 3> modulus = {0, 0, 0};
   std::array<double, 3> viscosity = {0, 0, 0};
   ContactBlock b;
@@ -96,6 +112,11 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
                                                     " m, more than half the smaller radius"));
       }
       add_damping(k, i, j);
+      if (b.rolling_stiffness[k] + b.twisting_stiffness[k] > 0) {
+        moments.resize(n, {0, 0, 0});
+        rolling += b.rolling_stiffness[k];
+        twisting += b.twisting_stiffness[k];
+      }
       const double kn = b.normal_stiffness[k];
       const double ks = b.tangential_stiffness[k];
       const double n2[3] = {b.nx[k] * b.nx[k], b.ny[k] * b.ny[k], b.nz[k] * b.nz[k]};
@@ -108,6 +129,10 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
         stiffness[j][a] += translation;
         stiffness[i][a + 3] += ks * across * b.radius_i[k] * b.radius_i[k] + moment;
         stiffness[j][a + 3] += ks * across * b.radius_j[k] * b.radius_j[k] + moment;
+        if (moment > 0) {
+          moments[i][a] += moment;
+          moments[j][a] += moment;
+        }
         modulus[a] += translation * d[a] * d[a];
       }
     }
@@ -125,8 +150,16 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
       if (damped) {
         damping.resize(n, {0, 0, 0, 0, 0, 0});
       }
+      if (w.rolling_stiffness[k] + w.twisting_stiffness[k] > 0) {
+        moments.resize(n, {0, 0, 0});
+        rolling += w.rolling_stiffness[k];
+        twisting += w.twisting_stiffness[k];
+      }
       for (std::size_t a = 0; a < 3; ++a) {
         const double across = 1.0 - n2[a];
+        if (!moments.empty()) {
+          moments[i][a] += w.rolling_stiffness[k] * across + w.twisting_stiffness[k] * n2[a];
+        }
         stiffness[i][a] += w.normal_stiffness[k] * n2[a] + w.tangential_stiffness[k] * across;
         stiffness[i][a + 3] += w.tangential_stiffness[k] * across * r2 +
                                w.rolling_stiffness[k] * across + w.twisting_stiffness[k] * n2[a];
@@ -137,18 +170,35 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
       }
     }
   });
+  const auto largest_rate = [&p, n](const std::vector<std::array<double, 6>>& of) {
+    double rate2 = 0;  // K/m
+    for (std::size_t g = 0; g < n; ++g) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        rate2 =
+            std::max({rate2, of[g][a] * p.inverse_mass[g], of[g][a + 3] * p.inverse_inertia[g]});
+      }
+    }
+    return std::sqrt(rate2);
+  };
+  std::vector<std::array<double, 6>> by_forces;
+  if (!moments.empty()) {
+    by_forces = stiffness;
+    for (std::size_t g = 0; g < n; ++g) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        by_forces[g][a + 3] = std::max(0.0, by_forces[g][a + 3] - moments[g][a]);
+      }
+    }
+    clumps_.Fold(by_forces);
+  }
   clumps_.Fold(stiffness);
   if (!damping.empty()) {
     clumps_.Fold(damping);
   }
-  double rate2 = 0;  // largest K/m
-  for (std::size_t g = 0; g < n; ++g) {
-    for (std::size_t a = 0; a < 3; ++a) {
-      rate2 = std::max(
-          {rate2, stiffness[g][a] * p.inverse_mass[g], stiffness[g][a + 3] * p.inverse_inertia[g]});
-    }
-  }
-  double rate = std::sqrt(rate2);
+  double rate = largest_rate(stiffness);
+  const double slow = by_forces.empty() ? rate : largest_rate(by_forces);
+  estimate.step_by_forces = slow > 0 ? 1.0 / slow : 0.0;
+  estimate.elastic_step = rate > 0 ? 1.0 / rate : 0.0;
+  estimate.by_twisting = twisting > rolling;
   for (std::size_t g = 0; g < damping.size(); ++g) {
     for (std::size_t a = 0; a < 6; ++a) {
       const double inverse = a < 3 ? p.inverse_mass[g] : p.inverse_inertia[g];
@@ -162,6 +212,20 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
     estimate.viscosity[a] = viscosity[a] / cell_.Volume();
   }
   return status;
+}
+
+double Assembly::MomentDelay(const StiffnessEstimate& estimate) const {
+  const double nominal = NominalStepByForces();
+  const double by_forces =
+      estimate.step_by_forces > 0 ? std::min(nominal, estimate.step_by_forces) : nominal;
+  return estimate.elastic_step > 0 ? by_forces / estimate.elastic_step : 1.0;
+}
+
+std::string Assembly::MomentStepText(const StiffnessEstimate& estimate) const {
+  return absl::StrCat("the stiffness of ",
+                      estimate.by_twisting ? "twisting_resistance" : "rolling_resistance",
+                      " makes the time step ", std::lround(MomentDelay(estimate)),
+                      " times shorter than the contact forces do (", estimate.elastic_step, " s)");
 }
 
 double Assembly::UnbalancedForce() const {

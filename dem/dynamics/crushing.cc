@@ -7,11 +7,14 @@
 #include <numbers>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+
 namespace calib::dem {
 namespace {
 
 constexpr std::uint32_t kPurpose = 4;      // 1 to 3: random_cloud.cc, elongation.cc
 constexpr double kComminutionLimit = 0.1;  ///< of the first diameter
+constexpr double kDensestFines = 0.64;     ///< of the pores: random close packing
 
 double Volume(double radius) { return 4.0 / 3.0 * std::numbers::pi * radius * radius * radius; }
 
@@ -40,6 +43,20 @@ double Crushing::FinesVolume(const Assembly& assembly) const {
     fines += Volume(first_radius_[g]) - Volume(assembly.particles().radius[g]);
   }
   return fines;
+}
+
+absl::Status Crushing::FinesFit(const Assembly& assembly) const {
+  const double volume = assembly.cell().Volume();
+  const double fines = FinesVolume(assembly);
+  const double pores = volume - (assembly.solid_volume() - fines);
+  if (fines <= kDensestFines * std::max(0.0, pores)) {
+    return absl::OkStatus();
+  }
+  return absl::OutOfRangeError(absl::StrCat(
+      "the fines of particle_crushing no longer fit between the grains: they are ", fines / volume,
+      " of the volume, the pores ", pores / volume, ", of which they can fill ", kDensestFines,
+      " without carrying load (porosity with fines ", 1.0 - assembly.solid_volume() / volume,
+      "); weakness or size_loss is too large for the stress"));
 }
 
 double Crushing::Strength(int id, int times, double diameter) const {

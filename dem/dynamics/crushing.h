@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "dem/dynamics/assembly.h"
 
 namespace calib::dem {
@@ -35,6 +36,11 @@ class Crushing {
   /// Crushes every grain whose strength the last EvaluateForces has reached, each once; returns how
   /// many. The forces are those of before until the next evaluation.
   int Crush(Assembly& assembly);
+
+  /// OK while the fines fit the pores between what is left of the grains. Beyond a random close
+  /// packing of them there, 0.64 of the pores [Scott & Kilgour, J. Phys. D 2 (1969) 863], they
+  /// would carry the load, which the law has grains do alone. OUT_OF_RANGE with the porosity.
+  [[nodiscard]] absl::Status FinesFit(const Assembly& assembly) const;
 
   /// What has crumbled away from grains of these radii [m^3].
   [[nodiscard]] double FinesVolume(const Assembly& assembly) const;

@@ -58,6 +58,9 @@ StageEnd Flow::Inspect() {
   if (auto s = assembly_->EstimateStiffness(estimate); !s.ok()) {
     return Diverge(absl::StrCat(std::string(s.message()), " at ", time_, " s"));
   }
+  if (assembly_->MomentDelay(estimate) > Assembly::kLongestMomentDelay) {
+    return Diverge(assembly_->MomentStepText(estimate));
+  }
   dt_ = estimate.critical_step > 0 ? std::min(largest_dt_, kSafety * 2 * estimate.critical_step)
                                    : largest_dt_;
   return StageEnd::kDone;

@@ -18,6 +18,16 @@ constexpr double kServoRateOverDriven = 10;
 /// A stress target counts as reached for the end of loading; settling then closes the rest.
 constexpr double kLoadingTolerance = 1e-2;
 
+/// How many times shorter moments make the step before a settling that fails says so.
+constexpr double kDelayToTell = 10;
+
+/// Steps over the critical one of a single grain at which two that move against each other become
+/// unstable.
+constexpr double kUnstable = 1.4142135623730951;
+
+/// Strain of an axis under a held stress from which on its cell is said to have collapsed.
+constexpr double kCollapse = 0.05;
+
 /// Largest strain in one step, where no stiffness limits the step yet.
 constexpr double kMaxStrainPerStep = 1e-4;
 
@@ -69,16 +79,32 @@ StageEnd QuasiStatic::Begin() {
   if (auto s = assembly_->EvaluateForces(); !s.ok()) {
     return Diverge(std::string(s.message()));
   }
-  return Inspect();
+  const StageEnd end = Inspect();
+  first_interval_ = true;
+  return end;
+}
+
+/// Grains that barely touch are soft: a step judged by them is too long as soon as they overlap,
+/// all of them at once in a lattice. Looked at before every step of the first interval; a step that
+/// is stable stays what it is.
+void QuasiStatic::GuardFirstSteps() {
+  StiffnessEstimate estimate;
+  if (assembly_->EstimateStiffness(estimate).ok() && estimate.critical_step > 0 &&
+      dt_ > kUnstable * estimate.critical_step) {
+    Adopt(estimate);
+  }
 }
 
 StageEnd QuasiStatic::Inspect() {
   since_inspection_ = 0;
+  first_interval_ = false;
   if (std::string bad = assembly_->FirstNotFinite(); !bad.empty()) {
     return Diverge(std::move(bad));
   }
   if (intervention_) {
-    intervention_(*assembly_);
+    if (auto s = intervention_(*assembly_); !s.ok()) {
+      return Diverge(std::string(s.message()));
+    }
   }
   if (straining_ && options_.adaptive) {
     speed_.Adapt(assembly_->UnbalancedForce(), options_.unbalanced);
@@ -87,6 +113,16 @@ StageEnd QuasiStatic::Inspect() {
   if (auto s = assembly_->EstimateStiffness(estimate); !s.ok()) {
     return Diverge(std::string(s.message()));
   }
+  const double delay = assembly_->MomentDelay(estimate);
+  moment_text_ = delay > kDelayToTell ? assembly_->MomentStepText(estimate) : "";
+  if (delay > Assembly::kLongestMomentDelay) {
+    return Diverge(moment_text_);
+  }
+  Adopt(estimate);
+  return StageEnd::kDone;
+}
+
+void QuasiStatic::Adopt(const StiffnessEstimate& estimate) {
   const double largest = std::min(kMaxStrainPerStep / (options_.rate * speed_.factor()),
                                   assembly_->NominalCriticalStep());
   dt_ = options_.step_share *
@@ -96,7 +132,28 @@ StageEnd QuasiStatic::Inspect() {
     // stiffness.
     modulus_[a] = estimate.modulus[a] + 2.0 * estimate.viscosity[a] / dt_;
   }
-  return StageEnd::kDone;
+}
+
+/// A cell that a held stress makes too short for its periodic images is a specimen that yields
+/// without end; of one that is driven there the length itself is what is wrong.
+std::string QuasiStatic::WhyNoForces(const CellTarget& target, const std::string& problem) const {
+  const double* const length = assembly_->cell().length;
+  const auto shortest = static_cast<std::size_t>(std::min_element(length, length + 3) - length);
+  const double strain = std::log(stage_length_[shortest] / length[shortest]);
+  if (target[shortest].mode != AxisTarget::Mode::kStress || !(strain > kCollapse) ||
+      !assembly_->FirstNotFinite().empty()) {
+    return problem;
+  }
+  const auto held = [&target](std::size_t a, const char* name) {
+    return target[a].mode == AxisTarget::Mode::kStress
+               ? absl::StrCat(name, " ", target[a].value, " Pa")
+               : std::string();
+  };
+  const std::string axial = held(2, "axial");
+  const std::string lateral = held(shortest == 1 ? 1 : 0, "lateral");
+  return absl::StrCat("the specimen collapses under ", axial,
+                      axial.empty() || lateral.empty() ? "" : ", ", lateral, ": strain ", strain,
+                      " along ", std::string(1, "xyz"[shortest]), " in this stage; ", problem);
 }
 
 bool QuasiStatic::StressesWithin(const CellTarget& target, double tolerance) const {
@@ -157,9 +214,15 @@ StageEnd QuasiStatic::Step(const CellTarget& target, double damping) {
     assembly_->SetDisplacement(target.displacement);
   }
   if (auto s = assembly_->EvaluateForces(); !s.ok()) {
-    return Diverge(std::string(s.message()));
+    return Diverge(WhyNoForces(target, std::string(s.message())));
   }
-  return ++since_inspection_ >= kInspection ? Inspect() : StageEnd::kDone;
+  if (++since_inspection_ >= kInspection) {
+    return Inspect();
+  }
+  if (first_interval_) {
+    GuardFirstSteps();
+  }
+  return StageEnd::kDone;
 }
 
 CellTarget QuasiStatic::Current(const CellTarget& asked, FollowGap& gap) const {
@@ -218,7 +281,7 @@ StageEnd QuasiStatic::Settle(const CellTarget& asked) {
   return Diverge(absl::StrCat("the specimen did not settle within ", options_.max_settling_steps,
                               " steps: unbalanced force ", unbalanced, " (limit ",
                               options_.unbalanced, "), stresses ", stress[0], " ", stress[1], " ",
-                              stress[2], " Pa"));
+                              stress[2], " Pa", moment_text_.empty() ? "" : "; ", moment_text_));
 }
 
 StageEnd QuasiStatic::MoveTo(const CellTarget& target) {
@@ -227,6 +290,7 @@ StageEnd QuasiStatic::MoveTo(const CellTarget& target) {
 }
 
 StageEnd QuasiStatic::MoveThrough(const CellTarget& target) {
+  std::copy_n(assembly_->cell().length, 3, stage_length_.begin());
   if (const StageEnd end = Begin(); end != StageEnd::kDone) {
     return end;
   }

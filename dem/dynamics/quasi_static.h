@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "absl/status/status.h"
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/stress_servo.h"
 
@@ -97,8 +98,9 @@ class QuasiStatic {
   /// Lets every target from now on be followed; empty: targets are what they are.
   void SetFollow(Follow follow) { follow_ = std::move(follow); }
 
-  /// Called at every inspection (20 steps); may change grains, as those that crush.
-  void SetIntervention(std::function<void(Assembly&)> intervention) {
+  /// Called at every inspection (20 steps); may change grains, as those that crush. An error ends
+  /// the stage, with its message as the reason.
+  void SetIntervention(std::function<absl::Status(Assembly&)> intervention) {
     intervention_ = std::move(intervention);
   }
 
@@ -123,6 +125,9 @@ class QuasiStatic {
   StageEnd Load(const CellTarget& target);
   StageEnd Step(const CellTarget& target, double damping);
   StageEnd Inspect();
+  void Adopt(const StiffnessEstimate& estimate);
+  void GuardFirstSteps();
+  [[nodiscard]] std::string WhyNoForces(const CellTarget& target, const std::string& problem) const;
   StageEnd Diverge(std::string reason);
   [[nodiscard]] CellTarget Current(const CellTarget& asked, FollowGap& gap) const;
   [[nodiscard]] bool StressesWithin(const CellTarget& target, double tolerance) const;
@@ -139,8 +144,11 @@ class QuasiStatic {
   double dt_ = 0;
   std::int64_t since_inspection_ = 0;
   bool begun_ = false;
+  bool first_interval_ = false;  ///< up to the first inspection after forces were first evaluated
   Follow follow_;
-  std::function<void(Assembly&)> intervention_;
+  std::function<absl::Status(Assembly&)> intervention_;
+  std::array<double, 3> stage_length_ = {0, 0, 0};  ///< of the cell when the stage began [m]
+  std::string moment_text_;  ///< where moments shorten the step much: Assembly::MomentStepText()
   std::string reason_;
 };
 

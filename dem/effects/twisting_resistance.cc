@@ -2,6 +2,8 @@
 
 #include "dem/contact/simd.h"
 #include "dem/effects/moment_stiffness.h"
+#include "dem/lab_tests/element_test.h"
+#include "dem/lab_tests/gravity_test.h"
 
 namespace calib::dem {
 namespace {
@@ -42,6 +44,14 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
   return std::make_unique<TwistingKernel>(MomentLawFrom(context));
 }
 
+/// A collision happens in a plane: nothing twists about its normal.
+std::vector<std::string> WhereGrainsTwist() {
+  std::vector<std::string> names = ElementTestNames();
+  const std::vector<std::string> poured = GravityTestNames();
+  names.insert(names.end(), poured.begin(), poured.end());
+  return names;
+}
+
 }  // namespace
 
 EffectEntry TwistingResistance() {
@@ -54,7 +64,8 @@ EffectEntry TwistingResistance() {
                .parameters = MomentParameters("twisting"),
                .reference = "Cheng et al. 2018, Table 1",
                .two_sided = false,
-               .rays = MomentRays()},
+               .rays = MomentRays(),
+               .excited_by = WhereGrainsTwist()},
       .kernels = {{.stage = ContactStage::kMoment, .make = &Make}}};
 }
 

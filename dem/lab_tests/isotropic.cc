@@ -16,7 +16,9 @@ ElementTestEntry Isotropic() {
                        "Periodic cell, isotropic compression to confining_pressure (the start "
                        "pressure), then the mean stress driven through the control path [Pa, "
                        "positive] with all three normal stresses equal; unload-reload by a "
-                       "path that turns",
+                       "path that turns. Fails when the packing cannot be brought to the start "
+                       "pressure or a porosity asked for, when grains overlap by more than half "
+                       "the smaller radius, or when the specimen does not come to rest",
                    .settings = {ConfiningPressure()},
                    .observables = ElementObservables(),
                    .control = "mean_stress",

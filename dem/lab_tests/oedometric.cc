@@ -15,7 +15,10 @@ ElementTestEntry Oedometric() {
                    .description =
                        "Periodic cell, isotropic compression to confining_pressure (the start "
                        "pressure), then axial strain driven through the control path without "
-                       "lateral strain; unload-reload by a path that turns",
+                       "lateral strain; unload-reload by a path that turns. Fails when the packing "
+                       "cannot be brought to the start pressure or a porosity asked for, when "
+                       "grains overlap by more than half the smaller radius, when the cell becomes "
+                       "shorter than two grains, or when the specimen does not come to rest",
                    .settings = {ConfiningPressure()},
                    .observables = ElementObservables(),
                    .control = "axial_strain",

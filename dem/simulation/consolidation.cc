@@ -172,6 +172,65 @@ std::optional<double> PorosityToReach(const ConsolidationPlan& plan, const Assem
   return plan.consolidation.porosity.value_or(Porosity(compressed)) - densification;
 }
 
+/// With the model's own friction to the stress at which loading begins.
+StageEnd MoveToStart(const ConsolidationPlan& plan, double own_friction, QuasiStatic& stages) {
+  CellTarget target = Isotropic(plan.pressure);
+  if (plan.initial_stress) {
+    target[0].value = target[1].value = plan.initial_stress->lateral;
+    target[2].value = plan.initial_stress->axial;
+  }
+  stages.assembly().SetSlidingFriction(own_friction);
+  return stages.MoveTo(target);
+}
+
+/// Lowers friction to a porosity from which the initial stress leads to the one asked for: the
+/// first guess is that one itself, each further one corrected by what the last came out wrong.
+absl::Status ReachPorosityAtStart(const ConsolidationPlan& plan, double porosity,
+                                  double own_friction, QuasiStatic& stages, StageEnd& end) {
+  constexpr int kAttempts = 10;
+  Assembly& assembly = stages.assembly();
+  const Assembly compressed = assembly;
+  const double loosest = Porosity(compressed);
+  const auto cannot = [&plan, porosity](const auto&... why) {
+    return absl::OutOfRangeError(absl::StrCat("porosity ", porosity,
+                                              " cannot be met at the initial stress (axial ",
+                                              plan.initial_stress->axial, " Pa, lateral ",
+                                              plan.initial_stress->lateral, " Pa): ", why...));
+  };
+  double before = porosity;  // at the isotropic pressure
+  double reached = 0;
+  double last_before = 0;
+  double last_reached = 0;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    if (attempt > 0) {
+      assembly = compressed;
+    }
+    if (auto s = LowerFrictionToPorosity(before, plan.pressure, stages, end); !s.ok()) {
+      if (attempt == 0) {
+        return cannot(std::string(s.message()));
+      }
+      return cannot("from ", last_before, " at the confining pressure it comes to ", last_reached,
+                    ", and ", std::string(s.message()));
+    }
+    if (end == StageEnd::kDone) {
+      end = MoveToStart(plan, own_friction, stages);
+    }
+    reached = Porosity(assembly);
+    if (end != StageEnd::kDone || std::abs(reached - porosity) <= kPorosityTolerance) {
+      return absl::OkStatus();
+    }
+    double slope = attempt > 0 ? (before - last_before) / (reached - last_reached) : 1.0;
+    slope = slope > 0.5 && slope < 2.0 ? slope : 1.0;  // small steps are noise of the tolerance
+    last_before = before;
+    last_reached = reached;
+    before += slope * (porosity - reached);
+    if (before > loosest && last_before < loosest - kPorosityTolerance) {
+      before = loosest;
+    }
+  }
+  return cannot("after ", kAttempts, " attempts it is ", reached);
+}
+
 }  // namespace
 
 absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, StageEnd& end) {
@@ -200,6 +259,9 @@ absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, Sta
         return absl::OkStatus();
       }
     }
+    if (plan.initial_stress && plan.consolidation.porosity) {
+      return ReachPorosityAtStart(plan, *porosity, own_friction, stages, end);
+    }
     if (auto s = LowerFrictionToPorosity(*porosity, plan.pressure, stages, end); !s.ok()) {
       return s;
     }
@@ -207,13 +269,7 @@ absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, Sta
       return absl::OkStatus();
     }
   }
-  CellTarget target = Isotropic(plan.pressure);
-  if (plan.initial_stress) {
-    target[0].value = target[1].value = plan.initial_stress->lateral;
-    target[2].value = plan.initial_stress->axial;
-  }
-  assembly.SetSlidingFriction(own_friction);
-  end = stages.MoveTo(target);
+  end = MoveToStart(plan, own_friction, stages);
   return absl::OkStatus();
 }
 

@@ -55,10 +55,13 @@ class ElementTestRun {
     SetStage();
     if (crushing_ || assembly_.model().stage() != nullptr) {
       stages_.SetIntervention([this](Assembly& assembly) {
-        if (crushing_) {
-          crushing_->Crush(assembly);
+        if (crushing_ && crushing_->Crush(assembly) > 0) {
+          if (auto s = crushing_->FinesFit(assembly); !s.ok()) {
+            return s;
+          }
         }
         SetStage();
+        return absl::OkStatus();
       });
     }
   }
@@ -148,7 +151,17 @@ class ElementTestRun {
 
   /// The present readings; what is wrong with them.
   std::string ReadInto(State& state) const {
+    if (crushing_) {
+      if (auto s = crushing_->FinesFit(assembly_); !s.ok()) {
+        return std::string(s.message());
+      }
+    }
     Measurement read = Read();
+    if (!(read.porosity > 0)) {
+      return absl::StrCat("porosity is ", read.porosity,
+                          ", no pores are left: the grains overlap too much for spheres, or the "
+                          "apparatus reads more strain than there is");
+    }
     if (auto s = formulas_.Apply(read); !s.ok()) {
       return std::string(s.message());
     }

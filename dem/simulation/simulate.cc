@@ -24,9 +24,6 @@ absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink
     return absl::InvalidArgumentError(absl::StrJoin(problems, "; "));
   }
   if (scenario.test == "collision") {
-    if (!recording.vtk_directory.empty()) {
-      return absl::InvalidArgumentError("collision: one contact has no pictures of grains");
-    }
     return RunCollision(scenario, sink, std::move(stop));
   }
   std::optional<VtkSeries> series;

@@ -82,6 +82,13 @@ std::string MeshSizeProblem(const Scenario& scenario, double largest_diameter) {
       return absl::StrCat("mesh ", name, " is ", length, " m long, the largest grain ",
                           largest_diameter, " m: is the mesh's unit right?");
     }
+    if (name == "silo" && bounds.low.z > largest_diameter) {
+      return absl::StrCat("mesh silo ends ", bounds.low.z,
+                          " m above the floor, more than the "
+                          "largest grain, ",
+                          largest_diameter,
+                          " m, which would leave below it: move it down to z = 0");
+    }
   }
   return "";
 }

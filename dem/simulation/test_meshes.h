@@ -16,7 +16,8 @@ void CheckMeshes(const Scenario& scenario, const TestInfo& test,
                  std::vector<std::string>& problems);
 
 /// Why meshes do not go with grains of this size, in a sentence; empty: they do. A mesh is at least
-/// one, at most ten thousand largest diameters long: beyond that its unit is another one.
+/// one, at most ten thousand largest diameters long: beyond that its unit is another one. A silo
+/// stands on the floor, z = 0, within a largest diameter.
 std::string MeshSizeProblem(const Scenario& scenario, double largest_diameter);
 
 }  // namespace calib::dem

@@ -8,7 +8,8 @@
 #include <sstream>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
+#include "dem/simulation/test_meshes.h"
+#include "server/campaign/excitation.h"
 #include "server/campaign/map_reader.h"
 #include "server/campaign/read_context.h"
 #include "server/campaign/read_experiment.h"
@@ -55,6 +56,19 @@ void ReadName(MapReader& map, Campaign& campaign) {
   }
 }
 
+// Of the grains in all specimens [m]; 0 where there are none.
+double LargestDiameter(const Experiment& experiment) {
+  double largest = 0;
+  for (const Specimen& specimen : experiment.specimens) {
+    if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
+      largest = std::max(largest, 2 * recipe->mean_radius * (1 + recipe->radius_spread));
+    } else if (const auto* file = std::get_if<PackingFile>(&specimen)) {
+      for (const double radius : file->packing.radius) largest = std::max(largest, 2 * radius);
+    }
+  }
+  return largest;
+}
+
 // What the engine itself would refuse. Asked last, at the middle of the priors, where only rare
 // things are left.
 void AskEngine(const MapReader& map, const Campaign& campaign) {
@@ -75,24 +89,10 @@ void AskEngine(const MapReader& map, const Campaign& campaign) {
     for (const std::string& problem : dem::ScenarioProblems(scenario)) {
       map.Problem("experiments", experiment.name + ": " + problem);
     }
-  }
-}
-
-// Grains' shape and strength and a specimen's preparation: without a test of such a specimen no
-// reading depends on them, and what is calibrated of them would be their prior.
-void CheckEffectsAct(const MapReader& map, const Campaign& campaign) {
-  for (const std::string& name : campaign.model.effects) {
-    const dem::EffectInfo* effect = dem::FindEffect(name);
-    if (effect == nullptr || (effect->kind != "particle" && effect->kind != "initial_state")) {
-      continue;
-    }
-    const auto& tests = effect->excited_by;
-    if (std::none_of(campaign.experiments.begin(), campaign.experiments.end(),
-                     [&tests](const Experiment& experiment) {
-                       return std::find(tests.begin(), tests.end(), experiment.test) != tests.end();
-                     })) {
-      map.Problem("model", absl::StrCat("effect ", name, " has no part in any of the experiments: ",
-                                        "it acts in ", absl::StrJoin(tests, ", ")));
+    if (const double grain = LargestDiameter(experiment); grain > 0) {
+      if (const std::string problem = dem::MeshSizeProblem(scenario, grain); !problem.empty()) {
+        map.Problem("experiments", experiment.name + ": " + problem);
+      }
     }
   }
 }
@@ -167,7 +167,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     }
     map.Finish();
     if (is_new && problems.size() == 0 && !campaign.precomputed) {
-      CheckEffectsAct(map, campaign);
+      for (const std::string& inert : EffectsWithoutPart(campaign)) map.Problem("model", inert);
       AskEngine(map, campaign);
     }
   }

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "absl/strings/str_cat.h"
+#include "server/campaign/excitation.h"
 #include "server/ctl/extension.h"
 
 namespace calib::ctl {
@@ -78,15 +79,9 @@ absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
   return directions;
 }
 
-// Walked in stages that end when the specimen has come to rest.
-bool ReadAtRest(const campaign::Experiment& experiment) {
-  const dem::TestInfo* const test = dem::FindTest(experiment.test);
-  return test != nullptr && test->needs_packing && !test->poured && !experiment.loading_rate;
-}
-
 std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect) {
   std::set<double> pressures;
-  bool excited = false;
+  bool shown = false;
   bool moving = false;
   for (const campaign::Experiment& e : campaign.experiments) {
     const dem::TestInfo* const test = dem::FindTest(e.test);
@@ -96,16 +91,14 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
     if (e.role != campaign::Role::kCalibrate) continue;
     const auto pressure = e.settings.find("confining_pressure");
     if (pressure != e.settings.end()) pressures.insert(pressure->second);
-    excited = excited || effect.excited_by.empty() ||
-              std::find(effect.excited_by.begin(), effect.excited_by.end(), e.test) !=
-                  effect.excited_by.end();
-    moving = moving || !ReadAtRest(e);
+    moving = moving || !campaign::ReadAtRest(e);
+    shown = shown || campaign::CanShow(e, effect);
   }
   if (effect.needs_motion && !moving) {
     return "all readings are taken at rest: "
            "it shows in tests with a loading_rate, in collisions and in flows";
   }
-  if (!excited) return "none of the fitted tests can show it";
+  if (!shown) return "none of the fitted tests can show it";
   if (effect.across_pressures && pressures.size() < 2) {
     return "it shows only between tests at different pressures";
   }

@@ -2,6 +2,7 @@
 
 #include "server/ctl/catalog_text.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 
@@ -13,8 +14,8 @@ int Contacts(const Arguments& arguments) {
     return kDone;
   }
   for (const dem::ContactInfo& contact : dem::Contacts()) {
-    std::cout << contact.name << "\n  " << contact.description << "\n  " << contact.reference
-              << "\n"
+    std::cout << contact.name << "\n"
+              << Wrapped(contact.description, "  ", "  ") << Wrapped(contact.reference, "  ", "  ")
               << ParameterTable(contact.parameters) << "\n";
   }
   return kDone;

@@ -3,6 +3,7 @@
 #include "server/ctl/catalog_text.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/source_files.h"
+#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 
@@ -20,10 +21,12 @@ int Effects(const Arguments& arguments) {
     return kDone;
   }
   for (const dem::EffectInfo* effect : dem::AllEffects(declared)) {
-    std::cout << effect->name << " (" << effect->kind << ")\n  " << effect->description << "\n  "
-              << effect->reference << "\n"
-              << ParameterTable(effect->parameters) << "\n";
+    std::cout << EffectText(*effect) << "\n";
   }
+  std::cout << Wrapped(
+      "Scales: p is the pressure at which a test starts [Pa], d the mean diameter "
+      "of the grains [m], E young_modulus [Pa], all as of the campaign.",
+      "", "");
   return kDone;
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/catalog/catalog.h"
 #include "server/ctl/assignments.h"
 #include "server/ctl/evaluation.h"
 #include "server/ctl/exit_codes.h"
@@ -44,6 +45,23 @@ std::vector<std::string> MeshContents(const campaign::Experiment& experiment,
 // Path of a name in a folder; empty without a folder.
 std::string Below(const std::string& folder, const std::string& name) {
   return folder.empty() ? "" : (std::filesystem::path(folder) / name).string();
+}
+
+// A collision is one contact, of bodies that its settings make.
+bool HasPictures(const campaign::Experiment& experiment) {
+  const dem::TestInfo* const test = dem::FindTest(experiment.test);
+  return test == nullptr || test->needs_packing;
+}
+
+void SayWhatHasNoPictures(const campaign::Campaign& campaign) {
+  std::string names;
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    if (!HasPictures(experiment))
+      absl::StrAppend(&names, names.empty() ? "" : ", ", experiment.name);
+  }
+  if (names.empty()) return;
+  std::cerr << "calibctl: --vtk makes no pictures of " << names
+            << ": a collision is one contact without grains\n";
 }
 
 class Simulation {
@@ -113,7 +131,7 @@ class Simulation {
         .spec = scheduler::SpecOf(campaign_, static_cast<int>(e), values_, 0),
         .packing = PackingText(experiment, source_),
         .meshes = MeshContents(experiment, source_),
-        .vtk = Below(arguments_.vtk, experiment.name),
+        .vtk = HasPictures(experiment) ? Below(arguments_.vtk, experiment.name) : "",
         .checkpoint = Below(arguments_.checkpoint, experiment.name + ".checkpoint")};
     std::error_code error;
     std::filesystem::create_directories(own, error);
@@ -179,6 +197,7 @@ int Simulate(const Arguments& arguments) {
   if (!program.ok()) return Fail(program.status());
   const auto folder = TemporaryFolder::Make();
   if (!folder.ok()) return Fail(folder.status());
+  if (!arguments.vtk.empty()) SayWhatHasNoPictures(campaign);
   CatchInterrupts();
   Simulation simulation(*source, campaign, *std::move(values), arguments);
   if (auto ran = simulation.RunAll(*program, folder->path()); !ran.ok()) return Fail(ran);

@@ -13,15 +13,7 @@ int Tests(const Arguments& arguments) {
     return kDone;
   }
   for (const dem::TestInfo& test : dem::Tests()) {
-    std::cout << test.name << " (control: " << test.control
-              << (test.may_reverse ? "" : ", one way only") << ")\n  " << test.description
-              << "\n  observables:";
-    for (const std::string& observable : test.observables) std::cout << " " << observable;
-    std::cout << "\n";
-    for (const dem::MeshInfo& mesh : test.meshes) {
-      std::cout << "  mesh " << mesh.name << ": " << mesh.description << "\n";
-    }
-    std::cout << ParameterTable(test.settings) << "\n";
+    std::cout << TestText(test) << "\n";
   }
   return kDone;
 }

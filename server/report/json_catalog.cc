@@ -29,6 +29,43 @@ Json Parameter(const dem::ParameterInfo& p) {
   return json;
 }
 
+Json Scale(const dem::ReferenceScale& scale) {
+  return {{"factor", scale.factor},
+          {"pressure", scale.pressure},
+          {"diameter", scale.diameter},
+          {"modulus", scale.modulus}};
+}
+
+// Of an effect: what makes its strength comparable, too.
+Json EffectParameter(const dem::ParameterInfo& p) {
+  Json json = Parameter(p);
+  json["reference_scale"] = Scale(p.scale);
+  if (!p.scale_by_contact.empty()) {
+    Json& by_contact = json["reference_scale_by_contact"] = Json::object();
+    for (const auto& [contact, scale] : p.scale_by_contact) by_contact[contact] = Scale(scale);
+  }
+  json["scaled_default_prior"] = p.scaled_prior ? Json({{"prior", p.scaled_prior->kind},
+                                                        {"min", p.scaled_prior->min},
+                                                        {"max", p.scaled_prior->max}})
+                                                : Json(nullptr);
+  return json;
+}
+
+Json EffectParameters(const std::vector<dem::ParameterInfo>& parameters) {
+  Json list = Json::array();
+  for (const dem::ParameterInfo& p : parameters) list.push_back(EffectParameter(p));
+  return list;
+}
+
+Json ObservableDetails(const std::vector<std::string>& names) {
+  Json list = Json::array();
+  for (const std::string& name : names) {
+    const dem::ObservableInfo& info = *dem::FindObservable(name);
+    list.push_back({{"name", info.name}, {"unit", info.unit}, {"description", info.description}});
+  }
+  return list;
+}
+
 Json Parameters(const std::vector<dem::ParameterInfo>& parameters) {
   Json list = Json::array();
   for (const dem::ParameterInfo& p : parameters) list.push_back(Parameter(p));
@@ -56,7 +93,10 @@ std::string EffectsJson(std::span<const dem::UserEffect> declared) {
                     {"description", e->description},
                     {"contacts", e->contacts},
                     {"two_sided", e->two_sided},
-                    {"parameters", Parameters(e->parameters)},
+                    {"excited_by", e->excited_by},
+                    {"needs_motion", e->needs_motion},
+                    {"across_pressures", e->across_pressures},
+                    {"parameters", EffectParameters(e->parameters)},
                     {"reference", e->reference}});
   }
   return list.dump(2) + "\n";
@@ -74,6 +114,7 @@ std::string TestsJson() {
                     {"parameters", Parameters(t.settings)},
                     {"meshes", meshes},
                     {"observables", t.observables},
+                    {"observable_details", ObservableDetails(t.observables)},
                     {"control", t.control},
                     {"may_reverse", t.may_reverse},
                     {"reference", t.reference}});

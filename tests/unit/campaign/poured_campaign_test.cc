@@ -147,6 +147,28 @@ TEST(PouredCampaign, AMeshIsReadInItsUnit) {
   EXPECT_EQ(scenario.meshes.at("silo").size(), 8);
 }
 
+// The engine would say so of each run.
+TEST(PouredCampaign, AMeshThatDoesNotFitTheGrainsIsRefused) {
+  auto files = Files();
+  auto sides = calib::testing::FourSides({.lower = 20, .upper = 40, .height = 300});
+  files["silo.stl"] = calib::testing::TextStl(sides);
+  EXPECT_THAT(ProblemsOf(WithMesh("{silo: {file: silo.stl, unit: m}}"), files),
+              HasSubstr("c.yaml:10: experiments: outlet: mesh silo is 300 m long, the largest "
+                        "grain 0.0044 m: is the mesh's unit right?"));
+  EXPECT_THAT(ProblemsOf(WithMesh("{silo: {file: silo.stl, unit: um}}"), files),
+              HasSubstr("mesh silo is 0.0003 m long, the largest grain 0.0044 m"));
+  const auto raised_by = [&](double up) {
+    auto raised = sides;
+    for (auto& triangle : raised) {
+      for (auto& p : triangle) p[2] += up;
+    }
+    files["silo.stl"] = calib::testing::TextStl(raised);
+    return ProblemsOf(WithMesh("{silo: {file: silo.stl, unit: mm}}"), files);
+  };
+  EXPECT_EQ(raised_by(4), "") << "a gap that no grain passes";
+  EXPECT_THAT(raised_by(50), HasSubstr("mesh silo ends 0.05 m above the floor"));
+}
+
 TEST(PouredCampaign, AVesselWithAHoleOrWithoutAnOutletIsRefused) {
   auto files = Files();
   const auto sides = calib::testing::FourSides({.lower = 20, .upper = 40, .height = 300});

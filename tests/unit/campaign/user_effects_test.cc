@@ -64,6 +64,10 @@ TEST(UserEffects, JoinTheModelLikeAnyOther) {
   yaml.replace(yaml.find("[rolling_resistance]"), 20, "[rolling_resistance, my_damping]");
   EXPECT_THAT(ProblemsOf(yaml), HasSubstr("parameters: my_damping.c has no value"));
   yaml.replace(yaml.find("parameters:\n  young"), 12, "parameters:\n  my_damping.c: default\n");
+  EXPECT_THAT(ProblemsOf(yaml),
+              HasSubstr("effect my_damping has no part in any of the experiments"))
+      << "a dashpot, and all readings are taken at rest";
+  yaml.insert(yaml.find("    role: validate"), "    loading_rate: 0.1 1/s\n");
   EXPECT_EQ(ProblemsOf(yaml), "");
 }
 

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -82,6 +83,32 @@ TEST(Json, CataloguesHaveNamesAndParameters) {
     for (const Json& entry : list) {
       EXPECT_TRUE(entry.contains("name"));
       EXPECT_TRUE(entry["parameters"].is_array());
+    }
+  }
+}
+
+TEST(Json, CataloguesSayWhereEffectsActAndWhatObservablesAre) {
+  const Json effects = Json::parse(EffectsJson());
+  const auto effect = [&effects](const std::string& name) {
+    return *std::find_if(effects.begin(), effects.end(),
+                         [&name](const Json& entry) { return entry["name"] == name; });
+  };
+  const Json membrane = effect("membrane_stiffness");
+  EXPECT_EQ(membrane["excited_by"], Json({"triaxial_drained", "triaxial_undrained"}));
+  EXPECT_EQ(membrane["parameters"][0]["reference_scale"],
+            Json({{"factor", 1}, {"pressure", 1}, {"diameter", 0}, {"modulus", 0}}));
+  EXPECT_EQ(membrane["parameters"][0]["scaled_default_prior"],
+            Json({{"prior", "log_uniform"}, {"min", 0.01}, {"max", 10}}));
+  EXPECT_TRUE(effect("viscous_damping")["needs_motion"]);
+  const Json rolling = effect("rolling_resistance")["parameters"][0];
+  EXPECT_EQ(rolling["reference_scale_by_contact"]["hertz_mindlin"]["diameter"], 3);
+  EXPECT_TRUE(effect("wall_friction")["parameters"][0]["scaled_default_prior"].is_null());
+  for (const Json& test : Json::parse(TestsJson())) {
+    ASSERT_EQ(test["observable_details"].size(), test["observables"].size());
+    for (std::size_t k = 0; k < test["observables"].size(); ++k) {
+      EXPECT_EQ(test["observable_details"][k]["name"], test["observables"][k]);
+      EXPECT_FALSE(test["observable_details"][k]["unit"].get<std::string>().empty());
+      EXPECT_FALSE(test["observable_details"][k]["description"].get<std::string>().empty());
     }
   }
 }

@@ -1,6 +1,7 @@
 // Crushing: strength distribution, size effect, mass, and what it does to a compression curve.
 #include "dem/dynamics/crushing.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -91,6 +92,21 @@ TEST(ParticleCrushing, MakesASpecimenMoreCompressible) {
   s.seed = 1;
   const test::Run other = test::RunAll(s);
   EXPECT_NE(other.states[1].values, crushed.states[1].values);
+}
+
+// Fines that fill the pores would carry the load, which the law does not have them do.
+TEST(ParticleCrushing, EndsWhereTheFinesNoLongerFitThePores) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.packing = test::SmallPacking(200);
+  s.model.effects = {"particle_crushing"};
+  s.model.parameters["particle_crushing.weakness"] = 1;  // everything crushes, again and again
+  s.model.parameters["particle_crushing.size_loss"] = 0.05;
+  const test::Run run = test::RunAll(s);
+  EXPECT_EQ(run.summary.outcome, Outcome::kDiverged);
+  EXPECT_THAT(run.summary.reason,
+              testing::HasSubstr("consolidation: the fines of particle_crushing no longer fit "
+                                 "between the grains: they are 0."));
+  EXPECT_THAT(run.summary.reason, testing::HasSubstr("(porosity with fines "));
 }
 
 }  // namespace

@@ -119,6 +119,83 @@ TEST(Consolidation, InitialStressReplacesTheIsotropicStart) {
   EXPECT_NEAR(Value(run.states[2], "lateral_stress"), 2e5, 2e2);
 }
 
+// With both, the porosity is that at which loading begins.
+TEST(Consolidation, ThePorosityHoldsAtTheInitialStress) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.packing = test::SmallPacking(200);
+  s.path = {{.target = 0, .load_step = 0}};
+  s.initial_stress = InitialStress{.axial = 4e5, .lateral = 2e5};
+  const double loose = Value(test::RunAll(s).states[0], "porosity");
+  s.consolidation.porosity = loose - 0.01;
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  EXPECT_NEAR(Value(run.states[0], "porosity"), loose - 0.01, 1.01e-4);
+  EXPECT_NEAR(Value(run.states[0], "axial_stress"), 4e5, 4e2);
+
+  s.consolidation.porosity = loose + 0.02;
+  const auto refused = Simulate(s, [](const State&) {}, {});
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kOutOfRange);
+  EXPECT_THAT(std::string(refused.status().message()),
+              HasSubstr("cannot be met at the initial stress (axial 400000 Pa, lateral 200000 "
+                        "Pa): porosity "));
+}
+
+// 4 x 4 x 4 grains that just touch, without the first one.
+Packing TouchingLattice() {
+  constexpr int kSide = 4;
+  constexpr double kRadius = 1e-3;
+  Packing packing;
+  for (double& length : packing.length) {
+    length = 2 * kRadius * kSide;
+  }
+  for (int i = 1; i < kSide * kSide * kSide; ++i) {
+    packing.x.push_back(kRadius * (2 * (i % kSide) + 1));
+    packing.y.push_back(kRadius * (2 * (i / kSide % kSide) + 1));
+    packing.z.push_back(kRadius * (2 * (i / kSide / kSide) + 1));
+    packing.radius.push_back(kRadius);
+    packing.clump.push_back(-1);
+  }
+  return packing;
+}
+
+// Its first time step would be judged at almost no overlap.
+TEST(Consolidation, ALatticeThatJustTouchesIsCompressed) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.packing = TouchingLattice();
+  s.model.density = 2650;
+  s.model.parameters["young_modulus"] = 1e9;
+  s.model.parameters["friction_coefficient"] = 2;
+  s.settings["confining_pressure"] = 1e5;
+  s.path = {{.target = 0, .load_step = 0}};
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  EXPECT_NEAR(Value(run.states[0], "mean_stress"), 1e5, 1e2);
+}
+
+TEST(Failure, ASpecimenThatYieldsWithoutEndIsSaidToCollapse) {
+  Scenario s = test::SmallTriaxial(test::HertzModel());
+  s.model.effects = {"initial_fabric"};
+  s.model.parameters["initial_fabric.stress_anisotropy"] = 1.5;  // axial four times lateral
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kDiverged);
+  EXPECT_THAT(run.summary.reason,
+              testing::ContainsRegex("consolidation: the specimen collapses under axial [0-9e+.]+ "
+                                     "Pa, lateral [0-9e+.]+ Pa: strain 0.[0-9]+ along z in this "
+                                     "stage; the cell has become too short along z"));
+}
+
+TEST(Failure, AMomentStiffnessThatLeavesNoTimeStepIsNamed) {
+  for (const std::string effect : {"rolling_resistance", "twisting_resistance"}) {
+    const test::Run run = test::RunAll(test::With(test::SmallTriaxial(test::HertzModel()), effect,
+                                                  {{"stiffness", 1e8}, {"friction", 0.5}}));
+    EXPECT_EQ(run.summary.outcome, Outcome::kDiverged);
+    EXPECT_EQ(run.summary.steps, 0) << effect;
+    EXPECT_THAT(run.summary.reason,
+                testing::ContainsRegex("consolidation: the stiffness of " + effect +
+                                       " makes the time step [0-9]+ times shorter"));
+  }
+}
+
 /// Largest difference of an observable over its largest value.
 double LargestDifference(const test::Run& a, const test::Run& b, const std::string& name) {
   double difference = 0;
