@@ -37,6 +37,7 @@ struct Surroundings {
   std::vector<Wall> walls{};          ///< in a periodic axis they reach a diameter beyond the cell
   bool planar = false;                ///< grains move in the plane of x and z only
   double thickness = 0;               ///< of disks, planar only [m]; 0: the grains are spheres
+  std::string material{};             ///< of the walls; "": the model's own
   double skin = 0.25;  ///< gap up to which pairs are listed, over the mean diameter; flows search
                        ///< less often with a wide one
 };
@@ -45,6 +46,7 @@ struct Surroundings {
 struct NewGrain {
   Vec3 centre{}, velocity{};  ///< [m, m/s]
   double radius = 0;          ///< [m] > 0
+  int material = 0;           ///< index in Materials
 };
 
 /// Copyable: a copy is a snapshot that goes on to the same bits. Not thread-safe; uses `threads`
@@ -169,6 +171,9 @@ class Assembly {
             shear_stress_, contacts_);
     archive(clumps_, bodies_, solid_volume_, mean_diameter_, nominal_critical_step_, steps_,
             contact_updates_);
+    if (model_.materials() != nullptr) {
+      archive(p.material);
+    }
   }
 
   /// Places and drives single grains by hand; for tests and for preparing states.
@@ -185,6 +190,12 @@ class Assembly {
   void CarryMemory();
   void EvaluateChunk(int chunk);
   void PrepareBlock(ContactBlock& block) const;
+  void TakeMaterials(const Packing& packing);
+  [[nodiscard]] double DensityOf(int material) const;
+  [[nodiscard]] int MaterialOf(std::size_t grain) const {
+    return particles_.material.empty() ? 0 : particles_.material[grain];
+  }
+  void LoadMaterials(int b, ContactBlock& block) const;
   void SetShifts();
   void PackAllGrains();
   [[nodiscard]] bool AnyTouching(int b) const;
