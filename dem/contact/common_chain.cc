@@ -296,7 +296,7 @@ void ClearUnused(int moments, ContactBlock& b) {
 std::optional<CommonChain> CommonChainOf(const Model& model, double thickness) {
   CommonChain chain;
   chain.hertz = model.contact == "hertz_mindlin";
-  if (!chain.hertz && model.contact != "linear") {
+  if ((!chain.hertz && model.contact != "linear") || !model.materials.empty()) {
     return std::nullopt;
   }
   const auto entries = ContactEntries();

@@ -83,6 +83,13 @@ struct alignas(64) ContactBlock {
   /// the block itself, or where the caller keeps them between steps (aligned as a block).
   Lane own_history[kMaxHistory];
   Lane* history = own_history;
+
+  // Of models with several materials only, set by the caller per contact; what follows from the
+  // pair is filled in by Materials::Complete().
+  bool mixed = false;     ///< there are several materials
+  int materials[kBlock];  ///< Materials::Pair() of i and j
+  Lane friction;          ///< stands for sliding_friction; at walls set by the caller [-] >= 0
+  Lane effective_mass;    ///< m* [kg]
 };
 
 /// Repeats lane 0 in the unused lanes, so that kernels meet valid numbers everywhere;
@@ -94,6 +101,10 @@ inline void PadLanes(int width, ContactBlock& b) {
   }
   for (int c = 0; c < width; ++c) {
     std::fill(b.history[c] + b.count, b.history[c] + kBlock, b.history[c][0]);
+  }
+  if (b.mixed) {
+    std::fill(b.materials + b.count, b.materials + kBlock, b.materials[0]);
+    std::fill(b.friction + b.count, b.friction + kBlock, b.friction[0]);
   }
 }
 

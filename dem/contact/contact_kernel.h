@@ -44,6 +44,8 @@ class ContactKernel {
   virtual void Apply(ContactBlock& block, int first) const = 0;
 };
 
+class Materials;
+
 /// What a law or an effect may know when it is made: its own parameters and the law it joins.
 struct KernelContext {
   std::string contact;   ///< name of the contact law
@@ -52,6 +54,7 @@ struct KernelContext {
   ParameterSet law;      ///< parameters of the law, defaults filled in
   ParameterSet
       parameters;  ///< of the law, or of the effect (without its prefix), defaults filled in
+  const Materials* materials = nullptr;  ///< while the kernel is made; null: there is one material
 };
 
 using MakeKernel = std::unique_ptr<ContactKernel> (*)(const KernelContext& context);

@@ -40,11 +40,15 @@ ContactModel::ContactModel(const Model& model, double thickness)
   std::vector<std::pair<ContactStage, std::shared_ptr<const ContactKernel>>> kernels;
   const ContactEntry& law = LawNamed(model.contact);
   const ParameterSet law_parameters = ResolveParameters(law.info.parameters, "", model.parameters);
+  if (!model.materials.empty()) {
+    materials_ = std::make_shared<const Materials>(model, law_parameters, thickness);
+  }
   const KernelContext law_context{.contact = model.contact,
                                   .density = model.density,
                                   .thickness = thickness,
                                   .law = law_parameters,
-                                  .parameters = law_parameters};
+                                  .parameters = law_parameters,
+                                  .materials = materials_.get()};
   kernels.emplace_back(ContactStage::kNormal, law.make(law_context));
   kernels.emplace_back(ContactStage::kSlidingLimit, MakeCoulombLimit());
   kernels.emplace_back(ContactStage::kTangential, MakeTangentialSpring());
@@ -58,7 +62,8 @@ ContactModel::ContactModel(const Model& model, double thickness)
           .density = model.density,
           .thickness = thickness,
           .law = law_parameters,
-          .parameters = ResolveParameters(effect.info.parameters, name + ".", model.parameters)};
+          .parameters = ResolveParameters(effect.info.parameters, name + ".", model.parameters),
+          .materials = materials_.get()};
       if (effect.bound != nullptr) {
         effect.bound(context.parameters, walls);
       }
@@ -127,6 +132,9 @@ void ContactModel::Evaluate(ContactBlock& block) const {
     ComputeKinematics(block);
   }
   ClearExtras(block);
+  if (materials_ != nullptr) {
+    materials_->Complete(block);
+  }
   for (const Link& link : chain_) {
     link.kernel->Apply(block, link.first_history);
   }

@@ -7,6 +7,7 @@
 
 #include "dem/contact/common_chain.h"
 #include "dem/contact/contact_kernel.h"
+#include "dem/contact/materials.h"
 #include "dem/formula/formula_kernel.h"
 #include "dem/simulation/scenario.h"
 
@@ -34,6 +35,10 @@ class ContactModel {
   /// tan(phi_w) of contacts with walls.
   [[nodiscard]] double wall_friction() const { return wall_friction_; }
 
+  /// null: the model has one material. Otherwise blocks need `mixed` and `materials`, at walls
+  /// `friction`, too.
+  [[nodiscard]] const Materials* materials() const { return materials_.get(); }
+
   /// Kinematics, every kernel in the order of ContactStage, totals. All inputs of the block are
   /// set; its history is read and updated.
   void Evaluate(ContactBlock& block) const;
@@ -57,6 +62,7 @@ class ContactModel {
   std::optional<CommonChain> common_;
   std::vector<std::shared_ptr<const FormulaKernel>> formulas_;
   std::shared_ptr<StageState> stage_;
+  std::shared_ptr<const Materials> materials_;
   int history_size_ = 0;
   double sliding_friction_ = 0;
   double wall_friction_ = 0;

@@ -16,6 +16,13 @@ CALIB_DEM_CLONES void LimitByCoulomb(ContactBlock& b) {
   }
 }
 
+CALIB_DEM_CLONES void LimitPairsByCoulomb(ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const double load = b.normal_force[k] + b.attraction[k];
+    b.sliding_limit[k] = load > 0 ? b.friction[k] * load : 0.0;
+  }
+}
+
 CALIB_DEM_CLONES void IntegrateShear(ContactBlock& b, int first) {
   double* const sx = b.history[first];
   double* const sy = b.history[first + 1];
@@ -41,7 +48,13 @@ CALIB_DEM_CLONES void IntegrateShear(ContactBlock& b, int first) {
 
 class CoulombLimit final : public ContactKernel {
  public:
-  void Apply(ContactBlock& block, int /*first*/) const override { LimitByCoulomb(block); }
+  void Apply(ContactBlock& block, int /*first*/) const override {
+    if (block.mixed) {
+      LimitPairsByCoulomb(block);
+    } else {
+      LimitByCoulomb(block);
+    }
+  }
 };
 
 class TangentialSpring final : public ContactKernel {

@@ -7,7 +7,8 @@
 
 namespace calib::dem {
 
-/// Largest shear force tan(phi_mu) (Fn + attraction), zero where that pulls. [Cheng 2018, Table 1]
+/// Largest shear force tan(phi_mu) (Fn + attraction), zero where that pulls; with several materials
+/// tan(phi_mu) is that of the pair. [Cheng 2018, Table 1]
 std::unique_ptr<ContactKernel> MakeCoulombLimit();
 
 /// Incremental shear force dFs = -ks slip, carried along with the contact and cut back to

@@ -1,9 +1,12 @@
 #include "dem/contact/viscoelastic.h"
 
 #include <cmath>
+#include <utility>
 
 #include "dem/contact/common_parameters.h"
+#include "dem/contact/materials.h"
 #include "dem/contact/power.h"
+#include "dem/contact/quad.h"
 #include "dem/contact/simd.h"
 
 namespace calib::dem {
@@ -14,13 +17,23 @@ struct Springs {
   double tangential = 0;  ///< k_t [N/m]
 };
 
+CALIB_DEM_INLINE void SpringsLane(const Springs springs, int k, ContactBlock& b) {
+  const double u = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
+  const double secant = springs.normal * std::sqrt(b.effective_radius[k] * u);
+  b.normal_force[k] = secant * u;
+  b.normal_stiffness[k] = 1.5 * secant;
+  b.tangential_stiffness[k] = springs.tangential;
+}
+
 CALIB_DEM_CLONES void EvaluateSprings(const Springs springs, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
-    const double u = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
-    const double secant = springs.normal * std::sqrt(b.effective_radius[k] * u);
-    b.normal_force[k] = secant * u;
-    b.normal_stiffness[k] = 1.5 * secant;
-    b.tangential_stiffness[k] = springs.tangential;
+    SpringsLane(springs, k, b);
+  }
+}
+
+CALIB_DEM_CLONES void EvaluatePairSprings(const Springs* springs, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    SpringsLane(springs[b.materials[k]], k, b);
   }
 }
 
@@ -44,56 +57,87 @@ CALIB_DEM_CLONES void RaiseOverlap(const ViscoelasticExponent& exponent, const C
   }
 }
 
+/// c [N s/m]
+CALIB_DEM_INLINE void DampLane(double c, int k, ContactBlock& b) {
+  b.normal_force[k] -= c * b.normal_velocity[k];
+  b.normal_damping[k] += c;
+  // The Coulomb limit takes |F|: what pulls is turned into load.
+  const double load = b.normal_force[k] + b.attraction[k];
+  b.attraction[k] -= load < 0 ? 2.0 * load : 0.0;
+}
+
 CALIB_DEM_CLONES void Damp(double damping, const double* __restrict raised, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
-    const double c = damping * raised[k];
-    b.normal_force[k] -= c * b.normal_velocity[k];
-    b.normal_damping[k] += c;
-    // The Coulomb limit takes |F|: what pulls is turned into load.
-    const double load = b.normal_force[k] + b.attraction[k];
-    b.attraction[k] -= load < 0 ? 2.0 * load : 0.0;
+    DampLane(damping * raised[k], k, b);
+  }
+}
+
+CALIB_DEM_CLONES void DampPairs(const double* damping, const double* __restrict raised,
+                                ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    DampLane(damping[b.materials[k]] * b.viscous * raised[k], k, b);
   }
 }
 
 class SpringsKernel final : public ContactKernel {
  public:
-  explicit SpringsKernel(const Springs& springs) : springs_(springs) {}
+  explicit SpringsKernel(std::vector<Springs> springs) : springs_(std::move(springs)) {}
   void Apply(ContactBlock& block, int /*first*/) const override {
-    EvaluateSprings(springs_, block);
+    if (block.mixed) {
+      EvaluatePairSprings(springs_.data(), block);
+    } else {
+      EvaluateSprings(springs_.front(), block);
+    }
   }
 
  private:
-  Springs springs_;
+  std::vector<Springs> springs_;  ///< per pair of materials
 };
 
 class DashpotKernel final : public ContactKernel {
  public:
-  DashpotKernel(double damping, const ViscoelasticExponent& exponent)
-      : damping_(damping), exponent_(exponent) {}
+  DashpotKernel(std::vector<double> damping, const ViscoelasticExponent& exponent)
+      : damping_(std::move(damping)), exponent_(exponent) {}
   void Apply(ContactBlock& block, int /*first*/) const override {
     ContactBlock::Lane raised;
     RaiseOverlap(exponent_, block, raised);
-    Damp(damping_ * block.viscous, raised, block);
+    if (block.mixed) {
+      DampPairs(damping_.data(), raised, block);
+    } else {
+      Damp(damping_.front() * block.viscous, raised, block);
+    }
   }
 
  private:
-  double damping_;  ///< gamma [N s/m^(1 + alpha)]
+  std::vector<double> damping_;  ///< per pair of materials: gamma [N s/m^(1 + alpha)]
   ViscoelasticExponent exponent_;
 };
+
+Springs SpringsAmongEquals(const ParameterSet& law) {
+  const double e = law.Get("young_modulus");
+  const double nu = law.Get("poisson_ratio");
+  return {.normal = 2.0 * e / (3.0 * (1.0 - nu * nu)),
+          .tangential = law.Get("tangential_stiffness")};
+}
 
 }  // namespace
 
 std::unique_ptr<ContactKernel> MakeViscoelasticSprings(const KernelContext& context) {
-  const double e = context.parameters.Get("young_modulus");
-  const double nu = context.parameters.Get("poisson_ratio");
   return std::make_unique<SpringsKernel>(
-      Springs{.normal = 2.0 * e / (3.0 * (1.0 - nu * nu)),
-              .tangential = context.parameters.Get("tangential_stiffness")});
+      ForPairs<Springs>(context, &SpringsAmongEquals, [](const Springs& a, const Springs& b) {
+        return Springs{.normal = InSeries(a.normal, b.normal),
+                       .tangential = InSeries(a.tangential, b.tangential)};
+      }));
 }
 
 std::unique_ptr<ContactKernel> MakeViscoelasticDashpot(const KernelContext& context,
                                                        const ViscoelasticExponent& exponent) {
-  return std::make_unique<DashpotKernel>(context.parameters.Get("damping"), exponent);
+  std::vector<double> damping = ForPairs<double>(
+      context, [](const ParameterSet& law) { return law.Get("damping"); }, &InSeries);
+  if (context.materials != nullptr) {
+    context.materials->TakePairs("damping", damping);
+  }
+  return std::make_unique<DashpotKernel>(std::move(damping), exponent);
 }
 
 std::vector<ParameterInfo> ViscoelasticParameters(const std::string& damping_unit) {

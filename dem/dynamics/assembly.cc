@@ -35,6 +35,10 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model,
   assert(particles_.size() > 0 && density > 0 && threads >= 1);
   std::copy(std::begin(packing.length), std::end(packing.length), std::begin(cell_.length));
   std::copy(std::begin(surroundings.open), std::end(surroundings.open), std::begin(cell_.open));
+  if (model_.materials() != nullptr) {
+    TakeMaterials(packing);
+    walls_.SetMaterial(model_.materials()->IndexOf(surroundings.material));
+  }
   clumps_ = RigidClumps(packing, density, particles_);
   assert(thickness_ == 0 || (planar_ && clumps_.all().empty()));
   double radii = 0;
@@ -56,6 +60,24 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model,
   skin_ = surroundings.skin * mean_diameter_ + reach_;
   wall_reach_ = walls_.empty() ? 0 : model_.Reach(2 * largest_radius_);
   nominal_critical_step_ = CriticalStepAt(1e-4);
+}
+
+/// Masses of grains that are not of the model's own material. Precondition: no clumps.
+void Assembly::TakeMaterials(const Packing& packing) {
+  const Materials& materials = *model_.materials();
+  ParticleArrays& p = particles_;
+  p.material.assign(p.x.size(), 0);
+  for (std::size_t g = 0; g < p.x.size() && !packing.material.empty(); ++g) {
+    const int material = materials.IndexOf(packing.material[static_cast<std::size_t>(p.id[g])]);
+    const Inertia inertia = InertiaOf(p.radius[g], DensityOf(material), thickness_);
+    p.material[g] = static_cast<std::uint8_t>(material);
+    p.inverse_mass[g] = 1.0 / inertia.mass;
+    p.inverse_inertia[g] = 1.0 / inertia.moment;
+  }
+}
+
+double Assembly::DensityOf(int material) const {
+  return material == 0 ? density_ : model_.materials()->density(material);
 }
 
 void Assembly::Shrink(const std::vector<std::pair<int, double>>& radii) {

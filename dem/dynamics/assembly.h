@@ -28,7 +28,7 @@ struct StiffnessEstimate {
       0;  ///< min over grains of sqrt(m/K), translation and rotation [s]; 0: no contact
   double elastic_step = 0;    ///< the same without dashpots [s]
   double step_by_forces = 0;  ///< the same without moment stiffness either [s]
-  bool by_twisting = false;  ///< of the moment stiffnesses twisting is larger than rolling
+  bool by_twisting = false;   ///< of the moment stiffnesses twisting is larger than rolling
   std::array<double, 3> modulus = {0, 0, 0};    ///< affine (Voigt) stiffness of each axis [Pa]
   std::array<double, 3> viscosity = {0, 0, 0};  ///< the same of the dashpots [Pa s]
 };
@@ -40,6 +40,7 @@ struct Surroundings {
   std::vector<Wall> walls{};          ///< in a periodic axis they reach a diameter beyond the cell
   bool planar = false;                ///< grains move in the plane of x and z only
   double thickness = 0;               ///< of disks, planar only [m]; 0: the grains are spheres
+  std::string material{};             ///< of the walls; "": the model's own
   double skin = 0.25;  ///< gap up to which pairs are listed, over the mean diameter; flows search
                        ///< less often with a wide one
 };
@@ -48,6 +49,7 @@ struct Surroundings {
 struct NewGrain {
   Vec3 centre{}, velocity{};  ///< [m, m/s]
   double radius = 0;          ///< [m] > 0
+  int material = 0;           ///< index in Materials
 };
 
 /// Copyable: a copy is a snapshot that goes on to the same bits. Not thread-safe; uses `threads`
@@ -183,6 +185,9 @@ class Assembly {
             shear_stress_, contacts_);
     archive(clumps_, bodies_, solid_volume_, mean_diameter_, nominal_critical_step_, steps_,
             contact_updates_);
+    if (model_.materials() != nullptr) {
+      archive(p.material);
+    }
   }
 
   /// Places and drives single grains by hand; for tests and for preparing states.
@@ -199,6 +204,12 @@ class Assembly {
   void CarryMemory();
   void EvaluateChunk(int chunk);
   void PrepareBlock(ContactBlock& block) const;
+  void TakeMaterials(const Packing& packing);
+  [[nodiscard]] double DensityOf(int material) const;
+  [[nodiscard]] int MaterialOf(std::size_t grain) const {
+    return particles_.material.empty() ? 0 : particles_.material[grain];
+  }
+  void LoadMaterials(int b, ContactBlock& block) const;
   void SetShifts();
   void PackAllGrains();
   [[nodiscard]] bool AnyTouching(int b) const;
@@ -270,6 +281,8 @@ class Assembly {
   double mean_diameter_ = 0;
   /// NominalCriticalStep() if contacts had no moment stiffness [s].
   [[nodiscard]] double NominalStepByForces() const;
+  /// Of the smallest grain, of each material where there are several; overlap: in radii.
+  [[nodiscard]] double LeastNominalStep(double overlap, bool with_moments) const;
 
   double nominal_critical_step_ = 0;
   std::int64_t steps_ = 0;

@@ -134,6 +134,21 @@ void Assembly::PrepareBlock(ContactBlock& block) const {
   block.shear = cell_.shear;
 }
 
+/// Which materials meet in the lanes of block b, where the model has several.
+void Assembly::LoadMaterials(int b, ContactBlock& block) const {
+  const Materials* materials = model_.materials();
+  if (materials == nullptr) {
+    return;
+  }
+  block.mixed = true;
+  const std::size_t first = static_cast<std::size_t>(b) * kBlock;
+  for (std::size_t k = 0; k < kBlock; ++k) {
+    block.materials[k] =
+        materials->Pair(MaterialOf(static_cast<std::size_t>(lanes_.first[first + k])),
+                        MaterialOf(static_cast<std::size_t>(lanes_.second[first + k])));
+  }
+}
+
 void Assembly::EvaluateChunk(int chunk) {
   constexpr int kBlocks = kPairChunk / kBlock;
   ContactBlock block;
@@ -154,6 +169,7 @@ void Assembly::EvaluateChunk(int chunk) {
       sums.contacts += EvaluateCommonChain(*model_.common(), block, touching);
     } else {
       for (int k = 0; k < block.count; ++k) block.pair[k] = b * kBlock + k;
+      LoadMaterials(b, block);
       model_.Evaluate(block);
       sums.contacts += CloseBlock(block.count, reach_, model_.history_size(), block, touching);
     }

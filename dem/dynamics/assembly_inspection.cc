@@ -22,40 +22,62 @@ constexpr double kNominalOverlap = 1e-4;
 
 enum class Moments { kWith, kWithout };
 
-/// sqrt(m/K) of the smallest grain, held by one like it at an overlap given in radii.
-double NominalStep(const ContactModel& model, const ParticleArrays& p, double overlap,
-                   Moments moments) {
-  const auto smallest = static_cast<std::size_t>(
-      std::min_element(p.radius.begin(), p.radius.end()) - p.radius.begin());
+/// sqrt(m/K) of a grain, held by one like it at an overlap given in radii; pair: of materials,
+/// where there are several.
+double NominalStep(const ContactModel& model, const ParticleArrays& p, std::size_t grain,
+                   double overlap, int pair, Moments moments) {
   ContactBlock block{};
+  block.mixed = model.materials() != nullptr;
   for (int k = 0; k < kBlock; ++k) {
-    block.radius_i[k] = block.radius_j[k] = p.radius[smallest];
-    block.dx[k] = (2.0 - overlap) * p.radius[smallest];
+    block.radius_i[k] = block.radius_j[k] = p.radius[grain];
+    block.dx[k] = (2.0 - overlap) * p.radius[grain];
+    block.materials[k] = pair;
   }
   model.Evaluate(block);
   if (moments == Moments::kWithout) {
     block.rolling_stiffness[0] = block.twisting_stiffness[0] = 0.0;
   }
   const double translation =
-      (block.normal_stiffness[0] + block.tangential_stiffness[0]) * p.inverse_mass[smallest];
-  const double rotation = (block.tangential_stiffness[0] * p.radius[smallest] * p.radius[smallest] +
+      (block.normal_stiffness[0] + block.tangential_stiffness[0]) * p.inverse_mass[grain];
+  const double rotation = (block.tangential_stiffness[0] * p.radius[grain] * p.radius[grain] +
                            block.rolling_stiffness[0] + block.twisting_stiffness[0]) *
-                          p.inverse_inertia[smallest];
+                          p.inverse_inertia[grain];
   const double fastest = std::sqrt(std::max(translation, rotation));
   const double damping =
-      (block.normal_damping[0] + block.tangential_damping[0]) * p.inverse_mass[smallest];
+      (block.normal_damping[0] + block.tangential_damping[0]) * p.inverse_mass[grain];
   return 1.0 / DampedRate(fastest, damping);
 }
 
 }  // namespace
 
-double Assembly::CriticalStepAt(double overlap) const {
-  return NominalStep(model_, particles_, overlap, Moments::kWith);
+double Assembly::LeastNominalStep(double overlap, bool with_moments) const {
+  const ParticleArrays& p = particles_;
+  const Moments moments = with_moments ? Moments::kWith : Moments::kWithout;
+  const Materials* materials = model_.materials();
+  if (materials == nullptr) {
+    const auto smallest = std::min_element(p.radius.begin(), p.radius.end()) - p.radius.begin();
+    return NominalStep(model_, p, static_cast<std::size_t>(smallest), overlap, 0, moments);
+  }
+  // The smallest grain of each material against every material.
+  double least = std::numeric_limits<double>::infinity();
+  for (int a = 0; a < materials->count(); ++a) {
+    std::size_t smallest = p.radius.size();
+    for (std::size_t g = 0; g < p.radius.size(); ++g) {
+      if (MaterialOf(g) == a && (smallest == p.radius.size() || p.radius[g] < p.radius[smallest])) {
+        smallest = g;
+      }
+    }
+    for (int b = 0; b < materials->count() && smallest < p.radius.size(); ++b) {
+      least = std::min(least,
+                       NominalStep(model_, p, smallest, overlap, materials->Pair(a, b), moments));
+    }
+  }
+  return least;
 }
 
-double Assembly::NominalStepByForces() const {
-  return NominalStep(model_, particles_, kNominalOverlap, Moments::kWithout);
-}
+double Assembly::CriticalStepAt(double overlap) const { return LeastNominalStep(overlap, true); }
+
+double Assembly::NominalStepByForces() const { return LeastNominalStep(kNominalOverlap, false); }
 
 absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
   const ParticleArrays& p = particles_;
@@ -98,6 +120,7 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
       const double* const column = history_[ColumnsOf(static_cast<std::size_t>(block)) + c].lane;
       std::copy_n(column, kBlock, b.history[c]);
     }
+    LoadMaterials(block, b);
     model_.Evaluate(b);
     for (int k = 0; k < kBlock; ++k) {
       const auto slot = static_cast<std::size_t>(block) * kBlock + static_cast<std::size_t>(k);

@@ -24,10 +24,14 @@ void Keep(const std::vector<int>& to, ParticleArrays& p) {
   std::size_t kept = 0;
   for (std::size_t g = 0; g < to.size(); ++g) {
     if (to[g] != kGone) {
+      if (!p.material.empty()) {
+        p.material[kept] = p.material[g];
+      }
       p.id[kept++] = p.id[g];
     }
   }
   p.id.resize(kept);
+  p.material.resize(p.material.empty() ? 0 : kept);
 }
 
 }  // namespace
@@ -60,7 +64,7 @@ void Assembly::Remove(const std::vector<int>& grains) {
   for (const int g : grains) {
     const auto q = static_cast<std::size_t>(g);
     to[q] = kGone;
-    solid_volume_ -= 1.0 / (particles_.inverse_mass[q] * density_);
+    solid_volume_ -= 1.0 / (particles_.inverse_mass[q] * DensityOf(MaterialOf(q)));
   }
   int next = 0;
   for (int& index : to) {
@@ -75,7 +79,8 @@ void Assembly::Insert(const std::vector<NewGrain>& grains) {
   ParticleArrays& p = particles_;
   for (const NewGrain& grain : grains) {
     assert(grain.radius > 0 && grain.radius <= largest_radius_ * (1 + 1e-12));
-    const Inertia inertia = InertiaOf(grain.radius, density_, thickness_);
+    const double density = DensityOf(grain.material);
+    const Inertia inertia = InertiaOf(grain.radius, density, thickness_);
     for (auto* a : {&p.wx, &p.wy, &p.wz, &p.fx, &p.fy, &p.fz, &p.tx, &p.ty, &p.tz}) {
       a->push_back(0);
     }
@@ -89,7 +94,10 @@ void Assembly::Insert(const std::vector<NewGrain>& grains) {
     p.inverse_mass.push_back(1.0 / inertia.mass);
     p.inverse_inertia.push_back(1.0 / inertia.moment);
     p.id.push_back(next_id_++);
-    solid_volume_ += inertia.mass / density_;
+    if (model_.materials() != nullptr) {
+      p.material.push_back(static_cast<std::uint8_t>(grain.material));
+    }
+    solid_volume_ += inertia.mass / density;
   }
   stale_ = true;
   loads_fit_ = false;

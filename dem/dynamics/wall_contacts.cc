@@ -32,9 +32,10 @@ struct Near {
 
 }  // namespace
 
-double WallContacts::FrictionOf(int wall, const ContactModel& model) const {
+double WallContacts::FrictionOf(int wall, const ContactModel& model, int pair) const {
   const Wall& w = walls_[static_cast<std::size_t>(wall)];
-  return w.friction.value_or(model.wall_friction());
+  return w.friction.value_or(model.materials() == nullptr ? model.wall_friction()
+                                                          : model.materials()->friction(pair));
 }
 
 void WallContacts::FindContacts(const ParticleArrays& p, const Step& step, std::size_t r,
@@ -170,6 +171,11 @@ void WallContacts::LoadLane(const ParticleArrays& p, const ContactModel& model, 
   for (int c = 0; c < model.history_size(); ++c) {
     b.history[c][k] = contact.history[c];
   }
+  if (model.materials() != nullptr) {
+    b.mixed = true;
+    b.materials[k] = PairOf(p, row.grain, model);
+    b.friction[k] = FrictionOf(contact.wall, model, b.materials[k]);
+  }
 }
 
 void WallContacts::EvaluateChunk(const ParticleArrays& p, const ContactModel& model,
@@ -225,7 +231,7 @@ void WallContacts::EvaluateChunk(const ParticleArrays& p, const ContactModel& mo
     row.load = GrainLoad{};
     for (int c = 0; c < row.contacts; ++c) {
       Contact& contact = ContactOf(row, c);
-      const double friction = FrictionOf(contact.wall, model);
+      const double friction = FrictionOf(contact.wall, model, PairOf(p, row.grain, model));
       if (block.count > 0 && friction != block.sliding_friction) {
         flush();
       }

@@ -30,6 +30,9 @@ class WallContacts {
   /// Velocities, activity and friction may be set between steps; places change by Move() only.
   std::vector<Wall>& mutable_walls() { return walls_; }
 
+  /// Of all walls, an index in Materials; the model's own unless set.
+  void SetMaterial(int material) { material_ = material; }
+
   /// Lists what each grain may touch until grains and walls have moved by `skin` together; what
   /// contacts remember goes along.
   void Search(const ParticleArrays& particles, double skin);
@@ -118,10 +121,17 @@ class WallContacts {
                      int chunk, ChunkResult& result);
   void LoadLane(const ParticleArrays& p, const ContactModel& model, const Row& row,
                 const Contact& contact, ContactBlock& block) const;
-  [[nodiscard]] double FrictionOf(int wall, const ContactModel& model) const;
+  /// pair: of materials, where the model has several.
+  [[nodiscard]] double FrictionOf(int wall, const ContactModel& model, int pair) const;
+  [[nodiscard]] int PairOf(const ParticleArrays& p, int grain, const ContactModel& model) const {
+    return model.materials() == nullptr
+               ? 0
+               : model.materials()->Pair(p.material[static_cast<std::size_t>(grain)], material_);
+  }
   [[nodiscard]] Vec3 NearestOn(const Candidate& candidate, const Vec3& p) const;
 
   std::vector<Wall> walls_;
+  int material_ = 0;
   std::vector<std::vector<Vec3>> searched_;  ///< vertices at the search; a plane's point
   double moved_ = 0;
   std::vector<Row> rows_;  ///< ascending by grain

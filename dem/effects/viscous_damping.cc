@@ -1,23 +1,47 @@
 #include "dem/effects/viscous_damping.h"
 
 #include <cmath>
+#include <vector>
 
+#include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 
 namespace calib::dem {
 namespace {
 
+CALIB_DEM_INLINE void DampNormalLane(double scale, double mass, int k, ContactBlock& b) {
+  const double stiffness = b.normal_stiffness[k] > 0 ? b.normal_stiffness[k] : 0.0;
+  const double c = scale * std::sqrt(mass * stiffness);
+  const double elastic = b.normal_force[k];
+  const double least = elastic < 0 ? elastic : 0.0;
+  const double total = elastic - c * b.normal_velocity[k];
+  b.normal_force[k] = total > least ? total : least;
+  b.normal_damping[k] += c;
+}
+
+CALIB_DEM_INLINE void DampShearLane(double scale, double per_time, double mass, int k,
+                                    ContactBlock& b) {
+  const double c = scale * std::sqrt(mass * b.tangential_stiffness[k]);
+  const double limit = b.sliding_limit[k];
+  const double spring = std::sqrt(b.fx[k] * b.fx[k] + b.fy[k] * b.fy[k] + b.fz[k] * b.fz[k]);
+  // Rounding must not decide: a spring that slides is cut to the limit, up to its last bit.
+  const double rate = spring < (1.0 - 1e-9) * limit ? c * per_time : 0.0;
+  const double x = b.fx[k] - rate * b.slip_x[k];
+  const double y = b.fy[k] - rate * b.slip_y[k];
+  const double z = b.fz[k] - rate * b.slip_z[k];
+  const double size = std::sqrt(x * x + y * y + z * z);
+  const double cut = rate > 0 && size > limit ? limit / size : 1.0;
+  b.fx[k] = cut * x;
+  b.fy[k] = cut * y;
+  b.fz[k] = cut * z;
+  b.tangential_damping[k] += c;
+}
+
 CALIB_DEM_CLONES void DampNormal(const Dashpot dashpot, ContactBlock& b) {
   const double scale = dashpot.twice_ratio * b.viscous;
   for (int k = 0; k < kBlock; ++k) {
     const double mass = EffectiveMass(dashpot.grains, b.mass_factor, b.radius_i[k], b.radius_j[k]);
-    const double stiffness = b.normal_stiffness[k] > 0 ? b.normal_stiffness[k] : 0.0;
-    const double c = scale * std::sqrt(mass * stiffness);
-    const double elastic = b.normal_force[k];
-    const double least = elastic < 0 ? elastic : 0.0;
-    const double total = elastic - c * b.normal_velocity[k];
-    b.normal_force[k] = total > least ? total : least;
-    b.normal_damping[k] += c;
+    DampNormalLane(scale, mass, k, b);
   }
 }
 
@@ -26,47 +50,77 @@ CALIB_DEM_CLONES void DampShear(const Dashpot dashpot, ContactBlock& b) {
   const double per_time = b.dt > 0 ? 1.0 / b.dt : 0.0;
   for (int k = 0; k < kBlock; ++k) {
     const double mass = EffectiveMass(dashpot.grains, b.mass_factor, b.radius_i[k], b.radius_j[k]);
-    const double c = scale * std::sqrt(mass * b.tangential_stiffness[k]);
-    const double limit = b.sliding_limit[k];
-    const double spring = std::sqrt(b.fx[k] * b.fx[k] + b.fy[k] * b.fy[k] + b.fz[k] * b.fz[k]);
-    // Rounding must not decide: a spring that slides is cut to the limit, up to its last bit.
-    const double rate = spring < (1.0 - 1e-9) * limit ? c * per_time : 0.0;
-    const double x = b.fx[k] - rate * b.slip_x[k];
-    const double y = b.fy[k] - rate * b.slip_y[k];
-    const double z = b.fz[k] - rate * b.slip_z[k];
-    const double size = std::sqrt(x * x + y * y + z * z);
-    const double cut = rate > 0 && size > limit ? limit / size : 1.0;
-    b.fx[k] = cut * x;
-    b.fy[k] = cut * y;
-    b.fz[k] = cut * z;
-    b.tangential_damping[k] += c;
+    DampShearLane(scale, per_time, mass, k, b);
   }
+}
+
+CALIB_DEM_CLONES void DampPairsNormal(const double* twice_ratio, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    DampNormalLane(twice_ratio[b.materials[k]] * b.viscous, b.effective_mass[k], k, b);
+  }
+}
+
+CALIB_DEM_CLONES void DampPairsShear(const double* twice_ratio, ContactBlock& b) {
+  const double per_time = b.dt > 0 ? 1.0 / b.dt : 0.0;
+  for (int k = 0; k < kBlock; ++k) {
+    DampShearLane(twice_ratio[b.materials[k]] * b.viscous, per_time, b.effective_mass[k], k, b);
+  }
+}
+
+/// 2 beta per pair of materials.
+std::vector<double> RatiosOf(const KernelContext& context, const Dashpot& dashpot) {
+  if (context.materials == nullptr) {
+    return {};
+  }
+  std::vector<double> ratios(static_cast<std::size_t>(context.materials->pairs()),
+                             0.5 * dashpot.twice_ratio);
+  context.materials->TakePairs("damping_ratio", ratios);
+  for (double& ratio : ratios) {
+    ratio *= 2.0;
+  }
+  return ratios;
 }
 
 class NormalDashpot final : public ContactKernel {
  public:
-  explicit NormalDashpot(const Dashpot& dashpot) : dashpot_(dashpot) {}
-  void Apply(ContactBlock& block, int /*first*/) const override { DampNormal(dashpot_, block); }
+  explicit NormalDashpot(const KernelContext& context)
+      : dashpot_(DashpotFrom(context)), twice_ratio_(RatiosOf(context, dashpot_)) {}
+  void Apply(ContactBlock& block, int /*first*/) const override {
+    if (block.mixed) {
+      DampPairsNormal(twice_ratio_.data(), block);
+    } else {
+      DampNormal(dashpot_, block);
+    }
+  }
 
  private:
   Dashpot dashpot_;
+  std::vector<double> twice_ratio_;  ///< per pair of materials
 };
 
 class ShearDashpot final : public ContactKernel {
  public:
-  explicit ShearDashpot(const Dashpot& dashpot) : dashpot_(dashpot) {}
-  void Apply(ContactBlock& block, int /*first*/) const override { DampShear(dashpot_, block); }
+  explicit ShearDashpot(const KernelContext& context)
+      : dashpot_(DashpotFrom(context)), twice_ratio_(RatiosOf(context, dashpot_)) {}
+  void Apply(ContactBlock& block, int /*first*/) const override {
+    if (block.mixed) {
+      DampPairsShear(twice_ratio_.data(), block);
+    } else {
+      DampShear(dashpot_, block);
+    }
+  }
 
  private:
   Dashpot dashpot_;
+  std::vector<double> twice_ratio_;  ///< per pair of materials
 };
 
 std::unique_ptr<ContactKernel> MakeNormal(const KernelContext& context) {
-  return std::make_unique<NormalDashpot>(DashpotFrom(context));
+  return std::make_unique<NormalDashpot>(context);
 }
 
 std::unique_ptr<ContactKernel> MakeShear(const KernelContext& context) {
-  return std::make_unique<ShearDashpot>(DashpotFrom(context));
+  return std::make_unique<ShearDashpot>(context);
 }
 
 }  // namespace

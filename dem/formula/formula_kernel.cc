@@ -91,7 +91,7 @@ double FormulaKernel::ValueAt(int quantity, const ContactBlock& b, int first, in
     case kShearForce:
       return ShearOf(b, k);
     case kFriction:
-      return b.sliding_friction;
+      return b.mixed ? b.friction[k] : b.sliding_friction;
     case kEffectiveRadius:
       return b.effective_radius[k];
     case kSmallerRadius:
@@ -99,7 +99,8 @@ double FormulaKernel::ValueAt(int quantity, const ContactBlock& b, int first, in
     case kLargerRadius:
       return std::max(b.radius_i[k], b.radius_j[k]);
     case kEffectiveMass:
-      return EffectiveMass(grains_, b.mass_factor, b.radius_i[k], b.radius_j[k]);
+      return b.mixed ? b.effective_mass[k]
+                     : EffectiveMass(grains_, b.mass_factor, b.radius_i[k], b.radius_j[k]);
     case kMeanStress:
       return stage_->mean_stress;
     case kDeviatoricStress:

@@ -15,6 +15,8 @@ struct Packing {
   double length[3] = {0, 0, 0};         ///< periodic cell [m], axial direction last (z)
   std::vector<double> x, y, z, radius;  ///< [m], size N each
   std::vector<int> clump;               ///< -1: single sphere; equal ids move as one rigid body
+  std::vector<std::string> material{};  ///< of each grain, "" or `grains`: the model's own; empty:
+                                        ///< of all grains
 };
 
 /// One thing wrong in a text file. line is 1-based; 0: the file as a whole.
@@ -23,8 +25,8 @@ struct PackingProblem {
   std::string message;
 };
 
-/// Reads `##PERIODIC:: Lx Ly Lz` followed by `x y z r clump` per line (blank lines, # comments and a
-/// byte order mark allowed) [m]. Appends everything wrong to problems (not a number, missing fields,
+/// Reads `##PERIODIC:: Lx Ly Lz` followed by `x y z r clump` or `x y z r clump material` per line
+/// (blank lines, # comments and a byte order mark allowed) [m]. Appends everything wrong to problems (not a number, missing fields,
 /// radius <= 0 or too large for the cell, a grain outside the cell by more than half its length,
 /// fewer than two grains); centres outside by less belong to an image; the result is meaningful
 /// only if none was added.

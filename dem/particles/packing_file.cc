@@ -42,9 +42,11 @@ bool ParseHeader(const std::string& line, int number, Packing& packing,
 void ParseGrain(const std::string& line, int number, Packing& packing,
                 std::vector<PackingProblem>& problems) {
   const std::vector<std::string> fields = Fields(line);
-  if (fields.size() != 5) {
-    problems.push_back({number, absl::StrCat("found ", fields.size(),
-                                             " fields, a grain has five: x y z r clump")});
+  if (fields.size() != 5 && fields.size() != 6) {
+    problems.push_back(
+        {number, absl::StrCat("found ", fields.size(),
+                              " fields, a grain has five: x y z r clump, or six: x y z r clump "
+                              "material")});
     return;
   }
   static constexpr std::array<const char*, 4> kNames = {"x", "y", "z", "r"};
@@ -88,6 +90,12 @@ void ParseGrain(const std::string& line, int number, Packing& packing,
   packing.z.push_back(values[2]);
   packing.radius.push_back(values[3]);
   packing.clump.push_back(clump);
+  if (fields.size() == 6) {
+    packing.material.resize(packing.clump.size() - 1);
+    packing.material.push_back(fields[5]);
+  } else if (!packing.material.empty()) {
+    packing.material.emplace_back();
+  }
 }
 
 }  // namespace
@@ -129,8 +137,10 @@ std::string FormatPacking(const Packing& packing) {
   std::string text = absl::StrFormat("%s %.17g %.17g %.17g\n", kHeader, packing.length[0],
                                      packing.length[1], packing.length[2]);
   for (std::size_t i = 0; i < packing.x.size(); ++i) {
-    absl::StrAppendFormat(&text, "%.17g %.17g %.17g %.17g %d\n", packing.x[i], packing.y[i],
+    absl::StrAppendFormat(&text, "%.17g %.17g %.17g %.17g %d", packing.x[i], packing.y[i],
                           packing.z[i], packing.radius[i], packing.clump[i]);
+    const bool named = !packing.material.empty() && !packing.material[i].empty();
+    absl::StrAppend(&text, named ? " " : "", named ? packing.material[i] : "", "\n");
   }
   return text;
 }

@@ -1,6 +1,7 @@
 #pragma once
 // State of all grains, one array per quantity. SI units.
 
+#include <cstdint>
 #include <vector>
 
 #include "dem/particles/packing.h"
@@ -18,6 +19,7 @@ struct ParticleArrays {
   std::vector<double> inverse_inertia;  ///< about the centre (InertiaOf) [1/(kg m^2)]
   std::vector<int> id;                  ///< index in the packing
   std::vector<int> body;                ///< clump of each sphere, -1: none; empty: no clumps at all
+  std::vector<std::uint8_t> material;   ///< index in Materials; empty: the model has one material
 
   [[nodiscard]] int size() const { return static_cast<int>(x.size()); }
 };

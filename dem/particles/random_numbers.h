@@ -26,5 +26,6 @@ inline constexpr std::uint32_t kPositionDraw = 2;
 inline constexpr std::uint32_t kFillDraw = 3;
 inline constexpr std::uint32_t kOrderDraw = 4;
 inline constexpr std::uint32_t kFeedDraw = 5;
+inline constexpr std::uint32_t kMaterialDraw = 6;
 
 }  // namespace calib::dem

@@ -92,10 +92,22 @@ class CollisionRun {
       : model_(scenario.model, SettingOf(scenario, "thickness")), stop_(std::move(stop)) {
     const double thickness = SettingOf(scenario, "thickness");
     body_ = MakeBody(SettingOf(scenario, "radius"), thickness, scenario.model.density);
-    partner_ = MakeBody(SettingOf(scenario, "partner_radius"), thickness, scenario.model.density);
+    const Materials* materials = model_.materials();
+    const auto named = scenario.materials.bodies.find("partner");
+    const int made_of = materials != nullptr && named != scenario.materials.bodies.end()
+                            ? materials->IndexOf(named->second)
+                            : 0;
+    partner_ = MakeBody(SettingOf(scenario, "partner_radius"), thickness,
+                        made_of > 0 ? materials->density(made_of) : scenario.model.density);
     block_.sliding_friction = IsWall() ? model_.wall_friction() : model_.sliding_friction();
     block_.wall = IsWall();
     block_.mass_factor = IsWall() ? 2.0 : 1.0;
+    if (materials != nullptr) {
+      block_.mixed = true;
+      const int pair = materials->Pair(0, made_of);
+      std::fill(std::begin(block_.materials), std::end(block_.materials), pair);
+      std::fill(std::begin(block_.friction), std::end(block_.friction), materials->friction(pair));
+    }
   }
 
   [[nodiscard]] std::optional<ContactFault> Fault() const { return model_.Fault(); }

@@ -13,6 +13,7 @@
 #include "dem/dynamics/quasi_static.h"
 #include "dem/measure/observables.h"
 #include "dem/measure/reading_formulas.h"
+#include "dem/particles/material_shares.h"
 #include "dem/simulation/consolidation.h"
 #include "dem/simulation/element_test_setup.h"
 #include "dem/simulation/shape_change.h"
@@ -325,6 +326,12 @@ class ElementTestRun {
 
 absl::StatusOr<Summary> RunElementTest(const Scenario& scenario, RunRecord& record,
                                        std::stop_token stop) {
+  if (!scenario.materials.grains.empty()) {
+    Scenario mixture = scenario;
+    DrawMaterials(scenario.materials.grains, scenario.seed, mixture.packing);
+    mixture.materials.grains.clear();
+    return RunElementTest(mixture, record, std::move(stop));
+  }
   const Alterations alterations = AlterationsOf(scenario);
   if (alterations.preparation.aspect == 1) {
     return ElementTestRun(scenario, scenario.packing, alterations, std::move(stop)).Run(record);

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "dem/particles/material_shares.h"
 #include "dem/simulation/test_meshes.h"
 
 namespace calib::dem {
@@ -81,10 +82,24 @@ const TriangleMesh* GravityRun::Mesh(const std::string& name) const {
 
 double GravityRun::fall_time() const { return std::sqrt(mean_diameter_ / gravity()); }
 
+std::string GravityRun::MaterialOf(const std::string& body) const {
+  const auto it = scenario_.materials.bodies.find(body);
+  return it == scenario_.materials.bodies.end() ? "" : it->second;
+}
+
+void GravityRun::Mix(Packing& grains) const {
+  DrawMaterials(scenario_.materials.grains, scenario_.seed, grains);
+}
+
 Assembly GravityRun::Make(const Packing& grains, Surroundings surroundings) const {
   surroundings.gravity = {0, 0, -gravity()};
+  surroundings.material = MaterialOf("walls");
   ContactModel model(scenario_.model, surroundings.thickness);
-  return {grains, scenario_.model.density, std::move(model), std::move(surroundings),
+  Packing mixture = grains;
+  if (mixture.material.empty()) {
+    Mix(mixture);
+  }
+  return {mixture, scenario_.model.density, std::move(model), std::move(surroundings),
           scenario_.threads};
 }
 

@@ -69,7 +69,14 @@ class GravityRun {
   /// sqrt(d/g), the time of a fall by half a mean diameter [s].
   [[nodiscard]] double fall_time() const;
 
-  /// Grains between walls; surroundings get the test's gravity.
+  /// Material of a body of the test, "": the model's own.
+  [[nodiscard]] std::string MaterialOf(const std::string& body) const;
+
+  /// Draws the materials of grains where the scenario mixes some.
+  void Mix(Packing& grains) const;
+
+  /// Grains between walls; surroundings get the test's gravity and the walls' material. Grains
+  /// without materials are mixed first.
   [[nodiscard]] Assembly Make(const Packing& grains, Surroundings surroundings) const;
 
   /// drop_height and the box of the options are the procedure's; damping and drag the settings'.

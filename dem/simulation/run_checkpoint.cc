@@ -120,6 +120,19 @@ std::string MeshBytes(const std::map<std::string, TriangleMesh>& meshes) {
   return std::move(archive.bytes());
 }
 
+std::string MaterialBytes(const Scenario& s) {
+  SaveArchive archive;
+  std::vector<std::string> names = s.model.materials;
+  std::vector<std::string> grains = s.packing.material;
+  archive(names, grains);
+  for (auto [body, name] : s.materials.bodies) {
+    std::string key = body;
+    archive(key, name);
+  }
+  Put(archive, s.materials.grains);
+  return std::move(archive.bytes());
+}
+
 std::vector<Part> PartsOf(const Scenario& s) {
   std::optional<double> axial;
   std::optional<double> lateral;
@@ -128,22 +141,27 @@ std::vector<Part> PartsOf(const Scenario& s) {
     lateral = s.initial_stress->lateral;
   }
   const Packing& grains = s.packing;
-  return {{"contact law", Bytes(s.model.contact)},
-          {"effects", EffectsOf(s.model)},
-          {"density", Bytes(s.model.density)},
-          {"parameters", MapBytes(s.model.parameters)},
-          {"test", Bytes(s.test)},
-          {"settings", MapBytes(s.settings)},
-          {"packing", Bytes(grains.length[0], grains.length[1], grains.length[2], grains.x,
-                            grains.y, grains.z, grains.radius, grains.clump)},
-          {"consolidation",
-           OptionalBytes({s.consolidation.friction_coefficient, s.consolidation.porosity})},
-          {"initial stress", OptionalBytes({axial, lateral})},
-          {"loading rate", OptionalBytes({s.loading_rate})},
-          {"staging", StagingBytes(s.staging)},
-          {"control path", PathBytes(s.path)},
-          {"seed", Bytes(s.seed)},
-          {"meshes", MeshBytes(s.meshes)}};
+  std::vector<Part> parts = {
+      {"contact law", Bytes(s.model.contact)},
+      {"effects", EffectsOf(s.model)},
+      {"density", Bytes(s.model.density)},
+      {"parameters", MapBytes(s.model.parameters)},
+      {"test", Bytes(s.test)},
+      {"settings", MapBytes(s.settings)},
+      {"packing", Bytes(grains.length[0], grains.length[1], grains.length[2], grains.x, grains.y,
+                        grains.z, grains.radius, grains.clump)},
+      {"consolidation",
+       OptionalBytes({s.consolidation.friction_coefficient, s.consolidation.porosity})},
+      {"initial stress", OptionalBytes({axial, lateral})},
+      {"loading rate", OptionalBytes({s.loading_rate})},
+      {"staging", StagingBytes(s.staging)},
+      {"control path", PathBytes(s.path)},
+      {"seed", Bytes(s.seed)},
+      {"meshes", MeshBytes(s.meshes)}};
+  if (!s.model.materials.empty()) {
+    parts.push_back({"materials", MaterialBytes(s)});
+  }
+  return parts;
 }
 
 std::vector<std::string> Differences(const std::vector<Part>& found,

@@ -26,6 +26,16 @@ struct Model {
   double density = 2650;                     ///< of the grains [kg/m^3] > 0
   std::map<std::string, double> parameters;  ///< every parameter without a default must be present
   std::vector<UserEffect> user_effects{};    ///< declared; those that `effects` names act
+  std::vector<std::string> materials{};      ///< besides the model's own, which is called `grains`;
+                                             ///< their values are parameters (contact/materials.h)
+};
+
+/// Who is not of the model's own material. Grains of a packing may say so themselves.
+struct MaterialUse {
+  std::map<std::string, std::string> bodies{};  ///< by name: `walls` of tests under gravity (all of
+                                                ///< them), `intruder` of shaken_box, `partner` of
+                                                ///< collision, its wall included
+  std::map<std::string, double> grains{};       ///< share of the number of grains, (0, 1] in all
 };
 
 /// Friction during consolidation, restored before loading. At most one is set; none: the model's
@@ -73,6 +83,7 @@ struct Scenario {
   Packing packing;
   std::map<std::string, TriangleMesh> meshes = {};  ///< by name of TestInfo::meshes, with the
                                                     ///< origin and axes that stand there [m]
+  MaterialUse materials{};
   Consolidation consolidation;
   std::optional<InitialStress> initial_stress;
   std::optional<double> loading_rate;  ///< [1/s]: real-rate loading instead of staged quasi-static

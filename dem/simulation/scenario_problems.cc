@@ -8,9 +8,11 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
+#include "dem/contact/materials.h"
 #include "dem/lab_tests/collision.h"
 #include "dem/lab_tests/rotating_drum.h"
 #include "dem/simulation/collision_run.h"
+#include "dem/simulation/material_use.h"
 #include "dem/simulation/scenario.h"
 #include "dem/simulation/test_meshes.h"
 
@@ -116,8 +118,11 @@ void CheckModel(const Model& model, Problems& problems) {
     CheckParameters(effect->parameters, name + ".", model, problems);
   }
   for (const auto& [name, value] : model.parameters) {
-    if (FindParameter(model.user_effects, model.contact, model.effects, name) == nullptr) {
+    const ParameterInfo* info = FindParameter(model, name);
+    if (info == nullptr) {
       problems.push_back(absl::StrCat("the model has no parameter \"", name, "\""));
+    } else if (FindParameter(model.user_effects, model.contact, model.effects, name) == nullptr) {
+      CheckRange(name, value, *info, info->unit, problems);  // of a material
     }
   }
 }
@@ -385,6 +390,9 @@ void CheckPreparation(const Scenario& scenario, Problems& problems) {
 std::vector<std::string> ScenarioProblems(const Scenario& scenario) {
   Problems problems;
   CheckModel(scenario.model, problems);
+  for (auto& more : {MaterialProblems(scenario.model), MaterialUseProblems(scenario)}) {
+    problems.insert(problems.end(), more.begin(), more.end());
+  }
   const TestInfo* test = FindTest(scenario.test);
   if (test == nullptr || test->needs_packing) {
     const bool poured = test != nullptr && test->poured;

@@ -57,6 +57,12 @@ StageEnd RunShakenBox(GravityRun& run) {
   if (grains.x.size() < run.radii().size()) {
     return run.Fail("box_width is too small: no grain fits into the box");
   }
+  run.Mix(grains);
+  if (const std::string made_of = run.MaterialOf("intruder");
+      !made_of.empty() || !grains.material.empty()) {
+    grains.material.resize(grains.x.size());
+    grains.material.push_back(made_of);
+  }
   grains.x.push_back(intruder.x);
   grains.y.push_back(0);
   grains.z.push_back(start);

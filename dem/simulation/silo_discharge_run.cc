@@ -73,7 +73,9 @@ void BreakArch(const std::vector<int>& arch, Assembly& assembly) {
   for (std::size_t g = 0; g < p.z.size(); ++g) {
     top = std::max(top, p.z[g] + p.radius[g]);
   }
-  const NewGrain grain{.centre = {p.x[q], p.y[q], top + 1.1 * p.radius[q]}, .radius = p.radius[q]};
+  const NewGrain grain{.centre = {p.x[q], p.y[q], top + 1.1 * p.radius[q]},
+                       .radius = p.radius[q],
+                       .material = p.material.empty() ? 0 : p.material[q]};
   assembly.Remove({arch.front()});
   assembly.Insert({grain});
 }

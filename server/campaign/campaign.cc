@@ -207,6 +207,7 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
     }
   }
   for (const auto& [name, file] : experiment.meshes) scenario.meshes[name] = file.mesh;
+  scenario.materials = experiment.materials;
   scenario.consolidation = experiment.consolidation;
   scenario.initial_stress = experiment.initial_stress;
   scenario.loading_rate = experiment.loading_rate;

@@ -87,6 +87,7 @@ struct Experiment {
   /// Of the specimen that was measured; empty: unknown, taken for as few as the model's.
   std::optional<double> specimen_grains;
   std::map<std::string, MeshFile> meshes;  ///< by name of dem::TestInfo::meshes
+  dem::MaterialUse materials;
   dem::Consolidation consolidation;
   std::optional<dem::InitialStress> initial_stress;
   std::optional<double> loading_rate;

@@ -15,6 +15,7 @@
 #include "server/campaign/read_experiment.h"
 #include "server/campaign/read_inference.h"
 #include "server/campaign/read_joint_prior.h"
+#include "server/campaign/read_materials.h"
 #include "server/campaign/read_model.h"
 #include "server/campaign/read_noise_groups.h"
 #include "server/campaign/read_precomputed.h"
@@ -168,6 +169,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     map.Finish();
     if (is_new && problems.size() == 0 && !campaign.precomputed) {
       for (const std::string& inert : EffectsWithoutPart(campaign)) map.Problem("model", inert);
+      CheckMaterialsUsed(map, campaign);
       AskEngine(map, campaign);
     }
   }

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
 #include "server/campaign/quantity.h"
+#include "server/campaign/read_materials.h"
 #include "server/campaign/read_measurements.h"
 #include "server/campaign/read_meshes.h"
 #include "server/campaign/read_specimen.h"
@@ -211,7 +212,12 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   if (campaign.precomputed) {
     if (test == nullptr) map.Ignore({"confining_pressure"});
     RefuseKeys(map, "has no meaning with precomputed runs; remove it");
+    map.Ignore({"materials"});
+    if (map.Has("materials")) {
+      map.Problem("materials", "has no meaning with precomputed runs; remove it");
+    }
   } else {
+    if (test != nullptr) experiment.materials = ReadMaterialUse(map, *test, campaign.model);
     const bool poured = test != nullptr && test->poured;
     const bool bodiless = test != nullptr && !test->needs_packing;
     if (bodiless) {

@@ -5,7 +5,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "dem/contact/materials.h"
 #include "server/campaign/quantity.h"
+#include "server/campaign/read_materials.h"
 #include "server/campaign/read_prior.h"
 #include "server/campaign/read_user_effects.h"
 #include "server/campaign/suggestion.h"
@@ -17,6 +19,7 @@ namespace {
 struct ModelParameter {
   std::string name;
   const dem::ParameterInfo* info;
+  bool of_material = false;  // left out, it is as of the model's own material
 };
 
 std::vector<ModelParameter> ParametersOf(const dem::Model& model) {
@@ -30,6 +33,9 @@ std::vector<ModelParameter> ParametersOf(const dem::Model& model) {
     for (const dem::ParameterInfo& info : effect->parameters) {
       all.push_back({name + "." + info.name, &info});
     }
+  }
+  for (const std::string& name : dem::MaterialParameters(model)) {
+    all.push_back({name, dem::FindParameter(model, name), true});
   }
   return all;
 }
@@ -119,8 +125,7 @@ void ReadFixed(MapReader& map, dem::Model& model) {
   auto fixed = map.Map("fixed");
   if (!fixed) return;
   for (const std::string& name : fixed->Keys()) {
-    const dem::ParameterInfo* info =
-        dem::FindParameter(model.user_effects, model.contact, model.effects, name);
+    const dem::ParameterInfo* info = dem::FindParameter(model, name);
     if (info == nullptr) {
       fixed->Ignore({name});
       if (!model.contact.empty()) fixed->Problem(name, UnknownParameter(name, model));
@@ -128,6 +133,9 @@ void ReadFixed(MapReader& map, dem::Model& model) {
     }
     const auto value =
         fixed->Quantity(name, dem::UnitFor(*info, model.contact), AdmissibleRange(*info));
+    if (model.parameters.contains(name)) {
+      fixed->Problem(name, "stands in model.materials or model.pairs already; keep one of them");
+    }
     // A refused value still counts as given, so that one mistake is one problem.
     model.parameters[name] = value.value_or(std::nan(""));
   }
@@ -162,8 +170,7 @@ void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign)
     campaign.parameters.push_back(parameter);
     return;
   }
-  const dem::ParameterInfo* info = dem::FindParameter(
-      campaign.model.user_effects, campaign.model.contact, campaign.model.effects, name);
+  const dem::ParameterInfo* info = dem::FindParameter(campaign.model, name);
   if (info == nullptr) {
     if (!campaign.model.contact.empty()) {
       parameters.Problem(name, UnknownParameter(name, campaign.model));
@@ -202,7 +209,7 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
     }
     if (std::find(said.begin(), said.end(), parameter.name) != said.end()) continue;
     bool covered = given(parameter.name) || parameter.info->default_value ||
-                   OfRefusedEffect(parameter.name, model);
+                   parameter.of_material || OfRefusedEffect(parameter.name, model);
     std::string or_others;
     for (const std::string& other : AlternativesOf(parameter, all)) {
       said.push_back(other);
@@ -229,8 +236,8 @@ void ReadModel(MapReader& campaign_map, Campaign& campaign) {
   if (node == nullptr) return;
   MapReader map(*node, campaign_map.PathOf("model"), campaign_map.problems());
   if (map.Has("precomputed")) {
-    map.Ignore({"precomputed", "contact", "effects", "user_effects", "density",
-                "fixed"});  // read with the experiments
+    map.Ignore({"precomputed", "contact", "effects", "user_effects", "density", "materials",
+                "pairs", "fixed"});  // read with the experiments
     campaign.precomputed.emplace();
     map.Finish();
     return;
@@ -245,6 +252,7 @@ void ReadModel(MapReader& campaign_map, Campaign& campaign) {
   ReadEffects(map, model);
   model.density =
       map.Quantity("density", "kg/m^3", {.min = 0, .min_open = true}).value_or(model.density);
+  ReadMaterials(map, model);
   ReadFixed(map, model);
   map.Finish();
 }

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
+#include "dem/contact/materials.h"
 #include "server/campaign/map_reader.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/suggestion.h"
@@ -34,8 +35,7 @@ std::string Apply(const std::string& assignment, const campaign::Campaign& campa
                         " is not NAME=VALUE, e.g. --set young_modulus='2 GPa'");
   }
   const std::string name = assignment.substr(0, equals);
-  const dem::ParameterInfo* info = dem::FindParameter(
-      campaign.model.user_effects, campaign.model.contact, campaign.model.effects, name);
+  const dem::ParameterInfo* info = dem::FindParameter(campaign.model, name);
   if (info == nullptr) {
     return absl::StrCat("--set ", name, ": the model has no such parameter; ",
                         campaign::Suggestion(name, KnownNames(campaign)));

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "dem/contact/materials.h"
 #include "server/campaign/derive.h"
 #include "server/campaign/suggestion.h"
 
@@ -184,6 +185,11 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
                                              campaign.model.contact) == effect->contacts.end()) {
     return absl::StrCat(name, " cannot join the contact ", campaign.model.contact,
                         "; it works with ", absl::StrJoin(effect->contacts, ", "));
+  }
+  dem::Model joined = campaign.model;
+  joined.effects.push_back(name);
+  if (const auto problems = dem::MaterialProblems(joined); !problems.empty()) {
+    return problems.front();  // the model itself has none
   }
   return "";
 }

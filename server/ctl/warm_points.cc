@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "dem/catalog/catalog.h"
+#include "dem/contact/materials.h"
 #include "server/ctl/reading_effects.h"
 
 namespace calib::ctl {
@@ -105,8 +106,7 @@ report::RunTable RunsWithoutEffect(const report::RunTable& without,
   std::vector<std::pair<Index, double>> nulls;
   for (const Index j : OnTop(parent, extended)) {
     const campaign::CalibratedParameter& own = extended.parameters[static_cast<std::size_t>(j)];
-    const dem::ParameterInfo* info = dem::FindParameter(
-        extended.model.user_effects, extended.model.contact, extended.model.effects, own.name);
+    const dem::ParameterInfo* info = dem::FindParameter(extended.model, own.name);
     const auto null =
         info == nullptr ? std::nullopt : dem::NullValueOf(*info, extended.model.contact);
     // A prior over orders of magnitude ends where the effect no longer matters.

@@ -120,6 +120,11 @@ v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& 
   spec.set_threads(scenario.threads);
   spec.set_experiment(experiment);
   SetUserEffects(scenario.model, spec);
+  spec.mutable_materials()->Add(scenario.model.materials.begin(), scenario.model.materials.end());
+  spec.mutable_body_materials()->insert(scenario.materials.bodies.begin(),
+                                        scenario.materials.bodies.end());
+  spec.mutable_grain_materials()->insert(scenario.materials.grains.begin(),
+                                         scenario.materials.grains.end());
   return spec;
 }
 

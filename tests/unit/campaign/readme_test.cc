@@ -28,7 +28,7 @@ TEST(CampaignReadme, EveryExampleIsAGoodCampaign) {
   files["states.csv"] = "sample,step,p_MPa,porosity\n0,0,1,0.4\n0,1,2,0.39\n";
   files["beads.dat"] = "#\te_a\tp\tn\n0.001\t1\t0.4\n0.002\t2\t0.39\n";
   const auto blocks = YamlBlocks(CALIB_CAMPAIGN_README);
-  EXPECT_EQ(blocks.size(), 5U);
+  EXPECT_EQ(blocks.size(), 6U);
   for (std::string block : blocks) {
     if (block.rfind("name:", 0) != 0) {  // a part, to be joined to the whole file
       std::string whole = blocks.front();

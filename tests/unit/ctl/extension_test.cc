@@ -16,6 +16,8 @@ TEST(Extension, SaysWhatIsPossibleWithRunsThatWereMadeElsewhere) {
   campaign::Campaign campaign;
   campaign.model.contact = "linear";
   EXPECT_EQ(WhyNotJoin(campaign, "rolling_resistance"), "");
+  campaign.model.materials = {"steel"};
+  EXPECT_THAT(WhyNotJoin(campaign, "wall_friction"), HasSubstr("knows one material only"));
   campaign.precomputed = campaign::Precomputed{};
   const std::string why = WhyNotJoin(campaign, "rolling_resistance");
   EXPECT_THAT(why, HasSubstr("made elsewhere cannot be joined by rolling_resistance"));

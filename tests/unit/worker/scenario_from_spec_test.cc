@@ -15,7 +15,9 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
   scenario.model = {.contact = "hertz_mindlin",
                     .effects = {"rolling_resistance", "twisting_resistance"},
                     .density = 2600.5,
-                    .parameters = {{"young_modulus", 0.1 + 0.2}, {"friction_angle", 0.5}}};
+                    .parameters = {{"young_modulus", 0.1 + 0.2}, {"friction_angle", 0.5}},
+                    .materials = {"steel", "glass"}};
+  scenario.materials = {.bodies = {{"walls", "steel"}}, .grains = {{"glass", 0.3}}};
   scenario.test = "oedometric";
   scenario.settings = {{"start_pressure", 1e5}};
   scenario.consolidation.porosity = 0.391;
@@ -41,6 +43,9 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
   EXPECT_EQ(back.model.effects, scenario.model.effects);
   EXPECT_EQ(back.model.density, scenario.model.density);
   EXPECT_EQ(back.model.parameters, scenario.model.parameters);
+  EXPECT_EQ(back.model.materials, scenario.model.materials);
+  EXPECT_EQ(back.materials.bodies, scenario.materials.bodies);
+  EXPECT_EQ(back.materials.grains, scenario.materials.grains);
   EXPECT_EQ(back.settings, scenario.settings);
   EXPECT_EQ(back.consolidation.porosity, scenario.consolidation.porosity);
   EXPECT_FALSE(back.consolidation.friction_coefficient.has_value());

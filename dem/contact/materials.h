@@ -1,0 +1,102 @@
+#pragma once
+// Bodies of several materials: what each is made of, and what holds between two of them.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "dem/contact/contact_kernel.h"
+#include "dem/contact/grain_mass.h"
+#include "dem/simulation/scenario.h"
+
+namespace calib::dem {
+
+/// The model's own material, of everything that nobody says otherwise of.
+inline constexpr const char* kOwnMaterial = "grains";
+
+/// Materials that a model may have besides its own.
+inline constexpr int kMostMaterials = 16;
+
+/// Stiffness of two bodies one behind the other, from those of contacts among equals: 2ab/(a + b),
+/// exactly `a` where both are the same. For the moduli of Hertz and Mindlin this is
+///   1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2,   1/G* = (2 - nu_1)/G_1 + (2 - nu_2)/G_2
+/// [Johnson 1985, Eq. 4.24; Mindlin & Deresiewicz, J. Appl. Mech. 20 (1953) 327]. a, b >= 0.
+inline double InSeries(double a, double b) { return a == b ? a : 2.0 * (a / (a + b)) * b; }
+
+/// Immutable. Parameters of the model say what a material has: NAME.P with a parameter P of the
+/// contact law or with density [kg/m^3]; what is left out is that of `grains`. A pair A-B has
+/// InSeries() stiffnesses and dampings and the smaller friction of its two materials, unless A-B.P
+/// gives it one of its own: friction_coefficient [-]; damping, where the law has it; damping_ratio
+/// [-], where viscous_damping acts (else that of the effect).
+class Materials {
+ public:
+  /// thickness: of disks [m]; 0: spheres. Preconditions: MaterialProblems() finds nothing wrong.
+  Materials(const Model& model, const ParameterSet& own, double thickness);
+
+  [[nodiscard]] int count() const { return static_cast<int>(laws_.size()); }
+  [[nodiscard]] int pairs() const { return count() * count(); }
+
+  /// Position among the materials; 0: `grains`, or "". Precondition: the model has it.
+  [[nodiscard]] int IndexOf(const std::string& name) const;
+
+  /// Of the values of a pair, in either order the same.
+  [[nodiscard]] int Pair(int a, int b) const { return a * count() + b; }
+
+  /// Parameters of the contact law.
+  [[nodiscard]] const ParameterSet& law(int material) const {
+    return laws_[static_cast<std::size_t>(material)];
+  }
+  [[nodiscard]] double density(int material) const {  ///< [kg/m^3]
+    return densities_[static_cast<std::size_t>(material)];
+  }
+  [[nodiscard]] double friction(int pair) const {  ///< tan(phi_mu) [-]
+    return friction_[static_cast<std::size_t>(pair)];
+  }
+
+  /// Puts what the model says of pairs under this name in place of the values, one per pair.
+  void TakePairs(const std::string& name, std::vector<double>& values) const;
+
+  /// From block.materials and radii to what follows from the pair: effective masses, and between
+  /// grains friction, which changes in proportion where block.sliding_friction is not that of
+  /// `grains` (consolidation).
+  void Complete(ContactBlock& block) const;
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<ParameterSet> laws_;
+  std::vector<double> densities_;
+  std::vector<double> friction_;    ///< per pair
+  std::vector<double> mass_units_;  ///< per material: GrainMass::unit
+  double depth_ = 0;                ///< GrainMass::depth
+  std::map<std::string, double> parameters_;
+};
+
+/// One value per pair of materials, Materials::Pair() its index: alone(law) among equals, mixed(a,
+/// b) between two; of a model with one material that one value.
+template <class Value, class Alone, class Mixed>
+std::vector<Value> ForPairs(const KernelContext& context, const Alone& alone, const Mixed& mixed) {
+  if (context.materials == nullptr) {
+    return {alone(context.law)};
+  }
+  const Materials& materials = *context.materials;
+  std::vector<Value> values;
+  for (int a = 0; a < materials.count(); ++a) {
+    for (int b = 0; b < materials.count(); ++b) {
+      values.push_back(mixed(alone(materials.law(a)), alone(materials.law(b))));
+    }
+  }
+  return values;
+}
+
+/// Parameter of a model by its dotted campaign name, those of its effects and materials included,
+/// or nullptr when the model has none of that name.
+const ParameterInfo* FindParameter(const Model& model, const std::string& dotted_name);
+
+/// Dotted names that the model's materials and pairs of them may give values to; pairs once, in the
+/// order in which the materials are named.
+std::vector<std::string> MaterialParameters(const Model& model);
+
+/// Everything wrong with the names and values of the model's materials, one sentence each.
+std::vector<std::string> MaterialProblems(const Model& model);
+
+}  // namespace calib::dem
