@@ -238,10 +238,11 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
 }
 
 double Assembly::MomentDelay(const StiffnessEstimate& estimate) const {
+  if (!(estimate.elastic_step > 0)) return 1.0;  // nothing touches, or no grain is there yet
   const double nominal = NominalStepByForces();
   const double by_forces =
       estimate.step_by_forces > 0 ? std::min(nominal, estimate.step_by_forces) : nominal;
-  return estimate.elastic_step > 0 ? by_forces / estimate.elastic_step : 1.0;
+  return by_forces / estimate.elastic_step;
 }
 
 std::string Assembly::MomentStepText(const StiffnessEstimate& estimate) const {

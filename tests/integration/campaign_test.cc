@@ -40,7 +40,7 @@ TEST(Campaign, RunsToAPosteriorWithHeldOutExperiment) {
   const auto posterior = client.Posterior("c1");
   ASSERT_TRUE(posterior.ok()) << posterior.status();
   EXPECT_EQ(posterior->iterations(), 2);
-  EXPECT_EQ(posterior->model_evaluations(), 16);
+  EXPECT_EQ(posterior->model_evaluations(), 24);
   ASSERT_EQ(posterior->parameters_size(), 2);
   EXPECT_EQ(posterior->parameters(0).name(), "young_modulus");
   EXPECT_GT(posterior->parameters(0).sd(), 0);
