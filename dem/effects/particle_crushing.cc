@@ -62,7 +62,7 @@ EffectEntry ParticleCrushing() {
                                 "J. Mech. Phys. Solids 57 (2009) 1813",
                    .two_sided = false,
                    .rays = {{.parameter = "weakness",
-                             .steps = {0.2, 0.3},
+                             .steps = {0.1, 0.12},
                              .held = {{"reference_diameter", 1}}}},
                    .excited_by = ElementTestNames()},
           .prepare = &Prepare};
