@@ -6,7 +6,6 @@
 #include <iostream>
 
 #include "proto/rpc/address.h"
-#include "server/service/address.h"
 #include "server/service/server.h"
 
 namespace {
@@ -21,6 +20,7 @@ int main(int argc, char** argv) {
       "Holds calibration campaigns and leases their model evaluations to calib-worker nodes."};
   calib::service::ServerOptions options;
   options.listen = "127.0.0.1:7443";
+  options.stays = true;
   std::int64_t lease_ms = options.lease.count();
   std::int64_t heartbeat_ms = options.heartbeat.count();
   app.add_option("--state", options.state_dir, "folder of the state, created if need be")
@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
   }
   options.lease = std::chrono::milliseconds(lease_ms);
   options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
-  if (!calib::service::IsLoopback(options.listen)) {
+  if (!calib::rpc::IsLoopback(options.listen)) {
     std::cerr << "warning: " << options.listen
               << " can be reached from other machines, and there is no authentication yet\n";
   }

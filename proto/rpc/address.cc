@@ -22,7 +22,7 @@ bool IsHost(const std::string& host) {
 std::string ProblemOfAddress(const std::string& address, int least_port) {
   const std::size_t colon = address.rfind(':');
   int port = -1;
-  if (colon != std::string::npos && IsHost(address.substr(0, colon))) {
+  if (colon != std::string::npos && IsHost(HostOf(address))) {
     const char* const end = address.data() + address.size();
     const auto [at, error] = std::from_chars(address.data() + colon + 1, end, port);
     if (error != std::errc() || at != end) port = -1;
@@ -30,6 +30,13 @@ std::string ProblemOfAddress(const std::string& address, int least_port) {
   if (port >= least_port && port <= 65535) return "";
   return absl::StrCat("'", address, "' is not HOST:PORT with a port from ", least_port,
                       " to 65535");
+}
+
+std::string HostOf(const std::string& address) { return address.substr(0, address.rfind(':')); }
+
+bool IsLoopback(const std::string& address) {
+  const std::string host = HostOf(address);
+  return host == "localhost" || host == "[::1]" || host.starts_with("127.");
 }
 
 }  // namespace calib::rpc

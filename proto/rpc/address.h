@@ -10,4 +10,10 @@ namespace calib::rpc {
 /// up.
 std::string ProblemOfAddress(const std::string& address, int least_port = 1);
 
+/// Of HOST:PORT.
+std::string HostOf(const std::string& address);
+
+/// True where only this machine is reached by the address. Names are not looked up.
+bool IsLoopback(const std::string& address);
+
 }  // namespace calib::rpc

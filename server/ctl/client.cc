@@ -15,6 +15,7 @@
 #include "proto/rpc/digest.h"
 #include "proto/rpc/random_id.h"
 #include "proto/rpc/status.h"
+#include "server/ctl/interrupt.h"
 
 namespace calib::ctl {
 namespace {
@@ -24,7 +25,7 @@ constexpr std::chrono::minutes kLongestStream{10};
 
 /// A server that is slow to answer (a disk that stalls, a machine that sleeps) or is started again
 /// is asked again, so that hours of a diagnosis do not end with one late answer. Every call may be
-/// made twice: those that change something carry a request_id.
+/// made twice: those that change something carry a request_id or a digest.
 constexpr int kLateAnswers = 10;
 constexpr int kLostConnections = 2;
 constexpr std::chrono::minutes kReturn{1};       // of a server that was lost
@@ -49,6 +50,7 @@ struct Connection {
     const auto end = std::chrono::system_clock::now() + kReturn;
     do {
       std::this_thread::sleep_for(kLull);
+      if (Interrupted()) return false;
       if (find_server) {
         const std::string found = find_server();
         if (found.empty()) return false;
@@ -85,7 +87,7 @@ absl::Status Insist(Connection& connection, std::optional<std::chrono::milliseco
       case grpc::StatusCode::OK:
         return absl::OkStatus();
       case grpc::StatusCode::DEADLINE_EXCEEDED:
-        if (++late >= kLateAnswers) return NoAnswer(status);
+        if (++late >= kLateAnswers || Interrupted()) return NoAnswer(status);
         break;
       case grpc::StatusCode::CANCELLED:  // by a server that ends
       case grpc::StatusCode::UNAVAILABLE:

@@ -379,7 +379,10 @@ class Inquiry {
     if (fits_.Find(candidate.effect) == nullptr) return;
     const WarmFit& fit = *fits_.Find(candidate.effect);
     candidate.campaign = fit.view.status.campaign();
-    if (fit.Found()) candidate.predicted_rms_error = fit.rms;
+    if (fit.Found()) {
+      candidate.predicted_rms_error = fit.rms;
+      candidate.predicted_by = "refit";
+    }
     for (const auto& [name, value] : fit.best) {
       if (name.starts_with(candidate.effect + ".")) candidate.amplitude[name] = value;
     }

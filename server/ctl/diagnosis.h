@@ -23,6 +23,7 @@ struct CandidateEffect {
   double screen_explained = 0;    ///< the same before the refit
   std::map<std::string, double> amplitude{};  ///< parameter -> strength that explains it best [SI]
   double predicted_rms_error = 0;             ///< with the effect, as Diagnosis::rms
+  std::string predicted_by = "screen";        ///< whose error that is: screen | refit
   std::vector<std::string> confusable_with{};
   // Of the warm fit, where there was one.
   std::string campaign{};                   ///< id

@@ -52,7 +52,7 @@ Json CandidateJson(const CandidateEffect& c) {
                {"explained_fraction", c.explained_fraction},
                {"amplitude", c.amplitude},
                {"predicted_rms_error", c.predicted_rms_error},
-               {"predicted_by", c.campaign.empty() || NotFound(c) ? "screen" : "refit"},
+               {"predicted_by", c.predicted_by},
                {"confusable_with", c.confusable_with},
                {"angles", c.angles}};
   if (!c.campaign.empty()) {

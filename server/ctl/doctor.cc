@@ -7,11 +7,11 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "dem/catalog/catalog.h"
+#include "proto/rpc/address.h"
 #include "server/campaign/sha256.h"
 #include "server/ctl/text_table.h"
 #include "server/ctl/trial_runs.h"
 #include "server/report/people_units.h"
-#include "server/service/address.h"
 
 namespace calib::ctl {
 namespace {
@@ -203,7 +203,7 @@ Check JudgeDatabase(const v1::ServerReport& server) {
 
 Check JudgeConnection(const std::string& address, const std::optional<std::string>& listen) {
   Check check{.name = "certificates", .subject = "connection"};
-  if (service::IsLoopback(listen.value_or(address))) {
+  if (rpc::IsLoopback(listen.value_or(address))) {
     check.found = absl::StrCat(listen.value_or(address),
                                " is reached from this machine only; no certificate is needed.");
     return check;

@@ -65,7 +65,10 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
   NoWorkerNotice notice(session_);
   for (;;) {
     const auto status = session_.client().Show(campaign);
-    if (!status.ok()) return status.status();
+    if (!status.ok()) {
+      const absl::Status why = session_.Check();
+      return why.ok() ? status.status() : why;
+    }
     if (!line && status->state() == "finished") return absl::OkStatus();
     if (!line) {
       std::cerr << what << ": campaign " << campaign << "\n";
@@ -123,6 +126,8 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
   auto status = session_.client().Show(campaign);
   if (!status.ok()) return status.status();
   if (status->state() == "paused") {
+    std::cerr << "campaign " << campaign << " was paused (" << status->reason()
+              << "); it goes on\n";
     status = session_.client().Resume(campaign);
     if (!status.ok()) return status.status();
   }

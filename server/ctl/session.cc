@@ -6,6 +6,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <thread>
 #include <utility>
 
@@ -103,6 +104,7 @@ absl::Status Session::ServeOrJoin() {
     last = client.status();
     if (server_ != nullptr) break;
   }
+  host_stays_ = is_guest() && service::IsServedForGood(state_);
   if (client_ != nullptr) {
     client_->OnLoss([this] { return Succeed(); });
   }
@@ -112,18 +114,34 @@ absl::Status Session::ServeOrJoin() {
 std::string Session::Succeed() {
   if (!failure_->Get().ok()) return "";
   if (server_ != nullptr) return address_;  // it is not gone, only slow
-  auto address = ServeOrFind(address_);     // where its workers look for it
-  if (absl::IsUnavailable(address.status())) address = ServeOrFind(kAnyPort);
-  if (!address.ok()) return "";
-  if (*address != address_ && !workers_.empty()) {
-    const int count = static_cast<int>(workers_.size());
-    workers_.clear();
-    address_ = *address;
-    if (!StartWorkers(count).ok()) return "";
+  if (host_stays_) {
+    const auto address = service::ServingAddress(state_);  // until somebody has started it again
+    if (address.ok()) address_ = *address;
+    return address_;
   }
+  auto address = ServeOrFind(address_);  // where its workers look for it
+  if (absl::IsUnavailable(address.status())) address = ServeOrFind(kAnyPort);
+  if (absl::IsUnavailable(address.status())) return address_;  // somebody is about to serve it
+  if (!address.ok()) return GiveUp(address.status());
+  const bool moved = *address != address_;
   address_ = *std::move(address);
-  if (server_ != nullptr && workers_.empty() && !StartWorkers(workers_as_host_).ok()) return "";
+  auto count = static_cast<int>(workers_.size());
+  if (moved) workers_.clear();  // they look for it elsewhere
+  if (server_ != nullptr && count == 0) count = workers_as_host_;
+  if (server_ != nullptr) {
+    std::cerr << "the process that served " << state_ << " has ended; this one serves it now, with "
+              << count << " worker(s)\n";
+  }
+  if (workers_.empty()) {
+    if (auto started = StartWorkers(count); !started.ok()) return GiveUp(started);
+  }
   return address_;
+}
+
+std::string Session::GiveUp(const absl::Status& why) {
+  absl::MutexLock lock(&failure_->mutex);
+  failure_->status = why;
+  return "";
 }
 
 Session::~Session() {

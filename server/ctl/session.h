@@ -35,7 +35,7 @@ class Session {
   Client& client() { return *client_; }
   const std::string& address() const { return address_; }  ///< HOST:PORT of its server
   /// The folder is served by another process, to which this session is connected. When that ends,
-  /// this one serves the folder.
+  /// this one serves the folder, unless it was calibd, which is waited for.
   bool is_guest() const { return server_ == nullptr; }
 
   /// Starts `count` single-slot workers; each logs to worker-N.log in the state folder. Without a
@@ -53,13 +53,15 @@ class Session {
   /// The address of who serves the folder, this process if nobody does. Whoever is starting or
   /// ending just now is tried again.
   absl::StatusOr<std::string> ServeOrFind(const std::string& listen);
-  /// After the process that served the folder has ended: ServeOrFind for the client, "" on failure.
+  /// After the process that served the folder has ended: serves it, or finds who does; the address
+  /// for the client, "" when it is hopeless (Check() says why). A server that stays is waited for.
   std::string Succeed();
+  std::string GiveUp(const absl::Status& why);
   absl::Status StartWorkers(int count);
   bool AllEnded();
   std::string Checkpoints() const;  ///< of local workers
 
-  /// What ended the service of the folder; set on another thread.
+  /// What ended the service of the folder; may be set on another thread.
   struct Failure {
     absl::Mutex mutex;
     absl::Status status ABSL_GUARDED_BY(mutex);
@@ -76,6 +78,7 @@ class Session {
   std::unique_ptr<Client> client_;
   std::vector<ChildProcess> workers_;
   int workers_as_host_ = 0;
+  bool host_stays_ = false;
 };
 
 }  // namespace calib::ctl

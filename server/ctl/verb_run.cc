@@ -31,7 +31,9 @@ bool IsOver(const v1::CampaignStatus& status) {
 absl::Status TakeUp(Client& client, const std::string& campaign) {
   const auto status = client.Show(campaign);
   if (!status.ok()) return status.status();
-  return status->state() == "paused" ? client.Resume(campaign).status() : absl::OkStatus();
+  if (status->state() != "paused") return absl::OkStatus();
+  std::cerr << "campaign " << campaign << " was paused (" << status->reason() << "); it goes on\n";
+  return client.Resume(campaign).status();
 }
 
 // Shows progress until the campaign is over, pauses by itself (too many failures) or the user
@@ -41,7 +43,10 @@ absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& c
   NoWorkerNotice notice(session);
   for (;;) {
     auto status = session.client().Show(campaign);
-    if (!status.ok()) return status;
+    if (!status.ok()) {
+      const absl::Status why = session.Check();
+      return why.ok() ? status.status() : why;
+    }
     constexpr int kMilestones = 5;
     line.Show(ProgressText(*status),
               kMilestones * 2 * status->iteration() +

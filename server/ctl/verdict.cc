@@ -62,7 +62,7 @@ bool Verdict::WorseLeftOut(const WarmFit& fit) const {
 // deviation.
 bool Verdict::Settles(const WarmFit& fit) const {
   const inference::Adequacy& base = diagnosis_.adequacy;
-  const double misfit = std::max(1.0, base.chi2 - base.degrees);
+  const double misfit = inference::ExplainableMisfit(base);
   return fit.adequacy.p_value >= level_ && 2 * fit.over_base.nats >= kNearlyAll * misfit &&
          base.p_value * static_cast<double>(fits_.size()) < level_ * level_;
 }

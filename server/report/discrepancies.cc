@@ -12,17 +12,13 @@ namespace {
 
 using Eigen::Index;
 
-// The size of a curve, to which discrepancies are relative.
 // From the least value of the control to the largest.
 double PathOf(const std::vector<double>& control) {
   const auto [least, most] = std::minmax_element(control.begin(), control.end());
   return *most - *least;
 }
 
-double RootMeanSquare(const Eigen::VectorXd& values) {
-  return std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
-}
-
+// The size of a curve, to which discrepancies are relative.
 double SizeOf(const Eigen::VectorXd& model) {
   return std::sqrt(model.squaredNorm() / static_cast<double>(std::max<Index>(1, model.size())));
 }
@@ -137,7 +133,7 @@ void AddDiscrepancies(const CampaignView& view,
            .heldout = experiment.role == campaign::Role::kValidate,
            .probability = found->fit.probability(),
            .log_bayes_factor = found->fit.log_bayes_factor(),
-           .amplitude = RootMeanSquare(band.mean),
+           .amplitude = SizeOf(band.mean),
            .length = std::exp(found->fit.log_length().mean),
            .throughout = std::exp(found->fit.log_length().mean) >= PathOf(experiment.control),
            .experiments = static_cast<int>(found->experiments.size()),

@@ -124,42 +124,94 @@ std::string StageTable(const std::vector<ErrorStep>& steps) {
          rows + "</table></div>\n";
 }
 
+// Error against the number of effects added, of the fitted data and, where they were opened, of the
+// held-out ones.
+struct ErrorCurve {
+  std::vector<double> x, fitted, held_x, held;
+};
+
+ErrorCurve OfAll(const std::vector<ErrorStep>& steps) {
+  ErrorCurve curve;
+  for (const ErrorStep& step : steps) {
+    curve.x.push_back(static_cast<double>(curve.x.size()));
+    curve.fitted.push_back(step.rms_error);
+    if (!step.heldout_rms_error) continue;
+    curve.held_x.push_back(curve.x.back());
+    curve.held.push_back(*step.heldout_rms_error);
+  }
+  return curve;
+}
+
+// Over the readings of all its experiments; none without any.
+std::optional<double> ErrorOf(const ErrorStep& step, const std::string& observable, bool heldout) {
+  if (heldout && !step.heldout_rms_error) return std::nullopt;
+  double squares = 0;
+  int readings = 0;
+  for (const ObservableMisfit& m : step.by_observable) {
+    if (m.observable != observable || m.heldout != heldout) continue;
+    squares += m.readings * m.rms_error * m.rms_error;
+    readings += m.readings;
+  }
+  return readings > 0 ? std::optional(std::sqrt(squares / readings)) : std::nullopt;
+}
+
+ErrorCurve OfObservable(const std::vector<ErrorStep>& steps, const std::string& observable) {
+  ErrorCurve curve;
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    if (const auto error = ErrorOf(steps[k], observable, false)) {
+      curve.x.push_back(static_cast<double>(k));
+      curve.fitted.push_back(*error);
+    }
+    if (const auto error = ErrorOf(steps[k], observable, true)) {
+      curve.held_x.push_back(static_cast<double>(k));
+      curve.held.push_back(*error);
+    }
+  }
+  return curve;
+}
+
+std::string ErrorPlot(const std::string& name, const ErrorCurve& curve, std::size_t steps) {
+  std::vector<double> all = {0, 1};
+  all.insert(all.end(), curve.fitted.begin(), curve.fitted.end());
+  all.insert(all.end(), curve.held.begin(), curve.held.end());
+  const int last = static_cast<int>(steps) - 1;
+  Plot plot({}, Axis("effects added", 0, last, last), Axis::Covering("error, sd", all, 5));
+  plot.AddHorizontal(1);
+  plot.AddLine(curve.x, curve.fitted, "mean");
+  plot.AddPoints(curve.x, curve.fitted, 3.5);
+  plot.AddLine(curve.held_x, curve.held, "mean held");
+  plot.AddPoints(curve.held_x, curve.held, 3.5, "residual held");
+  return "<figure>\n" +
+         plot.Svg("Error of " + name + " against the number of effects added",
+                  "rms of residual over standard deviation of the fitted data and of the held-out "
+                  "data") +
+         "<figcaption>" + Escape(name) + "</figcaption>\n</figure>\n";
+}
+
 std::string ErrorChart(const Story& story) {
   const std::vector<ErrorStep>& steps = story.steps;
   if (steps.size() < 2) return "";
-  std::vector<double> x;
-  std::vector<double> fitted;
-  std::vector<double> held_x;
-  std::vector<double> held;
-  std::vector<double> all = {0, 1};
-  for (std::size_t k = 0; k < steps.size(); ++k) {
-    x.push_back(static_cast<double>(k));
-    fitted.push_back(steps[k].rms_error);
-    all.push_back(fitted.back());
-    if (steps[k].heldout_rms_error) {
-      held_x.push_back(x.back());
-      held.push_back(*steps[k].heldout_rms_error);
-      all.push_back(held.back());
+  std::vector<std::string> observables;
+  for (const ObservableMisfit& m : steps.front().by_observable) {
+    if (std::find(observables.begin(), observables.end(), m.observable) == observables.end()) {
+      observables.push_back(m.observable);
     }
   }
-  Plot plot({}, Axis("effects added", 0, x.back(), static_cast<int>(steps.size()) - 1),
-            Axis::Covering("error, sd", all, 5));
-  plot.AddHorizontal(1);
-  plot.AddLine(x, fitted, "mean");
-  plot.AddPoints(x, fitted, 3.5);
-  plot.AddLine(held_x, held, "mean held");
-  plot.AddPoints(held_x, held, 3.5, "residual held");
   std::string html =
-      "<h3>Error before and after</h3>\n<div class=\"grid\">\n<figure>\n" +
-      plot.Svg(
-          "Error against the number of effects added",
-          "rms of residual over standard deviation of the fitted data and of the held-out data") +
-      "<figcaption>Fitted data; held-out data for the first and the last model. At one the model "
-      "is as close as the errors let it be.</figcaption>\n</figure>\n</div>\n" +
-      StepTable(story) +
-      "<h3>By observable</h3>\n<div class=\"scroll\"><table><tr><th>model</th><th "
-      "class=\"l\">experiment</th><th "
-      "class=\"l\">observable</th><th>error, sd</th></tr>\n";
+      "<h3>Error before and after</h3>\n<p class=\"sub\"><span class=\"key\" "
+      "style=\"color:var(--model)\"></span>Fitted data; <span class=\"key\" "
+      "style=\"color:var(--held)\"></span>held-out data, for the first and the last model. At one "
+      "the model is as close as the errors let it be.</p>\n<div class=\"grid\">\n" +
+      ErrorPlot("all observables", OfAll(steps), steps.size());
+  if (observables.size() > 1) {
+    for (const std::string& name : observables) {
+      html += ErrorPlot(NameForPeople(name), OfObservable(steps, name), steps.size());
+    }
+  }
+  html += "</div>\n" + StepTable(story) +
+          "<h3>By observable</h3>\n<div class=\"scroll\"><table><tr><th>model</th><th "
+          "class=\"l\">experiment</th><th "
+          "class=\"l\">observable</th><th>error, sd</th></tr>\n";
   for (const ErrorStep& step : steps) {
     for (const ObservableMisfit& m : step.by_observable) {
       if (m.heldout && !step.heldout_rms_error) continue;

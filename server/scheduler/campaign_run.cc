@@ -130,12 +130,25 @@ CampaignRun::Evaluation* CampaignRun::Find(const EvaluationKey& key) {
 std::map<EvaluationKey, std::string> CampaignRun::OfOtherMechanics() const {
   std::map<EvaluationKey, std::string> others;
   for (const auto& [key, evaluation] : evaluations_) {
-    if (store::IsTerminal(evaluation.status) || evaluation.digest.empty()) continue;
+    const bool for_good = evaluation.status == EvaluationStatus::kFinished ||
+                          evaluation.status == EvaluationStatus::kDiverged;
+    // What rests or was stopped may be asked to go on while its iteration is not concluded.
+    const bool stopped = evaluation.status == EvaluationStatus::kStoppedEarly &&
+                         record_.progress.phase != "calibrating";
+    if (for_good || stopped || evaluation.digest.empty()) continue;
     const std::string digest = SpecDigest(
         SpecOf(definition_->campaign, key.experiment, parameters_.at(key.sample), key.sample));
     if (digest != evaluation.digest) others[key] = digest;
   }
   return others;
+}
+
+bool CampaignRun::HasBegun() const {
+  return std::any_of(evaluations_.begin(), evaluations_.end(), [this](const auto& entry) {
+    const auto& [key, evaluation] = entry;
+    return store::IsTerminal(evaluation.status) ||
+           evaluation.missing.size() < definition_->LoadSteps(key.experiment).size();
+  });
 }
 
 void CampaignRun::BeginAnew(const EvaluationKey& key, const std::string& digest) {
@@ -144,6 +157,16 @@ void CampaignRun::BeginAnew(const EvaluationKey& key, const std::string& digest)
   evaluation.missing = {steps.begin(), steps.end()};
   evaluation.held_in.clear();
   evaluation.digest = digest;
+  SetStatus(key, EvaluationStatus::kWaiting, 0);
+  const auto arrived = arrived_.find(key.sample);
+  if (arrived == arrived_.end()) return;
+  arrived->second.out = false;
+  for (std::size_t t = 0; t < definition_->data.readings.size(); ++t) {
+    if (definition_->data.readings[t].experiment == key.experiment) {
+      arrived->second.predictions(static_cast<Eigen::Index>(t)) =
+          std::numeric_limits<double>::quiet_NaN();
+    }
+  }
 }
 
 std::vector<EvaluationKey> CampaignRun::With(EvaluationStatus status) const {

@@ -63,7 +63,9 @@ class CampaignRun {
   bool WantsPlan() const;
   /// What is open and was planned by a program with other mechanics, with its digest by this one.
   std::map<store::EvaluationKey, std::string> OfOtherMechanics() const;
-  /// Forgets what has been computed of it.
+  /// Anything has ended or given a state.
+  bool HasBegun() const;
+  /// Forgets what has been computed of it; it waits.
   void BeginAnew(const store::EvaluationKey& key, const std::string& digest);
   /// A plan is made of what is known now. again: and one more after it, whatever it says.
   void Planned(bool again);

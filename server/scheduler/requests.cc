@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/scheduler/attempt_spec.h"
+#include "server/scheduler/decisions.h"
 #include "server/scheduler/rungs.h"
 
 namespace calib::scheduler {
@@ -20,7 +21,8 @@ absl::Status Requests::Calibrate(const store::SampleRecord& sample, bool refused
     const std::size_t first = plan_.evaluations.size();
     // Where runs may rest or stop, what has ended decides what goes on: a run that is there to its
     // end already, of another campaign, would change the answer.
-    const bool may_stop = RestsAtRungs(definition_) || !std::isnan(sample.stop_below);
+    const bool may_stop =
+        RestsAtRungs(definition_) || DecidesAtOnce(definition_) || !std::isnan(sample.stop_below);
     absl::Status status = Request(sample, definition_.ExperimentsOf(Role::kCalibrate), !may_stop);
     for (std::size_t i = first; i < plan_.evaluations.size(); ++i) {
       plan_.evaluations[i].rest_after = FirstRung(definition_, plan_.evaluations[i].key.experiment);

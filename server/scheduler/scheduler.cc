@@ -1,6 +1,7 @@
 // Campaigns: taking them up, their states, and what they do next. Workers: scheduler_workers.cc.
 #include "server/scheduler/scheduler.h"
 
+#include <algorithm>
 #include <new>
 #include <utility>
 
@@ -77,8 +78,37 @@ absl::Status Scheduler::Load() {
   return absl::OkStatus();
 }
 
+store::Store::Job Scheduler::BeginAnew(CampaignRun& run,
+                                       const std::map<EvaluationKey, std::string>& others) {
+  std::vector<store::AttemptEnd> ends;
+  for (const LeaseEntry& lease : leases_.OfCampaign(run.id())) {
+    if (others.count(lease.key) == 0) continue;
+    leases_.Release(lease.attempt);
+    v1::Finished finished;
+    finished.set_attempt(lease.attempt);
+    finished.set_reason("of other mechanics");
+    ends.push_back(ToRecord(finished, "stopped"));
+  }
+  for (const auto& [key, digest] : others) {
+    run.BeginAnew(key, digest);
+  }
+  return [others, ends](Transaction& transaction) {
+    for (const store::AttemptEnd& end : ends) {
+      transaction.EndAttempt(end);
+    }
+    for (const auto& [key, digest] : others) {
+      transaction.BeginAnew(key, digest);
+    }
+  };
+}
+
 void Scheduler::PauseIfOfOtherMechanics(CampaignRun& run) {
-  if (!IsLeasable(run.state()) || run.OfOtherMechanics().empty()) {
+  const std::map<EvaluationKey, std::string> others = run.OfOtherMechanics();
+  if (!IsLeasable(run.state()) || others.empty()) {
+    return;
+  }
+  if (!run.HasBegun()) {  // there is nothing that could be mixed
+    ports_.Write(BeginAnew(run, others), [](const absl::Status&) {});
     return;
   }
   SetState(run, CampaignEvent::kPause,
@@ -97,6 +127,9 @@ void Scheduler::TakeUp(std::int64_t campaign, store::Reader& reader) {
   }
   if (MayPass(run.status())) {
     again_[campaign] = [this, campaign] { TakeUpNow(campaign); };
+    return;
+  }
+  if (absl::IsNotFound(run.status())) {  // deleted since
     return;
   }
   // One campaign that cannot be read must not keep the others from going on.
@@ -118,11 +151,31 @@ void Scheduler::TakeUpNow(std::int64_t campaign) {
   }
   TakeUp(campaign, *reader);
   if (CampaignRun* run = FindRun(campaign); run != nullptr) {
+    ReturnUnleased(*run);
+    PauseIfOfOtherMechanics(*run);
     Enqueue(*run);
     Advance(campaign);
     Dispatch();
   }
   ++version_;
+}
+
+void Scheduler::ReturnUnleased(CampaignRun& run) {
+  std::vector<EvaluationKey> unleased = run.With(EvaluationStatus::kRunning);
+  const auto leases = leases_.OfCampaign(run.id());
+  std::erase_if(unleased, [&leases](const EvaluationKey& key) {
+    return std::any_of(leases.begin(), leases.end(),
+                       [&key](const LeaseEntry& lease) { return lease.key == key; });
+  });
+  for (const EvaluationKey& key : unleased) {
+    const int failures = run.Find(key)->failures;
+    run.SetStatus(key, EvaluationStatus::kWaiting, failures);
+    ports_.Write(
+        [key, failures](Transaction& transaction) {
+          transaction.SetEvaluation(key, EvaluationStatus::kWaiting, "", failures);
+        },
+        [](const absl::Status&) {});
+  }
 }
 
 void Scheduler::TakeIn(std::int64_t campaign, bool at_rest) {
@@ -148,7 +201,10 @@ CampaignRun* Scheduler::FindRun(std::int64_t campaign) {
 CampaignRun* Scheduler::LiveRun(std::int64_t campaign, const Reply& reply) {
   CampaignRun* run = FindRun(campaign);
   if (run == nullptr) {
-    reply(absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
+    reply(again_.count(campaign) > 0
+              ? absl::UnavailableError(absl::StrCat("campaign c", campaign,
+                                                    " cannot be read now; try again in a moment"))
+              : absl::FailedPreconditionError(absl::StrCat("campaign c", campaign, " is over")));
   }
   return run;
 }
@@ -234,25 +290,27 @@ void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, con
     run->progress().pause_waived = run->progress().pause_waived || run->Diverged() > 0;
   }
   std::vector<EvaluationKey> again;
-  std::map<EvaluationKey, std::string> anew;
+  std::map<EvaluationKey, std::string> others;
+  store::Store::Job anew;
   if (run->state() == CampaignState::kPaused) {
-    anew = run->OfOtherMechanics();
-    for (const auto& [key, digest] : anew) {
-      run->BeginAnew(key, digest);
-    }
+    others = run->OfOtherMechanics();
+    anew = BeginAnew(*run, others);
     again = run->With(EvaluationStatus::kFailed);
     for (const EvaluationKey& key : again) {
       run->SetStatus(key, EvaluationStatus::kWaiting, 0);
     }
   }
   SetState(
-      *run, CampaignEvent::kResume, "",
+      *run, CampaignEvent::kResume,
+      others.empty() ? ""
+                     : absl::StrCat(others.size(), " evaluations begin anew by mechanics version ",
+                                    dem::EngineVersion()),
       [again, anew, also](Transaction& transaction) {
         if (also) {
           also(transaction);
         }
-        for (const auto& [key, digest] : anew) {
-          transaction.BeginAnew(key, digest);
+        if (anew) {
+          anew(transaction);
         }
         for (const EvaluationKey& key : again) {
           transaction.SetEvaluation(key, EvaluationStatus::kWaiting, "", 0);
@@ -303,6 +361,7 @@ void Scheduler::Delete(std::int64_t campaign, const store::Store::Job& also, con
                                                      ToString(run->state()), "; cancel it first")));
     return;
   }
+  again_.erase(campaign);
   ports_.Write(
       [campaign, also](Transaction& transaction) {
         transaction.DeleteCampaign(campaign);
@@ -355,8 +414,8 @@ std::string Scheduler::TooManyDiverged(CampaignRun& run, const std::string& last
 
 void Scheduler::Advance(std::int64_t campaign) {
   CampaignRun* run = FindRun(campaign);
-  if (run == nullptr || computing_.count(campaign) > 0 || !IsLeasable(run->state()) ||
-      !run->WantsPlan()) {
+  if (run == nullptr || computing_.count(campaign) > 0 || again_.count(campaign) > 0 ||
+      !IsLeasable(run->state()) || !run->WantsPlan()) {
     return;
   }
   run->Planned(false);

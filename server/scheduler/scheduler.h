@@ -125,7 +125,13 @@ class Scheduler {
 
   // Campaigns (scheduler.cc)
   void TakeUp(std::int64_t campaign, store::Reader& reader);
+  /// Forgets what other mechanics have begun, leases included; the job does so in the store.
+  store::Store::Job BeginAnew(CampaignRun& run,
+                              const std::map<store::EvaluationKey, std::string>& others);
+  /// What other mechanics have begun waits for a word; what nobody has begun is planned anew.
   void PauseIfOfOtherMechanics(CampaignRun& run);
+  /// What runs by the store, but by no lease, waits again.
+  void ReturnUnleased(CampaignRun& run);
   /// TakeUp, then what follows from it; again with the next Tick when the store cannot be read now.
   void TakeUpNow(std::int64_t campaign);
   /// What a plan has added to the store, then what follows from it; again with the next Tick when

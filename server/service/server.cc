@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "proto/rpc/address.h"
 #include "server/service/campaigns_service.h"
 #include "server/service/core.h"
 #include "server/service/state_folder.h"
@@ -36,8 +37,6 @@ absl::Status StartLog(const std::string& file) {
   spdlog::flush_on(spdlog::level::info);
   return absl::OkStatus();
 }
-
-std::string HostOf(const std::string& address) { return address.substr(0, address.rfind(':')); }
 
 }  // namespace
 
@@ -66,7 +65,7 @@ struct Server::Impl {
       return absl::UnavailableError(
           absl::StrCat("cannot listen on ", listen, ": in use, or not an address of this machine"));
     }
-    address = absl::StrCat(HostOf(listen), ":", port);
+    address = absl::StrCat(rpc::HostOf(listen), ":", port);
     return absl::OkStatus();
   }
 };
@@ -109,7 +108,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   if (absl::Status status = impl->Listen(options.listen); !status.ok()) {
     return status;
   }
-  if (absl::Status status = impl->folder->Announce(impl->address); !status.ok()) {
+  if (absl::Status status = impl->folder->Announce(impl->address, options.stays); !status.ok()) {
     return status;
   }
   spdlog::info("serving address={} state={}", impl->address, options.state_dir);

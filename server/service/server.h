@@ -15,6 +15,8 @@ namespace calib::service {
 struct ServerOptions {
   std::string state_dir{};             ///< created if need be; holds calib.db, lock and server.json
   std::string listen = "127.0.0.1:0";  ///< HOST:PORT; port 0: a free one, see Server::port()
+  /// Its owner starts it again when it ends, so that nobody else should serve the folder then.
+  bool stays = false;
   std::chrono::milliseconds lease{
       15'000};  ///< a worker is lost when nothing was heard from it for this long
   std::chrono::milliseconds heartbeat{2'000};  ///< workers speak at least this often

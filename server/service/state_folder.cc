@@ -19,6 +19,7 @@ namespace {
 struct Announcement {
   std::string address;
   int pid = 0;
+  bool stays = false;
 };
 
 std::string AnnouncementPath(const std::string& directory) { return directory + "/server.json"; }
@@ -30,7 +31,9 @@ std::optional<Announcement> ReadAnnouncement(const std::string& directory) {
   if (!json.is_object() || !json.contains("address") || !json.contains("pid")) {
     return std::nullopt;
   }
-  return Announcement{.address = json["address"].get<std::string>(), .pid = json["pid"].get<int>()};
+  return Announcement{.address = json["address"].get<std::string>(),
+                      .pid = json["pid"].get<int>(),
+                      .stays = json.value("stays", false)};
 }
 
 /// The whole file, for the open file description (not the process: threads of one process exclude
@@ -78,13 +81,14 @@ StateFolder::~StateFolder() {
   close(lock_);
 }
 
-absl::Status StateFolder::Announce(const std::string& address) const {
+absl::Status StateFolder::Announce(const std::string& address, bool stays) const {
   // Written aside and renamed: readers see all of it or nothing.
   const std::string path = AnnouncementPath(directory_);
   const std::string draft = path + ".new";
   {
     std::ofstream file(draft);
-    file << nlohmann::json{{"address", address}, {"pid", getpid()}}.dump() << '\n';
+    file << nlohmann::json{{"address", address}, {"pid", getpid()}, {"stays", stays}}.dump()
+         << '\n';
     if (!file.flush()) {
       return CannotWrite(draft, errno);
     }
@@ -111,6 +115,11 @@ absl::StatusOr<std::string> ServingAddress(const std::string& directory) {
     return absl::UnavailableError(absl::StrCat("the server of ", directory, " is starting"));
   }
   return announcement->address;
+}
+
+bool IsServedForGood(const std::string& directory) {
+  const auto announcement = ReadAnnouncement(directory);
+  return announcement.has_value() && announcement->stays;
 }
 
 }  // namespace calib::service

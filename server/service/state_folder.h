@@ -21,8 +21,9 @@ class StateFolder {
   StateFolder& operator=(const StateFolder&) = delete;
 
   std::string DatabasePath() const { return directory_ + "/calib.db"; }
-  /// Writes server.json: {"address": "127.0.0.1:43210", "pid": 123}.
-  absl::Status Announce(const std::string& address) const;
+  /// Writes server.json: {"address": "127.0.0.1:43210", "pid": 123, "stays": false}. stays: see
+  /// ServerOptions.
+  absl::Status Announce(const std::string& address, bool stays = false) const;
 
  private:
   StateFolder(std::string directory, int lock) : directory_(std::move(directory)), lock_(lock) {}
@@ -33,5 +34,8 @@ class StateFolder {
 /// Address of the process that serves the folder now. NOT_FOUND: none does (no server.json, or its
 /// lock is free); UNAVAILABLE: one holds the lock but has not announced its address yet (retry).
 absl::StatusOr<std::string> ServingAddress(const std::string& directory);
+
+/// True where a process serves the folder that stays, as far as has been announced.
+bool IsServedForGood(const std::string& directory);
 
 }  // namespace calib::service

@@ -183,9 +183,9 @@ void Transaction::BeginAnew(const EvaluationKey& key, const std::string& digest)
     connection_.Run("DELETE FROM state WHERE campaign = ? AND sample = ? AND experiment = ?",
                     key.campaign, key.sample, key.experiment);
     connection_.Run(
-        "UPDATE evaluation SET digest = ?, held_in = '' "
+        "UPDATE evaluation SET digest = ?, held_in = '', status = ?, reason = '', failures = 0 "
         "WHERE campaign = ? AND sample = ? AND experiment = ?",
-        digest, key.campaign, key.sample, key.experiment);
+        digest, ToString(EvaluationStatus::kWaiting), key.campaign, key.sample, key.experiment);
   });
 }
 

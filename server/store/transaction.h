@@ -57,7 +57,7 @@ class Transaction {
   void SetRest(const EvaluationKey& key, std::optional<int> rest_after);
   /// It rests, and workers with this checkpoint folder can go on with it.
   void SetHeldIn(const EvaluationKey& key, const std::string& folder);
-  /// Forgets what has been computed of an evaluation, which from now on is this one.
+  /// Forgets what has been computed of an evaluation, which from now on is this one and waits.
   void BeginAnew(const EvaluationKey& key, const std::string& digest);
   /// Ends `to` as `from` ended and gives it the same states; counted as reused.
   void ReuseEvaluation(const EvaluationKey& from, const EvaluationKey& to);

@@ -9,7 +9,7 @@ namespace {
 class SharedFolder : public CalibctlFixture {
  protected:
   SharedFolder() {
-    Write("first.yaml", SmallCampaign(2, 1));
+    Write("first.yaml", SmallCampaign(8, 1));
     Write("second.yaml", SmallCampaign(20, 2));
   }
 
@@ -19,6 +19,8 @@ class SharedFolder : public CalibctlFixture {
 "$1" run first.yaml --state s --workers 1 >first 2>&1 & host=$!
 until test -e s/server.json; do sleep 0.02; done
 "$@" & guest=$!
+until "$1" list --state s | grep -q '^c2 '; do sleep 0.02; done
+kill -0 $host && echo yes >joined
 )sh" + end + R"sh(
 wait $guest
 )sh");
@@ -29,7 +31,9 @@ wait $guest
 TEST_F(SharedFolder, AGuestGoesOnWhenItsHostIsDone) {
   const Answer guest = RunAsGuest("wait $host");
   ASSERT_EQ(guest.code, 0) << guest.err << Read("first");
+  EXPECT_EQ(Read("joined"), "yes\n") << "the host was done before its guest came";
   EXPECT_EQ(guest.json()["model_evaluations"], 40);
+  EXPECT_THAT(guest.err, ::testing::HasSubstr("this one serves it now"));
   EXPECT_THAT(Read("first"), ::testing::HasSubstr("campaign c1"));
 }
 
@@ -44,18 +48,21 @@ TEST_F(SharedFolder, AGuestTakesOverFromAHostThatIsKilled) {
 }
 
 TEST_F(SharedFolder, WhoWatchesServesOnceTheHostIsGone) {
-  ASSERT_EQ(Call("submit second.yaml --state s").code, 0);
   Write("watch.sh", R"sh(
 "$1" run first.yaml --state s --workers 1 >first 2>&1 & host=$!
 until test -e s/server.json; do sleep 0.02; done
+"$1" submit second.yaml --state s >second
 "$@" & guest=$!
 wait $host
-"$1" watch c1 --state s --workers 2 >/dev/null 2>&1
+"$1" show c2 --state s >at_the_end
+"$1" watch c2 --state s --workers 2 >/dev/null 2>&1
 wait $guest
 )sh");
-  const Answer watched = CallWith("sh watch.sh", "watch c1 --state s");
+  const Answer watched = CallWith("sh watch.sh", "watch c2 --state s");
+  EXPECT_EQ(Read("second"), "c2\n");
+  EXPECT_THAT(Read("at_the_end"), ::testing::Not(::testing::HasSubstr("finished")));
   EXPECT_EQ(watched.code, 0) << watched.err;
-  EXPECT_THAT(watched.out, ::testing::HasSubstr("c1 is finished"));
+  EXPECT_THAT(watched.out, ::testing::HasSubstr("c2 is finished"));
 }
 
 }  // namespace

@@ -25,5 +25,14 @@ TEST(Address, AServerMayTakeAnyPort) {
             "'127.0.0.1:65536' is not HOST:PORT with a port from 0 to 65535");
 }
 
+TEST(Address, OnlyThisMachineIsReachedByALoopback) {
+  for (const char* own : {"127.0.0.1:1", "127.3.2.1:1", "localhost:7443", "[::1]:7443"}) {
+    EXPECT_TRUE(IsLoopback(own)) << own;
+  }
+  for (const char* open : {"0.0.0.0:1", "[::]:1", "node12:7443", "10.0.0.127:1"}) {
+    EXPECT_FALSE(IsLoopback(open)) << open;
+  }
+}
+
 }  // namespace
 }  // namespace calib::rpc

@@ -89,24 +89,49 @@ TEST(CampaignLife, CancelStopsWhatRuns) {
 }
 
 TEST(CampaignLife, WhatOtherMechanicsHaveBegunWaitsForAWord) {
-  SimulatedService service("upgraded");
-  service.Submit(Small());
-  const store::EvaluationKey key{1, 0, 0};
-  const auto digest = [&service] { return Value(service.Read().Evaluations(1)).front().digest; };
-  const std::string own = digest();
-  service.Write([key](store::Transaction& t) { t.BeginAnew(key, "of another version"); });
-  service.Restart();
-  EXPECT_EQ(service.Campaign().progress.state, "paused");
-  EXPECT_NE(service.Campaign().progress.reason.find("other mechanics"), std::string::npos);
-  service.scheduler().Resume(
-      1, nullptr, [](const absl::Status& status) { EXPECT_TRUE(status.ok()) << status; });
-  service.ports().Run();
-  EXPECT_EQ(digest(), own);
-  service.RunToEnd(1, true);
+  constexpr const char* kOld = "of another version";
   SimulatedService calm("not_upgraded");
   calm.Submit(Small());
   calm.RunToEnd(1, true);
-  EXPECT_EQ(service.Fingerprint(), calm.Fingerprint());
+  SimulatedService service("upgraded");
+  service.Submit(Small());
+  const auto digest = [&service](std::size_t k) {
+    return Value(service.Read().Evaluations(1))[k].digest;
+  };
+  // Nothing has run: there is nothing to be mixed.
+  const std::string first = digest(0);
+  service.Write([](store::Transaction& t) { t.BeginAnew({1, 0, 0}, kOld); });
+  service.Restart();
+  EXPECT_EQ(digest(0), first);
+  EXPECT_EQ(service.Campaign().progress.state, "queued");
+  // One has ended, another one has come half its way.
+  const std::int64_t worker = service.Connect("w", 1);
+  const v1::Lease done = service.Next(worker, Kind::kLease).lease();
+  service.SendStates(worker, done, 0, 4);
+  service.SendEnd(worker, done.attempt(), v1::Finished::OUTCOME_COMPLETED);
+  const store::EvaluationKey half{1, 1, 0};
+  const std::string second = digest(1);
+  service.SendStates(worker, service.Next(worker, Kind::kLease).lease(), 0, 2);
+  const auto states = Value(service.Read().States(1, 1));
+  ASSERT_EQ(states.size(), 2U);
+  service.Write([&half, &states](store::Transaction& t) {
+    t.BeginAnew(half, kOld);
+    for (store::StateRecord state : states) {
+      state.observables.front() *= 2;
+      t.PutState(state, 0);
+    }
+  });
+  service.Restart();
+  EXPECT_EQ(service.Campaign().progress.state, "paused");
+  EXPECT_NE(service.Campaign().progress.reason.find("other mechanics"), std::string::npos);
+  EXPECT_EQ(digest(1), kOld);
+  service.scheduler().Resume(
+      1, nullptr, [](const absl::Status& status) { EXPECT_TRUE(status.ok()) << status; });
+  service.ports().Run();
+  EXPECT_EQ(digest(1), second);
+  EXPECT_TRUE(Value(service.Read().States(1, 1)).empty());
+  service.RunToEnd(1, true);
+  EXPECT_TRUE(service.Fingerprint() == calm.Fingerprint());
 }
 
 // Whatever is on the disk when the server is killed: the failure and the pause that follows from

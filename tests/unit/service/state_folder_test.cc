@@ -21,6 +21,9 @@ TEST(StateFolder, BelongsToOneServerAtATimeAndSaysWhere) {
         << "it has not announced itself yet";
     ASSERT_TRUE((*owner)->Announce("127.0.0.1:4711").ok());
     EXPECT_EQ(*ServingAddress(folder), "127.0.0.1:4711");
+    EXPECT_FALSE(IsServedForGood(folder));
+    ASSERT_TRUE((*owner)->Announce("127.0.0.1:4711", /*stays=*/true).ok());
+    EXPECT_TRUE(IsServedForGood(folder));
     const auto second = StateFolder::Open(folder);
     EXPECT_EQ(second.status().code(), absl::StatusCode::kAlreadyExists);
     EXPECT_NE(second.status().message().find("127.0.0.1:4711"), std::string::npos);
