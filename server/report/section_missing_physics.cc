@@ -175,7 +175,8 @@ std::string ErrorPlot(const std::string& name, const ErrorCurve& curve, std::siz
   all.insert(all.end(), curve.fitted.begin(), curve.fitted.end());
   all.insert(all.end(), curve.held.begin(), curve.held.end());
   const int last = static_cast<int>(steps) - 1;
-  Plot plot({}, Axis("effects added", 0, last, last), Axis::Covering("error, sd", all, 5));
+  Plot plot({.width = 330, .height = 190}, Axis("effects added", 0, last, last),
+            Axis::Covering("error, sd", all, 5));
   plot.AddHorizontal(1);
   plot.AddLine(curve.x, curve.fitted, "mean");
   plot.AddPoints(curve.x, curve.fitted, 3.5);
