@@ -169,6 +169,13 @@ std::span<const ObservableInfo> Observables() {
 
 const ContactInfo* FindContact(const std::string& name) { return FindByName(Contacts(), name); }
 const EffectInfo* FindEffect(const std::string& name) { return FindByName(Effects(), name); }
+
+bool Exclude(const EffectInfo& a, const EffectInfo& b) {
+  const auto names = [](const EffectInfo& one, const EffectInfo& other) {
+    return std::find(one.excludes.begin(), one.excludes.end(), other.name) != one.excludes.end();
+  };
+  return names(a, b) || names(b, a);
+}
 const TestInfo* FindTest(const std::string& name) { return FindByName(Tests(), name); }
 const ObservableInfo* FindObservable(const std::string& name) {
   return FindByName(Observables(), name);

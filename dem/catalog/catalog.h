@@ -97,6 +97,7 @@ struct EffectInfo {
   bool across_pressures = false;  ///< shows only between experiments at different pressures
   bool needs_motion = false;  ///< shows only where grains move while they are read: not in staged
                               ///< tests, whose readings are taken at rest
+  std::vector<std::string> excludes = {};  ///< other laws of the same thing: never both
 };
 
 struct ObservableInfo {
@@ -144,6 +145,8 @@ std::span<const ObservableInfo> Observables();
 /// Entry by name, or nullptr.
 const ContactInfo* FindContact(const std::string& name);
 const EffectInfo* FindEffect(const std::string& name);
+/// One of them says that it excludes the other.
+bool Exclude(const EffectInfo& a, const EffectInfo& b);
 const TestInfo* FindTest(const std::string& name);
 const ObservableInfo* FindObservable(const std::string& name);
 

@@ -101,7 +101,8 @@ EffectEntry AdhesionJkr() {
                    .reference = "Johnson, Kendall & Roberts, Proc. R. Soc. Lond. A 324 (1971) 301; "
                                 "Johnson, Contact Mechanics (1985), sec. 5.5",
                    .two_sided = false,
-                   .rays = {{.parameter = "work_of_adhesion", .steps = {0.1, 0.4}}}},
+                   .rays = {{.parameter = "work_of_adhesion", .steps = {0.1, 0.4}}},
+                   .excludes = {"adhesion_dmt"}},
           .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
 }
 

@@ -72,6 +72,9 @@ std::string EffectText(const dem::EffectInfo& effect) {
         "flows\n";
   }
   if (effect.across_pressures) text += "  only between experiments at different pressures\n";
+  if (!effect.excludes.empty()) {
+    text += Wrapped(absl::StrJoin(effect.excludes, ", "), "  not together with: ", kIndent);
+  }
   return text + ParameterTable(effect.parameters);
 }
 

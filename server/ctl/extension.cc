@@ -181,6 +181,13 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
   if (std::find(has.begin(), has.end(), name) != has.end()) {
     return absl::StrCat(name, " is part of the model already");
   }
+  for (const std::string& other : has) {
+    const dem::EffectInfo* joined = dem::FindEffect(declared, other);
+    if (joined != nullptr && dem::Exclude(*effect, *joined)) {
+      return absl::StrCat(name, " is another law of what ", other,
+                          " stands for already: one of them, not both");
+    }
+  }
   if (!effect->contacts.empty() && std::find(effect->contacts.begin(), effect->contacts.end(),
                                              campaign.model.contact) == effect->contacts.end()) {
     return absl::StrCat(name, " cannot join the contact ", campaign.model.contact,
@@ -216,10 +223,12 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
       .replicates = plan.replicates,
       .model_evaluations = plan.model_evaluations,
       .rows = {}};
+  campaign::Campaign grown = parent.campaign;
   for (const std::string& name : plan.effects) {
-    if (const std::string why = WhyNotJoin(parent.campaign, name); !why.empty()) {
+    if (const std::string why = WhyNotJoin(grown, name); !why.empty()) {
       return absl::InvalidArgumentError(why);
     }
+    grown.model.effects.push_back(name);
     derivation.parameters.merge(
         ParametersOf(*dem::FindEffect(parent.campaign.model.user_effects, name),
                      parent.campaign.model.contact, state, moduli));

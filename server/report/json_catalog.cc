@@ -96,6 +96,7 @@ std::string EffectsJson(std::span<const dem::UserEffect> declared) {
                     {"excited_by", e->excited_by},
                     {"needs_motion", e->needs_motion},
                     {"across_pressures", e->across_pressures},
+                    {"excludes", e->excludes},
                     {"parameters", EffectParameters(e->parameters)},
                     {"reference", e->reference}});
   }

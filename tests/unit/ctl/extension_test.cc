@@ -25,6 +25,16 @@ TEST(Extension, SaysWhatIsPossibleWithRunsThatWereMadeElsewhere) {
   EXPECT_THAT(WhyNotJoin(campaign, "magic"), HasSubstr("there is no effect magic"));
 }
 
+TEST(Extension, AModelHasOneLawOfAThing) {
+  campaign::Campaign campaign;
+  campaign.model.contact = "hertz_mindlin";
+  campaign.model.effects = {"adhesion_jkr"};
+  EXPECT_THAT(WhyNotJoin(campaign, "adhesion_dmt"), HasSubstr("another law of what adhesion_jkr"));
+  campaign.model.effects = {"adhesion_dmt"};
+  EXPECT_THAT(WhyNotJoin(campaign, "adhesion_jkr"), HasSubstr("one of them, not both"));
+  EXPECT_EQ(WhyNotJoin(campaign, "capillary_bridges"), "");
+}
+
 // Strengths are in units of the forces that the test's own contacts carry.
 TEST(Extension, TestsWithoutAPressureHaveThatOfTheirWeightOrImpact) {
   report::CampaignView view;
