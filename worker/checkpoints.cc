@@ -9,13 +9,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <random>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "dem/simulation/whole_file.h"
+#include "proto/rpc/random_id.h"
 
 namespace calib::worker {
 namespace {
@@ -30,20 +30,13 @@ std::string ReadAll(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-std::string NewIdentity() {
-  std::random_device device;
-  std::string identity;
-  for (int i = 0; i < 4; ++i) absl::StrAppend(&identity, absl::Hex(device(), absl::kZeroPad8));
-  return identity;
-}
-
 /// Of two processes that open a new folder at the same time one gives it its identity.
 std::string IdentityOf(const std::string& folder) {
   const std::string path = folder + "/identity";
   const std::string own = absl::StrCat(path, ".", getpid());
   if (std::string identity = ReadAll(path); !identity.empty()) return identity;
   std::ofstream file(own);
-  file << NewIdentity();
+  file << rpc::RandomId();
   file.close();  // tells whether the disk has taken it
   if (file) {
     // Fails where there is one already, which then counts.

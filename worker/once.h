@@ -9,8 +9,9 @@ namespace calib::worker {
 
 struct OnceOptions {
   std::string spec{};  ///< file with an AttemptSpec, JSON or binary protobuf
-  std::string
-      packing{};  ///< file whose text has the spec's packing_digest, or its recipe's sizes_digest; empty: the spec names none
+  /// File whose text has the spec's packing_digest, or its recipe's sizes_digest; empty: the spec
+  /// names none.
+  std::string packing{};
   std::vector<std::string> meshes{};  ///< files that have the digests of the spec's meshes
   std::string output{};               ///< CSV file; empty: standard output
   std::string vtk{};                  ///< folder for grains; empty: none

@@ -61,6 +61,7 @@ dem::Scenario ScenarioFromSpec(const v1::AttemptSpec& spec) {
   scenario.model.materials.assign(spec.materials().begin(), spec.materials().end());
   scenario.materials.bodies.insert(spec.body_materials().begin(), spec.body_materials().end());
   scenario.materials.grains.insert(spec.grain_materials().begin(), spec.grain_materials().end());
+  scenario.materials.seed = spec.mixture_seed();
   scenario.test = spec.test();
   scenario.settings.insert(spec.settings().begin(), spec.settings().end());
   if (spec.has_consolidation_friction()) {

@@ -5,90 +5,30 @@
 #include <cmath>
 #include <utility>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/registry.h"
 #include "dem/contact/common_parameters.h"
 
 namespace calib::dem {
-namespace {
 
-const ParameterInfo& Density() {
-  static const ParameterInfo info = [] {
-    ParameterInfo density;
-    density.name = "density";
-    density.unit = "kg/m^3";
-    density.min_open = true;
-    density.max = 1e9;
-    density.default_prior = {.kind = "log_uniform", .min = 500, .max = 2e4};
-    density.description = "of the material";
-    return density;
-  }();
-  return info;
-}
-
-const ParameterInfo& PairFriction() {
-  static const ParameterInfo info = [] {
-    ParameterInfo friction = FrictionCoefficient();
-    friction.alternative_to = "";
-    friction.description = "coefficient tan(phi_mu) of friction between two materials";
-    return friction;
-  }();
-  return info;
-}
-
-const ParameterInfo& PairDampingRatio() {
-  static const ParameterInfo info = [] {
-    ParameterInfo ratio;
-    ratio.name = "damping_ratio";
-    ratio.unit = "1";
-    ratio.max = 10;
-    ratio.default_prior = {.kind = "log_uniform", .min = 0.01, .max = 10};
-    ratio.description = "viscous_damping.ratio between two materials";
-    return ratio;
-  }();
-  return info;
-}
-
-const ParameterInfo* Named(const std::vector<ParameterInfo>& infos, const std::string& name) {
-  const auto it = std::find_if(infos.begin(), infos.end(),
-                               [&](const ParameterInfo& info) { return info.name == name; });
-  return it == infos.end() ? nullptr : &*it;
-}
-
-bool Has(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-std::vector<std::string> AllNames(const Model& model) {
+std::vector<std::string> MaterialNames(const Model& model) {
   std::vector<std::string> names = {kOwnMaterial};
   names.insert(names.end(), model.materials.begin(), model.materials.end());
   return names;
 }
 
-/// Of materials A and B as "A-B" or "B-A".
-const ParameterInfo* PairParameter(const Model& model, const std::string& pair,
-                                   const std::string& name) {
-  const auto dash = pair.find('-');
-  const std::vector<std::string> names = AllNames(model);
-  if (dash == std::string::npos || !Has(names, pair.substr(0, dash)) ||
-      !Has(names, pair.substr(dash + 1)) || pair.substr(0, dash) == pair.substr(dash + 1)) {
-    return nullptr;
-  }
-  if (name == "friction_coefficient") {
-    return &PairFriction();
-  }
-  if (name == "damping_ratio" && Has(model.effects, "viscous_damping")) {
-    return &PairDampingRatio();
-  }
-  const ContactInfo* law = FindContact(model.contact);
-  return name == "damping" && law != nullptr ? Named(law->parameters, name) : nullptr;
+bool IsMaterialPair(const Model& model, const std::string& name) {
+  const std::vector<std::string> names = MaterialNames(model);
+  const auto has = [&names](const std::string& one) {
+    return std::find(names.begin(), names.end(), one) != names.end();
+  };
+  const std::size_t dash = name.find('-');
+  return dash != std::string::npos && has(name.substr(0, dash)) && has(name.substr(dash + 1)) &&
+         name.substr(0, dash) != name.substr(dash + 1);
 }
 
-}  // namespace
-
 Materials::Materials(const Model& model, const ParameterSet& own, double thickness)
-    : names_(AllNames(model)),
+    : names_(MaterialNames(model)),
       laws_{own},
       densities_{model.density},
       mass_units_{GrainMassOf(model.density, thickness).unit},
@@ -168,110 +108,6 @@ void Materials::Complete(ContactBlock& b) const {
       b.effective_mass[k] = b.mass_factor * (mi * mj / (mi + mj));
     }
   }
-}
-
-const ParameterInfo* FindParameter(const Model& model, const std::string& dotted_name) {
-  if (const ParameterInfo* info =
-          FindParameter(model.user_effects, model.contact, model.effects, dotted_name)) {
-    return info;
-  }
-  const auto dot = dotted_name.find('.');
-  if (dot == std::string::npos) {
-    return nullptr;
-  }
-  const std::string prefix = dotted_name.substr(0, dot);
-  const std::string name = dotted_name.substr(dot + 1);
-  if (!Has(model.materials, prefix)) {
-    return PairParameter(model, prefix, name);
-  }
-  if (name == "density") {
-    return &Density();
-  }
-  const ContactInfo* law = FindContact(model.contact);
-  return law == nullptr ? nullptr : Named(law->parameters, name);
-}
-
-std::vector<std::string> MaterialParameters(const Model& model) {
-  const ContactInfo* law = FindContact(model.contact);
-  std::vector<std::string> dotted;
-  for (const std::string& name : model.materials) {
-    for (std::size_t p = 0; law != nullptr && p < law->parameters.size(); ++p) {
-      dotted.push_back(absl::StrCat(name, ".", law->parameters[p].name));
-    }
-    dotted.push_back(absl::StrCat(name, ".density"));
-  }
-  const std::vector<std::string> names = AllNames(model);
-  for (std::size_t a = 0; a < names.size(); ++a) {
-    for (std::size_t b = a + 1; b < names.size(); ++b) {
-      const std::string pair = absl::StrCat(names[a], "-", names[b]);
-      for (const char* name : {"friction_coefficient", "damping_ratio", "damping"}) {
-        if (PairParameter(model, pair, name) != nullptr) {
-          dotted.push_back(absl::StrCat(pair, ".", name));
-        }
-      }
-    }
-  }
-  return dotted;
-}
-
-std::vector<std::string> MaterialProblems(const Model& model) {
-  std::vector<std::string> problems;
-  if (model.materials.size() > kMostMaterials) {
-    problems.push_back(
-        absl::StrCat(model.materials.size(), " materials, allowed are at most ", kMostMaterials));
-  }
-  for (std::size_t m = 0; m < model.materials.size(); ++m) {
-    const std::string& name = model.materials[m];
-    const bool word = !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
-      return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_';
-    });
-    if (!word) {
-      problems.push_back(
-          absl::StrCat("material \"", name, "\": a name has letters, digits and _ only"));
-    } else if (name == kOwnMaterial) {
-      problems.push_back(absl::StrCat("material ", name,
-                                      " is the model's own, whose values stand with the model; "
-                                      "name others"));
-    } else if (FindEffect(model.user_effects, name) != nullptr) {
-      problems.push_back(
-          absl::StrCat("material ", name, " has the name of an effect; call it something else"));
-    } else if (std::find(model.materials.begin(),
-                         model.materials.begin() + static_cast<std::ptrdiff_t>(m),
-                         name) != model.materials.begin() + static_cast<std::ptrdiff_t>(m)) {
-      problems.push_back(absl::StrCat("material ", name, " is named twice"));
-    }
-    const std::string angle = absl::StrCat(name, ".friction_angle");
-    const std::string coefficient = absl::StrCat(name, ".friction_coefficient");
-    if (model.parameters.contains(angle) && model.parameters.contains(coefficient)) {
-      problems.push_back(absl::StrCat(coefficient, " and ", angle,
-                                      " are alternatives: only one of them may be given"));
-    }
-  }
-  if (model.materials.empty()) {
-    return problems;
-  }
-  for (const char* effect : {"adhesion_jkr", "wall_friction", "nonspherical_shape"}) {
-    if (Has(model.effects, effect)) {
-      problems.push_back(absl::StrCat("effect ", effect,
-                                      " knows one material only; leave it out or model.materials",
-                                      effect == std::string("wall_friction")
-                                          ? ": friction at walls of a material is that of the pair"
-                                          : ""));
-    }
-  }
-  const std::vector<std::string> names = AllNames(model);
-  for (std::size_t a = 0; a < names.size(); ++a) {
-    for (std::size_t b = a + 1; b < names.size(); ++b) {
-      for (const char* name : {".friction_coefficient", ".damping_ratio", ".damping"}) {
-        const std::string one = absl::StrCat(names[a], "-", names[b], name);
-        const std::string other = absl::StrCat(names[b], "-", names[a], name);
-        if (model.parameters.contains(one) && model.parameters.contains(other)) {
-          problems.push_back(absl::StrCat(one, " and ", other, " are the same; give one of them"));
-        }
-      }
-    }
-  }
-  return problems;
 }
 
 }  // namespace calib::dem

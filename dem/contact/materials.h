@@ -17,6 +17,12 @@ inline constexpr const char* kOwnMaterial = "grains";
 /// Materials that a model may have besides its own.
 inline constexpr int kMostMaterials = 16;
 
+/// The model's own material first, then its others in their order.
+std::vector<std::string> MaterialNames(const Model& model);
+
+/// Whether a name is "A-B" of two different materials of the model.
+bool IsMaterialPair(const Model& model, const std::string& name);
+
 /// Stiffness of two bodies one behind the other, from those of contacts among equals: 2ab/(a + b),
 /// exactly `a` where both are the same. For the moduli of Hertz and Mindlin this is
 ///   1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2,   1/G* = (2 - nu_1)/G_1 + (2 - nu_2)/G_2
@@ -58,7 +64,8 @@ class Materials {
 
   /// From block.materials and radii to what follows from the pair: effective masses, and between
   /// grains friction, which changes in proportion where block.sliding_friction is not that of
-  /// `grains` (consolidation).
+  /// `grains` (consolidation); where that is 0, there is no proportion, and the pairs that rub keep
+  /// theirs.
   void Complete(ContactBlock& block) const;
 
  private:
@@ -87,16 +94,5 @@ std::vector<Value> ForPairs(const KernelContext& context, const Alone& alone, co
   }
   return values;
 }
-
-/// Parameter of a model by its dotted campaign name, those of its effects and materials included,
-/// or nullptr when the model has none of that name.
-const ParameterInfo* FindParameter(const Model& model, const std::string& dotted_name);
-
-/// Dotted names that the model's materials and pairs of them may give values to; pairs once, in the
-/// order in which the materials are named.
-std::vector<std::string> MaterialParameters(const Model& model);
-
-/// Everything wrong with the names and values of the model's materials, one sentence each.
-std::vector<std::string> MaterialProblems(const Model& model);
 
 }  // namespace calib::dem

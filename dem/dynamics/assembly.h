@@ -225,6 +225,10 @@ class Assembly {
   [[nodiscard]] double ShearSinceSearch() const;
   void TakeBranchesBetweenBodies();
   [[nodiscard]] absl::Status FormulasFinite() const;
+  /// NominalCriticalStep() if contacts had no moment stiffness [s].
+  [[nodiscard]] double NominalStepByForces() const;
+  /// Of the smallest grain, of each material where there are several; overlap: in radii.
+  [[nodiscard]] double LeastNominalStep(double overlap, bool with_moments) const;
 
   PeriodicCell cell_;
   ParticleArrays particles_;
@@ -279,11 +283,6 @@ class Assembly {
   int bodies_ = 0;
   double solid_volume_ = 0;
   double mean_diameter_ = 0;
-  /// NominalCriticalStep() if contacts had no moment stiffness [s].
-  [[nodiscard]] double NominalStepByForces() const;
-  /// Of the smallest grain, of each material where there are several; overlap: in radii.
-  [[nodiscard]] double LeastNominalStep(double overlap, bool with_moments) const;
-
   double nominal_critical_step_ = 0;
   std::int64_t steps_ = 0;
   std::int64_t contact_updates_ = 0;

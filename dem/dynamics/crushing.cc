@@ -8,11 +8,11 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/particles/random_numbers.h"
 
 namespace calib::dem {
 namespace {
 
-constexpr std::uint32_t kPurpose = 4;      // 1 to 3: random_cloud.cc, elongation.cc
 constexpr double kComminutionLimit = 0.1;  ///< of the first diameter
 constexpr double kDensestFines = 0.64;     ///< of the pores: random close packing
 
@@ -63,7 +63,7 @@ double Crushing::Strength(int id, int times, double diameter) const {
   const r123::Philox4x32::key_type key = {
       {static_cast<std::uint32_t>(seed_), static_cast<std::uint32_t>(seed_ >> 32)}};
   const auto bits = r123::Philox4x32()(
-      {{kPurpose, static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(times), 0}}, key);
+      {{kCrushingDraw, static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(times), 0}}, key);
   const double u = (bits[0] + 0.5) / 4294967296.0;
   const double size = law_.reference_diameter / diameter;
   return std::pow(size * size * size * -std::log1p(-u), 1.0 / law_.weibull_modulus) / law_.weakness;

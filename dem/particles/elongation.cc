@@ -6,15 +6,15 @@
 #include <cstdint>
 #include <numbers>
 
+#include "dem/particles/random_numbers.h"
+
 namespace calib::dem {
 namespace {
-
-constexpr std::uint32_t kPurpose = 3;  // 1 and 2: random_cloud.cc
 
 /// Uniform direction of grain i.
 void Direction(int grain, double* axis) {
   const auto bits =
-      r123::Philox4x32()({{kPurpose, static_cast<std::uint32_t>(grain), 0, 0}}, {{0, 0}});
+      r123::Philox4x32()({{kElongationDraw, static_cast<std::uint32_t>(grain), 0, 0}}, {{0, 0}});
   const double z = 2.0 * bits[0] / 4294967296.0 - 1.0;
   const double phi = 2.0 * std::numbers::pi * bits[1] / 4294967296.0;
   const double across = std::sqrt(1.0 - z * z);

@@ -26,10 +26,10 @@ struct PackingProblem {
 };
 
 /// Reads `##PERIODIC:: Lx Ly Lz` followed by `x y z r clump` or `x y z r clump material` per line
-/// (blank lines, # comments and a byte order mark allowed) [m]. Appends everything wrong to problems (not a number, missing fields,
-/// radius <= 0 or too large for the cell, a grain outside the cell by more than half its length,
-/// fewer than two grains); centres outside by less belong to an image; the result is meaningful
-/// only if none was added.
+/// (blank lines, # comments and a byte order mark allowed) [m]. Appends everything wrong to problems
+/// (not a number, missing fields, radius <= 0 or too large for the cell, a grain outside the cell by
+/// more than half its length, fewer than two grains); centres outside by less belong to an image;
+/// the result is meaningful only if none was added.
 Packing ParsePacking(const std::string& text, std::vector<PackingProblem>& problems);
 
 /// The same text format, with 17 digits: ParsePacking() gives the same bits back.
@@ -51,6 +51,9 @@ struct PackingRecipe {
   /// [m], of every grain, in place of all that; `particles` of them.
   std::vector<double> radii{};
 };
+
+/// Radius of the largest grain that the recipe can give [m].
+double LargestRadius(const PackingRecipe& recipe);
 
 /// Grains of the recipe's sizes, thrown loosely into a cell, for tests that pour them themselves;
 /// its porosity and pressure are not used. Errors as GeneratePacking.

@@ -1,4 +1,5 @@
-// What a packing says of how another one like it is made.
+// What a packing says of how another one like it is made, and what a recipe says of its grains.
+#include <algorithm>
 #include <numbers>
 #include <numeric>
 
@@ -12,6 +13,16 @@ double PorosityOf(const Packing& packing) {
     solid += 4.0 / 3.0 * std::numbers::pi * r * r * r;
   }
   return 1 - solid / (packing.length[0] * packing.length[1] * packing.length[2]);
+}
+
+double LargestRadius(const PackingRecipe& recipe) {
+  if (!recipe.radii.empty()) {
+    return *std::max_element(recipe.radii.begin(), recipe.radii.end());
+  }
+  if (!recipe.grading.empty()) {
+    return GradedRadii(recipe.grading, recipe.particles).front();
+  }
+  return recipe.mean_radius * (1 + recipe.radius_spread);
 }
 
 PackingRecipe RecipeLike(const Packing& packing) {

@@ -20,10 +20,13 @@ inline std::array<double, 3> Uniform(std::uint64_t seed, std::uint32_t purpose, 
   return {bits[0] / 4294967296.0, bits[1] / 4294967296.0, bits[2] / 4294967296.0};
 }
 
-/// Purposes in use, one for each kind of draw.
+/// Purposes in use, one for each kind of draw. Two of them share a number where no run makes both:
+/// elongation and crushing are of tests in the periodic cell, fill and order of those that pour.
 inline constexpr std::uint32_t kRadiusDraw = 1;
 inline constexpr std::uint32_t kPositionDraw = 2;
+inline constexpr std::uint32_t kElongationDraw = 3;
 inline constexpr std::uint32_t kFillDraw = 3;
+inline constexpr std::uint32_t kCrushingDraw = 4;
 inline constexpr std::uint32_t kOrderDraw = 4;
 inline constexpr std::uint32_t kFeedDraw = 5;
 inline constexpr std::uint32_t kMaterialDraw = 6;

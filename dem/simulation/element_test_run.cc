@@ -328,7 +328,7 @@ absl::StatusOr<Summary> RunElementTest(const Scenario& scenario, RunRecord& reco
                                        std::stop_token stop) {
   if (!scenario.materials.grains.empty()) {
     Scenario mixture = scenario;
-    DrawMaterials(scenario.materials.grains, scenario.seed, mixture.packing);
+    DrawMaterials(scenario.materials.grains, scenario.materials.seed, mixture.packing);
     mixture.materials.grains.clear();
     return RunElementTest(mixture, record, std::move(stop));
   }

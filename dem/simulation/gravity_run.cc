@@ -88,7 +88,7 @@ std::string GravityRun::MaterialOf(const std::string& body) const {
 }
 
 void GravityRun::Mix(Packing& grains) const {
-  DrawMaterials(scenario_.materials.grains, scenario_.seed, grains);
+  DrawMaterials(scenario_.materials.grains, scenario_.materials.seed, grains);
 }
 
 Assembly GravityRun::Make(const Packing& grains, Surroundings surroundings) const {

@@ -14,12 +14,12 @@ namespace {
 std::string Known(const Model& model) {
   return model.materials.empty()
              ? absl::StrCat("the model has no materials besides ", kOwnMaterial)
-             : absl::StrCat("there are ", kOwnMaterial, ", ", absl::StrJoin(model.materials, ", "));
+             : absl::StrCat("there are ", absl::StrJoin(MaterialNames(model), ", "));
 }
 
 bool Has(const Model& model, const std::string& name) {
-  return name == kOwnMaterial ||
-         std::find(model.materials.begin(), model.materials.end(), name) != model.materials.end();
+  const std::vector<std::string> names = MaterialNames(model);
+  return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 void CheckBodies(const Scenario& scenario, std::vector<std::string>& problems) {

@@ -130,6 +130,8 @@ std::string MaterialBytes(const Scenario& s) {
     archive(key, name);
   }
   Put(archive, s.materials.grains);
+  std::uint64_t seed = s.materials.seed;
+  archive(seed);
   return std::move(archive.bytes());
 }
 
@@ -171,6 +173,9 @@ std::vector<std::string> Differences(const std::vector<Part>& found,
     if (k >= found.size() || found[k].name != wanted[k].name || found[k].bytes != wanted[k].bytes) {
       names.push_back(wanted[k].name);
     }
+  }
+  for (std::size_t k = wanted.size(); k < found.size(); ++k) {
+    names.push_back(found[k].name);
   }
   return names;
 }

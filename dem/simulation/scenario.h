@@ -36,6 +36,7 @@ struct MaterialUse {
                                                 ///< them), `intruder` of shaken_box, `partner` of
                                                 ///< collision, its wall included
   std::map<std::string, double> grains{};       ///< share of the number of grains, (0, 1] in all
+  std::uint64_t seed = 0;                       ///< of the draw of `grains`, that of the specimen
 };
 
 /// Friction during consolidation, restored before loading. At most one is set; none: the model's

@@ -8,11 +8,11 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
-#include "dem/contact/materials.h"
 #include "dem/lab_tests/collision.h"
 #include "dem/lab_tests/rotating_drum.h"
 #include "dem/simulation/collision_run.h"
 #include "dem/simulation/material_use.h"
+#include "dem/simulation/model_parameters.h"
 #include "dem/simulation/scenario.h"
 #include "dem/simulation/test_meshes.h"
 

@@ -199,15 +199,16 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
   }
   scenario.test = experiment.test;
   scenario.settings = experiment.settings;
+  scenario.materials = experiment.materials;
   const int stream = StreamOf(campaign, sample);
   if (!experiment.specimens.empty()) {
     const auto index = static_cast<std::size_t>(stream) % experiment.specimens.size();
     if (const auto* file = std::get_if<PackingFile>(&experiment.specimens[index])) {
       scenario.packing = file->packing;
     }
+    if (!scenario.materials.grains.empty()) scenario.materials.seed = campaign.seed + index;
   }
   for (const auto& [name, file] : experiment.meshes) scenario.meshes[name] = file.mesh;
-  scenario.materials = experiment.materials;
   scenario.consolidation = experiment.consolidation;
   scenario.initial_stress = experiment.initial_stress;
   scenario.loading_rate = experiment.loading_rate;

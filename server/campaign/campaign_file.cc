@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <sstream>
 
 #include "absl/strings/str_cat.h"
@@ -62,7 +63,7 @@ double LargestDiameter(const Experiment& experiment) {
   double largest = 0;
   for (const Specimen& specimen : experiment.specimens) {
     if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
-      largest = std::max(largest, 2 * recipe->mean_radius * (1 + recipe->radius_spread));
+      largest = std::max(largest, 2 * dem::LargestRadius(*recipe));
     } else if (const auto* file = std::get_if<PackingFile>(&specimen)) {
       for (const double radius : file->packing.radius) largest = std::max(largest, 2 * radius);
     }
@@ -79,16 +80,26 @@ void AskEngine(const MapReader& map, const Campaign& campaign) {
   }
   for (const Experiment& experiment : campaign.experiments) {
     dem::Scenario scenario = MakeScenario(campaign, experiment, middle, 0);
-    if (scenario.packing.x.empty()) {  // a recipe, whose packing does not exist yet
-      scenario.packing = {.length = {1, 1, 1},
-                          .x = {0, 0.5},
-                          .y = {0, 0.5},
-                          .z = {0, 0.5},
-                          .radius = {0.1, 0.1},
-                          .clump = {-1, -1}};
-    }
-    for (const std::string& problem : dem::ScenarioProblems(scenario)) {
-      map.Problem("experiments", experiment.name + ": " + problem);
+    std::set<std::string> said;
+    const auto ask = [&](const dem::Packing& packing, const std::string& path) {
+      scenario.packing = packing;
+      for (const std::string& problem : dem::ScenarioProblems(scenario)) {
+        if (!said.insert(problem).second) continue;
+        map.Problem("experiments",
+                    absl::StrCat(experiment.name, ": ", path, path.empty() ? "" : ": ", problem));
+      }
+    };
+    // Without a file first, in place of a recipe's packing, which does not exist yet: what is wrong
+    // with any packing is not said of a file.
+    ask({.length = {1, 1, 1},
+         .x = {0, 0.5},
+         .y = {0, 0.5},
+         .z = {0, 0.5},
+         .radius = {0.1, 0.1},
+         .clump = {-1, -1}},
+        "");
+    for (const Specimen& specimen : experiment.specimens) {
+      if (const auto* file = std::get_if<PackingFile>(&specimen)) ask(file->packing, file->path);
     }
     if (const double grain = LargestDiameter(experiment); grain > 0) {
       if (const std::string problem = dem::MeshSizeProblem(scenario, grain); !problem.empty()) {
@@ -143,7 +154,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
   MapReader map(*parse.root, "", problems);
   if (parse.root->kind == YamlNode::Kind::kMap) {
     ReadName(map, campaign);
-    ReadModel(map, campaign);
+    ReadModel(map, context, campaign);
     ReadInference(map, campaign);
     const std::size_t sound = problems.size();
     ReadParameters(map, campaign);

@@ -6,6 +6,8 @@
 #include "absl/strings/str_cat.h"
 #include "dem/contact/materials.h"
 #include "dem/simulation/material_use.h"
+#include "dem/simulation/model_parameters.h"
+#include "server/campaign/admissible_range.h"
 #include "server/campaign/suggestion.h"
 
 namespace calib::campaign {
@@ -13,12 +15,6 @@ namespace {
 
 bool Has(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-std::vector<std::string> WithOwn(const dem::Model& model) {
-  std::vector<std::string> names = {dem::kOwnMaterial};
-  names.insert(names.end(), model.materials.begin(), model.materials.end());
-  return names;
 }
 
 // The values that stand under a material or a pair.
@@ -44,18 +40,11 @@ void ReadValues(MapReader& section, const std::string& owner, dem::Model& model)
           key, absl::StrCat("is nothing that ", owner, " may have; ", Suggestion(key, offered)));
       continue;
     }
-    const auto value = values->Quantity(
-        key, dem::UnitFor(*info, model.contact),
-        {.min = info->min, .max = info->max, .min_open = info->min_open, .infinite_allowed = true});
+    const auto value =
+        values->Quantity(key, dem::UnitFor(*info, model.contact), AdmissibleRange(*info));
     model.parameters[name] = value.value_or(std::nan(""));
   }
   values->Finish();
-}
-
-bool IsPair(const std::string& key, const std::vector<std::string>& names) {
-  const std::size_t dash = key.find('-');
-  return dash != std::string::npos && Has(names, key.substr(0, dash)) &&
-         Has(names, key.substr(dash + 1)) && key.substr(0, dash) != key.substr(dash + 1);
 }
 
 }  // namespace
@@ -70,10 +59,10 @@ void ReadMaterials(MapReader& model_map, dem::Model& model) {
     for (const std::string& name : model.materials) ReadValues(*materials, name, model);
     materials->Finish();
   }
-  const std::vector<std::string> names = WithOwn(model);
+  const std::vector<std::string> names = dem::MaterialNames(model);
   if (pairs) {
     for (const std::string& key : pairs->Keys()) {
-      if (IsPair(key, names)) {
+      if (dem::IsMaterialPair(model, key)) {
         ReadValues(*pairs, key, model);
         continue;
       }
@@ -109,7 +98,7 @@ dem::MaterialUse ReadMaterialUse(MapReader& experiment_map, const dem::TestInfo&
   }
   for (const std::string& body : dem::BodiesOf(test.name)) {
     if (!map->Has(body)) continue;
-    const auto name = map->Choice(body, WithOwn(model));
+    const auto name = map->Choice(body, dem::MaterialNames(model));
     if (name) use.bodies[body] = *name;
   }
   map->Finish();
@@ -117,6 +106,7 @@ dem::MaterialUse ReadMaterialUse(MapReader& experiment_map, const dem::TestInfo&
 }
 
 void CheckMaterialsUsed(const MapReader& campaign_map, const Campaign& campaign) {
+  if (campaign.table || campaign.lineage) return;
   for (const std::string& name : campaign.model.materials) {
     const auto uses = [&name](const Experiment& experiment) {
       const auto of_body = [&name](const auto& body) { return body.second == name; };

@@ -6,6 +6,8 @@
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
 #include "dem/contact/materials.h"
+#include "dem/simulation/model_parameters.h"
+#include "server/campaign/admissible_range.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/read_materials.h"
 #include "server/campaign/read_prior.h"
@@ -60,10 +62,6 @@ std::vector<std::string> AlternativesOf(const ModelParameter& parameter,
     if (named && prefix(other.name) == prefix(parameter.name)) names.push_back(other.name);
   }
   return names;
-}
-
-Range AdmissibleRange(const dem::ParameterInfo& info) {
-  return {.min = info.min, .max = info.max, .min_open = info.min_open, .infinite_allowed = true};
 }
 
 // Whether an effect can act together with the contact, if that is known.
@@ -121,6 +119,14 @@ void ReadEffects(MapReader& map, dem::Model& model) {
   }
 }
 
+// Of the parameter of a pair A-B the name that it has as one of B-A; empty: it is of no pair.
+std::string InOtherOrder(const dem::Model& model, const std::string& name) {
+  const std::string pair = name.substr(0, name.find('.'));
+  if (!dem::IsMaterialPair(model, pair)) return "";
+  const std::size_t dash = pair.find('-');
+  return absl::StrCat(pair.substr(dash + 1), "-", pair.substr(0, dash), name.substr(pair.size()));
+}
+
 void ReadFixed(MapReader& map, dem::Model& model) {
   auto fixed = map.Map("fixed");
   if (!fixed) return;
@@ -135,6 +141,10 @@ void ReadFixed(MapReader& map, dem::Model& model) {
         fixed->Quantity(name, dem::UnitFor(*info, model.contact), AdmissibleRange(*info));
     if (model.parameters.contains(name)) {
       fixed->Problem(name, "stands in model.materials or model.pairs already; keep one of them");
+    }
+    if (const std::string other = InOtherOrder(model, name); model.parameters.contains(other)) {
+      fixed->Problem(name,
+                     absl::StrCat("is ", other, ", which is given already; keep one of them"));
     }
     // A refused value still counts as given, so that one mistake is one problem.
     model.parameters[name] = value.value_or(std::nan(""));
@@ -200,13 +210,21 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
   const auto given = [&](const std::string& name) {
     return calibrated(name) || model.parameters.contains(name);
   };
+  for (const CalibratedParameter& parameter : campaign.parameters) {
+    const std::string& name = parameter.name;
+    if (model.parameters.contains(name)) {
+      campaign_map.Problem("parameters", name + " is both calibrated and fixed; keep one of them");
+    }
+    const std::string other = InOtherOrder(model, name);
+    // Of two that are both calibrated the first in the alphabet speaks.
+    if (model.parameters.contains(other) || (name < other && calibrated(other))) {
+      campaign_map.Problem("parameters",
+                           absl::StrCat(name, " and ", other, " are the same; give one of them"));
+    }
+  }
   const std::vector<ModelParameter> all = ParametersOf(model);
   std::vector<std::string> said;  // names dealt with as the alternative of an earlier one
   for (const ModelParameter& parameter : all) {
-    if (calibrated(parameter.name) && model.parameters.contains(parameter.name)) {
-      campaign_map.Problem("parameters",
-                           parameter.name + " is both calibrated and fixed; keep one of them");
-    }
     if (std::find(said.begin(), said.end(), parameter.name) != said.end()) continue;
     bool covered = given(parameter.name) || parameter.info->default_value ||
                    parameter.of_material || OfRefusedEffect(parameter.name, model);
@@ -230,7 +248,7 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
 
 }  // namespace
 
-void ReadModel(MapReader& campaign_map, Campaign& campaign) {
+void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& campaign) {
   const YamlNode* node =
       campaign_map.Require("model", "it names contact, effects, density and fixed parameters");
   if (node == nullptr) return;
@@ -248,7 +266,7 @@ void ReadModel(MapReader& campaign_map, Campaign& campaign) {
   if (map.Require("contact", "one of " + Listed(contacts)) != nullptr) {
     model.contact = map.Choice("contact", contacts).value_or("");
   }
-  ReadUserEffects(map, model);
+  ReadUserEffects(map, context, model);
   ReadEffects(map, model);
   model.density =
       map.Quantity("density", "kg/m^3", {.min = 0, .min_open = true}).value_or(model.density);

@@ -3,12 +3,13 @@
 
 #include "server/campaign/campaign.h"
 #include "server/campaign/map_reader.h"
+#include "server/campaign/read_context.h"
 
 namespace calib::campaign {
 
 /// Reads contact, effects, density and fixed parameters. With precomputed runs none of them is
 /// needed.
-void ReadModel(MapReader& campaign_map, Campaign& campaign);
+void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& campaign);
 
 /// Reads the calibrated parameters and their priors, then checks that every parameter of the model
 /// has exactly one source: calibrated, fixed, or the catalogue's default. Call after ReadModel.

@@ -76,6 +76,11 @@ std::string NoOtherLike(const PackingFile& file) {
   for (const int clump : file.packing.clump) {
     if (clump >= 0) return absl::StrCat(file.path, " holds clumps, which are not thrown anew");
   }
+  if (!file.packing.material.empty()) {
+    return absl::StrCat(file.path,
+                        " says which grains are of which material, which other packings would not "
+                        "keep; give shares of the grains instead");
+  }
   const dem::PackingRecipe recipe = dem::RecipeLike(file.packing);
   if (!kRecipePorosity.Contains(recipe.porosity) && !(recipe.porosity >= dem::kCloudPorosity)) {
     return absl::StrFormat(

@@ -54,7 +54,7 @@ std::optional<inference::Prior> ReadDefaultPrior(MapReader& map, dem::ParameterI
 
 // Two values of the parameter as distances from its null, the nearer first.
 std::optional<dem::StrengthRay> ReadRay(MapReader& map, const dem::ParameterInfo& info,
-                                        const inference::Prior& prior, bool both) {
+                                        const inference::Prior& prior, bool both, bool is_new) {
   const double null = *info.null_value;
   std::vector<double> values;
   if (const auto texts = map.TextList("steps")) {
@@ -85,7 +85,7 @@ std::optional<dem::StrengthRay> ReadRay(MapReader& map, const dem::ParameterInfo
       map.Problem("steps", absl::StrCat(value, " is outside what its sign allows"));
       return std::nullopt;
     }
-    if (value < prior.min || value > prior.max) {
+    if (is_new && (value < prior.min || value > prior.max)) {
       map.Problem("steps", absl::StrCat(value, " is outside its prior, ", prior.min, " to ",
                                         prior.max, ": a fit could not take that strength"));
       return std::nullopt;
@@ -96,7 +96,7 @@ std::optional<dem::StrengthRay> ReadRay(MapReader& map, const dem::ParameterInfo
   return dem::StrengthRay{.parameter = info.name, .steps = {values[0] - null, values[1] - null}};
 }
 
-void ReadParameter(MapReader& map, const std::string& name, dem::UserEffect& effect) {
+void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::UserEffect& effect) {
   const std::size_t before = map.problems().size();
   dem::ParameterInfo info;
   info.name = name;
@@ -141,7 +141,7 @@ void ReadParameter(MapReader& map, const std::string& name, dem::UserEffect& eff
     }
   }
   if (prior && info.null_value && map.problems().size() == before) {
-    if (const auto ray = ReadRay(map, info, *prior, both)) {
+    if (const auto ray = ReadRay(map, info, *prior, both, is_new)) {
       effect.info.rays.push_back(*ray);
       effect.info.two_sided = effect.info.two_sided || both;
     }
@@ -214,7 +214,7 @@ std::string Describe(const dem::UserEffect& effect, const std::string& own) {
 }
 
 // With problems the effect is what could be read of it, so that its names cause no further ones.
-dem::UserEffect ReadOne(MapReader& map, const std::string& name) {
+dem::UserEffect ReadOne(MapReader& map, const std::string& name, bool is_new) {
   const std::size_t before = map.problems().size();
   dem::UserEffect effect;
   effect.info.name = name;
@@ -233,7 +233,7 @@ dem::UserEffect ReadOne(MapReader& map, const std::string& name) {
   }
   if (auto parameters = map.Map("parameters")) {
     for (const std::string& key : parameters->Keys()) {
-      if (auto parameter = parameters->Map(key)) ReadParameter(*parameter, key, effect);
+      if (auto parameter = parameters->Map(key)) ReadParameter(*parameter, key, is_new, effect);
     }
     parameters->Finish();
   } else if (!map.Has("parameters")) {
@@ -289,7 +289,7 @@ dem::UserEffect ReadOne(MapReader& map, const std::string& name) {
 
 }  // namespace
 
-void ReadUserEffects(MapReader& model_map, dem::Model& model) {
+void ReadUserEffects(MapReader& model_map, const ReadContext& context, dem::Model& model) {
   auto effects = model_map.Map("user_effects");
   if (!effects) return;
   std::vector<std::string> seen;
@@ -298,7 +298,7 @@ void ReadUserEffects(MapReader& model_map, dem::Model& model) {
     seen.push_back(name);
     auto one = effects->Map(name);
     if (!one) continue;
-    model.user_effects.push_back(ReadOne(*one, name));
+    model.user_effects.push_back(ReadOne(*one, name, context.is_new()));
   }
   effects->Finish();
 }

@@ -7,8 +7,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
-#include "dem/contact/materials.h"
-#include "server/campaign/map_reader.h"
+#include "dem/simulation/model_parameters.h"
+#include "server/campaign/admissible_range.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/suggestion.h"
 
@@ -44,8 +44,7 @@ std::string Apply(const std::string& assignment, const campaign::Campaign& campa
   const std::string& unit = dem::UnitFor(*info, campaign.model.contact);
   const auto value = campaign::ParseQuantity(assignment.substr(equals + 1), unit);
   if (!value.ok()) return absl::StrCat("--set ", name, ": ", std::string(value.status().message()));
-  const campaign::Range range{
-      .min = info->min, .max = info->max, .min_open = info->min_open, .infinite_allowed = true};
+  const campaign::Range range = campaign::AdmissibleRange(*info);
   if (!range.Contains(*value)) {
     return absl::StrCat("--set ", name, ": ", Quoted(assignment.substr(equals + 1)),
                         " is outside what is allowed: ", range.Describe(unit));

@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "dem/contact/materials.h"
+#include "dem/simulation/model_parameters.h"
 #include "server/campaign/derive.h"
 #include "server/campaign/suggestion.h"
 

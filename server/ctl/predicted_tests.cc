@@ -83,6 +83,25 @@ absl::Status SpellOutControl(const std::string& path, YamlNode& experiment,
 
 }  // namespace
 
+void TakeSpecimen(const YamlNode& from, YamlNode& experiment) {
+  const YamlNode* test = campaign::YamlFind(experiment, "test");
+  const dem::TestInfo* info = test != nullptr ? dem::FindTest(test->scalar) : nullptr;
+  const YamlNode* packing = campaign::YamlFind(from, "packing");
+  if (packing == nullptr || campaign::YamlFind(experiment, "packing") != nullptr) return;
+  if (info != nullptr && !info->needs_packing) return;
+  campaign::YamlAt(experiment, "packing") = *packing;
+  const YamlNode* realizations = campaign::YamlFind(from, "realizations");
+  if (realizations != nullptr && campaign::YamlFind(experiment, "realizations") == nullptr) {
+    campaign::YamlAt(experiment, "realizations") = *realizations;
+  }
+  const YamlNode* materials = campaign::YamlFind(from, "materials");
+  const YamlNode* grains =
+      materials != nullptr ? campaign::YamlFind(*materials, "grains") : nullptr;
+  if (grains != nullptr && campaign::YamlFind(experiment, "materials") == nullptr) {
+    campaign::YamlAt(experiment, "materials") = campaign::YamlMap({{"grains", *grains}});
+  }
+}
+
 absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path,
                                          const report::CampaignView& parent) {
   const auto text = ReadText(path);
@@ -113,17 +132,7 @@ absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path
     if (auto spelled = SpellOutControl(path, experiment, tests.files); !spelled.ok()) {
       return spelled;
     }
-    for (const char* key : {"packing", "realizations"}) {
-      const YamlNode* inherited = first != nullptr && !first->items.empty()
-                                      ? campaign::YamlFind(first->items.front(), key)
-                                      : nullptr;
-      const bool has_packing =
-          campaign::YamlFind(experiment, "packing") != nullptr && std::string(key) == "packing";
-      if (has_packing) break;
-      if (inherited != nullptr && campaign::YamlFind(experiment, key) == nullptr) {
-        campaign::YamlAt(experiment, key) = *inherited;
-      }
-    }
+    if (first != nullptr && !first->items.empty()) TakeSpecimen(first->items.front(), experiment);
   }
   tests.experiments = list.items;
   // Whatever the experiments name is read once, so that problems are found here and files travel.

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "dem/catalog/catalog.h"
-#include "dem/contact/materials.h"
+#include "dem/simulation/model_parameters.h"
 #include "server/ctl/reading_effects.h"
 
 namespace calib::ctl {

@@ -125,6 +125,7 @@ v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& 
                                         scenario.materials.bodies.end());
   spec.mutable_grain_materials()->insert(scenario.materials.grains.begin(),
                                          scenario.materials.grains.end());
+  if (!scenario.materials.grains.empty()) spec.set_mixture_seed(scenario.materials.seed);
   return spec;
 }
 

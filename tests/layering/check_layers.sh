@@ -17,7 +17,7 @@ server/store      server/store/,server/campaign/,inference/                     
 server/scheduler  server/scheduler/,server/store/,server/campaign/,inference/,dem/,calib/v1/   chrono|spdlog|nlohmann
 server/report     server/report/,server/campaign/,inference/,dem/catalog/,dem/formula/,calib/v1/   nlohmann|chrono
 server/service    server/service/,server/scheduler/,server/store/,server/campaign/,inference/,dem/,proto/rpc/,calib/v1/  grpcpp|spdlog|chrono|nlohmann
-server/ctl        server/,proto/rpc/,calib/v1/,dem/catalog/,dem/contact/materials.h,dem/formula/,dem/simulation/,inference/  grpcpp|CLI|nlohmann|chrono|spdlog
+server/ctl        server/,proto/rpc/,calib/v1/,dem/catalog/,dem/formula/,dem/simulation/,inference/  grpcpp|CLI|nlohmann|chrono|spdlog
 server            server/service/,server/store/,server/scheduler/,proto/rpc/address.h                     spdlog|CLI|chrono
 '
 watched='grpcpp|SQLiteCpp|sqlite3|yaml-cpp|spdlog|CLI|nlohmann|chrono'

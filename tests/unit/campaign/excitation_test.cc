@@ -51,6 +51,7 @@ TEST(Excitation, WhatNoExperimentShowsIsNamed) {
       {"viscous_damping.ratio", Of("isotropic")},
       {"twisting_resistance.stiffness", Of("collision")},
       {"twisting_resistance.friction", Of("collision")},
+      {"twisting_resistance.friction", Of("shaken_box")},
       {"nonspherical_shape.aspect", Of("collision")}};
   for (const Case& c : inert) {
     EXPECT_THAT(EffectsWithoutPart(Calibrating(c)),

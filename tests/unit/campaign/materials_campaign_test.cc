@@ -109,5 +109,61 @@ TEST(MaterialsCampaign, EveryMistakeIsOneSentence) {
               HasSubstr("effect wall_friction knows one material only"));
 }
 
+TEST(MaterialsCampaign, APairHasOneSourceInWhateverOrder) {
+  const std::string parameters = "  wood.young_modulus: default\n";
+  EXPECT_EQ(
+      With(parameters, parameters + "  steel-grains.friction_coefficient: default\n"),
+      "c.yaml:11: parameters: steel-grains.friction_coefficient is both calibrated and fixed; "
+      "keep one of them\n");
+  EXPECT_EQ(With(parameters, parameters + "  grains-steel.friction_coefficient: default\n"),
+            "c.yaml:11: parameters: grains-steel.friction_coefficient and "
+            "steel-grains.friction_coefficient are the same; give one of them\n");
+  EXPECT_EQ(With(parameters, parameters + "  wood-steel.friction_coefficient: default\n" +
+                                 "  steel-wood.friction_coefficient: default\n"),
+            "c.yaml:11: parameters: steel-wood.friction_coefficient and "
+            "wood-steel.friction_coefficient are the same; give one of them\n");
+  EXPECT_EQ(With("fixed: {",
+                 "fixed: {wood-steel.friction_coefficient: 0.3, "
+                 "steel-wood.friction_coefficient: 0.4, "),
+            "c.yaml:5: model.fixed.steel-wood.friction_coefficient: is "
+            "wood-steel.friction_coefficient, which is given already; keep one of them\n");
+  EXPECT_THAT(With("  pairs:\n", "  pairs:\n    grains-steel: {friction_coefficient: 0.3}\n"),
+              HasSubstr("are the same; give one of them"));
+}
+
+// E.g. `predict` of a test without the grains that the material is of.
+TEST(MaterialsCampaign, OfATableOrDerivedOneMaterialsMayHaveNoPart) {
+  const std::string unused = absl::StrReplaceAll(
+      Yaml(), {{"partner: steel", "partner: wood"}, {"intruder: steel", "intruder: wood"}});
+  const std::string said = "material steel has no part in any of the experiments";
+  EXPECT_THAT(ProblemsOf(unused, Files()), HasSubstr(said));
+  EXPECT_EQ(ProblemsOf(unused + "lineage: {parent: c1, purpose: warm_fit}\n", Files()), "");
+  EXPECT_EQ(ProblemsOf(absl::StrReplaceAll(unused, {{"{samples: 10}",
+                                                     "{method: table, rows: [{young_modulus: 7e10, "
+                                                     "wood.young_modulus: 1e10}]}"}}),
+                       Files()),
+            "");
+}
+
+TEST(MaterialsCampaign, SamplesOfOnePackingHaveOneMixture) {
+  const Campaign c =
+      ReadCampaign(absl::StrReplaceAll(Yaml(), {{"    materials: {walls",
+                                                 "    realizations: 2\n    materials: {walls"}}) +
+                       "seed: 40\n",
+                   "c.yaml", ReaderOf(Files()))
+          .campaign;
+  std::vector<std::uint64_t> mixtures;
+  std::vector<std::uint64_t> runs;
+  for (int sample = 0; sample < 4; ++sample) {
+    const dem::Scenario scenario = MakeScenario(c, c.experiments.at(1), {7e10, 1e10}, sample);
+    mixtures.push_back(scenario.materials.seed);
+    runs.push_back(scenario.seed);
+  }
+  EXPECT_THAT(mixtures, ElementsAre(40, 41, 40, 41));
+  EXPECT_THAT(runs, ElementsAre(40, 41, 42, 43));
+  // Without a mixture nothing is drawn, and equal runs have equal specs.
+  EXPECT_EQ(MakeScenario(c, c.experiments.at(0), {7e10, 1e10}, 1).materials.seed, 0U);
+}
+
 }  // namespace
 }  // namespace calib::campaign

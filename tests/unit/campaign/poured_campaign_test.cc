@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "server/campaign/specimen_notes.h"
 #include "tests/support/stl_text.h"
@@ -157,6 +158,12 @@ TEST(PouredCampaign, AMeshThatDoesNotFitTheGrainsIsRefused) {
                         "grain 0.0044 m: is the mesh's unit right?"));
   EXPECT_THAT(ProblemsOf(WithMesh("{silo: {file: silo.stl, unit: um}}"), files),
               HasSubstr("mesh silo is 0.0003 m long, the largest grain 0.0044 m"));
+  const std::string graded =
+      absl::StrReplaceAll(WithMesh("{silo: {file: silo.stl, unit: m}}"),
+                          {{"{mean: 2 mm, spread: 0.1}", "{cumulative: [[1 mm, 0], [3 mm, 1]]}"}});
+  const double largest = dem::GradedRadii({{1e-3, 0}, {3e-3, 1}}, 200).front();
+  EXPECT_THAT(ProblemsOf(graded, files),
+              HasSubstr(absl::StrCat("the largest grain ", 2 * largest, " m")));
   const auto raised_by = [&](double up) {
     auto raised = sides;
     for (auto& triangle : raised) {

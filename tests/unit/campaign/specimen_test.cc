@@ -40,6 +40,14 @@ std::string TwentyGrains(double length, int clump = -1) {
   }
   return dem::FormatPacking(packing);
 }
+// The same with every second grain of a material.
+std::string OfMaterials(const std::string& text, const std::string& material) {
+  std::vector<dem::PackingProblem> problems;
+  dem::Packing packing = dem::ParsePacking(text, problems);
+  packing.material.assign(packing.x.size(), "");
+  for (std::size_t i = 0; i < packing.x.size(); i += 2) packing.material[i] = material;
+  return dem::FormatPacking(packing);
+}
 constexpr double kDense = 2.594e-3;  // porosity 0.4
 
 std::string WithRealizations(const std::string& packing, int count) {
@@ -121,6 +129,25 @@ TEST(Realizations, AFileOfWhichNoOtherCanBeMadeIsRefused) {
             "porosity of packing.txt is 0.648, neither that of a packing (between 0.2 (excluded) "
             "and 0.6 (excluded)) nor that of a cloud (0.7 or more); name one file per realization "
             "in packing.files, or generate them\n");
+  files["packing.txt"] = OfMaterials(TwentyGrains(kDense), "soft");
+  const std::string yaml = absl::StrReplaceAll(
+      WithRealizations("file: packing.txt", 4),
+      {{"  fixed: {", "  materials: {soft: {young_modulus: 1e8}}\n  fixed: {"}});
+  EXPECT_EQ(ProblemsOf(yaml, files),
+            "c.yaml:18: experiments[1].realizations: is 4, but one packing file is given, and "
+            "packing.txt says which grains are of which material, which other packings would not "
+            "keep; give shares of the grains instead; name one file per realization in "
+            "packing.files, or generate them\n");
+}
+
+// Of every file, not of the first alone.
+TEST(Realizations, WhatTheEngineRefusesIsSaidWithTheFileOnce) {
+  auto files = GoodFiles();
+  files["a.txt"] = TwentyGrains(kDense);
+  files["b.txt"] = files["c.txt"] = OfMaterials(TwentyGrains(kDense), "soft");
+  EXPECT_EQ(ProblemsOf(WithRealizations("files: [a.txt, b.txt, c.txt]", 3), files),
+            "c.yaml:12: experiments: tx02: b.txt: grains of the packing are of material \"soft\"; "
+            "the model has no materials besides grains\n");
 }
 
 std::string WithSizes(const std::string& sizes) {

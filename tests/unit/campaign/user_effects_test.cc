@@ -101,6 +101,16 @@ TEST(UserEffects, ReadingsAreAddedToAndScaled) {
   EXPECT_EQ(read.campaign.model.user_effects[1].action, dem::FormulaAction::kScales);
 }
 
+// A fit could not take such a strength; one that was accepted once still has to load.
+TEST(UserEffects, StepsOutsideThePriorAreRefusedOfNewCampaignsOnly) {
+  const std::string yaml = Changed("steps: [0.1, 1 N s/m]", "steps: [0.1, 20 N s/m]");
+  EXPECT_THAT(ProblemsOf(yaml), HasSubstr("steps: 20 is outside its prior, 0.01 to 10"));
+  const ReadOutcome stored =
+      ReadCampaign(yaml, "c.yaml", ReaderOf(GoodFiles()), std::nullopt, CampaignIs::kStored);
+  for (const Problem& problem : stored.problems) ADD_FAILURE() << ToString(problem);
+  EXPECT_THAT(stored.campaign.model.user_effects.at(0).info.rays.at(0).steps, ElementsAre(0.1, 20));
+}
+
 // extend, diagnose and improve write campaigns that follow from this one.
 TEST(UserEffects, SurviveTheTextOfADerivedCampaign) {
   const auto derived =

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+#include <string>
+
 namespace calib::scheduler {
 namespace {
 
@@ -35,6 +38,45 @@ TEST(SpecDigest, NamesWhatDeterminesTheStatesAndNothingElse) {
   other = Spec();
   other.mutable_staging()->set_rate(0.1);
   EXPECT_NE(SpecDigest(other), digest);
+}
+
+TEST(SpecDigest, NamesMaterialsAndMixtures) {
+  dem::Scenario scenario;
+  scenario.model.contact = "linear";
+  const campaign::PackingFile file{.path = "p.txt", .digest = "abc", .packing = {}};
+  const auto digest = [&] { return SpecDigest(ToSpec(scenario, file, "tx")); };
+  std::set<std::string> seen = {digest()};
+  scenario.materials.seed = 5;  // of no mixture
+  EXPECT_EQ(digest(), *seen.begin());
+  scenario.model.materials = {"steel", "wood"};
+  EXPECT_TRUE(seen.insert(digest()).second);
+  scenario.materials.bodies = {{"walls", "steel"}};
+  EXPECT_TRUE(seen.insert(digest()).second);
+  scenario.materials.bodies = {{"walls", "wood"}};
+  EXPECT_TRUE(seen.insert(digest()).second);
+  scenario.materials.grains = {{"wood", 0.25}};
+  EXPECT_TRUE(seen.insert(digest()).second);
+  scenario.materials.grains = {{"wood", 0.3}};
+  EXPECT_TRUE(seen.insert(digest()).second);
+  scenario.materials.seed = 6;
+  EXPECT_TRUE(seen.insert(digest()).second);
+}
+
+TEST(SpecDigest, NamesGradingAndShapeOfARecipe) {
+  const auto digest = [](const dem::PackingRecipe& recipe) {
+    return SpecDigest(ToSpec(dem::Scenario{}, recipe, "tx"));
+  };
+  const dem::Grading grading = {{1e-3, 0}, {2e-3, 1}};
+  const dem::Grading finer = {{1e-3, 0}, {1.5e-3, 0.4}, {2e-3, 1}};
+  const std::set<std::string> digests = {digest({}), digest({.depth_ratio = 1.1}),
+                                         digest({.depth_ratio = 1.2}), digest({.grading = grading}),
+                                         digest({.grading = finer})};
+  EXPECT_EQ(digests.size(), 5U);
+  // A cell as deep as wide is what specs said before they spoke of it: their runs are found again.
+  EXPECT_FALSE(ToSpec(dem::Scenario{}, dem::PackingRecipe{}, "tx").recipe().has_depth_ratio());
+  EXPECT_TRUE(ToSpec(dem::Scenario{}, dem::PackingRecipe{.depth_ratio = 2}, "tx")
+                  .recipe()
+                  .has_depth_ratio());
 }
 
 TEST(ToSpec, ARealizationBeyondTheFilesNamesTheFileOfItsSizes) {

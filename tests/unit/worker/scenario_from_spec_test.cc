@@ -17,7 +17,7 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
                     .density = 2600.5,
                     .parameters = {{"young_modulus", 0.1 + 0.2}, {"friction_angle", 0.5}},
                     .materials = {"steel", "glass"}};
-  scenario.materials = {.bodies = {{"walls", "steel"}}, .grains = {{"glass", 0.3}}};
+  scenario.materials = {.bodies = {{"walls", "steel"}}, .grains = {{"glass", 0.3}}, .seed = 77};
   scenario.test = "oedometric";
   scenario.settings = {{"start_pressure", 1e5}};
   scenario.consolidation.porosity = 0.391;
@@ -46,6 +46,7 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
   EXPECT_EQ(back.model.materials, scenario.model.materials);
   EXPECT_EQ(back.materials.bodies, scenario.materials.bodies);
   EXPECT_EQ(back.materials.grains, scenario.materials.grains);
+  EXPECT_EQ(back.materials.seed, 77U);
   EXPECT_EQ(back.settings, scenario.settings);
   EXPECT_EQ(back.consolidation.porosity, scenario.consolidation.porosity);
   EXPECT_FALSE(back.consolidation.friction_coefficient.has_value());

@@ -207,6 +207,14 @@ TEST(RunCheckpoint, OfAnotherRunIsRefusedNamingWhatDiffers) {
   EXPECT_THAT(CheckpointProblem(adaptive, bytes), HasSubstr("what differs: staging"));
   Scenario effect = With(scenario, "rolling_resistance", {{"stiffness", 0}, {"friction", 0}});
   EXPECT_THAT(CheckpointProblem(effect, bytes), HasSubstr("what differs: effects"));
+  Scenario mixed = scenario;  // whose checkpoint has a part more
+  mixed.model.materials = {"twin"};
+  mixed.materials = {.grains = {{"twin", 0.4}}, .seed = 3};
+  const std::string of_mixture = Record(mixed).checkpoints.front();
+  EXPECT_THAT(CheckpointProblem(scenario, of_mixture), HasSubstr("what differs: materials"));
+  EXPECT_THAT(CheckpointProblem(mixed, bytes), HasSubstr("what differs: materials"));
+  mixed.materials.seed = 4;
+  EXPECT_THAT(CheckpointProblem(mixed, of_mixture), HasSubstr("what differs: materials"));
   int states = 0;
   const auto summary =
       Simulate(grains, [&](const State&) { ++states; }, {}, {.resume_from = bytes});

@@ -156,7 +156,9 @@ TEST(MaterialPair, DampingRatioOfThePairSetsItsRestitution) {
     const test::Run run = test::RunAll(
         Collide(model, {{"radius", 0.01}, {"partner_radius", partner}, {"impact_angle", 0}}));
     ASSERT_EQ(run.states.size(), 2U) << run.summary.reason;
-    EXPECT_NEAR(Value(run.states[0], "normal_restitution"), expected(0.1), 2e-3);
+    for (const State& state : run.states) {  // whatever the speed
+      EXPECT_NEAR(Value(state, "normal_restitution"), expected(0.1), 2e-3);
+    }
   }
 }
 
@@ -343,7 +345,7 @@ TEST(Mixture, HasTheSameBitsOnAnyNumberOfThreadsAndFromACheckpoint) {
   Scenario mixture = test::SmallTriaxial(test::HertzModel());
   mixture.model.materials = {"soft"};
   mixture.model.parameters["soft.young_modulus"] = 1e8;
-  mixture.model.parameters["soft.density"] = 1000e3;
+  mixture.model.parameters["soft.density"] = 1000;
   mixture.model.parameters["grains-soft.friction_coefficient"] = 0.3;
   mixture.materials.grains = {{"soft", 0.3}};
   Scenario other = mixture;
@@ -399,6 +401,20 @@ TEST(Mixture, OfASoftMaterialIsTheSofterTheMoreThereIsOfIt) {
     EXPECT_GT(strain, 1.5 * last);
     last = strain;
   }
+}
+
+TEST(Mixture, FollowsFromTheSeedOfTheSpecimenAlone) {
+  Scenario scenario = test::SmallTriaxial(test::HertzModel());
+  scenario.model.materials = {"soft"};
+  scenario.model.parameters["soft.young_modulus"] = 1e8;
+  scenario.materials = {.grains = {{"soft", 0.3}}, .seed = 7};
+  Scenario sample = scenario;  // another one of the same packing
+  sample.seed = scenario.seed + 1;
+  ExpectSameBits(scenario, sample);
+  Scenario realization = scenario;
+  realization.materials.seed = 8;
+  EXPECT_NE(test::RunAll(scenario).states.back().values,
+            test::RunAll(realization).states.back().values);
 }
 
 TEST(DrawMaterials, GivesEachItsShareAndTheSameToTheSameSeed) {

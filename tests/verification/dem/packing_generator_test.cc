@@ -56,7 +56,7 @@ TEST(GeneratePacking, AnotherPackingOfTheSameGrainsIsAsDense) {
                                      .porosity = 0.40,
                                      .aspect = 1.5,
                                      .seed = 3,
-                                     .depth_ratio = 1.2,
+                                     .depth_ratio = 2,
                                      .grading = {{1e-3, 0}, {1.5e-3, 0.4}, {2e-3, 1}}},
                                     1, {});
   ASSERT_TRUE(file.ok()) << file.status();
