@@ -90,7 +90,16 @@ bool OfRefusedEffect(const std::string& parameter, const dem::Model& model) {
   return effect != nullptr && !Joins(*effect, model.contact);
 }
 
-void ReadEffects(MapReader& map, dem::Model& model) {
+// Of the effects that the model has, one that stands for the same thing as this one; empty: none.
+std::string OtherLawOf(const dem::EffectInfo& effect, const dem::Model& model) {
+  for (const std::string& name : model.effects) {
+    const dem::EffectInfo* const other = dem::FindEffect(model.user_effects, name);
+    if (other != nullptr && dem::Exclude(effect, *other)) return name;
+  }
+  return "";
+}
+
+void ReadEffects(MapReader& map, const ReadContext& context, dem::Model& model) {
   auto names = map.TextList("effects");
   if (!names) return;
   if (*names == std::vector<std::string>{"none"}) names->clear();
@@ -114,6 +123,11 @@ void ReadEffects(MapReader& map, dem::Model& model) {
                                           "; it works with ", Listed(effect->contacts)));
       model.effects.push_back(name);  // so that its parameters are no further problems
     } else {
+      const std::string other = context.is_new() ? OtherLawOf(*effect, model) : "";
+      if (!other.empty()) {
+        map.Problem("effects", absl::StrCat(name, " is another law of what ", other,
+                                            " stands for: name one of them"));
+      }
       model.effects.push_back(name);
     }
   }
@@ -267,7 +281,7 @@ void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& ca
     model.contact = map.Choice("contact", contacts).value_or("");
   }
   ReadUserEffects(map, context, model);
-  ReadEffects(map, model);
+  ReadEffects(map, context, model);
   model.density =
       map.Quantity("density", "kg/m^3", {.min = 0, .min_open = true}).value_or(model.density);
   ReadMaterials(map, model);

@@ -464,10 +464,10 @@ class Inquiry {
     auto next =
         PlanNextExperiment(laboratory_, rivals, base_.runs().sample[like], response_.scatter);
     if (!next.ok()) return next.status();
-    diagnosis_.next_experiment = *std::move(next);
-    const std::string why = diagnosis_.next_experiment ? "" : WhyNoPlans(base_.view().campaign);
-    if (rivals.size() >= 2 && !why.empty()) {
-      diagnosis_.warnings.push_back(absl::StrCat("No next experiment is planned: ", why, "."));
+    diagnosis_.next_experiment = std::move(next->next);
+    if (!diagnosis_.next_experiment) {
+      diagnosis_.warnings.push_back(
+          absl::StrCat("No next experiment is planned: ", next->why_none, "."));
     }
     return absl::OkStatus();
   }

@@ -72,6 +72,9 @@ Json PlannedJson(const PlannedExperiment& planned) {
   return {{"test", planned.test},
           {"settings", planned.settings},
           {"unloading", planned.unloading},
+          {"control", planned.control},
+          {"control_from", planned.path.front()},
+          {"control_to", planned.path.back()},
           {"expected_power", planned.expected_power},
           {"distance_sd", planned.distance}};
 }
@@ -90,16 +93,28 @@ Json NextJson(const std::optional<NextExperiment>& next) {
   return json;
 }
 
+std::string UnitOf(const std::string& quantity, const dem::TestInfo& test) {
+  if (quantity == "loading_rate") return "1/s";
+  for (const dem::ParameterInfo& setting : test.settings) {
+    if (setting.name == quantity) return setting.unit;
+  }
+  const dem::ObservableInfo* const observable = dem::FindObservable(quantity);
+  return observable != nullptr ? observable->unit : "1";
+}
+
 std::string InWords(const PlannedExperiment& planned) {
+  const dem::TestInfo& test = *dem::FindTest(planned.test);
+  const auto in_words = [&test](const std::string& name, double value) {
+    return report::NumberWithUnit(value, name, UnitOf(name, test), 3);
+  };
   std::string text = planned.test;
   for (const auto& [name, value] : planned.settings) {
-    const dem::TestInfo* test = dem::FindTest(planned.test);
-    std::string unit = "1";
-    for (const dem::ParameterInfo& setting : test->settings) {
-      if (setting.name == name) unit = setting.unit;
-    }
-    text += fmt::format(", {} {}", report::NameForPeople(name),
-                        report::NumberWithUnit(value, name, unit, 3));
+    text += fmt::format(", {} {}", report::NameForPeople(name), in_words(name, value));
+  }
+  if (planned.control != "axial_strain") {
+    text += fmt::format(", driven by {} from {} to {}", report::NameForPeople(planned.control),
+                        in_words(planned.control, planned.path.front()),
+                        in_words(planned.control, planned.path.back()));
   }
   return text + (planned.unloading ? ", one unloading and reloading half-way" : "");
 }

@@ -149,4 +149,16 @@ absl::StatusOr<report::CampaignView> Laboratory::Run(
   return LoadView(session_.client(), *campaign);
 }
 
+bool Laboratory::Accepts(const report::CampaignView& parent, const std::string& yaml,
+                         const std::map<std::string, std::string>& further) {
+  const campaign::FileReader reader =
+      [this, &parent, &further](const std::string& path) -> absl::StatusOr<std::string> {
+    if (const auto own = further.find(path); own != further.end()) return own->second;
+    const auto digest = parent.source.files().find(path);
+    if (digest == parent.source.files().end()) return absl::NotFoundError("was not submitted");
+    return session_.client().GetBlob(digest->second);
+  };
+  return campaign::ReadCampaign(yaml, parent.source.file_name(), reader).problems.empty();
+}
+
 }  // namespace calib::ctl

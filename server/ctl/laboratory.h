@@ -37,6 +37,10 @@ class Laboratory {
                                            const std::string& yaml, const std::string& what,
                                            const std::map<std::string, std::string>& further = {});
 
+  /// Whether the text is a campaign without a problem; files as for Run().
+  bool Accepts(const report::CampaignView& parent, const std::string& yaml,
+               const std::map<std::string, std::string>& further);
+
  private:
   absl::Status Wait(const std::string& campaign, const std::string& what);
 

@@ -76,6 +76,53 @@ constexpr const char* kSnippetHead =
     "`data`,\n"
     "  # columns named as our observables, SI units unless `units:` says otherwise.\n";
 
+// The rival run in these experiments.
+absl::StatusOr<std::string> RivalsText(const Rival& rival, const std::string& parent, int like,
+                                       const std::vector<YamlNode>& entries) {
+  return campaign::Derive(rival.view->source.campaign_file(),
+                          {.name = fmt::format("{}: next experiment", rival.view->campaign.name),
+                           .lineage = {.parent = parent, .purpose = "next_experiment"},
+                           .effects = rival.effects,
+                           .fixed = rival.fixed,
+                           .experiments = entries,
+                           .rows = {{.like = like, .values = rival.values}}});
+}
+
+// Those that this build accepts: some settings go together with others.
+absl::StatusOr<std::vector<std::pair<TestPlan, YamlNode>>> AcceptedPlans(Laboratory& laboratory,
+                                                                         const Rival& rival,
+                                                                         int like) {
+  const report::CampaignView& view = *rival.view;
+  const campaign::Experiment& pattern = PatternOf(view.campaign);
+  std::vector<std::pair<TestPlan, YamlNode>> accepted;
+  const auto parsed = campaign::ParseYaml(view.source.campaign_file());
+  const YamlNode* list = parsed.root ? campaign::YamlFind(*parsed.root, "experiments") : nullptr;
+  if (list == nullptr) return accepted;
+  const auto original =
+      std::find_if(list->items.begin(), list->items.end(), [&pattern](const YamlNode& item) {
+        const YamlNode* name = campaign::YamlFind(item, "name");
+        return name != nullptr && name->scalar == pattern.name;
+      });
+  if (original == list->items.end()) return accepted;
+  for (TestPlan& plan : PlansFor(view.campaign)) {
+    YamlNode entry = EntryFor(plan, pattern, *original);
+    const auto text = RivalsText(rival, view.status.campaign(), like, {entry});
+    if (!text.ok()) return text.status();
+    const std::map<std::string, std::string> file = {{plan.file, DataOf(plan.experiment, pattern)}};
+    if (laboratory.Accepts(view, *text, file)) {
+      accepted.emplace_back(std::move(plan), std::move(entry));
+    }
+  }
+  return accepted;
+}
+
+std::string NothingToPlan(const campaign::Experiment& pattern) {
+  return absl::StrCat("tests are planned by other values of what the campaign file sets and of ",
+                      "what drives them, and ", pattern.test,
+                      " here has nothing of that to change; other tests and observables that were "
+                      "not read (`calibctl tests`) are for you to choose");
+}
+
 }  // namespace
 
 double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter) {
@@ -94,43 +141,33 @@ double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatt
   return std::max(0.0, square - of_chance);
 }
 
-absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& laboratory,
-                                                                 const std::vector<Rival>& rivals,
-                                                                 int like, double scatter) {
-  if (rivals.size() < 2) return std::nullopt;
+absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
+                                            const std::vector<Rival>& rivals, int like,
+                                            double scatter) {
+  if (rivals.size() < 2) return NextPlan{.why_none = "there are no two models to tell apart"};
   const report::CampaignView& base = *rivals.front().view;
-  if (base.campaign.filter.noise != inference::NoiseMode::kGiven) return std::nullopt;
+  if (base.campaign.filter.noise != inference::NoiseMode::kGiven) {
+    return NextPlan{.why_none =
+                        "the size of the errors is inferred, so that no distance in units "
+                        "of them is known beforehand; state the noise"};
+  }
   const campaign::Experiment& pattern = PatternOf(base.campaign);
-  std::vector<TestPlan> plans = PlansFor(base.campaign);
-  const auto parsed = campaign::ParseYaml(base.source.campaign_file());
-  if (plans.empty() || !parsed.root) return std::nullopt;
-  const YamlNode* list = campaign::YamlFind(*parsed.root, "experiments");
-  if (list == nullptr) return std::nullopt;
-  const auto original =
-      std::find_if(list->items.begin(), list->items.end(), [&pattern](const YamlNode& item) {
-        const YamlNode* name = campaign::YamlFind(item, "name");
-        return name != nullptr && name->scalar == pattern.name;
-      });
-  if (original == list->items.end()) return std::nullopt;
-
-  std::map<std::string, std::string> files;
+  auto offered = AcceptedPlans(laboratory, rivals.front(), like);
+  if (!offered.ok()) return offered.status();
+  if (offered->empty()) return NextPlan{.why_none = NothingToPlan(pattern)};
+  std::vector<TestPlan> plans;
   std::vector<YamlNode> entries;
-  for (const TestPlan& plan : plans) {
-    entries.push_back(EntryFor(plan, pattern, *original));
-    files[plan.file] = plan.data;
+  std::map<std::string, std::string> files;
+  for (auto& [plan, entry] : *offered) {
+    files[plan.file] = DataOf(plan.experiment, pattern);
+    plans.push_back(std::move(plan));
+    entries.push_back(std::move(entry));
   }
   NextExperiment next;
   std::vector<std::vector<std::vector<Eigen::VectorXd>>> curves;  // [rival][plan][observable]
   double core_hours = 0;
   for (const Rival& rival : rivals) {
-    const auto text = campaign::Derive(
-        rival.view->source.campaign_file(),
-        {.name = fmt::format("{}: next experiment", rival.view->campaign.name),
-         .lineage = {.parent = base.status.campaign(), .purpose = "next_experiment"},
-         .effects = rival.effects,
-         .fixed = rival.fixed,
-         .experiments = entries,
-         .rows = {{.like = like, .values = rival.values}}});
+    const auto text = RivalsText(rival, base.status.campaign(), like, entries);
     if (!text.ok()) return text.status();
     const auto view = laboratory.Run(*rival.view, *text,
                                      "planning the next experiment with " + rival.name, files);
@@ -140,8 +177,7 @@ absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& lab
     next.separates.push_back(rival.name);
     auto& own = curves.emplace_back();
     for (const TestPlan& plan : plans) {
-      const auto readings =
-          static_cast<Index>(std::count(plan.data.begin(), plan.data.end(), '\n') - 1);
+      const auto readings = static_cast<Index>(plan.experiment.path.size());
       own.push_back(CurvesOf(*view, plan.name, pattern, readings));
     }
   }
@@ -168,7 +204,9 @@ absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& lab
         boost::math::cdf(normal, closest - boost::math::quantile(normal, 1 - kLevel));
     finished.push_back(p);
   }
-  if (finished.empty()) return std::nullopt;
+  if (finished.empty()) {
+    return NextPlan{.why_none = "no planned test came to an end with all of the models"};
+  }
   std::stable_sort(finished.begin(), finished.end(), [&plans](std::size_t a, std::size_t b) {
     return plans[a].experiment.distance > plans[b].experiment.distance;
   });
@@ -181,7 +219,7 @@ absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& lab
   const std::string section = campaign::ToYaml(
       campaign::YamlMap({{"experiments", campaign::YamlList({std::move(snippet)})}}));
   next.snippet = absl::StrCat(kSnippetHead, section.substr(section.find('\n') + 1));
-  return next;
+  return NextPlan{.next = std::move(next)};
 }
 
 }  // namespace calib::ctl

@@ -40,13 +40,19 @@ struct NextExperiment {
   double core_seconds = 0;  ///< of one evaluation, mean over what was tried
 };
 
+struct NextPlan {
+  std::optional<NextExperiment> next{};
+  std::string why_none{};  ///< a clause; empty where there is one
+};
+
 /// Runs every rival once in every planned test, from the specimen and seed of sample `like`. Errors
 /// of a measurement: the noise that the campaign states for the observables at values of their
 /// size, and `scatter` (of a single run, in units of that noise) for the measurement and both runs:
-/// see SeparationOf(). Empty: fewer than two rivals, no known size of the errors, or
-/// nothing that all rivals finish. Errors: those of the runs.
-absl::StatusOr<std::optional<NextExperiment>> PlanNextExperiment(Laboratory& laboratory,
-                                                                 const std::vector<Rival>& rivals,
-                                                                 int like, double scatter);
+/// see SeparationOf(). None for fewer than two rivals, without a known size of the errors, where no
+/// plan is a campaign that this build accepts, or where no plan is finished by all rivals. Errors:
+/// those of the runs.
+absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
+                                            const std::vector<Rival>& rivals, int like,
+                                            double scatter);
 
 }  // namespace calib::ctl

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <set>
+#include <utility>
 #include <variant>
 
 #include "dem/catalog/catalog.h"
 #include "server/campaign/yaml_text.h"
+#include "server/ctl/control_way.h"
+#include "server/ctl/setting_plans.h"
 
 namespace calib::ctl {
 
@@ -17,42 +19,9 @@ using campaign::YamlNode;
 
 namespace {
 
-constexpr int kReadings = 40;
-constexpr double kBeyond = 4;  // times the lowest and the highest pressure so far
+constexpr double kBeyond = 4;  // times the lowest and the highest pressure, and the rate, so far
 constexpr double kOedometricStrain = 0.03;
-constexpr double kUnloading = 0.1;  // of the way, once, half-way
-constexpr double kDensity = 0.02;   // in porosity
-
-// The way of the control, with one unloading if asked for.
-std::vector<double> Path(double last, bool unloading) {
-  std::vector<double> path;
-  const auto branch = [&path](double from, double to, int count) {
-    for (int i = 1; i <= count; ++i) path.push_back(from + (to - from) * i / count);
-  };
-  if (!unloading) {
-    branch(0, last, kReadings);
-    return path;
-  }
-  branch(0, 0.5 * last, kReadings / 2);
-  branch(path.back(), (0.5 - kUnloading) * last, kReadings / 8);
-  branch(path.back(), 0.5 * last, kReadings / 8);
-  branch(path.back(), last, kReadings / 4);
-  return path;
-}
-
-// Only the control is read of it: runs of a table are not compared with readings. The observables
-// stand at one, so that a relative noise is known.
-std::string DataText(const campaign::Experiment& pattern, const std::vector<double>& path) {
-  std::string text = "axial_strain";
-  for (const auto& observable : pattern.observables) text += "," + observable.name;
-  text += "\n";
-  for (const double strain : path) {
-    text += fmt::format("{:.9g}", strain);
-    for (std::size_t k = 0; k < pattern.observables.size(); ++k) text += ",1";
-    text += "\n";
-  }
-  return text;
-}
+constexpr double kDensity = 0.02;  // in porosity
 
 // Over which the errors of a covariance fall to 1/e, along neighbouring readings; 0: independent.
 double CorrelationLength(const std::vector<double>& control,
@@ -81,6 +50,69 @@ std::vector<double> OtherPorosities(const campaign::Experiment& pattern) {
   return {rounded(recipe->porosity + kDensity), rounded(recipe->porosity - kDensity)};
 }
 
+bool IsStrainedUnderPressure(const campaign::Experiment& pattern) {
+  const auto pressure = pattern.settings.find("confining_pressure");
+  return pressure != pattern.settings.end() && pressure->second > 0 &&
+         pattern.control_name == "axial_strain" && !pattern.control.empty();
+}
+
+// One pressure and an axial strain define it, and it has what was read of the pattern.
+bool CanFollow(const dem::TestInfo& test, const campaign::Experiment& pattern) {
+  const auto has = [&test](const auto& observable) {
+    return std::find(test.observables.begin(), test.observables.end(), observable.name) !=
+           test.observables.end();
+  };
+  return test.settings.size() == 1 && test.settings[0].name == "confining_pressure" &&
+         test.control == "axial_strain" &&
+         std::all_of(pattern.observables.begin(), pattern.observables.end(), has);
+}
+
+std::vector<PlannedExperiment> PressurePlans(const campaign::Campaign& campaign) {
+  const campaign::Experiment& pattern = PatternOf(campaign);
+  std::set<double> pressures;
+  for (const campaign::Experiment& e : campaign.experiments) {
+    const auto found = e.settings.find("confining_pressure");
+    if (found != e.settings.end() && found->second > 0) pressures.insert(found->second);
+  }
+  const double low = *pressures.begin();
+  const double high = *pressures.rbegin();
+  const double middle = std::sqrt(low * high);
+  const double strain = *std::max_element(pattern.control.begin(), pattern.control.end());
+  std::vector<PlannedExperiment> plans;
+  const auto add = [&plans, strain](const std::string& test, double pressure,
+                                    bool unloading) -> PlannedExperiment& {
+    const double last = test == "oedometric" ? std::min(strain, kOedometricStrain) : strain;
+    return plans.emplace_back(
+        PlannedExperiment{.test = test,
+                          .settings = {{"confining_pressure", pressure}},
+                          .unloading = unloading,
+                          .control = "axial_strain",
+                          .path = unloading ? WithUnloading(0, last) : Monotonic(0, last)});
+  };
+  for (const dem::TestInfo& test : dem::Tests()) {
+    if (!CanFollow(test, pattern)) continue;
+    const bool same = test.name == pattern.test;
+    if (same) {
+      add(test.name, low / kBeyond, false);
+      add(test.name, high * kBeyond, false);
+      for (const double porosity : OtherPorosities(pattern)) {
+        add(test.name, middle, false).settings["porosity"] = porosity;
+      }
+      if (pattern.loading_rate) {
+        for (const double factor : {1 / kBeyond, kBeyond}) {
+          add(test.name, middle, false).settings["loading_rate"] = factor * *pattern.loading_rate;
+        }
+      }
+    }
+    if (test.may_reverse) {
+      add(test.name, middle, true);
+    } else if (!same) {
+      add(test.name, middle, false);
+    }
+  }
+  return plans;
+}
+
 }  // namespace
 
 const campaign::Experiment& PatternOf(const campaign::Campaign& campaign) {
@@ -88,84 +120,36 @@ const campaign::Experiment& PatternOf(const campaign::Campaign& campaign) {
                        [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
 }
 
-std::string WhyNoPlans(const campaign::Campaign& campaign) {
-  const campaign::Experiment& pattern = PatternOf(campaign);
-  const auto pressure = pattern.settings.find("confining_pressure");
-  if (pressure == pattern.settings.end() || !(pressure->second > 0) ||
-      pattern.control_name != "axial_strain" || pattern.control.empty()) {
-    return "tests are planned that are driven by axial_strain under a confining pressure, and the "
-           "first fitted one is not; other settings of it and observables that were not read "
-           "(`calibctl tests`) are for you to choose";
-  }
-  if (pattern.loading_rate) {
-    return "tests without a loading_rate are planned, and the first fitted one has one; another "
-           "rate, a quarter or four times it, shows what depends on it";
-  }
-  if (pattern.initial_stress) {
-    return "tests that start from an isotropic stress are planned, and the first fitted one has "
-           "an initial_stress";
-  }
-  return "";
-}
-
 std::vector<TestPlan> PlansFor(const campaign::Campaign& campaign) {
   const campaign::Experiment& pattern = PatternOf(campaign);
-  std::set<double> pressures;
-  for (const campaign::Experiment& e : campaign.experiments) {
-    const auto found = e.settings.find("confining_pressure");
-    if (found != e.settings.end() && found->second > 0) pressures.insert(found->second);
-  }
   std::vector<TestPlan> plans;
-  if (!WhyNoPlans(campaign).empty()) return plans;
-  const double low = *pressures.begin();
-  const double high = *pressures.rbegin();
-  const double strain = *std::max_element(pattern.control.begin(), pattern.control.end());
-  const auto add = [&](const std::string& test, double pressure, bool unloading,
-                       std::optional<double> porosity = std::nullopt) {
-    const double last = test == "oedometric" ? std::min(strain, kOedometricStrain) : strain;
+  for (PlannedExperiment& planned :
+       IsStrainedUnderPressure(pattern) ? PressurePlans(campaign) : SettingPlans(pattern)) {
     const std::string name = fmt::format("next_{}", plans.size() + 1);
-    TestPlan& plan = plans.emplace_back();
-    plan.experiment.test = test;
-    plan.experiment.settings["confining_pressure"] = pressure;
-    plan.experiment.unloading = unloading;
-    plan.name = name;
-    plan.file = name + ".csv";
-    plan.data = DataText(pattern, Path(last, unloading));
-    if (porosity) plans.back().experiment.settings["porosity"] = *porosity;
-  };
-  for (const dem::TestInfo& test : dem::Tests()) {
-    const auto has = [&test](const std::string& name) {
-      return std::find(test.observables.begin(), test.observables.end(), name) !=
-             test.observables.end();
-    };
-    const bool settable =
-        test.settings.size() == 1 && test.settings[0].name == "confining_pressure";
-    const bool readable = std::all_of(pattern.observables.begin(), pattern.observables.end(),
-                                      [&has](const auto& o) { return has(o.name); });
-    if (!settable || !readable || test.control != "axial_strain") continue;
-    const bool same = test.name == pattern.test;
-    if (same) {
-      add(test.name, low / kBeyond, false);
-      add(test.name, high * kBeyond, false);
-      for (const double porosity : OtherPorosities(pattern)) {
-        add(test.name, std::sqrt(low * high), false, porosity);
-      }
-    }
-    if (test.may_reverse) {
-      add(test.name, std::sqrt(low * high), true);
-    } else if (!same) {
-      add(test.name, std::sqrt(low * high), false);
-    }
+    plans.push_back({.experiment = std::move(planned), .name = name, .file = name + ".csv"});
   }
   return plans;
 }
 
-// The pattern's entry in the campaign file with another test, pressure and measurement.
+std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern) {
+  std::string text = planned.control;
+  for (const auto& observable : pattern.observables) text += "," + observable.name;
+  text += "\n";
+  for (const double value : planned.path) {
+    text += fmt::format("{:.9g}", value);
+    // Runs of a table are not compared with readings: at one a relative noise is known.
+    for (std::size_t k = 0; k < pattern.observables.size(); ++k) text += ",1";
+    text += "\n";
+  }
+  return text;
+}
+
 YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
                   const YamlNode& original) {
   YamlNode entry = original;
   campaign::YamlAt(entry, "name") = campaign::YamlScalar(plan.name);
   campaign::YamlAt(entry, "test") = campaign::YamlScalar(plan.experiment.test);
+  campaign::YamlErase(entry, plan.experiment.control);  // what drives a test is no setting
   for (const auto& [name, value] : plan.experiment.settings) {
     if (name == "porosity") {
       YamlNode& recipe = campaign::YamlAt(campaign::YamlAt(entry, "packing"), "generate");
@@ -175,9 +159,20 @@ YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
       campaign::YamlAt(entry, name) = campaign::YamlNumber(value);
     }
   }
-  campaign::YamlAt(entry, "data") = campaign::YamlMap(
-      {{"file", campaign::YamlScalar(plan.file)}, {"strain", campaign::YamlScalar("logarithmic")}});
-  campaign::YamlAt(entry, "control") = campaign::YamlScalar("axial_strain");
+  const auto pressure = plan.experiment.settings.find("confining_pressure");
+  if (pattern.initial_stress && pressure != plan.experiment.settings.end()) {
+    const double ratio = pressure->second / pattern.settings.at("confining_pressure");
+    campaign::YamlAt(entry, "initial_stress") = campaign::YamlMap(
+        {{"axial", campaign::YamlNumber(ratio * pattern.initial_stress->axial)},
+         {"lateral", campaign::YamlNumber(ratio * pattern.initial_stress->lateral)}});
+  }
+  YamlNode& data = campaign::YamlAt(entry, "data");
+  data = campaign::YamlMap({{"file", campaign::YamlScalar(plan.file)}});
+  const dem::TestInfo* const test = dem::FindTest(plan.experiment.test);
+  if (test != nullptr && test->needs_packing && !test->poured) {  // one that reads strains
+    campaign::YamlAt(data, "strain") = campaign::YamlScalar("logarithmic");
+  }
+  campaign::YamlAt(entry, "control") = campaign::YamlScalar(plan.experiment.control);
   campaign::YamlErase(entry, "role");
   campaign::YamlErase(entry, "segments");
   YamlNode& observables = campaign::YamlAt(entry, "observables");

@@ -411,6 +411,17 @@ TEST(BadCampaigns, ParametersOfAnEffectThatCannotJoinAreNoFurtherProblems) {
   expect_one_line(ProblemsOf(yaml));
 }
 
+TEST(BadCampaigns, OneLawOfAdhesionIsEnough) {
+  std::string yaml =
+      Spoiled("[rolling_resistance]", "[rolling_resistance, adhesion_dmt, adhesion_jkr]");
+  yaml.replace(yaml.find("poisson_ratio: 0.2"), 18,
+               "poisson_ratio: 0.2, adhesion_dmt.work_of_adhesion: 0.1, "
+               "adhesion_jkr.work_of_adhesion: 0.1");
+  EXPECT_EQ(ProblemsOf(yaml),
+            "c.yaml:4: model.effects: adhesion_jkr is another law of what adhesion_dmt stands for: "
+            "name one of them\n");
+}
+
 TEST(BadCampaigns, EveryMistakeIsReportedAtOnce) {
   std::string yaml = Spoiled("min: 1e8 Pa", "min: 1e8 deg");
   yaml.replace(yaml.find("seed: 7"), 7, "sede: 7");

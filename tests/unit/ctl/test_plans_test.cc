@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "server/campaign/yaml_text.h"
 
@@ -30,16 +29,6 @@ campaign::Campaign Measured() {
   campaign::Campaign campaign;
   campaign.experiments = {Triaxial(1e5), Triaxial(4e5)};
   return campaign;
-}
-
-std::vector<double> StrainsOf(const TestPlan& plan) {
-  std::istringstream text(plan.data);
-  std::string line;
-  std::getline(text, line);
-  EXPECT_EQ(line, "axial_strain,q_over_p");
-  std::vector<double> strains;
-  while (std::getline(text, line)) strains.push_back(std::stod(line));
-  return strains;
 }
 
 int Count(const std::vector<TestPlan>& plans, const auto& condition) {
@@ -69,7 +58,7 @@ TEST(TestPlans, GridOfPressureDensityAndUnloading) {
   EXPECT_GE(Count(plans, [](const TestPlan& p) { return p.experiment.test != "triaxial_drained"; }),
             1);
   for (const TestPlan& plan : plans) {
-    const std::vector<double> strains = StrainsOf(plan);
+    const std::vector<double>& strains = plan.experiment.path;
     EXPECT_GE(strains.size(), 40U);
     EXPECT_EQ(std::is_sorted(strains.begin(), strains.end()), !plan.experiment.unloading);
     EXPECT_NEAR(strains.back(), plan.experiment.test == "oedometric" ? 0.03 : 0.1, 1e-9);
@@ -86,16 +75,49 @@ TEST(TestPlans, SpecimensFromAFileKeepTheirDensity) {
       0);
 }
 
-TEST(TestPlans, NoneWhereTheControlIsNotAnAxialStrainUnderAPressure) {
+TEST(TestPlans, ARateIsVariedAndKeptByTheOthers) {
   campaign::Campaign campaign = Measured();
-  campaign.experiments[0].loading_rate = 1;
-  EXPECT_TRUE(PlansFor(campaign).empty());
-  campaign = Measured();
-  campaign.experiments[0].control_name = "mean_stress";
-  EXPECT_TRUE(PlansFor(campaign).empty());
-  campaign = Measured();
-  for (auto& experiment : campaign.experiments) experiment.settings.clear();
-  EXPECT_TRUE(PlansFor(campaign).empty());
+  for (auto& experiment : campaign.experiments) experiment.loading_rate = 2;
+  const std::vector<TestPlan> plans = PlansFor(campaign);
+  const auto original = campaign::ParseYaml("name: dense\nloading_rate: 2 1/s\n");
+  for (const double rate : {0.5, 8.0}) {
+    const auto at = std::find_if(plans.begin(), plans.end(), [rate](const TestPlan& plan) {
+      const auto& settings = plan.experiment.settings;
+      return settings.contains("loading_rate") && settings.at("loading_rate") == rate;
+    });
+    ASSERT_NE(at, plans.end()) << rate;
+    const auto entry = EntryFor(*at, PatternOf(campaign), *original.root);
+    EXPECT_EQ(std::stod(campaign::YamlFind(entry, "loading_rate")->scalar), rate);
+  }
+  EXPECT_EQ(campaign::YamlFind(EntryFor(plans.front(), PatternOf(campaign), *original.root),
+                               "loading_rate")
+                ->scalar,
+            "2 1/s");
+}
+
+TEST(TestPlans, AnInitialStressGrowsWithThePressure) {
+  campaign::Campaign campaign = Measured();
+  for (auto& experiment : campaign.experiments) {
+    experiment.initial_stress = dem::InitialStress{.axial = 2e5, .lateral = 1e5};
+  }
+  const std::vector<TestPlan> plans = PlansFor(campaign);
+  const auto low = std::find_if(plans.begin(), plans.end(), [](const TestPlan& plan) {
+    return std::abs(plan.experiment.settings.at("confining_pressure") - 1e5 / 4) < 1e-6;
+  });
+  ASSERT_NE(low, plans.end());
+  const auto original = campaign::ParseYaml("initial_stress: {axial: 0.2 MPa, lateral: 0.1 MPa}\n");
+  const auto entry = EntryFor(*low, PatternOf(campaign), *original.root);
+  const auto* stress = campaign::YamlFind(entry, "initial_stress");
+  EXPECT_DOUBLE_EQ(std::stod(campaign::YamlFind(*stress, "axial")->scalar), 5e4);
+  EXPECT_DOUBLE_EQ(std::stod(campaign::YamlFind(*stress, "lateral")->scalar), 2.5e4);
+}
+
+TEST(TestPlans, FileHoldsTheControlAndNamesWhatWasRead) {
+  const campaign::Campaign campaign = Measured();
+  PlannedExperiment planned;
+  planned.control = "axial_strain";
+  planned.path = {0.01, 0.02};
+  EXPECT_EQ(DataOf(planned, PatternOf(campaign)), "axial_strain,q_over_p\n0.01,1\n0.02,1\n");
 }
 
 TEST(TestPlans, EntryKeepsWhatThePlanDoesNotChange) {
