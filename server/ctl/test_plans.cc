@@ -77,7 +77,9 @@ std::vector<PlannedExperiment> PressurePlans(const campaign::Campaign& campaign)
   const double low = *pressures.begin();
   const double high = *pressures.rbegin();
   const double middle = std::sqrt(low * high);
-  const double strain = *std::max_element(pattern.control.begin(), pattern.control.end());
+  const double strain =
+      *std::max_element(pattern.control.begin(), pattern.control.end(),
+                        [](double a, double b) { return std::abs(a) < std::abs(b); });
   std::vector<PlannedExperiment> plans;
   const auto add = [&plans, strain](const std::string& test, double pressure,
                                     bool unloading) -> PlannedExperiment& {

@@ -112,6 +112,12 @@ TEST(TestPlans, AnInitialStressGrowsWithThePressure) {
   EXPECT_DOUBLE_EQ(std::stod(campaign::YamlFind(*stress, "lateral")->scalar), 2.5e4);
 }
 
+TEST(TestPlans, AnExtensionStaysOne) {
+  campaign::Campaign campaign = Measured();
+  for (auto& experiment : campaign.experiments) experiment.control = {0, -0.05, -0.1};
+  EXPECT_DOUBLE_EQ(PlansFor(campaign).front().experiment.path.back(), -0.1);
+}
+
 TEST(TestPlans, FileHoldsTheControlAndNamesWhatWasRead) {
   const campaign::Campaign campaign = Measured();
   PlannedExperiment planned;
