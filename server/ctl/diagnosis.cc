@@ -339,7 +339,12 @@ class Inquiry {
       std::optional<std::int64_t> most = options_.max_evaluations;
       if (most) *most -= screen_.evaluations();
       const std::vector<std::string> first = WorthARefit();
-      if (auto status = fits_.Fit(first, FurtherThan(first), most); !status.ok()) return status;
+      std::map<std::string, double> promised;
+      for (const CandidateEffect& candidate : diagnosis_.candidates) {
+        promised[candidate.effect] = candidate.predicted_rms_error / diagnosis_.rms;
+      }
+      const auto status = fits_.Fit(first, FurtherThan(first), std::move(promised), most);
+      if (!status.ok()) return status;
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (CandidateEffect& candidate : diagnosis_.candidates) Describe(candidate);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "server/ctl/extension.h"
@@ -46,8 +47,10 @@ std::int64_t WarmFits::Least() const {
 }
 
 absl::Status WarmFits::Fit(std::vector<std::string> first, const std::vector<std::string>& later,
+                           std::map<std::string, double> promised,
                            std::optional<std::int64_t> most) {
   if (first.empty()) return absl::OkStatus();
+  promised_ = std::move(promised);
   samples_ = BatchOf(base_);
   const int batch = samples_ * base_.fitted_experiments();
   int allowed = static_cast<int>(base_.runs().sample.size()) * base_.fitted_experiments();
@@ -101,6 +104,7 @@ const WarmFit& WarmFits::Closest() const {
 std::optional<std::string> WarmFits::Next() const {
   const WarmFit& best = Closest();
   // Without the effect it is the base model: a fit that is further off has merely not been found.
+  // One that is not as close as the screen expects has further to go.
   const auto adequacy = inference::TestAdequacy(Base());
   const double base = adequacy.ok() ? adequacy->chi2 : std::numeric_limits<double>::infinity();
   std::optional<std::string> next;
@@ -108,9 +112,11 @@ std::optional<std::string> WarmFits::Next() const {
   for (const std::string& effect : begun_) {
     const WarmFit& fit = fits_.at(effect);
     if (fit.stalled || fit.runs.histories.rows() == 0) continue;
-    const double price = &fit == &best && fit.Satisfied()
-                             ? std::numeric_limits<double>::infinity()
-                             : PriceOf(std::min(Chi2(effect), base), fit.iterations);
+    const auto hope = promised_.find(effect);
+    const double share = hope == promised_.end() ? 1 : std::min(1.0, hope->second);
+    const double chi2 = std::min(Chi2(effect), base * share * share);
+    const double price = &fit == &best && fit.Satisfied() ? std::numeric_limits<double>::infinity()
+                                                          : PriceOf(chi2, fit.iterations);
     if (!next || price < lowest) {
       next = effect;
       lowest = price;

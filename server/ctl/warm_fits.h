@@ -33,9 +33,11 @@ class WarmFits {
   /// Two batches of each of `first`, as far as they go; then the most promising go on, until each
   /// has stalled or as many evaluations have been made as the campaign has, or as `most` allows;
   /// Least() in any case. Once all have stalled, those of `later` are begun with what is left, in
-  /// their order. Errors: those of the runs.
+  /// their order. promised: by effect, the rms error that the screen expects with it over that
+  /// without: how close a refit may come yet.
+  /// Errors: those of the runs.
   absl::Status Fit(std::vector<std::string> first, const std::vector<std::string>& later,
-                   std::optional<std::int64_t> most = {});
+                   std::map<std::string, double> promised, std::optional<std::int64_t> most = {});
   /// Model evaluations of two batches of one effect.
   std::int64_t Least() const;
 
@@ -77,6 +79,7 @@ class WarmFits {
   int samples_ = 0;  // of a batch
   int spent_ = 0;    // evaluations of the batches, reused ones too
   std::vector<std::string> begun_;
+  std::map<std::string, double> promised_;
   std::int64_t evaluations_ = 0;
   std::map<std::string, WarmFit> fits_;
 };
