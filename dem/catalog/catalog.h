@@ -97,6 +97,8 @@ struct EffectInfo {
   bool across_pressures = false;  ///< shows only between experiments at different pressures
   bool needs_motion = false;  ///< shows only where grains move while they are read: not in staged
                               ///< tests, whose readings are taken at rest
+  bool needs_space = false;   ///< shows only where grains move in three dimensions: not in a plane
+                              ///< silo
   std::vector<std::string> excludes = {};  ///< other laws of the same thing: never both
 };
 

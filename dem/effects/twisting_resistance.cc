@@ -69,7 +69,8 @@ EffectEntry TwistingResistance() {
                .reference = "Cheng et al. 2018, Table 1",
                .two_sided = false,
                .rays = MomentRays(),
-               .excited_by = WhereGrainsTwist()},
+               .excited_by = WhereGrainsTwist(),
+               .needs_space = true},
       .kernels = {{.stage = ContactStage::kMoment, .make = &Make}}};
 }
 

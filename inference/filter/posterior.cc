@@ -200,9 +200,11 @@ std::string Degeneracy(const FilterOptions& options, const Ensemble& ensemble,
   if (posterior.ess >= kLeastEss && !heavy) return "";
   return absl::StrCat(
       "The weighted samples alone do not make a posterior: ", std::floor(posterior.ess * 10) / 10,
-      " of ", ensemble.log_start.size(), " are effective and the Pareto index of their weights is ",
-      std::round(posterior.pareto_k * 100) / 100, " (wanted: at least ", kLeastEss, " and at most ",
-      kLargestParetoIndex, ").");
+      " of ", ensemble.log_start.size(), " are effective and the Pareto index of their weights ",
+      std::isfinite(posterior.pareto_k)
+          ? absl::StrCat("is ", std::round(posterior.pareto_k * 100) / 100)
+          : "cannot be estimated from so few",
+      " (wanted: at least ", kLeastEss, " and at most ", kLargestParetoIndex, ").");
 }
 
 // The weights that the evidence is the mean of: without those of strangers, which are zero.

@@ -57,7 +57,7 @@ void SetQuantiles(QuantityPrediction& result) {
 
 absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parameters,
                                                    const Eigen::MatrixXd& runs,
-                                                   const Eigen::VectorXd& error_sd) {
+                                                   const Eigen::VectorXd& error_sd, bool scatters) {
   const Index n = runs.rows();
   const Index t = runs.cols();
   const Index d = parameters.cols();
@@ -78,14 +78,19 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
   const Eigen::MatrixXd departure = runs.rowwise() - result.mean.transpose();
   const Eigen::ArrayXd variance =
       departure.colwise().squaredNorm().transpose().array() / static_cast<double>(n - 1);
-  result.separated = n >= d + 4;
+  result.separated = !scatters || n >= d + 4;
   result.sd = (variance + error_sd.array().square()).sqrt();
   result.sd_parameters = result.sd_model = Eigen::VectorXd::Constant(t, kNone);
   // Too few to tell the parts apart: one normal law about their mean.
   result.conditional_mean = result.mean.transpose().replicate(n, 1);
   result.conditional_sd = result.sd;
   result.freedom = static_cast<double>(n - 1);
-  if (result.separated) {
+  if (!scatters) {
+    result.sd_parameters = variance.sqrt();
+    result.sd_model.setZero();
+    result.conditional_mean = runs;
+    result.conditional_sd = error_sd;
+  } else if (result.separated) {
     const Eigen::MatrixXd centred = parameters.rowwise() - parameters.colwise().mean();
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> regression(centred);
     const Eigen::MatrixXd fitted = centred * regression.solve(departure);

@@ -30,11 +30,13 @@ struct QuantityPrediction {
 /// parameters' part).
 /// in: parameters N x d, any linear scale (the prior's standardised one); runs N x T;
 ///     error_sd T, >= 0, of a reading that would be taken (0: of the model alone); N >= 2, all
-///     finite
+///     finite; scatters: false where a run is a function of its parameters alone (no packing whose
+///     place chance decides): all that runs differ by is theirs, however curved mu is
 /// Errors: INVALID_ARGUMENT naming what does not fit.
 absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parameters,
                                                    const Eigen::MatrixXd& runs,
-                                                   const Eigen::VectorXd& error_sd);
+                                                   const Eigen::VectorXd& error_sd,
+                                                   bool scatters = true);
 
 /// The prediction with a further error of the model of standard deviation sd (T, >= 0),
 /// independent of scatter and parameters: it joins sd_model, sd and the quantiles, not the mean.

@@ -77,6 +77,10 @@ std::vector<double> TravelledControl(const Experiment& experiment, double correl
   return travelled;
 }
 
+double ErrorOf(const NoiseLaw& law, double value) {
+  return law.absolute ? *law.absolute : std::hypot(law.relative * value, law.floor);
+}
+
 double ScatterShare(const Experiment& experiment) {
   if (!experiment.specimen_grains || experiment.specimens.empty()) return 1;
   double grains = 0;

@@ -34,6 +34,16 @@ struct CalibratedParameter {
   inference::Prior prior;
 };
 
+/// Stated error of a reading as a function of what is read: sd = absolute, or
+/// sqrt((relative y)^2 + floor^2).
+struct NoiseLaw {
+  double relative = 0;             ///< >= 0
+  double floor = 0;                ///< >= 0, in the observable's SI unit
+  std::optional<double> absolute;  ///< > 0, in the observable's SI unit; takes the place of both
+};
+/// Standard deviation of a reading of `value`, SI.
+double ErrorOf(const NoiseLaw& law, double value);
+
 struct MeasuredObservable {
   std::string name;
   /// One per reading, SI, compression positive, strains logarithmic; none where the observable is
@@ -45,6 +55,9 @@ struct MeasuredObservable {
   /// and correlation_length say it all.
   Eigen::MatrixXd covariance = {};
   double ess_weight = 1;  ///< w_j of ess_target
+  /// What sd follows from, and would where nothing is measured yet; empty: the file states no such
+  /// law (a column, a covariance, nothing).
+  std::optional<NoiseLaw> noise = {};
 };
 
 enum class Role { kCalibrate, kValidate };

@@ -19,6 +19,12 @@ bool IsBetweenBodies(const Experiment& experiment) {
   return partner != experiment.settings.end() && std::isfinite(partner->second);
 }
 
+// Centres that stay in a plane, as those of a silo between two plates one grain apart.
+bool IsPlane(const Experiment& experiment) {
+  const auto flat = experiment.settings.find("flat");
+  return flat != experiment.settings.end() && flat->second >= 0.5;
+}
+
 bool IsCalibrated(const Campaign& campaign, const std::string& effect) {
   return std::any_of(campaign.parameters.begin(), campaign.parameters.end(),
                      [prefix = effect + "."](const CalibratedParameter& parameter) {
@@ -39,6 +45,7 @@ bool CanShow(const Experiment& experiment, const dem::EffectInfo& effect) {
     return false;
   }
   if (effect.kind == "boundary" && IsBetweenBodies(experiment)) return false;
+  if (effect.needs_space && IsPlane(experiment)) return false;
   return !effect.needs_motion || !ReadAtRest(experiment);
 }
 
@@ -53,6 +60,7 @@ std::string WhereItActs(const dem::EffectInfo& effect) {
                     "tests with a loading_rate, collisions and flows under gravity; readings of "
                     "staged tests are taken at rest");
   }
+  if (effect.needs_space) absl::StrAppend(&where, "; not in a plane (flat)");
   return where;
 }
 

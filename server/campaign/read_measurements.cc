@@ -116,11 +116,21 @@ void CheckPath(const MapReader& map, const LaboratoryTable& table, const dem::Te
   }
 }
 
+// Of the control, which may be one of the test's settings; empty: what its unit allows.
+std::optional<dem::ControlRange> RangeOf(const dem::TestInfo& test, const std::string& control) {
+  if (control == test.control) return test.control_range;
+  const auto setting = std::find_if(test.settings.begin(), test.settings.end(),
+                                    [&control](const auto& s) { return s.name == control; });
+  if (setting == test.settings.end()) return std::nullopt;
+  return dem::ControlRange{.min = setting->min, .max = setting->max, .whole = setting->whole};
+}
+
 void CheckRange(const LaboratoryTable& table, const dem::TestInfo& test, const ControlSpec& control,
                 const std::vector<double>& readings, ReadContext& context) {
-  if (!test.control_range) return;
+  const std::optional<dem::ControlRange> allowed = RangeOf(test, control.name);
+  if (!allowed) return;
+  const dem::ControlRange& range = *allowed;
   for (std::size_t i = 0; i < readings.size(); ++i) {
-    const dem::ControlRange& range = *test.control_range;
     const bool whole = !range.whole || readings[i] == std::round(readings[i]);
     if (readings[i] >= range.min && readings[i] <= range.max && whole) continue;
     context.problems().AddIn(

@@ -22,6 +22,12 @@ struct NoiseSpec {
   std::string covariance;  // file
 };
 
+NoiseLaw LawOf(const NoiseSpec& spec) {
+  return {.relative = spec.relative.value_or(0),
+          .floor = spec.floor.value_or(0),
+          .absolute = spec.absolute};
+}
+
 std::string UnitOf(const std::string& name) {
   const dem::ObservableInfo* info = dem::FindObservable(name);
   return info != nullptr ? info->unit : "1";
@@ -151,9 +157,8 @@ std::vector<double> StandardDeviations(const NoiseSpec& spec, const MapReader& n
                                        const std::string& name, const LaboratoryTable& table,
                                        const std::vector<double>& raw, ReadContext& context) {
   if (!spec.column.empty()) return FromColumn(spec, name, table, context);
-  if (spec.absolute) return std::vector<double>(raw.size(), *spec.absolute);
-  const double floor = spec.floor.value_or(0);
-  if (const auto zero = ReadingAtZero(raw); floor == 0 && zero) {
+  const NoiseLaw law = LawOf(spec);
+  if (const auto zero = ReadingAtZero(raw); !law.absolute && law.floor == 0 && zero) {
     noise.Problem(
         "relative",
         absl::StrCat(name, " reaches zero (", table.path(), ":", table.LineOf(*zero),
@@ -163,7 +168,7 @@ std::vector<double> StandardDeviations(const NoiseSpec& spec, const MapReader& n
   }
   std::vector<double> sd;
   sd.reserve(raw.size());
-  for (const double value : raw) sd.push_back(std::hypot(*spec.relative * value, floor));
+  for (const double value : raw) sd.push_back(ErrorOf(law, value));
   return sd;
 }
 
@@ -212,6 +217,7 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
       observable.correlation_length =
           noise->Quantity("correlation_length", UnitOf(rules.control), kNotNegative).value_or(0);
       noise->Finish();
+      if (spec && (spec->relative || spec->absolute)) observable.noise = LawOf(*spec);
       if (spec && noise->Has("correlation_length") && !spec->covariance.empty()) {
         noise->Problem("correlation_length", "is part of the covariance already; remove it");
       }

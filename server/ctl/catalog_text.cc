@@ -71,6 +71,8 @@ std::string EffectText(const dem::EffectInfo& effect) {
         "  only where grains move while they are read: with a loading_rate, in collisions, in "
         "flows\n";
   }
+  if (effect.needs_space)
+    text += "  only where grains move in three dimensions: not with flat: 1\n";
   if (effect.across_pressures) text += "  only between experiments at different pressures\n";
   if (!effect.excludes.empty()) {
     text += Wrapped(absl::StrJoin(effect.excludes, ", "), "  not together with: ", kIndent);

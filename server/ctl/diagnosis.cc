@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/campaign/noise_check.h"
 #include "server/ctl/effect_screen.h"
+#include "server/ctl/extension.h"
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
@@ -296,7 +297,11 @@ class Inquiry {
     }
     const std::map<std::string, double> strength = StrengthOf(
         score.name, static_cast<std::size_t>(score.detectable_difference), score.detectable);
-    const std::string why = WhyNotAdmissible(effect, model.contact, strength);
+    std::string why = WhyNotAdmissible(effect, model.contact, strength);
+    if (why.empty()) {
+      why =
+          WhyBeyondPrior(PriorsOfExtension(base_.view(), effect), effect, model.contact, strength);
+    }
     if (why.empty()) {
       diagnosis_.detectable[score.name] = strength;
     } else {

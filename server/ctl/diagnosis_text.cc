@@ -131,7 +131,8 @@ std::string NextText(const NextExperiment& next) {
                           InWords(next.best), names, report::Percent(next.best.expected_power, 3),
                           Number(next.best.distance, 3), Number(next.core_seconds, 2)),
               "", "") +
-      "\n" + next.snippet + "\nAlso tried:\n";
+      "\n" + next.snippet;
+  if (next.considered.size() > 1) text += "\nAlso tried:\n";
   for (std::size_t k = 1; k < next.considered.size(); ++k) {
     text += fmt::format("  {}: {} sd apart\n", InWords(next.considered[k]),
                         Number(next.considered[k].distance, 3));

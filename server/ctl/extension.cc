@@ -161,6 +161,13 @@ dem::ReferenceState ReferenceOf(const report::CampaignView& view) {
   return state;
 }
 
+std::map<std::string, dem::DefaultPrior> PriorsOfExtension(const report::CampaignView& parent,
+                                                           const dem::EffectInfo& effect) {
+  const dem::ReferenceState state = ReferenceOf(parent);
+  return ParametersOf(effect, parent.campaign.model.contact, state,
+                      ModuliOf(parent, state.modulus));
+}
+
 std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& name) {
   const auto& declared = campaign.model.user_effects;
   const dem::EffectInfo* effect = dem::FindEffect(declared, name);

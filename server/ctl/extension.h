@@ -18,6 +18,11 @@ namespace calib::ctl {
 /// calibrated experiments.
 dem::ReferenceState ReferenceOf(const report::CampaignView& view);
 
+/// The priors with which an effect would join the model: of its parameters that are calibrated then,
+/// by dotted name.
+std::map<std::string, dem::DefaultPrior> PriorsOfExtension(const report::CampaignView& parent,
+                                                           const dem::EffectInfo& effect);
+
 /// Why an effect cannot join the model of a campaign, in a sentence; empty: it can.
 std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& effect);
 

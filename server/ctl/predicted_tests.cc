@@ -128,6 +128,10 @@ absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path
   const YamlNode* first = own.error ? nullptr : campaign::YamlFind(*own.root, "experiments");
   for (YamlNode& experiment : list.items) {
     if (experiment.kind != Kind::kMap) return ProblemIn(path, experiment.line, "is no experiment");
+    if (campaign::YamlFind(experiment, "observables") == nullptr) {
+      return ProblemIn(path, std::max(experiment.line, 1),
+                       "observables is missing; it names what is predicted, e.g. [q_over_p]");
+    }
     campaign::YamlErase(experiment, "role");
     if (auto spelled = SpellOutControl(path, experiment, tests.files); !spelled.ok()) {
       return spelled;

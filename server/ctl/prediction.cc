@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 #include <utility>
+#include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
@@ -11,6 +12,7 @@
 #include "server/campaign/quantity.h"
 #include "server/campaign/suggestion.h"
 #include "server/report/discrepancies.h"
+#include "server/report/warnings.h"
 
 namespace calib::ctl {
 namespace {
@@ -74,11 +76,16 @@ absl::StatusOr<std::vector<Level>> ReadLevels(const std::vector<std::string>& te
   for (const std::string& text : texts) {
     const std::size_t equals = text.find('=');
     const std::string name = text.substr(0, equals);
-    if (equals == std::string::npos || !observables.contains(name)) {
+    if (equals == std::string::npos) {
       return absl::InvalidArgumentError(
           absl::StrCat("--exceed ", campaign::Quoted(text),
-                       " is not OBSERVABLE=LEVEL with an observable of the test: ",
-                       campaign::Suggestion(name, known)));
+                       " gives no level: OBSERVABLE=LEVEL is expected, e.g. --exceed ",
+                       observables.contains(name) ? name : known.front(), "=0.5"));
+    }
+    if (!observables.contains(name)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--exceed ", campaign::Quoted(text),
+                       " names no observable of the test: ", campaign::Suggestion(name, known)));
     }
     const dem::ObservableInfo* info = dem::FindObservable(name);
     const auto value =
@@ -86,6 +93,10 @@ absl::StatusOr<std::vector<Level>> ReadLevels(const std::vector<std::string>& te
     if (!value.ok()) {
       return absl::InvalidArgumentError(
           absl::StrCat("--exceed ", name, ": ", std::string(value.status().message())));
+    }
+    if (!std::isfinite(*value)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--exceed ", name, ": the level is a finite number"));
     }
     levels.push_back({name, *value});
   }
@@ -126,6 +137,33 @@ RunsOfObservable Collect(const report::CampaignView& view, const campaign::Exper
   return runs;
 }
 
+// A sentence; empty: none says why.
+std::string WhyOneFailed(const report::CampaignView& view) {
+  for (const v1::Sample& sample : view.samples) {
+    if (sample.status() == "finished" || sample.reason().empty()) continue;
+    return absl::StrCat("Sample ", sample.index(), ": ", sample.reason());
+  }
+  return "";
+}
+
+// Whether two runs at the same parameters can differ: chance places the grains of a packing.
+bool Scatters(const campaign::Experiment& experiment) {
+  return std::none_of(experiment.specimens.begin(), experiment.specimens.end(),
+                      [](const campaign::Specimen& specimen) {
+                        return std::holds_alternative<campaign::NoPacking>(specimen);
+                      });
+}
+
+// Of a measurement of what the runs predict on average; empty: the test states none.
+Eigen::VectorXd StatedError(const campaign::MeasuredObservable& observable,
+                            const Eigen::MatrixXd& runs) {
+  const Index t = runs.cols();
+  if (!observable.sd.empty()) return Eigen::Map<const Eigen::VectorXd>(observable.sd.data(), t);
+  if (!observable.noise || runs.rows() == 0) return {};
+  return runs.colwise().mean().transpose().unaryExpr(
+      [&law = *observable.noise](double value) { return campaign::ErrorOf(law, value); });
+}
+
 // What the model is known to miss where it was calibrated.
 struct Misfit {
   const report::CampaignView* parent = nullptr;
@@ -138,14 +176,18 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
   for (const campaign::MeasuredObservable& observable : experiment.observables) {
     const RunsOfObservable runs = Collect(view, experiment, observable.name);
     const auto t = static_cast<Index>(experiment.control.size());
-    if (runs.values.rows() < 2) {
-      return absl::FailedPreconditionError(
-          absl::StrCat("fewer than two of ", view.samples.size(), " runs of ", experiment.name,
-                       " have finished: nothing can be predicted from them"));
+    const auto wanted = static_cast<Index>(view.samples.size());
+    if (runs.values.rows() < 2 || 2 * runs.values.rows() < wanted) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "only ", runs.values.rows(), " of ", wanted, " runs of ", experiment.name,
+          " have finished, and those that do are no fair sample of the posterior: nothing is "
+          "predicted from fewer than half of them. ",
+          WhyOneFailed(view)));
     }
-    Eigen::VectorXd error = Eigen::VectorXd::Zero(t);
-    if (!observable.sd.empty()) error = Eigen::Map<const Eigen::VectorXd>(observable.sd.data(), t);
-    auto quantity = inference::PredictQuantity(runs.parameters, runs.values, error);
+    const Eigen::VectorXd stated = StatedError(observable, runs.values);
+    const Eigen::VectorXd error = stated.size() > 0 ? stated : Eigen::VectorXd::Zero(t);
+    auto quantity =
+        inference::PredictQuantity(runs.parameters, runs.values, error, Scatters(experiment));
     if (!quantity.ok()) return quantity.status();
     inference::DiscrepancyBand discrepancy = report::DiscrepancyAt(
         *misfit.parent, misfit.discrepancies, experiment, observable.name, quantity->mean);
@@ -157,7 +199,7 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
                             .control_name = experiment.control_name,
                             .control = experiment.control,
                             .quantity = *std::move(quantity),
-                            .sd_noise = observable.sd.empty() ? Eigen::VectorXd() : error,
+                            .sd_noise = stated,
                             .measured = observable.values,
                             .discrepancy = std::move(discrepancy),
                             .exceedance = {}};
@@ -178,12 +220,15 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
 }
 
 void AddNotes(const report::CampaignView& view, const Misfit& misfit, Prediction& prediction) {
-  bool errors = true;
-  for (const campaign::Experiment& experiment : view.campaign.experiments) {
-    for (const auto& observable : experiment.observables) errors &= !observable.sd.empty();
+  for (const std::string& warning : report::Warnings(*misfit.parent)) {
+    prediction.notes.push_back(absl::StrCat("Of ", prediction.parent, ": ", warning));
   }
+  bool errors = true;
   bool separated = true;
-  for (const PredictedObservable& o : prediction.observables) separated &= o.quantity.separated;
+  for (const PredictedObservable& o : prediction.observables) {
+    errors &= o.sd_noise.size() > 0;
+    separated &= o.quantity.separated;
+  }
   if (!errors) {
     prediction.notes.emplace_back(
         "Where the test states no noise of an observable, its prediction is that of a perfectly "
@@ -198,7 +243,11 @@ void AddNotes(const report::CampaignView& view, const Misfit& misfit, Prediction
     }
   }
   for (const report::FittedDiscrepancy& d : misfit.discrepancies) {
-    if (d.fit.probability() > kStays) {
+    const bool carried = std::any_of(
+        prediction.observables.begin(), prediction.observables.end(), [&d](const auto& o) {
+          return o.observable == d.observable && o.discrepancy.mean.size() > 0;
+        });
+    if (carried && d.fit.probability() > kStays) {
       prediction.notes.push_back(
           absl::StrCat(d.observable,
                        ": the model misses the fitted measurements by a smooth misfit beyond noise "

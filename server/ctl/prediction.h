@@ -46,7 +46,8 @@ struct Prediction {
 };
 
 /// Errors: INVALID_ARGUMENT for levels that name no observable; FAILED_PRECONDITION without a
-/// posterior, with runs made elsewhere or when fewer than two runs finish; those of the runs.
+/// posterior, with runs made elsewhere or when fewer than half of the runs of a test finish; those
+/// of the runs.
 absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::CampaignView& parent,
                                    const PredictedTests& tests, const PredictionOptions& options);
 

@@ -103,7 +103,7 @@ std::string PredictionText(const Prediction& prediction) {
     text +=
         "\nThe band and the probability at a reading are those of a measurement with its noise.\n";
   }
-  for (const std::string& note : prediction.notes) text += "! " + note + "\n";
+  for (const std::string& note : prediction.notes) text += Wrapped(note, "! ", "  ");
   return text;
 }
 

@@ -14,7 +14,13 @@ namespace {
 
 constexpr double kFactor = 4;
 constexpr double kFactorOfFlows = 1.5;
+constexpr double kTowardsLimit =
+    0.9;  // of the way to where the catalogue ends; nobody measures there
 constexpr std::size_t kPoints = 20;  // of a control whose values are runs of their own
+
+double Towards(double from, double limit) {
+  return std::isfinite(limit) ? from + kTowardsLimit * (limit - from) : limit;
+}
 
 const dem::ParameterInfo* FindSetting(const dem::TestInfo& test, const std::string& name) {
   const auto found = std::find_if(test.settings.begin(), test.settings.end(),
@@ -83,16 +89,24 @@ class Plans {
     }
   }
 
-  // Values that the control may have, of those between low and high; empty: not two of them.
-  std::optional<std::array<double, 2>> Within(const std::string& control, double low,
-                                              double high) const {
+  struct Reach {
+    double down = 0, up = 0;      // as far as the plan would go
+    double lowest = 0, most = 0;  // as far as is measured
+  };
+  // Values that the control may have; empty: not two of them.
+  std::optional<std::array<double, 2>> Within(const std::string& control,
+                                              const Reach& reach) const {
+    double low = reach.down;
+    double high = reach.up;
+    const auto limit = [&](double min, double max) {
+      low = std::max(low, std::min(reach.lowest, Towards(reach.lowest, min)));
+      high = std::min(high, std::max(reach.most, Towards(reach.most, max)));
+    };
     if (test_.control_range && control == test_.control) {
-      low = std::max(low, test_.control_range->min);
-      high = std::min(high, test_.control_range->max);
+      limit(test_.control_range->min, test_.control_range->max);
     }
     if (const dem::ParameterInfo* setting = FindSetting(test_, control)) {
-      low = std::max(low, setting->min);
-      high = std::min(high, setting->max);
+      limit(setting->min, setting->max);
     }
     if (!(low < high)) return std::nullopt;
     return std::array<double, 2>{low, high};
@@ -109,7 +123,8 @@ class Plans {
     const auto [low, high] = std::minmax_element(pattern_.control.begin(), pattern_.control.end());
     const double down = *low > 0 ? *low / factor_ : *low * factor_;
     const double up = *high > 0 ? *high * factor_ : *high / factor_;
-    const auto range = Within(pattern_.control_name, down, up);
+    const auto range =
+        Within(pattern_.control_name, {.down = down, .up = up, .lowest = *low, .most = *high});
     if (!range) return;
     plans_.push_back(AsMeasured());
     plans_.back().path = Points(*range);
@@ -122,7 +137,10 @@ class Plans {
         !(value->second > 0) || pattern_.control.empty()) {
       return;
     }
-    const auto range = Within(control, value->second / factor_, value->second * factor_);
+    const auto range = Within(control, {.down = value->second / factor_,
+                                        .up = value->second * factor_,
+                                        .lowest = value->second,
+                                        .most = value->second});
     if (!range) return;
     std::vector<double> values = pattern_.control;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

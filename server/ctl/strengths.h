@@ -17,4 +17,10 @@ std::map<std::string, std::string> UnitsOf(const dem::EffectInfo& effect,
 std::string WhyNotAdmissible(const dem::EffectInfo& effect, const std::string& contact,
                              const std::map<std::string, double>& strength);
 
+/// Why a strength lies beyond the priors with which an extension would look for it, in a clause;
+/// empty: within. Names without a prior are passed over.
+std::string WhyBeyondPrior(const std::map<std::string, dem::DefaultPrior>& priors,
+                           const dem::EffectInfo& effect, const std::string& contact,
+                           const std::map<std::string, double>& strength);
+
 }  // namespace calib::ctl

@@ -23,15 +23,17 @@ constexpr int kMostIdle = 3;       // batches in a row that were not
 // Of the mean history at the point that a fit is judged by, sd of the readings.
 constexpr double kMostUnknown = 1;
 
-// Of another batch: what is left to explain, dearer with every batch that has been made.
-double PriceOf(double chi2, int batches) { return std::sqrt(chi2) * std::pow(kPatience, batches); }
-
 // Samples of a batch.
 int BatchOf(const FittedCampaign& base) {
   return std::max(kLeastSamples, static_cast<int>(base.runs().sample.size()) / kShares);
 }
 
 }  // namespace
+
+double PriceOf(double chi2, double base, double promised, int batches) {
+  const double share = std::min(1.0, promised);
+  return std::sqrt(std::min(chi2, base * share * share)) * std::pow(kPatience, batches);
+}
 
 std::map<std::string, double> PointOf(const report::CampaignView& view,
                                       const Eigen::MatrixXd& points, Index row) {
@@ -113,10 +115,10 @@ std::optional<std::string> WarmFits::Next() const {
     const WarmFit& fit = fits_.at(effect);
     if (fit.stalled || fit.runs.histories.rows() == 0) continue;
     const auto hope = promised_.find(effect);
-    const double share = hope == promised_.end() ? 1 : std::min(1.0, hope->second);
-    const double chi2 = std::min(Chi2(effect), base * share * share);
-    const double price = &fit == &best && fit.Satisfied() ? std::numeric_limits<double>::infinity()
-                                                          : PriceOf(chi2, fit.iterations);
+    const double share = hope == promised_.end() ? 1 : hope->second;
+    const double price = &fit == &best && fit.Satisfied()
+                             ? std::numeric_limits<double>::infinity()
+                             : PriceOf(Chi2(effect), base, share, fit.iterations);
     if (!next || price < lowest) {
       next = effect;
       lowest = price;

@@ -84,6 +84,12 @@ class WarmFits {
   std::map<std::string, WarmFit> fits_;
 };
 
+/// What orders the refits, the lowest first: the rms that is left to explain where the fit stands or
+/// where the screen expects it to end, whichever is less, dearer with every batch that has been made.
+/// chi2, base: of the fit so far and of the model without the effect, >= 0, may be infinite;
+/// promised: rms the screen expects over the base model's, >= 0 (above 1: as 1).
+double PriceOf(double chi2, double base, double promised, int batches);
+
 /// Calibrated parameters of a campaign at a row of `points`, by name.
 std::map<std::string, double> PointOf(const report::CampaignView& view,
                                       const Eigen::MatrixXd& points, Eigen::Index row);

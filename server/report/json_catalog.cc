@@ -95,6 +95,7 @@ std::string EffectsJson(std::span<const dem::UserEffect> declared) {
                     {"two_sided", e->two_sided},
                     {"excited_by", e->excited_by},
                     {"needs_motion", e->needs_motion},
+                    {"needs_space", e->needs_space},
                     {"across_pressures", e->across_pressures},
                     {"excludes", e->excludes},
                     {"parameters", EffectParameters(e->parameters)},

@@ -10,6 +10,8 @@
 namespace calib::report {
 namespace {
 
+constexpr double kRounding = 1e-9;  // of a stated error
+
 absl::Status CheckRivals(const std::vector<RivalModel>& rivals) {
   if (rivals.size() < 2) {
     return absl::InvalidArgumentError("name at least two campaigns to compare");
@@ -55,6 +57,17 @@ absl::Status CheckSameData(const std::vector<RivalModel>& rivals) {
   return absl::OkStatus();
 }
 
+// The errors that weigh the readings are the same in both.
+bool SameErrors(const campaign::Campaign& a, const campaign::Campaign& b) {
+  const inference::DataSet x = campaign::MakeDataSet(a);
+  const inference::DataSet y = campaign::MakeDataSet(b);
+  if (a.filter.noise != b.filter.noise) return false;
+  return std::equal(x.readings.begin(), x.readings.end(), y.readings.begin(), y.readings.end(),
+                    [](const auto& i, const auto& j) {
+                      return std::abs(i.sd - j.sd) <= kRounding * std::max(i.sd, j.sd);
+                    });
+}
+
 std::vector<std::string> Warnings(const std::vector<RivalModel>& rivals) {
   std::vector<std::string> warnings;
   const auto names = [&rivals](auto chosen) {
@@ -65,6 +78,14 @@ std::vector<std::string> Warnings(const std::vector<RivalModel>& rivals) {
     }
     return list;
   };
+  const campaign::Campaign& first = rivals.front().campaign;
+  const std::string others =
+      names([&first](const RivalModel& r) { return !SameErrors(first, r.campaign); });
+  if (!others.empty()) {
+    warnings.push_back(absl::StrCat(
+        "The errors of the readings are not stated as in ", rivals.front().posterior.campaign(),
+        ": ", others, "; the evidence compares models and errors together, not the models alone."));
+  }
   const std::string open = names([](const RivalModel& r) { return !r.posterior.converged(); });
   if (!open.empty()) {
     warnings.push_back(absl::StrCat("Not converged: ", open, "; its evidence is provisional."));

@@ -25,6 +25,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr const char* kUnitPoints = "unit_points";
+constexpr const char* kBestRun = "The values stand for the best run.";
 
 /// A point of the unit cube in the parameters' units, through the prior's quantiles. A face is the
 /// prior's bound; where there is none, its outermost 1e-4. Correlated priors have no faces of their
@@ -89,8 +90,10 @@ class SurrogateMethod final : public Method {
                                ", step ", state->step);
     if (goes_on) {
       outcome.answer.warnings.push_back(outcome.answer.weighted.degeneracy);
+      outcome.answer.warnings.emplace_back(kBestRun);
     } else {
       AskEmulator(definition_, history.iterations, outcome.answer);
+      if (!outcome.answer.FromEmulator()) outcome.answer.warnings.emplace_back(kBestRun);
       outcome.converged = outcome.answer.FromEmulator() && HalvesGiveOne(outcome.answer);
     }
     return outcome;
@@ -391,9 +394,7 @@ class SurrogateMethod final : public Method {
     }
     posterior.log_evidence = posterior.log_evidence_se = posterior.pareto_k = kNone;
     posterior.ess = 1;
-    posterior.degeneracy =
-        "An optimiser looks for the best fit and gives no posterior: the values stand for the best "
-        "run.";
+    posterior.degeneracy = "An optimiser looks for the best fit and gives no posterior by itself.";
     return answer;
   }
 

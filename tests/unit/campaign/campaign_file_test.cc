@@ -325,6 +325,53 @@ TEST(CampaignFile, AnObservableThatIsOnlyPredictedNeedNoColumn) {
   EXPECT_THAT(c.experiments[1].observables[1].values, IsEmpty());
 }
 
+// What will be measured has the error that the file states of it.
+TEST(CampaignFile, NoiseStatedOfWhatIsNotMeasuredIsKept) {
+  const std::string table =
+      "inference: {method: table, rows: [{young_modulus: 1 GPa, friction_angle: 30 deg, "
+      "rolling_resistance.stiffness: 0.1, rolling_resistance.friction: 0.1}]}";
+  std::string yaml = Spoiled(
+      "inference: {method: iterative_bayesian_filter, samples: 20, max_iterations: 3}", table);
+  const std::string noise = "    observables: {q_over_p: {noise: {relative: 0.05}}}\n";
+  yaml.replace(yaml.find(noise), noise.size(),
+               "    observables: {q_over_p: {noise: {relative: 0.05, floor: 0.12}}, "
+               "volumetric_strain: {noise: {absolute: 0.2 percent}}}\n");
+  const Campaign c = Read(yaml).campaign;
+  ASSERT_THAT(c.experiments[1].observables, SizeIs(2));
+  const MeasuredObservable& unmeasured = c.experiments[1].observables[1];
+  EXPECT_THAT(unmeasured.values, IsEmpty());
+  EXPECT_THAT(unmeasured.sd, IsEmpty());
+  ASSERT_TRUE(unmeasured.noise.has_value());
+  EXPECT_DOUBLE_EQ(ErrorOf(*unmeasured.noise, 7), 0.002);
+  ASSERT_TRUE(c.experiments[1].observables[0].noise.has_value());
+  EXPECT_DOUBLE_EQ(ErrorOf(*c.experiments[1].observables[0].noise, -1), 0.13);
+}
+
+// A setting that drives the test has the range it has when it is given.
+TEST(CampaignFile, AControlThatIsASettingHasItsRange) {
+  const std::string yaml = R"(name: impact
+model: {contact: hertz_mindlin, density: 2500, fixed: {poisson_ratio: 0.2}}
+parameters:
+  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
+  friction_coefficient: {prior: uniform, min: 0, max: 1}
+experiments:
+  - name: wall
+    test: collision
+    radius: 10 mm
+    impact_angle: 0.3
+    data: {file: impact.csv}
+    control: impact_speed
+    observables: {normal_restitution: {noise: {absolute: 0.01}}}
+inference: {samples: 10}
+)";
+  const ReadOutcome outcome =
+      ReadCampaign(yaml, "c.yaml",
+                   ReaderOf({{"impact.csv", "impact_speed,normal_restitution\n1,0.9\n-2,0.9\n"}}));
+  ASSERT_THAT(outcome.problems, SizeIs(1));
+  EXPECT_THAT(ToString(outcome.problems[0]),
+              ::testing::HasSubstr("impact.csv:3: impact_speed: is -2; collision allows "));
+}
+
 TEST(CampaignFile, ReadsWhatTiesThePriors) {
   const Campaign c =
       Read(Spoiled("noise: given",

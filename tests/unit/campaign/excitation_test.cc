@@ -52,6 +52,7 @@ TEST(Excitation, WhatNoExperimentShowsIsNamed) {
       {"twisting_resistance.stiffness", Of("collision")},
       {"twisting_resistance.friction", Of("collision")},
       {"twisting_resistance.friction", Of("shaken_box")},
+      {"twisting_resistance.friction", Of("silo_discharge", {{"flat", 1}})},
       {"nonspherical_shape.aspect", Of("collision")}};
   for (const Case& c : inert) {
     EXPECT_THAT(EffectsWithoutPart(Calibrating(c)),

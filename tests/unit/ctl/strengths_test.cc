@@ -37,5 +37,24 @@ TEST(Strengths, OutsideTheRangeOfTheCatalogueIsSaid) {
   EXPECT_EQ(WhyNotAdmissible(effect, "linear", {{"young_modulus", -1.0}}), "");
 }
 
+TEST(Strengths, BeyondThePriorOfAnExtensionIsSaid) {
+  dem::EffectInfo effect;
+  effect.name = "damping";
+  effect.parameters.resize(1);
+  effect.parameters[0].name = "ratio";
+  effect.parameters[0].null_value = 0;
+  const std::map<std::string, dem::DefaultPrior> priors = {
+      {"damping.ratio", {.kind = "log_uniform", .min = 0.01, .max = 1}}};
+  const auto why = [&](double value) {
+    return WhyBeyondPrior(priors, effect, "linear", {{"damping.ratio", value}});
+  };
+  EXPECT_EQ(why(0.5), "");
+  EXPECT_EQ(why(0.001), "") << "weaker than the prior: an extension sees more";
+  EXPECT_EQ(why(3), "damping.ratio would have to be 3, beyond the prior of an extension (up to 1)");
+  EXPECT_EQ(why(-0.5),
+            "damping.ratio would have to be -0.5, beyond the prior of an extension (from 0.01)");
+  EXPECT_EQ(WhyBeyondPrior(priors, effect, "linear", {{"young_modulus", 7}}), "");
+}
+
 }  // namespace
 }  // namespace calib::ctl

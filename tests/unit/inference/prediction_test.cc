@@ -64,6 +64,22 @@ TEST(Prediction, TwentyRunsAreUnbiased) {
   EXPECT_NEAR(model / 2.25, 1, 4 * std::sqrt(2.0 / 17 / kTimes));
 }
 
+// A run without grains is a function of its parameters: its curvature is no scatter.
+TEST(Prediction, WhatDoesNotScatterIsAllOfTheParameters) {
+  Eigen::MatrixXd parameters(5, 1);
+  parameters << -2, -1, 0, 1, 2;
+  const Eigen::MatrixXd runs = parameters.array().square().matrix();
+  const auto p = PredictQuantity(parameters, runs, Eigen::VectorXd::Constant(1, 0.5), false);
+  ASSERT_TRUE(p.ok()) << p.status();
+  const double variance = (4 + 1 + 4 + 1 + 4) / 4.0;  // of 4, 1, 0, 1, 4 about 2
+  EXPECT_TRUE(p->separated);
+  EXPECT_DOUBLE_EQ(p->sd_parameters[0], std::sqrt(variance));
+  EXPECT_EQ(p->sd_model[0], 0);
+  EXPECT_DOUBLE_EQ(p->sd[0], std::sqrt(variance + 0.25));
+  // Two of five runs are at 4, half of their readings above it.
+  EXPECT_NEAR(ExceedanceProbability(*p, 4)[0], 0.2, 1e-6);
+}
+
 TEST(Prediction, FewRunsAreNotTakenApart) {
   const Sample sample = Draw(5, 1.5, 3);
   const auto p = PredictQuantity(sample.parameters, sample.runs, Eigen::VectorXd::Zero(1));

@@ -61,7 +61,10 @@ TEST(ModelComparison, ErrorsAndHeldOutDataMayDiffer) {
     }
   }
   other.campaign.experiments.pop_back();  // held out
-  EXPECT_EQ(Refusal({Rival("c1", 0), other}), "");
+  const auto comparison = CompareModels({Rival("c1", 0), other});
+  ASSERT_TRUE(comparison.ok()) << comparison.status();
+  ASSERT_EQ(comparison->warnings.size(), 1U);
+  EXPECT_THAT(comparison->warnings[0], HasSubstr("not stated as in c1: c2;"));
 }
 
 TEST(ModelComparison, OtherDataAreRefused) {
