@@ -132,6 +132,11 @@ absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path
       return ProblemIn(path, std::max(experiment.line, 1),
                        "observables is missing; it names what is predicted, e.g. [q_over_p]");
     }
+    if (campaign::YamlFind(experiment, "name") == nullptr) {
+      const auto number = static_cast<int>(&experiment - list.items.data()) + 1;
+      campaign::YamlAt(experiment, "name") = campaign::YamlScalar(
+          list.items.size() == 1 ? "predicted" : absl::StrCat("predicted_", number));
+    }
     campaign::YamlErase(experiment, "role");
     if (auto spelled = SpellOutControl(path, experiment, tests.files); !spelled.ok()) {
       return spelled;

@@ -26,7 +26,8 @@ struct PredictedTests {
 /// are of the other test. Nothing where the test makes its bodies from its settings.
 void TakeSpecimen(const campaign::YamlNode& from, campaign::YamlNode& experiment);
 
-/// Reads a file that holds `experiments:` (the rest of it is passed over) or is one experiment. A
+/// Reads a file that holds `experiments:` (the rest of it is passed over) or is one experiment;
+/// one without a name is called predicted, of several predicted_1, ... A
 /// test without data is given by `control: {column: NAME, to: VALUE, readings: N}`: that many
 /// readings, evenly spaced. Without `packing` a test takes the specimen of the parent's first experiment
 /// (TakeSpecimen).

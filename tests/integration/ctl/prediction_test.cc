@@ -67,6 +67,33 @@ TEST_F(Predicting, PosteriorAtAnotherPressure) {
   EXPECT_EQ(evaluations(), before);
 }
 
+// What the file states of a measurement that nobody has made is part of what is predicted of it.
+TEST_F(Predicting, TheStatedErrorOfAnUnmeasuredTestCounts) {
+  ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  Write("noisy.yaml", R"(test: triaxial_drained
+confining_pressure: 200 kPa
+control: {column: axial_strain, to: 1 percent, readings: 4}
+staging: {rate: 1 1/s, step: 0.005, damping: [0.3, 0.9], unbalanced: 5e-3}
+observables: {q_over_p: {noise: {absolute: 10}}, volumetric_strain: {}}
+)");
+  const Answer answer = Call(
+      "predict c1 --test noisy.yaml --draws 10 --exceed q_over_p=5 --state s --workers 2 --json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const Json json = answer.json();
+  const Json& q = json["predictions"][0];
+  EXPECT_EQ(q["experiment"], "predicted");
+  for (const Json& point : q["points"]) {
+    EXPECT_EQ(point["sd_noise"], 10);
+    const double parts =
+        std::hypot(point["sd_parameters"].get<double>(), point["sd_model_error"].get<double>());
+    EXPECT_NEAR(point["sd"].get<double>(), std::hypot(parts, 10), 1e-9 * parts);
+  }
+  // Without the error 5 is out of reach; with it the level is less than half an error away.
+  EXPECT_GT(q["exceedance"][0]["probability"][3], 0.3);
+  EXPECT_LT(q["exceedance"][0]["probability"][3], 0.5);
+  EXPECT_TRUE(json["predictions"][1]["points"][0]["sd_noise"].is_null());
+}
+
 TEST_F(Predicting, RefusesInASentence) {
   ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
   EXPECT_EQ(Call("predict c1 --test none.yaml --state s").code, 2);
@@ -81,6 +108,14 @@ TEST_F(Predicting, RefusesInASentence) {
   EXPECT_EQ(wrong.code, 2);
   EXPECT_NE(wrong.err.find("q_over_q"), std::string::npos) << wrong.err;
   EXPECT_NE(wrong.err.find("confining_pressure"), std::string::npos) << wrong.err;
+  const Answer level = Call("predict c1 --test other.yaml --exceed q_over_p=inf --state s");
+  EXPECT_EQ(level.code, 2);
+  EXPECT_NE(level.err.find("the level is a finite number"), std::string::npos) << level.err;
+  Write("unasked.yaml", "name: a\ntest: triaxial_drained\n");
+  const Answer unasked = Call("predict c1 --test unasked.yaml --state s");
+  EXPECT_EQ(unasked.code, 2);
+  EXPECT_NE(unasked.err.find("unasked.yaml:1: observables is missing"), std::string::npos)
+      << unasked.err;
   EXPECT_EQ(Call("list --state s --json").json().size(), 1U) << "nothing was submitted";
 }
 
