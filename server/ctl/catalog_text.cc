@@ -12,7 +12,7 @@ std::string Units(const dem::ParameterInfo& p) {
   if (p.unit_by_contact.empty()) return p.unit;
   std::string text;
   for (const auto& [contact, unit] : p.unit_by_contact) {
-    text += (text.empty() ? "" : ", ") + unit + " (" + contact + ")";
+    absl::StrAppend(&text, text.empty() ? "" : ", ", unit, " (", contact, ")");
   }
   return text;
 }

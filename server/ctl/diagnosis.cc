@@ -66,11 +66,11 @@ class Inquiry {
     if (auto status = FitWarm(base); !status.ok()) return status;
     Verdict(diagnosis_, fits_.all(), base, options_.level).Conclude(fits);
     if (options_.next_experiment && !elsewhere && diagnosis_.verdict != "adequate") {
-      if (auto status = PlanNext(); absl::IsCancelled(status)) {
-        return status;
-      } else if (!status.ok()) {
+      const absl::Status planned = PlanNext();
+      if (absl::IsCancelled(planned)) return planned;
+      if (!planned.ok()) {
         diagnosis_.warnings.push_back(absl::StrCat(
-            "The verdict stands; the next experiment could not be planned: ", status.message()));
+            "The verdict stands; the next experiment could not be planned: ", planned.message()));
       }
     }
     return diagnosis_;
@@ -335,6 +335,7 @@ class Inquiry {
       return a->explained_fraction > b->explained_fraction;
     });
     std::vector<std::string> names;
+    names.reserve(others.size());
     for (const CandidateEffect* other : others) names.push_back(other->effect);
     return names;
   }
@@ -348,8 +349,10 @@ class Inquiry {
       for (const CandidateEffect& candidate : diagnosis_.candidates) {
         promised[candidate.effect] = candidate.predicted_rms_error / diagnosis_.rms;
       }
-      const auto status = fits_.Fit(first, FurtherThan(first), std::move(promised), most);
-      if (!status.ok()) return status;
+      if (auto status = fits_.Fit(first, FurtherThan(first), std::move(promised), most);
+          !status.ok()) {
+        return status;
+      }
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (CandidateEffect& candidate : diagnosis_.candidates) Describe(candidate);
