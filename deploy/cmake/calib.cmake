@@ -76,6 +76,8 @@ function(calib_test name)
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
   if(CALIB_THREAD_SANITIZER)
+    math(EXPR slow "4 * ${ARG_TIMEOUT}")  # scheduler_test takes 1300 s under it
+    set_tests_properties(${name} PROPERTIES TIMEOUT ${slow})
     add_dependencies(${name} tsan_mutex)
     set_tests_properties(${name} PROPERTIES ENVIRONMENT
       "LD_PRELOAD=$<TARGET_FILE:tsan_mutex>;TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/tsan.supp")
