@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <variant>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -33,6 +34,11 @@ bool IsCalibrated(const Campaign& campaign, const std::string& effect) {
 }
 
 }  // namespace
+
+bool MakesItsBodies(const Experiment& experiment) {
+  return !experiment.specimens.empty() &&
+         std::holds_alternative<NoPacking>(experiment.specimens.front());
+}
 
 bool ReadAtRest(const Experiment& experiment) {
   const dem::TestInfo* const test = dem::FindTest(experiment.test);

@@ -8,13 +8,17 @@
 
 namespace calib::campaign {
 
+/// Its bodies come from its settings: there is no packing whose grains chance has placed.
+bool MakesItsBodies(const Experiment& experiment);
+
 /// Walked in stages that end when the specimen has come to rest: a test in the periodic cell
 /// without a loading_rate.
 bool ReadAtRest(const Experiment& experiment);
 
 /// Whether a reading of the experiment can depend on the effect: it is one of the effect's tests, a
-/// collision has the wall that an effect of kind "boundary" is about, and an effect that needs
-/// motion is not read at rest. Whether the effect is in the model is not asked.
+/// collision has the wall that an effect of kind "boundary" is about, one that needs motion is
+/// not read at rest, one that needs space is not held in a plane. Whether the effect is in the model
+/// is not asked.
 bool CanShow(const Experiment& experiment, const dem::EffectInfo& effect);
 
 /// Where an effect acts, to follow "it acts in": its tests, and what they need.

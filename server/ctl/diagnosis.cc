@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "server/campaign/excitation.h"
 #include "server/campaign/noise_check.h"
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/extension.h"
@@ -121,10 +122,7 @@ class Inquiry {
           return e.role != campaign::Role::kCalibrate || e.specimens.size() <= 1;
         });
     const bool has_grains =
-        std::none_of(experiments.begin(), experiments.end(), [](const campaign::Experiment& e) {
-          return !e.specimens.empty() &&
-                 std::holds_alternative<campaign::NoPacking>(e.specimens.front());
-        });
+        std::none_of(experiments.begin(), experiments.end(), &campaign::MakesItsBodies);
     if (one_packing && has_grains && !view.campaign.precomputed) {
       diagnosis_.warnings.emplace_back(
           "Every fitted test is run on one packing: by how much another one differs is not in the "

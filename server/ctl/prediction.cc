@@ -4,11 +4,11 @@
 #include <cmath>
 #include <set>
 #include <utility>
-#include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
 #include "server/campaign/derive.h"
+#include "server/campaign/excitation.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/suggestion.h"
 #include "server/report/discrepancies.h"
@@ -146,14 +146,6 @@ std::string WhyOneFailed(const report::CampaignView& view) {
   return "";
 }
 
-// Whether two runs at the same parameters can differ: chance places the grains of a packing.
-bool Scatters(const campaign::Experiment& experiment) {
-  return std::none_of(experiment.specimens.begin(), experiment.specimens.end(),
-                      [](const campaign::Specimen& specimen) {
-                        return std::holds_alternative<campaign::NoPacking>(specimen);
-                      });
-}
-
 // Of a measurement of what the runs predict on average; empty: the test states none.
 Eigen::VectorXd StatedError(const campaign::MeasuredObservable& observable,
                             const Eigen::MatrixXd& runs) {
@@ -186,8 +178,8 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
     }
     const Eigen::VectorXd stated = StatedError(observable, runs.values);
     const Eigen::VectorXd error = stated.size() > 0 ? stated : Eigen::VectorXd::Zero(t);
-    auto quantity =
-        inference::PredictQuantity(runs.parameters, runs.values, error, Scatters(experiment));
+    auto quantity = inference::PredictQuantity(runs.parameters, runs.values, error,
+                                               !campaign::MakesItsBodies(experiment));
     if (!quantity.ok()) return quantity.status();
     inference::DiscrepancyBand discrepancy = report::DiscrepancyAt(
         *misfit.parent, misfit.discrepancies, experiment, observable.name, quantity->mean);

@@ -52,9 +52,9 @@ TEST(CampaignFile, ReadsEverySection) {
   EXPECT_THAT(outcome.files, ElementsAre("packing.txt", "data.txt", "validation.csv"));
 }
 
-TEST(CampaignFile, AnInfinitePartnerIsAWall) {
-  for (const char* radius : {"inf", ".inf", "2 cm"}) {
-    const std::string yaml = std::string(R"(name: impact
+// Collisions with what `settings` says of them, measured in impact.csv along `control`.
+std::string Impact(const std::string& settings, const std::string& control) {
+  return R"(name: impact
 model: {contact: hertz_mindlin, density: 2500, fixed: {poisson_ratio: 0.2}}
 parameters:
   young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
@@ -63,14 +63,16 @@ experiments:
   - name: wall
     test: collision
     radius: 10 mm
-    impact_speed: 1 m/s
-    partner_radius: )") + radius +
-                             R"(
     data: {file: impact.csv}
-    control: impact_angle
     observables: {normal_restitution: {noise: {absolute: 0.01}}}
-inference: {samples: 10}
-)";
+    )" + settings +
+         "\n    control: " + control + "\ninference: {samples: 10}\n";
+}
+
+TEST(CampaignFile, AnInfinitePartnerIsAWall) {
+  for (const char* radius : {"inf", ".inf", "2 cm"}) {
+    const std::string yaml =
+        Impact(std::string("impact_speed: 1 m/s\n    partner_radius: ") + radius, "impact_angle");
     const ReadOutcome outcome = ReadCampaign(
         yaml, "c.yaml", ReaderOf({{"impact.csv", "impact_angle,normal_restitution\n0.3,1\n"}}));
     for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
@@ -349,21 +351,7 @@ TEST(CampaignFile, NoiseStatedOfWhatIsNotMeasuredIsKept) {
 
 // A setting that drives the test has the range it has when it is given.
 TEST(CampaignFile, AControlThatIsASettingHasItsRange) {
-  const std::string yaml = R"(name: impact
-model: {contact: hertz_mindlin, density: 2500, fixed: {poisson_ratio: 0.2}}
-parameters:
-  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
-  friction_coefficient: {prior: uniform, min: 0, max: 1}
-experiments:
-  - name: wall
-    test: collision
-    radius: 10 mm
-    impact_angle: 0.3
-    data: {file: impact.csv}
-    control: impact_speed
-    observables: {normal_restitution: {noise: {absolute: 0.01}}}
-inference: {samples: 10}
-)";
+  const std::string yaml = Impact("impact_angle: 0.3", "impact_speed");
   const ReadOutcome outcome =
       ReadCampaign(yaml, "c.yaml",
                    ReaderOf({{"impact.csv", "impact_speed,normal_restitution\n1,0.9\n-2,0.9\n"}}));
