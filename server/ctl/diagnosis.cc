@@ -113,7 +113,8 @@ class Inquiry {
     if (readings < kPerParameter * (parameters + 1)) {
       diagnosis_.warnings.push_back(
           absl::StrCat("Only ", readings, " readings are fitted with ", parameters,
-                       " parameters: little can be seen with so few, neither a missing effect nor "
+                       parameters == 1 ? " parameter" : " parameters",
+                       ": little can be seen with so few, neither a missing effect nor "
                        "that there is none. Give longer curves or more tests."));
     }
     const auto& experiments = view.campaign.experiments;
