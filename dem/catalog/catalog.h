@@ -81,6 +81,8 @@ struct StrengthRay {
                                          ///< effect; of a two-sided effect -steps are as good where
                                          ///< they are admissible
   std::map<std::string, double> held = {};  ///< other parameters / scale; not listed: their default
+  /// What it changes grows with this power of the distance from the null, about; > 0.
+  double order = 1;
 };
 
 struct EffectInfo {

@@ -63,7 +63,9 @@ EffectEntry ParticleCrushing() {
                    .two_sided = false,
                    .rays = {{.parameter = "weakness",
                              .steps = {0.1, 0.12},
-                             .held = {{"reference_diameter", 1}}}},
+                             .held = {{"reference_diameter", 1}},
+                             // Of few grains that crush: their share goes with weakness^m.
+                             .order = *modulus.default_value}},
                    .excited_by = ElementTestNames()},
           .prepare = &Prepare};
 }

@@ -216,6 +216,7 @@ std::string SensitivityText(const report::Sensitivity& sensitivity) {
         "! ", "  ");
   }
   for (const std::string& what : sensitivity.left_out) text += Wrapped(what, "! ", "  ");
+  for (const std::string& warning : sensitivity.warnings) text += Wrapped(warning, "! ", "  ");
   return text;
 }
 

@@ -281,6 +281,18 @@ std::string DiagnosisText(const Diagnosis& d) {
           "contains, before its runs were used up; more samples tell.",
           "", "");
     }
+    if (std::any_of(d.candidates.begin(), d.candidates.end(), [&d](const CandidateEffect& c) {
+          return !NotFound(c) && c.explained_fraction > 0 && c.predicted_rms_error > d.rms;
+        })) {
+      text += Wrapped(
+          fmt::format(
+              "Explains: share of the excess of chi-squared, which counts readings that err "
+              "together (neighbours on one curve, the scatter of a packing) once. The error "
+              "takes each reading alone: it may stay, or rise above the {} of the model "
+              "without an effect, while chi-squared falls.",
+              Number(d.rms, 3)),
+          "", "");
+    }
     if (d.left_out_error) {
       text += Wrapped(
           fmt::format("Left out: error on data that a model was not fitted to, one "

@@ -22,6 +22,14 @@ constexpr double kWanted = 18;
 constexpr double kMostRatio = 16;  // of the second strength to the first
 constexpr double kGrades = 4;      // of an octave: the last bits of a history change no run
 
+// A share of what a step on the ray changes, as a share of the step; and the other way about.
+double StepFor(const dem::StrengthRay& ray, double share) {
+  return std::copysign(std::pow(std::abs(share), 1 / ray.order), share);
+}
+double ShareAt(const dem::StrengthRay& ray, double step) {
+  return std::copysign(std::pow(std::abs(step), ray.order), step);
+}
+
 // The last step within the default prior, or the catalogue's second.
 double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
                 const std::string& contact, const dem::ReferenceState& state) {
@@ -37,7 +45,8 @@ double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
 double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
                   const std::string& contact, const dem::ReferenceState& state) {
   if (!(square > 0)) return ray.steps[1];
-  const double grade = std::round(kGrades * std::log2(std::sqrt(kWanted / square))) / kGrades;
+  const double grade =
+      std::round(kGrades * std::log2(StepFor(ray, std::sqrt(kWanted / square)))) / kGrades;
   const double wanted = std::max(ray.steps[1], std::exp2(grade) * ray.steps[0]);
   const double step = std::min({wanted, std::max(ray.steps[1], kMostRatio * ray.steps[0]),
                                 LastStep(effect, ray, contact, state)});
@@ -231,7 +240,8 @@ absl::Status EffectScreen::Measure(const dem::EffectInfo& effect, const Pair& pa
   }
   signature.differences.emplace_back(
       (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
-  if (effect.rays.size() == 1) signature.strengths.push_back(pair.step.step);
+  if (effect.rays.size() == 1)
+    signature.strengths.push_back(ShareAt(*pair.step.ray, pair.step.step));
   tried_[effect.name].push_back(pair.step);
   EffectRun run{.values = pair.with.rows.front().values,
                 .history = with.histories.row(0),
@@ -250,7 +260,7 @@ std::map<std::string, double> EffectScreen::StrengthOf(const std::string& name, 
                                                        double multiple) const {
   const Step& step = tried_.at(name)[which];
   const dem::EffectInfo* effect = dem::FindEffect(base_.view().campaign.model.user_effects, name);
-  return dem::ParametersOnRay(*effect, *step.ray, step.step * multiple,
+  return dem::ParametersOnRay(*effect, *step.ray, step.step * StepFor(*step.ray, multiple),
                               base_.view().campaign.model.contact, base_.state());
 }
 

@@ -1,6 +1,7 @@
 #include <iostream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "server/ctl/answer_text.h"
@@ -12,6 +13,7 @@
 #include "server/report/discrepancies.h"
 #include "server/report/json_documents.h"
 #include "server/report/parameter_drift.h"
+#include "server/report/warnings.h"
 
 namespace calib::ctl {
 namespace {
@@ -42,6 +44,9 @@ int Compare(const Arguments& arguments) {
   const auto predictions = report::PredictReadings(*view);
   report::Comparison comparison = report::Compare(*view, predictions);
   report::AddDiscrepancies(*view, predictions, comparison);
+  // Parameters at a bound are among where it fails.
+  std::vector<std::string> of_posterior = report::PosteriorWarnings(*view);
+  comparison.warnings.insert(comparison.warnings.begin(), of_posterior.begin(), of_posterior.end());
   if (auto drifts = report::ParameterDrifts(*view); drifts.ok()) {
     comparison.parameter_drift = *std::move(drifts);
   } else {

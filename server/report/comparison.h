@@ -82,7 +82,8 @@ struct Comparison {
   std::vector<std::string> at_bound;  ///< parameters pressed against a bound of their prior
   std::vector<ParameterDrift> parameter_drift;  ///< filled by whoever has the time: ParameterDrifts
   std::vector<ObservableDiscrepancy> discrepancies;  ///< filled by AddDiscrepancies()
-  /// The stated noise against the curves themselves: campaign::NoiseWarnings.
+  /// The stated noise against the curves themselves: campaign::NoiseWarnings. Whoever shows no
+  /// posterior beside it adds PosteriorWarnings().
   std::vector<std::string> warnings{};
   std::string note;  ///< why something is not given; may be empty
 };

@@ -234,7 +234,8 @@ std::string SensitivityJson(const std::string& campaign, const Sensitivity& s) {
                {"independent", s.independent},
                {"posterior_from", s.points_from},
                {"quantities", quantities},
-               {"left_out", s.left_out}});
+               {"left_out", s.left_out},
+               {"warnings", s.warnings}});
 }
 
 std::string ComparisonJson(const std::string& campaign, const Comparison& c) {

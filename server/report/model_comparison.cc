@@ -86,6 +86,14 @@ std::vector<std::string> Warnings(const std::vector<RivalModel>& rivals) {
         "The errors of the readings are not stated as in ", rivals.front().posterior.campaign(),
         ": ", others, "; the evidence compares models and errors together, not the models alone."));
   }
+  const std::string methods =
+      names([&first](const RivalModel& r) { return r.campaign.method != first.method; });
+  if (!methods.empty()) {
+    warnings.push_back(
+        absl::StrCat("The evidence was not found by the same method as that of ",
+                     rivals.front().posterior.campaign(), ": ", methods,
+                     "; differences within a few standard errors may be those of the methods."));
+  }
   const std::string open = names([](const RivalModel& r) { return !r.posterior.converged(); });
   if (!open.empty()) {
     warnings.push_back(absl::StrCat("Not converged: ", open, "; its evidence is provisional."));

@@ -9,6 +9,7 @@
 #include "dem/catalog/catalog.h"
 #include "inference/sampling/philox.h"
 #include "server/report/bulk_properties.h"
+#include "server/report/warnings.h"
 
 namespace calib::report {
 namespace {
@@ -171,6 +172,7 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
     }
   }
   if (result.quantities.empty()) return last;
+  result.warnings = Warnings(view);
   return result;
 }
 

@@ -28,6 +28,7 @@ struct Sensitivity {
   std::string points_from;  ///< of the posterior: weights, tmcmc, emulator or none
   std::vector<Quantity> quantities;
   std::vector<std::string> left_out;  ///< "tx02: secant_modulus: ...", a clause each
+  std::vector<std::string> warnings;  ///< of the posterior: Warnings()
 };
 
 /// All experiments, held-out ones where runs have them. Deterministic. Errors: FAILED_PRECONDITION

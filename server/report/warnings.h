@@ -8,8 +8,9 @@
 
 namespace calib::report {
 
-/// Whole sentences: those of the inference, then iterations that ended unsettled and parameters at
-/// a bound of their prior.
+/// Whole sentences: those of the inference, then iterations that ended unsettled.
+std::vector<std::string> PosteriorWarnings(const CampaignView& view);
+/// PosteriorWarnings(), then parameters at a bound of their prior.
 std::vector<std::string> Warnings(const CampaignView& view);
 
 }  // namespace calib::report

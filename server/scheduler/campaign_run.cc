@@ -101,6 +101,23 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
   return absl::OkStatus();
 }
 
+absl::Status CampaignRun::Refresh(store::Reader& reader, const std::vector<EvaluationKey>& keys) {
+  const auto evaluations = reader.Evaluations(id_);
+  if (!evaluations.ok()) return evaluations.status();
+  std::set<int> samples;
+  for (const EvaluationKey& key : keys) samples.insert(key.sample);
+  for (const int sample : samples) {
+    if (absl::Status status = AddStates(reader.States(id_, sample)); !status.ok()) return status;
+  }
+  const std::set<EvaluationKey> wanted(keys.begin(), keys.end());
+  for (const store::EvaluationRecord& evaluation : *evaluations) {
+    if (wanted.count(evaluation.key) > 0) {
+      SetStatus(evaluation.key, evaluation.status, evaluation.failures);
+    }
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CampaignRun::AddStates(const absl::StatusOr<std::vector<store::StateRecord>>& states) {
   if (!states.ok()) {
     return states.status();

@@ -65,6 +65,8 @@ class CampaignRun {
   std::map<store::EvaluationKey, std::string> OfOtherMechanics() const;
   /// Anything has ended or given a state.
   bool HasBegun() const;
+  /// Reads again what the store has of these evaluations: statuses and states.
+  absl::Status Refresh(store::Reader& reader, const std::vector<store::EvaluationKey>& keys);
   /// Forgets what has been computed of it; it waits.
   void BeginAnew(const store::EvaluationKey& key, const std::string& digest);
   /// A plan is made of what is known now. again: and one more after it, whatever it says.

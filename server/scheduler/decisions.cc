@@ -14,4 +14,8 @@ bool DecidesAtOnce(const Definition& definition) {
          (definition.campaign.method == campaign::Method::kSurrogateMsrs || StopsEarly(definition));
 }
 
+bool RunsToItsEnds(const Definition& definition) {
+  return !StopsEarly(definition) && !DecidesAtOnce(definition);
+}
+
 }  // namespace calib::scheduler

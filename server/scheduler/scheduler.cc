@@ -72,6 +72,7 @@ absl::Status Scheduler::Load() {
   }
   for (auto& [id, run] : runs_) {
     PauseIfOfOtherMechanics(*run);
+    TakeFromOthers(*run);
     Enqueue(*run);
     Advance(id);
   }
@@ -187,6 +188,9 @@ void Scheduler::TakeIn(std::int64_t campaign, bool at_rest) {
   if (!reader.ok() || !(at_rest ? run->Reload(*reader) : run->Extend(*reader)).ok()) {
     again_[campaign] = [this, campaign, at_rest] { TakeIn(campaign, at_rest); };
     return;
+  }
+  if (runs_.size() > 1) {  // something may have ended since the plan was made
+    TakeFromOthers(*run);
   }
   Enqueue(*run);
   Advance(campaign);

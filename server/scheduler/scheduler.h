@@ -103,8 +103,9 @@ class Scheduler {
   // Work (scheduler_workers.cc)
   void Dispatch();
   /// The first waiting evaluation that this worker should take: not one that rests where another
-  /// worker, which is there, can go on with it.
-  std::optional<store::EvaluationKey> NextFor(const WorkerEntry& worker);
+  /// worker, which is there, can go on with it, nor one that is computed for another campaign.
+  std::optional<store::EvaluationKey> NextFor(const WorkerEntry& worker,
+                                              const std::set<std::string>& under_way);
   void Grant(const WorkerEntry& worker, const store::EvaluationKey& key);
   void SendDrain(std::int64_t session);
   void Refuse(std::int64_t session, std::int64_t attempt);
@@ -122,6 +123,18 @@ class Scheduler {
   void StopEarly(std::int64_t session, const LeaseEntry& lease,
                  std::vector<store::StateRecord> records);
   store::AttemptEnd ToRecord(const v1::Finished& finished, const std::string& outcome);
+
+  // Runs that another campaign makes as well (scheduler_reuse.cc)
+  /// Whether it is computed for every campaign that waits for the same.
+  bool IsShared(const store::EvaluationKey& key);
+  /// Digests of the shared ones that workers compute now, or that are on their way to the disk.
+  std::set<std::string> SharedUnderWay();
+  /// The shared ones that wait in a campaign; of this digest only unless it is empty.
+  std::vector<store::EvaluationKey> SharedWaiting(CampaignRun& run, const std::string& digest);
+  /// Takes what waits here and has ended in another campaign from there.
+  void TakeFromOthers(CampaignRun& run, const std::string& digest = "");
+  /// What TakeFromOthers has written is taken into memory.
+  void Taken(std::int64_t campaign, const std::vector<store::EvaluationKey>& keys);
 
   // Campaigns (scheduler.cc)
   void TakeUp(std::int64_t campaign, store::Reader& reader);
@@ -153,8 +166,9 @@ class Scheduler {
   Ports& ports_;
   SchedulerOptions options_;
   LeaseTable leases_;
-  std::set<std::int64_t>
-      ending_;  // attempts whose end is on its way to the disk: neither held nor refused
+  /// Attempts whose end is on its way to the disk: neither held nor refused. With the digest of what
+  /// others may take then; empty: nothing.
+  std::map<std::int64_t, std::string> ending_;
   WorkerTable workers_;
   std::vector<v1::RefusedWorker> refused_;                     // oldest first
   std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over

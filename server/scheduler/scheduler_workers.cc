@@ -316,7 +316,8 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   ++version_;
   const bool diverged = status == EvaluationStatus::kDiverged;
   const bool resting = status == EvaluationStatus::kStoppedEarly;
-  ending_.insert(lease.attempt);
+  const std::string digest = resting ? "" : run.Find(lease.key)->digest;
+  ending_[lease.attempt] = digest;
   const store::Store::Job end = [key = lease.key, status, failures, diverged, resting, held_in,
                                  now = ports_.UnixMs(), name = NameOf(run, lease.key),
                                  end =
@@ -332,8 +333,8 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
       t.Log(key.campaign, now, absl::StrCat(name, " diverged: ", end.reason));
     }
   };
-  const Reply then = [this, session, lease,
-                      states = finished.states()](const absl::Status& committed) {
+  const Reply then = [this, session, lease, states = finished.states(),
+                      digest](const absl::Status& committed) {
     ending_.erase(lease.attempt);
     if (!committed.ok()) {
       return;
@@ -344,6 +345,13 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
     ack.mutable_ack()->set_finished(true);
     ports_.Send(session, std::move(ack));
     Advance(lease.key.campaign);
+    if (digest.empty() || runs_.size() < 2) {
+      return;
+    }
+    for (const auto& [id, other] : runs_) {
+      TakeFromOthers(*other, digest);
+    }
+    Dispatch();
   };
   const std::string too_many = diverged ? TooManyDiverged(run, finished.reason()) : "";
   if (too_many.empty()) {
@@ -388,13 +396,17 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how,
 }
 
 void Scheduler::Dispatch() {
+  std::set<std::string> under_way = SharedUnderWay();
   bool granted = true;
   while (granted && !queue_.empty()) {
     granted = false;
     for (const WorkerEntry* worker : workers_.Free(leases_, ports_.Now() - options_.lease)) {
-      if (const auto key = NextFor(*worker); key.has_value()) {
+      if (const auto key = NextFor(*worker, under_way); key.has_value()) {
         queue_.erase(*key);
         Grant(*worker, *key);
+        if (runs_.size() > 1 && IsShared(*key)) {
+          under_way.insert(FindRun(key->campaign)->Find(*key)->digest);
+        }
         granted = true;
         break;
       }
@@ -402,10 +414,13 @@ void Scheduler::Dispatch() {
   }
 }
 
-std::optional<EvaluationKey> Scheduler::NextFor(const WorkerEntry& worker) {
+std::optional<EvaluationKey> Scheduler::NextFor(const WorkerEntry& worker,
+                                                const std::set<std::string>& under_way) {
   const Clock::time_point heard_since = ports_.Now() - options_.lease;
   for (const EvaluationKey& key : queue_) {
-    const std::string& held_in = FindRun(key.campaign)->Find(key)->held_in;
+    const CampaignRun::Evaluation& evaluation = *FindRun(key.campaign)->Find(key);
+    if (under_way.count(evaluation.digest) > 0 && IsShared(key)) continue;
+    const std::string& held_in = evaluation.held_in;
     if (held_in.empty() || held_in == worker.hello.checkpoints() ||
         !workers_.IsThere(held_in, heard_since)) {
       return key;

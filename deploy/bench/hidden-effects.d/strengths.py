@@ -156,7 +156,10 @@ class Strengths:
             return None
         signature, scatter = found
         whitened = signature @ scatter.whiten.T
-        variance = scatter.variance(whitened.mean(axis=0))
+        visible = whitened.mean(axis=0)
+        if not visible.any():  # too weak to do anything, as crushing is below a threshold
+            return 0.0, 0.0, 1.0
+        variance = scatter.variance(visible)
         return tuple(value / variance for value in self.product(whitened, whitened)) + (variance,)
 
     def angle(self, a, b, two_sided):

@@ -94,6 +94,54 @@ observables: {q_over_p: {noise: {absolute: 10}}, volumetric_strain: {}}
   EXPECT_TRUE(json["predictions"][1]["points"][0]["sd_noise"].is_null());
 }
 
+// Runs that end where others do not are no fair sample of the posterior.
+TEST_F(Predicting, NothingIsPredictedFromFewerThanHalfOfTheRuns) {
+  Write("brittle.yaml", R"(name: brittle
+model:
+  contact: hertz_mindlin
+  density: 2500
+  effects: [brittle]
+  fixed: {poisson_ratio: 0.2, brittle.c: 0.001 m/s}
+  user_effects:
+    brittle:
+      scales: normal_force
+      formula: "closing_velocity > limit ? 1 + c / (closing_velocity - closing_velocity) : 1 + c / limit"
+      parameters:
+        c: {null: 0, unit: m/s, prior: {prior: uniform, min: 0, max: 1}, steps: [0.1, 0.2]}
+        limit: {unit: m/s, default: 2}
+parameters:
+  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
+  friction_coefficient: {prior: uniform, min: 0.01, max: 1}
+experiments:
+  - name: wall
+    test: collision
+    radius: 10 mm
+    impact_speed: 1 m/s
+    data: {file: impact.csv}
+    control: impact_angle
+    observables: {rebound_angle: {noise: {absolute: 0.02}}}
+inference: {samples: 20, max_iterations: 1}
+seed: 3
+)");
+  Write("impact.csv", "impact_angle,rebound_angle\n0.3,0.21\n0.6,0.42\n0.9,0.75\n");
+  const std::string faster = R"(test: collision
+radius: 10 mm
+impact_speed: 3 m/s
+control: {column: impact_angle, to: 50 deg, readings: 3}
+observables: [rebound_angle]
+)";
+  Write("faster.yaml", faster);
+  Write("slower.yaml", std::string(faster).replace(faster.find("3 m/s"), 1, "1.5"));
+  ASSERT_EQ(Call("run brittle.yaml --state s --workers 1 --json").code, 0) << Read("err");
+  const std::string options = " --draws 10 --state s --workers 1 --json";
+  EXPECT_EQ(Call("predict c1 --test slower.yaml" + options).code, 0) << Read("err");
+  const Answer refused = Call("predict c1 --test faster.yaml" + options);
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_TRUE(refused.out.empty()) << refused.out;
+  EXPECT_NE(refused.err.find("0 of 10 runs"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("effect brittle"), std::string::npos) << refused.err;
+}
+
 TEST_F(Predicting, RefusesInASentence) {
   ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
   EXPECT_EQ(Call("predict c1 --test none.yaml --state s").code, 2);

@@ -42,6 +42,21 @@ TEST(DiagnosisText, ARefitThatIsFurtherOffThanItsOwnBaseModelHasFoundNothing) {
   EXPECT_THAT(DiagnosisText(diagnosis), Not(HasSubstr("not found")));
 }
 
+TEST(DiagnosisText, AShareExplainedBesideALargerErrorIsPutInWords) {
+  ctl::Diagnosis diagnosis;
+  diagnosis.verdict = "unexplained";
+  diagnosis.rms = 2;
+  diagnosis.candidates = {{.effect = "adhesion_dmt",
+                           .explained_fraction = 0.34,
+                           .predicted_rms_error = 2.2,
+                           .campaign = "c2",
+                           .refit_p_value = 0,
+                           .over_base = {.nats = 5}}};
+  EXPECT_THAT(DiagnosisText(diagnosis), HasSubstr("Explains: share of the excess of chi-squared"));
+  diagnosis.candidates.front().predicted_rms_error = 1.8;
+  EXPECT_THAT(DiagnosisText(diagnosis), Not(HasSubstr("share of the excess")));
+}
+
 // What needs no runs has none that could be used up.
 TEST(DiagnosisText, ACalculatedEffectThatHelpsNothingExplainsNothing) {
   ctl::Diagnosis diagnosis;

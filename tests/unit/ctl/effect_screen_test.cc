@@ -21,6 +21,11 @@ TEST(SecondStep, GrowsWithTheRootOfWhatIsMissing) {
   EXPECT_EQ(Second("contact_plasticity", 0.3), Second("contact_plasticity", 0.3001)) << "in grades";
 }
 
+// Crushing goes with weakness^3: eight times as much of it wants twice the weakness.
+TEST(SecondStep, KnowsHowWhatIsSeenGrowsWithTheStrength) {
+  EXPECT_NEAR(Second("particle_crushing", 18. / 64), 2, 1e-12);
+}
+
 // The catalogue's second strength is four times its first here.
 TEST(SecondStep, IsNoWeakerThanTheCatalogues) {
   EXPECT_NEAR(Second("contact_plasticity", 3.9), 4, 1e-12);

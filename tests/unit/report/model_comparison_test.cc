@@ -67,6 +67,17 @@ TEST(ModelComparison, ErrorsAndHeldOutDataMayDiffer) {
   EXPECT_THAT(comparison->warnings[0], HasSubstr("not stated as in c1: c2;"));
 }
 
+TEST(ModelComparison, AnotherMethodIsSaidToBeOne) {
+  RivalModel other = Rival("c2", 1);
+  other.campaign.method = campaign::Method::kTmcmc;
+  ASSERT_NE(other.campaign.method, Rival("c1", 0).campaign.method);
+  const auto comparison = CompareModels({Rival("c1", 0), other});
+  ASSERT_TRUE(comparison.ok()) << comparison.status();
+  ASSERT_EQ(comparison->warnings.size(), 1U);
+  EXPECT_THAT(comparison->warnings[0],
+              HasSubstr("not found by the same method as that of c1: c2;"));
+}
+
 TEST(ModelComparison, OtherDataAreRefused) {
   RivalModel other = Rival("c2", 1);
   other.campaign.experiments.front().observables.front().values.back() += 1e-12;

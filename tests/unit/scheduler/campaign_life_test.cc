@@ -172,6 +172,63 @@ TEST(CampaignLife, AFailureThatPausesIsWrittenWithItsPauseOrNotAtAll) {
   }
 }
 
+// All are planned before the first run has ended.
+TEST(CampaignLife, WhatSeveralCampaignsWaitForIsRunOnce) {
+  const auto run = [](SimulatedService& service, std::int64_t campaign) {
+    const auto all = Value(service.Read().Evaluations(campaign));
+    return std::count_if(all.begin(), all.end(), [](const auto& e) { return !e.reused; });
+  };
+  SimulatedService alone("alone");
+  alone.Submit(Small());
+  alone.RunToEnd(1, true);
+  SimulatedService service("several");
+  for (int i = 0; i < 3; ++i) service.Submit(Small());
+  // Two at a time: none of them twice.
+  const std::int64_t worker = service.Connect("w", 2);
+  const v1::Lease first = service.Next(worker, Kind::kLease).lease();
+  const v1::Lease second = service.Next(worker, Kind::kLease).lease();
+  EXPECT_FALSE(google::protobuf::util::MessageDifferencer::Equals(first.spec(), second.spec()));
+  service.scheduler().Receive(worker, v1::Leaving());
+  service.ports().Run();
+  service.RunToEnd(1, true);
+  EXPECT_EQ(run(service, 1) + run(service, 2) + run(service, 3), run(alone, 1));
+  for (const std::int64_t campaign : {1, 2, 3}) {
+    EXPECT_EQ(Value(service.Read().Campaign(campaign)).progress.state, "finished");
+    EXPECT_TRUE(service.Runs(campaign) == alone.Runs(1)) << campaign;
+  }
+}
+
+TEST(CampaignLife, SeveralCampaignsHaveTheSameBitsWhateverGoesWrong) {
+  SimulatedService alone("alone");
+  alone.Submit(Small());
+  alone.RunToEnd(1, true);
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    SimulatedService service("several_in_a_storm");
+    for (int i = 0; i < 2; ++i) service.Submit(Small());
+    service.RunToEnd(seed, false);
+    for (const std::int64_t campaign : {1, 2}) {
+      EXPECT_EQ(Value(service.Read().Campaign(campaign)).progress.state, "finished") << seed;
+      EXPECT_TRUE(service.Runs(campaign) == alone.Runs(1)) << campaign << ", seed " << seed;
+    }
+  }
+}
+
+// Whoever computes it may go: the others do not wait for ever.
+TEST(CampaignLife, ACancelledCampaignLeavesWhatOthersWaitFor) {
+  SimulatedService service("cancelled_twin");
+  for (int i = 0; i < 2; ++i) service.Submit(Small());
+  const std::int64_t worker = service.Connect("w", 1);
+  const v1::Lease of_first = service.Next(worker, Kind::kLease).lease();
+  service.SendStates(worker, of_first, 0, 2);
+  service.scheduler().Cancel(
+      1, nullptr, [](const absl::Status& status) { EXPECT_TRUE(status.ok()) << status; });
+  service.ports().Run();
+  const v1::Lease of_second = service.Next(worker, Kind::kLease).lease();
+  EXPECT_TRUE(
+      google::protobuf::util::MessageDifferencer::Equals(of_second.spec(), of_first.spec()));
+  EXPECT_NE(of_second.attempt(), of_first.attempt());
+}
+
 TEST(CampaignLife, SameBitsWhateverGoesWrong) {
   SimulatedService calm("calm");
   calm.Submit(Small());

@@ -351,14 +351,20 @@ std::string SimulatedService::Fingerprint() {
   for (const store::IterationRecord& iteration : Value(reader.Iterations(1))) {
     text += iteration.proposal + iteration.posterior.value_or("none") + "\n";
   }
-  for (const store::SampleRecord& sample : Value(reader.Samples(1))) {
+  return text + Runs(1);
+}
+
+std::string SimulatedService::Runs(std::int64_t campaign) {
+  store::Reader reader = Read();
+  std::string text;
+  for (const store::SampleRecord& sample : Value(reader.Samples(campaign))) {
     text += std::to_string(sample.sample) + Bytes(sample.parameters) +
             Bytes({sample.log_weight, sample.log_likelihood}) + "\n";
   }
-  for (const store::EvaluationRecord& evaluation : Value(reader.Evaluations(1))) {
+  for (const store::EvaluationRecord& evaluation : Value(reader.Evaluations(campaign))) {
     text += ToString(evaluation.status) + evaluation.reason + "\n";
   }
-  for (const store::StateRecord& state : Value(reader.States(1))) {
+  for (const store::StateRecord& state : Value(reader.States(campaign))) {
     text += std::to_string(state.key.sample) + " " + std::to_string(state.load_step) +
             Bytes(state.observables) + "\n";
   }

@@ -86,6 +86,8 @@ class SimulatedService {
   store::CampaignRecord Campaign();
   /// What the store holds about the campaign's result, with every bit.
   std::string Fingerprint();
+  /// The same of any campaign, without proposals and posteriors, which tell of effort too.
+  std::string Runs(std::int64_t campaign);
 
   /// Relative change of a curve from one packing to another, a number of order one times this.
   double packing_scatter = 0;

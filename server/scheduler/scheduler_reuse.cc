@@ -1,0 +1,86 @@
+// The same run asked for by several campaigns is made once. What had ended when a campaign was
+// planned is reused by its plan (requests.h); here is what ends afterwards.
+#include <utility>
+
+#include "server/scheduler/decisions.h"
+#include "server/scheduler/scheduler.h"
+
+namespace calib::scheduler {
+
+using store::EvaluationKey;
+using store::EvaluationStatus;
+using store::Transaction;
+
+bool Scheduler::IsShared(const EvaluationKey& key) {
+  CampaignRun* run = FindRun(key.campaign);
+  return run != nullptr && RunsToItsEnds(run->definition()) && !run->Find(key)->digest.empty();
+}
+
+std::set<std::string> Scheduler::SharedUnderWay() {
+  std::set<std::string> digests;
+  if (runs_.size() < 2) return digests;
+  for (const auto& [id, run] : runs_) {
+    for (const LeaseEntry& lease : leases_.OfCampaign(id)) {
+      if (IsShared(lease.key)) digests.insert(run->Find(lease.key)->digest);
+    }
+  }
+  for (const auto& [attempt, digest] : ending_) digests.insert(digest);
+  return digests;
+}
+
+std::vector<EvaluationKey> Scheduler::SharedWaiting(CampaignRun& run, const std::string& digest) {
+  std::vector<EvaluationKey> keys;
+  for (const EvaluationKey& key : run.With(EvaluationStatus::kWaiting)) {
+    if (IsShared(key) && (digest.empty() || digest == run.Find(key)->digest)) keys.push_back(key);
+  }
+  return keys;
+}
+
+void Scheduler::TakeFromOthers(CampaignRun& run, const std::string& digest) {
+  const std::vector<EvaluationKey> waiting = SharedWaiting(run, digest);
+  if (waiting.empty()) return;
+  auto reader = ports_.Read();
+  if (!reader.ok()) return;  // they are run, then
+  std::vector<EvaluationKey> taken;
+  std::vector<std::pair<EvaluationKey, EvaluationKey>> from_to;
+  for (const EvaluationKey& key : waiting) {
+    const auto equal = reader->FindEqual(run.Find(key)->digest);
+    if (!equal.ok() || !equal->has_value()) continue;
+    queue_.erase(key);
+    run.SetStatus(key, EvaluationStatus::kRunning, run.Find(key)->failures);  // without a lease
+    taken.push_back(key);
+    from_to.emplace_back(**equal, key);
+  }
+  if (taken.empty()) return;
+  ports_.Write(
+      [from_to = std::move(from_to)](Transaction& transaction) {
+        for (const auto& [from, to] : from_to) {
+          transaction.ReuseEvaluation(from, to);
+        }
+      },
+      [this, campaign = run.id(), taken = std::move(taken)](const absl::Status& /*written*/) {
+        Taken(campaign, taken);  // as much of it as the disk has
+      });
+}
+
+void Scheduler::Taken(std::int64_t campaign, const std::vector<EvaluationKey>& keys) {
+  CampaignRun* run = FindRun(campaign);
+  if (run == nullptr) {
+    return;
+  }
+  auto reader = ports_.Read();
+  if (!reader.ok() || !run->Refresh(*reader, keys).ok()) {
+    // After whatever else is to be tried again for this campaign.
+    again_[campaign] = [this, campaign, keys, before = again_[campaign]] {
+      if (before) before();
+      Taken(campaign, keys);
+    };
+    return;
+  }
+  ++version_;
+  Enqueue(*run);
+  Advance(campaign);
+  Dispatch();
+}
+
+}  // namespace calib::scheduler
