@@ -55,6 +55,9 @@ class Improvement {
   struct ClosestRun;
   static ClosestRun ClosestRunWith(const std::string& effect, const Diagnosis& diagnosis);
   static double ErrorOf(const report::CampaignView& view);
+  // Whether more samples are not needed: the posterior is known, and as close as it should be.
+  static bool IsFound(const report::CampaignView& view, const ClosestRun& closest);
+  static bool IsCloser(const report::CampaignView& a, const report::CampaignView& b);
   bool Spent() const { return limits_.evaluations && evaluations_ >= *limits_.evaluations; }
   std::optional<std::int64_t> Left() const;
   absl::StatusOr<Diagnosis> Judge(const report::CampaignView& view, bool only_adequacy);
