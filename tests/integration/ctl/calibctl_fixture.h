@@ -44,6 +44,26 @@ class CalibctlFixture : public ::testing::Test {
         samples, iterations);
   }
 
+  /// Rebounds of a sphere of 1 cm from a wall at 1 m/s, measured in impact.csv, which this writes.
+  /// model: a flow mapping; noise: absolute, of the rebound angle [rad]; inference: a flow mapping.
+  std::string Rebounds(const std::string& model, const std::string& noise,
+                       const std::string& inference) const {
+    Write("impact.csv", "impact_angle,rebound_angle\n0.3,0.21\n0.6,0.42\n0.9,0.75\n");
+    return "name: rebounds\nmodel: " + model + R"(
+parameters:
+  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
+  friction_coefficient: {prior: uniform, min: 0.01, max: 1}
+experiments:
+  - name: wall
+    test: collision
+    radius: 10 mm
+    impact_speed: 1 m/s
+    data: {file: impact.csv}
+    control: impact_angle
+    observables: {rebound_angle: {noise: {absolute: )" +
+           noise + "}}}\ninference: " + inference + "\nseed: 3\n";
+  }
+
   void Write(const std::string& name, const std::string& text) const {
     std::ofstream(work_ / name) << text;
   }

@@ -162,23 +162,9 @@ TEST_F(Calibctl, CataloguesNeedNoServer) {
 
 // Misfit and spread of a population on its way to the posterior are not those of the posterior.
 TEST_F(Calibctl, WhoeverLooksAtAnUnfinishedTemperingIsTold) {
-  Write("impact.csv", "impact_angle,rebound_angle\n0.3,0.21\n0.6,0.42\n0.9,0.75\n");
-  Write("tempered.yaml", R"(name: impact
-model: {contact: hertz_mindlin, density: 2500, fixed: {poisson_ratio: 0.2}}
-parameters:
-  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
-  friction_coefficient: {prior: uniform, min: 0.01, max: 1}
-experiments:
-  - name: wall
-    test: collision
-    radius: 10 mm
-    impact_speed: 1 m/s
-    data: {file: impact.csv}
-    control: impact_angle
-    observables: {rebound_angle: {noise: {absolute: 0.002}}}
-inference: {method: tmcmc, samples: 20, steps: 2, max_iterations: 1}
-seed: 3
-)");
+  Write("tempered.yaml",
+        Rebounds("{contact: hertz_mindlin, density: 2500, fixed: {poisson_ratio: 0.2}}", "0.002",
+                 "{method: tmcmc, samples: 20, steps: 2, max_iterations: 1}"));
   ASSERT_EQ(Call("run tempered.yaml --state s --workers 1").code, 0) << Read("err");
   for (const std::string verb : {"compare", "sensitivity"}) {
     const Answer words = Call(verb + " c1 --state s");

@@ -96,34 +96,13 @@ observables: {q_over_p: {noise: {absolute: 10}}, volumetric_strain: {}}
 
 // Runs that end where others do not are no fair sample of the posterior.
 TEST_F(Predicting, NothingIsPredictedFromFewerThanHalfOfTheRuns) {
-  Write("brittle.yaml", R"(name: brittle
-model:
-  contact: hertz_mindlin
-  density: 2500
-  effects: [brittle]
-  fixed: {poisson_ratio: 0.2, brittle.c: 0.001 m/s}
-  user_effects:
-    brittle:
-      scales: normal_force
-      formula: "closing_velocity > limit ? 1 + c / (closing_velocity - closing_velocity) : 1 + c / limit"
-      parameters:
-        c: {null: 0, unit: m/s, prior: {prior: uniform, min: 0, max: 1}, steps: [0.1, 0.2]}
-        limit: {unit: m/s, default: 2}
-parameters:
-  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
-  friction_coefficient: {prior: uniform, min: 0.01, max: 1}
-experiments:
-  - name: wall
-    test: collision
-    radius: 10 mm
-    impact_speed: 1 m/s
-    data: {file: impact.csv}
-    control: impact_angle
-    observables: {rebound_angle: {noise: {absolute: 0.02}}}
-inference: {samples: 20, max_iterations: 1}
-seed: 3
-)");
-  Write("impact.csv", "impact_angle,rebound_angle\n0.3,0.21\n0.6,0.42\n0.9,0.75\n");
+  Write("brittle.yaml", Rebounds(R"({contact: hertz_mindlin, density: 2500, effects: [brittle],
+  fixed: {poisson_ratio: 0.2, brittle.c: 0.001 m/s},
+  user_effects: {brittle: {scales: normal_force,
+    formula: "closing_velocity > limit ? 1 + c / (closing_velocity - closing_velocity) : 1 + c / limit",
+    parameters: {c: {null: 0, unit: m/s, prior: {prior: uniform, min: 0, max: 1}, steps: [0.1, 0.2]},
+                 limit: {unit: m/s, default: 2}}}}})",
+                                 "0.02", "{samples: 20, max_iterations: 1}"));
   const std::string faster = R"(test: collision
 radius: 10 mm
 impact_speed: 3 m/s

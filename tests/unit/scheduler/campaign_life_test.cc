@@ -199,16 +199,20 @@ TEST(CampaignLife, WhatSeveralCampaignsWaitForIsRunOnce) {
 }
 
 TEST(CampaignLife, SeveralCampaignsHaveTheSameBitsWhateverGoesWrong) {
-  SimulatedService alone("alone");
-  alone.Submit(Small());
-  alone.RunToEnd(1, true);
-  for (unsigned seed = 1; seed <= 20; ++seed) {
-    SimulatedService service("several_in_a_storm");
-    for (int i = 0; i < 2; ++i) service.Submit(Small());
-    service.RunToEnd(seed, false);
-    for (const std::int64_t campaign : {1, 2}) {
-      EXPECT_EQ(Value(service.Read().Campaign(campaign)).progress.state, "finished") << seed;
-      EXPECT_TRUE(service.Runs(campaign) == alone.Runs(1)) << campaign << ", seed " << seed;
+  for (const std::string method : {"iterative_bayesian_filter", "tmcmc", "surrogate_msrs"}) {
+    const auto campaign =
+        testing::MakeSmallCampaign({.samples = 20, .failure_attempts = 100, .method = method});
+    SimulatedService alone("alone");
+    alone.Submit(campaign);
+    alone.RunToEnd(1, true);
+    for (unsigned seed = 1; seed <= 10; ++seed) {
+      SimulatedService service("several_in_a_storm");
+      for (int i = 0; i < 2; ++i) service.Submit(campaign);
+      service.RunToEnd(seed, false);
+      for (const std::int64_t id : {1, 2}) {
+        EXPECT_EQ(Value(service.Read().Campaign(id)).progress.state, "finished") << method << seed;
+        EXPECT_TRUE(service.Runs(id) == alone.Runs(1)) << method << ", " << id << ", seed " << seed;
+      }
     }
   }
 }
