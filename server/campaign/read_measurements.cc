@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
+#include "server/campaign/admissible_range.h"
 #include "server/campaign/control_path.h"
 #include "server/campaign/laboratory_table.h"
 #include "server/campaign/observable_range.h"
@@ -116,27 +117,42 @@ void CheckPath(const MapReader& map, const LaboratoryTable& table, const dem::Te
   }
 }
 
-// Of the control, which may be one of the test's settings; empty: what its unit allows.
-std::optional<dem::ControlRange> RangeOf(const dem::TestInfo& test, const std::string& control) {
-  if (control == test.control) return test.control_range;
+// What the control may be.
+struct ControlLimits {
+  Range range;
+  bool whole = false;
+  std::string unit = "1";
+};
+
+// The control may be one of the test's settings; empty: what its unit allows.
+std::optional<ControlLimits> LimitsOf(const dem::TestInfo& test, const std::string& control) {
+  if (control == test.control) {
+    const auto& range = test.control_range;
+    if (!range) return std::nullopt;
+    const dem::ObservableInfo* info = dem::FindObservable(control);
+    return ControlLimits{.range = {.min = range->min, .max = range->max},
+                         .whole = range->whole,
+                         .unit = info != nullptr ? info->unit : "1"};
+  }
   const auto setting = std::find_if(test.settings.begin(), test.settings.end(),
                                     [&control](const auto& s) { return s.name == control; });
   if (setting == test.settings.end()) return std::nullopt;
-  return dem::ControlRange{.min = setting->min, .max = setting->max, .whole = setting->whole};
+  return ControlLimits{
+      .range = AdmissibleRange(*setting), .whole = setting->whole, .unit = setting->unit};
 }
 
 void CheckRange(const LaboratoryTable& table, const dem::TestInfo& test, const ControlSpec& control,
                 const std::vector<double>& readings, ReadContext& context) {
-  const std::optional<dem::ControlRange> allowed = RangeOf(test, control.name);
-  if (!allowed) return;
-  const dem::ControlRange& range = *allowed;
+  const std::optional<ControlLimits> limits = LimitsOf(test, control.name);
+  if (!limits) return;
   for (std::size_t i = 0; i < readings.size(); ++i) {
-    const bool whole = !range.whole || readings[i] == std::round(readings[i]);
-    if (readings[i] >= range.min && readings[i] <= range.max && whole) continue;
+    const bool whole = !limits->whole || readings[i] == std::round(readings[i]);
+    if (limits->range.Contains(readings[i]) && whole) continue;
+    const std::string unit = limits->unit == "1" ? "" : " " + limits->unit;
     context.problems().AddIn(
         table.path(), table.LineOf(i), table.ColumnOf(control.name),
-        absl::StrCat("is ", readings[i], "; ", test.name, " allows ",
-                     range.whole ? "whole numbers " : "", range.min, " .. ", range.max));
+        absl::StrCat("is ", readings[i], unit, "; ", test.name, " allows ",
+                     limits->whole ? "whole numbers " : "", limits->range.Describe(limits->unit)));
     return;
   }
 }

@@ -352,12 +352,16 @@ TEST(CampaignFile, NoiseStatedOfWhatIsNotMeasuredIsKept) {
 // A setting that drives the test has the range it has when it is given.
 TEST(CampaignFile, AControlThatIsASettingHasItsRange) {
   const std::string yaml = Impact("impact_angle: 0.3", "impact_speed");
-  const ReadOutcome outcome =
-      ReadCampaign(yaml, "c.yaml",
-                   ReaderOf({{"impact.csv", "impact_speed,normal_restitution\n1,0.9\n-2,0.9\n"}}));
-  ASSERT_THAT(outcome.problems, SizeIs(1));
-  EXPECT_THAT(ToString(outcome.problems[0]),
-              ::testing::HasSubstr("impact.csv:3: impact_speed: is -2; collision allows "));
+  for (const std::string speed : {"-2", "0"}) {  // at a speed of 0 nothing collides
+    SCOPED_TRACE(speed);
+    const ReadOutcome outcome = ReadCampaign(
+        yaml, "c.yaml",
+        ReaderOf({{"impact.csv", "impact_speed,normal_restitution\n1,0.9\n" + speed + ",0.9\n"}}));
+    ASSERT_THAT(outcome.problems, SizeIs(1));
+    EXPECT_EQ(ToString(outcome.problems[0]), "impact.csv:3: impact_speed: is " + speed +
+                                                 " m/s; collision allows between 0 (excluded) and "
+                                                 "10000 m/s");
+  }
 }
 
 TEST(CampaignFile, ReadsWhatTiesThePriors) {

@@ -219,8 +219,9 @@ TEST(PouredCampaign, NumbersOfThingsAreWhole) {
                                    {"control: opening", "control: repetition"},
                                    {"mass_flow_rate:", "angle_of_repose:"}});
   EXPECT_EQ(ProblemsOf(heap, {{"heap.csv", "repetition,angle_of_repose\n1,0.5\n2,0.5\n"}}), "");
-  EXPECT_EQ(ProblemsOf(heap, {{"heap.csv", "repetition,angle_of_repose\n1,0.5\n1.5,0.5\n"}}),
-            "heap.csv:3: repetition: is 1.5; angle_of_repose allows whole numbers 0 .. 1e+06\n");
+  EXPECT_EQ(
+      ProblemsOf(heap, {{"heap.csv", "repetition,angle_of_repose\n1,0.5\n1.5,0.5\n"}}),
+      "heap.csv:3: repetition: is 1.5; angle_of_repose allows whole numbers between 0 and 1e+06\n");
 }
 
 TEST(PouredCampaign, ADrumThatCarriesItsGrainsAroundIsRefused) {
