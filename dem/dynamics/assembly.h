@@ -173,6 +173,7 @@ class Assembly {
   template <class Archive>
   void Visit(Archive& archive) {
     ParticleArrays& p = particles_;
+    packed_ = false;
     archive(cell_, p.x, p.y, p.z, p.vx, p.vy, p.vz, p.wx, p.wy, p.wz, p.fx, p.fy, p.fz, p.tx, p.ty,
             p.tz, p.radius, p.inverse_mass, p.inverse_inertia, p.id, p.body);
     archive(sliding_friction_, viscous_, gravity_, density_, thickness_, next_id_, planar_, walls_,
@@ -190,8 +191,12 @@ class Assembly {
     }
   }
 
-  /// Places and drives single grains by hand; for tests and for preparing states.
-  ParticleArrays& mutable_particles() { return particles_; }
+  /// Places and drives single grains by hand; for tests and for preparing states. Asked for anew
+  /// where grains are changed between a Move and the EvaluateForces after it.
+  ParticleArrays& mutable_particles() {
+    packed_ = false;
+    return particles_;
+  }
 
  private:
   struct ChunkSums {
@@ -212,6 +217,7 @@ class Assembly {
   void LoadMaterials(int b, ContactBlock& block) const;
   void SetShifts();
   void PackAllGrains();
+  void PackChunk(int chunk);
   [[nodiscard]] bool AnyTouching(int b) const;
   /// First column of block b in the memory.
   [[nodiscard]] std::size_t ColumnsOf(std::size_t b) const {
@@ -219,7 +225,8 @@ class Assembly {
   }
   void AddSurroundings(int begin, int end);
   void Renumber(const std::vector<int>& to);
-  double MoveChunk(int chunk, const Motion& motion);
+  void MoveChunk(int chunk, const Motion& motion);
+  void FinishChunk(int chunk);
   [[nodiscard]] double LargestShift2OfChunk(int chunk) const;
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
@@ -261,7 +268,9 @@ class Assembly {
   std::vector<std::uint8_t> touching_;  ///< per lane
   LaneMemory history_;                  ///< per block, history_size() columns of kBlock lanes
   std::vector<GrainLoad> loads_;  ///< per place of the list, and one more; zero where not touching
-  std::vector<GrainRecord> records_;  ///< of the grains, at the last evaluation
+  std::vector<GrainRecord> records_;  ///< of the grains, at the last evaluation or Move
+  bool packed_ = false;               ///< records_ are those of the grains since the last Move
+  std::vector<double> shift2_;        ///< largest of each chunk of grains, see moved_ [m^2]
   ImageShift shift_[kImages] = {};    ///< translation of each image now [m]
   std::vector<ChunkSums> sums_;
   std::array<double, 3> stress_ = {0, 0, 0};

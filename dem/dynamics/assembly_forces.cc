@@ -16,7 +16,10 @@ absl::Status Assembly::EvaluateForces() {
   }
   loads_fit_ = true;
   SetShifts();
-  PackAllGrains();
+  if (!packed_) {
+    PackAllGrains();
+  }
+  packed_ = false;  // who drives grains by hand may move them after this
   ForEachChunk(static_cast<int>(sums_.size()), threads_,
                [this](int chunk) { EvaluateChunk(chunk); });
   if (auto s = FormulasFinite(); !s.ok()) {
@@ -112,11 +115,13 @@ void Assembly::SetShifts() {
 
 void Assembly::PackAllGrains() {
   records_.resize(particles_.x.size());
-  ForEachChunk(ChunkCount(particles_.size(), kGrainChunk), threads_, [this](int chunk) {
-    const int begin = chunk * kGrainChunk;
-    PackGrains(particles_, begin, std::min(begin + kGrainChunk, particles_.size()),
-               records_.data());
-  });
+  ForEachChunk(ChunkCount(particles_.size(), kGrainChunk), threads_,
+               [this](int chunk) { PackChunk(chunk); });
+}
+
+void Assembly::PackChunk(int chunk) {
+  const int begin = chunk * kGrainChunk;
+  PackGrains(particles_, begin, std::min(begin + kGrainChunk, particles_.size()), records_.data());
 }
 
 bool Assembly::AnyTouching(int b) const {

@@ -45,6 +45,7 @@ absl::Status Assembly::SearchNeighbors() {
   searched_tilt_ = cell_.Tilt();
   moved_ = 0;
   stale_ = false;
+  packed_ = false;  // grains were wrapped, have joined or left
   if (!walls_.empty()) {
     walls_.Search(particles_, skin_ + (wall_reach_ - reach_));
   }

@@ -206,6 +206,22 @@ TEST(PairBlocks, LoadsAreSummedInTheOrderOfPlaces) {
   }
 }
 
+TEST(PairBlocks, ChangesByHandBetweenMotionAndForcesCount) {
+  Packing two;
+  two.x = {4e-3, 6.1e-3};
+  two.y = two.z = {5e-3, 5e-3};
+  two.radius = {1e-3, 1e-3};
+  two.clump = {-1, -1};
+  two.length[0] = two.length[1] = two.length[2] = 1e-2;
+  Assembly assembly(two, 2650, ContactModel(test::LinearModel()), Surroundings{}, 1);
+  ASSERT_TRUE(assembly.EvaluateForces().ok());
+  EXPECT_EQ(assembly.contacts(), 0);
+  assembly.Move({.dt = 1e-9});
+  for (double& x : assembly.mutable_particles().x) x *= 0.95;
+  ASSERT_TRUE(assembly.EvaluateForces().ok());
+  EXPECT_EQ(assembly.contacts(), 1);
+}
+
 /// Finds what contacts remember among the members that an assembly shows to archives.
 struct MemoryFinder {
   LaneMemory* memory = nullptr;
