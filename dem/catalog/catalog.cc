@@ -305,6 +305,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "10"; }
+std::string EngineVersion() { return "11"; }
 
 }  // namespace calib::dem

@@ -267,8 +267,8 @@ double Assembly::UnbalancedForce() const {
   std::int64_t contacts = 0;
   for (std::size_t s = 0; s < touching_.size(); ++s) {
     if (touching_[s] != 0) {
-      const double* f = load_on_j(static_cast<int>(s)).force;
-      contact += std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+      const Vec3 f = force_on_j(static_cast<int>(s));
+      contact += std::sqrt(f.x * f.x + f.y * f.y + f.z * f.z);
       ++contacts;
     }
   }
