@@ -13,6 +13,7 @@
 #include "dem/dynamics/leapfrog.h"
 #include "dem/dynamics/pair_blocks.h"
 #include "dem/dynamics/rigid_clumps.h"
+#include "dem/dynamics/stiffness_blocks.h"
 #include "dem/dynamics/wall_contacts.h"
 #include "dem/geometry/periodic_cell.h"
 #include "dem/neighbor/neighbor_list.h"
@@ -182,7 +183,7 @@ class Assembly {
     archive(list_.skin, list_.row, list_.first, list_.second, list_.image, order_, lanes_.first,
             lanes_.second, lanes_.place_i, lanes_.place_j, lanes_.image, records_);
     archive(searched_[0], searched_[1], searched_[2], searched_length_, searched_tilt_, moved_,
-            skin_, largest_radius_, touching_, history_, loads_, forces_, shift_, sums_, stress_,
+            skin_, largest_radius_, touching_, history_, places_, forces_, shift_, sums_, stress_,
             shear_stress_, contacts_);
     archive(clumps_, bodies_, solid_volume_, mean_diameter_, nominal_critical_step_, steps_,
             contact_updates_);
@@ -231,6 +232,7 @@ class Assembly {
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
   void TakeBranchesBetweenBodies();
+  [[nodiscard]] ChunkStiffness StiffnessOfChunk(int chunk) const;
   [[nodiscard]] absl::Status FormulasFinite() const;
   /// NominalCriticalStep() if contacts had no moment stiffness [s].
   [[nodiscard]] double NominalStepByForces() const;
@@ -267,7 +269,7 @@ class Assembly {
   PairLanes lanes_;         ///< the list, padded to whole blocks
   std::vector<std::uint8_t> touching_;  ///< per lane
   LaneMemory history_;                  ///< per block, history_size() columns of kBlock lanes
-  LoadPlaces loads_;                    ///< what contacts do to grains
+  LoadPlaces places_;                   ///< what contacts do to grains
   std::vector<BlockForces> forces_;     ///< per block; zero where not touching
   std::vector<GrainRecord> records_;    ///< of the grains, at the last evaluation or Move
   bool packed_ = false;                 ///< records_ are those of the grains since the last Move

@@ -83,7 +83,7 @@ void Assembly::TakeBranchesBetweenBodies() {
     const int* const members = clump.members.data();
     const std::array<double, 3>* const arms = clump.arm.data();
     for (std::size_t s = 0; s < clump.members.size(); ++s) {
-      const Vec3 force = loads_.ForceOn(members[s]);
+      const Vec3 force = places_.ForceOn(members[s]);
       const std::array<double, 3>& arm = arms[s];
       stress_[0] -= force.x * arm[0] / volume;
       stress_[1] -= force.y * arm[1] / volume;
@@ -149,7 +149,7 @@ void Assembly::EvaluateChunk(int chunk) {
   ContactBlock block;
   PrepareBlock(block);
   ChunkSums sums;
-  GrainLoad* const loads = loads_.Clear(chunk);
+  GrainLoad* const loads = places_.Clear(chunk);
   const int end = std::min((chunk + 1) * kBlocks, lanes_.blocks());
   for (int b = chunk * kBlocks; b < end; ++b) {
     if (!LoadBranches(lanes_, b, records_.data(), shift_, block) && !AnyTouching(b)) {

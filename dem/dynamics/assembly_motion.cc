@@ -75,7 +75,7 @@ void Assembly::AddSurroundings(int begin, int end) {
 void Assembly::MoveChunk(int chunk, const Motion& motion) {
   const auto begin = static_cast<std::size_t>(chunk) * kGrainChunk;
   const auto end = std::min(begin + kGrainChunk, particles_.x.size());
-  loads_.Gather(static_cast<int>(begin), static_cast<int>(end), particles_);
+  places_.Gather(static_cast<int>(begin), static_cast<int>(end), particles_);
   AddSurroundings(static_cast<int>(begin), static_cast<int>(end));
   AdvanceGrains(motion, static_cast<int>(begin), static_cast<int>(end), particles_);
 }

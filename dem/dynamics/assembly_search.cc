@@ -59,7 +59,7 @@ absl::Status Assembly::SearchNeighbors() {
   }
   ArrangeLanes();
   CarryMemory();
-  loads_.Assign(particles_.size(), lanes_);
+  places_.Assign(particles_.size(), lanes_);
   forces_.assign(static_cast<std::size_t>(lanes_.blocks()), BlockForces{});
   sums_.assign(static_cast<std::size_t>(ChunkCount(list_.size(), kPairChunk)), {});
   if (rests) {

@@ -4,6 +4,7 @@
 // memory stays in place as long as the list holds.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "dem/contact/contact_block.h"
@@ -48,16 +49,23 @@ class LoadPlaces {
   /// fx .. tz. Precondition: begin is a multiple of four.
   void Gather(int begin, int end, ParticleArrays& particles) const;
 
+  /// Grains of the places of a chunk.
+  [[nodiscard]] std::span<const int> GrainsOf(int chunk) const {
+    const auto c = static_cast<std::size_t>(chunk);
+    return {grain_of_.data() + chunk_row_[c], grain_of_.data() + chunk_row_[c + 1]};
+  }
+
   /// The sum of forces of one grain, in the same order [N].
   [[nodiscard]] Vec3 ForceOn(int grain) const;
 
   template <class Archive>
   void Visit(Archive& archive) {
-    archive(chunk_row_, row_, place_, load_);
+    archive(chunk_row_, grain_of_, row_, place_, load_);
   }
 
  private:
   std::vector<int> chunk_row_;  ///< CSR over chunks: their places
+  std::vector<int> grain_of_;   ///< of each place
   std::vector<int> row_;        ///< CSR over fours of grains: what place_ has of them
   std::vector<int> place_;      ///< of four grains in turn, those that have fewer with the last one
   std::vector<GrainLoad> load_;  ///< of all places, and one more that stays zero
@@ -68,7 +76,6 @@ class LoadPlaces {
     int chunk, place, count;
   };
   std::vector<Met> met_;
-  std::vector<int> grain_of_;  ///< of each place
 };
 
 /// Forces on grains j of a block [N].
