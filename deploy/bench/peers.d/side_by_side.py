@@ -11,6 +11,7 @@ import csv
 import json
 import math
 import os
+import random
 import re
 import statistics
 import subprocess
@@ -168,10 +169,11 @@ class Work:
         campaign, out = self.path("triaxial.yaml"), self.path("triaxial.csv")
         with open(self.path("packing.txt"), "w") as file, open(self.packing(1000)) as source:
             file.write(source.readline())
+            shift = random.Random(repeat)  # grain by grain, as yade_triaxial.py does
             for line in source:
                 words = line.split()
                 if words:
-                    moved = [repr(float(x) * (1 + 1e-9 * ((repeat * 7919 + 31 * k) % 97) / 97)) for k, x in enumerate(words[:3])]
+                    moved = [repr(float(x) * (1 + 1e-9 * shift.random() * (repeat > 0))) for x in words[:3]]
                     print(*moved, *words[3:], file=file)
         with open(self.path("triaxial_data.csv"), "w") as file:
             print("axial_strain,stress_ratio,volumetric_strain", file=file)
