@@ -285,19 +285,50 @@ void CampaignRun::SetStatus(const EvaluationKey& key, EvaluationStatus status, i
   }
 }
 
+bool CampaignRun::IsCalibrated(int experiment) const {
+  return definition_->campaign.experiments[static_cast<std::size_t>(experiment)].role ==
+         campaign::Role::kCalibrate;
+}
+
+bool CampaignRun::IsItsTurn(const EvaluationKey& key) const {
+  if (stop_below_.count(key.sample) == 0 || !IsCalibrated(key.experiment)) {
+    return true;
+  }
+  for (auto before = evaluations_.lower_bound({key.campaign, key.sample, 0});
+       before != evaluations_.end() && before->first < key; ++before) {
+    if (IsCalibrated(before->first.experiment) && !store::IsTerminal(before->second.status)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 bool CampaignRun::ShouldStop(const EvaluationKey& key) const {
   const auto threshold = stop_below_.find(key.sample);
   const auto arrived = arrived_.find(key.sample);
-  if (threshold == stop_below_.end() || arrived == arrived_.end()) {
+  if (threshold == stop_below_.end() || arrived == arrived_.end() ||
+      !IsCalibrated(key.experiment)) {
     return false;
   }
-  Eigen::RowVectorXd own = arrived->second.predictions;
+  Eigen::RowVectorXd known = arrived->second.predictions;
   for (std::size_t t = 0; t < definition_->data.readings.size(); ++t) {
-    if (definition_->data.readings[t].experiment != key.experiment) {
-      own(static_cast<Eigen::Index>(t)) = std::numeric_limits<double>::quiet_NaN();
+    if (definition_->data.readings[t].experiment > key.experiment) {
+      known(static_cast<Eigen::Index>(t)) = std::numeric_limits<double>::quiet_NaN();
     }
   }
-  return BestPossible(*definition_, own) < threshold->second;
+  return BestPossible(*definition_, known) < threshold->second;
+}
+
+std::vector<EvaluationKey> CampaignRun::WaitingBeside(const EvaluationKey& key) const {
+  std::vector<EvaluationKey> waiting;
+  for (auto other = evaluations_.lower_bound({key.campaign, key.sample, 0});
+       other != evaluations_.end() && other->first.sample == key.sample; ++other) {
+    if (other->second.status == EvaluationStatus::kWaiting &&
+        IsCalibrated(other->first.experiment)) {
+      waiting.push_back(other->first);
+    }
+  }
+  return waiting;
 }
 
 std::set<int> CampaignRun::OpenSamples() const {

@@ -82,9 +82,14 @@ class CampaignRun {
                 std::span<const double> observables);
   void SetStatus(const store::EvaluationKey& key, store::EvaluationStatus status, int failures);
 
-  /// True when an evaluation has shown, by its states so far, that its sample cannot count
-  /// (early_stopping.h).
+  /// Experiments of a sample that may be stopped run one after the other, in the order of the file:
+  /// the bound of each has what those before it came to, whatever arrives first.
+  bool IsItsTurn(const store::EvaluationKey& key) const;
+  /// True when an evaluation has shown, by its states so far and by the experiments before it, that
+  /// its sample cannot count (early_stopping.h).
   bool ShouldStop(const store::EvaluationKey& key) const;
+  /// Calibrated experiments of the same sample that wait: what is stopped with it.
+  std::vector<store::EvaluationKey> WaitingBeside(const store::EvaluationKey& key) const;
   /// Another threshold for that, see store::SampleRecord.
   void SetStopBelow(int sample, double stop_below) { stop_below_[sample] = stop_below; }
 
@@ -105,6 +110,7 @@ class CampaignRun {
   using ArrivedBySample = std::map<int, Arrived>;
   absl::Status AddStates(const absl::StatusOr<std::vector<store::StateRecord>>& states);
   bool IsOfRunningIteration(int sample) const;
+  bool IsCalibrated(int experiment) const;
   std::set<int> OpenSamples() const;
   std::set<int> EndedForPause() const;
   /// Results that a plan could go by: how many have ended, in their order up to the first that has

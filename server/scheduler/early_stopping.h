@@ -2,8 +2,10 @@
 // Early stopping with a bound: an evaluation ends as soon as even perfect agreement with every
 // reading to come could not give its sample a weight that counts.
 //
-// Thresholds are fixed when an iteration starts, from the complete iterations before it, and each
-// evaluation is judged by its own states alone: the same states are stored whatever arrives first.
+// Thresholds are fixed when an iteration starts, from the complete iterations before it. A sample's
+// experiments run one after the other, each judged by its own states and those of the ones before
+// it; once one is stopped, those behind it are not run. The same states are stored whatever arrives
+// first.
 // A campaign that decides at once (decisions.h) takes them again whenever a run ends, with the mass
 // that has finished by then, its own iteration's among it.
 // Weights are those that guide the campaign (inference::GuidingExponent): the plain ones where they

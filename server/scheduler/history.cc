@@ -51,9 +51,10 @@ void AddSamples(const Definition& definition, History& history) {
 using Places = std::map<int, std::pair<std::size_t, Eigen::Index>>;  // by sample
 
 /// What has ended and what is open, of all evaluations or those of the samples that have a place
-/// alone.
-void AddEnds(const std::vector<store::EvaluationRecord>& evaluations, const Places& place,
-             bool placed_alone, History& history) {
+/// alone. begun: those with a state; what was stopped before it had one was never run.
+void AddEnds(const std::vector<store::EvaluationRecord>& evaluations,
+             const std::set<store::EvaluationKey>& begun, const Places& place, bool placed_alone,
+             History& history) {
   for (const inference::Iteration& iteration : history.iterations) {
     history.ended.emplace_back(static_cast<std::size_t>(iteration.parameters.rows()), 1);
   }
@@ -64,7 +65,9 @@ void AddEnds(const std::vector<store::EvaluationRecord>& evaluations, const Plac
       continue;
     }
     if (store::IsTerminal(evaluation.status)) {
-      ran += evaluation.reused ? 0 : 1;
+      const bool spared = evaluation.status == store::EvaluationStatus::kStoppedEarly &&
+                          begun.count(evaluation.key) == 0;
+      ran += evaluation.reused || spared ? 0 : 1;
       continue;
     }
     ++history.open;
@@ -131,7 +134,11 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     const auto k = static_cast<std::size_t>(sample.iteration);
     place[sample.sample] = {k, next[k]++};
   }
-  AddEnds(*evaluations, place, first_iterations.has_value(), history);
+  std::set<store::EvaluationKey> with_states;
+  for (const store::StateRecord& state : *states) {
+    with_states.insert(with_states.end(), state.key);
+  }
+  AddEnds(*evaluations, with_states, place, first_iterations.has_value(), history);
   const auto finished = WithStatus(*evaluations, store::EvaluationStatus::kFinished);
   auto stopped = WithStatus(*evaluations, store::EvaluationStatus::kStoppedEarly);
   std::set<int> without_weight;  // whatever their other experiments would come to

@@ -263,6 +263,15 @@ void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
   const std::string reason =
       absl::StrCat("cannot reach a weight that counts, by load step ", records.back().load_step);
   run.SetStatus(lease.key, EvaluationStatus::kStoppedEarly, failures);
+  // The sample's further experiments would be run in vain.
+  std::map<EvaluationKey, int> spared;
+  for (const EvaluationKey& beside : run.WaitingBeside(lease.key)) {
+    spared[beside] = run.Find(beside)->failures;
+    run.SetStatus(beside, EvaluationStatus::kStoppedEarly, spared[beside]);
+    queue_.erase(beside);
+  }
+  const std::string beside_reason =
+      absl::StrCat("not run: the sample ", reason, " of ", NameOf(run, lease.key));
   const std::chrono::duration<double> elapsed = ports_.Now() - lease.started;
   v1::Finished finished = Because(lease.attempt, reason);
   if (const WorkerEntry* worker = workers_.OfSession(session); worker != nullptr) {
@@ -272,12 +281,15 @@ void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
   message.mutable_stop()->set_attempt(lease.attempt);
   ports_.Write(
       [key = lease.key, failures, reason, records = std::move(records), now = ports_.UnixMs(),
-       end = ToRecord(finished, "stopped_early")](Transaction& transaction) {
+       spared, beside_reason, end = ToRecord(finished, "stopped_early")](Transaction& transaction) {
         for (const store::StateRecord& record : records) {
           transaction.PutState(record, now);
         }
         transaction.EndAttempt(end);
         transaction.SetEvaluation(key, EvaluationStatus::kStoppedEarly, reason, failures);
+        for (const auto& [beside, so_far] : spared) {
+          transaction.SetEvaluation(beside, EvaluationStatus::kStoppedEarly, beside_reason, so_far);
+        }
       },
       [this, session, message, campaign = lease.key.campaign](const absl::Status& status) {
         if (status.ok()) {
@@ -420,6 +432,7 @@ std::optional<EvaluationKey> Scheduler::NextFor(const WorkerEntry& worker,
   for (const EvaluationKey& key : queue_) {
     const CampaignRun::Evaluation& evaluation = *FindRun(key.campaign)->Find(key);
     if (under_way.count(evaluation.digest) > 0 && IsShared(key)) continue;
+    if (!FindRun(key.campaign)->IsItsTurn(key)) continue;
     const std::string& held_in = evaluation.held_in;
     if (held_in.empty() || held_in == worker.hello.checkpoints() ||
         !workers_.IsThere(held_in, heard_since)) {

@@ -313,7 +313,9 @@ absl::StatusOr<Effort> Reader::EffortOf(std::int64_t campaign) {
     Effort effort;
     SQLite::Statement& evaluations = connection_->Bind(
         "SELECT count(*) FROM evaluation WHERE campaign = ? AND NOT reused "
-        "AND status IN ('finished', 'diverged', 'stopped_early')",
+        "AND (status IN ('finished', 'diverged') OR (status = 'stopped_early' AND EXISTS "
+        "(SELECT 1 FROM state WHERE state.campaign = evaluation.campaign AND "
+        "state.sample = evaluation.sample AND state.experiment = evaluation.experiment)))",
         campaign);
     if (evaluations.executeStep()) {
       effort.model_evaluations = evaluations.getColumn(0).getInt64();

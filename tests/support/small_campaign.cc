@@ -88,8 +88,9 @@ inference:
 seed: 7
 {})",
       Experiment("tx", "0.1 MPa", options.relative_noise, false, options.packings),
-      options.with_validation
-          ? Experiment("tx2", "0.2 MPa", options.relative_noise, true, options.packings)
+      options.with_validation || options.with_second
+          ? Experiment("tx2", "0.2 MPa", options.relative_noise, !options.with_second,
+                       options.packings)
           : "",
       options.method, options.samples, options.max_iterations, options.inference,
       options.failure_attempts, options.extra);

@@ -20,6 +20,7 @@ struct SmallCampaignOptions {
   double relative_noise = 0.1;
   int packings = 1;              ///< realizations, each a packing file of its own
   bool with_validation = false;  ///< a second experiment at another pressure, held out
+  bool with_second = false;      ///< the same, calibrated
   std::string method = "iterative_bayesian_filter";
   std::string inference{};  ///< further lines under inference, each "  key: value\n"
   std::string extra{};      ///< further top-level YAML

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
@@ -328,6 +329,90 @@ TEST(EarlyStopping, DecidedAtOnceItWaitsForTheSamplesThatGuide) {
       const bool known = given || done >= kWanted;
       EXPECT_EQ(thresholds.size(), known ? static_cast<std::size_t>(kSamples - done) : 0U)
           << done << " finished, exponent " << (given ? "given" : "guiding");
+    }
+  }
+}
+
+// Two calibrated experiments, each enough to tell that a sample cannot count: the second iteration
+// has the same samples from the same proposal with early stopping and without.
+testing::SmallCampaign TwoExperiments(const std::string& extra) {
+  return testing::MakeSmallCampaign({.samples = 60,
+                                     .max_iterations = 2,
+                                     .load_steps = 12,
+                                     .failure_attempts = 100,
+                                     .relative_noise = 0.04,
+                                     .with_second = true,
+                                     .extra = extra});
+}
+constexpr const char* kOwnWeights = "early_stopping: {discard_at_most: 1e-3, exponent: 1}\n";
+
+TEST(EarlyStopping, ExperimentsOfAStoppedSampleAreNotRunInVain) {
+  SimulatedService full("two_full");
+  full.Submit(TwoExperiments(""));
+  full.RunToEnd(1, true);
+  SimulatedService stopping("two_stopping");
+  stopping.Submit(TwoExperiments(kOwnWeights));
+  stopping.RunToEnd(1, true);
+  const v1::Posterior with = LastPosterior(stopping);
+  EXPECT_GT(with.stopped_early(), 5);
+  EXPECT_LE(with.stated_loss(), kAllowed);
+
+  // The posterior is the same but for what was stated.
+  const auto all = Value(full.Read().Samples(1));
+  const auto part = Value(stopping.Read().Samples(1));
+  ASSERT_EQ(all.size(), part.size());
+  double variation = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    ASSERT_EQ(all[i].parameters, part[i].parameters);
+    variation += 0.5 * std::abs(std::exp(all[i].log_weight) - std::exp(part[i].log_weight));
+  }
+  EXPECT_LE(variation, with.stated_loss());
+
+  // Of a stopped sample nothing was begun behind the experiment that stopped it.
+  std::map<store::EvaluationKey, int> steps;
+  for (const store::StateRecord& state : Value(stopping.Read().States(1))) ++steps[state.key];
+  int spared = 0;
+  int by_both = 0;  // the first experiment alone could not tell
+  for (const store::EvaluationRecord& first : Value(stopping.Read().Evaluations(1))) {
+    if (first.key.experiment != 0) continue;
+    const store::EvaluationKey second{1, first.key.sample, 1};
+    if (first.status == store::EvaluationStatus::kStoppedEarly) {
+      EXPECT_GT(steps[first.key], 0);
+      EXPECT_EQ(steps.count(second), 0U) << "sample " << first.key.sample;
+      ++spared;
+    } else if (steps[second] < 12) {
+      EXPECT_EQ(steps[first.key], 12);
+      ++by_both;
+    }
+  }
+  EXPECT_GE(spared, 2);
+  EXPECT_GT(by_both, 0);
+  EXPECT_EQ(spared + by_both, with.stopped_early());
+  EXPECT_EQ(with.model_evaluations(), LastPosterior(full).model_evaluations() - spared);
+
+  // What goes on is run whole, the experiments that had not been begun too.
+  EXPECT_EQ(with.audited(), 1);
+  for (const store::SampleRecord& sample : part) {
+    if (std::isnan(sample.audited)) continue;
+    for (const int experiment : {0, 1}) {
+      EXPECT_EQ((steps[{1, sample.sample, experiment}]), 12);
+    }
+    EXPECT_TRUE(std::isfinite(sample.log_weight));
+  }
+}
+
+TEST(EarlyStopping, SeveralExperimentsHaveTheSameBitsWhateverGoesWrong) {
+  for (const std::string rungs : {"", ", rungs: [0.3, 0.6]"}) {
+    const std::string extra = "early_stopping: {discard_at_most: 1e-3, exponent: 1" + rungs + "}\n";
+    SimulatedService calm("two_calm");
+    calm.Submit(TwoExperiments(extra));
+    calm.RunToEnd(1, true);
+    const std::string expected = calm.Fingerprint();
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      SimulatedService service("two_storm");
+      service.Submit(TwoExperiments(extra));
+      service.RunToEnd(seed, false);
+      EXPECT_TRUE(service.Fingerprint() == expected) << "seed " << seed << rungs;
     }
   }
 }
