@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "inference/prior/standard_normal.h"
 #include "inference/scatter/student_ratio.h"
 
 namespace calib::inference {
@@ -151,6 +153,32 @@ Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, doub
     probability[k] = StretchedExceeds(prediction, k, level);
   }
   return probability;
+}
+
+double ExceedanceAnywhere(const QuantityPrediction& prediction, const Eigen::MatrixXd& runs,
+                          const Eigen::VectorXd& shared_sd, const Eigen::VectorXd& error_sd,
+                          double level) {
+  constexpr int kShares = 200;  // equally probable shared errors
+  const double stretch = StudentRatio(prediction.freedom) * MeanStretch(prediction);
+  std::vector<double> shared(kShares);
+  for (int k = 0; k < kShares; ++k)
+    shared[static_cast<std::size_t>(k)] = NormalQuantile((k + 0.5) / kShares);
+  double sum = 0;
+  for (Index i = 0; i < runs.rows(); ++i) {
+    const Eigen::VectorXd history =
+        prediction.mean + stretch * (runs.row(i).transpose() - prediction.mean);
+    for (const double off : shared) {
+      double below = 1;
+      for (Index t = 0; t < history.size() && below > 0; ++t) {
+        const double gap = level - history[t] - off * shared_sd[t];
+        below *= error_sd[t] > 0 ? 0.5 * std::erfc(-gap / (error_sd[t] * std::sqrt(2.0)))
+                                 : (gap > 0 ? 1.0 : 0.0);
+      }
+      sum += 1 - below;
+    }
+  }
+  const double share = sum / static_cast<double>(kShares * runs.rows());
+  return std::max(share, ExceedanceProbability(prediction, level).maxCoeff());
 }
 
 }  // namespace calib::inference

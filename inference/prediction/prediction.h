@@ -46,4 +46,12 @@ QuantityPrediction WithModelError(QuantityPrediction prediction, const Eigen::Ve
 /// stretched as they are: Pr(Q_t >= q95_t) = 0.05.
 Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, double level);
 
+/// Pr(Q_t >= level for some t), of histories: a run's (N x T, those of the prediction), its departure
+/// from the mean stretched as the quantiles are, plus an error of the model that is off to one side
+/// all along (shared_sd, T, >= 0) and errors of readings that know nothing of each other (error_sd,
+/// T, >= 0). Never less than the largest ExceedanceProbability.
+double ExceedanceAnywhere(const QuantityPrediction& prediction, const Eigen::MatrixXd& runs,
+                          const Eigen::VectorXd& shared_sd, const Eigen::VectorXd& error_sd,
+                          double level);
+
 }  // namespace calib::inference

@@ -183,8 +183,10 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
     if (!quantity.ok()) return quantity.status();
     inference::DiscrepancyBand discrepancy = report::DiscrepancyAt(
         *misfit.parent, misfit.discrepancies, experiment, observable.name, quantity->mean);
+    Eigen::VectorXd missed = Eigen::VectorXd::Zero(t);
     if (discrepancy.mean.size() > 0) {
-      quantity = inference::WithModelError(*std::move(quantity), discrepancy.rms);
+      missed = discrepancy.rms;
+      quantity = inference::WithModelError(*std::move(quantity), missed);
     }
     PredictedObservable out{.experiment = experiment.name,
                             .observable = observable.name,
@@ -197,11 +199,11 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
                             .exceedance = {}};
     for (const Level& level : levels) {
       if (level.observable != observable.name) continue;
-      const auto reach = (runs.values.array() >= level.value).rowwise().any().count();
       out.exceedance.push_back(
           {.level = level.value,
            .probability = inference::ExceedanceProbability(out.quantity, level.value),
-           .anywhere = static_cast<double>(reach) / static_cast<double>(runs.values.rows())});
+           .anywhere = inference::ExceedanceAnywhere(out.quantity, runs.values, missed, error,
+                                                     level.value)});
     }
     prediction.runs = static_cast<int>(runs.values.rows());
     prediction.failed =

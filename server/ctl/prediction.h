@@ -32,7 +32,7 @@ struct PredictedObservable {
   struct Exceedance {
     double level = 0;             ///< SI
     Eigen::VectorXd probability;  ///< at each reading
-    double anywhere = 0;          ///< share of the runs that reach the level somewhere
+    double anywhere = 0;          ///< that it is reached somewhere, errors included
   };
   std::vector<Exceedance> exceedance;
 };

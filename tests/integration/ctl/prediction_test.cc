@@ -52,7 +52,7 @@ TEST_F(Predicting, PosteriorAtAnotherPressure) {
   // The fitted curve is one that 64 grains cannot follow; without model error it was above 0.9.
   EXPECT_GT(q["exceedance"][0]["probability"][3], 0.5);
   EXPECT_LT(q["exceedance"][1]["probability"][3], 0.01);
-  EXPECT_EQ(q["exceedance"][1]["anywhere"], 0);
+  EXPECT_LT(q["exceedance"][1]["anywhere"], 0.05);
   // Again: nothing is run, nothing changes; in words too.
   const auto evaluations = [this] {
     std::int64_t sum = 0;

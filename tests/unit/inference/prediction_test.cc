@@ -145,6 +145,25 @@ TEST(Prediction, RareLevelsAreExceededAsRarelyAsSaid) {
   }
 }
 
+// Runs that are all alike: what is off is a reading alone, or the whole history.
+TEST(Prediction, SomewhereAlongTheHistoryErrorsCountToo) {
+  constexpr Index kRuns = 200;
+  constexpr double kLevel = 1.5;
+  const double tail = 0.5 * std::erfc(kLevel / std::sqrt(2.0));
+  const Eigen::MatrixXd parameters = Draw(kRuns, 0, 3).parameters;
+  const Eigen::MatrixXd runs = Eigen::MatrixXd::Zero(kRuns, 3);
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(3);
+  const Eigen::VectorXd one = Eigen::VectorXd::Ones(3);
+  const auto read = PredictQuantity(parameters, runs, one);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_NEAR(ExceedanceAnywhere(*read, runs, none, one, kLevel), 1 - std::pow(1 - tail, 3), 1e-9);
+  const QuantityPrediction off = WithModelError(*PredictQuantity(parameters, runs, none), one);
+  const double shared = ExceedanceAnywhere(off, runs, one, none, kLevel);
+  EXPECT_NEAR(shared, tail, 0.005);  // as much as at each reading: all are off together
+  EXPECT_GE(shared, ExceedanceProbability(off, kLevel).maxCoeff());
+  EXPECT_EQ(ExceedanceAnywhere(*read, runs.array() + 2, none, none, kLevel), 1);
+}
+
 TEST(Prediction, RefusesWhatDoesNotFit) {
   const Sample sample = Draw(5, 1, 3);
   EXPECT_FALSE(
