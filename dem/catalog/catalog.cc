@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/registry.h"
+#include "dem/elementary/functions.h"
 #include "dem/formula/user_effect.h"
 #include "dem/lab_tests/collision.h"
 
@@ -190,8 +191,8 @@ double ScaleOf(const ParameterInfo& parameter, const std::string& contact,
                const ReferenceState& state) {
   const auto it = parameter.scale_by_contact.find(contact);
   const ReferenceScale& s = it == parameter.scale_by_contact.end() ? parameter.scale : it->second;
-  return s.factor * std::pow(state.pressure, s.pressure) * std::pow(state.diameter, s.diameter) *
-         std::pow(state.modulus, s.modulus);
+  return s.factor * Pow(state.pressure, s.pressure) * Pow(state.diameter, s.diameter) *
+         Pow(state.modulus, s.modulus);
 }
 
 std::optional<double> NullValueOf(const ParameterInfo& parameter, const std::string& contact) {
@@ -305,6 +306,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "10"; }
+std::string EngineVersion() { return "11"; }
 
 }  // namespace calib::dem

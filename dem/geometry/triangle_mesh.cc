@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 
 namespace calib::dem {
 
@@ -78,8 +79,8 @@ bool Same(const Vec3& a, const Vec3& b) { return a.x == b.x && a.y == b.y && a.z
 /// Point `along` the axis at radius r and angle of side k.
 Vec3 OnCircle(const Vec3& centre, double along, double r, int k, int sides, bool along_y) {
   const double angle = 2.0 * std::numbers::pi * (k % sides) / sides;
-  const double u = r * std::cos(angle);
-  const double v = r * std::sin(angle);
+  const double u = r * Cosine(angle);
+  const double v = r * Sine(angle);
   return along_y ? Vec3{centre.x + u, centre.y + along, centre.z + v}
                  : Vec3{centre.x + u, centre.y + v, centre.z + along};
 }

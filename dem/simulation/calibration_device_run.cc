@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/measure/free_surface.h"
 #include "dem/simulation/gravity_run.h"
 
@@ -33,8 +34,8 @@ Device Plan(const GravityRun& run) {
   device.depth = run.SettingOr("depth", 6 * run.largest_diameter());
   const double angle = run.Setting("slide_angle");
   const double length = run.SettingOr("slide_length", 16 * d);
-  const double dx = length * std::cos(angle);
-  const double dz = length * std::sin(angle);
+  const double dx = length * Cosine(angle);
+  const double dz = length * Sine(angle);
   device.lower_z = 10 * d;
   device.upper_x = device.opening;
   device.upper_z = device.lower_z + dz;
@@ -42,7 +43,7 @@ Device Plan(const GravityRun& run) {
   device.corner = device.lower_x - 10 * d;
   device.outlet = device.upper_z + 2 * d;
   device.hopper_z = device.outlet + 12 * d;
-  device.hopper_x = 0.5 * device.opening + 12 * d / std::tan(kHopperSlope);
+  device.hopper_x = 0.5 * device.opening + 12 * d / Tangent(kHopperSlope);
   return device;
 }
 
@@ -145,7 +146,7 @@ StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point
            [&](const Vec3& c, double r) {
              const double up = c.z - device.outlet - 2 * r;
              const double room =
-                 std::min(half, 0.5 * device.opening + up / std::tan(kHopperSlope)) - r;
+                 std::min(half, 0.5 * device.opening + up / Tangent(kHopperSlope)) - r;
              return std::abs(c.x) < room;
            }},
       run.seed() + static_cast<std::uint64_t>(std::llround(1e6 * point.target)) * 1'000'003U);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/geometry/mesh_interior.h"
 #include "dem/simulation/gravity_run.h"
 
@@ -49,7 +50,7 @@ std::vector<int> AboveOutlet(const ParticleArrays& p, const Silo& silo, double o
   for (int g = 0; g < p.size(); ++g) {
     const auto q = static_cast<std::size_t>(g);
     const double y = silo.flat ? 0 : p.y[q] - silo.middle;
-    if (std::hypot(p.x[q] - silo.middle, y) < 0.5 * opening) {
+    if (Hypotenuse(p.x[q] - silo.middle, y) < 0.5 * opening) {
       above.push_back(g);
     }
   }
@@ -194,7 +195,7 @@ StageEnd RunSiloDischarge(GravityRun& run) {
     }
   }
   const double m = silo.middle;
-  const double inner = 0.5 * silo.width * std::cos(std::numbers::pi / kSides);
+  const double inner = 0.5 * silo.width * Cosine(std::numbers::pi / kSides);
   vessel = Shifted(std::move(vessel), {m, m, 0});
   const bool own = vessel.size() > 0;
   const MeshInterior interior(vessel);
@@ -210,7 +211,7 @@ StageEnd RunSiloDischarge(GravityRun& run) {
                          return interior.Holds(c, r);
                        }
                        return silo.flat ? std::abs(c.x - m) + r < 0.5 * silo.width
-                                        : std::hypot(c.x - m, c.y - m) + r < inner;
+                                        : Hypotenuse(c.x - m, c.y - m) + r < inner;
                      }},
                 run.seed());
   if (own && grains.x.size() < run.radii().size()) {
