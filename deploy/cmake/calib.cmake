@@ -60,9 +60,9 @@ function(calib_program name)
 endfunction()
 
 # calib_test(NAME LABEL label SOURCES ... LINKS ... [TIMEOUT s]): one GoogleTest binary, one ctest entry with a label
-# (unit, property, verification, integration, fault, browser, data, layering, bench), or several: "verification;physics".
+# (unit, property, verification, integration, fault, browser, data, layering, bench), or several: verification physics.
 function(calib_test name)
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT" "LABEL;SOURCES;LINKS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
