@@ -104,8 +104,10 @@ double SizeOf(const TriangleMesh& mesh) {
   return std::max({high.x - low.x, high.y - low.y, high.z - low.z});
 }
 
-/// One number per place: vertices that agree on a fine grid share it.
-std::vector<int> Places(const TriangleMesh& mesh, double tolerance) {
+}  // namespace
+
+std::vector<int> PlacesOf(const TriangleMesh& mesh) {
+  const double tolerance = 1e-9 * SizeOf(mesh);
   std::map<std::tuple<std::int64_t, std::int64_t, std::int64_t>, int> known;
   std::vector<int> places;
   for (const Vec3& v : mesh.vertex) {
@@ -117,8 +119,6 @@ std::vector<int> Places(const TriangleMesh& mesh, double tolerance) {
   }
   return places;
 }
-
-}  // namespace
 
 void AddQuad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, TriangleMesh& mesh) {
   const int ia = AddVertex(a, mesh);
@@ -157,7 +157,7 @@ std::vector<std::string> MeshProblems(const TriangleMesh& mesh, bool closed) {
       problems.push_back(std::move(problem));
     }
   };
-  const std::vector<int> place = Places(mesh, 1e-9 * size);
+  const std::vector<int> place = PlacesOf(mesh);
   std::map<std::pair<int, int>, std::pair<int, int>> edges;  // places -> triangles, first of them
   for (int t = 0; t < mesh.size(); ++t) {
     const auto& corner = mesh.triangle[static_cast<std::size_t>(t)];

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "dem/elementary/functions.h"
 #include "dem/measure/free_surface.h"
+#include "dem/geometry/mesh_rims.h"
 #include "dem/simulation/gravity_run.h"
 
 namespace calib::dem {
@@ -218,3 +219,7 @@ StageEnd RunCalibrationDevice(GravityRun& run) {
 }
 
 }  // namespace calib::dem
+    if (const std::string problem = SlideProblemAcross(*slide, (1 - 1e-6) * reach);
+        !problem.empty()) {
+      return run.Fail("mesh slide " + problem);
+    }

@@ -369,3 +369,33 @@ TEST(GravityTests, BadSettingsAndFailuresAreSentences) {
 
 }  // namespace
 }  // namespace calib::dem
+TEST(GravityTests, MeshesWithHolesAreRefused) {
+  Scenario chute = Pour("transfer_chute", 60, {1.0});
+  TriangleMesh funnel;
+  AddFrustum({.height = 0.03, .lower_radius = 0.013, .upper_radius = 0.03, .sides = 16}, funnel);
+  chute.meshes = {{"funnel", funnel}};
+  EXPECT_THAT(ScenarioProblems(chute), testing::IsEmpty());
+  chute.meshes["funnel"].triangle.pop_back();
+  EXPECT_THAT(ScenarioProblems(chute),
+              testing::ElementsAre(testing::HasSubstr("mesh funnel has a hole or a notch")));
+
+  Scenario device = Pour("calibration_device", 60, {1});
+  TriangleMesh slide;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      const auto at = [](int k, int l) { return Vec3{0.01 * k, 0.01 * (l - 3), 0.008 * k}; };
+      AddQuad(at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1), slide);
+    }
+  }
+  device.settings = {{"slide_length", 0.0768}, {"slide_angle", 0.6747}, {"depth", 0.04}};
+  device.meshes = {{"slide", slide}};
+  EXPECT_THAT(ScenarioProblems(device), testing::IsEmpty());
+  device.meshes["slide"].triangle.erase(device.meshes["slide"].triangle.begin() + 30);
+  EXPECT_THAT(ScenarioProblems(device),
+              testing::ElementsAre(testing::HasSubstr("mesh slide has a hole: it has 2 loops")));
+  device.meshes["slide"] = slide;  // a triangle of the lower end: the run knows how far it matters
+  device.meshes["slide"].triangle.erase(device.meshes["slide"].triangle.begin() + 5);
+  EXPECT_THAT(ScenarioProblems(device), testing::IsEmpty());
+  EXPECT_THAT(test::RunAll(device).summary.reason, testing::HasSubstr("mesh slide has a notch"));
+}
+
