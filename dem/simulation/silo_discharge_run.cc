@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "dem/elementary/functions.h"
 #include "dem/geometry/mesh_interior.h"
+#include "dem/measure/avalanches.h"
 #include "dem/simulation/gravity_run.h"
 
 namespace calib::dem {
@@ -137,6 +138,7 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
   });
   StageEnd end = StageEnd::kDone;
   int jams = 0;
+  Avalanches avalanches;
   std::size_t seen = 0;
   double since = 0;  // time at which something last happened
   const double slice = 0.25 * jam_time;
@@ -153,6 +155,7 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
     if (AboveOutlet(assembly.particles(), silo, opening).empty()) {
       break;  // it has run empty
     }
+    avalanches.Block(flow.drained().size());
     if (++jams >= most) {
       break;
     }
@@ -167,11 +170,13 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
   for (const Drained& grain : flow.drained()) {
     mass += grain.mass;
   }
-  const double avalanches = std::max(1, jams);
+  const auto left = static_cast<double>(flow.drained().size());
+  const bool ended = avalanches.count() > 0;  // else one goes on, whose size is not known
   return run.Report(
       point,
-      {opening, FlowRate(flow.drained(), jam_time), mass,
-       static_cast<double>(flow.drained().size()) / avalanches, static_cast<double>(jams)},
+      {opening, FlowRate(flow.drained(), jam_time), mass, ended ? avalanches.Mean() : left,
+       static_cast<double>(jams), static_cast<double>(avalanches.count()),
+       ended ? avalanches.ExceededBy(0.5) : left, ended ? avalanches.ExceededBy(0.1) : left},
       assembly);
 }
 
