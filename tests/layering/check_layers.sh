@@ -22,9 +22,11 @@ server            server/service/,server/store/,server/scheduler/,proto/rpc/addr
 '
 watched='grpcpp|SQLiteCpp|sqlite3|yaml-cpp|spdlog|CLI|nlohmann|chrono'
 
+include='include[[:space:]]*["<]([^">]+)[">]'
 wrong=0
 while IFS=: read -r file line text; do
-  header=$(sed -E 's/^[[:space:]]*#[[:space:]]*include[[:space:]]*["<]([^">]+)[">].*/\1/' <<<"$text")
+  [[ $text =~ $include ]] || continue
+  header=${BASH_REMATCH[1]}
   best='' own='' libraries=''
   while read -r folder may_own may_libraries; do
     [ -n "$folder" ] || continue
