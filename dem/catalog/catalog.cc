@@ -315,6 +315,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "11"; }
+std::string EngineVersion() { return "12"; }
 
 }  // namespace calib::dem

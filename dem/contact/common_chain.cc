@@ -266,6 +266,59 @@ CALIB_DEM_CLONES void LinearMomentsDamped(const CommonChain& c, ContactBlock& b)
   Pass<LinearLaw, 2, true>(c, b);
 }
 
+/// The share of ComputeKinematics, the laws, DampNormal, DampShear and EvaluateMoment.
+template <class Law, bool kDamped>
+CALIB_DEM_INLINE void StiffnessPass(const CommonChain& chain, ContactBlock& b) {
+  const double normal = chain.normal;
+  const double tangential = chain.tangential;
+  const MomentLaw rolling = chain.rolling.value_or(MomentLaw{});
+  const MomentLaw twisting = chain.twisting.value_or(MomentLaw{});
+  const Dashpot dashpot = kDamped ? *chain.dashpot : Dashpot{};
+  const double damping = dashpot.twice_ratio * b.viscous;
+  const double mass_factor = b.mass_factor;
+#pragma GCC ivdep
+  for (int k = 0; k < kBlock; ++k) {
+    const double ri = b.radius_i[k];
+    const double rj = b.radius_j[k];
+    const double sum = ri + rj;
+    const double dx = b.dx[k];
+    const double dy = b.dy[k];
+    const double dz = b.dz[k];
+    const double distance = std::sqrt(dx * dx + dy * dy + dz * dz);
+    const double both = 1.0 / (distance * sum);
+    const double inverse = both * sum;
+    const double overlap = sum - distance;
+    b.nx[k] = dx * inverse;
+    b.ny[k] = dy * inverse;
+    b.nz[k] = dz * inverse;
+    b.overlap[k] = overlap;
+    const Response response =
+        Law::At(normal, tangential, ri * rj * (both * distance), overlap > 0 ? overlap : 0.0);
+    b.normal_stiffness[k] = response.kn;
+    b.tangential_stiffness[k] = response.ks;
+    const double arms = ri * rj * response.ks;
+    b.rolling_stiffness[k] = rolling.constant + rolling.ratio * arms;
+    b.twisting_stiffness[k] = twisting.constant + twisting.ratio * arms;
+    const double mass = kDamped ? EffectiveMass(dashpot.grains, mass_factor, ri, rj) : 0.0;
+    const double pressed = response.kn > 0 ? response.kn : 0.0;
+    b.normal_damping[k] = kDamped ? damping * std::sqrt(mass * pressed) : 0.0;
+    b.tangential_damping[k] = kDamped ? damping * std::sqrt(mass * response.ks) : 0.0;
+  }
+}
+
+CALIB_DEM_CLONES void HertzStiffness(const CommonChain& c, ContactBlock& b) {
+  StiffnessPass<HertzLaw, false>(c, b);
+}
+CALIB_DEM_CLONES void HertzStiffnessDamped(const CommonChain& c, ContactBlock& b) {
+  StiffnessPass<HertzLaw, true>(c, b);
+}
+CALIB_DEM_CLONES void LinearStiffness(const CommonChain& c, ContactBlock& b) {
+  StiffnessPass<LinearLaw, false>(c, b);
+}
+CALIB_DEM_CLONES void LinearStiffnessDamped(const CommonChain& c, ContactBlock& b) {
+  StiffnessPass<LinearLaw, true>(c, b);
+}
+
 CALIB_DEM_CLONES int Touching(const double* overlap, std::uint8_t* touching) {
   int count = 0;
   for (int k = 0; k < kBlock; ++k) {
@@ -354,6 +407,12 @@ int EvaluateCommonChain(const CommonChain& chain, ContactBlock& b, std::uint8_t*
     ClearUnused(moments, b);
   }
   return Touching(b.overlap, touching);
+}
+
+void CommonChainStiffness(const CommonChain& chain, ContactBlock& b) {
+  constexpr void (*kPasses[2][2])(const CommonChain&, ContactBlock&) = {
+      {&LinearStiffness, &LinearStiffnessDamped}, {&HertzStiffness, &HertzStiffnessDamped}};
+  kPasses[chain.hertz ? 1 : 0][chain.dashpot ? 1 : 0](chain, b);
 }
 
 }  // namespace calib::dem

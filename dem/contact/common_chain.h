@@ -28,7 +28,12 @@ std::optional<CommonChain> CommonChainOf(const Model& model, double thickness = 
 /// What ContactModel::Evaluate() and CloseBlock() do together, with the same bits: overlap, forces,
 /// torques and memory of all lanes; zero where the lane does not overlap or is not in use. Columns
 /// of memory: shear force, rolling moment, twisting moment. Sets touching (kBlock of them) and
-/// returns how many lanes overlap. Stiffnesses are not set.
+/// returns how many lanes overlap. Stiffnesses are not set: see
+/// CommonChainStiffness().
 int EvaluateCommonChain(const CommonChain& chain, ContactBlock& block, std::uint8_t* touching);
+
+/// Of what ContactModel::Evaluate() sets, with the same bits where lanes overlap: normals, overlap,
+/// all stiffnesses and dampings. Neither memory nor velocities are read.
+void CommonChainStiffness(const CommonChain& chain, ContactBlock& block);
 
 }  // namespace calib::dem

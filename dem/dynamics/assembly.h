@@ -10,10 +10,10 @@
 
 #include "absl/status/status.h"
 #include "dem/contact/contact_model.h"
-#include "dem/dynamics/grain_load.h"
 #include "dem/dynamics/leapfrog.h"
 #include "dem/dynamics/pair_blocks.h"
 #include "dem/dynamics/rigid_clumps.h"
+#include "dem/dynamics/stiffness_blocks.h"
 #include "dem/dynamics/wall_contacts.h"
 #include "dem/geometry/periodic_cell.h"
 #include "dem/neighbor/neighbor_list.h"
@@ -140,9 +140,11 @@ class Assembly {
     return touching_[static_cast<std::size_t>(slot)] != 0;
   }
 
-  /// What slot s of neighbors() does to its grain j: force and torque [N, N m].
-  [[nodiscard]] const GrainLoad& load_on_j(int slot) const {
-    return loads_[static_cast<std::size_t>(list_.place_j[static_cast<std::size_t>(slot)])];
+  /// Force of slot s of neighbors() on its grain j; zero where they do not touch [N].
+  [[nodiscard]] Vec3 force_on_j(int slot) const {
+    const BlockForces& f = forces_[static_cast<std::size_t>(slot) / kBlock];
+    const std::size_t lane = static_cast<std::size_t>(slot) % kBlock;
+    return {f.x[lane], f.y[lane], f.z[lane]};
   }
 
   /// Love-Weber stress sum_c f_a d_a / V of the last EvaluateForces, compression positive [Pa].
@@ -173,15 +175,15 @@ class Assembly {
   template <class Archive>
   void Visit(Archive& archive) {
     ParticleArrays& p = particles_;
+    packed_ = false;
     archive(cell_, p.x, p.y, p.z, p.vx, p.vy, p.vz, p.wx, p.wy, p.wz, p.fx, p.fy, p.fz, p.tx, p.ty,
             p.tz, p.radius, p.inverse_mass, p.inverse_inertia, p.id, p.body);
     archive(sliding_friction_, viscous_, gravity_, density_, thickness_, next_id_, planar_, walls_,
             stale_, loads_fit_, reach_, wall_reach_, last_dt_);
-    archive(list_.skin, list_.row, list_.first, list_.second, list_.image, list_.place_row,
-            list_.place_i, list_.place_j, order_, lanes_.first, lanes_.second, lanes_.place_i,
-            lanes_.place_j, lanes_.image, records_);
+    archive(list_.skin, list_.row, list_.first, list_.second, list_.image, order_, lanes_.first,
+            lanes_.second, lanes_.place_i, lanes_.place_j, lanes_.image, records_);
     archive(searched_[0], searched_[1], searched_[2], searched_length_, searched_tilt_, moved_,
-            skin_, largest_radius_, touching_, history_, loads_, shift_, sums_, stress_,
+            skin_, largest_radius_, touching_, history_, places_, forces_, shift_, sums_, stress_,
             shear_stress_, contacts_);
     archive(clumps_, bodies_, solid_volume_, mean_diameter_, nominal_critical_step_, steps_,
             contact_updates_);
@@ -190,8 +192,12 @@ class Assembly {
     }
   }
 
-  /// Places and drives single grains by hand; for tests and for preparing states.
-  ParticleArrays& mutable_particles() { return particles_; }
+  /// Places and drives single grains by hand; for tests and for preparing states. Asked for anew
+  /// where grains are changed between a Move and the EvaluateForces after it.
+  ParticleArrays& mutable_particles() {
+    packed_ = false;
+    return particles_;
+  }
 
  private:
   struct ChunkSums {
@@ -212,6 +218,7 @@ class Assembly {
   void LoadMaterials(int b, ContactBlock& block) const;
   void SetShifts();
   void PackAllGrains();
+  void PackChunk(int chunk);
   [[nodiscard]] bool AnyTouching(int b) const;
   /// First column of block b in the memory.
   [[nodiscard]] std::size_t ColumnsOf(std::size_t b) const {
@@ -219,11 +226,13 @@ class Assembly {
   }
   void AddSurroundings(int begin, int end);
   void Renumber(const std::vector<int>& to);
-  double MoveChunk(int chunk, const Motion& motion);
+  void MoveChunk(int chunk, const Motion& motion);
+  void FinishChunk(int chunk);
   [[nodiscard]] double LargestShift2OfChunk(int chunk) const;
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
   void TakeBranchesBetweenBodies();
+  [[nodiscard]] ChunkStiffness StiffnessOfChunk(int chunk) const;
   [[nodiscard]] absl::Status FormulasFinite() const;
   /// NominalCriticalStep() if contacts had no moment stiffness [s].
   [[nodiscard]] double NominalStepByForces() const;
@@ -260,9 +269,12 @@ class Assembly {
   PairLanes lanes_;         ///< the list, padded to whole blocks
   std::vector<std::uint8_t> touching_;  ///< per lane
   LaneMemory history_;                  ///< per block, history_size() columns of kBlock lanes
-  std::vector<GrainLoad> loads_;  ///< per place of the list, and one more; zero where not touching
-  std::vector<GrainRecord> records_;  ///< of the grains, at the last evaluation
-  ImageShift shift_[kImages] = {};    ///< translation of each image now [m]
+  LoadPlaces places_;                   ///< what contacts do to grains
+  std::vector<BlockForces> forces_;     ///< per block; zero where not touching
+  std::vector<GrainRecord> records_;    ///< of the grains, at the last evaluation or Move
+  bool packed_ = false;                 ///< records_ are those of the grains since the last Move
+  std::vector<double> shift2_;          ///< largest of each chunk of grains, see moved_ [m^2]
+  ImageShift shift_[kImages] = {};      ///< translation of each image now [m]
   std::vector<ChunkSums> sums_;
   std::array<double, 3> stress_ = {0, 0, 0};
   double shear_stress_ = 0;

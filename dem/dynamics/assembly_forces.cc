@@ -16,7 +16,10 @@ absl::Status Assembly::EvaluateForces() {
   }
   loads_fit_ = true;
   SetShifts();
-  PackAllGrains();
+  if (!packed_) {
+    PackAllGrains();
+  }
+  packed_ = false;  // who drives grains by hand may move them after this
   ForEachChunk(static_cast<int>(sums_.size()), threads_,
                [this](int chunk) { EvaluateChunk(chunk); });
   if (auto s = FormulasFinite(); !s.ok()) {
@@ -76,26 +79,16 @@ absl::Status Assembly::FormulasFinite() const {
 /// spheres less what the loads of the members do on their arms.
 void Assembly::TakeBranchesBetweenBodies() {
   const double volume = cell_.Volume();
-  const GrainLoad* const loads = loads_.data();
-  const int* const row = list_.place_row.data();
   for (const Clump& clump : clumps_.all()) {
     const int* const members = clump.members.data();
     const std::array<double, 3>* const arms = clump.arm.data();
     for (std::size_t s = 0; s < clump.members.size(); ++s) {
-      double x = 0;
-      double y = 0;
-      double z = 0;
-      const GrainLoad* const end = loads + row[members[s] + 1];
-      for (const GrainLoad* load = loads + row[members[s]]; load != end; ++load) {
-        x += load->force[0];
-        y += load->force[1];
-        z += load->force[2];
-      }
+      const Vec3 force = places_.ForceOn(members[s]);
       const std::array<double, 3>& arm = arms[s];
-      stress_[0] -= x * arm[0] / volume;
-      stress_[1] -= y * arm[1] / volume;
-      stress_[2] -= z * arm[2] / volume;
-      shear_stress_ += 0.5 * (x * arm[2] + z * arm[0]) / volume;
+      stress_[0] -= force.x * arm[0] / volume;
+      stress_[1] -= force.y * arm[1] / volume;
+      stress_[2] -= force.z * arm[2] / volume;
+      shear_stress_ += 0.5 * (force.x * arm[2] + force.z * arm[0]) / volume;
     }
   }
 }
@@ -112,11 +105,13 @@ void Assembly::SetShifts() {
 
 void Assembly::PackAllGrains() {
   records_.resize(particles_.x.size());
-  ForEachChunk(ChunkCount(particles_.size(), kGrainChunk), threads_, [this](int chunk) {
-    const int begin = chunk * kGrainChunk;
-    PackGrains(particles_, begin, std::min(begin + kGrainChunk, particles_.size()),
-               records_.data());
-  });
+  ForEachChunk(ChunkCount(particles_.size(), kGrainChunk), threads_,
+               [this](int chunk) { PackChunk(chunk); });
+}
+
+void Assembly::PackChunk(int chunk) {
+  const int begin = chunk * kGrainChunk;
+  PackGrains(particles_, begin, std::min(begin + kGrainChunk, particles_.size()), records_.data());
 }
 
 bool Assembly::AnyTouching(int b) const {
@@ -154,6 +149,7 @@ void Assembly::EvaluateChunk(int chunk) {
   ContactBlock block;
   PrepareBlock(block);
   ChunkSums sums;
+  GrainLoad* const loads = places_.Clear(chunk);
   const int end = std::min((chunk + 1) * kBlocks, lanes_.blocks());
   for (int b = chunk * kBlocks; b < end; ++b) {
     if (!LoadBranches(lanes_, b, records_.data(), shift_, block) && !AnyTouching(b)) {
@@ -173,7 +169,7 @@ void Assembly::EvaluateChunk(int chunk) {
       model_.Evaluate(block);
       sums.contacts += CloseBlock(block.count, reach_, model_.history_size(), block, touching);
     }
-    StoreLoads(lanes_, b, block, loads_.data(), sums.lanes);
+    AddLoads(lanes_, b, block, loads, forces_[static_cast<std::size_t>(b)], sums.lanes);
   }
   sums_[static_cast<std::size_t>(chunk)] = sums;
 }

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "absl/strings/str_cat.h"
 #include "dem/dynamics/assembly.h"
+#include "dem/dynamics/chunks.h"
 
 namespace calib::dem {
 namespace {
@@ -15,6 +17,18 @@ namespace {
 /// w = sqrt(K/m) [1/s], damping c/m [1/s]
 double DampedRate(double w, double damping) {
   return damping > 0 ? damping + std::sqrt(damping * damping + w * w) : w;
+}
+
+/// Translation and rotation of a chunk's places to those of its grains.
+void AddRows(std::span<const int> grains, const std::vector<GrainLoad>& rows,
+             std::vector<std::array<double, 6>>& to) {
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    std::array<double, 6>& sum = to[static_cast<std::size_t>(grains[k])];
+    for (std::size_t a = 0; a < 3; ++a) {
+      sum[a] += rows[k].force[a];
+      sum[a + 3] += rows[k].torque[a];
+    }
+  }
 }
 
 /// Where new contacts are judged, in radii.
@@ -79,6 +93,37 @@ double Assembly::CriticalStepAt(double overlap) const { return LeastNominalStep(
 
 double Assembly::NominalStepByForces() const { return LeastNominalStep(kNominalOverlap, false); }
 
+/// What pair chunk `chunk` adds to the estimate.
+ChunkStiffness Assembly::StiffnessOfChunk(int chunk) const {
+  constexpr int kBlocks = kPairChunk / kBlock;
+  ChunkStiffness stiffness;
+  ContactBlock b;
+  b.viscous = viscous_ ? 1.0 : 0.0;
+  const auto width = static_cast<std::size_t>(model_.history_size());
+  const int places = static_cast<int>(places_.GrainsOf(chunk).size());
+  const int end = std::min((chunk + 1) * kBlocks, lanes_.blocks());
+  for (int block = chunk * kBlocks; block < end; ++block) {
+    if (!AnyTouching(block)) {
+      continue;
+    }
+    LoadBranches(lanes_, block, records_.data(), shift_, b);
+    LoadGrains(lanes_, block, records_.data(), b);
+    if (model_.common()) {
+      CommonChainStiffness(*model_.common(), b);
+    } else {
+      for (std::size_t c = 0; c < width; ++c) {  // copies: evaluating must not move the memory on
+        const double* const column = history_[ColumnsOf(static_cast<std::size_t>(block)) + c].lane;
+        std::copy_n(column, kBlock, b.history[c]);
+      }
+      LoadMaterials(block, b);
+      model_.Evaluate(b);
+    }
+    AddStiffness(lanes_, block, b, touching_.data() + static_cast<std::ptrdiff_t>(block) * kBlock,
+                 places, stiffness);
+  }
+  return stiffness;
+}
+
 absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
   const ParticleArrays& p = particles_;
   const auto n = p.x.size();
@@ -89,75 +134,39 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
   double twisting = 0;
   std::array<double, 3> modulus = {0, 0, 0};
   std::array<double, 3> viscosity = {0, 0, 0};
-  ContactBlock b;
-  b.viscous = viscous_ ? 1.0 : 0.0;
   absl::Status status;
-  const auto add_damping = [&](int k, std::size_t i, std::size_t j) {
-    if (!(b.normal_damping[k] + b.tangential_damping[k] > 0)) {
-      return;
+  std::vector<ChunkStiffness> chunks(sums_.size());
+  ForEachChunk(static_cast<int>(chunks.size()), threads_, [&](int chunk) {
+    chunks[static_cast<std::size_t>(chunk)] = StiffnessOfChunk(chunk);
+  });
+  for (std::size_t c = 0; c < chunks.size(); ++c) {
+    const ChunkStiffness& chunk = chunks[c];
+    if (chunk.too_deep >= 0 && status.ok()) {
+      const auto slot = static_cast<std::size_t>(chunk.too_deep);
+      status = absl::OutOfRangeError(
+          absl::StrCat("grains ", p.id[static_cast<std::size_t>(list_.first[slot])], " and ",
+                       p.id[static_cast<std::size_t>(list_.second[slot])], " overlap by ",
+                       chunk.deepest_there, " m, more than half the smaller radius"));
     }
-    damping.resize(n, {0, 0, 0, 0, 0, 0});
-    const double n2[3] = {b.nx[k] * b.nx[k], b.ny[k] * b.ny[k], b.nz[k] * b.nz[k]};
-    const double d[3] = {b.dx[k], b.dy[k], b.dz[k]};
-    for (std::size_t a = 0; a < 3; ++a) {
-      const double across = b.tangential_damping[k] * (1.0 - n2[a]);
-      const double translation = b.normal_damping[k] * n2[a] + across;
-      viscosity[a] += translation * d[a] * d[a];
-      damping[i][a] += translation;
-      damping[j][a] += translation;
-      damping[i][a + 3] += across * b.radius_i[k] * b.radius_i[k];
-      damping[j][a + 3] += across * b.radius_j[k] * b.radius_j[k];
+    const std::span<const int> grains = places_.GrainsOf(static_cast<int>(c));
+    AddRows(grains, chunk.spring, stiffness);
+    if (!chunk.dashpot.empty()) {
+      damping.resize(n, {0, 0, 0, 0, 0, 0});
+      AddRows(grains, chunk.dashpot, damping);
     }
-  };
-  const auto width = static_cast<std::size_t>(model_.history_size());
-  for (int block = 0; block < lanes_.blocks(); ++block) {
-    if (!AnyTouching(block)) {
-      continue;
-    }
-    LoadBranches(lanes_, block, records_.data(), shift_, b);
-    LoadGrains(lanes_, block, records_.data(), b);
-    for (std::size_t c = 0; c < width; ++c) {  // copies: evaluating must not move the memory on
-      const double* const column = history_[ColumnsOf(static_cast<std::size_t>(block)) + c].lane;
-      std::copy_n(column, kBlock, b.history[c]);
-    }
-    LoadMaterials(block, b);
-    model_.Evaluate(b);
-    for (int k = 0; k < kBlock; ++k) {
-      const auto slot = static_cast<std::size_t>(block) * kBlock + static_cast<std::size_t>(k);
-      if (touching_[slot] == 0) {
-        continue;
-      }
-      const auto i = static_cast<std::size_t>(list_.first[slot]);
-      const auto j = static_cast<std::size_t>(list_.second[slot]);
-      if (!(b.overlap[k] <= 0.5 * std::min(b.radius_i[k], b.radius_j[k])) && status.ok()) {
-        status = absl::OutOfRangeError(absl::StrCat("grains ", p.id[i], " and ", p.id[j],
-                                                    " overlap by ", b.overlap[k],
-                                                    " m, more than half the smaller radius"));
-      }
-      add_damping(k, i, j);
-      if (b.rolling_stiffness[k] + b.twisting_stiffness[k] > 0) {
-        moments.resize(n, {0, 0, 0});
-        rolling += b.rolling_stiffness[k];
-        twisting += b.twisting_stiffness[k];
-      }
-      const double kn = b.normal_stiffness[k];
-      const double ks = b.tangential_stiffness[k];
-      const double n2[3] = {b.nx[k] * b.nx[k], b.ny[k] * b.ny[k], b.nz[k] * b.nz[k]};
-      const double d[3] = {b.dx[k], b.dy[k], b.dz[k]};
-      for (std::size_t a = 0; a < 3; ++a) {
-        const double across = 1.0 - n2[a];
-        const double translation = kn * n2[a] + ks * across;
-        const double moment = b.rolling_stiffness[k] * across + b.twisting_stiffness[k] * n2[a];
-        stiffness[i][a] += translation;
-        stiffness[j][a] += translation;
-        stiffness[i][a + 3] += ks * across * b.radius_i[k] * b.radius_i[k] + moment;
-        stiffness[j][a + 3] += ks * across * b.radius_j[k] * b.radius_j[k] + moment;
-        if (moment > 0) {
-          moments[i][a] += moment;
-          moments[j][a] += moment;
+    if (!chunk.moment.empty()) {
+      moments.resize(n, {0, 0, 0});
+      for (std::size_t k = 0; k < grains.size(); ++k) {
+        for (std::size_t a = 0; a < 3; ++a) {
+          moments[static_cast<std::size_t>(grains[k])][a] += chunk.moment[k].torque[a];
         }
-        modulus[a] += translation * d[a] * d[a];
       }
+    }
+    rolling += chunk.rolling;
+    twisting += chunk.twisting;
+    for (std::size_t a = 0; a < 3; ++a) {
+      modulus[a] += chunk.modulus[a];
+      viscosity[a] += chunk.viscosity[a];
     }
   }
   walls_.VisitBlocks(p, model_, viscous_, [&](const ContactBlock& w, const int* grains) {
@@ -267,8 +276,8 @@ double Assembly::UnbalancedForce() const {
   std::int64_t contacts = 0;
   for (std::size_t s = 0; s < touching_.size(); ++s) {
     if (touching_[s] != 0) {
-      const double* f = load_on_j(static_cast<int>(s)).force;
-      contact += std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+      const Vec3 f = force_on_j(static_cast<int>(s));
+      contact += std::sqrt(f.x * f.x + f.y * f.y + f.z * f.z);
       ++contacts;
     }
   }

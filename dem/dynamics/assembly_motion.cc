@@ -74,14 +74,18 @@ void Assembly::AddSurroundings(int begin, int end) {
   }
 }
 
-double Assembly::MoveChunk(int chunk, const Motion& motion) {
+void Assembly::MoveChunk(int chunk, const Motion& motion) {
   const auto begin = static_cast<std::size_t>(chunk) * kGrainChunk;
   const auto end = std::min(begin + kGrainChunk, particles_.x.size());
-  GatherPlaces(list_.place_row.data(), loads_.data(), static_cast<int>(begin),
-               static_cast<int>(end), particles_);
+  places_.Gather(static_cast<int>(begin), static_cast<int>(end), particles_);
   AddSurroundings(static_cast<int>(begin), static_cast<int>(end));
   AdvanceGrains(motion, static_cast<int>(begin), static_cast<int>(end), particles_);
-  return LargestShift2OfChunk(chunk);
+}
+
+/// What the next evaluation needs of grains at their new places, while caches still hold them.
+void Assembly::FinishChunk(int chunk) {
+  PackChunk(chunk);
+  shift2_[static_cast<std::size_t>(chunk)] = LargestShift2OfChunk(chunk);
 }
 
 double Assembly::LargestShift2OfChunk(int chunk) const {
@@ -105,18 +109,20 @@ void Assembly::Move(const Motion& motion) {
   }
   last_dt_ = motion.dt;
   const int chunks = ChunkCount(particles_.size(), kGrainChunk);
-  std::vector<double> moved2(static_cast<std::size_t>(chunks), 0.0);
+  shift2_.resize(static_cast<std::size_t>(chunks));
   ForEachChunk(chunks, threads_, [&](int chunk) {
-    moved2[static_cast<std::size_t>(chunk)] = MoveChunk(chunk, motion);
+    MoveChunk(chunk, motion);
+    if (clumps_.empty()) {
+      FinishChunk(chunk);
+    }
   });
   if (!clumps_.empty()) {  // takes its members back from where they went alone
     clumps_.Advance(motion, gravity_, cell_, threads_, particles_);
-    ForEachChunk(chunks, threads_, [&](int chunk) {
-      moved2[static_cast<std::size_t>(chunk)] = LargestShift2OfChunk(chunk);
-    });
+    ForEachChunk(chunks, threads_, [&](int chunk) { FinishChunk(chunk); });
   }
+  packed_ = true;
   double largest = 0;
-  for (const double m : moved2) {
+  for (const double m : shift2_) {
     largest = m <= largest ? largest : m;
   }
   moved_ = std::sqrt(largest);

@@ -1,5 +1,6 @@
 // When the list of neighbours may miss a pair, and carrying what contacts remember to a new one.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -7,6 +8,13 @@
 #include "dem/dynamics/chunks.h"
 
 namespace calib::dem {
+namespace {
+
+/// Neighbouring lanes come from so many parts of a group, so that pairs of one grain lie apart:
+/// each adds to what the one before it has left at the grain's place, and would wait for it.
+constexpr std::size_t kParts = 8;
+
+}  // namespace
 
 bool Assembly::ListMayMissPairs() const {
   double shrink = 0;
@@ -45,12 +53,14 @@ absl::Status Assembly::SearchNeighbors() {
   searched_tilt_ = cell_.Tilt();
   moved_ = 0;
   stale_ = false;
+  packed_ = false;  // grains were wrapped, have joined or left
   if (!walls_.empty()) {
     walls_.Search(particles_, skin_ + (wall_reach_ - reach_));
   }
   ArrangeLanes();
   CarryMemory();
-  loads_.assign(2 * static_cast<std::size_t>(list_.size()) + 1, GrainLoad{});
+  places_.Assign(particles_.size(), lanes_);
+  forces_.assign(static_cast<std::size_t>(lanes_.blocks()), BlockForces{});
   sums_.assign(static_cast<std::size_t>(ChunkCount(list_.size(), kPairChunk)), {});
   if (rests) {
     searching_ = {};
@@ -81,30 +91,34 @@ void Assembly::ArrangeLanes() {
   }
   order_.resize(slots);
   int slot = 0;
+  std::array<std::size_t, kPairChunk> members{};
   for (std::size_t begin = 0; begin < slots; begin += kPairChunk) {
     const std::size_t end = std::min(begin + kPairChunk, slots);
     for (int wanted = 0; wanted < 3; ++wanted) {
+      std::size_t count = 0;
       for (std::size_t s = begin; s < end; ++s) {
         if (group[s] == wanted) {
-          order_[s] = slot++;
+          members[count++] = s;
+        }
+      }
+      const std::size_t part = (count + kParts - 1) / kParts;
+      for (std::size_t r = 0; r < part; ++r) {
+        for (std::size_t t = r; t < count; t += part) {
+          order_[members[t]] = slot++;
         }
       }
     }
   }
   list_.skin = sorted.skin;
   list_.row = sorted.row;
-  list_.place_row = sorted.place_row;
-  for (auto* values : {&list_.first, &list_.second, &list_.place_i, &list_.place_j}) {
-    values->resize(slots);
-  }
+  list_.first.resize(slots);
+  list_.second.resize(slots);
   list_.image.resize(slots);
   for (std::size_t s = 0; s < slots; ++s) {
     const auto to = static_cast<std::size_t>(order_[s]);
     list_.first[to] = sorted.first[s];
     list_.second[to] = sorted.second[s];
     list_.image[to] = sorted.image[s];
-    list_.place_i[to] = sorted.place_i[s];
-    list_.place_j[to] = sorted.place_j[s];
   }
   const std::size_t lanes = (slots + kBlock - 1) / kBlock * kBlock;
   const std::size_t last = slots == 0 ? 0 : (slots - 1) / kBlock * kBlock;  // begin of last block
@@ -116,11 +130,8 @@ void Assembly::ArrangeLanes() {
     lanes_ = {};
     return;
   }
-  const auto nowhere = static_cast<int>(2 * slots);
   pad(list_.first, list_.first[last], lanes_.first);
   pad(list_.second, list_.second[last], lanes_.second);
-  pad(list_.place_i, nowhere, lanes_.place_i);
-  pad(list_.place_j, nowhere, lanes_.place_j);
   pad(list_.image, list_.image[last], lanes_.image);
 }
 

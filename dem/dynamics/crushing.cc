@@ -78,8 +78,8 @@ int Crushing::Crush(Assembly& assembly) {
     if (!assembly.touching(s)) {
       continue;
     }
-    const double* f = assembly.load_on_j(s).force;
-    const double force2 = f[0] * f[0] + f[1] * f[1] + f[2] * f[2];
+    const Vec3 f = assembly.force_on_j(s);
+    const double force2 = f.x * f.x + f.y * f.y + f.z * f.z;
     const auto slot = static_cast<std::size_t>(s);
     for (const int g : {list.first[slot], list.second[slot]}) {
       double& largest = largest2[static_cast<std::size_t>(g)];

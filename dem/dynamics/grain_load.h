@@ -2,7 +2,7 @@
 
 namespace calib::dem {
 
-/// What one contact does to one of its grains. The last element of either is zero: a load is two
+/// What contacts do to one of their grains. The last element of either is zero: a load is two
 /// vector registers.
 struct alignas(64) GrainLoad {
   double force[4];   ///< [N]

@@ -1,7 +1,12 @@
 #include "dem/dynamics/pair_blocks.h"
 
+#include <algorithm>
+#include <cassert>
+#include <cstring>
+
 #include "dem/contact/quad.h"
 #include "dem/contact/simd.h"
+#include "dem/dynamics/chunks.h"
 
 namespace calib::dem {
 namespace {
@@ -142,13 +147,36 @@ CALIB_DEM_CLONES int Decide(int count, double reach, const ContactBlock& b, std:
   return overlaps;
 }
 
-CALIB_DEM_CLONES void AddStress(const ContactBlock& b, LaneSums& sums) {
+struct LanePlaces {
+  const std::uint16_t* i;
+  const std::uint16_t* j;
+};
+
+CALIB_DEM_INLINE void AddQuad(const Quad& what, double* to) {
+  Quad sum;
+  LoadQuad(to, sum);
+  sum += what;
+  StoreQuad(sum, to);
+}
+
+/// Three quantities of four lanes, contact by contact: row[l] = {x[l], y[l], z[l], 0}.
+CALIB_DEM_INLINE void Rows(const double* x, const double* y, const double* z, Quad (&row)[4]) {
+  LoadQuad(x, row[0]);
+  LoadQuad(y, row[1]);
+  LoadQuad(z, row[2]);
+  row[3] = Quad{0, 0, 0, 0};
+  Transpose(row);
+}
+
+CALIB_DEM_CLONES void Add(const LanePlaces place, const ContactBlock& b, GrainLoad* loads,
+                          BlockForces& forces, LaneSums& sums) {
+  const Quad zero = {0, 0, 0, 0};
   Quad sum[4];
   for (int a = 0; a < 4; ++a) {
     LoadQuad(sums.at[a], sum[a]);
   }
   for (int k = 0; k < kBlock; k += kQuad) {
-    Quad f[3];
+    Quad f[4];
     Quad d[3];
     LoadQuad(b.force_x + k, f[0]);
     LoadQuad(b.force_y + k, f[1]);
@@ -160,31 +188,11 @@ CALIB_DEM_CLONES void AddStress(const ContactBlock& b, LaneSums& sums) {
     sum[1] += f[1] * d[1];
     sum[2] += f[2] * d[2];
     sum[3] += f[0] * d[2] + f[2] * d[0];
-  }
-  for (int a = 0; a < 4; ++a) {
-    StoreQuad(sum[a], sums.at[a]);
-  }
-}
-
-struct LanePlaces {
-  const int* i;
-  const int* j;
-};
-
-/// Three quantities of four lanes, contact by contact: row[l] = {x[l], y[l], z[l], 0}.
-CALIB_DEM_INLINE void Rows(const double* x, const double* y, const double* z, Quad (&row)[4]) {
-  LoadQuad(x, row[0]);
-  LoadQuad(y, row[1]);
-  LoadQuad(z, row[2]);
-  row[3] = Quad{0, 0, 0, 0};
-  Transpose(row);
-}
-
-CALIB_DEM_CLONES void Leave(const LanePlaces place, const ContactBlock& b, GrainLoad* loads) {
-  const Quad zero = {0, 0, 0, 0};
-  for (int k = 0; k < kBlock; k += kQuad) {
-    Quad f[4];
-    Rows(b.force_x + k, b.force_y + k, b.force_z + k, f);
+    StoreQuad(f[0], forces.x + k);
+    StoreQuad(f[1], forces.y + k);
+    StoreQuad(f[2], forces.z + k);
+    f[3] = zero;
+    Transpose(f);
     Quad ti[4];
     Rows(b.torque_ix + k, b.torque_iy + k, b.torque_iz + k, ti);
     Quad tj[4];
@@ -192,11 +200,14 @@ CALIB_DEM_CLONES void Leave(const LanePlaces place, const ContactBlock& b, Grain
     for (int l = 0; l < kQuad; ++l) {
       GrainLoad& on_i = loads[place.i[k + l]];
       GrainLoad& on_j = loads[place.j[k + l]];
-      StoreQuad(zero - f[l], on_i.force);
-      StoreQuad(ti[l], on_i.torque);
-      StoreQuad(f[l], on_j.force);
-      StoreQuad(tj[l], on_j.torque);
+      AddQuad(zero - f[l], on_i.force);
+      AddQuad(ti[l], on_i.torque);
+      AddQuad(f[l], on_j.force);
+      AddQuad(tj[l], on_j.torque);
     }
+  }
+  for (int a = 0; a < 4; ++a) {
+    StoreQuad(sum[a], sums.at[a]);
   }
 }
 
@@ -204,47 +215,43 @@ struct Sums {
   Three<double*> force, torque;
 };
 
-CALIB_DEM_INLINE void SumRow(const GrainLoad* load, const GrainLoad* end, Quad& force,
-                             Quad& torque) {
-  force = torque = Quad{0, 0, 0, 0};
-  for (; load != end; ++load) {
-    Quad f;
-    Quad t;
-    LoadQuad(load->force, f);
-    LoadQuad(load->torque, t);
-    force += f;
-    torque += t;
-  }
-}
-
-CALIB_DEM_CLONES void Gather(const int* place_row, const GrainLoad* loads, int begin, int end,
-                             const Sums& to) {
-  int g = begin;
-  for (; g + kQuad <= end; g += kQuad) {
-    Quad f[4];
-    Quad t[4];
-    for (int l = 0; l < kQuad; ++l) {
-      SumRow(loads + place_row[g + l], loads + place_row[g + l + 1], f[l], t[l]);
+/// Grains come four at a time, as many places for each as the one with most of them has: how many
+/// there are is then seldom guessed wrong. row: of fours.
+CALIB_DEM_CLONES void GatherFours(const int* row, const int* place, const GrainLoad* loads,
+                                  int begin, int end, const Sums& to) {
+  for (int g = begin; g < end; g += kQuad) {
+    Quad f[4] = {};
+    Quad t[4] = {};
+    const int* const last = place + row[g / kQuad + 1];
+    for (const int* at = place + row[g / kQuad]; at != last; at += kQuad) {
+      for (int l = 0; l < kQuad; ++l) {
+        Quad force;
+        Quad torque;
+        LoadQuad(loads[at[l]].force, force);
+        LoadQuad(loads[at[l]].torque, torque);
+        f[l] += force;
+        t[l] += torque;
+      }
     }
     Transpose(f);
     Transpose(t);
-    StoreQuad(f[0], to.force.x + g);
-    StoreQuad(f[1], to.force.y + g);
-    StoreQuad(f[2], to.force.z + g);
-    StoreQuad(t[0], to.torque.x + g);
-    StoreQuad(t[1], to.torque.y + g);
-    StoreQuad(t[2], to.torque.z + g);
-  }
-  for (; g < end; ++g) {
-    Quad f;
-    Quad t;
-    SumRow(loads + place_row[g], loads + place_row[g + 1], f, t);
-    to.force.x[g] = f[0];
-    to.force.y[g] = f[1];
-    to.force.z[g] = f[2];
-    to.torque.x[g] = t[0];
-    to.torque.y[g] = t[1];
-    to.torque.z[g] = t[2];
+    if (g + kQuad <= end) {
+      StoreQuad(f[0], to.force.x + g);
+      StoreQuad(f[1], to.force.y + g);
+      StoreQuad(f[2], to.force.z + g);
+      StoreQuad(t[0], to.torque.x + g);
+      StoreQuad(t[1], to.torque.y + g);
+      StoreQuad(t[2], to.torque.z + g);
+    } else {
+      for (int l = 0; g + l < end; ++l) {
+        to.force.x[g + l] = f[0][l];
+        to.force.y[g + l] = f[1][l];
+        to.force.z[g + l] = f[2][l];
+        to.torque.x[g + l] = t[0][l];
+        to.torque.y[g + l] = t[1][l];
+        to.torque.z[g + l] = t[2][l];
+      }
+    }
   }
 }
 
@@ -288,18 +295,84 @@ int CloseBlock(int count, double reach, int width, ContactBlock& b, std::uint8_t
   return overlaps;
 }
 
-void StoreLoads(const PairLanes& lanes, int b, const ContactBlock& block, GrainLoad* loads,
-                LaneSums& sums) {
+void AddLoads(const PairLanes& lanes, int b, const ContactBlock& block, GrainLoad* loads,
+              BlockForces& forces, LaneSums& sums) {
   const auto begin = static_cast<std::ptrdiff_t>(b) * kBlock;
-  AddStress(block, sums);
-  Leave({lanes.place_i.data() + begin, lanes.place_j.data() + begin}, block, loads);
+  Add({lanes.place_i.data() + begin, lanes.place_j.data() + begin}, block, loads, forces, sums);
 }
 
-void GatherPlaces(const int* place_row, const GrainLoad* loads, int begin, int end,
-                  ParticleArrays& p) {
-  Gather(place_row, loads, begin, end,
-         {.force = {p.fx.data(), p.fy.data(), p.fz.data()},
-          .torque = {p.tx.data(), p.ty.data(), p.tz.data()}});
+void LoadPlaces::Assign(int grains, PairLanes& lanes) {
+  const std::size_t slots = lanes.first.size();
+  lanes.place_i.resize(slots);
+  lanes.place_j.resize(slots);
+  met_.assign(static_cast<std::size_t>(grains), {.chunk = -1, .place = 0, .count = 0});
+  grain_of_.clear();
+  chunk_row_.assign(1, 0);
+  for (std::size_t begin = 0; begin < slots; begin += kPairChunk) {
+    const std::size_t end = std::min(begin + kPairChunk, slots);
+    const int chunk = static_cast<int>(begin / kPairChunk);
+    const auto first_place = static_cast<int>(grain_of_.size());
+    // Grains i of a chunk are neighbours in memory, and so their places become.
+    for (const auto& [of, to] :
+         {std::pair(&lanes.first, &lanes.place_i), std::pair(&lanes.second, &lanes.place_j)}) {
+      for (std::size_t s = begin; s < end; ++s) {
+        const int grain = (*of)[s];
+        Met& met = met_[static_cast<std::size_t>(grain)];
+        if (met.chunk != chunk) {
+          met.chunk = chunk;
+          met.place = static_cast<int>(grain_of_.size()) - first_place;
+          ++met.count;
+          grain_of_.push_back(grain);
+        }
+        (*to)[s] = static_cast<std::uint16_t>(met.place);
+      }
+    }
+    chunk_row_.push_back(static_cast<int>(grain_of_.size()));
+  }
+  const std::size_t fours = (met_.size() + kQuad - 1) / kQuad;
+  row_.assign(1, 0);
+  for (std::size_t q = 0; q < fours; ++q) {
+    int most = 0;
+    for (std::size_t g = kQuad * q; g < std::min(kQuad * (q + 1), met_.size()); ++g) {
+      most = std::max(most, met_[g].count);
+      met_[g].place = row_.back() + static_cast<int>(g % kQuad);
+    }
+    row_.push_back(row_.back() + kQuad * most);
+  }
+  const auto nothing = static_cast<int>(grain_of_.size());
+  place_.assign(static_cast<std::size_t>(row_.back()), nothing);
+  for (int place = 0; place < nothing; ++place) {
+    int& next = met_[static_cast<std::size_t>(grain_of_[static_cast<std::size_t>(place)])].place;
+    place_[static_cast<std::size_t>(next)] = place;
+    next += kQuad;
+  }
+  load_.assign(grain_of_.size() + 1, GrainLoad{});
+}
+
+GrainLoad* LoadPlaces::Clear(int chunk) {
+  const auto c = static_cast<std::size_t>(chunk);
+  GrainLoad* const begin = load_.data() + chunk_row_[c];
+  std::memset(static_cast<void*>(begin), 0,
+              sizeof(GrainLoad) * static_cast<std::size_t>(chunk_row_[c + 1] - chunk_row_[c]));
+  return begin;
+}
+
+void LoadPlaces::Gather(int begin, int end, ParticleArrays& p) const {
+  assert(begin % kQuad == 0);
+  GatherFours(row_.data(), place_.data(), load_.data(), begin, end,
+              {.force = {p.fx.data(), p.fy.data(), p.fz.data()},
+               .torque = {p.tx.data(), p.ty.data(), p.tz.data()}});
+}
+
+Vec3 LoadPlaces::ForceOn(int grain) const {
+  Vec3 sum;
+  const auto four = static_cast<std::size_t>(grain / kQuad);
+  for (int k = row_[four] + grain % kQuad; k < row_[four + 1]; k += kQuad) {
+    const double* const f =
+        load_[static_cast<std::size_t>(place_[static_cast<std::size_t>(k)])].force;
+    sum = {sum.x + f[0], sum.y + f[1], sum.z + f[2]};
+  }
+  return sum;
 }
 
 }  // namespace calib::dem

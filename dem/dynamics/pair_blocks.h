@@ -4,10 +4,12 @@
 // memory stays in place as long as the list holds.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "dem/contact/contact_block.h"
 #include "dem/dynamics/grain_load.h"
+#include "dem/geometry/vector3.h"
 #include "dem/particles/particle_arrays.h"
 
 namespace calib::dem {
@@ -23,13 +25,62 @@ struct alignas(32) GrainRecord {
 void PackGrains(const ParticleArrays& particles, int begin, int end, GrainRecord* records);
 
 /// Listed pairs, lane by lane; padded to whole blocks with copies of the first pair of the last
-/// block, whose loads go to a place that nobody reads.
+/// block, which never act.
 struct PairLanes {
-  std::vector<int> first, second;     ///< grains i and j
-  std::vector<int> place_i, place_j;  ///< where loads go
-  std::vector<std::uint8_t> image;    ///< ImageCode of the cell that j is seen in
+  std::vector<int> first, second;               ///< grains i and j
+  std::vector<std::uint16_t> place_i, place_j;  ///< theirs among the places of the chunk
+  std::vector<std::uint8_t> image;              ///< ImageCode of the cell that j is seen in
 
   [[nodiscard]] int blocks() const { return static_cast<int>(first.size()) / kBlock; }
+};
+
+/// Where pairs leave what they do to grains. Every chunk of kPairChunk pairs has one place for each
+/// grain that it touches, side by side, so that loads are added up in the first-level cache; a
+/// grain then gathers its few places.
+class LoadPlaces {
+ public:
+  /// Sets places and those of the lanes for `grains` grains; all loads are zero.
+  void Assign(int grains, PairLanes& lanes);
+
+  /// Loads of the chunk at its places, all zero.
+  GrainLoad* Clear(int chunk);
+
+  /// Sums the loads of grains [begin, end) over their places, in ascending order of chunks, into
+  /// fx .. tz. Precondition: begin is a multiple of four.
+  void Gather(int begin, int end, ParticleArrays& particles) const;
+
+  /// Grains of the places of a chunk.
+  [[nodiscard]] std::span<const int> GrainsOf(int chunk) const {
+    const auto c = static_cast<std::size_t>(chunk);
+    return {grain_of_.data() + chunk_row_[c], grain_of_.data() + chunk_row_[c + 1]};
+  }
+
+  /// The sum of forces of one grain, in the same order [N].
+  [[nodiscard]] Vec3 ForceOn(int grain) const;
+
+  template <class Archive>
+  void Visit(Archive& archive) {
+    archive(chunk_row_, grain_of_, row_, place_, load_);
+  }
+
+ private:
+  std::vector<int> chunk_row_;  ///< CSR over chunks: their places
+  std::vector<int> grain_of_;   ///< of each place
+  std::vector<int> row_;        ///< CSR over fours of grains: what place_ has of them
+  std::vector<int> place_;      ///< of four grains in turn, those that have fewer with the last one
+  std::vector<GrainLoad> load_;  ///< of all places, and one more that stays zero
+
+  /// Of a grain, while places are assigned: the last chunk that met it, its place there, and how
+  /// many have.
+  struct Met {
+    int chunk, place, count;
+  };
+  std::vector<Met> met_;
+};
+
+/// Forces on grains j of a block [N].
+struct alignas(64) BlockForces {
+  double x[kBlock], y[kBlock], z[kBlock];
 };
 
 /// Columns of lanes that contacts remember, aligned as blocks are.
@@ -60,12 +111,9 @@ struct alignas(32) LaneSums {
 /// columns) of those that do not become zero.
 int CloseBlock(int count, double reach, int width, ContactBlock& block, std::uint8_t* touching);
 
-/// Leaves the loads of all lanes at their places and adds to the sums.
-void StoreLoads(const PairLanes& lanes, int b, const ContactBlock& block, GrainLoad* loads,
-                LaneSums& sums);
-
-/// Sums the loads at the places of grains [begin, end), in ascending order, into fx .. tz.
-void GatherPlaces(const int* place_row, const GrainLoad* loads, int begin, int end,
-                  ParticleArrays& particles);
+/// Adds the loads of all lanes to those at their places, which begin at `loads`, keeps the forces
+/// and adds to the sums.
+void AddLoads(const PairLanes& lanes, int b, const ContactBlock& block, GrainLoad* loads,
+              BlockForces& forces, LaneSums& sums);
 
 }  // namespace calib::dem

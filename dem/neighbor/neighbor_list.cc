@@ -46,26 +46,6 @@ constexpr std::uint64_t kImageMask = (std::uint64_t{1} << kImageBits) - 1;
 
 }  // namespace
 
-/// Slots come sorted by (i, j), so that one pass in slot order meets, for a grain q, first the
-/// pairs (i, q) with i < q, then (q, j): its row of places fills in ascending order of neighbours.
-void NeighborSearch::AssignPlaces(int grains, NeighborList& list) {
-  list.place_row.assign(static_cast<std::size_t>(grains) + 1, 0);
-  for (std::size_t s = 0; s < list.second.size(); ++s) {
-    ++list.place_row[static_cast<std::size_t>(list.first[s]) + 1];
-    ++list.place_row[static_cast<std::size_t>(list.second[s]) + 1];
-  }
-  for (std::size_t i = 1; i < list.place_row.size(); ++i) {
-    list.place_row[i] += list.place_row[i - 1];
-  }
-  next_.assign(list.place_row.begin(), list.place_row.end() - 1);
-  list.place_i.resize(list.second.size());
-  list.place_j.resize(list.second.size());
-  for (std::size_t s = 0; s < list.second.size(); ++s) {
-    list.place_i[s] = next_[static_cast<std::size_t>(list.first[s])]++;
-    list.place_j[s] = next_[static_cast<std::size_t>(list.second[s])]++;
-  }
-}
-
 /// Appends those grains of a run that are listed with `self`: written always, counted where near,
 /// since which they are cannot be foreseen.
 NeighborSearch::Neighbor* NeighborSearch::KeepNear(const GridGrain& self, double skin,
@@ -152,7 +132,6 @@ absl::Status NeighborSearch::Build(const PeriodicCell& cell, double skin, Partic
     }
     list.row.push_back(list.size());
   }
-  AssignPlaces(p.size(), list);
   return absl::OkStatus();
 }
 

@@ -19,11 +19,6 @@ struct NeighborList {
   std::vector<int> row;             ///< CSR: slots of grain i are row[i] .. row[i+1]-1; size N+1
   std::vector<int> first, second;   ///< grains i and j of a slot
   std::vector<std::uint8_t> image;  ///< ImageCode of the cell that j is seen in
-  /// Every grain has a row of places, one per listed neighbour in ascending order, where the pairs
-  /// leave what they do to it: pair s writes to place_i[s] in the row of its i and to place_j[s] in
-  /// the row of its j; 2 size() places in all.
-  std::vector<int> place_row;  ///< CSR over grains, size N+1
-  std::vector<int> place_i, place_j;
 
   [[nodiscard]] int size() const { return static_cast<int>(second.size()); }
 };
@@ -50,13 +45,11 @@ class NeighborSearch {
 
   static Neighbor* KeepNear(const GridGrain& self, double skin, const double (&shift)[3], int code,
                             std::span<const GridGrain> run, Neighbor* end);
-  void AssignPlaces(int grains, NeighborList& list);
 
   CellGrid grid_;
   std::vector<GridGrain> grains_;
   std::vector<GridRun> around_;
   std::vector<Neighbor> found_;
-  std::vector<int> next_;
 };
 
 }  // namespace calib::dem

@@ -116,8 +116,7 @@ VtkPiece ContactsOf(const Assembly& assembly) {
     const Vec3 branch = Branch(assembly, Index(s));
     piece.points.push_back(from);
     piece.points.push_back(from + branch);
-    const double* const f = assembly.load_on_j(s).force;
-    const Vec3 force{f[0], f[1], f[2]};
+    const Vec3 force = assembly.force_on_j(s);
     const Vec3 n = (1.0 / Length(branch)) * branch;
     normal.push_back(Dot(force, n));
     tangential.push_back(Length(force - normal.back() * n));

@@ -123,9 +123,9 @@ absl::StatusOr<TrainedEmulator> TrainEmulator(const Runs& runs, const DataSet& d
   const Index n = runs.inputs.rows();
   const Index d = runs.inputs.cols();
   if (n < std::max<Index>(10, d + 4)) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("an emulator of ", d, " parameters needs at least ",
-                     std::max<Index>(10, d + 4), " runs; there are ", n, "."));
+    return absl::FailedPreconditionError(absl::StrCat(
+        "an emulator of ", d, " parameters needs at least ", std::max<Index>(10, d + 4),
+        " runs; there are ", n, " that came to their ends: run more samples."));
   }
   const auto wanted = static_cast<std::size_t>(
       options.relevant_runs > 0 ? options.relevant_runs : std::max<Index>(40, 10 * d));

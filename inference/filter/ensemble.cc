@@ -83,10 +83,17 @@ std::string NoWeight(const Ensemble& ensemble) {
     absl::StrAppend(&text, "; the other ", impossible,
                     " are so far from the readings that their likelihood is zero: state larger "
                     "errors");
-  } else if (ensemble.diverged > 0) {
-    absl::StrAppend(&text,
-                    "; `calibctl samples` says why each ended: narrow the priors to where the "
-                    "model runs");
+  } else {
+    if (ensemble.diverged > 0) {
+      absl::StrAppend(&text,
+                      "; `calibctl samples` says why each ended: narrow the priors to where the "
+                      "model runs");
+    }
+    if (ensemble.outside > 0) {
+      absl::StrAppend(&text,
+                      "; widen the priors to where the samples were drawn, or see whether their "
+                      "units are those of the priors");
+    }
   }
   return text + ".";
 }

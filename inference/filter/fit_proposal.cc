@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <numeric>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -143,6 +144,29 @@ absl::StatusOr<Proposal> FitMixture(const FilterOptions& options, const Weighted
   return proposal;
 }
 
+// Why no mixture can be fitted to so few samples that matter, and what would help.
+absl::Status TooFew(const Ensemble& ensemble, std::size_t significant, std::size_t free) {
+  Eigen::Index with_weight = 0;
+  for (Eigen::Index i = 0; i < ensemble.log_start.size(); ++i) {
+    with_weight += ensemble.log_start[i] > -kInfinity && ensemble.log_likelihood[i] > -kInfinity;
+  }
+  std::string text = absl::StrCat(
+      "no next iteration can be proposed: of ", ensemble.log_start.size(), " samples ", with_weight,
+      with_weight == 1 ? " has" : " have", " weight, nearly all of it in ", significant, ", and ",
+      free, free == 1 ? " parameter needs" : " parameters need", " more than ", free,
+      " that differ. ");
+  if (ensemble.diverged > 0) {
+    absl::StrAppend(&text, ensemble.diverged,
+                    " did not come to their ends (`calibctl samples` says why): narrow the priors "
+                    "to where the model runs. ");
+  }
+  if (ensemble.outside > 0) {
+    absl::StrAppend(&text, ensemble.outside, " lie outside the priors: widen them. ");
+  }
+  return absl::FailedPreconditionError(
+      absl::StrCat(text, "Run more samples, or state larger errors of the readings."));
+}
+
 // Parameters that are not held.
 std::vector<Eigen::Index> FreeOf(const JointPrior& priors,
                                  const std::vector<std::optional<double>>& frozen) {
@@ -244,6 +268,9 @@ absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& da
   const Eigen::VectorXd log_weights =
       TemperedLogWeights(*ensemble, TemperingExponent(options, *ensemble));
   StandardPoints points = Standardized(priors, free, ensemble->parameters, log_weights);
+  if (points.samples.size() <= free.size() || !(points.weighted.counts.sum() > 1)) {
+    return TooFew(*ensemble, points.samples.size(), free.size());
+  }
   if (options.mixture == MixtureOver::kParametersAndStates) {
     points.weighted =
         JoinStates(points.weighted, StatesOf(*ensemble, points.samples, data, options));

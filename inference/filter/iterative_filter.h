@@ -18,8 +18,7 @@
 
 namespace calib::inference {
 
-/// kSymmetricLatinHypercube: the maximin one of 1000 [Samuelsson 2023, sec. 3.2]; of fewer where
-/// samples^2 x parameters exceeds 4e6, so that the choice stays within seconds.
+/// kSymmetricLatinHypercube: the maximin one of 1000 [Samuelsson 2023, sec. 3.2].
 enum class Design { kHalton, kSobol, kLatinHypercube, kSymmetricLatinHypercube };
 
 /// What the mixture of the next proposal is fitted to: the parameters, or the parameters joint with

@@ -1,7 +1,6 @@
 // The posterior and its path from all finished iterations.
 
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -14,9 +13,9 @@
 #include "inference/filter/iterative_filter.h"
 #include "inference/filter/log_weights.h"
 #include "inference/filter/parameter_summary.h"
+#include "inference/filter/posterior_checks.h"
 #include "inference/filter/sequential_filter.h"
 #include "inference/filter/weighted_moments.h"
-#include "inference/sampling/halton.h"
 #include "inference/sampling/shuffle.h"
 
 namespace calib::inference {
@@ -60,85 +59,22 @@ absl::StatusOr<PosteriorPath> MakeReversedPath(const DataSet& data, const Filter
   return MakePath(reversed, ensemble, IncrementsOf(*likelihood, ensemble.used, true));
 }
 
-// Quantiles of sqrt(f) over the posterior, by equally probable draws: sample by sample the factor
-// is inverse gamma.
-absl::StatusOr<Eigen::MatrixXd> NoiseScale(const DataSet& data, const FilterOptions& options,
-                                           const Ensemble& ensemble,
-                                           const Eigen::VectorXd& log_weights) {
-  constexpr int kDraws = 2000;
+// Of all iterations together.
+absl::StatusOr<Eigen::MatrixXd> NoiseScaleOf(const DataSet& data, const FilterOptions& options,
+                                             const Ensemble& ensemble,
+                                             const Eigen::VectorXd& log_weights) {
   const auto likelihood = LikelihoodOf(ensemble, data, options);
   if (!likelihood.ok()) return likelihood.status();
-  Eigen::VectorXd shapes;
-  Eigen::MatrixXd rates;
+  GaussianLikelihood::FactorPosterior all;
   Eigen::Index row = 0;
   for (const Iteration& iteration : ensemble.used) {
     const auto factors = likelihood->VarianceFactors(iteration.predictions);
-    shapes = factors.shapes;
-    rates.conservativeResize(log_weights.size(), shapes.size());
-    rates.middleRows(row, factors.rates.rows()) = factors.rates;
+    all.shapes = factors.shapes;
+    all.rates.conservativeResize(log_weights.size(), all.shapes.size());
+    all.rates.middleRows(row, factors.rates.rows()) = factors.rates;
     row += factors.rates.rows();
   }
-  Eigen::MatrixXd scale(shapes.size(), 3);
-  std::vector<double> draws(kDraws);
-  for (Eigen::Index g = 0; g < scale.rows(); ++g) {
-    Eigen::Index i = 0;  // the last sample of positive weight passed
-    Eigen::Index next = 0;
-    double passed = 0;
-    for (int m = 0; m < kDraws; ++m) {
-      for (; passed < (m + 0.5) / kDraws && next < log_weights.size(); ++next) {
-        const double weight = std::exp(log_weights[next]);
-        if (weight > 0) i = next;
-        passed += weight;
-      }
-      const double u = RadicalInverse(static_cast<std::uint64_t>(m) + 1, 2);
-      draws[static_cast<std::size_t>(m)] =
-          std::sqrt(rates(i, g) / boost::math::gamma_q_inv(shapes[g], u));
-    }
-    std::sort(draws.begin(), draws.end());
-    scale.row(g) << draws[kDraws / 20], draws[kDraws / 2], draws[kDraws - 1 - kDraws / 20];
-  }
-  return scale;
-}
-
-// ln L = const - chi^2 / 2 with stated errors, the constant that of zero residuals.
-double PredictiveP(const DataSet& data, const Ensemble& ensemble,
-                   const Eigen::VectorXd& log_weights) {
-  // In double alone: in long double it was a sixth of the time of a posterior.
-  using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
-  const auto likelihood = GaussianLikelihood::Create(data, NoiseMode::kGiven);
-  double p = 0;
-  if (!likelihood.ok()) return std::numeric_limits<double>::quiet_NaN();
-  const auto readings = static_cast<Eigen::Index>(data.readings.size());
-  const double perfect = likelihood->LogLikelihoodBound(
-      Eigen::MatrixXd::Constant(1, readings, std::numeric_limits<double>::quiet_NaN()))[0];
-  for (Eigen::Index i = 0; i < log_weights.size(); ++i) {
-    const double weight = std::exp(log_weights[i]);
-    if (weight < 1e-12) continue;
-    const double half = std::max(0.0, perfect - ensemble.log_likelihood[i]);
-    p += weight * boost::math::gamma_q(0.5 * static_cast<double>(readings), half, Policy());
-  }
-  return p;
-}
-
-// Differences of the means of two halves of the samples over sd.
-Eigen::VectorXd SplitHalf(const Ensemble& ensemble, const Eigen::VectorXd& log_weights,
-                          const std::vector<ParameterSummary>& parameters) {
-  const Eigen::Index d = ensemble.parameters.cols();
-  const std::vector<int> half = Halves(log_weights.size());
-  double mass[2] = {0, 0};
-  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(2, d);
-  for (Eigen::Index i = 0; i < log_weights.size(); ++i) {
-    const double weight = std::exp(log_weights[i]);
-    const int own = half[static_cast<std::size_t>(i)];
-    mass[own] += weight;
-    for (Eigen::Index j = 0; j < d; ++j)
-      sums(own, j) += weight * (ensemble.parameters(i, j) - parameters[j].mean);
-  }
-  Eigen::VectorXd difference(d);
-  for (Eigen::Index j = 0; j < d; ++j) {
-    difference[j] = std::abs(sums(0, j) / mass[0] - sums(1, j) / mass[1]) / parameters[j].sd;
-  }
-  return difference;
+  return NoiseScale(all, log_weights);
 }
 
 // What is held has no uncertainty to state.
@@ -255,14 +191,15 @@ absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataS
     posterior.reversed_path = *std::move(reversed);
   }
   if (options.noise == NoiseMode::kInferred) {
-    auto scale = NoiseScale(data, options, *ensemble, log_weights);
+    auto scale = NoiseScaleOf(data, options, *ensemble, log_weights);
     if (!scale.ok()) return scale.status();
     posterior.noise_scale = *std::move(scale);
   }
   if (options.noise == NoiseMode::kGiven) {
-    posterior.predictive_p = PredictiveP(data, *ensemble, log_weights);
+    posterior.predictive_p = PredictiveP(data, ensemble->log_likelihood, log_weights);
   }
-  posterior.split_half = SplitHalf(*ensemble, log_weights, posterior.parameters);
+  posterior.split_half = SplitHalf(ensemble->parameters, log_weights, Halves(log_weights.size()),
+                                   posterior.parameters);
   posterior.frozen = ensemble->frozen;
   MarkFrozen(*ensemble, posterior);
   posterior.warnings = Warnings(options, *ensemble, posterior);

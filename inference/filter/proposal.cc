@@ -41,16 +41,14 @@ bool DrawOne(const GaussianMixture& mixture, double defensive_share, const Joint
 absl::StatusOr<Eigen::MatrixXd> UnitDesign(const FilterOptions& options, int n, int d) {
   if (options.design == Design::kHalton) return Halton(n, d);
   if (options.design == Design::kSobol) return ScrambledSobol(n, d, options.seed);
-  constexpr double kMostDistances = 2e9;  // squared differences of coordinates; a few seconds
+  constexpr int kCandidates = 1000;  // [Samuelsson 2023, sec. 3.2]
   const bool symmetric = options.design == Design::kSymmetricLatinHypercube;
-  const double designs = kMostDistances / (0.5 * n * n * d);
-  return LatinHypercube(
-      {.points = n,
-       .dimensions = d,
-       .symmetric = symmetric,
-       .centred = symmetric,
-       .candidates = symmetric ? static_cast<int>(std::clamp(designs, 1.0, 1e3)) : 1,
-       .seed = options.seed});
+  return LatinHypercube({.points = n,
+                         .dimensions = d,
+                         .symmetric = symmetric,
+                         .centred = symmetric,
+                         .candidates = symmetric ? kCandidates : 1,
+                         .seed = options.seed});
 }
 
 PhiloxStream DrawStream(const FilterOptions& options, int iteration, int sample) {

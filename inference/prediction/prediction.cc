@@ -39,10 +39,14 @@ double Quantile(const QuantityPrediction& prediction, Index t, double p) {
   return low + 0.5 * (high - low);
 }
 
+// The mean of so few runs is not the posterior's: as much as one run more.
+double MeanStretch(const QuantityPrediction& prediction) {
+  return std::sqrt(1 + 1 / static_cast<double>(prediction.conditional_mean.rows()));
+}
+
 void SetQuantiles(QuantityPrediction& result) {
   const Index t = result.mean.size();
-  const double stretch = StudentRatio(result.freedom) *
-                         std::sqrt(1 + 1 / static_cast<double>(result.conditional_mean.rows()));
+  const double stretch = StudentRatio(result.freedom) * MeanStretch(result);
   result.q05.resize(t);
   result.q50.resize(t);
   result.q95.resize(t);
@@ -51,6 +55,26 @@ void SetQuantiles(QuantityPrediction& result) {
     result.q05[k] = middle + stretch * (Quantile(result, k, 0.05) - middle);
     result.q95[k] = middle + stretch * (Quantile(result, k, 0.95) - middle);
   }
+}
+
+// Pr(Q_t >= level) of the stretched law, whose quantile of probability p lies from the median by
+// sqrt(1 + 1/N) t_p / z_p times that of the mixture: the place in the mixture that the stretch takes
+// to the level is found by bisection between the median and the level.
+double StretchedExceeds(const QuantityPrediction& prediction, Index t, double level) {
+  const double middle = prediction.q50[t];
+  const double mean_stretch = MeanStretch(prediction);
+  double near = middle;
+  double far = level;
+  for (int step = 0; step < 40; ++step) {  // to 1e-12 of the distance
+    const double place = near + 0.5 * (far - near);
+    if (place == near || place == far) break;
+    const double above = Exceeds(prediction, t, place);
+    const double tail = std::min(above, 1 - above);
+    const double reached =
+        mean_stretch * StudentRatio(prediction.freedom, tail) * std::abs(place - middle);
+    (reached < std::abs(level - middle) ? near : far) = place;
+  }
+  return Exceeds(prediction, t, far);
 }
 
 }  // namespace
@@ -123,7 +147,9 @@ QuantityPrediction WithModelError(QuantityPrediction prediction, const Eigen::Ve
 
 Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, double level) {
   Eigen::VectorXd probability(prediction.mean.size());
-  for (Index k = 0; k < probability.size(); ++k) probability[k] = Exceeds(prediction, k, level);
+  for (Index k = 0; k < probability.size(); ++k) {
+    probability[k] = StretchedExceeds(prediction, k, level);
+  }
   return probability;
 }
 

@@ -42,7 +42,8 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
 /// independent of scatter and parameters: it joins sd_model, sd and the quantiles, not the mean.
 QuantityPrediction WithModelError(QuantityPrediction prediction, const Eigen::VectorXd& sd);
 
-/// Pr(Q_t >= level) for each of the T quantities                                    [Eqs. 11, 12]
+/// Pr(Q_t >= level) for each of the T quantities [Eqs. 11, 12], of the law that the quantiles are of,
+/// stretched as they are: Pr(Q_t >= q95_t) = 0.05.
 Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, double level);
 
 }  // namespace calib::inference

@@ -64,6 +64,29 @@ Eigen::MatrixXd Candidate(const LatinHypercubeOptions& options, int candidate) {
   return points;
 }
 
+// The smallest distance between two points, or one that is no larger than `enough`, the first found.
+// Points are looked at in the order of their first coordinate: those further along it than the
+// smallest distance so far cannot be nearer.
+double SmallestAbove(const Eigen::MatrixXd& points, double enough) {
+  std::vector<Index> order(static_cast<std::size_t>(points.rows()));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&points](Index a, Index b) { return points(a, 0) < points(b, 0); });
+  const Eigen::MatrixXd columns = points(order, Eigen::all).transpose();  // a point is contiguous
+  double smallest = std::numeric_limits<double>::infinity();
+  double reach = smallest;
+  for (Index i = 0; i < columns.cols(); ++i) {
+    for (Index k = i + 1; k < columns.cols() && columns(0, k) - columns(0, i) <= reach; ++k) {
+      const double squared = (columns.col(i) - columns.col(k)).squaredNorm();
+      if (squared >= smallest) continue;
+      smallest = squared;
+      reach = std::sqrt(squared);
+      if (reach <= enough) return reach;
+    }
+  }
+  return reach;
+}
+
 }  // namespace
 
 absl::Status LatinHypercubeOptions::Validate() const {
@@ -84,7 +107,7 @@ absl::StatusOr<Eigen::MatrixXd> LatinHypercube(const LatinHypercubeOptions& opti
   double largest = SmallestDistance(best);
   for (int c = 1; c < options.candidates; ++c) {
     Eigen::MatrixXd points = Candidate(options, c);
-    const double distance = SmallestDistance(points);
+    const double distance = SmallestAbove(points, largest);
     if (distance <= largest) continue;
     largest = distance;
     best = std::move(points);
@@ -93,13 +116,7 @@ absl::StatusOr<Eigen::MatrixXd> LatinHypercube(const LatinHypercubeOptions& opti
 }
 
 double SmallestDistance(const Eigen::MatrixXd& points) {
-  const Eigen::MatrixXd columns = points.transpose();  // a point is contiguous
-  double smallest = std::numeric_limits<double>::infinity();
-  for (Index i = 0; i < columns.cols(); ++i) {
-    for (Index k = 0; k < i; ++k)
-      smallest = std::min(smallest, (columns.col(i) - columns.col(k)).squaredNorm());
-  }
-  return std::sqrt(smallest);
+  return SmallestAbove(points, -std::numeric_limits<double>::infinity());
 }
 
 bool SpansLinearFunctions(const Eigen::MatrixXd& points) {

@@ -104,12 +104,40 @@ void CleanBranch(std::vector<double>& values, std::size_t first, std::size_t las
 
 constexpr double kClearDrop = 0.03;  // of the rise: less is a plateau with noise on it
 
-// Index of the peak of a noisy curve within readings 0..last, or `last` when there is none that
-// stands out.
-std::size_t ClearPeak(const std::vector<double>& strength, std::size_t last) {
-  const auto peak_at =
-      std::max_element(strength.begin(), strength.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+// The readings that go beyond all before them in the direction of the first loading: the curve that
+// unloading and reloading interrupt, and come back to.
+struct PrimaryLoading {
+  std::vector<std::size_t> reading;
+  std::vector<double> control, strength;
+  std::vector<double> volume;  // empty: not measured
+
+  [[nodiscard]] std::size_t last() const { return reading.size() - 1; }
+};
+
+PrimaryLoading PrimaryOf(const ControlPath& path, const StageCurves& curves) {
+  PrimaryLoading primary;
+  const std::size_t first_end =
+      path.turning.empty() ? path.points.size() - 1 : path.turning.front();
+  const double sign = path.points[first_end].target >= path.points.front().target ? 1 : -1;
+  const bool has_volume = curves.volume.size() == curves.strength.size();
+  double furthest = path.points[first_end].target;
+  for (std::size_t i = 0; i < path.points.size(); ++i) {
+    const double control = path.points[i].target;
+    if (i > first_end && !(sign * (control - furthest) > 0)) continue;
+    if (i > first_end) furthest = control;
+    primary.reading.push_back(i);
+    primary.control.push_back(control);
+    primary.strength.push_back(curves.strength[i]);
+    if (has_volume) primary.volume.push_back(curves.volume[i]);
+  }
+  return primary;
+}
+
+// Index of the peak of a noisy curve, or the last one when there is none that stands out.
+std::size_t ClearPeak(const std::vector<double>& strength) {
+  const auto peak_at = std::max_element(strength.begin(), strength.end());
   const auto peak = static_cast<std::size_t>(peak_at - strength.begin());
+  const std::size_t last = strength.size() - 1;
   const double start = strength.front();
   const double drop = *peak_at - strength[last];
   constexpr std::size_t kFewest = 2;
@@ -117,47 +145,44 @@ std::size_t ClearPeak(const std::vector<double>& strength, std::size_t last) {
                                                                                        : last;
 }
 
-// Change along readings first..last of the line through y over x.
-double TrendOver(const ControlPath& path, const std::vector<double>& y, std::size_t first,
-                 std::size_t last) {
-  const auto n = static_cast<double>(last - first + 1);
+// Change from index `first` to the last of the line through y over x.
+double TrendFrom(const std::vector<double>& x, const std::vector<double>& y, std::size_t first) {
+  const auto n = static_cast<double>(x.size() - first);
   double mean_x = 0;
   double mean_y = 0;
-  for (std::size_t i = first; i <= last; ++i) {
-    mean_x += path.points[i].target / n;
+  for (std::size_t i = first; i < x.size(); ++i) {
+    mean_x += x[i] / n;
     mean_y += y[i] / n;
   }
   double xx = 0;
   double xy = 0;
-  for (std::size_t i = first; i <= last; ++i) {
-    const double x = path.points[i].target - mean_x;
-    xx += x * x;
-    xy += x * (y[i] - mean_y);
+  for (std::size_t i = first; i < x.size(); ++i) {
+    xx += (x[i] - mean_x) * (x[i] - mean_x);
+    xy += (x[i] - mean_x) * (y[i] - mean_y);
   }
-  return xx > 0 ? xy / xx * (path.points[last].target - path.points[first].target) : 0;
+  return xx > 0 ? xy / xx * (x.back() - x[first]) : 0;
 }
 
-// First reading of the steady state within first..last; last + 1: there is none.
-std::size_t SteadyFrom(const ControlPath& path, const StageCurves& curves, std::size_t first,
-                       std::size_t last) {
+// First index of the steady state from `first` on; one beyond the last: there is none.
+std::size_t SteadyFrom(const PrimaryLoading& primary, std::size_t first) {
   constexpr double kShare = 0.2;
   constexpr std::size_t kFewest = 5;
   constexpr double kDilatancy = 0.05;
-  const auto [low, high] = std::minmax_element(
-      curves.strength.begin(), curves.strength.begin() + static_cast<std::ptrdiff_t>(last) + 1);
+  const auto [low, high] = std::minmax_element(primary.strength.begin(), primary.strength.end());
   const double rise = *high - *low;
-  const double way = path.points[last].target - path.points.front().target;
-  for (std::size_t i = first; i + kFewest <= last + 1; ++i) {
-    const double part = path.points[last].target - path.points[i].target;
+  const std::vector<double>& control = primary.control;
+  const double way = control.back() - control.front();
+  for (std::size_t i = first; i + kFewest <= control.size(); ++i) {
+    const double part = control.back() - control[i];
     if (!(std::abs(part) >= kShare * std::abs(way)) || part == 0) break;
-    if (std::abs(TrendOver(path, curves.strength, i, last)) > kClearDrop * rise) continue;
-    if (curves.volume.size() == curves.strength.size() &&
-        std::abs(TrendOver(path, curves.volume, i, last)) > kDilatancy * std::abs(part)) {
+    if (std::abs(TrendFrom(control, primary.strength, i)) > kClearDrop * rise) continue;
+    if (!primary.volume.empty() &&
+        std::abs(TrendFrom(control, primary.volume, i)) > kDilatancy * std::abs(part)) {
       continue;
     }
     return i;
   }
-  return last + 1;
+  return control.size();
 }
 
 }  // namespace
@@ -201,10 +226,11 @@ std::vector<std::string> NameSegments(const ControlPath& path, const StageCurves
     const std::string name = (k % 2 == 0 ? "unload_" : "reload_") + std::to_string(k / 2 + 1);
     std::fill(names.begin() + static_cast<std::ptrdiff_t>(path.turning[k]) + 1, names.end(), name);
   }
-  const std::vector<double>& strength = curves.strength;
-  if (strength.size() != names.size()) return names;
-  const std::size_t last = path.turning.empty() ? names.size() - 1 : path.turning.front();
-  const std::size_t peak = ClearPeak(strength, last);
+  if (curves.strength.size() != names.size()) return names;
+  const PrimaryLoading primary = PrimaryOf(path, curves);
+  const std::vector<double>& strength = primary.strength;
+  const std::size_t last = primary.last();
+  const std::size_t peak = ClearPeak(strength);
   const double half = 0.5 * (strength.front() + strength[peak]);
   std::size_t rising = 0;
   while (strength[rising] < half) ++rising;
@@ -216,15 +242,12 @@ std::vector<std::string> NameSegments(const ControlPath& path, const StageCurves
     std::size_t behind = peak;
     while (behind < last && strength[behind + 1] >= near) ++behind;
     for (std::size_t i = rising; i <= last; ++i) {
-      names[i] = i < before ? "pre_peak" : (i <= behind ? "peak" : "post_peak");
+      names[primary.reading[i]] = i < before ? "pre_peak" : (i <= behind ? "peak" : "post_peak");
     }
     settled = behind + 1;
   }
-  // Of monotonic loading only: on unloading nothing is steady.
-  if (path.turning.empty()) {
-    for (std::size_t i = SteadyFrom(path, curves, settled, last); i <= last; ++i) {
-      names[i] = "steady_state";
-    }
+  for (std::size_t i = SteadyFrom(primary, settled); i <= last; ++i) {
+    names[primary.reading[i]] = "steady_state";
   }
   return names;
 }

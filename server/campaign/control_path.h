@@ -39,11 +39,11 @@ struct StageCurves {
 };
 
 /// Loading stage of each reading: initial_loading, then unload_1, reload_1, unload_2, ... at the
-/// turning points. Within the first stage, where strength has a clear peak (it falls by 3 % of its
-/// rise behind it): pre_peak beyond half of the peak, peak within 3 % of the rise about it,
-/// post_peak behind. The end of monotonic loading is steady_state where over its last fifth
-/// or more the trend of strength is below 3 % of its rise and that of volumetric strain below 5 %
-/// of the control's.
+/// turning points. Primary loading is the first stage with the readings of later ones that go
+/// beyond all before them. Where its strength has a clear peak (it falls by 3 % of its rise behind
+/// it), its readings are pre_peak beyond half of the peak, peak within 3 % of the rise about it,
+/// post_peak behind. Its end is steady_state where over its last fifth or more the trend of
+/// strength is below 3 % of its rise and that of volumetric strain below 5 % of the control's.
 std::vector<std::string> NameSegments(const ControlPath& path, const StageCurves& curves);
 
 }  // namespace calib::campaign

@@ -18,6 +18,7 @@
 #include "server/ctl/strengths.h"
 #include "server/ctl/verdict.h"
 #include "server/ctl/warm_fits.h"
+#include "server/report/prior_conflict.h"
 
 namespace calib::ctl {
 namespace {
@@ -40,6 +41,9 @@ class Inquiry {
     diagnosis_.campaign = base_.id();
     diagnosis_.only_adequacy = options_.only_adequacy;
     diagnosis_.warnings = campaign::NoiseWarnings(base_.view().campaign);
+    for (const report::PriorConflict& conflict : report::PriorConflicts(base_.view())) {
+      diagnosis_.warnings.push_back(report::InWords(conflict));
+    }
     if (auto possible = CheckPossible(); !possible.ok()) return possible;
     const bool elsewhere = base_.view().campaign.precomputed.has_value();
     WarnOfWeakSupport();
@@ -48,7 +52,10 @@ class Inquiry {
       auto nuisance = screen_.MeasureNuisance();
       if (!nuisance.ok()) return nuisance.status();
       nuisance_ = *std::move(nuisance);
+    } else if (options_.only_adequacy) {
+      nuisance_ = options_.nuisance;
     }
+    diagnosis_.nuisance = nuisance_;
     if (auto status = JudgeBase(); !status.ok()) return status;
     const bool fits = diagnosis_.adequacy.p_value >= options_.level;
     if (options_.only_adequacy) {

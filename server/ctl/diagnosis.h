@@ -63,14 +63,19 @@ struct Diagnosis {
   double emulator_error = 0, scatter = 0;
   std::int64_t screen_evaluations = 0, warm_evaluations = 0;
   std::optional<NextExperiment> next_experiment;
-  bool only_adequacy = false;           ///< no effect was tried
+  bool only_adequacy = false;  ///< no effect was tried
+  /// What a numerical choice (the rate) changes of each fitted reading, in sd of the noise; none
+  /// where there is no such choice. Not part of the JSON document.
+  std::vector<Eigen::VectorXd> nuisance{};
   std::vector<std::string> warnings{};  ///< about noise, readings and packings, a sentence each
   std::map<std::string, std::string> units{};  ///< SI, of the strengths of effects
 };
 
 struct DiagnosisOptions {
-  double level = 0.01;                    ///< of the adequacy test and of the screen
-  bool only_adequacy = false;             ///< no runs: says adequate or unexplained
+  double level = 0.01;         ///< of the adequacy test and of the screen
+  bool only_adequacy = false;  ///< no runs: says adequate or unexplained
+  /// As measured for a model of the same readings; taken with only_adequacy, which measures none.
+  std::vector<Eigen::VectorXd> nuisance = {};
   std::vector<std::string> without = {};  ///< effects that do not take part
   /// Of the screen and the warm fits together, on the fitted experiments; those that were made
   /// before count too.

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/campaign/excitation.h"
 #include "server/ctl/extension.h"
+#include "server/ctl/reading_effects.h"
 
 namespace calib::ctl {
 namespace {
@@ -21,6 +22,7 @@ constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all
 constexpr double kWanted = 18;
 constexpr double kMostRatio = 16;  // of the second strength to the first
 constexpr double kGrades = 4;      // of an octave: the last bits of a history change no run
+constexpr const char* kLoadCell = "load_cell_error";
 
 // A share of what a step on the ray changes, as a share of the step; and the other way about.
 double StepFor(const dem::StrengthRay& ray, double share) {
@@ -127,7 +129,12 @@ std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
   std::vector<const dem::EffectInfo*> effects;
   for (const dem::EffectInfo* info : dem::AllEffects(base_.view().campaign.model.user_effects)) {
     const dem::EffectInfo& effect = *info;
-    if (!WhyNotJoin(base_.view().campaign, effect.name).empty()) continue;
+    const auto& has = base_.view().campaign.model.effects;
+    if (std::find(has.begin(), has.end(), effect.name) != has.end()) continue;
+    if (const std::string why = WhyNotJoin(base_.view().campaign, effect.name); !why.empty()) {
+      if (reasons != nullptr) reasons->emplace_back(effect.name, why);
+      continue;
+    }
     const bool left_out = std::find(without.begin(), without.end(), effect.name) != without.end();
     const std::string why = left_out ? "left out as asked for" : WhyNotExcitable(effect);
     if (why.empty()) {
@@ -152,7 +159,7 @@ std::int64_t EffectScreen::Planned(const std::vector<std::string>& without) cons
   const std::vector<const dem::EffectInfo*> effects = Excitable(without, nullptr);
   std::size_t runs = RateIsGiven() ? 1 : 0;
   for (const dem::EffectInfo* effect : effects) {
-    runs += StepsOf(*effect, RowsFor(effects.size())).size();
+    if (!IsCalculated(*effect)) runs += StepsOf(*effect, RowsFor(effects.size())).size();
   }
   return static_cast<std::int64_t>(runs) * base_.fitted_experiments();
 }
@@ -168,9 +175,14 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
     signatures.push_back(
         {.name = effect->name, .differences = {}, .two_sided = effect->two_sided, .strengths = {}});
   }
-  std::vector<std::vector<Step>> steps;
-  steps.reserve(effects.size());
-  for (const dem::EffectInfo* effect : effects) steps.push_back(StepsOf(*effect, rows));
+  std::vector<std::vector<Step>> steps(effects.size());  // that are run
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    if (IsCalculated(*effects[e])) {
+      Calculate(*effects[e], runs, signatures[e]);
+    } else {
+      steps[e] = StepsOf(*effects[e], rows);
+    }
+  }
   for (std::size_t k = 0; k < rows; ++k) {
     const Index like = runs[std::min(k, runs.size() - 1)];
     std::vector<Pair> pairs;
@@ -228,6 +240,33 @@ EffectScreen::Pair EffectScreen::PairOf(const dem::EffectInfo& effect, Step step
   return pair;
 }
 
+// Exact, the specimen does not feel what a load cell reads: no run would tell more.
+bool EffectScreen::IsCalculated(const dem::EffectInfo& effect) const {
+  return effect.name == kLoadCell &&
+         MisreadLoads(base_.view().campaign, base_.readings().of_mean,
+                      base_.runs().histories.topRows(1), Eigen::VectorXd::Zero(1),
+                      Eigen::VectorXd::Zero(1))
+             .has_value();
+}
+
+// Every ray at the catalogue's second strength, as StepsOf() has them run.
+void EffectScreen::Calculate(const dem::EffectInfo& effect, const std::vector<Index>& runs,
+                             inference::Signature& signature) {
+  for (std::size_t k = 0; k < effect.rays.size(); ++k) {
+    const Index like = runs[std::min(k, runs.size() - 1)];
+    const Pair pair = PairOf(effect, {&effect.rays[k], effect.rays[k].steps[1]}, k, like);
+    const auto strength = [&pair](const char* parameter) {
+      const auto found = pair.with.fixed.find(absl::StrCat(kLoadCell, ".", parameter));
+      return Eigen::VectorXd::Constant(1, found == pair.with.fixed.end() ? 0.0 : found->second);
+    };
+    const Eigen::MatrixXd with =
+        *MisreadLoads(base_.view().campaign, base_.readings().of_mean,
+                      base_.runs().histories.row(like), strength("gain"), strength("offset"));
+    const std::vector<int>& streams = base_.runs().stream;
+    Keep(effect, pair, with.row(0), streams[static_cast<std::size_t>(like)], signature);
+  }
+}
+
 absl::Status EffectScreen::Measure(const dem::EffectInfo& effect, const Pair& pair,
                                    inference::Signature& signature) {
   const auto view = base_.Run(pair.with, pair.what);
@@ -238,17 +277,21 @@ absl::Status EffectScreen::Measure(const dem::EffectInfo& effect, const Pair& pa
     for (const v1::Sample& sample : view->samples) diverged_[effect.name] = sample.reason();
     return absl::OkStatus();
   }
+  Keep(effect, pair, with.histories.row(0), with.stream.front(), signature);
+  return absl::OkStatus();
+}
+
+void EffectScreen::Keep(const dem::EffectInfo& effect, const Pair& pair,
+                        const Eigen::RowVectorXd& history, int stream,
+                        inference::Signature& signature) {
   signature.differences.emplace_back(
-      (with.histories.row(0) - base_.runs().histories.row(pair.without)).transpose());
+      (history - base_.runs().histories.row(pair.without)).transpose());
   if (effect.rays.size() == 1)
     signature.strengths.push_back(ShareAt(*pair.step.ray, pair.step.step));
   tried_[effect.name].push_back(pair.step);
-  EffectRun run{.values = pair.with.rows.front().values,
-                .history = with.histories.row(0),
-                .stream = with.stream.front()};
+  EffectRun run{.values = pair.with.rows.front().values, .history = history, .stream = stream};
   run.values.insert(pair.with.fixed.begin(), pair.with.fixed.end());
   runs_with_[effect.name].push_back(std::move(run));
-  return absl::OkStatus();
 }
 
 std::vector<EffectScreen::EffectRun> EffectScreen::RunsWith(const std::string& effect) const {

@@ -43,7 +43,8 @@ class EffectScreen {
   std::int64_t Planned(const std::vector<std::string>& without) const;
 
   /// One signature of each effect that the fitted tests can show. `without` take no part. At most
-  /// the larger of a quarter of the campaign's evaluations and four runs for each effect. The first
+  /// the larger of a quarter of the campaign's evaluations and four runs for each effect, with
+  /// MeasureNuisance() where a load cell is among them: what it does is calculated. The first
   /// strength is the catalogue's; the second is that of SecondStep(), or as a user's effect says.
   absl::StatusOr<std::vector<inference::Signature>> MeasureSignatures(
       const std::vector<std::string>& without, const SquareOfDifference& square_of);
@@ -89,8 +90,13 @@ class EffectScreen {
       std::vector<std::pair<std::string, std::string>>* reasons) const;
   bool RateIsGiven() const;
   std::size_t RowsFor(std::size_t effects) const;
+  bool IsCalculated(const dem::EffectInfo& effect) const;
+  void Calculate(const dem::EffectInfo& effect, const std::vector<Eigen::Index>& runs,
+                 inference::Signature& signature);
   absl::Status Measure(const dem::EffectInfo& effect, const Pair& pair,
                        inference::Signature& signature);
+  void Keep(const dem::EffectInfo& effect, const Pair& pair, const Eigen::RowVectorXd& history,
+            int stream, inference::Signature& signature);
 
   const FittedCampaign& base_;
   std::map<std::string, std::vector<Step>> tried_;

@@ -13,26 +13,21 @@
 #include "server/campaign/sha256.h"
 #include "server/ctl/extension.h"
 #include "server/ctl/findings.h"
+#include "server/ctl/improve_step.h"
 #include "server/report/comparison.h"
-#include "server/report/people_units.h"
 
 namespace calib::ctl {
 namespace {
 
-// The effect to try next: named, or the best of a group, or what helps most.
-std::string NextEffect(const Diagnosis& diagnosis) {
-  if (!diagnosis.effect.empty()) return diagnosis.effect;
-  if (diagnosis.verdict == "ambiguous") return diagnosis.candidates.front().effect;
-  return diagnosis.best_partial;
+CalibratedModel Calibrated(const report::CampaignView& view, double rms_error) {
+  return {.rms_error = rms_error,
+          .has_posterior = view.posterior.posterior_from() != "none",
+          .log_evidence = view.posterior.log_evidence(),
+          .log_evidence_se = view.posterior.log_evidence_se()};
 }
 
-std::string WhyNext(const Diagnosis& diagnosis, const std::string& next) {
-  if (!diagnosis.effect.empty()) return absl::StrCat(next, " is named and added.");
-  if (diagnosis.verdict == "ambiguous") {
-    return absl::StrCat(next, " is added, the best of those that these tests do not tell apart: ",
-                        absl::StrJoin(diagnosis.candidates.front().confusable_with, ", "), ".");
-  }
-  return absl::StrCat(next, " is added, it helps most: ", diagnosis.reason, ".");
+void AddSentence(const std::string& sentence, std::string& text) {
+  absl::StrAppend(&text, text.empty() || sentence.empty() ? "" : " ", sentence);
 }
 
 // No calibration takes more: all iterations, replicates and held-out draws.
@@ -77,52 +72,69 @@ absl::Status Improvement::From(report::CampaignView view) {
     const auto diagnosis = Judge(view, last || (!added.empty() && Fits(view)));
     if (!diagnosis.ok()) return diagnosis.status();
     ImproveStep& step = steps_.back();
-    const std::string next = NextEffect(*diagnosis);
     if (diagnosis->verdict == "adequate") {
-      step.reason = absl::StrCat("Noise, scatter and the emulator's error explain what is left.",
-                                 step.reason.empty() ? "" : " ", step.reason);
+      std::string reason = "Noise, scatter and the emulator's error explain what is left.";
+      AddSentence(step.reason, reason);
+      step.reason = std::move(reason);
       break;
     }
     if (last) {
-      absl::StrAppend(&step.reason, step.reason.empty() ? "" : " ",
-                      Spent() ? "--max-evaluations is used up, so no effect was looked for."
-                              : absl::StrCat("--max-effects allows ", limits_.effects, "."));
+      AddSentence(Spent() ? "--max-evaluations is used up, so no effect was looked for."
+                          : absl::StrCat("--max-effects allows ", limits_.effects, "."),
+                  step.reason);
       break;
     }
-    if (next.empty()) {
-      if (step.reason.empty()) step.reason = diagnosis->reason;
-      break;
-    }
-    if (const std::string why = WhyNotJoin(view.campaign, next); !why.empty()) {
-      step.reason = absl::StrCat(next, " would be added, but cannot be: ", why, ".");
-      break;
-    }
-    auto extended = Extended(view, {next}, ClosestRunWith(next, *diagnosis));
-    if (absl::IsResourceExhausted(extended.status())) {
-      step.reason = absl::StrCat(next, " would be added, but --max-evaluations forbids it: ",
-                                 extended.status().message(), ".");
-      break;
-    }
+    if (step.reason.empty() && EffectsToTry(*diagnosis).empty()) step.reason = diagnosis->reason;
+    auto extended = Forward(view, *diagnosis);
     if (!extended.ok()) return extended.status();
-    if (extended->posterior.posterior_from() == "none" && !(ErrorOf(*extended) < step.rms_error)) {
-      step.reason = absl::StrCat(
-          "The calibration with ", next, " (", extended->status.campaign(),
-          ") has no posterior and comes no closer, so it is no step: run more samples.");
-      break;
-    }
-    step.next_effect = next;
-    step.reason = WhyNext(*diagnosis, next);
-    added.push_back(next);
-    view = *std::move(extended);
+    if (!*extended) break;
+    added.push_back(step.next_effect);
+    view = **std::move(extended);
   }
   last_ = std::move(view);
   if (auto status = Prune(added); !status.ok()) return status;
   return Open();
 }
 
+// The model with the first of the effects to try that makes it better; none: there is none. Sets
+// the effect of the last step, and its reason.
+absl::StatusOr<std::optional<report::CampaignView>> Improvement::Forward(
+    const report::CampaignView& view, const Diagnosis& diagnosis) {
+  ImproveStep& step = steps_.back();
+  const CalibratedModel without = Calibrated(view, step.rms_error);
+  std::string against;
+  for (const std::string& effect : EffectsToTry(diagnosis)) {
+    if (const std::string why = WhyNotJoin(view.campaign, effect); !why.empty()) {
+      AddSentence(absl::StrCat(effect, " would be added, but cannot be: ", why, "."), against);
+      continue;
+    }
+    auto extended = Extended(view, {effect}, ClosestRunWith(effect, diagnosis));
+    if (absl::IsResourceExhausted(extended.status())) {
+      AddSentence(absl::StrCat(effect, " would be added, but --max-evaluations forbids it: ",
+                               extended.status().message(), "."),
+                  against);
+      break;
+    }
+    if (!extended.ok()) return extended.status();
+    const std::string why = WhyNoStep(without, Calibrated(*extended, ErrorOf(*extended)));
+    if (why.empty()) {
+      step.next_effect = effect;
+      AddSentence(WhyNext(diagnosis, effect), step.reason);
+      AddSentence(against, step.reason);
+      return std::optional(*std::move(extended));
+    }
+    AddSentence(absl::StrCat("The calibration with ", effect, " (", extended->status.campaign(),
+                             ") is no step: ", why, "."),
+                against);
+  }
+  AddSentence(against, step.reason);
+  return std::optional<report::CampaignView>();
+}
+
 // Adds a step. A diagnosis that cannot be paid for is no more than the adequacy of the model.
 absl::StatusOr<Diagnosis> Improvement::Judge(const report::CampaignView& view, bool only_adequacy) {
-  DiagnosisOptions options{.only_adequacy = only_adequacy, .next_experiment = false};
+  DiagnosisOptions options{
+      .only_adequacy = only_adequacy, .nuisance = nuisance_, .next_experiment = false};
   options.max_evaluations = Left();
   std::string reason;
   auto diagnosis = Diagnose(laboratory_, view, options);
@@ -140,6 +152,7 @@ absl::StatusOr<Diagnosis> Improvement::Judge(const report::CampaignView& view, b
     diagnosis->verdict = "unexplained";
   } else {
     KeepFinding(client_, diagnosis->campaign, kDiagnosis, DiagnosisJson(*diagnosis));
+    if (!diagnosis->only_adequacy) nuisance_ = diagnosis->nuisance;
   }
   evaluations_ += diagnosis->screen_evaluations + diagnosis->warm_evaluations;
   steps_.push_back({.campaign = view.status.campaign(),
@@ -239,7 +252,7 @@ absl::StatusOr<report::CampaignView> Improvement::Extended(const report::Campaig
 }
 
 bool Improvement::Fits(const report::CampaignView& view) {
-  const auto quick = Diagnose(laboratory_, view, {.only_adequacy = true});
+  const auto quick = Diagnose(laboratory_, view, {.only_adequacy = true, .nuisance = nuisance_});
   return quick.ok() && quick->verdict == "adequate";
 }
 

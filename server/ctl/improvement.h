@@ -61,6 +61,8 @@ class Improvement {
   bool Spent() const { return limits_.evaluations && evaluations_ >= *limits_.evaluations; }
   std::optional<std::int64_t> Left() const;
   absl::StatusOr<Diagnosis> Judge(const report::CampaignView& view, bool only_adequacy);
+  absl::StatusOr<std::optional<report::CampaignView>> Forward(const report::CampaignView& view,
+                                                              const Diagnosis& diagnosis);
   absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
                                                 const std::vector<std::string>& effects,
                                                 const ClosestRun& closest);
@@ -73,6 +75,8 @@ class Improvement {
   ImprovementLimits limits_;
   std::int64_t evaluations_ = 0;
   std::vector<ImproveStep> steps_;
+  /// Of the last model that was screened: the others are judged by the same.
+  std::vector<Eigen::VectorXd> nuisance_;
   std::optional<report::CampaignView> first_, last_;
   std::string digest_;
 };

@@ -44,6 +44,7 @@ int Compare(const Arguments& arguments) {
   const auto predictions = report::PredictReadings(*view);
   report::Comparison comparison = report::Compare(*view, predictions);
   report::AddDiscrepancies(*view, predictions, comparison);
+  comparison.prior_conflicts = report::PriorConflicts(*view);
   // Parameters at a bound are among where it fails.
   std::vector<std::string> of_posterior = report::PosteriorWarnings(*view);
   comparison.warnings.insert(comparison.warnings.begin(), of_posterior.begin(), of_posterior.end());

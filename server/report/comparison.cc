@@ -1,12 +1,14 @@
 #include "server/report/comparison.h"
 
+#include <algorithm>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <map>
-#include <set>
+#include <utility>
 
 #include "server/campaign/noise_check.h"
 #include "server/report/residual_group.h"
+#include "server/report/setting_trend.h"
 
 namespace calib::report {
 namespace {
@@ -104,51 +106,27 @@ void ToShares(std::vector<SegmentMisfit>& segments) {
   }
 }
 
-// Weighted regression of a stage's bias on the logarithm of each setting that differs.
+// Where the bias of a stage goes with what differs between the experiments.
 std::vector<BiasTrend> TrendsOf(const campaign::Campaign& campaign,
                                 const std::vector<SegmentMisfit>& segments) {
-  std::map<std::pair<std::string, std::string>, std::vector<const SegmentMisfit*>> stages;
+  std::map<std::pair<std::string, std::string>, std::vector<ValueInExperiment>> stages;
   for (const SegmentMisfit& m : segments) {
-    if (!m.heldout && m.z && *m.z != 0) stages[{m.observable, m.segment}].push_back(&m);
+    if (m.heldout || !m.z || *m.z == 0) continue;
+    const auto experiment =
+        std::find_if(campaign.experiments.begin(), campaign.experiments.end(),
+                     [&m](const campaign::Experiment& e) { return e.name == m.experiment; });
+    stages[{m.observable, m.segment}].push_back(
+        {.experiment = &*experiment, .value = m.bias, .sd = m.bias / *m.z});
   }
   std::vector<BiasTrend> trends;
-  for (const auto& [stage, misfits] : stages) {
-    std::set<std::string> names;
-    for (const campaign::Experiment& e : campaign.experiments) {
-      for (const auto& setting : e.settings) names.insert(setting.first);
-    }
-    for (const std::string& name : names) {
-      double sw = 0;
-      double sx = 0;
-      double sxx = 0;
-      double sy = 0;
-      double sxy = 0;
-      std::size_t used = 0;
-      for (const SegmentMisfit* m : misfits) {
-        for (const campaign::Experiment& e : campaign.experiments) {
-          const auto found = e.settings.find(name);
-          if (e.name != m->experiment || found == e.settings.end() || !(found->second > 0))
-            continue;
-          const double x = std::log10(found->second);
-          const double w = std::pow(*m->z / m->bias, 2);  // 1 / variance of the bias
-          sw += w;
-          sx += w * x;
-          sxx += w * x * x;
-          sy += w * m->bias;
-          sxy += w * x * m->bias;
-          ++used;
-        }
-      }
-      const double spread = sxx - sx * sx / sw;
-      constexpr double kDistinct = 1e-9;
-      if (used < 2 || used != misfits.size() || !(spread > kDistinct * sxx)) continue;
-      const double slope = (sxy - sx * sy / sw) / spread;
-      const double z = slope * std::sqrt(spread);
+  for (const auto& [stage, biases] : stages) {
+    for (const SettingTrend& trend : TrendsWithSettings(biases)) {
+      const double z = trend.per_decade / trend.sd;
       if (std::abs(z) < kClear) continue;
       trends.push_back({.observable = stage.first,
                         .segment = stage.second,
-                        .with = name,
-                        .per_decade = slope,
+                        .with = trend.with,
+                        .per_decade = trend.per_decade,
                         .z = z});
     }
   }

@@ -9,6 +9,7 @@
 #include "server/report/campaign_view.h"
 #include "server/report/parameter_drift.h"
 #include "server/report/predictions.h"
+#include "server/report/prior_conflict.h"
 #include "server/report/residual_pattern.h"
 
 namespace calib::report {
@@ -82,6 +83,7 @@ struct Comparison {
   std::vector<std::string> at_bound;  ///< parameters pressed against a bound of their prior
   std::vector<ParameterDrift> parameter_drift;  ///< filled by whoever has the time: ParameterDrifts
   std::vector<ObservableDiscrepancy> discrepancies;  ///< filled by AddDiscrepancies()
+  std::vector<PriorConflict> prior_conflicts{};      ///< filled by whoever shows it: PriorConflicts
   /// The stated noise against the curves themselves: campaign::NoiseWarnings. Whoever shows no
   /// posterior beside it adds PosteriorWarnings().
   std::vector<std::string> warnings{};

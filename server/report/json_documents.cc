@@ -289,6 +289,17 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                              {"mean", d.mean[d.largest]},
                              {"sd", d.sd[d.largest]}}}});
   }
+  Json conflicts = Json::array();
+  for (const PriorConflict& p : c.prior_conflicts) {
+    conflicts.push_back({{"experiment", p.experiment},
+                         {"observable", p.observable},
+                         {"from", p.from},
+                         {"to", p.to},
+                         {"readings", p.readings},
+                         {"model_is", p.too_low ? "too_low" : "too_high"},
+                         {"nearest", p.nearest},
+                         {"text", InWords(p)}});
+  }
   Json trends = Json::array();
   for (const BiasTrend& t : c.trends) {
     trends.push_back({{"observable", t.observable},
@@ -307,6 +318,7 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& c) {
                {"parameter_drift", drift},
                {"trends", trends},
                {"discrepancy", discrepancy},
+               {"prior_conflicts", conflicts},
                {"at_bound", c.at_bound},
                {"warnings", c.warnings},
                {"note", c.note}});

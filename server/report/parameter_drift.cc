@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
-#include <set>
 
 #include "inference/emulator/emulated_posterior.h"
 #include "server/report/run_table.h"
+#include "server/report/setting_trend.h"
 
 namespace calib::report {
 namespace {
@@ -84,52 +84,24 @@ Common CommonFit(const std::vector<Estimate>& estimates) {
   return common;
 }
 
-// Weighted regression of the estimates on the logarithm of a setting.
+// The clearest trend of the estimates with a setting.
 void AddTrend(const campaign::Campaign& campaign, const std::vector<Part>& parts,
               const std::vector<Estimate>& estimates, double per_standard, ParameterDrift& drift) {
-  std::set<std::string> names;
-  for (const campaign::Experiment& e : campaign.experiments) {
-    for (const auto& [name, value] : e.settings) names.insert(name);
-    if (e.loading_rate) names.insert("loading_rate");
+  std::vector<ValueInExperiment> values;
+  for (const Estimate& e : estimates) {
+    const auto experiment = static_cast<std::size_t>(parts[e.part].experiment);
+    values.push_back(
+        {.experiment = &campaign.experiments[experiment], .value = e.mean, .sd = e.sd});
   }
-  for (const std::string& name : names) {
-    double sw = 0;
-    double sx = 0;
-    double sy = 0;
-    std::vector<double> x;
-    for (const Estimate& estimate : estimates) {
-      const campaign::Experiment& e =
-          campaign.experiments[static_cast<std::size_t>(parts[estimate.part].experiment)];
-      const auto found = e.settings.find(name);
-      const double value = name == "loading_rate"      ? e.loading_rate.value_or(0)
-                           : found == e.settings.end() ? 0
-                                                       : found->second;
-      if (!(value > 0)) break;
-      x.push_back(std::log10(value));
-      const double w = 1 / (estimate.sd * estimate.sd);
-      sw += w;
-      sx += w * x.back();
-      sy += w * estimate.mean;
-    }
-    if (x.size() != estimates.size()) continue;
-    double sxx = 0;
-    double sxy = 0;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      const double w = 1 / (estimates[i].sd * estimates[i].sd);
-      sxx += w * (x[i] - sx / sw) * (x[i] - sx / sw);
-      sxy += w * (x[i] - sx / sw) * (estimates[i].mean - sy / sw);
-    }
-    if (!(sxx > 0)) continue;
-    const double slope = sxy / sxx;
-    const double sd = 1 / std::sqrt(sxx);
-    if (!drift.trend_with.empty() &&
-        std::abs(slope / sd) <= std::abs(drift.trend / drift.trend_sd)) {
-      continue;
-    }
-    drift.trend_with = name;
-    drift.trend = slope * per_standard;
-    drift.trend_sd = sd * per_standard;
-  }
+  const std::vector<SettingTrend> trends = TrendsWithSettings(values);
+  const auto clearest = std::max_element(
+      trends.begin(), trends.end(), [](const SettingTrend& a, const SettingTrend& b) {
+        return std::abs(a.per_decade / a.sd) < std::abs(b.per_decade / b.sd);
+      });
+  if (clearest == trends.end()) return;
+  drift.trend_with = clearest->with;
+  drift.trend = clearest->per_decade * per_standard;
+  drift.trend_sd = clearest->sd * per_standard;
 }
 
 }  // namespace
@@ -154,6 +126,8 @@ absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& 
   // [parameter] -> estimates, experiments and stages apart.
   std::vector<std::vector<Estimate>> experiments(priors.size());
   std::vector<std::vector<Estimate>> segments(priors.size());
+  absl::Status first_problem;
+  int emulated = 0;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     const inference::DataSet own = inference::Restricted(readings.of_mean, parts[p].readings);
     inference::Iteration iteration;
@@ -173,7 +147,11 @@ absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& 
     }
     const std::vector<inference::Iteration> iterations = {iteration};
     const auto fit = inference::EmulatedPosterior(priors, own, options, iterations);
-    if (!fit.ok()) return fit.status();
+    if (!fit.ok()) {
+      first_problem.Update(fit.status());
+      continue;
+    }
+    ++emulated;
     if (!fit->adequate) continue;
     for (Index j = 0; j < d; ++j) {
       const inference::Prior& prior = priors[static_cast<std::size_t>(j)];
@@ -187,6 +165,8 @@ absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& 
       list[static_cast<std::size_t>(j)].push_back({.part = p, .mean = mean, .sd = sd});
     }
   }
+
+  if (emulated == 0 && !first_problem.ok()) return first_problem;
 
   std::vector<ParameterDrift> drifts;
   for (std::size_t j = 0; j < priors.size(); ++j) {

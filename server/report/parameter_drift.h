@@ -39,9 +39,9 @@ struct ParameterDrift {
 /// scatter and the emulator's error are in the widths: the scatter of packings and what refits of
 /// them show where it was measured, that of single runs otherwise. Parts by which a
 /// parameter stays as wide as its prior (sd above 0.8 of it) say nothing and are left out, and so
-/// are parts with fewer than `kLeastReadings` readings. Deterministic. About a second for each
+/// are parts with fewer than `kLeastReadings` readings and those that no emulator can be made of. Deterministic. About a second for each
 /// part. Errors: FAILED_PRECONDITION without a known size of the errors or with too few runs to
-/// emulate.
+/// emulate any part.
 absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& view);
 
 inline constexpr int kLeastReadings = 6;

@@ -13,6 +13,7 @@ std::string RenderReport(const CampaignView& view, const Story& story) {
   std::vector<ExperimentPrediction> predictions = PredictReadings(view);
   Comparison comparison = Compare(view, predictions);
   AddDiscrepancies(view, predictions, comparison);
+  comparison.prior_conflicts = PriorConflicts(view);
   comparison.parameter_drift = story.drift;
   const ReportData data{view, std::move(predictions), std::move(comparison), story};
   std::string body = SummarySection(data);

@@ -104,6 +104,9 @@ std::vector<std::string> WhereItFails(const Comparison& comparison) {
   });
   if (bad.size() > static_cast<std::size_t>(kMostStages)) bad.resize(kMostStages);
   std::vector<std::string> sentences;
+  for (const PriorConflict& conflict : comparison.prior_conflicts) {
+    sentences.push_back(InWords(conflict));
+  }
   for (const SegmentMisfit* m : bad) sentences.push_back(StageSentence(*m));
   std::vector<const ObservableDiscrepancy*> smooth;
   for (const ObservableDiscrepancy& d : comparison.discrepancies) {

@@ -41,7 +41,13 @@ bool HasLogPrior(const campaign::Campaign& campaign, const std::string& name) {
                      });
 }
 
-std::string Row(const v1::Posterior::Parameter& p, bool log) {
+// How far the means of two halves of the runs lie apart, in sd of the posterior.
+std::string HalvesCell(const v1::Posterior::Parameter& p) {
+  return fmt::format("<td>{}</td>",
+                     std::isfinite(p.split_half()) ? Number(p.split_half(), 2) + " sd" : "–");
+}
+
+std::string Row(const v1::Posterior::Parameter& p, bool log, bool halves) {
   const DisplayUnit unit = ParameterUnit(p);
   const auto shown = [&unit](double value, int digits) {
     return Escape(Number(value * unit.factor, digits));
@@ -50,27 +56,37 @@ std::string Row(const v1::Posterior::Parameter& p, bool log) {
       "<tr><td>{}</td><td "
       "class=\"l\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</"
       "td>"
-      "<td>{} – {}</td><td class=\"l\">{}</td><td class=\"l{}\">{}</td></tr>\n",
+      "{}<td>{} – {}</td><td class=\"l\">{}</td><td class=\"l{}\">{}</td></tr>\n",
       Escape(NameForPeople(p.name())), Escape(unit.label.empty() ? "–" : unit.label),
       shown(p.mean(), 4), shown(p.sd(), 2), Percent(p.cov(), 2), shown(p.q05(), 4),
-      shown(p.q50(), 4), shown(p.q95(), 4), shown(p.prior_min(), 3), shown(p.prior_max(), 3),
-      RangeBar(p, log), p.at_bound() ? " bad" : "", p.at_bound() ? "at a bound" : "");
+      shown(p.q50(), 4), shown(p.q95(), 4), halves ? HalvesCell(p) : "", shown(p.prior_min(), 3),
+      shown(p.prior_max(), 3), RangeBar(p, log), p.at_bound() ? " bad" : "",
+      p.at_bound() ? "at a bound" : "");
 }
 
 }  // namespace
 
 std::string ParameterSection(const ReportData& data) {
-  std::string html =
+  const auto& parameters = data.view.posterior.parameters();
+  const bool halves = std::any_of(parameters.begin(), parameters.end(),
+                                  [](const auto& p) { return std::isfinite(p.split_half()); });
+  std::string html = fmt::format(
       "<h2>Identified parameters</h2>\n<div class=\"scroll\"><table>\n<tr><th>parameter</th><th "
       "class=\"l\">unit</th><th>mean</th>"
       "<th>± "
-      "sd</th><th>cov</th><th>5&#8201;%</th><th>50&#8201;%</th><th>95&#8201;%</th><th>prior</"
+      "sd</th><th>cov</th><th>5&#8201;%</th><th>50&#8201;%</th><th>95&#8201;%</th>{}<th>prior</"
       "th><th class=\"l\">5–95&#8201;% in "
-      "the prior</th><th></th></tr>\n";
-  for (const auto& parameter : data.view.posterior.parameters()) {
-    html += Row(parameter, HasLogPrior(data.view.campaign, parameter.name()));
+      "the prior</th><th></th></tr>\n",
+      halves ? "<th>halves apart</th>" : "");
+  for (const auto& parameter : parameters) {
+    html += Row(parameter, HasLogPrior(data.view.campaign, parameter.name()), halves);
   }
   html += "</table></div>\n";
+  if (halves) {
+    html +=
+        "<p class=\"sub\">Halves apart: how far the means lie apart that either half of the runs "
+        "gives alone, in sd of the posterior; about one or more asks for more runs.</p>\n";
+  }
   if (!data.view.campaign.model.parameters.empty()) {
     html += "<p class=\"sub\">Held fixed: ";
     bool first = true;

@@ -124,6 +124,25 @@ std::string Pair(const ParameterPlot& x, const ParameterPlot& y, const std::vect
          fmt::format("<figcaption>correlation {}</figcaption></figure>\n", Number(correlation, 2));
 }
 
+// What the posterior says of the fit and of the errors stated; empty: nothing.
+std::string Checks(const v1::Posterior& posterior) {
+  std::string items;
+  if (posterior.has_predictive_p()) {
+    items += fmt::format(
+        "<li>Of data sets drawn from the posterior {} would fit no better than the measured ones "
+        "(posterior predictive p-value {}). Near 0 the model misses more than the stated errors "
+        "allow, near 1 these are stated too large.</li>\n",
+        Percent(posterior.predictive_p(), 2), Number(posterior.predictive_p(), 2));
+  }
+  for (const auto& scale : posterior.noise_scale()) {
+    items += fmt::format(
+        "<li>Errors of {} are {} times as large as stated (5–95&#8201;%: {} to {}).</li>\n",
+        Escape(fmt::format("{}", fmt::join(scale.observables(), ", "))), Number(scale.q50(), 2),
+        Number(scale.q05(), 2), Number(scale.q95(), 2));
+  }
+  return items.empty() ? "" : "<h3>Fit and errors</h3>\n<ul>\n" + items + "</ul>\n";
+}
+
 }  // namespace
 
 std::string PosteriorSection(const ReportData& data) {
@@ -140,7 +159,7 @@ std::string PosteriorSection(const ReportData& data) {
       : drawn  ? "draws from the posterior, one per chain,"
                : "weighted samples of all iterations");
   for (const ParameterPlot& parameter : parameters) html += Marginal(parameter, weights);
-  html += "</div>\n";
+  html += "</div>\n" + Checks(posterior);
   if (parameters.size() < 2) return html;
   html += fmt::format(
       "<h3>Pairs</h3>\n<p class=\"sub\">Every run as a faint dot; {}.</p>\n<div class=\"grid\">\n",

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/campaign/read_precomputed.h"
+#include "server/campaign/specimen_notes.h"
 #include "server/scheduler/answer.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
@@ -240,6 +241,11 @@ class Planner {
     }
     for (std::string& warning : campaign::RepeatedRunWarnings(campaign_)) {
       conclusion.posterior.add_warnings(std::move(warning));
+    }
+    const bool judged = outcome.answer.HasIntervals() || !campaign::IsFilter(campaign_.method);
+    if (const std::string left_out = campaign::ScatterLeftOut(campaign_);
+        judged && !outcome.answer.FromEmulator() && !left_out.empty()) {
+      conclusion.posterior.add_warnings(left_out);
     }
     conclusion.posterior.set_stated_loss(stated_loss_);
     if (audit_.samples > 0) {

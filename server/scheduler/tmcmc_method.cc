@@ -2,15 +2,21 @@
 // chains stand is computed again from the stored samples and states each time; whether a proposal
 // is accepted was decided by a number drawn before it ran, so neither order nor restarts matter.
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "inference/data/gaussian_likelihood.h"
 #include "inference/filter/log_weights.h"
 #include "inference/filter/parameter_summary.h"
+#include "inference/filter/posterior_checks.h"
 #include "inference/filter/weighted_moments.h"
+#include "inference/sampling/shuffle.h"
 #include "inference/tmcmc/tmcmc.h"
 #include "server/scheduler/early_stopping.h"
 #include "server/scheduler/method.h"
@@ -46,8 +52,10 @@ class TmcmcMethod final : public Method {
     if (!state.ok()) {
       return state.status();
     }
-    Outcome outcome{
-        .answer = AnswerOf(*state), .converged = false, .log = Describe(*state), .next = {}};
+    Outcome outcome{.answer = AnswerOf(*state, history),
+                    .converged = false,
+                    .log = Describe(*state),
+                    .next = {}};
     outcome.converged = state->finished() && outcome.answer.HasIntervals();
     const auto stages = static_cast<int>(state->stages.size());
     if (!state->finished() && affordable && stages <= definition_.campaign.max_iterations) {
@@ -111,7 +119,52 @@ class TmcmcMethod final : public Method {
     return (counts / static_cast<double>(state.origin.size())).array().log();
   }
 
-  Answer AnswerOf(const inference::TmcmcState& state) const {
+  /// Predictions of the runs that the chains stand on, one row per chain.
+  static Eigen::MatrixXd PredictionsOf(const inference::TmcmcState& state, const History& history) {
+    std::vector<Eigen::Index> begins;  // first run of each batch
+    Eigen::Index runs = 0;
+    for (const inference::Iteration& batch : history.iterations) {
+      begins.push_back(runs);
+      runs += batch.predictions.rows();
+    }
+    Eigen::MatrixXd predictions(state.samples.rows(),
+                                history.iterations.front().predictions.cols());
+    for (Eigen::Index i = 0; i < predictions.rows(); ++i) {
+      const auto run = static_cast<Eigen::Index>(state.origin[static_cast<std::size_t>(i)]);
+      const auto batch = std::prev(std::upper_bound(begins.begin(), begins.end(), run));
+      predictions.row(i) =
+          history.iterations[static_cast<std::size_t>(batch - begins.begin())].predictions.row(
+              run - *batch);
+    }
+    return predictions;
+  }
+
+  /// What the chains say of the fit, of the noise and of themselves. Chains of one family are not
+  /// independent of each other: halves are of families, not of chains.
+  void AddChecks(const inference::TmcmcState& state, const History& history,
+                 inference::Posterior& posterior) const {
+    const Eigen::Index n = state.samples.rows();
+    const Eigen::VectorXd equal = Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
+    const std::vector<int> half_of_family = inference::Halves(n);
+    std::vector<int> halves;
+    for (const int ancestor : state.ancestor) {
+      halves.push_back(half_of_family[static_cast<std::size_t>(ancestor)]);
+    }
+    posterior.split_half = inference::SplitHalf(state.samples, equal, halves, posterior.parameters);
+    if (definition_.campaign.filter.noise == inference::NoiseMode::kGiven) {
+      posterior.predictive_p =
+          inference::PredictiveP(definition_.data, state.log_likelihood, equal);
+      return;
+    }
+    const auto likelihood =
+        inference::GaussianLikelihood::Create(definition_.data, definition_.campaign.filter.noise);
+    if (likelihood.ok()) {  // the chains have come this far by it
+      posterior.noise_scale =
+          inference::NoiseScale(likelihood->VarianceFactors(PredictionsOf(state, history)), equal);
+    }
+  }
+
+  Answer AnswerOf(const inference::TmcmcState& state, const History& history) const {
     Answer answer;
     answer.weights_source = "tmcmc";
     inference::Posterior& posterior = answer.weighted;
@@ -132,6 +185,7 @@ class TmcmcMethod final : public Method {
     posterior.degeneracy = Degeneracy(state, posterior.ess);
     if (posterior.degeneracy.empty()) {
       answer.draws = state.samples;
+      AddChecks(state, history, posterior);
     } else {
       answer.warnings.push_back(posterior.degeneracy);
     }

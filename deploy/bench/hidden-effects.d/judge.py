@@ -38,9 +38,16 @@ def good(outcome, row):
         return diagnosis['verdict'] in ('unexplained', 'ambiguous')
     if row == 'two effects at once':
         return truth <= set(outcome['verdict']['improve']['steps'][-1]['effects'])
-    if row == 'measurement-side effect':
-        return diagnosis['verdict'] != 'missing_effect' or diagnosis['effect'] in MEASUREMENT_SIDE
+    if row == 'measurement-side effect':  # a group of grain effects alone is a mistake too
+        return not named or bool(named & MEASUREMENT_SIDE)
     return bool(truth & named)
+
+
+def confident_and_wrong(outcome):
+    """One name with p < 0.01 that is not what is hidden."""
+    diagnosis = outcome['verdict']['diagnose']
+    return (diagnosis['verdict'] == 'missing_effect' and diagnosis['effect'] not in outcome['truth']['effects']
+            and diagnosis['candidates'][0]['p_value'] < 0.01)
 
 
 def line(row, hits, n, what, required):
@@ -61,6 +68,8 @@ def table(outcomes, planned):
         own = [o for o in outcomes if row in o['case'].rows]
         if own:
             lines.append(line(row, sum(good(o, row) for o in own), len(own), what, required))
+            if row == 'true effect removed':
+                lines.append(line(row, sum(not confident_and_wrong(o) for o in own), len(own), 'no wrong name with p < 0.01', 0.95))
     improved = [o for o in outcomes if o['verdict'].get('improve', {}).get('steps')]
     held = [o['verdict']['improve']['steps'][-1].get('heldout_rms_error') for o in improved]
     held = [h for h in held if h is not None]

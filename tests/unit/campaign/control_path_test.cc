@@ -115,6 +115,36 @@ TEST(ControlPath, NamesTheSteadyState) {
   EXPECT_EQ(NameSegments(path, curves).back(), "post_peak");
 }
 
+// An unloading on the way up hides neither the peak nor what comes after it.
+TEST(ControlPath, NamesThePeakBehindAReloading) {
+  const ControlPath path =
+      CleanControl({0, 0.01, 0.02, 0.01, 0.015, 0.02, 0.03, 0.04, 0.08, 0.12}, 0, 1e-4);
+  EXPECT_THAT(NameSegments(path, {.strength = {0, 0.4, 0.9, 0.2, 0.6, 0.9, 1.2, 1.4, 1.2, 1.0}}),
+              ElementsAre("initial_loading", "initial_loading", "pre_peak", "unload_1", "reload_1",
+                          "reload_1", "pre_peak", "peak", "post_peak", "post_peak"));
+  // Without a peak the stages are those of the path.
+  EXPECT_THAT(NameSegments(path, {.strength = {0, 0.4, 0.9, 0.2, 0.6, 0.9, 1.2, 1.4, 1.6, 1.7}}),
+              ElementsAre("initial_loading", "initial_loading", "initial_loading", "unload_1",
+                          "reload_1", "reload_1", "reload_1", "reload_1", "reload_1", "reload_1"));
+}
+
+TEST(ControlPath, NamesTheSteadyStateBeforeAnUnloading) {
+  std::vector<double> strain;
+  StageCurves curves;
+  for (int i = 0; i <= 40; ++i) {
+    strain.push_back(0.005 * i);
+    curves.strength.push_back(1 - std::exp(-60 * strain.back()));
+  }
+  for (int i = 1; i <= 4; ++i) {
+    strain.push_back(0.2 - 0.005 * i);
+    curves.strength.push_back(1 - 0.3 * i);
+  }
+  const auto names = NameSegments(CleanControl(strain, 0, 1e-6), curves);
+  EXPECT_EQ(names[40], "steady_state");
+  EXPECT_EQ(names[41], "unload_1");
+  EXPECT_EQ(names.back(), "unload_1");
+}
+
 TEST(ControlPath, OneReadingAndNone) {
   EXPECT_THAT(CleanControl({}, 0, std::nullopt).points, IsEmpty());
   EXPECT_THAT(Targets(CleanControl({0.01}, 0, std::nullopt)), ElementsAre(0.01));

@@ -18,6 +18,7 @@
 namespace calib::campaign {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using testing::GoodFiles;
 using ::testing::HasSubstr;
@@ -109,6 +110,27 @@ TEST(Realizations, BeyondSeveralFilesTakeThemInTurn) {
   const Campaign fewer = Read(WithRealizations("files: [a.txt, b.txt]", 1), files).campaign;
   EXPECT_THAT(fewer.experiments[0].specimens, SizeIs(1));
   EXPECT_THAT(SpecimenNotes(fewer), IsEmpty());
+}
+
+// Where the method has no place for what packings differ by, a reader is told before a run is made.
+TEST(Realizations, WhoLeavesTheirScatterOutSaysSo) {
+  Campaign c = Read(WithRealizations("file: packing.txt", 2), GoodFiles()).campaign;
+  c.filter.noise = inference::NoiseMode::kGiven;
+  c.method = Method::kIterativeBayesianFilter;
+  EXPECT_EQ(ScatterLeftOut(c), "");
+  c.filter.noise = inference::NoiseMode::kInferred;
+  EXPECT_THAT(ScatterLeftOut(c), HasSubstr("With noise inferred what runs on different packings"));
+  for (const Method method : {Method::kTmcmc, Method::kSurrogateMsrs}) {
+    c.method = method;
+    EXPECT_THAT(ScatterLeftOut(c),
+                HasSubstr(std::string(ToString(method)) + " compares runs by the stated errors"));
+    EXPECT_THAT(SpecimenNotes(c), Contains(ScatterLeftOut(c)));
+    Campaign one = c;
+    one.experiments[0].specimens.resize(1);
+    EXPECT_EQ(ScatterLeftOut(one), "");
+    one.replicates = 4;
+    EXPECT_THAT(ScatterLeftOut(one), HasSubstr("what repeats of a run differ by"));
+  }
 }
 
 TEST(Realizations, ACloudGivesOtherClouds) {

@@ -104,6 +104,36 @@ TEST(CommonChain, HasTheBitsOfItsKernels) {
   }
 }
 
+TEST(CommonChain, StiffnessesHaveTheBitsOfItsKernels) {
+  for (const Model& law : {test::HertzModel(), test::LinearModel(), Damped(test::HertzModel()),
+                           Damped(test::LinearModel())}) {
+    for (const std::vector<std::string>& names : {std::vector<std::string>{},
+                                                  {"rolling_resistance"},
+                                                  {"rolling_resistance", "twisting_resistance"}}) {
+      for (unsigned seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE(law.contact + " " + std::to_string(names.size()));
+        const ContactModel model(With(law, names, seed % 2 == 0));
+        Case one(seed, kBlock, model.history_size());
+        Case other(seed, kBlock, model.history_size());
+        model.Evaluate(one.block);
+        CommonChainStiffness(*model.common(), other.block);
+        using Member = ContactBlock::Lane ContactBlock::*;
+        for (const Member lane :
+             {&ContactBlock::nx, &ContactBlock::ny, &ContactBlock::nz, &ContactBlock::overlap,
+              &ContactBlock::normal_stiffness, &ContactBlock::tangential_stiffness,
+              &ContactBlock::rolling_stiffness, &ContactBlock::twisting_stiffness,
+              &ContactBlock::normal_damping, &ContactBlock::tangential_damping}) {
+          for (int k = 0; k < kBlock; ++k) {
+            if (other.block.overlap[k] > 0) {
+              EXPECT_EQ((one.block.*lane)[k], (other.block.*lane)[k]);
+            }
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(CommonChain, OtherModelsHaveNone) {
   EXPECT_FALSE(CommonChainOf(With(test::LinearModel(), {"twisting_resistance"}, false)));
   Model sticky = test::HertzModel();

@@ -95,24 +95,6 @@ TEST(NeighborList, FindsWhatBruteForceFinds) {
   }
 }
 
-TEST(NeighborList, PlacesFollowAscendingNeighbours) {
-  const Packing packing = RandomGrains(3, 120, 2e-2);
-  ParticleArrays p = MakeParticles(packing, 2650);
-  PeriodicCell cell{.length = {packing.length[0], packing.length[1], packing.length[2]}};
-  NeighborList list;
-  ASSERT_TRUE(NeighborSearch().Build(cell, 1e-4, p, list).ok());
-  std::vector<int> neighbour(static_cast<std::size_t>(2 * list.size()), -1);
-  for (int s = 0; s < list.size(); ++s) {
-    neighbour[list.place_i[s]] = list.second[s];
-    neighbour[list.place_j[s]] = list.first[s];
-  }
-  for (int g = 0; g < p.size(); ++g) {
-    EXPECT_TRUE(std::is_sorted(neighbour.begin() + list.place_row[g],
-                               neighbour.begin() + list.place_row[g + 1]));
-  }
-  EXPECT_EQ(std::count(neighbour.begin(), neighbour.end(), -1), 0);
-}
-
 TEST(NeighborList, NamesTheGrainThatWasLost) {
   const Packing packing = RandomGrains(3, 50, 2e-2);
   ParticleArrays p = MakeParticles(packing, 2650);

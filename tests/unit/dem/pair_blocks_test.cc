@@ -11,6 +11,7 @@
 #include <set>
 
 #include "dem/dynamics/assembly.h"
+#include "dem/dynamics/chunks.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -40,24 +41,14 @@ ParticleArrays Cloud(int n, Random& random) {
   return p;
 }
 
-/// Random pairs of n grains in lanes of whole blocks; loads of a grain go to a row of places.
-PairLanes RandomLanes(int n, int blocks, Random& random, std::vector<int>& place_row) {
+/// Random pairs of n grains in lanes of whole blocks.
+PairLanes RandomLanes(int n, int blocks, Random& random) {
   PairLanes lanes;
-  std::vector<int> loads(static_cast<std::size_t>(n), 0);
   for (int k = 0; k < blocks * kBlock; ++k) {
     const int i = random.Below(n - 1);
     lanes.first.push_back(i);
     lanes.second.push_back(i + 1 + random.Below(n - 1 - i));
     lanes.image.push_back(static_cast<std::uint8_t>(random.Below(kImages)));
-    ++loads[static_cast<std::size_t>(lanes.first.back())];
-    ++loads[static_cast<std::size_t>(lanes.second.back())];
-  }
-  place_row = {0};
-  for (const int count : loads) place_row.push_back(place_row.back() + count);
-  std::vector<int> next(place_row.begin(), place_row.end() - 1);
-  for (std::size_t k = 0; k < lanes.first.size(); ++k) {
-    lanes.place_i.push_back(next[static_cast<std::size_t>(lanes.first[k])]++);
-    lanes.place_j.push_back(next[static_cast<std::size_t>(lanes.second[k])]++);
   }
   return lanes;
 }
@@ -73,8 +64,7 @@ TEST(PairBlocks, LanesAreLoadedAsSinglePairsWouldBe) {
   for (auto& translation : shift) {
     for (int a = 0; a < 3; ++a) translation[a] = random.In(-0.5, 0.5);
   }
-  std::vector<int> place_row;
-  const PairLanes lanes = RandomLanes(n, 20, random, place_row);
+  const PairLanes lanes = RandomLanes(n, 20, random);
   int blocks_apart = 0;
   for (int b = 0; b < lanes.blocks(); ++b) {
     ContactBlock block;
@@ -160,50 +150,84 @@ TEST(PairBlocks, OnlyLanesThatOverlapOrAreHeldAct) {
   }
 }
 
-TEST(PairBlocks, LoadsAreSummedInTheOrderOfPlaces) {
+TEST(PairBlocks, LoadsAreSummedChunkByChunkInTheOrderOfLanes) {
   Random random(3);
-  const int n = 23;
-  std::vector<int> place_row;
-  const PairLanes lanes = RandomLanes(n, 6, random, place_row);
-  std::vector<GrainLoad> loads(static_cast<std::size_t>(place_row.back()));
-  std::vector<std::array<double, 6>> at_place(loads.size());
+  const int n = 43;
+  const int blocks = 21;  // the last of three chunks is not whole
+  constexpr int kBlocks = kPairChunk / kBlock;
+  PairLanes lanes = RandomLanes(n - 1, blocks, random);  // nothing meets the last grain
+  LoadPlaces places;
+  places.Assign(n, lanes);
+  using Six = std::array<double, 6>;
+  std::vector<Six> expected(n, Six{});
   LaneSums sums;
   double stress[4] = {0, 0, 0, 0};
-  for (int b = 0; b < lanes.blocks(); ++b) {
-    ContactBlock block;
-    for (auto* lane : {&block.force_x, &block.force_y, &block.force_z, &block.torque_ix,
-                       &block.torque_iy, &block.torque_iz, &block.torque_jx, &block.torque_jy,
-                       &block.torque_jz, &block.dx, &block.dy, &block.dz}) {
-      for (double& value : *lane) value = random.In(-1, 1);
+  for (const bool again : {false, true}) {  // what was left before is forgotten
+    expected.assign(n, Six{});
+    for (int chunk = 0; chunk * kBlocks < blocks; ++chunk) {
+      GrainLoad* const loads = places.Clear(chunk);
+      std::vector<Six> of_chunk(n, Six{});
+      for (int b = chunk * kBlocks; b < std::min((chunk + 1) * kBlocks, blocks); ++b) {
+        ContactBlock block;
+        for (auto* lane : {&block.force_x, &block.force_y, &block.force_z, &block.torque_ix,
+                           &block.torque_iy, &block.torque_iz, &block.torque_jx, &block.torque_jy,
+                           &block.torque_jz, &block.dx, &block.dy, &block.dz}) {
+          for (double& value : *lane) value = random.In(-1, 1);
+        }
+        BlockForces forces;
+        AddLoads(lanes, b, block, loads, forces, sums);
+        for (int k = 0; k < kBlock; ++k) {
+          const auto lane = static_cast<std::size_t>(b * kBlock + k);
+          const double f[3] = {block.force_x[k], block.force_y[k], block.force_z[k]};
+          const Six on_i = {
+              -f[0], -f[1], -f[2], block.torque_ix[k], block.torque_iy[k], block.torque_iz[k]};
+          const Six on_j = {
+              f[0], f[1], f[2], block.torque_jx[k], block.torque_jy[k], block.torque_jz[k]};
+          for (std::size_t c = 0; c < 6; ++c) {
+            of_chunk[static_cast<std::size_t>(lanes.first[lane])][c] += on_i[c];
+            of_chunk[static_cast<std::size_t>(lanes.second[lane])][c] += on_j[c];
+          }
+          EXPECT_EQ((std::array{forces.x[k], forces.y[k], forces.z[k]}),
+                    (std::array{f[0], f[1], f[2]}));
+          stress[0] += f[0] * block.dx[k];
+          stress[1] += f[1] * block.dy[k];
+          stress[2] += f[2] * block.dz[k];
+          stress[3] += f[0] * block.dz[k] + f[2] * block.dx[k];
+        }
+      }
+      for (std::size_t g = 0; g < expected.size(); ++g) {
+        for (std::size_t c = 0; c < 6; ++c) expected[g][c] += of_chunk[g][c];
+      }
     }
-    StoreLoads(lanes, b, block, loads.data(), sums);
-    for (int k = 0; k < kBlock; ++k) {
-      const auto lane = static_cast<std::size_t>(b * kBlock + k);
-      at_place[static_cast<std::size_t>(lanes.place_i[lane])] = {
-          -block.force_x[k],  -block.force_y[k],  -block.force_z[k],
-          block.torque_ix[k], block.torque_iy[k], block.torque_iz[k]};
-      at_place[static_cast<std::size_t>(lanes.place_j[lane])] = {
-          block.force_x[k],   block.force_y[k],   block.force_z[k],
-          block.torque_jx[k], block.torque_jy[k], block.torque_jz[k]};
-      stress[0] += block.force_x[k] * block.dx[k];
-      stress[1] += block.force_y[k] * block.dy[k];
-      stress[2] += block.force_z[k] * block.dz[k];
-      stress[3] += block.force_x[k] * block.dz[k] + block.force_z[k] * block.dx[k];
+    ParticleArrays p = Cloud(n, random);
+    places.Gather(0, 8, p);
+    places.Gather(8, n, p);
+    for (std::size_t g = 0; g < expected.size(); ++g) {
+      EXPECT_EQ(expected[g], (Six{p.fx[g], p.fy[g], p.fz[g], p.tx[g], p.ty[g], p.tz[g]}))
+          << g << (again ? " again" : "");
+      const Vec3 force = places.ForceOn(static_cast<int>(g));
+      EXPECT_EQ((std::array{force.x, force.y, force.z}), (std::array{p.fx[g], p.fy[g], p.fz[g]}));
     }
-  }
-  ParticleArrays p = Cloud(n, random);
-  GatherPlaces(place_row.data(), loads.data(), 0, 6, p);
-  GatherPlaces(place_row.data(), loads.data(), 6, n, p);
-  for (std::size_t g = 0; g < static_cast<std::size_t>(n); ++g) {
-    std::array<double, 6> sum{};
-    for (int place = place_row[g]; place < place_row[g + 1]; ++place) {
-      for (std::size_t c = 0; c < 6; ++c) sum[c] += at_place[static_cast<std::size_t>(place)][c];
-    }
-    EXPECT_EQ(sum, (std::array<double, 6>{p.fx[g], p.fy[g], p.fz[g], p.tx[g], p.ty[g], p.tz[g]}));
   }
   for (int a = 0; a < 4; ++a) {
-    EXPECT_NEAR(sums.at[a][0] + sums.at[a][1] + sums.at[a][2] + sums.at[a][3], stress[a], 1e-12);
+    EXPECT_NEAR(sums.at[a][0] + sums.at[a][1] + sums.at[a][2] + sums.at[a][3], stress[a], 1e-11);
   }
+}
+
+TEST(PairBlocks, ChangesByHandBetweenMotionAndForcesCount) {
+  Packing two;
+  two.x = {4e-3, 6.1e-3};
+  two.y = two.z = {5e-3, 5e-3};
+  two.radius = {1e-3, 1e-3};
+  two.clump = {-1, -1};
+  two.length[0] = two.length[1] = two.length[2] = 1e-2;
+  Assembly assembly(two, 2650, ContactModel(test::LinearModel()), Surroundings{}, 1);
+  ASSERT_TRUE(assembly.EvaluateForces().ok());
+  EXPECT_EQ(assembly.contacts(), 0);
+  assembly.Move({.dt = 1e-9});
+  for (double& x : assembly.mutable_particles().x) x *= 0.95;
+  ASSERT_TRUE(assembly.EvaluateForces().ok());
+  EXPECT_EQ(assembly.contacts(), 1);
 }
 
 /// Finds what contacts remember among the members that an assembly shows to archives.

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <vector>
+
+#include "inference/filter/iterative_filter.h"
 
 namespace calib::inference {
 namespace {
@@ -58,6 +61,35 @@ TEST(LatinHypercube, MoreCandidatesNeverLieCloser) {
   }
   const auto one = LatinHypercube({.points = 11, .dimensions = 4, .symmetric = true, .seed = 7});
   EXPECT_GT(before, 1.2 * SmallestDistance(*one));
+}
+
+TEST(LatinHypercube, TheSmallestDistanceIsThatOfAllPairs) {
+  for (const int n : {2, 9, 200}) {
+    const auto points = LatinHypercube({.points = n, .dimensions = 3, .centred = false, .seed = 5});
+    ASSERT_TRUE(points.ok());
+    double smallest = INFINITY;
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < i; ++k)
+        smallest = std::min(smallest, (points->row(i) - points->row(k)).norm());
+    }
+    EXPECT_NEAR(SmallestDistance(*points), smallest, 1e-14);
+  }
+}
+
+// The size of a production set: candidates are given up at their first pair that is too close.
+TEST(LatinHypercube, AFilterStartsFromTheBestOfAThousandOfTwoThousandPoints) {
+  constexpr int kPoints = 2000;
+  const std::vector<Prior> priors(5, {.kind = PriorKind::kUniform, .min = 0, .max = 1});
+  const auto samples = DrawSamples(
+      Proposal{}, priors, {.design = Design::kSymmetricLatinHypercube, .seed = 3}, 0, kPoints);
+  ASSERT_TRUE(samples.ok()) << samples.status();
+  LatinHypercubeOptions options{
+      .points = kPoints, .dimensions = 5, .symmetric = true, .candidates = 1000, .seed = 3};
+  const auto best = LatinHypercube(options);
+  options.candidates = 200;
+  const auto of_fewer = LatinHypercube(options);
+  EXPECT_NEAR(SmallestDistance(*samples), SmallestDistance(*best), 1e-12);
+  EXPECT_GT(SmallestDistance(*best), SmallestDistance(*of_fewer));
 }
 
 TEST(LatinHypercube, DependsOnTheSeedAlone) {

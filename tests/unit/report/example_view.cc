@@ -82,6 +82,7 @@ void Summarise(CampaignView& view, double shrink, v1::Posterior& posterior) {
     p->set_q05(p->mean() - 1.64 * p->sd());
     p->set_q50(p->mean());
     p->set_q95(p->mean() + 1.64 * p->sd());
+    p->set_split_half(0.12 * (k + 1));
   }
   posterior.set_ess(38 / shrink);
   posterior.set_pareto_k(0.42 * shrink);
@@ -89,6 +90,7 @@ void Summarise(CampaignView& view, double shrink, v1::Posterior& posterior) {
   posterior.set_log_evidence_se(0.3);
   posterior.set_campaign(view.status.campaign());
   posterior.set_noise("given");
+  posterior.set_predictive_p(0.38);
 }
 
 }  // namespace

@@ -72,6 +72,32 @@ TEST(Report, ShowsTheScatterOfTheModelBesideTheNoise) {
   EXPECT_THAT(html, Not(HasSubstr("nan")));
 }
 
+// Whatever the method: what the store holds of them is shown.
+TEST(Report, ShowsHowThePosteriorJudgesItself) {
+  CampaignView view = testing::ExampleView("judged");
+  for (auto& p : *view.posterior.mutable_parameters()) p.set_split_half(NAN);
+  view.posterior.clear_predictive_p();
+  const std::string before = RenderReport(view);
+  EXPECT_THAT(before, Not(HasSubstr("Fit and errors")));
+  EXPECT_THAT(before, Not(HasSubstr("halves apart")));
+  view.posterior.set_predictive_p(0.034);
+  view.posterior.mutable_parameters(1)->set_split_half(0.21);
+  v1::Posterior::NoiseScale& scale = *view.posterior.add_noise_scale();
+  scale.add_observables("tx02.q_over_p");
+  scale.add_observables("tx02.<b>");
+  scale.set_q05(1.1);
+  scale.set_q50(1.4);
+  scale.set_q95(1.9);
+  const std::string html = RenderReport(view);
+  EXPECT_THAT(html, HasSubstr("p-value 0.034"));
+  EXPECT_THAT(html, HasSubstr("Of data sets drawn from the posterior 3.4"));
+  EXPECT_THAT(html, HasSubstr("Errors of tx02.q_over_p, tx02.&lt;b&gt; are 1.4 times as large as "
+                              "stated (5–95&#8201;%: 1.1 to 1.9)"));
+  EXPECT_THAT(html, HasSubstr("<th>halves apart</th>"));
+  EXPECT_THAT(html, HasSubstr("<td>0.21 sd</td>"));
+  EXPECT_THAT(html, Not(HasSubstr("nan")));
+}
+
 TEST(Report, TellsTheStoryOfAnAddedEffect) {
   const CampaignView view = testing::ExampleView("sand");
   ObservableMisfit misfit;

@@ -16,6 +16,11 @@
 namespace calib::scheduler {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
 constexpr int kSamples = 60;
 
 testing::SmallCampaign Campaign(int packings, const std::string& extra = "",
@@ -242,6 +247,31 @@ TEST(Realizations, OtherMethodsKeepTheirPosteriorAndStateTheScatter) {
   ASSERT_EQ(run.posterior.scatter_size(), 1);
   EXPECT_EQ(run.posterior.scatter(0).from(), "realizations");
   EXPECT_EQ(run.posterior.scatter(0).runs(), 2);
+  EXPECT_THAT(run.posterior.warnings(),
+              Contains(AllOf(HasSubstr("tmcmc compares runs by the stated errors alone"),
+                             HasSubstr("runs on different packings"))));
+}
+
+TEST(Realizations, WeightsWithNoiseInferredSayThatScatterIsLeftOut) {
+  for (const int packings : {1, 2}) {
+    testing::SmallCampaign campaign = testing::MakeSmallCampaign({.samples = 300,
+                                                                  .max_iterations = 1,
+                                                                  .load_steps = 6,
+                                                                  .relative_noise = 0.1,
+                                                                  .packings = packings,
+                                                                  .method = "sqmc"});
+    const std::string given = "noise: given";
+    campaign.yaml.replace(campaign.yaml.find(given), given.size(), "noise: inferred");
+    const Ended run = RunCampaign("scatter_inferred", campaign, 0.02);
+    ASSERT_EQ(run.posterior.posterior_from(), "weights");
+    const auto left_out =
+        HasSubstr("With noise inferred what runs on different packings differ by");
+    if (packings == 1) {
+      EXPECT_THAT(run.posterior.warnings(), Not(Contains(left_out)));
+    } else {
+      EXPECT_THAT(run.posterior.warnings(), Contains(left_out));
+    }
+  }
 }
 
 }  // namespace

@@ -77,6 +77,19 @@ TEST_F(FinishedTmcmcCampaign, HasEquallyWeightedDrawsAndTheirEvidence) {
   EXPECT_NEAR(mass, 1, 1e-12) << "chains stand on runs of the campaign";
 }
 
+TEST_F(FinishedTmcmcCampaign, JudgesItsFitAndItself) {
+  const v1::Posterior posterior = LastPosterior(*service_);
+  ASSERT_TRUE(posterior.has_predictive_p());
+  EXPECT_GT(posterior.predictive_p(), 0);
+  EXPECT_LT(posterior.predictive_p(), 1);
+  EXPECT_EQ(posterior.noise_scale_size(), 0) << "the noise is given";
+  for (const auto& parameter : posterior.parameters()) {
+    // Means of halves of 40 chains or so: 2 / sqrt(80) in the mean, of families somewhat more.
+    EXPECT_GT(parameter.split_half(), 0);
+    EXPECT_LT(parameter.split_half(), 4 * 2 / std::sqrt(80.0));
+  }
+}
+
 TEST_F(FinishedTmcmcCampaign, HasNotRunProposalsOutsideThePrior) {
   int refused = 0;
   int runs = 0;
@@ -104,30 +117,53 @@ TEST_F(FinishedTmcmcCampaign, HasRunHeldOutTestsOnSomeOfTheChains) {
   EXPECT_LE(held_out.size(), 20U);
 }
 
-// Of the same data: the weighted posterior of many samples drawn from the prior.
+// Of the same data: the weighted posterior of many samples drawn from the prior, with the noise
+// given and inferred.
 TEST(TmcmcCampaign, AgreesWithManyWeightedSamples) {
-  SimulatedService chains("tmcmc_many");
-  chains.Submit(Campaign(150, 50));
-  chains.RunToEnd(1, true);
-  SimulatedService weights("weights_many");
-  weights.Submit(testing::MakeSmallCampaign({.samples = 800,
-                                             .max_iterations = 1,
-                                             .load_steps = 12,
-                                             .relative_noise = 0.1,
-                                             .method = "sqmc"}));
-  weights.RunToEnd(1, true);
-  const v1::Posterior found = LastPosterior(chains);
-  const v1::Posterior expected = LastPosterior(weights);
-  ASSERT_EQ(expected.posterior_from(), "weights");
-  // Four standard errors of what 150 draws and 800 weighted samples know.
-  const double error = 4 * std::sqrt(1 / found.ess() + 1 / expected.ess());
-  for (int i = 0; i < found.parameters_size(); ++i) {
-    const double sd = expected.parameters(i).sd();
-    EXPECT_NEAR(found.parameters(i).mean(), expected.parameters(i).mean(), error * sd);
-    EXPECT_NEAR(found.parameters(i).sd(), sd, error * sd);
+  for (const std::string noise : {"given", "inferred"}) {
+    const auto submit = [&noise](SimulatedService& service, testing::SmallCampaign campaign) {
+      const std::string given = "noise: given";
+      campaign.yaml.replace(campaign.yaml.find(given), given.size(), "noise: " + noise);
+      service.Submit(campaign);
+      service.RunToEnd(1, true);
+      return LastPosterior(service);
+    };
+    SimulatedService chains("tmcmc_many");
+    const v1::Posterior found = submit(chains, Campaign(150, 50));
+    SimulatedService weights("weights_many");
+    const v1::Posterior expected =
+        submit(weights, testing::MakeSmallCampaign({.samples = 800,
+                                                    .max_iterations = 1,
+                                                    .load_steps = 12,
+                                                    .relative_noise = 0.1,
+                                                    .method = "sqmc"}));
+    ASSERT_EQ(expected.posterior_from(), "weights");
+    // Four standard errors of what 150 draws and 800 weighted samples know.
+    const double error = 4 * std::sqrt(1 / found.ess() + 1 / expected.ess());
+    for (int i = 0; i < found.parameters_size(); ++i) {
+      const double sd = expected.parameters(i).sd();
+      EXPECT_NEAR(found.parameters(i).mean(), expected.parameters(i).mean(), error * sd);
+      EXPECT_NEAR(found.parameters(i).sd(), sd, error * sd);
+    }
+    EXPECT_NEAR(found.log_evidence(), expected.log_evidence(),
+                4 * std::hypot(found.log_evidence_se(), expected.log_evidence_se()));
+    ASSERT_EQ(found.has_predictive_p(), expected.has_predictive_p());
+    if (expected.has_predictive_p()) {
+      // A mean of numbers between 0 and 1, whose sd is 0.5 at most.
+      EXPECT_NEAR(found.predictive_p(), expected.predictive_p(), 0.5 * error);
+    }
+    ASSERT_EQ(found.noise_scale_size(), expected.noise_scale_size());
+    ASSERT_EQ(found.noise_scale_size(), noise == "inferred" ? 1 : 0);
+    for (int g = 0; g < found.noise_scale_size(); ++g) {
+      const auto& own = found.noise_scale(g);
+      const auto& other = expected.noise_scale(g);
+      EXPECT_EQ(own.observables(0), "tx.stress_ratio");
+      const double range = other.q95() - other.q05();
+      EXPECT_NEAR(own.q05(), other.q05(), error * range);
+      EXPECT_NEAR(own.q50(), other.q50(), error * range);
+      EXPECT_NEAR(own.q95(), other.q95(), error * range);
+    }
   }
-  EXPECT_NEAR(found.log_evidence(), expected.log_evidence(),
-              4 * std::hypot(found.log_evidence_se(), expected.log_evidence_se()));
 }
 
 TEST(TmcmcCampaign, SameBitsWhateverGoesWrong) {

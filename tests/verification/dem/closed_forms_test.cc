@@ -207,8 +207,7 @@ double Energy(const Assembly& assembly, double modulus) {
     if (!assembly.touching(s)) continue;
     const auto i = static_cast<std::size_t>(assembly.neighbors().first[s]);
     const auto j = static_cast<std::size_t>(assembly.neighbors().second[s]);
-    const double* f = assembly.load_on_j(s).force;
-    const double force = std::hypot(f[0], f[1], f[2]);
+    const double force = Length(assembly.force_on_j(s));
     const double r = p.radius[i] * p.radius[j] / (p.radius[i] + p.radius[j]);
     const double overlap = std::pow(force / (modulus * std::sqrt(r)), 2.0 / 3.0);
     e += 0.4 * force * overlap;

@@ -275,8 +275,7 @@ TEST(NonsphericalShape, KeepsVolumesAndLetsTheGrainsGiveWay) {
   const auto& list = after.neighbors();
   for (int s = 0; s < list.size(); ++s) {
     if (after.touching(s)) {
-      const double* f = after.load_on_j(s).force;
-      largest = std::max(largest, std::hypot(f[0], f[1], f[2]));
+      largest = std::max(largest, Length(after.force_on_j(s)));
     }
   }
   // kn = 2 E r*: overlap over radius; jammed grains would keep percents.

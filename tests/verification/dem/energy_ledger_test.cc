@@ -102,8 +102,7 @@ class Book {
     const double rj = p.radius[j];
     const double kn = 2 * kModulus * ri * rj / (ri + rj);
     const double overlap = ri + rj - Length(d);
-    const double* const load = assembly_.load_on_j(slot).force;
-    const Vec3 force{load[0], load[1], load[2]};
+    const Vec3 force = assembly_.force_on_j(slot);
     contact.stiffness = kShearRatio * kn;
     contact.shear = force - Dot(force, n) * n;
     ledger_.normal += 0.5 * kn * overlap * overlap;
@@ -116,11 +115,12 @@ class Book {
     const double mass = 1.0 / (p.inverse_mass[i] + p.inverse_mass[j]);
     const double c = 2 * damping_ * std::sqrt(mass * kn);
     contact.damped = std::max(kn * overlap - c * opening, 0.0) - kn * overlap;
-    const auto before = contacts_.find({p.id[i], p.id[j]});
-    if (dt == 0 || before == contacts_.end()) {
+    if (dt == 0) {
       return;
     }
-    const Contact& old = before->second;
+    const auto before = contacts_.find({p.id[i], p.id[j]});
+    const Contact old =
+        before == contacts_.end() ? Contact{} : before->second;  // new: from nothing
     ledger_.dashpots -= 0.5 * (contact.damped + old.damped) * opening * dt;
     // Slip less what the spring has taken up of it is sliding.
     const Vec3 sliding =
@@ -138,7 +138,7 @@ Ledger Strained(Model model, double damping, const char* what) {
   model.density = kDensity;
   Book book(model, damping);
   const Ledger start = book.ledger();
-  const double dt = 2e-7;
+  const double dt = 1e-7;
   const int steps = static_cast<int>(std::lround(kStrain / kRate / dt));
   for (int step = 0; step < steps; ++step) {
     book.Step(dt);

@@ -99,10 +99,10 @@ TEST(SimpleShear, StressesAreTheForcesThroughHorizontalPlanes) {
         const auto d = Branch(assembly, static_cast<std::size_t>(list.first[c]),
                               static_cast<std::size_t>(list.second[c]));
         // The share of planes that a branch crosses is |dz|/Lz; force acts on its upper grain.
-        const double* f = assembly.load_on_j(c).force;
+        const Vec3 f = assembly.force_on_j(c);
         const double share = d[2] / cell.length[2] / (cell.length[0] * cell.length[1]);
-        normal += share * f[2];
-        shear -= share * f[0];
+        normal += share * f.z;
+        shear -= share * f.x;
       }
     }
     return absl::OkStatus();

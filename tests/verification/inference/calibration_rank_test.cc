@@ -126,7 +126,7 @@ int ThinnedRank(double truth, const Eigen::VectorXd& draws) {
 // Chains of the whole population from the prior to the posterior: the ranks see moves that are not
 // reversible, stages that stop short and chains that have not moved.
 TEST(CalibrationRank, TruthIsUniformUnderTmcmc) {
-  constexpr int kTrials = 400;
+  constexpr int kTrials = 500;
   constexpr std::uint64_t kFirstSeed = 1'000'000;
   std::vector<int> ranks[2];
   for (int trial = 0; trial < kTrials; ++trial) {

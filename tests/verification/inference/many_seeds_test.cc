@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "inference/data/gaussian_likelihood.h"
+#include "inference/filter/weighted_moments.h"
 #include "inference/tmcmc/tmcmc.h"
 #include "tests/verification/inference/linear_model.h"
 
@@ -30,9 +31,9 @@ int Seeds() {
 }
 
 // Sum of squares of `n` standard normal errors lies below this with probability 1 - alpha.
-double MostSquares(int n) {
+double MostSquares(int n, double alpha = kAlpha) {
   return boost::math::quantile(boost::math::complement(
-      boost::math::chi_squared_distribution<double>(static_cast<double>(n)), kAlpha));
+      boost::math::chi_squared_distribution<double>(static_cast<double>(n)), alpha));
 }
 
 // What one seed found, as errors over what they should be.
@@ -41,13 +42,44 @@ struct Found {
   double evidence_se = 0;         // as stated
   std::vector<double> mean_over;  // error of each mean over posterior sd
   std::vector<double> sd_ratio;   // found over exact
+  Eigen::MatrixXd correlation;    // d x d
   bool refused = false;           // its method says that this is no posterior
   double independent = 0;         // effective number of draws
 };
 
+struct Exact {
+  double log_evidence = 0;
+  Eigen::VectorXd mean, sd, kurtosis;
+  Eigen::MatrixXd correlation;  // empty where the posterior is not Gaussian
+};
+
+// Of correlated normal variables atanh of the correlation of n draws has variance 1 / (n - 3)
+// [Fisher 1921]. All pairs together are one check.
+void JudgeCorrelations(const std::string& name, const std::vector<Found>& all,
+                       const Eigen::MatrixXd& exact) {
+  const auto seeds = static_cast<int>(all.size());
+  const auto pairs = static_cast<double>(exact.rows() * (exact.rows() - 1) / 2);
+  double worst = 0;
+  double mean = 0;
+  for (Eigen::Index j = 0; j < exact.rows(); ++j) {
+    for (Eigen::Index k = 0; k < j; ++k) {
+      double squares = 0;
+      for (const Found& one : all) {
+        const double error = std::atanh(one.correlation(j, k)) - std::atanh(exact(j, k));
+        squares += error * error * (one.independent - 3);
+      }
+      worst = std::max(worst, squares);
+      mean += squares / pairs;
+    }
+  }
+  std::cout << "  correlations: rms error over expected " << std::sqrt(mean / seeds)
+            << ", of the worst pair " << std::sqrt(worst / seeds) << "\n";
+  EXPECT_LE(worst, MostSquares(seeds, kAlpha / pairs)) << name << ": correlations";
+}
+
 // Evidence: normalised errors have mean zero and the stated size. Means: sd / sqrt(n). sd:
 // sqrt((kurtosis - 1) / (4 n)) of itself. What a method refuses is not judged, but rare.
-void Judge(const std::string& name, std::vector<Found> all, const Eigen::VectorXd& kurtosis) {
+void Judge(const std::string& name, std::vector<Found> all, const Exact& exact) {
   const auto refused = std::erase_if(all, [](const Found& one) { return one.refused; });
   EXPECT_LE(static_cast<double>(refused), kMostRefused * Seeds()) << name;
   const auto seeds = static_cast<int>(all.size());
@@ -74,25 +106,22 @@ void Judge(const std::string& name, std::vector<Found> all, const Eigen::VectorX
     for (const Found& one : all) {
       means += std::pow(one.mean_over[j], 2) * one.independent;
       sds += std::pow(one.sd_ratio[j] - 1, 2) * 4 * one.independent /
-             (kurtosis[static_cast<Eigen::Index>(j)] - 1);
+             (exact.kurtosis[static_cast<Eigen::Index>(j)] - 1);
     }
     std::cout << "  parameter " << j << ": rms error over expected " << std::sqrt(means / seeds)
               << " of the mean, " << std::sqrt(sds / seeds) << " of the sd\n";
     EXPECT_LE(means, MostSquares(seeds)) << name << ": mean of parameter " << j;
     EXPECT_LE(sds, MostSquares(seeds)) << name << ": sd of parameter " << j;
   }
+  if (exact.correlation.size() > 0) JudgeCorrelations(name, all, exact.correlation);
 }
-
-struct Exact {
-  double log_evidence = 0;
-  Eigen::VectorXd mean, sd, kurtosis;
-};
 
 Exact ExactOf(const LinearModel& model) {
   return {.log_evidence = model.LogEvidence(),
           .mean = model.PosteriorMean(),
           .sd = model.PosteriorCovariance().diagonal().cwiseSqrt(),
-          .kurtosis = Eigen::VectorXd::Constant(model.PosteriorMean().size(), 3)};
+          .kurtosis = Eigen::VectorXd::Constant(model.PosteriorMean().size(), 3),
+          .correlation = CorrelationOf(model.PosteriorCovariance())};
 }
 
 // Readings y of a model that is a function of one row of parameters.
@@ -170,6 +199,7 @@ Found Filter(const Problem& problem, int iterations, int samples, std::uint64_t 
               .evidence_se = posterior->log_evidence_se,
               .mean_over = {},
               .sd_ratio = {},
+              .correlation = posterior->correlation,
               .refused = !posterior->degeneracy.empty(),
               .independent = posterior->ess};
   for (std::size_t j = 0; j < problem.priors.size(); ++j) {
@@ -194,7 +224,10 @@ Found Tmcmc(const Problem& problem, int samples, std::uint64_t seed) {
               .evidence_se = state->LogEvidenceStandardError(),
               .mean_over = {},
               .sd_ratio = {},
+              .correlation = {},
               .independent = 0.5 * samples};
+  const Eigen::MatrixXd centred = state->samples.rowwise() - state->samples.colwise().mean();
+  found.correlation = CorrelationOf(centred.transpose() * centred);
   for (Eigen::Index j = 0; j < state->samples.cols(); ++j) {
     const double mean = state->samples.col(j).mean();
     const double sd = std::sqrt((state->samples.col(j).array() - mean).square().mean());
@@ -217,7 +250,7 @@ TEST(ManySeeds, FilterOnLinearGaussianModels) {
       all.push_back(
           Filter(problem, size.iterations, size.samples, static_cast<std::uint64_t>(seed)));
     }
-    Judge("filter, d = " + std::to_string(size.d), all, problem.exact.kurtosis);
+    Judge("filter, d = " + std::to_string(size.d), all, problem.exact);
   }
 }
 
@@ -237,7 +270,7 @@ TEST(ManySeeds, TmcmcOnLinearGaussianModels) {
     for (int seed = 1; seed <= Seeds(); ++seed) {
       all.push_back(Tmcmc(problem, 1000, static_cast<std::uint64_t>(seed)));
     }
-    Judge("tmcmc, d = " + std::to_string(d), all, problem.exact.kurtosis);
+    Judge("tmcmc, d = " + std::to_string(d), all, problem.exact);
   }
 }
 
@@ -249,8 +282,8 @@ TEST(ManySeeds, Banana) {
     filter.push_back(Filter(problem, 4, 600, static_cast<std::uint64_t>(seed)));
     tmcmc.push_back(Tmcmc(problem, 1000, static_cast<std::uint64_t>(seed)));
   }
-  Judge("filter, banana", filter, problem.exact.kurtosis);
-  Judge("tmcmc, banana", tmcmc, problem.exact.kurtosis);
+  Judge("filter, banana", filter, problem.exact);
+  Judge("tmcmc, banana", tmcmc, problem.exact);
 }
 
 }  // namespace
