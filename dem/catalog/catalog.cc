@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/registry.h"
+#include "dem/elementary/functions.h"
 #include "dem/formula/user_effect.h"
 #include "dem/lab_tests/collision.h"
 
@@ -144,7 +145,16 @@ std::span<const ObservableInfo> Observables() {
       {.name = "discharged_mass", .unit = "kg", .description = "that has left a container"},
       {.name = "avalanche_size",
        .unit = "1",
-       .description = "mean number of grains between two arches that stop the flow"},
+       .description = "mean number of grains that leave until an arch stops the flow"},
+      {.name = "avalanche_count",
+       .unit = "1",
+       .description = "number of avalanches that an arch ended"},
+      {.name = "avalanche_median",
+       .unit = "1",
+       .description = "size that at most half of the avalanches exceed"},
+      {.name = "avalanche_p90",
+       .unit = "1",
+       .description = "size that at most a tenth of the avalanches exceed"},
       {.name = "jams", .unit = "1", .description = "number of arches that stopped the flow"},
       {.name = "slide_time",
        .unit = "s",
@@ -190,8 +200,8 @@ double ScaleOf(const ParameterInfo& parameter, const std::string& contact,
                const ReferenceState& state) {
   const auto it = parameter.scale_by_contact.find(contact);
   const ReferenceScale& s = it == parameter.scale_by_contact.end() ? parameter.scale : it->second;
-  return s.factor * std::pow(state.pressure, s.pressure) * std::pow(state.diameter, s.diameter) *
-         std::pow(state.modulus, s.modulus);
+  return s.factor * Pow(state.pressure, s.pressure) * Pow(state.diameter, s.diameter) *
+         Pow(state.modulus, s.modulus);
 }
 
 std::optional<double> NullValueOf(const ParameterInfo& parameter, const std::string& contact) {
@@ -305,6 +315,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "11"; }
+std::string EngineVersion() { return "12"; }
 
 }  // namespace calib::dem

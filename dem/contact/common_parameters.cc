@@ -3,6 +3,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "dem/elementary/functions.h"
+
 namespace calib::dem {
 
 ParameterInfo YoungModulus() {
@@ -57,7 +59,7 @@ double SlidingFriction(const std::map<std::string, double>& parameters) {
   }
   const auto angle = parameters.find("friction_angle");
   assert(angle != parameters.end());
-  return std::tan(angle->second);
+  return Tangent(angle->second);
 }
 
 }  // namespace calib::dem

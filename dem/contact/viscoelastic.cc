@@ -5,9 +5,9 @@
 
 #include "dem/contact/common_parameters.h"
 #include "dem/contact/materials.h"
-#include "dem/contact/power.h"
 #include "dem/contact/quad.h"
 #include "dem/contact/simd.h"
+#include "dem/elementary/power.h"
 
 namespace calib::dem {
 namespace {

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "dem/elementary/functions.h"
+
 namespace calib::dem {
 namespace {
 
@@ -51,7 +53,7 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model,
   }
   for (const Clump& clump : clumps_.all()) {
     solid_volume_ += clump.volume;
-    radii += std::cbrt(0.75 / std::numbers::pi * clump.volume);
+    radii += CubeRoot(0.75 / std::numbers::pi * clump.volume);
     ++bodies_;
   }
   mean_diameter_ = 2 * radii / bodies_;

@@ -61,7 +61,9 @@ void Assembly::AddSurroundings(int begin, int end) {
     if (g[a] != 0) {
       for (int k = begin; k < end; ++k) {
         const auto q = static_cast<std::size_t>(k);
-        (*force[a])[q] += g[a] / p.inverse_mass[q];
+        if (p.body.empty() || p.body[q] < 0) {  // clumps weigh once, at their centre of mass
+          (*force[a])[q] += g[a] / p.inverse_mass[q];
+        }
       }
     }
   }
@@ -115,7 +117,7 @@ void Assembly::Move(const Motion& motion) {
     }
   });
   if (!clumps_.empty()) {  // takes its members back from where they went alone
-    clumps_.Advance(motion, cell_, threads_, particles_);
+    clumps_.Advance(motion, gravity_, cell_, threads_, particles_);
     ForEachChunk(chunks, threads_, [&](int chunk) { FinishChunk(chunk); });
   }
   packed_ = true;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/particles/random_numbers.h"
 
 namespace calib::dem {
@@ -32,8 +33,8 @@ void Crushing::Refresh(std::size_t grain, const ParticleArrays& p) {
     return;
   }
   radius_[grain] = p.radius[grain];
-  const double shrunk = std::log(radius_[grain] / first_radius_[grain]);
-  const auto times = static_cast<int>(std::lround(shrunk / std::log1p(-law_.size_loss)));
+  const double shrunk = Log(radius_[grain] / first_radius_[grain]);
+  const auto times = static_cast<int>(std::lround(shrunk / Log1p(-law_.size_loss)));
   strength_[grain] = Strength(p.id[grain], times, 2 * radius_[grain]);
 }
 
@@ -66,7 +67,7 @@ double Crushing::Strength(int id, int times, double diameter) const {
       {{kCrushingDraw, static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(times), 0}}, key);
   const double u = (bits[0] + 0.5) / 4294967296.0;
   const double size = law_.reference_diameter / diameter;
-  return std::pow(size * size * size * -std::log1p(-u), 1.0 / law_.weibull_modulus) / law_.weakness;
+  return Pow(size * size * size * -Log1p(-u), 1.0 / law_.weibull_modulus) / law_.weakness;
 }
 
 int Crushing::Crush(Assembly& assembly) {

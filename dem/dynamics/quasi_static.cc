@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 
 namespace calib::dem {
 namespace {
@@ -59,7 +60,7 @@ double FurthestToGo(const CellTarget& target, const PeriodicCell& cell) {
 }  // namespace
 
 void StrainingSpeed::Adapt(double unbalanced, double settled) {
-  const double faster = unbalanced > 0 ? std::pow(kTarget * settled / unbalanced, kGain) : kFastest;
+  const double faster = unbalanced > 0 ? Pow(kTarget * settled / unbalanced, kGain) : kFastest;
   factor_ = std::clamp(factor_ * faster, 1.0, kFastest);
 }
 
@@ -139,7 +140,7 @@ void QuasiStatic::Adopt(const StiffnessEstimate& estimate) {
 std::string QuasiStatic::WhyNoForces(const CellTarget& target, const std::string& problem) const {
   const double* const length = assembly_->cell().length;
   const auto shortest = static_cast<std::size_t>(std::min_element(length, length + 3) - length);
-  const double strain = std::log(stage_length_[shortest] / length[shortest]);
+  const double strain = Log(stage_length_[shortest] / length[shortest]);
   if (target[shortest].mode != AxisTarget::Mode::kStress || !(strain > kCollapse) ||
       !assembly_->FirstNotFinite().empty()) {
     return problem;

@@ -166,9 +166,10 @@ void Store(const BodyLanes& b, int lane, Clump& c) {
   }
 }
 
-/// Loads of the members, about the centre of mass.
-void TakeLoads(const Clump& c, const ParticleArrays& p, int lane, BodyLanes& b) {
-  Vec force = {0, 0, 0};
+/// Loads of the members, about the centre of mass, where the weight acts.
+void TakeLoads(const Clump& c, const Vec3& gravity, const ParticleArrays& p, int lane,
+               BodyLanes& b) {
+  Vec force = {c.mass * gravity.x, c.mass * gravity.y, c.mass * gravity.z};
   Vec torque = {0, 0, 0};
   const int* const members = c.members.data();
   const Vector* const arms = c.arm.data();
@@ -224,6 +225,15 @@ CALIB_DEM_CLONES void AdvanceBodies(const Motion& motion, BodyLanes& b) {
       const double acceleration = b.force[a][l] / b.mass[l];
       b.velocity[a][l] +=
           dt * Damped(acceleration, b.velocity[a][l] + 0.5 * dt * acceleration, damping);
+    }
+  }
+  if (motion.drag > 0) {
+    const double keep = 1.0 - motion.drag * dt;
+    for (int a = 0; a < 3; ++a) {
+      for (int l = 0; l < kLanes; ++l) {
+        b.velocity[a][l] *= keep;
+        b.momentum[a][l] *= keep;
+      }
     }
   }
   double flow[3][kLanes];
@@ -318,8 +328,8 @@ RigidClumps::RigidClumps(const Packing& packing, double density, ParticleArrays&
   }
 }
 
-void RigidClumps::Advance(const Motion& motion, const PeriodicCell& cell, int threads,
-                          ParticleArrays& particles) {
+void RigidClumps::Advance(const Motion& motion, const Vec3& gravity, const PeriodicCell& cell,
+                          int threads, ParticleArrays& particles) {
   const int count = static_cast<int>(clumps_.size());
   ForEachChunk(ChunkCount(count, kClumpChunk), threads, [&](int chunk) {
     const int end = std::min(count, (chunk + 1) * kClumpChunk);
@@ -332,7 +342,7 @@ void RigidClumps::Advance(const Motion& motion, const PeriodicCell& cell, int th
       Clump* const block = clumps_.data() + first;
       for (int l = 0; l < bodies; ++l) {
         Load(block[l], l, lanes);
-        TakeLoads(block[l], particles, l, lanes);
+        TakeLoads(block[l], gravity, particles, l, lanes);
       }
       AdvanceBodies(motion, lanes);
       for (int l = 0; l < bodies; ++l) {

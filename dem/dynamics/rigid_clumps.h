@@ -7,6 +7,7 @@
 
 #include "dem/dynamics/leapfrog.h"
 #include "dem/geometry/periodic_cell.h"
+#include "dem/geometry/vector3.h"
 #include "dem/particles/packing.h"
 #include "dem/particles/particle_arrays.h"
 
@@ -51,11 +52,12 @@ class RigidClumps {
   [[nodiscard]] const std::vector<Clump>& all() const { return clumps_; }
   std::vector<Clump>& mutable_all() { return clumps_; }
 
-  /// One step under the members' loads (fx .. tz of the particles), with local damping; places
+  /// One step under the members' loads (fx .. tz of the particles) and the weight of the bodies,
+  /// gravity [m/s^2], with local damping and drag; places
   /// members and gives them velocities such that their displacement is exactly that of the body.
   /// Afterwards the body's loads stand at its first member and zero at the others. cell: after its
   /// own step.
-  void Advance(const Motion& motion, const PeriodicCell& cell, int threads,
+  void Advance(const Motion& motion, const Vec3& gravity, const PeriodicCell& cell, int threads,
                ParticleArrays& particles);
 
   /// Remembers where wrapping has put the members. To be called after each search.

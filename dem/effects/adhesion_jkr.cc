@@ -3,9 +3,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "dem/contact/power.h"
 #include "dem/contact/simd.h"
 #include "dem/effects/shared_parameters.h"
+#include "dem/elementary/power.h"
 
 namespace calib::dem {
 namespace {

@@ -4,8 +4,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "dem/contact/power.h"
 #include "dem/contact/simd.h"
+#include "dem/elementary/functions.h"
+#include "dem/elementary/power.h"
 
 namespace calib::dem {
 namespace {
@@ -62,7 +63,7 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
     return std::make_unique<NoBridges>();
   }
   const double angle = context.parameters.Get("contact_angle");
-  Liquid liquid{.tension = tension * std::cos(angle), .stretch = 1.0 + 0.5 * angle};
+  Liquid liquid{.tension = tension * Cosine(angle), .stretch = 1.0 + 0.5 * angle};
   if (const auto volume = context.parameters.Find("liquid_volume")) {
     liquid.volume = *volume;
   } else {

@@ -1,8 +1,8 @@
 #include "dem/effects/hertz_nonlinearity.h"
 
-#include "dem/contact/power.h"
 #include "dem/contact/simd.h"
 #include "dem/effects/shared_parameters.h"
+#include "dem/elementary/power.h"
 
 namespace calib::dem {
 namespace {

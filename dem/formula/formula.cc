@@ -9,6 +9,8 @@
 #include <mutex>
 #include <utility>
 
+#include "dem/elementary/functions.h"
+
 namespace calib::dem {
 namespace {
 
@@ -19,11 +21,20 @@ double Largest(const double* values, int count) {
 double Sign(double x) { return x > 0 ? 1.0 : (x < 0 ? -1.0 : 0.0); }
 double Root(double x) { return std::sqrt(x); }
 double Size(double x) { return std::abs(x); }
-double Exponential(double x) { return std::exp(x); }
-double Logarithm(double x) { return std::log(x); }
-double Sine(double x) { return std::sin(x); }
-double Cosine(double x) { return std::cos(x); }
-double HyperbolicTangent(double x) { return std::tanh(x); }
+
+/// muParser's own power is libm's, which has other bits on other processors, and cannot be
+/// redefined: formulas are given to it with this operator for theirs.
+constexpr char kPower = '#';
+
+std::string ForParser(std::string text) {
+  std::replace(text.begin(), text.end(), '^', kPower);
+  return text;
+}
+
+std::string AsWritten(std::string token) {
+  std::replace(token.begin(), token.end(), kPower, '^');
+  return token;
+}
 
 /// Only what is documented, so that what a formula may say does not depend on the library's
 /// version.
@@ -33,14 +44,15 @@ void Prepare(mu::Parser& parser) {
   parser.DefineConst("pi", 3.14159265358979323846);
   parser.DefineFun("sqrt", &Root);
   parser.DefineFun("abs", &Size);
-  parser.DefineFun("exp", &Exponential);
-  parser.DefineFun("log", &Logarithm);
+  parser.DefineFun("exp", &Exp);
+  parser.DefineFun("log", &Log);
   parser.DefineFun("sin", &Sine);
   parser.DefineFun("cos", &Cosine);
   parser.DefineFun("tanh", &HyperbolicTangent);
   parser.DefineFun("sign", &Sign);
   parser.DefineFun("min", &Least);
   parser.DefineFun("max", &Largest);
+  parser.DefineOprt(std::string(1, kPower), &Pow, mu::prPOW, mu::oaRIGHT);
 }
 
 /// Assignments, texts and lists are muParser's, not ours. 0: none of them stands there.
@@ -54,7 +66,8 @@ int ForbiddenAt(const std::string& text) {
     const bool comparison =
         after == '=' || before == '=' || before == '<' || before == '>' || before == '!';
     if ((c == '=' && !comparison) || (c == ',' && depth == 0) || c == '"' || c == ';' ||
-        static_cast<unsigned char>(c) > 126 || std::iscntrl(static_cast<unsigned char>(c)) != 0) {
+        c == kPower || static_cast<unsigned char>(c) > 126 ||
+        std::iscntrl(static_cast<unsigned char>(c)) != 0) {
       return static_cast<int>(i) + 1;
     }
   }
@@ -95,7 +108,7 @@ class Formula::Pool {
     for (std::size_t i = 0; i < names_.size(); ++i) {
       evaluator->parser.DefineVar(names_[i], &evaluator->values[i]);
     }
-    evaluator->parser.SetExpr(text_);
+    evaluator->parser.SetExpr(ForParser(text_));
     return evaluator;
   }
 
@@ -125,12 +138,12 @@ FormulaProblem Formula::Check(const std::string& text, const std::vector<std::st
     mu::Parser parser;
     Prepare(parser);
     for (std::size_t i = 0; i < names.size(); ++i) parser.DefineVar(names[i], &values[i]);
-    parser.SetExpr(text);
+    parser.SetExpr(ForParser(text));
     int results = 0;
     parser.Eval(results);
     if (results != 1) return {.message = "the formula gives more than one number", .position = 1};
   } catch (const mu::Parser::exception_type& error) {
-    const std::string token = error.GetToken();
+    const std::string token = AsWritten(error.GetToken());
     return {.message = token.empty() ? "the formula cannot be read"
                                      : "the formula cannot be read at '" + token + "'",
             .position = static_cast<int>(error.GetPos()) + 1};

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 
 namespace calib::dem {
 
@@ -78,8 +79,8 @@ bool Same(const Vec3& a, const Vec3& b) { return a.x == b.x && a.y == b.y && a.z
 /// Point `along` the axis at radius r and angle of side k.
 Vec3 OnCircle(const Vec3& centre, double along, double r, int k, int sides, bool along_y) {
   const double angle = 2.0 * std::numbers::pi * (k % sides) / sides;
-  const double u = r * std::cos(angle);
-  const double v = r * std::sin(angle);
+  const double u = r * Cosine(angle);
+  const double v = r * Sine(angle);
   return along_y ? Vec3{centre.x + u, centre.y + along, centre.z + v}
                  : Vec3{centre.x + u, centre.y + v, centre.z + along};
 }
@@ -103,8 +104,10 @@ double SizeOf(const TriangleMesh& mesh) {
   return std::max({high.x - low.x, high.y - low.y, high.z - low.z});
 }
 
-/// One number per place: vertices that agree on a fine grid share it.
-std::vector<int> Places(const TriangleMesh& mesh, double tolerance) {
+}  // namespace
+
+std::vector<int> PlacesOf(const TriangleMesh& mesh) {
+  const double tolerance = 1e-9 * SizeOf(mesh);
   std::map<std::tuple<std::int64_t, std::int64_t, std::int64_t>, int> known;
   std::vector<int> places;
   for (const Vec3& v : mesh.vertex) {
@@ -116,8 +119,6 @@ std::vector<int> Places(const TriangleMesh& mesh, double tolerance) {
   }
   return places;
 }
-
-}  // namespace
 
 void AddQuad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, TriangleMesh& mesh) {
   const int ia = AddVertex(a, mesh);
@@ -156,7 +157,7 @@ std::vector<std::string> MeshProblems(const TriangleMesh& mesh, bool closed) {
       problems.push_back(std::move(problem));
     }
   };
-  const std::vector<int> place = Places(mesh, 1e-9 * size);
+  const std::vector<int> place = PlacesOf(mesh);
   std::map<std::pair<int, int>, std::pair<int, int>> edges;  // places -> triangles, first of them
   for (int t = 0; t < mesh.size(); ++t) {
     const auto& corner = mesh.triangle[static_cast<std::size_t>(t)];

@@ -48,6 +48,9 @@ void AddFrustum(const Frustum& frustum, TriangleMesh& mesh);
 /// length along y.
 void AddFrustumAlongY(const Frustum& frustum, TriangleMesh& mesh);
 
+/// One number per place: vertices that agree within 1e-9 of the mesh's size share it.
+std::vector<int> PlacesOf(const TriangleMesh& mesh);
+
 /// What is wrong with a surface, one sentence each, at most ten; empty: nothing. Vertices count as
 /// the same where they agree within 1e-9 of the mesh's size. Wrong are: no triangle, a coordinate
 /// that is not finite, a triangle without area, an edge of more than two triangles and, where

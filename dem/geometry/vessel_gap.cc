@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 
 namespace calib::dem {
 namespace {
@@ -59,12 +60,12 @@ std::vector<Gap> GapsAt(const TriangleMesh& mesh, double z) {
       continue;
     }
     double width =
-        std::remainder(std::atan2(cut[1].y, cut[1].x) - std::atan2(cut[0].y, cut[0].x), kTurn);
+        std::remainder(Direction(cut[1].y, cut[1].x) - Direction(cut[0].y, cut[0].x), kTurn);
     if (width < 0) {
       std::swap(cut[0], cut[1]);
       width = -width;
     }
-    double from = std::atan2(cut[0].y, cut[0].x);
+    double from = Direction(cut[0].y, cut[0].x);
     from += from < 0 ? kTurn : 0;
     pieces.push_back({.from = from, .width = width, .first = cut[0], .last = cut[1]});
   }

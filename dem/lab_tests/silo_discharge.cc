@@ -17,7 +17,11 @@ GravityTestEntry SiloDischarge() {
               "set on top. "
               "Ends when the outlet has run empty, after `avalanches` arches or after `duration`. "
               "mass_flow_rate is the slope of the mass over the time of flow between 10 and 70 % "
-              "of what left. "
+              "of what left. An avalanche is what leaves until an arch forms, one or more grains; "
+              "what leaves "
+              "after the last arch belongs to none, and where no avalanche has ended "
+              "(avalanche_count "
+              "0) the sizes are all that left, a lower bound. "
               "Fails when a grain escapes",
           .settings = WithCommonSettings(
               {Whole("flat", {.value = 0, .min = 0, .max = 1},
@@ -32,7 +36,8 @@ GravityTestEntry SiloDischarge() {
                      "arches after which the test ends"),
                Chosen("duration", "s",
                       "longest time of discharge; 0: 400 sqrt(mean diameter / gravity)")}),
-          .observables = {"opening", "mass_flow_rate", "discharged_mass", "avalanche_size", "jams"},
+          .observables = {"opening", "mass_flow_rate", "discharged_mass", "avalanche_size", "jams",
+                          "avalanche_count", "avalanche_median", "avalanche_p90"},
           .control = "opening",
           .may_reverse = true,
           .reference =

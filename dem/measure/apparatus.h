@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dem/elementary/functions.h"
+
 namespace calib::dem {
 
 /// Perfect as it stands. Compression positive; x is the load on the rig since the start of loading,
@@ -26,12 +28,12 @@ struct Apparatus {
   /// Strain that is read beside that of the specimen: x/K + d0 (1 - exp(-x/q0)), bedding in
   /// compression only.
   [[nodiscard]] double RigStrain(double x) const {
-    return x * compliance + seating * (1.0 - std::exp(-std::max(x, 0.0) / seating_stress));
+    return x * compliance + seating * (1.0 - Exp(-std::max(x, 0.0) / seating_stress));
   }
 
   /// Its derivative [1/Pa].
   [[nodiscard]] double RigSlope(double x) const {
-    return compliance + (x >= 0 ? seating / seating_stress * std::exp(-x / seating_stress) : 0.0);
+    return compliance + (x >= 0 ? seating / seating_stress * Exp(-x / seating_stress) : 0.0);
   }
 
   /// Lateral stress that the membrane adds to the cell pressure [Pa].

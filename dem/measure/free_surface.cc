@@ -6,6 +6,8 @@
 #include <numbers>
 #include <vector>
 
+#include "dem/elementary/functions.h"
+
 namespace calib::dem {
 namespace {
 
@@ -57,8 +59,8 @@ Heap ConicalHeap(const ParticleArrays& p, const Vec3& axis, double diameter) {
   for (std::size_t g = 0; g < p.x.size(); ++g) {
     const double x = p.x[g] - axis.x;
     const double y = p.y[g] - axis.y;
-    const auto ring = static_cast<std::size_t>(std::hypot(x, y) / diameter);
-    const double turn = std::atan2(y, x) / (2 * std::numbers::pi) + 0.5;
+    const auto ring = static_cast<std::size_t>(Hypotenuse(x, y) / diameter);
+    const double turn = Direction(y, x) / (2 * std::numbers::pi) + 0.5;
     const auto sector =
         std::min(static_cast<std::size_t>(turn * kSectors), std::size_t{kSectors} - 1);
     const std::size_t cell = ring * kSectors + sector;
@@ -91,7 +93,7 @@ Heap ConicalHeap(const ParticleArrays& p, const Vec3& axis, double diameter) {
                 surface.end());
   std::erase_if(surface, [&](const Point& point) { return point.h > 0.85 * heap.height; });
   if (heap.height >= 2 * diameter && surface.size() >= 3) {
-    heap.angle = std::max(0.0, std::atan(-SlopeOf(surface)));
+    heap.angle = std::max(0.0, Arctangent(-SlopeOf(surface)));
   }
   return heap;
 }
@@ -115,7 +117,7 @@ std::optional<double> SurfaceSlope(const ParticleArrays& p, double diameter, dou
   if (surface.size() < 3) {
     return std::nullopt;
   }
-  return std::atan(SlopeOf(surface));
+  return Arctangent(SlopeOf(surface));
 }
 
 std::optional<Heap> SigmoidPile(const ParticleArrays& p, const PileBounds& bounds,
@@ -152,7 +154,7 @@ std::optional<Heap> SigmoidPile(const ParticleArrays& p, const PileBounds& bound
         double fh = 0;
         double hh = 0;
         for (const Point& point : surface) {
-          const double f = 1.0 / (1.0 + std::exp((point.s - place) / width));
+          const double f = 1.0 / (1.0 + Exp((point.s - place) / width));
           ff += f * f;
           fh += f * point.h;
           hh += point.h * point.h;
@@ -174,7 +176,7 @@ std::optional<Heap> SigmoidPile(const ParticleArrays& p, const PileBounds& bound
     high_width = best_width + half_width;
   }
   Heap heap;
-  heap.angle = std::atan(best_height / (4 * best_width));
+  heap.angle = Arctangent(best_height / (4 * best_width));
   heap.height = *std::max_element(top.begin(), top.end());
   return heap;
 }

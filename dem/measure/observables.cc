@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include "dem/elementary/functions.h"
+
 namespace calib::dem {
 
 double Porosity(const Assembly& assembly) {
@@ -30,7 +32,7 @@ Measurement ReadThrough(const Apparatus& apparatus, double x, bool by_axial, Mea
     m.axial_strain += rig;
     if (by_axial) {
       m.volumetric_strain += rig;
-      m.porosity = 1.0 - (1.0 - m.porosity) * std::exp(rig);
+      m.porosity = 1.0 - (1.0 - m.porosity) * Exp(rig);
     }
     m.lateral_strain = 0.5 * (m.volumetric_strain - m.axial_strain);
   }
@@ -42,7 +44,7 @@ Measurement Measure(const Assembly& assembly, const double reference[3]) {
   const PeriodicCell& cell = assembly.cell();
   double strain[3];
   for (int a = 0; a < 3; ++a) {
-    strain[a] = std::log(reference[a] / cell.length[a]);
+    strain[a] = Log(reference[a] / cell.length[a]);
   }
   const auto& stress = assembly.stress();
   Measurement m;

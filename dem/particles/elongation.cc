@@ -6,20 +6,21 @@
 #include <cstdint>
 #include <numbers>
 
+#include "dem/elementary/functions.h"
 #include "dem/particles/random_numbers.h"
 
 namespace calib::dem {
 namespace {
 
 /// Uniform direction of grain i.
-void Direction(int grain, double* axis) {
+void DrawDirection(int grain, double* axis) {
   const auto bits =
       r123::Philox4x32()({{kElongationDraw, static_cast<std::uint32_t>(grain), 0, 0}}, {{0, 0}});
   const double z = 2.0 * bits[0] / 4294967296.0 - 1.0;
   const double phi = 2.0 * std::numbers::pi * bits[1] / 4294967296.0;
   const double across = std::sqrt(1.0 - z * z);
-  axis[0] = across * std::cos(phi);
-  axis[1] = across * std::sin(phi);
+  axis[0] = across * Cosine(phi);
+  axis[1] = across * Sine(phi);
   axis[2] = z;
 }
 
@@ -28,7 +29,7 @@ void Direction(int grain, double* axis) {
 Dumbbell DumbbellOf(double aspect) {
   const double c = aspect - 1.0;  // offset over radius
   const double over_r3 = 8.0 / 3.0 - (4.0 + 2.0 * c) * (2.0 - 2.0 * c) * (2.0 - 2.0 * c) / 12.0;
-  const double radius = std::cbrt(4.0 / 3.0 / over_r3);
+  const double radius = CubeRoot(4.0 / 3.0 / over_r3);
   return {.radius = radius, .offset = c * radius};
 }
 
@@ -40,7 +41,7 @@ Packing Elongated(const Packing& spheres, double aspect) {
   }
   for (std::size_t i = 0; i < spheres.x.size(); ++i) {
     double axis[3];
-    Direction(static_cast<int>(i), axis);
+    DrawDirection(static_cast<int>(i), axis);
     for (const double side : {-1.0, 1.0}) {
       const double offset = side * shape.offset * spheres.radius[i];
       packing.x.push_back(spheres.x[i] + offset * axis[0]);

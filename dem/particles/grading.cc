@@ -3,12 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
+
+#include "dem/elementary/functions.h"
 
 namespace calib::dem {
 namespace {
 
 constexpr double kCutOff = 2;  // standard deviations
 constexpr int kLogNormalPoints = 41;
+
+double Cube(double r) { return r * r * r; }
 
 // Between two points of the curve, from the coarse end: with the mass even in ln r the number of
 // grains coarser than r is (r^-3 - coarse^-3) per_ln / 3 (a grain of radius r has the mass r^3).
@@ -27,24 +32,21 @@ std::vector<Segment> FromCoarseEnd(const Grading& curve) {
     if (!(mass > 0)) {
       continue;
     }
-    const double per_ln = mass / std::log(coarse.radius / fine.radius);
-    segments.push_back(
-        {.fine = fine.radius,
-         .coarse = coarse.radius,
-         .per_ln = per_ln,
-         .number = per_ln / 3 * (std::pow(fine.radius, -3) - std::pow(coarse.radius, -3)),
-         .mass = mass});
+    const double per_ln = mass / Log(coarse.radius / fine.radius);
+    segments.push_back({.fine = fine.radius,
+                        .coarse = coarse.radius,
+                        .per_ln = per_ln,
+                        .number = per_ln / 3 * (1 / Cube(fine.radius) - 1 / Cube(coarse.radius)),
+                        .mass = mass});
   }
   return segments;
 }
 
 // Mass of the `number` coarsest grains of a segment.
 double MassOfCoarsest(const Segment& s, double number) {
-  const double radius = 1 / std::cbrt(std::pow(s.coarse, -3) + 3 * number / s.per_ln);
-  return s.per_ln * std::log(s.coarse / radius);
+  const double radius = 1 / CubeRoot(1 / Cube(s.coarse) + 3 * number / s.per_ln);
+  return s.per_ln * Log(s.coarse / radius);
 }
-
-double Cube(double r) { return r * r * r; }
 
 }  // namespace
 
@@ -81,7 +83,7 @@ std::vector<double> GradedRadii(const Grading& curve, int particles) {
     }
     const double within = std::min(number - number_before, segments[at].number);
     const double mass = mass_before + MassOfCoarsest(segments[at], within);
-    const double radius = std::cbrt((mass - last_mass) * particles / total);
+    const double radius = CubeRoot((mass - last_mass) * particles / total);
     radii.push_back(std::clamp(radius, curve.front().radius, curve.back().radius));
     last_mass = mass;
   }
@@ -99,11 +101,11 @@ double LargestShare(const std::vector<double>& radii) {
 }
 
 Grading LogNormalGrading(double median, double log_sd) {
-  const auto finer = [](double z) { return 0.5 * std::erfc(-z / std::sqrt(2.0)); };
+  const auto finer = [](double z) { return 0.5 * (1 + ErrorFunction(z / std::numbers::sqrt2)); };
   Grading curve;
   for (int k = 0; k < kLogNormalPoints; ++k) {
     const double z = kCutOff * (2.0 * k / (kLogNormalPoints - 1) - 1);
-    curve.push_back({.radius = median * std::exp(log_sd * z),
+    curve.push_back({.radius = median * Exp(log_sd * z),
                      .finer = (finer(z) - finer(-kCutOff)) / (finer(kCutOff) - finer(-kCutOff))});
   }
   curve.front().finer = 0;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/particles/random_numbers.h"
 
 namespace calib::dem {
@@ -106,7 +107,7 @@ absl::StatusOr<Packing> RandomCloud(const PackingRecipe& recipe, double solid_fr
     solid += 4.0 / 3.0 * std::numbers::pi * r * r * r;
   }
   std::sort(packing.radius.begin(), packing.radius.end(), std::greater<>());
-  const double width = std::cbrt(solid / solid_fraction / recipe.aspect / recipe.depth_ratio);
+  const double width = CubeRoot(solid / solid_fraction / recipe.aspect / recipe.depth_ratio);
   packing.length[0] = width;
   packing.length[1] = recipe.depth_ratio * width;
   packing.length[2] = recipe.aspect * width;

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "dem/elementary/functions.h"
+
 namespace calib::dem {
 namespace {
 
@@ -20,7 +22,7 @@ bool AnyOverlap(const std::vector<Sphere>& spheres) {
     for (std::size_t j = i + 1; j < spheres.size(); ++j) {
       const Sphere& a = spheres[i];
       const Sphere& b = spheres[j];
-      if (std::hypot(a.centre[0] - b.centre[0], a.centre[1] - b.centre[1],
+      if (Hypotenuse(a.centre[0] - b.centre[0], a.centre[1] - b.centre[1],
                      a.centre[2] - b.centre[2]) < (1.0 - kTouching) * (a.radius + b.radius)) {
         return true;
       }
@@ -75,7 +77,7 @@ void AddLine(const std::vector<std::pair<double, double>>& intervals, double y, 
 /// polynomials up to the fourth degree, which three Gauss points give exactly. Precondition: the
 /// first lies at the origin.
 RawMoments Revolve(const Sphere& a, const Sphere& b) {
-  const double d = std::hypot(b.centre[0], b.centre[1], b.centre[2]);
+  const double d = Hypotenuse(b.centre[0], b.centre[1], b.centre[2]);
   const Vector axis = {b.centre[0] / d, b.centre[1] / d, b.centre[2] / d};
   const double plane = (d * d + a.radius * a.radius - b.radius * b.radius) / (2.0 * d);
   const double node = std::sqrt(0.6);
@@ -107,7 +109,7 @@ RawMoments Revolve(const Sphere& a, const Sphere& b) {
 
 /// Whether two spheres cut each other, the first at the origin: neither apart nor one inside.
 bool Cut(const Sphere& a, const Sphere& b) {
-  const double d = std::hypot(b.centre[0], b.centre[1], b.centre[2]);
+  const double d = Hypotenuse(b.centre[0], b.centre[1], b.centre[2]);
   return d < a.radius + b.radius && d > std::abs(a.radius - b.radius);
 }
 

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/measure/free_surface.h"
 #include "dem/simulation/gravity_run.h"
 
@@ -22,8 +23,8 @@ StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
   const double radius =
       0.5 *
       run.SettingOr("cylinder_diameter",
-                    std::max(3 * d, std::cbrt(4 * solid / (kSolidFraction * std::numbers::pi))));
-  const double inner = radius * std::cos(std::numbers::pi / kSides);
+                    std::max(3 * d, CubeRoot(4 * solid / (kSolidFraction * std::numbers::pi))));
+  const double inner = radius * Cosine(std::numbers::pi / kSides);
   const double speed =
       run.SettingOr("lift_speed", 0.15 * std::sqrt(run.gravity() * run.mean_diameter()));
   const Vec3 axis{4 * radius, 4 * radius, 0};
@@ -33,7 +34,7 @@ StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
        .width = 2 * radius,
        .depth = 2 * radius,
        .holds = [&](const Vec3& c,
-                    double r) { return std::hypot(c.x - axis.x, c.y - axis.y) + r < inner; }},
+                    double r) { return Hypotenuse(c.x - axis.x, c.y - axis.y) + r < inner; }},
       run.seed() + static_cast<std::uint64_t>(std::llround(1e6 * point.target)) * 1'000'003U);
   if (grains.x.size() < run.radii().size()) {
     return run.Fail("cylinder_diameter is too small: no grain fits into the cylinder");

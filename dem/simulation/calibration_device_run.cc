@@ -2,9 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
+#include "dem/geometry/mesh_rims.h"
 #include "dem/measure/free_surface.h"
 #include "dem/simulation/gravity_run.h"
 
@@ -12,6 +15,8 @@ namespace calib::dem {
 namespace {
 
 constexpr double kHopperSlope = 1.0471975511965976;  ///< of its walls, 60 degrees [rad]
+constexpr double kPiled = 0.55;                      ///< solid fraction of a loose pile
+constexpr int kLooks = 20;                           ///< in a fall by half a mean diameter
 constexpr double kOnSlide = 0.003;  ///< share of the material below which the slide counts as empty
 constexpr double kPenalty = 10;     ///< [s] per share of the material that never leaves the slide
 
@@ -33,16 +38,17 @@ Device Plan(const GravityRun& run) {
   device.depth = run.SettingOr("depth", 6 * run.largest_diameter());
   const double angle = run.Setting("slide_angle");
   const double length = run.SettingOr("slide_length", 16 * d);
-  const double dx = length * std::cos(angle);
-  const double dz = length * std::sin(angle);
-  device.lower_z = 10 * d;
+  const double dx = length * Cosine(angle);
+  const double dz = length * Sine(angle);
+  device.lower_z = run.SettingOr(
+      "slide_height", std::max(10 * d, std::sqrt(2 * run.solid() / (kPiled * device.depth))));
   device.upper_x = device.opening;
   device.upper_z = device.lower_z + dz;
   device.lower_x = device.upper_x - dx;
   device.corner = device.lower_x - 10 * d;
   device.outlet = device.upper_z + 2 * d;
   device.hopper_z = device.outlet + 12 * d;
-  device.hopper_x = 0.5 * device.opening + 12 * d / std::tan(kHopperSlope);
+  device.hopper_x = 0.5 * device.opening + 12 * d / Tangent(kHopperSlope);
   return device;
 }
 
@@ -78,6 +84,8 @@ double LossRate(const std::vector<double>& time, const std::vector<double>& mass
 
 struct Masses {
   double hopper = 0, slide = 0, total = 0;
+  double buries = 0;  ///< what lies above the slide's lower end, beyond it
+  double top = 0;     ///< of that, a height
 };
 
 Masses Weigh(const ParticleArrays& p, const Device& device) {
@@ -89,34 +97,57 @@ Masses Weigh(const ParticleArrays& p, const Device& device) {
       masses.hopper += mass;
     } else if (p.x[g] > device.lower_x && p.z[g] > device.lower_z) {
       masses.slide += mass;
+    } else if (p.x[g] < device.lower_x - 2 * p.radius[g] && p.z[g] > device.lower_z) {
+      masses.buries += mass;
+      masses.top = std::max(masses.top, p.z[g] + p.radius[g]);
     }
   }
   return masses;
 }
 
+/// Long enough for three times what a slot of six diameters takes: its flow is
+/// 0.55 sqrt(g) (0.7 x 6 d)^{3/2} depth of solid per time. [Beverloo's form in the plane]
+double LongestFlow(const GravityRun& run, const Device& device) {
+  const double width = 4.2 * run.mean_diameter();
+  const double flow = kPiled * std::sqrt(run.gravity()) * width * std::sqrt(width) * device.depth;
+  return std::max(200 * run.fall_time(), 3 * run.solid() / flow);
+}
+
 StageEnd Measure(GravityRun& run, const Device& device, const ControlPoint& point, Flow& flow) {
   Assembly& assembly = flow.assembly();
   const double opened = flow.time();
-  const double longest = run.SettingOr("duration", 200 * run.fall_time());
+  const double longest = run.SettingOr("duration", LongestFlow(run, device));
   std::vector<double> time = {0};
   std::vector<double> hopper = {Weigh(assembly.particles(), device).hopper};
   double last_on_slide = 0;
   StageEnd end = StageEnd::kDone;
   int still = 0;
   Masses masses;
+  const double look = run.fall_time() / kLooks;
+  flow.SetBeforeStep([&](double now, double) {
+    if (now - opened >= look * static_cast<double>(time.size())) {
+      masses = Weigh(assembly.particles(), device);
+      time.push_back(now - opened);
+      hopper.push_back(masses.hopper);
+      last_on_slide = masses.slide >= kOnSlide * masses.total ? time.back() : last_on_slide;
+    }
+  });
   while (end == StageEnd::kDone && time.back() < longest && still < 5) {
     end = flow.Advance(run.fall_time());
-    masses = Weigh(assembly.particles(), device);
-    time.push_back(flow.time() - opened);
-    hopper.push_back(masses.hopper);
-    if (masses.slide >= kOnSlide * masses.total) {
-      last_on_slide = time.back();
-    }
     const double quiet = 1e-4 * run.gravity() * run.mean_diameter();
     still = flow.MeanSquareSpeed() < quiet ? still + 1 : 0;
   }
   if (end != StageEnd::kDone) {
     return end;
+  }
+  masses = Weigh(assembly.particles(), device);
+  if (masses.buries >= kOnSlide * masses.total) {
+    return run.Fail(absl::StrCat(
+        "repetition ", point.target, ", pile: it has grown over the slide's lower end, up to ",
+        masses.top, " m where that stands at ", device.lower_z,
+        " m, so that neither flow nor slope are the material's: ",
+        run.Setting("slide_height") > 0 ? "raise slide_height" : "set a slide_height above that",
+        ", make depth larger, or take fewer grains"));
   }
   const bool stays = masses.slide >= kOnSlide * masses.total;
   const double slide_time =
@@ -145,7 +176,7 @@ StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point
            [&](const Vec3& c, double r) {
              const double up = c.z - device.outlet - 2 * r;
              const double room =
-                 std::min(half, 0.5 * device.opening + up / std::tan(kHopperSlope)) - r;
+                 std::min(half, 0.5 * device.opening + up / Tangent(kHopperSlope)) - r;
              return std::abs(c.x) < room;
            }},
       run.seed() + static_cast<std::uint64_t>(std::llround(1e6 * point.target)) * 1'000'003U);
@@ -211,6 +242,10 @@ StageEnd RunCalibrationDevice(GravityRun& run) {
       return run.Fail(absl::StrCat("mesh slide reaches to ", found, " m from its middle along y, ",
                                    "the slice and a grain beyond it take ", reach,
                                    " m: widen it, or set a smaller depth"));
+    }
+    if (const std::string problem = SlideProblemAcross(*slide, (1 - 1e-6) * reach);
+        !problem.empty()) {
+      return run.Fail("mesh slide " + problem);
     }
   }
   return run.Walk([&](const ControlPoint& point) { return Repeat(run, device, point); });

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
 #include "dem/contact/contact_model.h"
+#include "dem/elementary/functions.h"
 #include "dem/lab_tests/collision.h"
 #include "dem/particles/particle_arrays.h"
 
@@ -119,8 +120,8 @@ class CollisionRun {
       const Impact& impact = impacts[std::min(k, count - 1)];
       flights_[k] = {};
       flights_[k].dx = body_.radius + partner_.radius;
-      flights_[k].vix = impact.speed * std::cos(impact.angle);
-      flights_[k].viy = impact.speed * std::sin(impact.angle);
+      flights_[k].vix = impact.speed * Cosine(impact.angle);
+      flights_[k].viy = impact.speed * Sine(impact.angle);
       flights_[k].wi = impact.spin;
     }
     for (auto& column : block_.own_history) {
@@ -173,9 +174,9 @@ class CollisionRun {
     const double after = mass * (vx * vx + vy * vy) + spin_energy(f.wi, f.wj);
     return {.load_step = impact.load_step,
             .values = {impact.angle, impact.speed, impact.spin,
-                       normal / (impact.speed * std::cos(impact.angle)),
-                       tangential / (impact.speed * std::sin(impact.angle)), after / before,
-                       std::atan2(tangential, normal), f.wi, f.ended - f.begun, f.peak}};
+                       normal / (impact.speed * Cosine(impact.angle)),
+                       tangential / (impact.speed * Sine(impact.angle)), after / before,
+                       Direction(tangential, normal), f.wi, f.ended - f.begun, f.peak}};
   }
 
   /// Why bodies that have not parted are given up.

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/measure/observables.h"
 
 namespace calib::dem {
@@ -22,10 +24,10 @@ CellTarget Isotropic(double pressure) {
 /// 1-2-5 x 10^k in [pressure/20, pressure), then the pressure itself.
 std::vector<double> PressureStages(double pressure) {
   std::vector<double> stages;
-  const int decade = static_cast<int>(std::floor(std::log10(pressure)));
-  for (int k = decade - 2; k <= decade; ++k) {
+  const int decade = static_cast<int>(std::floor(Log(pressure) / std::numbers::ln10));
+  for (int k = decade - 2; k <= decade + 1; ++k) {
     for (const double digit : {1.0, 2.0, 5.0}) {
-      const double stage = digit * std::pow(10.0, k);
+      const double stage = digit * Pow(10.0, k);
       if (stage >= 0.05 * pressure * (1 - 1e-9) && stage < pressure * (1 - 1e-9)) {
         stages.push_back(stage);
       }

@@ -11,6 +11,7 @@
 #include "dem/dynamics/archive.h"
 #include "dem/dynamics/crushing.h"
 #include "dem/dynamics/quasi_static.h"
+#include "dem/elementary/functions.h"
 #include "dem/measure/observables.h"
 #include "dem/measure/reading_formulas.h"
 #include "dem/particles/material_shares.h"
@@ -192,7 +193,7 @@ class ElementTestRun {
     for (std::size_t a = 0; a < 3; ++a) {
       const bool strain = goal[a].mode == AxisGoal::Mode::kStrain;
       target[a] = {.mode = strain ? AxisTarget::Mode::kLength : AxisTarget::Mode::kStress,
-                   .value = strain ? reference_[a] * std::exp(-goal[a].value) : goal[a].value};
+                   .value = strain ? reference_[a] * Exp(-goal[a].value) : goal[a].value};
     }
     target.displacement = goal.shear_strain * reference_[2];
     return target;
@@ -209,8 +210,7 @@ class ElementTestRun {
 
   [[nodiscard]] double LateralStrain() const {
     const PeriodicCell& cell = assembly_.cell();
-    return 0.5 *
-           (std::log(reference_[0] / cell.length[0]) + std::log(reference_[1] / cell.length[1]));
+    return 0.5 * (Log(reference_[0] / cell.length[0]) + Log(reference_[1] / cell.length[1]));
   }
 
   /// The present state as the laboratory reads it.
@@ -254,7 +254,7 @@ class ElementTestRun {
   /// part. With the affine stiffness, an upper bound of the real one, the reading is approached
   /// from one side.
   FollowGap FollowReading(const std::array<double, 3>& modulus, CellTarget& target) const {
-    const double strain = std::log(reference_[2] / assembly_.cell().length[2]);
+    const double strain = Log(reference_[2] / assembly_.cell().length[2]);
     FollowGap gap{.tolerances = 0, .strain = std::abs(control_ - strain)};
     if (apparatus_.AltersStrain()) {
       const double x = RigStress() - rig_start_;

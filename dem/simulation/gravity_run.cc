@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -81,6 +82,14 @@ const TriangleMesh* GravityRun::Mesh(const std::string& name) const {
 }
 
 double GravityRun::fall_time() const { return std::sqrt(mean_diameter_ / gravity()); }
+
+double GravityRun::solid() const {
+  double sum = 0;
+  for (const double r : radii()) {
+    sum += 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  }
+  return sum;
+}
 
 std::string GravityRun::MaterialOf(const std::string& body) const {
   const auto it = scenario_.materials.bodies.find(body);

@@ -65,6 +65,8 @@ class GravityRun {
   [[nodiscard]] double largest_diameter() const { return largest_diameter_; }
   [[nodiscard]] double gravity() const { return Setting("gravity"); }
   [[nodiscard]] double density() const { return scenario_.model.density; }
+  /// Volume of all grains [m^3].
+  [[nodiscard]] double solid() const;
   [[nodiscard]] std::uint64_t seed() const { return scenario_.seed; }
   /// sqrt(d/g), the time of a fall by half a mean diameter [s].
   [[nodiscard]] double fall_time() const;

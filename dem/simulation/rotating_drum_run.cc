@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/lab_tests/rotating_drum.h"
 #include "dem/measure/free_surface.h"
 #include "dem/simulation/gravity_run.h"
@@ -21,7 +22,7 @@ constexpr double kMiddle = 0.6;          ///< share of the surface's width that 
 
 /// The drum's grains, set loosely within a circle of that radius about (radius, radius).
 Packing Fill(const GravityRun& run, double radius, double length) {
-  const double inner = radius * std::cos(std::numbers::pi / kSides);
+  const double inner = radius * Cosine(std::numbers::pi / kSides);
   return LooseFill(
       run.radii(),
       {.low = {0, 0, 0},
@@ -29,7 +30,7 @@ Packing Fill(const GravityRun& run, double radius, double length) {
        .depth = length,
        .height = 2 * radius,
        .holds = [&](const Vec3& c,
-                    double r) { return std::hypot(c.x - radius, c.z - radius) + r < inner; }},
+                    double r) { return Hypotenuse(c.x - radius, c.z - radius) + r < inner; }},
       run.seed());
 }
 

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/simulation/gravity_run.h"
-#include "dem/simulation/sine.h"
 
 namespace calib::dem {
 namespace {
@@ -51,7 +51,7 @@ StageEnd RunShakenBox(GravityRun& run) {
                               .holds =
                                   [&](const Vec3& c, double r) {
                                     return c.x - r > side && c.x + r < side + width &&
-                                           std::hypot(c.x - intruder.x, c.z - start) > r + big;
+                                           Hypotenuse(c.x - intruder.x, c.z - start) > r + big;
                                   }},
                              run.seed());
   if (grains.x.size() < run.radii().size()) {

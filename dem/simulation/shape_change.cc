@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "dem/contact/contact_model.h"
 #include "dem/dynamics/assembly.h"
+#include "dem/elementary/functions.h"
 #include "dem/particles/elongation.h"
 
 namespace calib::dem {
@@ -66,7 +67,7 @@ void Reshape(const Assembly& assembly, const Packing& spheres, double aspect, Pa
   const Dumbbell shape = DumbbellOf(aspect);
   const ParticleArrays& p = assembly.particles();
   for (const Clump& clump : assembly.clumps().all()) {
-    const double length = std::hypot(clump.arm[0][0], clump.arm[0][1], clump.arm[0][2]);
+    const double length = Hypotenuse(clump.arm[0][0], clump.arm[0][1], clump.arm[0][2]);
     for (std::size_t s = 0; s < 2; ++s) {
       const auto i = static_cast<std::size_t>(p.id[static_cast<std::size_t>(clump.members[s])]);
       const double radius = spheres.radius[i / 2];  // members of sphere i are 2i and 2i + 1

@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/geometry/mesh_interior.h"
+#include "dem/measure/avalanches.h"
 #include "dem/simulation/gravity_run.h"
 
 namespace calib::dem {
@@ -49,7 +51,7 @@ std::vector<int> AboveOutlet(const ParticleArrays& p, const Silo& silo, double o
   for (int g = 0; g < p.size(); ++g) {
     const auto q = static_cast<std::size_t>(g);
     const double y = silo.flat ? 0 : p.y[q] - silo.middle;
-    if (std::hypot(p.x[q] - silo.middle, y) < 0.5 * opening) {
+    if (Hypotenuse(p.x[q] - silo.middle, y) < 0.5 * opening) {
       above.push_back(g);
     }
   }
@@ -136,6 +138,7 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
   });
   StageEnd end = StageEnd::kDone;
   int jams = 0;
+  Avalanches avalanches;
   std::size_t seen = 0;
   double since = 0;  // time at which something last happened
   const double slice = 0.25 * jam_time;
@@ -152,6 +155,7 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
     if (AboveOutlet(assembly.particles(), silo, opening).empty()) {
       break;  // it has run empty
     }
+    avalanches.Block(flow.drained().size());
     if (++jams >= most) {
       break;
     }
@@ -166,11 +170,13 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
   for (const Drained& grain : flow.drained()) {
     mass += grain.mass;
   }
-  const double avalanches = std::max(1, jams);
+  const auto left = static_cast<double>(flow.drained().size());
+  const bool ended = avalanches.count() > 0;  // else one goes on, whose size is not known
   return run.Report(
       point,
-      {opening, FlowRate(flow.drained(), jam_time), mass,
-       static_cast<double>(flow.drained().size()) / avalanches, static_cast<double>(jams)},
+      {opening, FlowRate(flow.drained(), jam_time), mass, ended ? avalanches.Mean() : left,
+       static_cast<double>(jams), static_cast<double>(avalanches.count()),
+       ended ? avalanches.ExceededBy(0.5) : left, ended ? avalanches.ExceededBy(0.1) : left},
       assembly);
 }
 
@@ -194,7 +200,7 @@ StageEnd RunSiloDischarge(GravityRun& run) {
     }
   }
   const double m = silo.middle;
-  const double inner = 0.5 * silo.width * std::cos(std::numbers::pi / kSides);
+  const double inner = 0.5 * silo.width * Cosine(std::numbers::pi / kSides);
   vessel = Shifted(std::move(vessel), {m, m, 0});
   const bool own = vessel.size() > 0;
   const MeshInterior interior(vessel);
@@ -210,7 +216,7 @@ StageEnd RunSiloDischarge(GravityRun& run) {
                          return interior.Holds(c, r);
                        }
                        return silo.flat ? std::abs(c.x - m) + r < 0.5 * silo.width
-                                        : std::hypot(c.x - m, c.y - m) + r < inner;
+                                        : Hypotenuse(c.x - m, c.y - m) + r < inner;
                      }},
                 run.seed());
   if (own && grains.x.size() < run.radii().size()) {

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "dem/geometry/mesh_rims.h"
 #include "dem/geometry/triangle_mesh.h"
 #include "dem/geometry/vessel_gap.h"
 
@@ -62,6 +64,12 @@ void CheckMeshes(const Scenario& scenario, const TestInfo& test,
       problems.push_back(
           absl::StrCat("mesh ", name, " reaches down to z = ", bounds.low.z,
                        " m, below its origin, the middle of its outlet: move it up"));
+    }
+    for (const auto& [piece, find] :
+         {std::pair("funnel", &FunnelProblem), std::pair("slide", &SlideProblem)}) {
+      if (const std::string problem = name == piece ? find(mesh) : ""; !problem.empty()) {
+        problems.push_back(absl::StrCat("mesh ", name, " ", problem));
+      }
     }
     if (name == "silo") {
       const std::string problem = bounds.high.z > 0 ? VesselProblem(mesh) : "";

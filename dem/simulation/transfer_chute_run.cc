@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
 #include "dem/particles/random_numbers.h"
 #include "dem/simulation/gravity_run.h"
 
@@ -32,8 +33,8 @@ constexpr auto kPlaces = static_cast<std::size_t>((kBeltWidth - 1) / kPitch);
 
 /// Turns a mesh about the line through `pivot` along x.
 void TurnAboutX(double angle, const Vec3& pivot, TriangleMesh& mesh) {
-  const double c = std::cos(angle);
-  const double s = std::sin(angle);
+  const double c = Cosine(angle);
+  const double s = Sine(angle);
   for (Vec3& v : mesh.vertex) {
     const double y = v.y - pivot.y;
     const double z = v.z - pivot.z;

@@ -60,9 +60,9 @@ function(calib_program name)
 endfunction()
 
 # calib_test(NAME LABEL label SOURCES ... LINKS ... [TIMEOUT s]): one GoogleTest binary, one ctest entry with a label
-# (unit, property, verification, integration, fault, browser, data, layering, bench).
+# (unit, property, verification, integration, fault, browser, data, layering, bench), or several: verification physics.
 function(calib_test name)
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT" "LABEL;SOURCES;LINKS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -74,7 +74,7 @@ function(calib_test name)
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_test_main calib_flags)
   add_test(NAME ${name} COMMAND ${name})
-  set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+  set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT ${ARG_TIMEOUT})
   if(CALIB_THREAD_SANITIZER)
     math(EXPR slow "4 * ${ARG_TIMEOUT}")  # scheduler_test takes 1300 s under it
     set_tests_properties(${name} PROPERTIES TIMEOUT ${slow})

@@ -22,9 +22,11 @@ server            server/service/,server/store/,server/scheduler/,proto/rpc/addr
 '
 watched='grpcpp|SQLiteCpp|sqlite3|yaml-cpp|spdlog|CLI|nlohmann|chrono'
 
+include='include[[:space:]]*["<]([^">]+)[">]'
 wrong=0
 while IFS=: read -r file line text; do
-  header=$(sed -E 's/^[[:space:]]*#[[:space:]]*include[[:space:]]*["<]([^">]+)[">].*/\1/' <<<"$text")
+  [[ $text =~ $include ]] || continue
+  header=${BASH_REMATCH[1]}
   best='' own='' libraries=''
   while read -r folder may_own may_libraries; do
     [ -n "$folder" ] || continue
@@ -45,4 +47,13 @@ done < <(grep -rnE '^[[:space:]]*#[[:space:]]*include' --include='*.h' --include
 if grep -rnE '\b(std::)?(getenv|cout|cerr|clock_gettime|gettimeofday)\b' --include='*.h' --include='*.cc' dem inference; then
   echo 'dem and inference know no environment, no clock and no terminal'; wrong=1
 fi
+
+# libm chooses its code by the processor and gives other bits on another: dem has functions of its own (dem/elementary). sqrt,
+# rounding and remainders are exact everywhere. Words in comments and texts do not count.
+libm='exp|exp2|expm1|log|log2|log10|log1p|pow|cbrt|hypot|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|asinh|acosh|atanh|erf|erfc|tgamma|lgamma|beta|fma'
+for file in $(grep -rlE "\b($libm)[fl]? *\(|std::($libm)\b" --include='*.h' --include='*.cc' dem | sort); do
+  if sed -E 's/"([^"\\]|\\.)*"//g; s|//.*||' "$file" | grep -nE "\bstd::($libm)[fl]?\b|(^|[^_.>:[:alnum:]])($libm)[fl]? *\(" | sed "s|^|$file:|"; then
+    echo "dem may not call libm's transcendental functions: other processors would give other bits (dem/elementary)"; wrong=1
+  fi
+done
 exit $wrong

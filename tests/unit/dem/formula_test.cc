@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "dem/contact/contact_model.h"
+#include "dem/elementary/functions.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"
 
@@ -34,10 +35,19 @@ TEST(Formula, FollowsTheUsualPrecedence) {
   EXPECT_EQ(Value("-a^b", v), -9);
   EXPECT_EQ(Value("b^a^b", v), 512);
   EXPECT_EQ(Value("b^-1", v), 0.5);
+  EXPECT_EQ(Value("(-a)^-b", v), 1.0 / 9);
   EXPECT_EQ(Value("a > b && ab >= 7 ? a : b", v), 3);
   EXPECT_EQ(Value("max(a, b, ab) - min(a, b) + abs(-a) * sign(-b)", v), 2);
   EXPECT_DOUBLE_EQ(Value("sqrt(a) + exp(b) + log(ab) + tanh(a) + sin(pi * a / 6) + cos(0)", v),
                    std::sqrt(3.0) + std::exp(2.0) + std::log(7.0) + std::tanh(3.0) + 2.0);
+}
+
+// Powers, exponentials and the like are those of dem/elementary, not of the machine's libm.
+TEST(Formula, ComputesTheSameBitsOnEveryProcessor) {
+  for (double x = 0.3; x < 9; x += 0.7) {
+    EXPECT_EQ(Value("a^b", {x, 33.3, 0}), Pow(x, 33.3)) << x;
+    EXPECT_EQ(Value("log(a) + tanh(b)", {x, 0.4, 0}), Log(x) + HyperbolicTangent(0.4)) << x;
+  }
 }
 
 TEST(Formula, KnowsWhichNamesItMentions) {
@@ -57,8 +67,8 @@ TEST(Formula, MistakesHaveAPlace) {
   EXPECT_EQ(check("a + c").position, 5);
   EXPECT_THAT(check("a + c").message, HasSubstr("c"));
   for (const char* wrong :
-       {"", " ", "a +", "a b", "(a", "a)", "a = 3", "a, b", "a; b", "\"a\"", "sqrt()", "sqrt(a, b)",
-        "rnd(a)", "a +* b", "a\nb", "sum(a, b)", "\xc3\xa4"}) {
+       {"", " ", "a +", "a b", "(a", "a)", "a = 3", "a, b", "a; b", "a # b", "\"a\"", "sqrt()",
+        "sqrt(a, b)", "rnd(a)", "a +* b", "a\nb", "sum(a, b)", "\xc3\xa4"}) {
     EXPECT_NE(check(wrong).message, "") << wrong;
   }
   EXPECT_EQ(check("a = 3").position, 3);

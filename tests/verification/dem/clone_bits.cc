@@ -1,13 +1,17 @@
-// Prints the bits of runs that pass through every kernel. Built twice, with the copies of kernels
-// that the CPU may choose and without: both print the same (test dem_clone_bits).
+// Prints the bits of runs that pass through every kernel and every elementary function of the
+// engine. Built twice, with the copies of kernels that the CPU may choose and without: both print
+// the same (test dem_clone_bits). So does a C library that takes the processor for an older one
+// (test dem_other_cpu_bits).
 
 #include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <string>
 
 #include "dem/catalog/catalog.h"
+#include "dem/particles/grading.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -43,8 +47,55 @@ bool Print(const std::string& title, const Scenario& scenario) {
   return true;
 }
 
+/// Strains, angles and sizes for which libm would be at hand: a friction angle, a rig, crushing, a
+/// graded packing, turned vessels, impacts. exp(-0.01568), cos(0.3338), cos(0.7291) and sin(0.1374)
+/// are among those that glibc 2.36 gives with other bits where it has fused operations.
+bool PrintFunctions() {
+  Scenario fine = test::SmallTriaxial(test::HertzModel());
+  fine.model.parameters.erase("friction_coefficient");
+  fine.model.parameters["friction_angle"] = 0.47;
+  fine.settings["confining_pressure"] = 1.57e5;
+  fine.path = {{.target = 0, .load_step = 0},
+               {.target = 0.01568, .load_step = 1},
+               {.target = 0.017, .load_step = 2}};
+  bool good = Print("friction_angle", fine);
+  good = Print("strain_offset",
+               test::With(fine, "strain_offset", {{"offset", 0.003}, {"stress", 1e5}})) &&
+         good;
+  const std::map<std::string, double> weak = {
+      {"weakness", 0.15 / 2e5}, {"reference_diameter", 2e-3}, {"size_loss", 0.05}};
+  good = Print("particle_crushing", test::With(fine, "particle_crushing", weak)) && good;
+  const auto graded =
+      GenerateSizes({.particles = 150, .seed = 3, .grading = LogNormalGrading(2e-3, 0.2)});
+  if (!graded.ok()) {
+    return false;
+  }
+  Scenario poured;
+  poured.model = test::HertzModel();
+  poured.model.density = 2650;
+  poured.model.parameters["young_modulus"] = 5e6;
+  poured.packing = *graded;
+  poured.test = "rotating_drum";
+  poured.settings = {{"turns", 0.02}};
+  poured.path = {{.target = 2, .load_step = 0}};
+  good = Print(poured.test, poured) && good;
+  poured.test = "calibration_device";
+  poured.settings = {{"slide_angle", 0.7291}};
+  poured.path = {{.target = 1, .load_step = 0}};
+  good = Print(poured.test, poured) && good;
+  Scenario collision;
+  collision.model = test::HertzModel();
+  collision.test = "collision";
+  collision.settings = {{"radius", 0.01}, {"impact_speed", 1}};
+  for (const double angle : {0.1374, 0.1915, 0.2209, 0.3338, 0.3714, 0.7291, 1.1325}) {
+    const auto step = static_cast<int>(collision.path.size());
+    collision.path.push_back({.target = angle, .load_step = step});
+  }
+  return Print(collision.test, collision) && good;
+}
+
 int PrintAll() {
-  bool good = true;
+  bool good = PrintFunctions();
   for (const char* law : {"tsuji", "kuwabara_kono", "extended_viscoelastic"}) {
     Scenario scenario = test::SmallTriaxial(test::HertzModel());
     scenario.path = {{.target = 0, .load_step = 0}, {.target = 0.002, .load_step = 1}};

@@ -62,7 +62,7 @@ TEST(Clump, PendulumSwingsWithItsPeriod) {
     p.fx[held] -= stiffness * (p.x[held] - 0.5);
     p.fy[held] -= stiffness * (p.y[held] - 0.5);
     p.fz[held] -= stiffness * (p.z[held] - 0.5);
-    clumps.Advance({.dt = dt}, cell, 1, p);
+    clumps.Advance({.dt = dt}, {}, cell, 1, p);
     const double now = p.x[1 - held] - p.x[held];
     if (last > 0 && now <= 0) {
       crossings.push_back((step + now / (last - now)) * dt);
@@ -73,6 +73,70 @@ TEST(Clump, PendulumSwingsWithItsPeriod) {
   const double found = (crossings.back() - crossings.front()) / (crossings.size() - 1);
   std::printf("period over closed form %.6f\n", found / period);
   EXPECT_NEAR(found, period, 5e-4 * period);
+}
+
+/// Grains between walls with real gravity and 1 GPa.
+Assembly Heavy(const Packing& packing, double friction, Surroundings surroundings) {
+  Model model = test::HertzModel();
+  model.density = kDensity;
+  model.parameters["friction_coefficient"] = friction;
+  return {packing, kDensity, ContactModel(model), std::move(surroundings), 1};
+}
+
+// An L of three spheres weighs what it weighs, once, at its centre of mass: it falls with g and does
+// not turn; under drag it comes to g/drag.
+TEST(Clump, FallsWithGravityAndDoesNotTurn) {
+  const Packing packing =
+      Spheres({{0.47, 0.5, 0.5}, {0.47, 0.515, 0.5}, {0.458, 0.5, 0.503}}, {3, 3, 3});
+  Assembly assembly = Heavy(packing, 0.5, {.gravity = {1, 2, -9.81}});
+  ASSERT_TRUE(assembly.EvaluateForces().ok());
+  const Clump start = assembly.clumps().all()[0];
+  for (int step = 0; step < 1000; ++step) {
+    assembly.Move({.dt = 1e-5});
+    ASSERT_TRUE(assembly.EvaluateForces().ok());
+  }
+  const Clump& body = assembly.clumps().all()[0];
+  const double g[3] = {1, 2, -9.81};
+  for (std::size_t a = 0; a < 3; ++a) {
+    EXPECT_NEAR(body.velocity[a], 0.01 * g[a], 1e-12);
+    EXPECT_NEAR(body.centre[a] - start.centre[a], 0.5 * 1e-4 * g[a], 1e-3 * 0.5 * 1e-4 * 9.81);
+    EXPECT_NEAR(body.momentum[a], 0, 1e-18);
+  }
+  for (int step = 0; step < 2000; ++step) {
+    assembly.Move({.dt = 1e-5, .drag = 1000});
+    ASSERT_TRUE(assembly.EvaluateForces().ok());
+  }
+  EXPECT_NEAR(assembly.clumps().all()[0].velocity[2], -9.81 / 1000, 0.02 * 9.81 / 1000);
+}
+
+// Two spheres side by side roll down an incline as one does: I = 2 (2/5) m r^2 about their line, so
+// that the acceleration is 5/7 g sin(alpha); the floor bears their weight.
+TEST(Clump, RollsDownAnInclineWithFiveSeventhsOfGravity) {
+  constexpr double kAlpha = 0.3;
+  const double g = 9.81;
+  const double kn = 2 * 8e8 / (3 * (1 - 0.04)) * std::sqrt(kRadius);  // F = kn u^1.5
+  const double overlap = std::pow(kSphere * g * std::cos(kAlpha) / kn, 2.0 / 3.0);
+  const double height = kRadius - overlap;
+  const Packing packing = Spheres({{0.2, 0.49, height}, {0.2, 0.49 + 2 * kRadius, height}}, {0, 0});
+  Assembly assembly = Heavy(packing, 0.4,
+                            {.gravity = {g * std::sin(kAlpha), 0, -g * std::cos(kAlpha)},
+                             .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1})}});
+  ASSERT_TRUE(assembly.EvaluateForces().ok());
+  const double dt = 0.1 * assembly.NominalCriticalStep();
+  const int steps = static_cast<int>(0.05 / dt);
+  double borne = 0;
+  for (int step = 0; step < steps; ++step) {
+    assembly.Move({.dt = dt});
+    ASSERT_TRUE(assembly.EvaluateForces().ok());
+    borne -= assembly.walls().ForceOn(0).z / steps;
+  }
+  const Clump& body = assembly.clumps().all()[0];
+  const double expected = 5.0 / 7.0 * g * std::sin(kAlpha) * steps * dt;
+  std::printf("speed over closed form %.5f, weight on the floor %.5f\n",
+              body.velocity[0] / expected, borne / (2 * kSphere * g * std::cos(kAlpha)));
+  EXPECT_NEAR(body.velocity[0], expected, 2e-3 * expected);
+  EXPECT_NEAR(borne, 2 * kSphere * g * std::cos(kAlpha), 2e-3 * borne);
+  EXPECT_NEAR(assembly.particles().wy[0], expected / kRadius, 3e-3 * expected / kRadius);
 }
 
 // A dumbbell spun off its axis precesses about its angular momentum with L/I_t; both its energy and
@@ -95,7 +159,7 @@ TEST(Clump, FreeTopPrecesses) {
   const int steps = 20000;
   const double dt = 0.75 * std::numbers::pi / precession / steps;  // 3/8 of a turn
   for (int k = 0; k < steps; ++k) {
-    clumps.Advance({.dt = dt}, cell, 1, p);
+    clumps.Advance({.dt = dt}, {}, cell, 1, p);
   }
   EXPECT_EQ(body.momentum[0], l[0]);
   EXPECT_EQ(body.momentum[2], l[2]);

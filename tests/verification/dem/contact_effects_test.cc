@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "dem/catalog/catalog.h"
-#include "dem/contact/power.h"
 #include "dem/dynamics/assembly.h"
+#include "dem/elementary/power.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

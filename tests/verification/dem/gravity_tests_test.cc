@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "dem/catalog/catalog.h"
 #include "dem/geometry/triangle_mesh.h"
@@ -87,7 +88,29 @@ TEST(SiloDischarge, ArchesStopASmallOutletAndAreBroken) {
   silo.settings = {{"flat", 1}, {"silo_width", 14 * kDiameter}, {"avalanches", 4}};
   const test::Run run = test::RunAll(silo);
   EXPECT_GE(Value(run, "silo_discharge", "jams", 0), 1);
-  EXPECT_GT(Value(run, "silo_discharge", "avalanche_size", 0), 0);
+  const auto value = [&run](const char* name) { return Value(run, "silo_discharge", name, 0); };
+  std::printf("arches: %g, avalanches %g, mean %.1f, median %g, 90 %% %g\n", value("jams"),
+              value("avalanche_count"), value("avalanche_size"), value("avalanche_median"),
+              value("avalanche_p90"));
+  EXPECT_GT(value("avalanche_size"), 0);
+  EXPECT_LE(value("avalanche_count"), value("jams"));
+  EXPECT_LE(value("avalanche_median"), value("avalanche_p90"));
+  // Ended by its fourth arch, or with grains that left after the last one: never more than left.
+  double mean_mass = 0;
+  for (const double r : silo.packing.radius) {
+    mean_mass += 2500 * 4.0 / 3.0 * std::numbers::pi * r * r * r / 150;
+  }
+  EXPECT_LE(value("avalanche_size") * value("avalanche_count"),
+            1.1 * value("discharged_mass") / mean_mass);
+}
+
+TEST(SiloDischarge, WithoutAnArchNoAvalancheHasEnded) {
+  Scenario silo = Pour("silo_discharge", 100, {8 * kDiameter});
+  silo.settings = {{"flat", 1}, {"silo_width", 9 * kDiameter}};
+  const test::Run run = test::RunAll(silo);
+  EXPECT_EQ(Value(run, "silo_discharge", "avalanche_count", 0), 0);
+  EXPECT_EQ(Value(run, "silo_discharge", "avalanche_size", 0),
+            Value(run, "silo_discharge", "avalanche_p90", 0));
 }
 
 TEST(SiloDischarge, DisksWeighWhatTheirThicknessSays) {
@@ -172,6 +195,41 @@ TEST(CalibrationDevice, SlipperySlideIsLeftSooner) {
   EXPECT_GT(value(fast, "mass_flow_rate"), 0);
   EXPECT_LT(value(fast, "slide_time"), value(slow, "slide_time"));
   EXPECT_GT(value(fast, "angle_of_repose"), 0);
+}
+
+// 520 grains in a slice of three diameters make a pile higher than ten diameters, where the slide of
+// a few grains ends; a slide that ends at five is buried by 300.
+TEST(CalibrationDevice, ALargeFillingDoesNotBuryTheSlide) {
+  Scenario device = Pour("calibration_device", 520, {1});
+  device.settings = {{"duration", 2}, {"depth", 3 * kDiameter}};
+  const test::Run run = test::RunAll(device);
+  const auto value = [&](const char* name) { return Value(run, "calibration_device", name, 0); };
+  std::printf("device of 520: rate %.4f kg/s, slide %.4f s, pile %.1f deg\n",
+              value("mass_flow_rate"), value("slide_time"), value("angle_of_repose") / kDegree);
+  EXPECT_LT(value("slide_time"), 2);  // it has run empty
+
+  device = Pour("calibration_device", 300, {1});
+  device.settings = {{"duration", 2}, {"depth", 3 * kDiameter}, {"slide_height", 5 * kDiameter}};
+  const test::Run buried = test::RunAll(device);
+  EXPECT_EQ(buried.summary.outcome, Outcome::kDiverged);
+  EXPECT_THAT(buried.summary.reason,
+              testing::AllOf(testing::HasSubstr("repetition 1, pile: it has grown over the slide's "
+                                                "lower end, up to 0.0"),
+                             testing::HasSubstr(" m where that stands at 0.02 m"),
+                             testing::HasSubstr("raise slide_height")));
+}
+
+// Slides a little longer each keep their grains a little longer: no steps of the time between looks.
+TEST(CalibrationDevice, SlideTimeIsFinelyResolved) {
+  const double fall = std::sqrt(kDiameter / 9.81);
+  std::set<long> remainders;
+  for (const double length : {16.0, 16.5, 17.0, 17.5}) {
+    Scenario device = Pour("calibration_device", 60, {1});
+    device.settings = {{"slide_length", length * kDiameter}, {"depth", 3 * kDiameter}};
+    const double time = Value(test::RunAll(device), "calibration_device", "slide_time", 0);
+    remainders.insert(std::lround(20 * std::remainder(time / fall, 1)));
+  }
+  EXPECT_GT(remainders.size(), 2U);
 }
 
 TEST(TransferChute, AFunnelShiftedToTheRightFeedsTheRight) {
@@ -326,6 +384,36 @@ TEST(GravityTests, MeshesThatDoNotFitAreRefused) {
   EXPECT_THAT(ScenarioProblems(silo),
               ::testing::ElementsAre(::testing::HasSubstr("mesh silo reaches down to z = -0.001 m"),
                                      ::testing::HasSubstr("silo_width has no meaning with it")));
+}
+
+TEST(GravityTests, MeshesWithHolesAreRefused) {
+  Scenario chute = Pour("transfer_chute", 60, {1.0});
+  TriangleMesh funnel;
+  AddFrustum({.height = 0.03, .lower_radius = 0.013, .upper_radius = 0.03, .sides = 16}, funnel);
+  chute.meshes = {{"funnel", funnel}};
+  EXPECT_THAT(ScenarioProblems(chute), testing::IsEmpty());
+  chute.meshes["funnel"].triangle.pop_back();
+  EXPECT_THAT(ScenarioProblems(chute),
+              testing::ElementsAre(testing::HasSubstr("mesh funnel has a hole or a notch")));
+
+  Scenario device = Pour("calibration_device", 60, {1});
+  TriangleMesh slide;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      const auto at = [](int k, int l) { return Vec3{0.01 * k, 0.01 * (l - 3), 0.008 * k}; };
+      AddQuad(at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1), slide);
+    }
+  }
+  device.settings = {{"slide_length", 0.0768}, {"slide_angle", 0.6747}, {"depth", 0.04}};
+  device.meshes = {{"slide", slide}};
+  EXPECT_THAT(ScenarioProblems(device), testing::IsEmpty());
+  device.meshes["slide"].triangle.erase(device.meshes["slide"].triangle.begin() + 30);
+  EXPECT_THAT(ScenarioProblems(device),
+              testing::ElementsAre(testing::HasSubstr("mesh slide has a hole: it has 2 loops")));
+  device.meshes["slide"] = slide;  // a triangle of the lower end: the run knows how far it matters
+  device.meshes["slide"].triangle.erase(device.meshes["slide"].triangle.begin() + 5);
+  EXPECT_THAT(ScenarioProblems(device), testing::IsEmpty());
+  EXPECT_THAT(test::RunAll(device).summary.reason, testing::HasSubstr("mesh slide has a notch"));
 }
 
 TEST(ShakenBox, TheIntruderRises) {
