@@ -243,7 +243,7 @@ wait
 TEST_F(Misfit, AParentOfOneIterationIsImprovedToo) {
   std::string yaml = Read("small.yaml");
   const std::size_t at = yaml.find("\ninference:");
-  yaml.replace(at, yaml.find("\nseed") - at, "\ninference: {method: sqmc, samples: 24}");
+  yaml.replace(at, yaml.find("\nseed") - at, "\ninference: {method: sqmc, samples: 36}");
   Write("small.yaml", yaml);
   ASSERT_EQ(Call("run small.yaml --state s --workers 2 --json").code, 0) << Read("err");
   const Answer improved = Call("improve c1 --state s --workers 2 --max-effects 1 --json");
@@ -263,7 +263,7 @@ TEST_F(Misfit, AParentOfOneIterationIsImprovedToo) {
       EXPECT_GE(of("compare", id)["rms_error"], of("compare", kept)["rms_error"]) << id;
     }
   }
-  EXPECT_EQ(most_samples, 3 * 24) << improved.out;
+  EXPECT_EQ(most_samples, 3 * 36) << improved.out;
 }
 
 // No verdict without support: two readings for two parameters.
