@@ -17,7 +17,7 @@ std::string RangeBar(const v1::Posterior::Parameter& p, bool log) {
                          : (value - p.prior_min()) / (p.prior_max() - p.prior_min());
     return std::clamp(f, 0.0, 1.0);
   };
-  constexpr double kWidth = 150;
+  constexpr double kWidth = 100;
   if (std::isnan(p.q05())) return "–";
   const double left = kWidth * fraction(p.q05());
   const double width = std::max(1.5, kWidth * fraction(p.q95()) - left);
@@ -75,8 +75,7 @@ std::string ParameterSection(const ReportData& data) {
       "class=\"l\">unit</th><th>mean</th>"
       "<th>± "
       "sd</th><th>cov</th><th>5&#8201;%</th><th>50&#8201;%</th><th>95&#8201;%</th>{}<th>prior</"
-      "th><th class=\"l\">5–95&#8201;% in "
-      "the prior</th><th></th></tr>\n",
+      "th><th class=\"l\">in the prior</th><th></th></tr>\n",
       halves ? "<th>halves apart</th>" : "");
   for (const auto& parameter : parameters) {
     html += Row(parameter, HasLogPrior(data.view.campaign, parameter.name()), halves);
