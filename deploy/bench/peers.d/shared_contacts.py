@@ -9,6 +9,7 @@ Eight friction angles (20 to 40 degrees), packing_1000 at 0.5 MPa, linear contac
 import base64
 import os
 import re
+import shutil
 import struct
 import subprocess
 import sys
@@ -16,26 +17,10 @@ import tempfile
 
 import numpy as np
 
+from side_by_side import TRIAXIAL
+
 ANGLES = (20, 24, 26, 28, 32, 34, 36, 40)  # degrees
 STAGES = (0, 2, 4, 9, 14, 24, 36, 49)
-CAMPAIGN = """name: shared contacts
-model:
-  contact: linear
-  effects: [rolling_resistance, twisting_resistance]
-  density: 2650000 kg/m^3
-  fixed: {young_modulus: 1 GPa, poisson_ratio: 0.25, rolling_resistance.stiffness: 0.13, rolling_resistance.friction: 0.13,
-          twisting_resistance.stiffness: 0.13, twisting_resistance.friction: 0.13}
-parameters: {friction_angle: {prior: uniform, min: 10 deg, max: 45 deg}}
-experiments:
-  - name: triaxial
-    test: triaxial_drained
-    confining_pressure: 0.5 MPa
-    packing: {file: $CALIB_DATA/toyoura_triaxial/packing_1000.txt}
-    data: {file: data.csv, strain: logarithmic}
-    control: axial_strain
-    staging: {rate: 0.1 1/s, step: 0.004, damping: [0.2, 0.9], unbalanced: 1e-3}
-    observables: {stress_ratio: {noise: {absolute: 0.1}}}
-"""
 TYPES = {"Float64": np.float64, "Int32": np.int32, "Int64": np.int64, "UInt8": np.uint8}
 
 
@@ -69,9 +54,10 @@ def main():
         sys.exit(__doc__)
     with tempfile.TemporaryDirectory(prefix="calib-contacts-") as folder:
         with open(f"{folder}/campaign.yaml", "w") as file:
-            file.write(CAMPAIGN)
-        with open(f"{folder}/data.csv", "w") as file:
-            print("axial_strain,stress_ratio", *(f"{0.004 * k:.3f},3" for k in range(1, 51)), sep="\n", file=file)
+            file.write(TRIAXIAL)
+        shutil.copy(os.path.join(os.environ["CALIB_DATA"], "toyoura_triaxial", "packing_1000.txt"), f"{folder}/packing.txt")
+        with open(f"{folder}/triaxial_data.csv", "w") as file:
+            print("axial_strain,stress_ratio,volumetric_strain", *(f"{0.004 * k:.3f},3,0" for k in range(1, 51)), sep="\n", file=file)
         for angle in ANGLES:
             subprocess.run([os.path.abspath(sys.argv[1]), "simulate", f"{folder}/campaign.yaml", "--set", f"friction_angle={angle}deg",
                             "-o", f"{folder}/{angle}.csv", "--vtk", f"{folder}/{angle}"], check=True, stderr=subprocess.DEVNULL)

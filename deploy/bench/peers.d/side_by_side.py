@@ -24,6 +24,26 @@ DATA = os.path.join(os.environ["CALIB_DATA"], "toyoura_triaxial")
 SKIN = {1000: 2e-4, 5000: 1e-4, 10000: 8e-5}  # m, near the fastest of LAMMPS and LIGGGHTS
 STEP = {1000: 4e-5, 5000: 1.5e-5, 10000: 1e-5}  # s, of LAMMPS and LIGGGHTS
 
+# One drained triaxial evaluation: 50 stages to 20 %, packing and stages in files beside it.
+TRIAXIAL = """name: complete evaluation
+model:
+  contact: linear
+  effects: [rolling_resistance, twisting_resistance]
+  density: 2650000 kg/m^3
+  fixed: {young_modulus: 1 GPa, poisson_ratio: 0.25, rolling_resistance.stiffness: 0.13, rolling_resistance.friction: 0.13,
+          twisting_resistance.stiffness: 0.13, twisting_resistance.friction: 0.13}
+parameters: {friction_angle: {prior: uniform, min: 10 deg, max: 45 deg}}
+experiments:
+  - name: triaxial
+    test: triaxial_drained
+    confining_pressure: 0.5 MPa
+    packing: {file: packing.txt}
+    data: {file: triaxial_data.csv, strain: logarithmic}
+    control: axial_strain
+    staging: {rate: 0.1 1/s, step: 0.004, damping: [0.2, 0.9], unbalanced: 1e-3}
+    observables: {stress_ratio: {noise: {absolute: 0.1}}, volumetric_strain: {noise: {absolute: 1e-3}}}
+"""
+
 
 def run(command, environment=None):
     """Runs to the end; wall and processor time [s], largest resident memory [MiB], output. Ends the program with the
@@ -180,24 +200,7 @@ class Work:
             for stage in range(1, 51):
                 print(0.004 * stage, 3, 0, sep=",", file=file)
         with open(campaign, "w") as file:
-            file.write("""name: complete evaluation
-model:
-  contact: linear
-  effects: [rolling_resistance, twisting_resistance]
-  density: 2650000 kg/m^3
-  fixed: {young_modulus: 1 GPa, poisson_ratio: 0.25, rolling_resistance.stiffness: 0.13, rolling_resistance.friction: 0.13,
-          twisting_resistance.stiffness: 0.13, twisting_resistance.friction: 0.13}
-parameters: {friction_angle: {prior: uniform, min: 10 deg, max: 45 deg}}
-experiments:
-  - name: triaxial
-    test: triaxial_drained
-    confining_pressure: 0.5 MPa
-    packing: {file: packing.txt}
-    data: {file: triaxial_data.csv, strain: logarithmic}
-    control: axial_strain
-    staging: {rate: 0.1 1/s, step: 0.004, damping: [0.2, 0.9], unbalanced: 1e-3}
-    observables: {stress_ratio: {noise: {absolute: 0.1}}, volumetric_strain: {noise: {absolute: 1e-3}}}
-""")
+            file.write(TRIAXIAL)
         (_, cpu), _, _ = run([os.path.join(self.binaries, "calibctl"), "simulate", campaign, "--set", "friction_angle=29deg", "-o", out],
                          {"OMP_NUM_THREADS": "1"})
         with open(out) as file:
