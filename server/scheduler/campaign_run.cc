@@ -14,6 +14,17 @@ namespace calib::scheduler {
 using store::EvaluationKey;
 using store::EvaluationStatus;
 
+CampaignRun::CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition)
+    : id_(id), definition_(std::move(definition)) {
+  const inference::NoiseMode noise = definition_->campaign.filter.noise;
+  if (noise == inference::NoiseMode::kEssTarget) {
+    return;
+  }
+  if (auto made = inference::GaussianLikelihood::Create(definition_->data, noise); made.ok()) {
+    likelihood_ = *std::move(made);
+  }
+}
+
 absl::StatusOr<std::unique_ptr<CampaignRun>> CampaignRun::Load(store::Reader& reader,
                                                                std::int64_t id) {
   const auto record = reader.Campaign(id);
@@ -43,6 +54,7 @@ absl::Status CampaignRun::Reload(store::Reader& reader) {
   stop_below_.clear();
   arrived_.clear();
   evaluations_.clear();
+  by_status_.clear();
   return Extend(reader);
 }
 
@@ -57,7 +69,7 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
   const bool everything = evaluations_.empty();
   std::vector<store::EvaluationRecord> added;
   std::set<int> of_samples;
-  std::set<int> open;
+  std::set<int> open = OpenSamples();
   for (const store::EvaluationRecord& evaluation : *evaluations) {
     if (evaluations_.count(evaluation.key) > 0) {
       continue;
@@ -71,6 +83,9 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
   const Eigen::RowVectorXd nothing =
       Eigen::RowVectorXd::Constant(static_cast<Eigen::Index>(definition_->data.readings.size()),
                                    std::numeric_limits<double>::quiet_NaN());
+  std::erase_if(arrived_, [this, &open](const auto& entry) {
+    return !IsOfRunningIteration(entry.first) && open.count(entry.first) == 0;
+  });
   for (const store::SampleRecord& sample : *samples) {
     if (!parameters_.emplace(sample.sample, sample.parameters).second) {
       continue;
@@ -187,31 +202,33 @@ void CampaignRun::BeginAnew(const EvaluationKey& key, const std::string& digest)
 }
 
 std::vector<EvaluationKey> CampaignRun::With(EvaluationStatus status) const {
-  std::vector<EvaluationKey> keys;
-  for (const auto& [key, evaluation] : evaluations_) {
-    if (evaluation.status == status) {
-      keys.push_back(key);
-    }
-  }
-  return keys;
+  const auto found = by_status_.find(status);
+  return found == by_status_.end()
+             ? std::vector<EvaluationKey>{}
+             : std::vector<EvaluationKey>(found->second.begin(), found->second.end());
 }
 
 bool CampaignRun::AllTerminal() const {
-  return std::all_of(evaluations_.begin(), evaluations_.end(),
-                     [](const auto& item) { return store::IsTerminal(item.second.status); });
+  return std::all_of(by_status_.begin(), by_status_.end(), [](const auto& item) {
+    return item.second.empty() || store::IsTerminal(item.first);
+  });
+}
+
+std::vector<EvaluationKey> CampaignRun::Open() const {
+  std::vector<EvaluationKey> open;
+  for (const auto& [status, keys] : by_status_) {
+    if (!store::IsTerminal(status)) open.insert(open.end(), keys.begin(), keys.end());
+  }
+  return open;
 }
 
 std::size_t CampaignRun::Results() const {
-  const bool in_order = definition_->campaign.decisions == campaign::Decisions::kReproducible;
-  std::size_t results = 0;
-  for (const auto& [key, evaluation] : evaluations_) {
-    if (store::IsTerminal(evaluation.status)) {
-      ++results;
-    } else if (in_order) {
-      break;
-    }
+  const std::vector<EvaluationKey> open = Open();
+  if (open.empty() || definition_->campaign.decisions == campaign::Decisions::kImmediate) {
+    return evaluations_.size() - open.size();
   }
-  return results;
+  const auto first_open = evaluations_.find(*std::min_element(open.begin(), open.end()));
+  return static_cast<std::size_t>(std::distance(evaluations_.begin(), first_open));
 }
 
 bool CampaignRun::WantsPlan() const {
@@ -276,6 +293,8 @@ void CampaignRun::AddState(const EvaluationKey& key, int load_step,
 
 void CampaignRun::SetStatus(const EvaluationKey& key, EvaluationStatus status, int failures) {
   Evaluation& evaluation = evaluations_[key];
+  by_status_[evaluation.status].erase(key);
+  by_status_[status].insert(key);
   evaluation.status = status;
   evaluation.failures = failures;
   const auto found = arrived_.find(key.sample);
@@ -306,7 +325,7 @@ bool CampaignRun::IsItsTurn(const EvaluationKey& key) const {
 bool CampaignRun::ShouldStop(const EvaluationKey& key) const {
   const auto threshold = stop_below_.find(key.sample);
   const auto arrived = arrived_.find(key.sample);
-  if (threshold == stop_below_.end() || arrived == arrived_.end() ||
+  if (threshold == stop_below_.end() || arrived == arrived_.end() || !likelihood_.has_value() ||
       !IsCalibrated(key.experiment)) {
     return false;
   }
@@ -316,7 +335,7 @@ bool CampaignRun::ShouldStop(const EvaluationKey& key) const {
       known(static_cast<Eigen::Index>(t)) = std::numeric_limits<double>::quiet_NaN();
     }
   }
-  return BestPossible(*definition_, known) < threshold->second;
+  return BestPossible(*likelihood_, known) < threshold->second;
 }
 
 std::vector<EvaluationKey> CampaignRun::WaitingBeside(const EvaluationKey& key) const {
@@ -333,9 +352,7 @@ std::vector<EvaluationKey> CampaignRun::WaitingBeside(const EvaluationKey& key) 
 
 std::set<int> CampaignRun::OpenSamples() const {
   std::set<int> open;
-  for (const auto& [key, evaluation] : evaluations_) {
-    if (!store::IsTerminal(evaluation.status)) open.insert(key.sample);
-  }
+  for (const EvaluationKey& key : Open()) open.insert(key.sample);
   return open;
 }
 

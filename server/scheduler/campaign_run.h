@@ -1,7 +1,7 @@
 #pragma once
 // A live campaign in memory: which evaluations still need what, and how well the running iteration
-// does so far. It mirrors the store; after a restart, and after every plan made while nothing ran,
-// it is read again from there. What a plan adds while others run is read beside what is known.
+// does so far. It mirrors the store; after a restart, and after a plan that resumes what had
+// ended, it is read again from there. What a plan adds is read beside what is known.
 
 #include <cstdint>
 #include <map>
@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "inference/data/gaussian_likelihood.h"
 #include "server/scheduler/definition.h"
 #include "server/scheduler/transitions.h"
 #include "server/store/reader.h"
@@ -100,8 +101,7 @@ class CampaignRun {
   LiveView View() const;
 
  private:
-  CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition)
-      : id_(id), definition_(std::move(definition)) {}
+  CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition);
   /// Readings of a sample of the running iteration, or of one before it that had not ended.
   struct Arrived {
     Eigen::RowVectorXd predictions;  ///< NaN where they have not
@@ -111,6 +111,8 @@ class CampaignRun {
   absl::Status AddStates(const absl::StatusOr<std::vector<store::StateRecord>>& states);
   bool IsOfRunningIteration(int sample) const;
   bool IsCalibrated(int experiment) const;
+  /// Those that have not ended.
+  std::vector<store::EvaluationKey> Open() const;
   std::set<int> OpenSamples() const;
   std::set<int> EndedForPause() const;
   /// Results that a plan could go by: how many have ended, in their order up to the first that has
@@ -121,7 +123,10 @@ class CampaignRun {
   std::shared_ptr<const Definition> definition_;
   store::CampaignRecord record_;
   CampaignState state_ = CampaignState::kQueued;
+  /// Of running evaluations; empty with ess_target.
+  std::optional<inference::GaussianLikelihood> likelihood_;
   std::map<store::EvaluationKey, Evaluation> evaluations_;
+  std::map<store::EvaluationStatus, std::set<store::EvaluationKey>> by_status_;
   std::map<int, std::vector<double>> parameters_;  // by sample
   std::map<int, double> stop_below_;               // samples that may be stopped early
   ArrivedBySample arrived_;

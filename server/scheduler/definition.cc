@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "server/scheduler/plan_memory.h"
 
 namespace calib::scheduler {
 namespace {
@@ -105,7 +106,8 @@ std::shared_ptr<const Definition> MakeDefinition(campaign::Campaign campaign) {
                                                        .replicates = std::nullopt,
                                                        .priors = std::move(priors),
                                                        .readings = std::move(readings),
-                                                       .interpolant = std::move(interpolant)});
+                                                       .interpolant = std::move(interpolant),
+                                                       .memory = std::make_shared<PlanMemory>()});
 }
 
 absl::StatusOr<std::shared_ptr<const Definition>> LoadDefinition(

@@ -37,6 +37,8 @@ class ReadingIndex {
   std::map<std::pair<int, int>, std::vector<Column>> columns_;  // by (experiment, load step)
 };
 
+struct PlanMemory;
+
 struct Definition {
   campaign::Campaign campaign;
   inference::DataSet data;  ///< errors of a reading about a run
@@ -49,6 +51,8 @@ struct Definition {
   /// Of surrogate_msrs, kept from one plan to the next: nothing that the store does not give again
   /// bit for bit. A campaign has one plan in the making at a time.
   std::shared_ptr<inference::CubicRbf> interpolant{};
+  /// Of tmcmc, likewise (plan_memory.h).
+  std::shared_ptr<PlanMemory> memory{};
 
   /// Load steps that a complete evaluation of the experiment has.
   std::vector<int> LoadSteps(int experiment) const;

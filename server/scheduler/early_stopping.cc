@@ -256,10 +256,9 @@ absl::StatusOr<Audit> AuditOf(const Definition& definition, const History& histo
   return audit;
 }
 
-double BestPossible(const Definition& definition, const Eigen::RowVectorXd& predictions) {
-  const auto bound = inference::LogLikelihoodBound(definition.data, definition.campaign.filter,
-                                                   Eigen::MatrixXd(predictions));
-  return bound.ok() ? (*bound)(0) : std::numeric_limits<double>::infinity();
+double BestPossible(const inference::GaussianLikelihood& likelihood,
+                    const Eigen::RowVectorXd& predictions) {
+  return likelihood.LogLikelihoodBound(Eigen::MatrixXd(predictions))(0);
 }
 
 }  // namespace calib::scheduler

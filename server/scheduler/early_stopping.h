@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "inference/data/gaussian_likelihood.h"
 #include "server/scheduler/definition.h"
 #include "server/scheduler/history.h"
 
@@ -77,8 +78,9 @@ struct Audit {
 /// the errors later changes both.
 absl::StatusOr<Audit> AuditOf(const Definition& definition, const History& history);
 
-/// The largest log likelihood that a sample can still reach judged by one evaluation: `predictions`
-/// holds the readings of its experiment so far, NaN everywhere else.
-double BestPossible(const Definition& definition, const Eigen::RowVectorXd& predictions);
+/// The largest log likelihood that a sample can still reach: `predictions` holds its readings so far,
+/// NaN everywhere else.
+double BestPossible(const inference::GaussianLikelihood& likelihood,
+                    const Eigen::RowVectorXd& predictions);
 
 }  // namespace calib::scheduler

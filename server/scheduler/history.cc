@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "server/scheduler/plan_memory.h"
 #include "server/scheduler/posterior_record.h"
 
 namespace calib::scheduler {
@@ -26,8 +27,13 @@ void PlaceState(const Definition& definition, const store::StateRecord& state, E
                             predictions.row(row));
 }
 
-/// Rows of parameters, predictions still unknown, one matrix per iteration.
-void AddSamples(const Definition& definition, History& history) {
+/// Whether its ended iterations are kept from plan to plan: nothing of them is ever run again.
+bool IsKept(const Definition& definition) {
+  return definition.campaign.method == campaign::Method::kTmcmc;
+}
+
+/// Rows of parameters, predictions still unknown, one matrix per iteration from `known` on.
+void AddSamples(const Definition& definition, std::size_t known, History& history) {
   const auto d = static_cast<Eigen::Index>(definition.priors.size());
   const auto t = static_cast<Eigen::Index>(definition.data.readings.size());
   std::vector<Eigen::Index> count(history.iterations.size(), 0);
@@ -35,7 +41,7 @@ void AddSamples(const Definition& definition, History& history) {
     ++count[static_cast<std::size_t>(sample.iteration)];
   }
   std::vector<Eigen::Index> next(history.iterations.size(), 0);
-  for (std::size_t k = 0; k < history.iterations.size(); ++k) {
+  for (std::size_t k = known; k < history.iterations.size(); ++k) {
     history.iterations[k].parameters.resize(count[k], d);
     history.iterations[k].predictions.setConstant(count[k], t,
                                                   std::numeric_limits<double>::quiet_NaN());
@@ -43,6 +49,9 @@ void AddSamples(const Definition& definition, History& history) {
   }
   for (const store::SampleRecord& sample : history.samples) {
     const auto k = static_cast<std::size_t>(sample.iteration);
+    if (k < known) {
+      continue;
+    }
     history.iterations[k].parameters.row(next[k]++) = Eigen::Map<const Eigen::RowVectorXd>(
         sample.parameters.data(), static_cast<Eigen::Index>(sample.parameters.size()));
   }
@@ -51,13 +60,14 @@ void AddSamples(const Definition& definition, History& history) {
 using Places = std::map<int, std::pair<std::size_t, Eigen::Index>>;  // by sample
 
 /// What has ended and what is open, of all evaluations or those of the samples that have a place
-/// alone. begun: those with a state; what was stopped before it had one was never run.
-void AddEnds(const std::vector<store::EvaluationRecord>& evaluations,
-             const std::set<store::EvaluationKey>& begun, const Places& place, bool placed_alone,
-             History& history) {
-  for (const inference::Iteration& iteration : history.iterations) {
-    history.ended.emplace_back(static_cast<std::size_t>(iteration.parameters.rows()), 1);
+/// alone. What was stopped before it had a state was never run.
+void AddEnds(const std::vector<store::EvaluationRecord>& evaluations, const Places& place,
+             bool placed_alone, History& history) {
+  for (std::size_t k = history.ended.size(); k < history.iterations.size(); ++k) {
+    history.ended.emplace_back(static_cast<std::size_t>(history.iterations[k].parameters.rows()),
+                               1);
   }
+  history.open = 0;
   std::int64_t ran = 0;  // to an end here
   for (const store::EvaluationRecord& evaluation : evaluations) {
     const auto found = place.find(evaluation.key.sample);
@@ -66,7 +76,7 @@ void AddEnds(const std::vector<store::EvaluationRecord>& evaluations,
     }
     if (store::IsTerminal(evaluation.status)) {
       const bool spared = evaluation.status == store::EvaluationStatus::kStoppedEarly &&
-                          begun.count(evaluation.key) == 0;
+                          history.begun.count(evaluation.key) == 0;
       ran += evaluation.reused || spared ? 0 : 1;
       continue;
     }
@@ -83,11 +93,15 @@ void AddEnds(const std::vector<store::EvaluationRecord>& evaluations,
 
 absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t campaign,
                                     store::Reader& reader, std::optional<int> first_iterations) {
-  History history;
+  const bool keeps = IsKept(definition) && !first_iterations.has_value();
+  History history =
+      keeps && definition.memory->history.has_value() ? *definition.memory->history : History{};
+  const std::size_t known = history.iterations.size();
+  const int first = history.samples.empty() ? 0 : history.samples.back().sample + 1;
   auto iterations = reader.Iterations(campaign);
-  auto samples = reader.Samples(campaign);
+  auto samples = reader.Samples(campaign, first);
   auto evaluations = reader.Evaluations(campaign);
-  auto states = reader.States(campaign);
+  auto states = reader.StatesFrom(campaign, first);
   auto effort = reader.EffortOf(campaign);
   for (const absl::Status& status : {iterations.status(), samples.status(), evaluations.status(),
                                      states.status(), effort.status()}) {
@@ -95,6 +109,9 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
       return status;
     }
   }
+  history.last_posterior.reset();
+  history.previous_posterior.reset();
+  history.concluded = 0;
   for (store::IterationRecord& record : *iterations) {
     if (record.proposal == kHeldOutDraws || record.proposal == kReplicates) {
       break;  // nothing of the ensemble comes after them
@@ -102,17 +119,19 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     if (first_iterations.has_value() && record.number >= *first_iterations) {
       break;
     }
-    inference::Iteration& iteration = history.iterations.emplace_back();
-    if (campaign::IsFilter(definition.campaign.method)) {
-      auto proposal = ProposalFromJson(record.proposal);
-      if (!proposal.ok()) {
-        return proposal.status();
+    if (static_cast<std::size_t>(record.number) >= known) {
+      inference::Iteration& iteration = history.iterations.emplace_back();
+      if (campaign::IsFilter(definition.campaign.method)) {
+        auto proposal = ProposalFromJson(record.proposal);
+        if (!proposal.ok()) {
+          return proposal.status();
+        }
+        iteration.proposal = *std::move(proposal);
       }
-      iteration.proposal = *std::move(proposal);
-    }
-    history.proposals.push_back(std::move(record.proposal));
-    if (definition.campaign.precomputed.has_value()) {
-      iteration.log_proposal = definition.campaign.precomputed->log_proposal;
+      history.proposals.push_back(std::move(record.proposal));
+      if (definition.campaign.precomputed.has_value()) {
+        iteration.log_proposal = definition.campaign.precomputed->log_proposal;
+      }
     }
     if (record.posterior.has_value()) {
       history.previous_posterior = std::move(history.last_posterior);
@@ -120,27 +139,28 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
       ++history.concluded;
     }
   }
-  history.samples = *std::move(samples);
-  std::erase_if(history.samples, [&history](const store::SampleRecord& sample) {
+  std::erase_if(*samples, [&history](const store::SampleRecord& sample) {
     return static_cast<std::size_t>(sample.iteration) >= history.iterations.size();
   });
+  history.samples.insert(history.samples.end(), samples->begin(), samples->end());
   history.effort = *effort;
-  AddSamples(definition, history);
+  AddSamples(definition, known, history);
 
   // Position of a sample within its iteration, by its number.
   Places place;
   std::vector<Eigen::Index> next(history.iterations.size(), 0);
-  for (const store::SampleRecord& sample : history.samples) {
+  for (const store::SampleRecord& sample : *samples) {
     const auto k = static_cast<std::size_t>(sample.iteration);
     place[sample.sample] = {k, next[k]++};
   }
-  std::set<store::EvaluationKey> with_states;
-  for (const store::StateRecord& state : *states) {
-    with_states.insert(with_states.end(), state.key);
-  }
-  AddEnds(*evaluations, with_states, place, first_iterations.has_value(), history);
   const auto finished = WithStatus(*evaluations, store::EvaluationStatus::kFinished);
   auto stopped = WithStatus(*evaluations, store::EvaluationStatus::kStoppedEarly);
+  for (const store::StateRecord& state : *states) {
+    if (stopped.count(state.key) > 0) {
+      history.begun.insert(state.key);
+    }
+  }
+  AddEnds(*evaluations, place, first_iterations.has_value(), history);
   std::set<int> without_weight;  // whatever their other experiments would come to
   for (const auto& key : WithStatus(*evaluations, store::EvaluationStatus::kDiverged)) {
     without_weight.insert(key.sample);
@@ -173,12 +193,16 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
       history.resting[evaluation.key] = *evaluation.rest_after;
     }
   }
-  history.stopped_early = static_cast<int>(begun.size());
-  for (const inference::Iteration& iteration : history.iterations) {
+  history.stopped_early += static_cast<int>(begun.size());
+  for (std::size_t k = known; k < history.iterations.size(); ++k) {
     std::vector<char>& diverged = history.diverged.emplace_back();
-    for (Eigen::Index i = 0; i < iteration.predictions.rows(); ++i) {
-      diverged.push_back(iteration.predictions.row(i).allFinite() ? 0 : 1);
+    const Eigen::MatrixXd& predictions = history.iterations[k].predictions;
+    for (Eigen::Index i = 0; i < predictions.rows(); ++i) {
+      diverged.push_back(predictions.row(i).allFinite() ? 0 : 1);
     }
+  }
+  if (keeps && history.open == 0) {
+    definition.memory->history = history;
   }
   return history;
 }

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct History {
   std::vector<store::EvaluationKey> stopped_keys;  ///< evaluations stopped early or resting
   std::map<store::EvaluationKey, int> resting;     ///< those with a rung: they came no
                                                    ///< further than this load step
+  std::set<store::EvaluationKey> begun;            ///< of those stopped early: they gave a state
   std::vector<std::vector<char>> diverged;   ///< [iteration][position]: it has no finite prediction
   std::vector<std::vector<char>> ended;      ///< likewise: nothing of it is waiting or running
   std::vector<store::SampleRecord> samples;  ///< of all iterations
@@ -40,8 +42,9 @@ inline constexpr const char* kHeldOutDraws = "\"draws from the posterior\"";
 /// Likewise when they are the best estimate on every packing, one sample each.
 inline constexpr const char* kReplicates = "\"best estimate on every packing\"";
 
-/// Reads every record in the order of its natural key. iterations: the first ones alone, as if
-/// nothing had followed (the core seconds are those of all); empty: all.
+/// Reads every record in the order of its natural key; of tmcmc the samples and states alone that
+/// definition.memory has not kept. iterations: the first ones alone, as if nothing had followed (the
+/// core seconds are those of all); empty: all.
 absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t campaign,
                                     store::Reader& reader, std::optional<int> iterations = {});
 

@@ -17,11 +17,12 @@ std::unique_ptr<Method> MakeMethod(const Definition& definition) {
 }
 
 absl::StatusOr<std::vector<Eigen::VectorXd>> LogLikelihoodsByBatch(const Definition& definition,
-                                                                   const History& history) {
+                                                                   const History& history,
+                                                                   std::size_t first) {
   std::vector<Eigen::VectorXd> batches;
-  for (const inference::Iteration& iteration : history.iterations) {
+  for (std::size_t k = first; k < history.iterations.size(); ++k) {
     auto likelihood = inference::LogLikelihood(definition.data, definition.campaign.filter,
-                                               iteration.predictions);
+                                               history.iterations[k].predictions);
     if (!likelihood.ok()) {
       return likelihood.status();
     }

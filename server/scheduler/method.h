@@ -70,8 +70,10 @@ std::unique_ptr<Method> MakeFilterMethod(const Definition& definition);
 std::unique_ptr<Method> MakeTmcmcMethod(const Definition& definition);
 std::unique_ptr<Method> MakeSurrogateMethod(const Definition& definition);
 
-/// ln p(data | sample) of every sample of the history in order; -inf: it has no finite prediction.
+/// ln p(data | sample) of every sample of the history's iterations from `first` on, in order; -inf:
+/// it has no finite prediction.
 absl::StatusOr<std::vector<Eigen::VectorXd>> LogLikelihoodsByBatch(const Definition& definition,
-                                                                   const History& history);
+                                                                   const History& history,
+                                                                   std::size_t first = 0);
 
 }  // namespace calib::scheduler

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "absl/strings/str_cat.h"
+#include "inference/data/gaussian_likelihood.h"
 #include "server/campaign/read_precomputed.h"
 #include "server/campaign/specimen_notes.h"
 #include "server/scheduler/answer.h"
@@ -273,14 +274,18 @@ class Planner {
     return numbers;
   }
 
-  std::vector<double> LogLikelihoods() {
+  std::vector<double> LogLikelihoods() const {
+    const bool tempered = campaign_.filter.noise == inference::NoiseMode::kEssTarget;
+    const auto likelihood =
+        tempered ? absl::FailedPreconditionError("known at the end alone")
+                 : inference::GaussianLikelihood::Create(definition_.data, campaign_.filter.noise);
     std::vector<double> values;
     for (const inference::Iteration& iteration : history_.iterations) {
-      const auto of_iteration =
-          inference::LogLikelihood(definition_.data, campaign_.filter, iteration.predictions);
-      for (Eigen::Index i = 0; i < iteration.predictions.rows(); ++i) {
-        values.push_back(of_iteration.ok() ? (*of_iteration)(i) : store::kUnknown);
-      }
+      const Eigen::Index n = iteration.predictions.rows();
+      const Eigen::VectorXd of_iteration = likelihood.ok()
+                                               ? likelihood->LogLikelihood(iteration.predictions)
+                                               : Eigen::VectorXd::Constant(n, store::kUnknown);
+      values.insert(values.end(), of_iteration.begin(), of_iteration.end());
     }
     return values;
   }

@@ -179,14 +179,14 @@ void Scheduler::ReturnUnleased(CampaignRun& run) {
   }
 }
 
-void Scheduler::TakeIn(std::int64_t campaign, bool at_rest) {
+void Scheduler::TakeIn(std::int64_t campaign, bool resumed) {
   CampaignRun* run = FindRun(campaign);
   if (run == nullptr) {
     return;
   }
   auto reader = ports_.Read();
-  if (!reader.ok() || !(at_rest ? run->Reload(*reader) : run->Extend(*reader)).ok()) {
-    again_[campaign] = [this, campaign, at_rest] { TakeIn(campaign, at_rest); };
+  if (!reader.ok() || !(resumed ? run->Reload(*reader) : run->Extend(*reader)).ok()) {
+    again_[campaign] = [this, campaign, resumed] { TakeIn(campaign, resumed); };
     return;
   }
   if (runs_.size() > 1) {  // something may have ended since the plan was made
@@ -500,7 +500,7 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
   const bool at_rest = run->AllTerminal();
   ports_.Write([plan, campaign, progress, now = ports_.UnixMs()](
                    Transaction& t) { scheduler::Write(plan, campaign, progress, now, t); },
-               [this, campaign, over, at_rest, begins,
+               [this, campaign, over, at_rest, begins, resumed = !plan.resumed.empty(),
                 stop_below = plan.stop_below](const absl::Status& status) {
                  computing_.erase(campaign);
                  ++version_;
@@ -519,7 +519,7 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
                  for (const auto& [sample, threshold] : stop_below) {
                    planned->SetStopBelow(sample, threshold);
                  }
-                 TakeIn(campaign, at_rest);
+                 TakeIn(campaign, resumed);
                });
 }
 

@@ -148,8 +148,8 @@ class Scheduler {
   /// TakeUp, then what follows from it; again with the next Tick when the store cannot be read now.
   void TakeUpNow(std::int64_t campaign);
   /// What a plan has added to the store, then what follows from it; again with the next Tick when
-  /// the store cannot be read now. at_rest: nothing ran when it was written.
-  void TakeIn(std::int64_t campaign, bool at_rest);
+  /// the store cannot be read now. resumed: something that had ended goes on.
+  void TakeIn(std::int64_t campaign, bool resumed);
   /// Puts waiting evaluations into the queue, or takes them out, as the campaign's state demands.
   void Enqueue(CampaignRun& run);
   /// Why a campaign must pause that has too many diverged samples; empty: it need not. last: why

@@ -1,6 +1,7 @@
 // tmcmc: every Metropolis step of every stage is one batch, the proposals of all chains. Where the
-// chains stand is computed again from the stored samples and states each time; whether a proposal
-// is accepted was decided by a number drawn before it ran, so neither order nor restarts matter.
+// chains stand follows from the stored samples and states (computed again after a start, kept from
+// plan to plan after that); whether a proposal is accepted was decided by a number drawn before it
+// ran, so neither order nor restarts matter.
 
 #include <algorithm>
 #include <cmath>
@@ -20,6 +21,7 @@
 #include "inference/tmcmc/tmcmc.h"
 #include "server/scheduler/early_stopping.h"
 #include "server/scheduler/method.h"
+#include "server/scheduler/plan_memory.h"
 #include "server/scheduler/posterior_record.h"
 
 namespace calib::scheduler {
@@ -65,24 +67,33 @@ class TmcmcMethod final : public Method {
   }
 
  private:
+  /// Goes on from where the plan before left the chains.
   absl::StatusOr<inference::TmcmcState> Replay(const History& history) const {
-    auto state = inference::StartTmcmc(definition_.priors, options_);
-    const auto likelihoods = LogLikelihoodsByBatch(definition_, history);
+    PlanMemory& memory = *definition_.memory;
+    const bool goes_on = memory.chains.has_value() && memory.batches <= history.iterations.size();
+    const std::size_t first = goes_on ? memory.batches : 0;
+    auto state = goes_on ? absl::StatusOr<inference::TmcmcState>(*memory.chains)
+                         : inference::StartTmcmc(definition_.priors, options_);
+    const auto likelihoods = LogLikelihoodsByBatch(definition_, history, first);
     if (!likelihoods.ok()) {
       return likelihoods.status();
     }
-    for (std::size_t k = 0; state.ok() && k < likelihoods->size(); ++k) {
+    for (std::size_t k = first; state.ok() && k < history.iterations.size(); ++k) {
       if (state->proposals != history.iterations[k].parameters) {
         return absl::DataLossError(
             absl::StrCat("the stored samples of batch ", k,
                          " are not those that follow from the ones before; "
                          "was the campaign begun by another version of this program?"));
       }
-      if (auto advanced =
-              inference::AdvanceTmcmc(definition_.priors, options_, (*likelihoods)[k], *state);
+      if (auto advanced = inference::AdvanceTmcmc(definition_.priors, options_,
+                                                  (*likelihoods)[k - first], *state);
           !advanced.ok()) {
         return advanced;
       }
+    }
+    if (state.ok()) {
+      memory.chains = *state;
+      memory.batches = history.iterations.size();
     }
     return state;
   }

@@ -53,6 +53,18 @@ CampaignRecord ToCampaign(SQLite::Statement& row) {
   return record;
 }
 
+std::vector<StateRecord> ToStates(std::int64_t campaign, SQLite::Statement& row) {
+  std::vector<StateRecord> records;
+  while (row.executeStep()) {
+    records.push_back({.key = {.campaign = campaign,
+                               .sample = row.getColumn(0).getInt(),
+                               .experiment = row.getColumn(1).getInt()},
+                       .load_step = row.getColumn(2).getInt(),
+                       .observables = ToDoubles(row.getColumn(3))});
+  }
+  return records;
+}
+
 constexpr std::string_view kAllCampaigns =
     "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
     "state, reason, phase, iteration, converged, pause_waived FROM campaign ORDER BY id";
@@ -183,14 +195,14 @@ absl::StatusOr<std::vector<IterationRecord>> Reader::Iterations(std::int64_t cam
   });
 }
 
-absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign) {
+absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign, int first) {
   return Guard([&] {
     std::vector<SampleRecord> records;
     SQLite::Statement& row = connection_->Bind(
         "SELECT sample, iteration, parameters, log_weight, log_likelihood, stop_below, audited "
         "FROM sample "
-        "WHERE campaign = ? ORDER BY sample",
-        campaign);
+        "WHERE campaign = ? AND sample >= ? ORDER BY sample",
+        campaign, first);
     while (row.executeStep()) {
       records.push_back({.sample = row.getColumn(0).getInt(),
                          .iteration = row.getColumn(1).getInt(),
@@ -231,26 +243,25 @@ absl::StatusOr<std::vector<EvaluationRecord>> Reader::Evaluations(std::int64_t c
 
 absl::StatusOr<std::vector<StateRecord>> Reader::States(std::int64_t campaign,
                                                         std::optional<int> sample) {
+  if (!sample.has_value()) {
+    return StatesFrom(campaign, 0);
+  }
   return Guard([&] {
-    std::vector<StateRecord> records;
-    SQLite::Statement& row =
-        sample.has_value()
-            ? connection_->Bind(
-                  "SELECT sample, experiment, load_step, observables FROM state "
-                  "WHERE campaign = ? AND sample = ? ORDER BY sample, experiment, load_step",
-                  campaign, *sample)
-            : connection_->Bind(
-                  "SELECT sample, experiment, load_step, observables FROM state "
-                  "WHERE campaign = ? ORDER BY sample, experiment, load_step",
-                  campaign);
-    while (row.executeStep()) {
-      records.push_back({.key = {.campaign = campaign,
-                                 .sample = row.getColumn(0).getInt(),
-                                 .experiment = row.getColumn(1).getInt()},
-                         .load_step = row.getColumn(2).getInt(),
-                         .observables = ToDoubles(row.getColumn(3))});
-    }
-    return records;
+    return ToStates(campaign,
+                    connection_->Bind(
+                        "SELECT sample, experiment, load_step, observables FROM state "
+                        "WHERE campaign = ? AND sample = ? ORDER BY sample, experiment, load_step",
+                        campaign, *sample));
+  });
+}
+
+absl::StatusOr<std::vector<StateRecord>> Reader::StatesFrom(std::int64_t campaign, int first) {
+  return Guard([&] {
+    return ToStates(campaign,
+                    connection_->Bind(
+                        "SELECT sample, experiment, load_step, observables FROM state "
+                        "WHERE campaign = ? AND sample >= ? ORDER BY sample, experiment, load_step",
+                        campaign, first));
   });
 }
 

@@ -39,11 +39,14 @@ class Reader {
   absl::StatusOr<std::optional<RequestRecord>> Request(const std::string& id);
 
   absl::StatusOr<std::vector<IterationRecord>> Iterations(std::int64_t campaign);
-  absl::StatusOr<std::vector<SampleRecord>> Samples(std::int64_t campaign);
+  /// Those with the number `first` or a larger one.
+  absl::StatusOr<std::vector<SampleRecord>> Samples(std::int64_t campaign, int first = 0);
   absl::StatusOr<std::vector<EvaluationRecord>> Evaluations(std::int64_t campaign);
   /// Of one sample, or of all.
   absl::StatusOr<std::vector<StateRecord>> States(std::int64_t campaign,
                                                   std::optional<int> sample = std::nullopt);
+  /// Of the samples with the number `first` or a larger one.
+  absl::StatusOr<std::vector<StateRecord>> StatesFrom(std::int64_t campaign, int first);
   /// An evaluation that ended with a result (finished or diverged) and was determined by the same
   /// things.
   absl::StatusOr<std::optional<EvaluationKey>> FindEqual(const std::string& digest);

@@ -112,7 +112,9 @@ void Transaction::SetWeight(std::int64_t campaign, int sample, double log_weight
                             double log_likelihood) {
   Guard([&] {
     connection_.Run(
-        "UPDATE sample SET log_weight = ?, log_likelihood = ? WHERE campaign = ? AND sample = ?",
+        "UPDATE sample SET log_weight = ?1, log_likelihood = ?2 WHERE campaign = ?3 AND sample = "
+        "?4 "
+        "AND (log_weight IS NOT ?1 OR log_likelihood IS NOT ?2)",
         log_weight, log_likelihood, campaign, sample);
   });
 }

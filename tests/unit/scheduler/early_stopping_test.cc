@@ -112,12 +112,14 @@ TEST(EarlyStopping, TotalVariationIsWithinTheStatedLoss) {
   stopped.stopped_keys.clear();
   const Eigen::Index readings = last.predictions.cols();
   int saved = 0;
+  const auto likelihood =
+      *inference::GaussianLikelihood::Create(definition->data, inference::NoiseMode::kGiven);
   for (Eigen::Index i = 0; i < last.predictions.rows(); ++i) {
     const Eigen::RowVectorXd run = last.predictions.row(i);
     Eigen::RowVectorXd seen = Eigen::RowVectorXd::Constant(readings, std::nan(""));
     for (Eigen::Index t = 0; t + 1 < readings; ++t) {
       seen[t] = run[t];
-      if (BestPossible(*definition, seen) >= thresholds[static_cast<std::size_t>(i)]) continue;
+      if (BestPossible(likelihood, seen) >= thresholds[static_cast<std::size_t>(i)]) continue;
       stopped.iterations.back().predictions.row(i).setConstant(std::nan(""));
       stopped.stopped.back().row(i) = seen;
       const auto first = static_cast<int>((stopped.iterations.size() - 1) * 40);
@@ -183,10 +185,12 @@ TEST(EarlyStopping, TotalVariationIsWithinAStatedLossThatIsHardlyLarger) {
   const auto thresholds = *StopThresholds(definition, before, complete.iterations[1]);
 
   History stopped = complete;
+  const auto likelihood =
+      *inference::GaussianLikelihood::Create(definition.data, inference::NoiseMode::kGiven);
   for (int i = 0; i < kSamples; ++i) {
     Eigen::RowVectorXd seen = Eigen::RowVectorXd::Constant(kReadings, std::nan(""));
     seen[0] = complete.iterations[1].predictions(i, 0);
-    if (BestPossible(definition, seen) >= thresholds[static_cast<std::size_t>(i)]) continue;
+    if (BestPossible(likelihood, seen) >= thresholds[static_cast<std::size_t>(i)]) continue;
     stopped.iterations[1].predictions.row(i).setConstant(std::nan(""));
     stopped.stopped[1].row(i) = seen;
     stopped.stopped_keys.push_back({0, static_cast<int>(kSamples) + i, 0});
