@@ -298,6 +298,78 @@ TEST(EarlyStopping, DecidedAtOnceItStopsInTheFirstIterationWithinTheStatedLoss) 
   }
 }
 
+// Depth first, thresholds of the last iteration put so high that most of them stop samples that
+// count: only the bounds taken again at its end can bring these back. What is stopped by the others
+// may stay so.
+TEST(EarlyStopping, WhatWasStoppedTooSoonIsResumedUntilTheLossIsAllowed) {
+  constexpr int kSamples = 40;
+  const auto campaign = [](const std::string& extra) {
+    return testing::MakeSmallCampaign({.samples = kSamples,
+                                       .max_iterations = 2,
+                                       .load_steps = 12,
+                                       .failure_attempts = 100,
+                                       .relative_noise = 0.05,
+                                       .extra = extra});
+  };
+  SimulatedService full("too_soon_full");
+  full.Submit(campaign(""));
+  full.RunToEnd(1, true);
+
+  SimulatedService service("too_soon");
+  service.Submit(campaign("early_stopping: {discard_at_most: 1e-3, exponent: 1}\n"));
+  const auto worker = service.Connect("w0", 1);  // the one that RunToEnd goes on with
+  using Kind = v1::ServerMessage;
+  for (int i = 0; i < kSamples; ++i) {
+    const v1::Lease lease = service.Next(worker, Kind::kLease).lease();
+    service.SendStates(worker, lease, 0, 12);
+    service.SendEnd(worker, lease.attempt(), v1::Finished::OUTCOME_COMPLETED);
+  }
+  store::Reader reader = service.Read();
+  const auto definition = *LoadDefinition(reader, Value(reader.Campaign(1)).submitted);
+  const auto likelihood =
+      *inference::GaussianLikelihood::Create(definition->data, inference::NoiseMode::kGiven);
+  const double perfect =
+      BestPossible(likelihood, Eigen::RowVectorXd::Constant(likelihood.readings(), std::nan("")));
+  ASSERT_EQ(Value(reader.Samples(1)).size(), 2U * kSamples) << "the last iteration has begun";
+  service.Write([perfect](store::Transaction& transaction) {
+    for (int sample = kSamples; sample < 2 * kSamples; ++sample) {
+      transaction.SetStopBelow(1, sample, perfect - (sample % 4 == 0 ? 25 : 3));
+    }
+  });
+  service.Restart();
+  service.RunToEnd(1, true);
+
+  int resumed = 0;
+  for (const store::EventRecord& event : Value(service.Read().Events(1))) {
+    resumed += event.what.find("stopped early are resumed") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_GE(resumed, 1);
+  int finished = 0;  // of those that were stopped
+  for (const store::SampleRecord& sample : Value(service.Read().Samples(1))) {
+    if (sample.sample < kSamples || !std::isfinite(sample.log_weight)) continue;
+    finished += sample.log_likelihood < perfect - 3 && std::isnan(sample.audited) ? 1 : 0;
+  }
+  EXPECT_GT(finished, 0) << "none of the resumed lies below the threshold that had stopped it";
+  const v1::Posterior with = LastPosterior(service);
+  EXPECT_GT(with.stopped_early(), 0) << "all were resumed";
+  EXPECT_GT(with.stated_loss(), 0);
+  EXPECT_LE(with.stated_loss(), kAllowed);
+  double variation = 0;
+  double lost = 0;  // without resuming
+  const auto whole = Value(full.Read().Samples(1));
+  const auto part = Value(service.Read().Samples(1));
+  ASSERT_EQ(whole.size(), part.size());
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    ASSERT_EQ(whole[i].parameters, part[i].parameters);
+    variation += 0.5 * std::abs(std::exp(whole[i].log_weight) - std::exp(part[i].log_weight));
+    if (i >= kSamples && whole[i].log_likelihood < perfect - 3) {
+      lost += std::exp(whole[i].log_weight);
+    }
+  }
+  EXPECT_GT(lost, 10 * kAllowed) << "the thresholds were not too high";
+  EXPECT_LE(variation, with.stated_loss());
+}
+
 // Of few finished samples the guiding exponent is one, and stops what lies a few nats lower:
 // without an exponent of the campaign's nothing is stopped before twice as many as it leaves
 // effective.
