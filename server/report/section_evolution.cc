@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "server/report/html.h"
 #include "server/report/plot/plot.h"
@@ -90,16 +92,33 @@ std::string EssAlongPath(const CampaignView& view) {
          "</figure>\n";
 }
 
+// Rows of a table that a person reads; the chains of tmcmc take a hundred steps and more.
+constexpr int kMostRows = 20;
+
+// Every iteration, or evenly spaced ones with the first and the last.
+std::vector<int> IterationsShown(int iterations) {
+  std::vector<int> shown;
+  const int rows = std::min(iterations, kMostRows);
+  for (int row = 0; row < rows; ++row) {
+    shown.push_back(rows == 1 ? 0 : row * (iterations - 1) / (rows - 1));
+  }
+  return shown;
+}
+
 std::string IterationTable(const CampaignView& view) {
   std::string html =
       "<div class=\"scroll\"><table><tr><th>after iteration</th><th>effective "
       "samples</th><th>Pareto index</th><th>log evidence</th>"
       "<th>model evaluations</th></tr>\n";
-  for (const v1::Posterior& posterior : view.iterations) {
-    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{} ± {}</td><td>{}</td></tr>\n",
+  for (const int k : IterationsShown(static_cast<int>(view.iterations.size()))) {
+    const v1::Posterior& posterior = view.iterations[static_cast<std::size_t>(k)];
+    const std::string evidence = std::isfinite(posterior.log_evidence())
+                                     ? fmt::format("{} ± {}", Number(posterior.log_evidence(), 5),
+                                                   Number(posterior.log_evidence_se(), 2))
+                                     : "–";
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
                         posterior.iteration() + 1, Number(posterior.ess(), 3),
-                        Number(posterior.pareto_k(), 2), Number(posterior.log_evidence(), 5),
-                        Number(posterior.log_evidence_se(), 2), posterior.model_evaluations());
+                        Number(posterior.pareto_k(), 2), evidence, posterior.model_evaluations());
   }
   return html + "</table></div>\n";
 }

@@ -213,6 +213,29 @@ TEST(Report, ACampaignWithoutAnIterationSaysSo) {
   EXPECT_THAT(RenderReport(view), HasSubstr("No iteration is complete yet"));
 }
 
+// tmcmc takes a hundred steps and more: the page showed a row of each.
+TEST(Report, ATableOfIterationsKeepsTheFirstAndTheLastOfMany) {
+  CampaignView view = testing::ExampleView("sand");
+  const v1::Posterior last = view.posterior;
+  view.iterations.assign(111, last);
+  for (int k = 0; k < 111; ++k) {
+    view.iterations[static_cast<std::size_t>(k)].set_iteration(k);
+    if (k < 110) view.iterations[static_cast<std::size_t>(k)].set_log_evidence(std::nan(""));
+  }
+  const std::string html = RenderReport(view);
+  const std::string table = html.substr(html.find("<th>after iteration</th>"));
+  std::vector<std::string> rows;
+  const std::regex row("<tr><td>([0-9]+)</td>");
+  const std::string until = table.substr(0, table.find("</table>"));
+  for (std::sregex_iterator at(until.begin(), until.end(), row), end; at != end; ++at) {
+    rows.push_back((*at)[1]);
+  }
+  ASSERT_EQ(rows.size(), 20U);
+  EXPECT_EQ(rows.front(), "1");
+  EXPECT_EQ(rows.back(), "111");
+  EXPECT_THAT(until, Not(HasSubstr("– ±")));
+}
+
 TEST(Html, EscapesMarkupAndRepairsText) {
   EXPECT_EQ(Escape("a<b>&\"'"), "a&lt;b&gt;&amp;&quot;&#39;");
   EXPECT_EQ(Escape("\x01\x7f"), "");
