@@ -17,6 +17,8 @@ std::vector<double> Counting(std::size_t n) {
   return numbers;
 }
 
+constexpr int kMostTicks = 8;  // labels of more run into each other
+
 // Mean and 5-95 % of one parameter after each iteration.
 std::string OverIterations(const CampaignView& view, int k) {
   const auto& last = view.posterior.parameters(k);
@@ -35,8 +37,8 @@ std::string OverIterations(const CampaignView& view, int k) {
   shown.insert(shown.end(), low.begin(), low.end());
   shown.insert(shown.end(), high.begin(), high.end());
   Plot plot({.width = 330, .height = 200},
-            Axis("iterations", 0.7, static_cast<double>(x.size()) + 0.3, static_cast<int>(x.size()),
-                 Axis::Scale::kLinear, true),
+            Axis("iterations", 0.7, static_cast<double>(x.size()) + 0.3,
+                 std::min(static_cast<int>(x.size()), kMostTicks), Axis::Scale::kLinear, true),
             Axis::Covering(LabelWithUnit(last.name(), unit), shown, 4));
   plot.AddBand(x, low, high);
   plot.AddLine(x, mean);

@@ -155,6 +155,43 @@ TEST(TmcmcRestitution, EvidenceOfModelOne) {
   }
 }
 
+// Of the samples' values in this column, the share in [low, high).
+double ShareWithin(const Fit& fit, Eigen::Index j, double low, double high) {
+  const auto column = fit.state.samples.col(j).array();
+  return static_cast<double>((column >= low && column < high).count()) /
+         static_cast<double>(column.size());
+}
+
+// The two shapes that the paper reports [Hadjidoukas 2014, Figs. 2 and 4]: k_t with one mode near
+// 0.45e8 N/m and one near 1.4e8 (it has 0.4 and 1.33), and gamma u^alpha, known at the overlaps of
+// these impacts alone, so that ln gamma grows with alpha along a ridge: by ln(1/u), u the largest
+// overlap, 1e-4 m or so.
+TEST(TmcmcRestitution, StiffnessHasTwoModesAndDampingARidge) {
+  const Fit one = FitModel(1, 3, 4000);
+  std::cout << "M1, share of k_t [1e8 N/m]:";
+  for (int bin = 1; bin < 20; ++bin) {
+    std::cout << " " << 0.1 * bin << ": " << ShareWithin(one, 1, 0.1 * bin, 0.1 * (bin + 1));
+  }
+  std::cout << "\n";
+  const double lower = ShareWithin(one, 1, 0.35, 0.6);
+  const double valley = ShareWithin(one, 1, 0.7, 0.95);
+  const double upper = ShareWithin(one, 1, 1.3, 1.55);
+  EXPECT_GT(lower, 2 * valley) << lower << ", valley " << valley;
+  EXPECT_GT(upper, 5 * lower) << upper << ", lower mode " << lower;
+
+  const Fit three = FitModel(3, 3, 1500);
+  const Eigen::ArrayXd alpha = three.state.samples.col(5).array();
+  const Eigen::ArrayXd log_gamma = three.state.samples.col(2).array().log();
+  const Eigen::ArrayXd a = alpha - alpha.mean();
+  const Eigen::ArrayXd g = log_gamma - log_gamma.mean();
+  const double correlation = (a * g).sum() / std::sqrt(a.square().sum() * g.square().sum());
+  const double slope = (a * g).sum() / a.square().sum();
+  std::cout << "M3: correlation of ln gamma with alpha " << correlation << ", slope " << slope
+            << "\n";
+  EXPECT_GT(correlation, 0.9);
+  EXPECT_NEAR(slope, std::log(1e4), 2);
+}
+
 // Columns: speed, model, mu, k_t [1e8 N/m], gamma [1e4], alpha, variances of the normal and the
 // tangential coefficients, log evidence with its standard error; README.md beside this file.
 // The impact speeds are those that the paper leaves open; CALIB_RESTITUTION sets the number of
