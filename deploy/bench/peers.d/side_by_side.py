@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Times YADE, LAMMPS, LIGGGHTS and this engine on the same packings: see deploy/bench/peers.
 
-usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|flow|together|evaluation] [--quick]
+usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|flow|together|evaluation|curves]
+           [--cases base,rolling,linear] [--tests '0.2 MPa,oedometric'] [--keep FOLDER] [--quick]
 Every round runs all codes once, one after the other, so that what disturbs the machine disturbs all of them; the tables
 hold medians over the rounds. One thread is timed by processor time, so that other work on the machine takes nothing
 from anybody; two threads by wall time, which wants an idle machine. Prints Markdown.
@@ -18,6 +19,8 @@ import subprocess
 import sys
 import tempfile
 import time
+
+import curves
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 DATA = os.path.join(os.environ["CALIB_DATA"], "toyoura_triaxial")
@@ -312,7 +315,10 @@ def main():
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--grains", default="1000,5000,10000")
     parser.add_argument("--threads", default="1,2")
-    parser.add_argument("--only", choices=("speed", "together", "flow", "evaluation"), help="one of the parts")
+    parser.add_argument("--only", choices=("speed", "together", "flow", "evaluation", "curves"), help="one of the parts")
+    parser.add_argument("--cases", default=",".join(curves.CASES), help="of the part curves")
+    parser.add_argument("--tests", default=",".join(curves.TESTS), help="of the part curves")
+    parser.add_argument("--keep", help="folder for the curves of the part curves, so that it may be stopped and run again")
     parser.add_argument("--quick", action="store_true", help="few steps, one repeat: shows that all programs run")
     arguments = parser.parse_args()
     repeats = 1 if arguments.quick else arguments.repeats
@@ -320,14 +326,23 @@ def main():
     unknown = sorted(set(grains) - set(SKIN))
     if unknown:
         parser.error(f"no packing of {unknown} grains; there are {sorted(SKIN)}")
+    cases, tests = arguments.cases.split(","), arguments.tests.split(",")
+    for given, known in ((cases, curves.CASES), (tests, curves.TESTS)):
+        if not set(given) <= set(known):
+            parser.error(f"{sorted(set(given) - set(known))}: there are {sorted(known)}")
+    if arguments.quick:
+        cases, tests = cases[:1], tests[:1]
+    if arguments.keep:
+        os.makedirs(arguments.keep, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="calib-peers-") as folder:
         work = Work(os.path.abspath(arguments.binaries), folder, arguments.quick)
         parts = {"speed": lambda: speed(work, grains, [int(word) for word in arguments.threads.split(",")], repeats),
                  "together": lambda: together(work, grains, repeats),
                  "flow": lambda: flow(work, repeats),
-                 "evaluation": lambda: evaluation(work, repeats)}
+                 "evaluation": lambda: evaluation(work, repeats),
+                 "curves": lambda: curves.curves(work, run, os.environ["CALIB_DATA"], cases, tests, repeats, arguments.keep or folder)}
         for name, part in parts.items():
-            if arguments.only in (None, name):
+            if arguments.only == name or (arguments.only is None and name != "curves"):  # those take an hour
                 part()
 
 
