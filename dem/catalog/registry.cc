@@ -1,32 +1,16 @@
 #include "dem/catalog/registry.h"
 
+#include <algorithm>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "dem/catalog/found_effects.h"
 #include "dem/contact/extended_viscoelastic.h"
 #include "dem/contact/hertz_mindlin.h"
 #include "dem/contact/kuwabara_kono.h"
 #include "dem/contact/linear.h"
 #include "dem/contact/tsuji.h"
-#include "dem/effects/adhesion_dmt.h"
-#include "dem/effects/adhesion_jkr.h"
-#include "dem/effects/apparatus_compliance.h"
-#include "dem/effects/capillary_bridges.h"
-#include "dem/effects/contact_plasticity.h"
-#include "dem/effects/hertz_nonlinearity.h"
-#include "dem/effects/initial_density.h"
-#include "dem/effects/initial_fabric.h"
-#include "dem/effects/linear_cohesion.h"
-#include "dem/effects/load_cell_error.h"
-#include "dem/effects/membrane_stiffness.h"
-#include "dem/effects/nonspherical_shape.h"
-#include "dem/effects/particle_crushing.h"
-#include "dem/effects/pressure_dependent_friction.h"
-#include "dem/effects/rolling_resistance.h"
-#include "dem/effects/strain_offset.h"
-#include "dem/effects/twisting_resistance.h"
-#include "dem/effects/viscous_damping.h"
-#include "dem/effects/wall_friction.h"
 #include "dem/lab_tests/angle_of_repose.h"
 #include "dem/lab_tests/calibration_device.h"
 #include "dem/lab_tests/isotropic.h"
@@ -61,16 +45,13 @@ std::span<const ContactEntry> ContactEntries() {
 }
 
 std::span<const EffectEntry> EffectEntries() {
-  static const std::vector<EffectEntry> entries = {NonsphericalShape(), ParticleCrushing(),
-                                                   HertzNonlinearity(), ContactPlasticity(),
-                                                   LinearCohesion(),    AdhesionDmt(),
-                                                   AdhesionJkr(),       CapillaryBridges(),
-                                                   ViscousDamping(),    PressureDependentFriction(),
-                                                   RollingResistance(), TwistingResistance(),
-                                                   InitialDensity(),    InitialFabric(),
-                                                   WallFriction(),      ApparatusCompliance(),
-                                                   StrainOffset(),      MembraneStiffness(),
-                                                   LoadCellError()};
+  static const std::vector<EffectEntry> entries = [] {
+    std::vector<EffectEntry> found = FoundEffects();
+    std::sort(found.begin(), found.end(), [](const EffectEntry& a, const EffectEntry& b) {
+      return std::tie(a.place, a.info.name) < std::tie(b.place, b.info.name);
+    });
+    return found;
+  }();
   return entries;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
-// Where contact laws, effects and lab tests are listed: one line each in registry.cc makes an entry
-// known to everything that reads the catalogue and to the engine.
+// Where contact laws, effects and lab tests are listed, for everything that reads the catalogue and for
+// the engine. Effects are found by their files, one each in dem/effects; the others are a line each in
+// registry.cc.
 
 #include <optional>
 #include <span>
@@ -46,9 +47,10 @@ struct WallProperties {
 };
 
 /// An effect acts between grains, at walls, on the readings, or on the initial state: it sets what
-/// it needs. Effects of one stage act in the order of the registry.
+/// it needs.
 struct EffectEntry {
   EffectInfo info;
+  int place = 1000;  ///< effects of one stage act, and all are listed, in this order, then by name
   std::vector<EffectKernel> kernels = {};
   void (*alter)(const ParameterSet& parameters, Apparatus& apparatus) = nullptr;
   void (*prepare)(const ParameterSet& parameters, Preparation& preparation) = nullptr;
@@ -72,7 +74,10 @@ ParameterSet ResolveParameters(const std::vector<ParameterInfo>& infos, const st
                                const std::map<std::string, double>& given);
 
 std::span<const ContactEntry> ContactEntries();
+
+/// Every effect of dem/effects, in the order of their places.
 std::span<const EffectEntry> EffectEntries();
+
 std::span<const ElementTestEntry> ElementTestEntries();
 std::span<const GravityTestEntry> GravityTestEntries();
 

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "dem/contact/contact_block.h"
-#include "dem/effects/moment_stiffness.h"
+#include "dem/effects/shared/moment_stiffness.h"
 #include "dem/effects/viscous_damping.h"
 #include "dem/simulation/scenario.h"
 

@@ -1,9 +1,10 @@
-#include "dem/effects/adhesion_dmt.h"
+// `adhesion_dmt`: a constant attraction of touching grains.
 
 #include <numbers>
 
+#include "dem/catalog/registry.h"
 #include "dem/contact/simd.h"
-#include "dem/effects/shared_parameters.h"
+#include "dem/effects/shared/parameters.h"
 
 namespace calib::dem {
 namespace {
@@ -32,6 +33,10 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 
 }  // namespace
 
+///   F = F_b - F_p,   F_p = 2 pi W R*,   |Fs| <= tan(phi_mu) (F + F_p),   R* = r1 r2/(r1 + r2)
+/// Stiff, small grains: attraction acts around the contact and does not change its profile; it ends
+/// with the contact. W is the work of adhesion [J/m^2]; codes that use the surface energy gamma
+/// have W = 2 gamma. One-sided, vanishes at W = 0. [Derjaguin, Muller & Toporov 1975]
 EffectEntry AdhesionDmt() {
   return {
       .info = {.name = "adhesion_dmt",
@@ -44,6 +49,7 @@ EffectEntry AdhesionDmt() {
                             "314",
                .two_sided = false,
                .rays = {{.parameter = "work_of_adhesion", .steps = {0.1, 0.4}}}},
+      .place = 60,
       .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
 }
 

@@ -1,5 +1,6 @@
-#include "dem/effects/initial_fabric.h"
+// `initial_fabric`: an anisotropic fabric left by the way the specimen was made.
 
+#include "dem/catalog/registry.h"
 #include "dem/lab_tests/element_test.h"
 
 namespace calib::dem {
@@ -11,6 +12,11 @@ void Prepare(const ParameterSet& parameters, Preparation& preparation) {
 
 }  // namespace
 
+/// Consolidation follows q/p = a, the `stress_anisotropy`,
+///   sigma_a = p (1 + 2/3 a),   sigma_r = p (1 - a/3),
+/// and ends at the stress asked for: contacts made under the larger stress remain. Positive: made
+/// under axial load, as by pluviation or K0 compression; negative: in extension. Two-sided,
+/// vanishes at 0. [Oda 1972; Yimsiri & Soga 2010, by preshearing]
 EffectEntry InitialFabric() {
   ParameterInfo anisotropy;
   anisotropy.name = "stress_anisotropy";
@@ -32,6 +38,7 @@ EffectEntry InitialFabric() {
                    .two_sided = true,
                    .rays = {{.parameter = "stress_anisotropy", .steps = {0.2, 0.5}}},
                    .excited_by = ElementTestNames()},
+          .place = 140,
           .prepare = &Prepare};
 }
 

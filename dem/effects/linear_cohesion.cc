@@ -1,7 +1,8 @@
-#include "dem/effects/linear_cohesion.h"
+// `linear_cohesion`: attraction in proportion to the area of contact.
 
 #include <numbers>
 
+#include "dem/catalog/registry.h"
 #include "dem/contact/simd.h"
 
 namespace calib::dem {
@@ -31,6 +32,13 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 
 }  // namespace
 
+///   F = F_b - C A,   A = 2 pi r* u
+/// A is the circle in which two spheres cut each other, to first order, C a cohesion energy density
+/// [J/m^3 = Pa]. Sliding limit tan(phi_mu) (F + C A). With linear contacts CA/F_b = pi C/E whatever
+/// the load: a softer spring with more friction. Hertz contacts, whose force falls faster than
+/// their area, are held together below an overlap of r* (2 pi C/(kn/sqrt(r* u)))^2. One-sided,
+/// vanishes at C = 0. Acts while grains overlap.
+/// [Luding 2008, sec. 2.2.2, on tension that grows with overlap; Johnson 1985, sec. 5.5]
 EffectEntry LinearCohesion() {
   ParameterInfo density;
   density.name = "energy_density";
@@ -52,6 +60,7 @@ EffectEntry LinearCohesion() {
                                 "Mechanics (1985), sec. 5.5",
                    .two_sided = false,
                    .rays = {{.parameter = "energy_density", .steps = {1, 3}}}},
+          .place = 50,
           .kernels = {{.stage = ContactStage::kNormalExtra, .make = &Make}}};
 }
 

@@ -1,4 +1,6 @@
-#include "dem/effects/load_cell_error.h"
+// `load_cell_error`: gain and zero of the load cell.
+
+#include "dem/catalog/registry.h"
 
 namespace calib::dem {
 namespace {
@@ -10,6 +12,10 @@ void Alter(const ParameterSet& parameters, Apparatus& apparatus) {
 
 }  // namespace
 
+///   sigma_a reported = sigma_a + g x + s0,   x as in apparatus_compliance
+/// The cell is taken to zero at the start of loading; what it then reads is wrong by a factor and
+/// by a shift. Changes reports only, not the test. Two-sided, vanishes at g = 0 and s0 = 0. [ASTM
+/// E74]
 EffectEntry LoadCellError() {
   ParameterInfo gain;
   gain.name = "gain";
@@ -44,6 +50,7 @@ EffectEntry LoadCellError() {
                    .rays = {{.parameter = "gain", .steps = {0.05, 0.15}},
                             {.parameter = "offset", .steps = {0.03, 0.1}}},
                    .excited_by = {"triaxial_drained", "triaxial_undrained", "oedometric"}},
+          .place = 190,
           .alter = &Alter};
 }
 

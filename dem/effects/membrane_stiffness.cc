@@ -1,4 +1,6 @@
-#include "dem/effects/membrane_stiffness.h"
+// `membrane_stiffness`: a rubber membrane that confines a bulging specimen.
+
+#include "dem/catalog/registry.h"
 
 namespace calib::dem {
 namespace {
@@ -9,6 +11,10 @@ void Alter(const ParameterSet& parameters, Apparatus& apparatus) {
 
 }  // namespace
 
+///   sigma_r of the specimen = sigma_cell + M max(0, -eps_r)
+/// The lateral stress held on the specimen grows as it bulges, while the laboratory reports the
+/// cell pressure; M = 2 E_m t/D of a membrane of modulus E_m and thickness t on a diameter D.
+/// Triaxial tests only. One-sided, vanishes at M = 0. [Henkel & Gilbert 1952]
 EffectEntry MembraneStiffness() {
   ParameterInfo stiffness;
   stiffness.name = "stiffness";
@@ -30,6 +36,7 @@ EffectEntry MembraneStiffness() {
                    .two_sided = false,
                    .rays = {{.parameter = "stiffness", .steps = {0.5, 2}}},
                    .excited_by = {"triaxial_drained", "triaxial_undrained"}},
+          .place = 180,
           .alter = &Alter};
 }
 

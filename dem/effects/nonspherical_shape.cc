@@ -1,5 +1,6 @@
-#include "dem/effects/nonspherical_shape.h"
+// `nonspherical_shape`: elongated grains in place of spheres.
 
+#include "dem/catalog/registry.h"
 #include "dem/lab_tests/element_test.h"
 
 namespace calib::dem {
@@ -11,6 +12,10 @@ void Prepare(const ParameterSet& parameters, Preparation& preparation) {
 
 }  // namespace
 
+/// Every sphere becomes a rigid clump of two equal overlapping spheres of the same volume (of the
+/// union), length over width `aspect`, directions at random; the specimen is brought to the new
+/// shape at constant porosity before consolidation (simulation/shape_change.h). Null by definition
+/// at aspect 1: spheres. One-sided. [Favier et al. 1999; Ng 2004, J. Eng. Mech. 130, 193]
 EffectEntry NonsphericalShape() {
   ParameterInfo aspect;
   aspect.name = "aspect";
@@ -33,6 +38,7 @@ EffectEntry NonsphericalShape() {
                    .two_sided = false,
                    .rays = {{.parameter = "aspect", .steps = {0.1, 0.3}}},
                    .excited_by = ElementTestNames()},
+          .place = 10,
           .prepare = &Prepare};
 }
 

@@ -1,5 +1,6 @@
-#include "dem/effects/particle_crushing.h"
+// `particle_crushing`: grains that crush under their contact forces and lose size.
 
+#include "dem/catalog/registry.h"
 #include "dem/lab_tests/element_test.h"
 
 namespace calib::dem {
@@ -14,6 +15,9 @@ void Prepare(const ParameterSet& parameters, Preparation& preparation) {
 
 }  // namespace
 
+/// Law and size-loss rule: dynamics/crushing.h. Vanishes at weakness 0 (infinite strength) and at
+/// size_loss 0. One-sided. Fines carry no force and count as solid volume. [McDowell & Bolton 1998;
+/// crushed material taken out of the skeleton as in Marketos & Bolton 2009]
 EffectEntry ParticleCrushing() {
   ParameterInfo weakness;
   weakness.name = "weakness";
@@ -67,6 +71,7 @@ EffectEntry ParticleCrushing() {
                              // Of few grains that crush: their share goes with weakness^m.
                              .order = *modulus.default_value}},
                    .excited_by = ElementTestNames()},
+          .place = 20,
           .prepare = &Prepare};
 }
 

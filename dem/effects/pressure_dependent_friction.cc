@@ -1,7 +1,8 @@
-#include "dem/effects/pressure_dependent_friction.h"
+// `pressure_dependent_friction`: friction that falls or grows with the load of a contact.
 
+#include "dem/catalog/registry.h"
 #include "dem/contact/simd.h"
-#include "dem/effects/shared_parameters.h"
+#include "dem/effects/shared/parameters.h"
 #include "dem/elementary/power.h"
 
 namespace calib::dem {
@@ -37,6 +38,13 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 
 }  // namespace
 
+///   mu = tan(phi_mu) (sigma/p_ref)^(-m),   sigma = Fn/d*^2,  d* = 4 r* (= d of equal grains)
+/// sigma is the contact's own nominal pressure: on average about the mean stress p of the packing,
+/// since p = Z phi F/(pi d^2) [Rumpf 1958] with coordination number times solid fraction near pi.
+/// In one test at one pressure this is nearly another constant friction; it shows between
+/// pressures. Fn is without adhesive pull. Two-sided, vanishes at m = 0; for Hertz contacts of
+/// constant shear strength per area m = 1/3. sigma/p_ref below 1e-6 counts as 1e-6. [Bowden & Tabor
+/// 1950; Archard 1957]
 EffectEntry PressureDependentFriction() {
   ParameterInfo exponent;
   exponent.name = "exponent";
@@ -62,6 +70,7 @@ EffectEntry PressureDependentFriction() {
                              .steps = {0.1, 0.25},
                              .held = {{"reference_pressure", 1}}}},
                    .across_pressures = true},
+          .place = 100,
           .kernels = {{.stage = ContactStage::kSlidingLimit, .make = &Make}}};
 }
 

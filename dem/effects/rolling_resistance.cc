@@ -1,10 +1,11 @@
-#include "dem/effects/rolling_resistance.h"
+// `rolling_resistance`: a bending moment against relative rolling, elastic up to a limit.
 
 #include <cmath>
 
+#include "dem/catalog/registry.h"
 #include "dem/contact/contact_kinematics.h"
 #include "dem/contact/simd.h"
-#include "dem/effects/moment_stiffness.h"
+#include "dem/effects/shared/moment_stiffness.h"
 
 namespace calib::dem {
 namespace {
@@ -56,6 +57,13 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 
 }  // namespace
 
+///   dM = k_m dtheta,  dtheta = (w2 - w1) without its normal part, times dt;   |M| <= eta Fn l
+///   hertz_mindlin: k_m = stiffness [N m/rad] or stiffness_ratio r1 r2 ks (current ks),
+///                  l = (r1 + r2)/2
+///   linear:        k_m = stiffness r1 r2 ks (stiffness_ratio is the same),
+///                  l = min(r1, r2)
+/// M is carried along with the contact like the shear force. Vanishes at stiffness 0 or friction 0.
+/// [Cheng 2018, Table 1]
 EffectEntry RollingResistance() {
   return {
       .info = {.name = "rolling_resistance",
@@ -68,6 +76,7 @@ EffectEntry RollingResistance() {
                             "(1998) 285",
                .two_sided = false,
                .rays = MomentRays()},
+      .place = 110,
       .kernels = {{.stage = ContactStage::kMoment, .make = &Make}}};
 }
 

@@ -1,4 +1,6 @@
-#include "dem/effects/strain_offset.h"
+// `strain_offset`: bedding and seating errors that close under load.
+
+#include "dem/catalog/registry.h"
 
 namespace calib::dem {
 namespace {
@@ -10,6 +12,10 @@ void Alter(const ParameterSet& parameters, Apparatus& apparatus) {
 
 }  // namespace
 
+///   reading of axial strain = eps + d0 (1 - exp(-x/q0)),   x >= 0 as in apparatus_compliance
+/// Gaps between platens and specimen close as load comes on: strain that the specimen does not
+/// have, most of it below q0. Drives the test like apparatus_compliance. One-sided, vanishes at
+/// d0 = 0. [Jardine, Symes & Burland 1984; Goto et al. 1991]
 EffectEntry StrainOffset() {
   ParameterInfo offset;
   offset.name = "offset";
@@ -44,6 +50,7 @@ EffectEntry StrainOffset() {
            .two_sided = false,
            .rays = {{.parameter = "offset", .steps = {0.1, 0.4}, .held = {{"stress", 0.3}}}},
            .excited_by = {"triaxial_drained", "triaxial_undrained", "oedometric"}},
+      .place = 170,
       .alter = &Alter};
 }
 

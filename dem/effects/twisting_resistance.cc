@@ -1,10 +1,12 @@
-#include "dem/effects/twisting_resistance.h"
+// `twisting_resistance`: a moment about the normal against relative twisting, elastic up to a
+// limit.
 
 #include <algorithm>
 #include <iterator>
 
+#include "dem/catalog/registry.h"
 #include "dem/contact/simd.h"
-#include "dem/effects/moment_stiffness.h"
+#include "dem/effects/shared/moment_stiffness.h"
 #include "dem/lab_tests/element_test.h"
 #include "dem/lab_tests/gravity_test.h"
 
@@ -58,6 +60,10 @@ std::vector<std::string> WhereGrainsTwist() {
 
 }  // namespace
 
+///   dM = k_t dtheta,  dtheta = n.(w2 - w1) dt,   |M| <= eta Fn l
+/// Stiffness k_t, limit and length l as in rolling_resistance, with parameters of their own (the
+/// papers share one stiffness between rolling and twisting). Vanishes at stiffness 0 or friction 0.
+/// [Cheng 2018, Table 1]
 EffectEntry TwistingResistance() {
   return {
       .info = {.name = "twisting_resistance",
@@ -71,6 +77,7 @@ EffectEntry TwistingResistance() {
                .rays = MomentRays(),
                .excited_by = WhereGrainsTwist(),
                .needs_space = true},
+      .place = 120,
       .kernels = {{.stage = ContactStage::kMoment, .make = &Make}}};
 }
 

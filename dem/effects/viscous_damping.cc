@@ -1,8 +1,11 @@
+// `viscous_damping`: dashpots beside the springs of a contact.
+
 #include "dem/effects/viscous_damping.h"
 
 #include <cmath>
 #include <vector>
 
+#include "dem/catalog/registry.h"
 #include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 
@@ -130,6 +133,16 @@ Dashpot DashpotFrom(const KernelContext& context) {
           .grains = GrainMassOf(context.density, context.thickness)};
 }
 
+///   c = 2 beta sqrt(m* k),   m* = m1 m2/(m1 + m2),   k the tangent stiffness
+///   normal: F = F_b + c du/dt, but a repulsive contact never pulls (F >= min(F_b, 0))
+///   shear:  Fs = spring - c_s ds/dt with k = ks, only while the spring sticks (below the sliding
+///           limit), and never beyond the limit
+/// beta is the damping ratio of two grains on a linear spring, 1 critical. With linear contacts
+/// their restitution is exp(-beta/sqrt(1-beta^2) (pi - arctan(2 beta sqrt(1-beta^2)/(2 beta^2-1))))
+/// [Schwager & Poeschel 2007, Eq. 14]; with Hertz contacts it does not depend on speed either
+/// [Tsuji, Tanaka & Ishida 1992]. Masses are those of the grains, spheres or disks. Off during
+/// consolidation; in staged quasi-static tests little is left of it, since a settled state has no
+/// velocities. One-sided, vanishes at beta = 0. The time step follows the dashpots.
 EffectEntry ViscousDamping() {
   ParameterInfo ratio;
   ratio.name = "ratio";
@@ -151,6 +164,7 @@ EffectEntry ViscousDamping() {
                    .two_sided = false,
                    .rays = {{.parameter = "ratio", .steps = {0.3, 2}}},
                    .needs_motion = true},
+          .place = 90,
           .kernels = {{.stage = ContactStage::kNormalExtra, .make = &MakeNormal},
                       {.stage = ContactStage::kShearExtra, .make = &MakeShear}}};
 }

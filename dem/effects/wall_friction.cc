@@ -1,5 +1,6 @@
-#include "dem/effects/wall_friction.h"
+// `wall_friction`: grains slide on walls with another friction than on each other.
 
+#include "dem/catalog/registry.h"
 #include "dem/lab_tests/gravity_test.h"
 
 namespace calib::dem {
@@ -19,6 +20,8 @@ std::vector<std::string> WhereWallsAre() {
 
 }  // namespace
 
+/// |Fs| <= tan(phi_w) Fn at contacts with walls, tan(phi_w) = ratio tan(phi_mu), or given as such.
+/// Null: ratio 1. [Samuelsson 2023, sec. 4.1: particle-particle and particle-steel friction]
 EffectEntry WallFriction() {
   ParameterInfo ratio;
   ratio.name = "ratio";
@@ -48,7 +51,7 @@ EffectEntry WallFriction() {
                    .two_sided = true,
                    .rays = {{.parameter = "ratio", .steps = {0.25, 0.5}}},
                    .excited_by = WhereWallsAre()},
-          .kernels = {},
+          .place = 150,
           .bound = &Bound};
 }
 

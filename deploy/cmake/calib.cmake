@@ -39,8 +39,9 @@ function(calib_precompile name)
 endfunction()
 
 # calib_library(NAME SOURCES a.cc ... LINKS x ... [PRECOMPILE <header> ...] [TOGETHER]): a static library of this tree; sources by
-# name, no globs. PRECOMPILE: large headers of others that most of its files include anyway. TOGETHER: its files are short beside
-# what they include, and compiled several at a time where that is on; names in anonymous namespaces then meet.
+# name, no globs (but effects: dem/CMakeLists.txt). PRECOMPILE: large headers of others that most of its files include anyway.
+# TOGETHER: its files are short beside what they include, and compiled several at a time where that is on; names in anonymous
+# namespaces then meet.
 function(calib_library name)
   cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;LINKS;PRECOMPILE" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES})

@@ -1,4 +1,4 @@
-#include "dem/effects/shared_parameters.h"
+#include "dem/effects/shared/parameters.h"
 
 namespace calib::dem {
 

@@ -1,4 +1,4 @@
-#include "dem/effects/moment_stiffness.h"
+#include "dem/effects/shared/moment_stiffness.h"
 
 #include <algorithm>
 
