@@ -30,5 +30,6 @@ inline constexpr std::uint32_t kCrushingDraw = 4;
 inline constexpr std::uint32_t kOrderDraw = 4;
 inline constexpr std::uint32_t kFeedDraw = 5;
 inline constexpr std::uint32_t kMaterialDraw = 6;
+inline constexpr std::uint32_t kOrientationDraw = 7;
 
 }  // namespace calib::dem

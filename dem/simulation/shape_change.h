@@ -1,9 +1,11 @@
 #pragma once
-// Specimens of elongated clumps from specimens of spheres, at the same density.
+// Specimens of clumps from specimens of spheres, at the same density.
 
+#include <cstdint>
 #include <stop_token>
 
 #include "absl/status/statusor.h"
+#include "dem/particles/clump_template.h"
 #include "dem/particles/packing.h"
 
 namespace calib::dem {
@@ -15,5 +17,19 @@ namespace calib::dem {
 /// short. Preconditions: single spheres; aspect in (1, 2].
 absl::StatusOr<Packing> Elongate(const Packing& spheres, double aspect, int threads,
                                  std::stop_token stop);
+
+/// A packing in which every sphere has become a clump of its volume.
+struct ClumpPacking {
+  Packing packing;             ///< clump ids are the indices of the spheres
+  double porosity = 0;         ///< 1 - volumes of the unions over the cell
+  double largest_overlap = 0;  ///< of two clumps that touch, in radii of the smaller sphere
+};
+
+/// The same for any shape, in orientations drawn from the seed: spheres grow into the shape
+/// (Between) by at most 0.02 radii at a time, without friction, so that long ones find room. Materials stay with their grains. Errors: INVALID_ARGUMENT
+/// when a grain is part of a clump already, two overlap by more than half a radius, or the cell is not longer than two clumps; others as
+/// Elongate.
+absl::StatusOr<ClumpPacking> MakeClumps(const Packing& spheres, const ClumpTemplate& shape,
+                                        std::uint64_t seed, int threads, std::stop_token stop);
 
 }  // namespace calib::dem

@@ -19,7 +19,8 @@ struct Arguments {
   // Of some.
   bool with_children = false;            ///< of delete: what comes from the campaign too
   bool force = false;                    ///< of delete: although something comes from it
-  std::string file;                      ///< campaign file
+  std::string file;                      ///< campaign file, or packing
+  std::string clumps;                    ///< dumbbell:ASPECT or the file of a template
   std::string campaign;                  ///< id
   std::vector<std::string> campaigns{};  ///< ids
   std::string worker;                    ///< name

@@ -247,6 +247,17 @@ void AddOtherVerbs(Builder& b) {
                    "file of a campaign, whose user_effects are listed too");
   b.Add("tests", &Tests, "Lab tests this build offers", "tests");
   b.Add("contacts", &Contacts, "Contact laws this build offers", "contacts");
+  auto* pack = b.Add("pack", &Pack,
+                     "A packing of spheres as one of rigid clumps: same volumes, porosity and cell",
+                     "pack spheres.txt --clumps dumbbell:1.4 -o clumps.txt");
+  pack->add_option("FILE", b.arguments().file, "packing of single spheres")->required();
+  pack->add_option(
+          "--clumps", b.arguments().clumps,
+          "dumbbell:LENGTH/WIDTH, above 1 and at most 2, or a file with a sphere `x y z r` "
+          "per line, in any unit")
+      ->required();
+  pack->add_option("-o,--output", b.arguments().output, "packing file")->required();
+  pack->add_option("--seed", b.arguments().seed, "of the orientations [1]")->check(WholeNumber);
 }
 
 }  // namespace

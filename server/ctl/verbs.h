@@ -30,6 +30,7 @@ int Doctor(const Arguments& arguments);
 int Effects(const Arguments& arguments);
 int Tests(const Arguments& arguments);
 int Contacts(const Arguments& arguments);
+int Pack(const Arguments& arguments);
 int Pause(const Arguments& arguments);
 int Resume(const Arguments& arguments);
 int Cancel(const Arguments& arguments);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <fstream>
 #include <map>
+#include <regex>
 
 #include "tests/integration/ctl/calibctl_fixture.h"
 
@@ -157,6 +158,42 @@ TEST_F(Calibctl, CataloguesNeedNoServer) {
   for (const std::string verb : {"effects", "tests", "contacts"}) {
     EXPECT_TRUE(Call(verb + " --json").json().is_array());
     EXPECT_EQ(Call(verb).code, 0);
+  }
+}
+
+// Spheres on a lattice become clumps in a file that a campaign can name.
+TEST_F(Calibctl, PackMakesClumpsOfSpheres) {
+  std::string spheres = "##PERIODIC:: 0.03 0.03 0.03\n";
+  for (int k = 0; k < 27; ++k) {
+    spheres += std::to_string(0.005 + 0.01 * (k % 3)) + " " +
+               std::to_string(0.005 + 0.01 * (k / 3 % 3)) + " " +
+               std::to_string(0.005 + 0.01 * (k / 9)) + " 0.003 -1\n";
+  }
+  Write("spheres.txt", spheres);
+  Write("corner.txt", "0 0 0 1\n1 0 0 1\n0 1 0 0.8\n");
+  const Answer corner = Call("pack spheres.txt --clumps corner.txt -o clumps.txt --json");
+  ASSERT_EQ(corner.code, 0) << corner.err;
+  EXPECT_EQ(corner.json()["clumps"], 27);
+  EXPECT_EQ(corner.json()["spheres"], 81);
+  EXPECT_NEAR(corner.json()["porosity"].get<double>(),
+              corner.json()["porosity_of_spheres"].get<double>(), 2e-4);
+  const Answer dumbbells = Call("pack spheres.txt --clumps dumbbell:1.5 -o dumbbells.txt");
+  ASSERT_EQ(dumbbells.code, 0) << dumbbells.err;
+  EXPECT_THAT(dumbbells.out, HasSubstr("27 clumps of 2 spheres in dumbbells.txt"));
+  Write("clumped.yaml", std::regex_replace(SmallCampaign(8, 1), std::regex("packing: .*"),
+                                           "packing: {file: clumps.txt}"));
+  const Answer good = Call("validate clumped.yaml");
+  EXPECT_EQ(good.code, 0) << good.err;
+  const std::vector<std::pair<std::string, std::string>> bad = {
+      {"pack spheres.txt --clumps dumbbell:2.5 -o x.txt", "above 1 and at most 2"},
+      {"pack spheres.txt --clumps nowhere.txt -o x.txt", "nowhere.txt: no such file"},
+      {"pack corner.txt --clumps dumbbell:1.5 -o x.txt", "the first line must be ##PERIODIC::"},
+      {"pack clumps.txt --clumps dumbbell:1.5 -o x.txt", "is part of clump 0 already"},
+      {"pack spheres.txt --clumps spheres.txt -o x.txt", "spheres.txt:2: \"0.005"}};
+  for (const auto& [call, what] : bad) {
+    const Answer answer = Call(call);
+    EXPECT_EQ(answer.code, 2) << call;
+    EXPECT_THAT(answer.err, HasSubstr(what)) << call;
   }
 }
 

@@ -336,5 +336,101 @@ TEST(Clump, PackingFilesWithClumpsRun) {
   EXPECT_EQ(by_file.states[0].values, by_effect.states[0].values);
 }
 
+/// Two sizes of touching spheres in a bent row, by no symmetry of theirs in their principal axes.
+ClumpTemplate Touching() {
+  std::vector<PackingProblem> problems;
+  ClumpTemplate shape = ParseClumpTemplate("0 0 0 1\n2 0 0 1\n2 1.5 0 0.5\n", problems);
+  EXPECT_TRUE(problems.empty());
+  return shape;
+}
+
+// Touching spheres have closed forms: each its own mass and 2/5 m r^2, the arms by Steiner.
+TEST(MakeClumps, KeepsMassInertiaAndPorosity) {
+  const Packing& spheres = test::SmallPacking(200);
+  const ClumpTemplate shape = Touching();
+  const auto made = MakeClumps(spheres, shape, 7, 1, {});
+  ASSERT_TRUE(made.ok()) << made.status();
+  EXPECT_NEAR(made->porosity, PorosityOf(spheres), 1e-9);
+  EXPECT_LT(made->largest_overlap, 2e-2);
+  std::printf("largest overlap %.2g of a radius\n", made->largest_overlap);
+  const Assembly assembly(made->packing, kDensity, ContactModel(test::LinearModel()), 1);
+  ASSERT_EQ(assembly.bodies(), 200);
+  double mass = 0;
+  std::array<double, 3> centre{};
+  for (const Sphere& s : shape.spheres) {
+    const double m = std::pow(s.radius, 3);  // over 4/3 pi rho R^3, of a sphere of radius R
+    mass += m;
+    for (std::size_t a = 0; a < 3; ++a) {
+      centre[a] += m * s.centre[a];
+    }
+  }
+  EXPECT_NEAR(mass, 1, 1e-9);
+  double trace = 0;  // of the inertia over 4/3 pi rho R^5
+  for (const Sphere& s : shape.spheres) {
+    const double m = std::pow(s.radius, 3);
+    double arm2 = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      arm2 += std::pow(s.centre[a] - centre[a], 2);
+    }
+    trace += 3 * 0.4 * m * s.radius * s.radius + 2 * m * arm2;
+  }
+  const ParticleArrays& p = assembly.particles();
+  double turned = 0;  // mean square of a direction that starts along x
+  for (const Clump& clump : assembly.clumps().all()) {
+    const auto first = static_cast<std::size_t>(p.id[static_cast<std::size_t>(clump.members[0])]);
+    const double r = spheres.radius[static_cast<std::size_t>(made->packing.clump[first])];
+    const double sphere = kDensity * 4.0 / 3.0 * std::numbers::pi * r * r * r;
+    EXPECT_NEAR(clump.mass, sphere, 1e-9 * sphere);
+    EXPECT_NEAR(clump.inertia[0] + clump.inertia[1] + clump.inertia[2], trace * sphere * r * r,
+                1e-9 * sphere * r * r);
+  }
+  for (std::size_t i = 0; i < made->packing.x.size(); i += 3) {  // from the first to the second
+    const double dx = made->packing.x[i + 1] - made->packing.x[i];
+    const double d = 2 * made->packing.radius[i];
+    turned += dx * dx / (d * d) / 200;
+    EXPECT_NEAR(std::hypot(dx, made->packing.y[i + 1] - made->packing.y[i],
+                           made->packing.z[i + 1] - made->packing.z[i]),
+                d, 1e-9 * d);
+  }
+  EXPECT_NEAR(turned, 1.0 / 3.0, 4 * std::sqrt(4.0 / 45.0 / 200));  // any direction alike
+}
+
+TEST(MakeClumps, RunsFromItsFileToTheSameBitsOnAnyNumberOfThreads) {
+  const Packing& spheres = test::SmallPacking(60);
+  std::vector<PackingProblem> problems;
+  const ClumpTemplate corner = ParseClumpTemplate("0 0 0 1\n0.8 0 0 1\n0 0.8 0 0.8\n", problems);
+  const auto text = [&](std::uint64_t seed, int threads) {
+    const auto made = MakeClumps(spheres, corner, seed, threads, {});
+    EXPECT_TRUE(made.ok()) << made.status();
+    return made.ok() ? FormatPacking(made->packing) : "";
+  };
+  const std::string file = text(7, 1);
+  EXPECT_EQ(file, text(7, 2));
+  EXPECT_NE(file, text(8, 1));
+  Scenario s = test::SmallTriaxial(test::LinearModel());
+  s.packing = ParsePacking(file, problems);
+  ASSERT_TRUE(problems.empty()) << problems[0].message;
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  EXPECT_NEAR(At(run.states.back(), "lateral_stress"), 2e5, 2e2);
+}
+
+TEST(MakeClumps, RefusesWhatCannotBecomeClumps) {
+  Packing spheres = test::SmallPacking(60);
+  const auto why = [&] {
+    return std::string(MakeClumps(spheres, Touching(), 1, 1, {}).status().message());
+  };
+  spheres.clump[3] = 5;
+  EXPECT_THAT(why(), testing::HasSubstr("grain 3 is part of clump 5 already"));
+  spheres = test::SmallPacking(60);
+  spheres.x[1] = spheres.x[0];
+  spheres.y[1] = spheres.y[0];
+  spheres.z[1] = spheres.z[0];
+  EXPECT_THAT(why(), testing::HasSubstr("grains 0 and 1 overlap by"));
+  spheres = Spheres({{0.5, 0.5, 0.5}, {0.2, 0.2, 0.2}}, {-1, -1});
+  spheres.length[1] = 5 * kRadius;
+  EXPECT_THAT(why(), testing::HasSubstr("must be longer than two of them"));
+}
+
 }  // namespace
 }  // namespace calib::dem

@@ -1,0 +1,37 @@
+#pragma once
+// The shape of rigid clumps that replace spheres: a few overlapping spheres.
+
+#include <string>
+#include <vector>
+
+#include "dem/particles/packing.h"
+#include "dem/particles/union_of_spheres.h"
+
+namespace calib::dem {
+
+/// Spheres whose union has the volume of a sphere of radius 1; the mean of their centres is the
+/// origin.
+struct ClumpTemplate {
+  std::vector<Sphere> spheres;
+};
+
+inline constexpr int kMostSpheresOfAClump = 64;
+
+/// Reads `x y z r` per line, blank lines and # comments allowed, in any unit of length: the shape is
+/// scaled to the volume (of the union; MomentsOfUnion says how exactly) and set about the origin.
+/// Appends everything wrong to problems: not four numbers, radius <= 0, fewer than two spheres or
+/// more than kMostSpheresOfAClump, a sphere that overlaps no other, all within one of them; the
+/// result is meaningful only if none was added.
+ClumpTemplate ParseClumpTemplate(const std::string& text, std::vector<PackingProblem>& problems);
+
+/// Two equal spheres along z, length over width `aspect` in (1, 2].
+ClumpTemplate DumbbellTemplate(double aspect);
+
+/// The shape on its way from a sphere of radius 1 (share 0) to the template (share 1), always of
+/// the same volume: centres at `share` of their places, radii between 1 and their own, all scaled.
+ClumpTemplate Between(const ClumpTemplate& shape, double share);
+
+/// Largest distance of a surface from the origin, in radii of the sphere that it replaces.
+double ReachOf(const ClumpTemplate& shape);
+
+}  // namespace calib::dem
