@@ -33,7 +33,7 @@ class ElementTestRun {
       : scenario_(scenario),
         entry_(ElementTestNamed(scenario.test)),
         assembly_(packing, scenario.model.density, ContactModel(scenario.model), scenario.threads),
-        staging_(ResolveStaging(scenario, assembly_)),
+        staging_(ResolveStaging(scenario, assembly_.mean_diameter())),
         stages_(assembly_, OptionsFrom(staging_), std::move(stop)),
         apparatus_(alterations.apparatus),
         preparation_(alterations.preparation),

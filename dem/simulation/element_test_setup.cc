@@ -33,10 +33,10 @@ const ElementTestEntry& ElementTestNamed(const std::string& test) {
                        [&](const ElementTestEntry& entry) { return entry.info.name == test; });
 }
 
-Staging ResolveStaging(const Scenario& scenario, const Assembly& assembly) {
+Staging ResolveStaging(const Scenario& scenario, double mean_diameter) {
   const Staging& given = scenario.staging;
   const bool adaptive = given.adaptive && !scenario.loading_rate;
-  const double quasi_static_rate = kInertialNumber / assembly.mean_diameter() *
+  const double quasi_static_rate = kInertialNumber / mean_diameter *
                                    std::sqrt(PressureScale(scenario) / scenario.model.density);
   return {.rate = given.rate.value_or(quasi_static_rate),
           .step = given.step.value_or(adaptive ? kAdaptiveStep : kStep),

@@ -1,6 +1,5 @@
 #pragma once
-// What is known of an element test before its grains move: its entry, staging, and what effects
-// ask.
+// What is known of an element test before its grains move: its entry and what effects ask.
 
 #include <string>
 
@@ -13,10 +12,6 @@ namespace calib::dem {
 
 /// Of the registry. Precondition: there is a test of this name in the periodic cell.
 const ElementTestEntry& ElementTestNamed(const std::string& test);
-
-/// Staging with every field set: the user's, or the engine's choice. assembly: as the packing was
-/// given.
-Staging ResolveStaging(const Scenario& scenario, const Assembly& assembly);
 
 /// What the effects of the model ask of readings and initial state.
 struct Alterations {

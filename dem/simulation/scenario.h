@@ -94,6 +94,10 @@ struct Scenario {
   std::uint64_t seed = 0;  ///< for effects that draw random numbers
 };
 
+/// Staging with every field set: the scenario's, or the engine's choice for a packing of this mean
+/// diameter [m] > 0. Precondition: the test is one in the periodic cell, with a confining_pressure.
+Staging ResolveStaging(const Scenario& scenario, double mean_diameter);
+
 /// Observables at one load step, in the order of the test's TestInfo::observables; all finite.
 struct State {
   int load_step = 0;

@@ -71,18 +71,26 @@ bool IsHeldOut(const YamlNode& experiment) {
   return role != nullptr && role->scalar == "validate";
 }
 
+// out: an entry of `experiments`.
+void SetStaging(const dem::Staging& staging, YamlNode& out) {
+  YamlNode& node = YamlAt(out, "staging");
+  if (staging.rate) YamlAt(node, "rate") = YamlNumber(*staging.rate);
+  if (staging.step) YamlAt(node, "step") = YamlNumber(*staging.step);
+  if (staging.damping_loading && staging.damping_settling) {
+    YamlAt(node, "damping") = YamlList(
+        {YamlNumber(*staging.damping_loading), YamlNumber(*staging.damping_settling)});
+  }
+}
+
 void ChangeExperiments(const Derivation& derivation, YamlNode& root) {
   YamlNode& experiments = YamlAt(root, "experiments");
   if (!derivation.experiments.empty()) experiments = YamlList(derivation.experiments);
   if (!derivation.held_out) std::erase_if(experiments.items, IsHeldOut);
-  if (derivation.rate_factor == 1) return;
   for (YamlNode& experiment : experiments.items) {
-    const YamlNode* staging = YamlFind(experiment, "staging");
-    const YamlNode* rate = staging != nullptr ? YamlFind(*staging, "rate") : nullptr;
-    if (rate == nullptr) continue;
-    const auto value = ParseQuantity(rate->scalar, "1/s");
-    if (!value.ok()) continue;
-    YamlAt(YamlAt(experiment, "staging"), "rate") = YamlNumber(*value * derivation.rate_factor);
+    const YamlNode* name = YamlFind(experiment, "name");
+    if (name == nullptr) continue;
+    const auto staging = derivation.staging.find(name->scalar);
+    if (staging != derivation.staging.end()) SetStaging(staging->second, experiment);
   }
 }
 

@@ -13,6 +13,7 @@
 
 #include "absl/status/statusor.h"
 #include "dem/catalog/catalog.h"
+#include "dem/simulation/scenario.h"
 #include "server/campaign/campaign.h"
 #include "server/campaign/yaml_tree.h"
 
@@ -38,7 +39,8 @@ struct Derivation {
     std::map<std::string, double> values{};
   };
   std::vector<Row> rows{};
-  double rate_factor = 1;  ///< multiplies staging.rate where the parent gives one
+  /// By name of an experiment: replaces the fields of its staging that are set here.
+  std::map<std::string, dem::Staging> staging{};
 };
 
 /// INVALID_ARGUMENT when the parent's text cannot be read; whether the result is a valid campaign

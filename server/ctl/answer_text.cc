@@ -121,6 +121,9 @@ std::string ComparisonText(const report::Comparison& comparison) {
     text += fmt::format(", reduced chi-squared {}", Number(*comparison.reduced_chi2, 3));
   }
   if (comparison.p_value) text += fmt::format(" (p = {})", Number(*comparison.p_value, 2));
+  if (comparison.predictive_p) {
+    text += fmt::format(", posterior predictive p {}", Number(*comparison.predictive_p, 2));
+  }
   text += ".\n";
   if (comparison.heldout_rms_error) {
     text += fmt::format("Error of the held-out data, never fitted: {} sd.\n",
@@ -139,11 +142,13 @@ std::string ComparisonText(const report::Comparison& comparison) {
          m.z ? Verdict(m.rms_error, m.p_value) : ""});
   }
   TextTable segments(
-      {"<experiment", "<observable", "<stage", "model − measured", "z", "error", "chi2", "<shape"});
+      {"<experiment", "<observable", "<stage", "model − measured", "z", "error", "p", "chi2",
+       "<shape"});
   for (const report::SegmentMisfit& m : comparison.by_segment) {
     segments.AddRow({m.experiment + (m.heldout ? " (held out)" : ""), m.observable, m.segment,
                      report::NumberWithUnit(m.bias, m.observable, UnitOf(m.observable), 3),
                      m.z ? Number(*m.z, 3) : "–", Number(m.rms_error, 3),
+                     m.p_value ? Number(*m.p_value, 2) : "–",
                      m.chi2_share ? report::Percent(*m.chi2_share, 2) : "–",
                      m.pattern.name == "none" ? "" : m.pattern.name});
   }

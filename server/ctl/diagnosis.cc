@@ -476,12 +476,38 @@ class Inquiry {
     return rivals;
   }
 
+  // Where the base model is not one of the rivals itself.
+  std::optional<NoneOfThese> None(const std::vector<Rival>& rivals) const {
+    if (!rivals.empty() && rivals.back().name == BaseRival().name) return std::nullopt;
+    const std::vector<inference::Reading>& readings = base_.readings().of_mean.readings;
+    const std::vector<inference::Reading> plain =
+        campaign::MakeDataSet(base_.view().campaign).readings;
+    std::map<std::string, std::pair<double, int>> squares;  // and how many
+    for (std::size_t k = 0; k < readings.size(); ++k) {
+      const campaign::Experiment& experiment =
+          base_.view().campaign.experiments[static_cast<std::size_t>(readings[k].experiment)];
+      const double missed =
+          response_.model.histories(diagnosis_.adequacy.best, static_cast<Eigen::Index>(k)) *
+          readings[k].sd / plain[k].sd;
+      auto& [sum, count] =
+          squares[experiment.observables[static_cast<std::size_t>(readings[k].observable)].name];
+      sum += missed * missed;
+      ++count;
+    }
+    NoneOfThese none{.base = BaseRival()};
+    for (const auto& [observable, of] : squares) {
+      none.missed[observable] = std::sqrt(of.first / of.second);
+    }
+    return none;
+  }
+
   absl::Status PlanNext() {
     const std::vector<Rival> rivals =
         diagnosis_.verdict == "ambiguous" ? RivalsOfGroup() : BestTwo();
     const auto like = static_cast<std::size_t>(base_.BestRuns(1).front());
     auto next =
-        PlanNextExperiment(laboratory_, rivals, base_.runs().sample[like], response_.scatter);
+        PlanNextExperiment(laboratory_, rivals, None(rivals), base_.runs().sample[like],
+                           response_.scatter);
     if (!next.ok()) return next.status();
     diagnosis_.next_experiment = std::move(next->next);
     if (!diagnosis_.next_experiment) {

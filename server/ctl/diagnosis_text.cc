@@ -76,7 +76,10 @@ Json PlannedJson(const PlannedExperiment& planned) {
           {"control_from", planned.path.front()},
           {"control_to", planned.path.back()},
           {"expected_power", planned.expected_power},
-          {"distance_sd", planned.distance}};
+          {"distance_sd", planned.distance},
+          {"none_of_these",
+           {{"distance_sd", OrNull(planned.distance_from_none)},
+            {"expected_power", OrNull(planned.power_against_none)}}}};
 }
 
 Json NextJson(const std::optional<NextExperiment>& next) {
@@ -119,6 +122,16 @@ std::string InWords(const PlannedExperiment& planned) {
   return text + (planned.unloading ? ", one unloading and reloading half-way" : "");
 }
 
+// That no effect of the group is the one that is missing.
+std::string AgainstNone(const PlannedExperiment& planned) {
+  if (!planned.power_against_none) return "";
+  return Wrapped(fmt::format("That it is none of these, but a misfit of the present size of unknown "
+                             "cause, would show with a power of {} ({} sd apart).",
+                             report::Percent(*planned.power_against_none, 3),
+                             Number(*planned.distance_from_none, 3)),
+                 "", "");
+}
+
 std::string NextText(const NextExperiment& next) {
   std::string names;
   for (const std::string& name : next.separates) names += (names.empty() ? "" : " and ") + name;
@@ -131,7 +144,7 @@ std::string NextText(const NextExperiment& next) {
                           InWords(next.best), names, report::Percent(next.best.expected_power, 3),
                           Number(next.best.distance, 3), Number(next.core_seconds, 2)),
               "", "") +
-      "\n" + next.snippet;
+      AgainstNone(next.best) + "\n" + next.snippet;
   if (next.considered.size() > 1) text += "\nAlso tried:\n";
   for (std::size_t k = 1; k < next.considered.size(); ++k) {
     text += fmt::format("  {}: {} sd apart\n", InWords(next.considered[k]),

@@ -15,8 +15,10 @@ namespace {
 using Eigen::Index;
 
 constexpr double kNothing = 1e-8;      // of the square of a reading's sd, per reading
-constexpr int kMostRuns = 4;           // of one effect, or
-constexpr double kScreenShare = 0.25;  // of the campaign's evaluations over all effects
+constexpr std::size_t kMostRuns = 4;   // model evaluations of one effect, or
+constexpr double kScreenShare = 0.25;  // of the campaign's over all effects
+constexpr std::size_t kMostRows = 2;   // runs of the campaign from which an effect is tried
+constexpr double kMostDamping = 0.9;
 // A second strength is to change three times what two runs differ by chance: of what a measurement
 // scatters, in square.
 constexpr double kWanted = 18;
@@ -66,25 +68,52 @@ std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& eff
   return steps;
 }
 
-bool EffectScreen::RateIsGiven() const {
-  const auto& experiments = base_.view().campaign.experiments;
-  return std::any_of(experiments.begin(), experiments.end(), [](const auto& e) {
-    return e.staging.rate && e.role == campaign::Role::kCalibrate;
-  });
+std::vector<campaign::Derivation> EffectScreen::NumericalChanges() const {
+  const campaign::Campaign& campaign = base_.view().campaign;
+  const Index best = base_.BestRuns(1).front();
+  const campaign::Derivation::Row row = base_.RowLike(best);
+  std::vector<campaign::Derivation> changes;
+  for (const char* what : {"twice the rate", "half the step", "other damping"}) {
+    changes.push_back(base_.Derived("nuisance", what));
+    changes.back().rows = {row};
+  }
+  bool staged = false;
+  for (const campaign::Experiment& e : campaign.experiments) {
+    if (e.role != campaign::Role::kCalibrate || !campaign::ReadAtRest(e)) continue;
+    staged = true;
+    dem::Scenario scenario;
+    scenario.model = campaign.model;
+    scenario.settings = e.settings;
+    scenario.initial_stress = e.initial_stress;
+    scenario.staging = e.staging;
+    const dem::Staging used = dem::ResolveStaging(scenario, base_.state().diameter);
+    const double damping = *used.damping_loading;
+    changes[0].staging[e.name].rate = 2 * *used.rate;
+    changes[1].staging[e.name].step = *used.step / 2;
+    dem::Staging& damped = changes[2].staging[e.name];
+    damped.damping_loading = damping > kMostDamping / 2 ? damping / 2 : 2 * damping;
+    damped.damping_settling = used.damping_settling;
+  }
+  if (!staged) changes.clear();
+  return changes;
 }
 
 absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
-  std::vector<Eigen::VectorXd> directions;
-  if (!RateIsGiven()) return directions;
+  const std::vector<campaign::Derivation> changes = NumericalChanges();
+  const auto what = [](const campaign::Derivation& change) {
+    return "influence of numerical choices, " + change.name;
+  };
+  for (const campaign::Derivation& change : changes) {
+    if (auto status = base_.Announce(change, what(change)); !status.ok()) return status;
+  }
   const Index best = base_.BestRuns(1).front();
-  campaign::Derivation derivation = base_.Derived("nuisance", "twice the rate");
-  derivation.rate_factor = 2;
-  derivation.rows = {base_.RowLike(best)};
-  const auto view = base_.Run(derivation, "influence of the loading rate");
-  if (!view.ok()) return view.status();
-  evaluations_ += base_.fitted_experiments();
-  const report::RunTable runs = report::RunsOf(*view, base_.readings().of_mean);
-  if (!runs.sample.empty()) {
+  std::vector<Eigen::VectorXd> directions;
+  for (const campaign::Derivation& change : changes) {
+    const auto view = base_.Run(change, what(change));
+    if (!view.ok()) return view.status();
+    evaluations_ += base_.fitted_experiments();
+    const report::RunTable runs = report::RunsOf(*view, base_.readings().of_mean);
+    if (runs.sample.empty()) continue;
     directions.emplace_back((runs.histories.row(0) - base_.runs().histories.row(best)).transpose());
   }
   return directions;
@@ -146,20 +175,40 @@ std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
   return effects;
 }
 
-// Runs from which each of so many effects is tried.
-std::size_t EffectScreen::RowsFor(std::size_t effects) const {
+std::vector<std::size_t> EffectScreen::RunsOfEach(
+    const std::vector<const dem::EffectInfo*>& effects) const {
   const int experiments = std::max(1, base_.fitted_experiments());
-  const double share = kScreenShare * static_cast<double>(base_.runs().sample.size()) *
-                       experiments / static_cast<double>(effects);
-  return static_cast<std::size_t>(
-      std::clamp(static_cast<int>(std::max<double>(kMostRuns, share)) / experiments, 1, 2));
+  const double share = kScreenShare * static_cast<double>(base_.runs().sample.size());
+  const double most =
+      std::max(share, static_cast<double>(kMostRuns * effects.size()) / experiments);
+  auto left = static_cast<std::int64_t>(most) - static_cast<std::int64_t>(NumericalChanges().size());
+  std::vector<std::size_t> runs(effects.size(), 0);
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    if (IsCalculated(*effects[e])) continue;
+    runs[e] = 1;
+    --left;
+  }
+  // Another ray is another signature; what instruments do is nearly in proportion to its strength.
+  const auto grade = [](const dem::EffectInfo& effect) {
+    if (effect.rays.size() > 1) return 0;
+    return effect.kind == "measurement" ? 2 : 1;
+  };
+  for (int wanted = 0; wanted <= 2; ++wanted) {
+    for (std::size_t e = 0; e < effects.size() && left > 0; ++e) {
+      if (runs[e] == 0 || grade(*effects[e]) != wanted) continue;
+      runs[e] = 2;
+      --left;
+    }
+  }
+  return runs;
 }
 
 std::int64_t EffectScreen::Planned(const std::vector<std::string>& without) const {
   const std::vector<const dem::EffectInfo*> effects = Excitable(without, nullptr);
-  std::size_t runs = RateIsGiven() ? 1 : 0;
-  for (const dem::EffectInfo* effect : effects) {
-    if (!IsCalculated(*effect)) runs += StepsOf(*effect, RowsFor(effects.size())).size();
+  std::size_t runs = NumericalChanges().size();
+  const std::vector<std::size_t> of_each = RunsOfEach(effects);
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    runs += StepsOf(*effects[e], of_each[e]).size();
   }
   return static_cast<std::int64_t>(runs) * base_.fitted_experiments();
 }
@@ -169,8 +218,8 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
   std::vector<inference::Signature> signatures;
   const std::vector<const dem::EffectInfo*> effects = Excitable(without, &not_excitable_);
   if (effects.empty()) return signatures;
-  const std::size_t rows = RowsFor(effects.size());
-  const std::vector<Index> runs = base_.BestRuns(rows);
+  const std::vector<Index> runs = base_.BestRuns(kMostRows);
+  const std::vector<std::size_t> of_each = RunsOfEach(effects);
   for (const dem::EffectInfo* effect : effects) {
     signatures.push_back(
         {.name = effect->name, .differences = {}, .two_sided = effect->two_sided, .strengths = {}});
@@ -180,10 +229,10 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
     if (IsCalculated(*effects[e])) {
       Calculate(*effects[e], runs, signatures[e]);
     } else {
-      steps[e] = StepsOf(*effects[e], rows);
+      steps[e] = StepsOf(*effects[e], of_each[e]);
     }
   }
-  for (std::size_t k = 0; k < rows; ++k) {
+  for (std::size_t k = 0; k < kMostRows; ++k) {
     const Index like = runs[std::min(k, runs.size() - 1)];
     std::vector<Pair> pairs;
     // All at once, so that no worker waits for the last run of an effect.

@@ -35,16 +35,18 @@ class EffectScreen {
  public:
   explicit EffectScreen(const FittedCampaign& base) : base_(base) {}
 
-  /// What twice the rate of staging changes: no physics. Empty where the campaign leaves the rate
-  /// to the engine.
+  /// What twice the rate, half the step and twice the damping of staging change: no physics. Those
+  /// of experiments with a loading_rate and of flows are left as they are; none where there are no
+  /// others.
   absl::StatusOr<std::vector<Eigen::VectorXd>> MeasureNuisance();
 
   /// Model evaluations that MeasureNuisance() and MeasureSignatures() take together.
   std::int64_t Planned(const std::vector<std::string>& without) const;
 
-  /// One signature of each effect that the fitted tests can show. `without` take no part. At most
-  /// the larger of a quarter of the campaign's evaluations and four runs for each effect, with
-  /// MeasureNuisance() where a load cell is among them: what it does is calculated. The first
+  /// One signature of each effect that the fitted tests can show. `without` take no part. With
+  /// MeasureNuisance() at most the larger of a quarter of the campaign's evaluations and four for
+  /// each effect, but one run of each effect in any case: what is left of them goes to a second one
+  /// where it tells most, another ray of strength first, what instruments do last. The first
   /// strength is the catalogue's; the second is that of SecondStep(), or as a user's effect says.
   absl::StatusOr<std::vector<inference::Signature>> MeasureSignatures(
       const std::vector<std::string>& without, const SquareOfDifference& square_of);
@@ -88,8 +90,9 @@ class EffectScreen {
   std::vector<const dem::EffectInfo*> Excitable(
       const std::vector<std::string>& without,
       std::vector<std::pair<std::string, std::string>>* reasons) const;
-  bool RateIsGiven() const;
-  std::size_t RowsFor(std::size_t effects) const;
+  /// Of the run that comes closest; each with what it changes.
+  std::vector<campaign::Derivation> NumericalChanges() const;
+  std::vector<std::size_t> RunsOfEach(const std::vector<const dem::EffectInfo*>& effects) const;
   bool IsCalculated(const dem::EffectInfo& effect) const;
   void Calculate(const dem::EffectInfo& effect, const std::vector<Eigen::Index>& runs,
                  inference::Signature& signature);

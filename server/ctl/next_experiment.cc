@@ -116,6 +116,21 @@ absl::StatusOr<std::vector<std::pair<TestPlan, YamlNode>>> AcceptedPlans(Laborat
   return accepted;
 }
 
+// Chance that a difference of so many sd is seen at the 1 % level.
+double PowerAt(double distance) {
+  const boost::math::normal normal;
+  return boost::math::cdf(normal, distance - boost::math::quantile(normal, 1 - kLevel));
+}
+
+std::vector<double> ShiftsOf(const NoneOfThese& none, const campaign::Experiment& pattern) {
+  std::vector<double> shifts;
+  for (const campaign::MeasuredObservable& observable : pattern.observables) {
+    const auto missed = none.missed.find(observable.name);
+    shifts.push_back(missed == none.missed.end() ? 0 : missed->second);
+  }
+  return shifts;
+}
+
 std::string NothingToPlan(const campaign::Experiment& pattern) {
   return absl::StrCat("tests are planned by other values of what the campaign file sets and of ",
                       "what drives them, and ", pattern.test,
@@ -125,15 +140,18 @@ std::string NothingToPlan(const campaign::Experiment& pattern) {
 
 }  // namespace
 
-double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter) {
+double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter,
+                    const std::vector<double>& shift) {
   const double half = 0.5 * scatter * scatter;  // of the variance of one run
   double square = 0;
   double of_chance = 0;  // its mean between two runs of one model
-  for (const Eigen::VectorXd& u : departures) {
+  for (std::size_t j = 0; j < departures.size(); ++j) {
+    const Eigen::VectorXd& u = departures[j];
     const auto n = static_cast<double>(u.size());
     // Covariance of a reading among three of a kind (the measurement, both runs) and of their mean.
     const double single = 1 + 3 * half;
-    const double whole = single + 3 * half * n;
+    const double other = shift.empty() ? 0 : shift[j];
+    const double whole = single + (3 * half + other * other) * n;
     const double along = u.sum() * u.sum() / n;
     square += along / whole + (u.squaredNorm() - along) / single;
     of_chance += 2 * half * (1 + n) / whole + 2 * half * (n - 1) / single;
@@ -142,7 +160,8 @@ double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatt
 }
 
 absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
-                                            const std::vector<Rival>& rivals, int like,
+                                            const std::vector<Rival>& rivals,
+                                            const std::optional<NoneOfThese>& none, int like,
                                             double scatter) {
   if (rivals.size() < 2) return NextPlan{.why_none = "there are no two models to tell apart"};
   const report::CampaignView& base = *rivals.front().view;
@@ -164,9 +183,11 @@ absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
     entries.push_back(std::move(entry));
   }
   NextExperiment next;
-  std::vector<std::vector<std::vector<Eigen::VectorXd>>> curves;  // [rival][plan][observable]
+  std::vector<std::vector<std::vector<Eigen::VectorXd>>> curves;  // [model][plan][observable]
   double core_hours = 0;
-  for (const Rival& rival : rivals) {
+  std::vector<Rival> models = rivals;
+  if (none) models.push_back(none->base);
+  for (const Rival& rival : models) {
     const auto text = RivalsText(rival, base.status.campaign(), like, entries);
     if (!text.ok()) return text.status();
     const auto view = laboratory.Run(*rival.view, *text,
@@ -174,7 +195,7 @@ absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
     if (!view.ok()) return view.status();
     next.evaluations += view->status.model_evaluations();
     core_hours += view->status.core_hours();
-    next.separates.push_back(rival.name);
+    if (next.separates.size() < rivals.size()) next.separates.push_back(rival.name);
     auto& own = curves.emplace_back();
     for (const TestPlan& plan : plans) {
       const auto readings = static_cast<Index>(plan.experiment.path.size());
@@ -185,7 +206,6 @@ absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
   next.core_seconds = next.evaluations > 0
                           ? core_hours * kSecondsPerHour / static_cast<double>(next.evaluations)
                           : 0;
-  const boost::math::normal normal;
   std::vector<std::size_t> finished;
   for (std::size_t p = 0; p < plans.size(); ++p) {
     double closest = std::numeric_limits<double>::infinity();
@@ -200,8 +220,19 @@ absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
     }
     if (!std::isfinite(closest)) continue;
     plans[p].experiment.distance = closest;
-    plans[p].experiment.expected_power =
-        boost::math::cdf(normal, closest - boost::math::quantile(normal, 1 - kLevel));
+    plans[p].experiment.expected_power = PowerAt(closest);
+    if (!none || curves.back()[p].empty()) {
+      finished.push_back(p);
+      continue;
+    }
+    double from_none = std::numeric_limits<double>::infinity();
+    for (std::size_t a = 0; a < rivals.size(); ++a) {
+      const auto departures = DeparturesOf(curves[a][p], curves.back()[p], pattern);
+      from_none = std::min(
+          from_none, std::sqrt(SeparationOf(departures, scatter, ShiftsOf(*none, pattern))));
+    }
+    plans[p].experiment.distance_from_none = from_none;
+    plans[p].experiment.power_against_none = PowerAt(from_none);
     finished.push_back(p);
   }
   if (finished.empty()) {

@@ -27,8 +27,17 @@ struct Rival {
 /// What two runs differ by beyond what two runs of one model do, as a squared distance in units of
 /// what a measurement and both runs scatter by; 0 where it is no more. departures: per curve, the
 /// difference of the runs over the noise. scatter s of a single run in units of the noise: half of
-/// its variance shifts a curve as a whole, half is from reading to reading.
-double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter);
+/// its variance shifts a curve as a whole, half is from reading to reading. shift: per curve, sd of
+/// what else may shift it as a whole, in units of the noise; empty: nothing does.
+double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter,
+                    const std::vector<double>& shift = {});
+
+/// "None of these": the campaign's own model with a smooth misfit as large as the one that is there.
+struct NoneOfThese {
+  Rival base{};
+  /// By observable: rms of what it misses of the fitted readings, in units of their noise.
+  std::map<std::string, double> missed{};
+};
 
 struct NextExperiment {
   PlannedExperiment best;
@@ -45,14 +54,17 @@ struct NextPlan {
   std::string why_none{};  ///< a clause; empty where there is one
 };
 
-/// Runs every rival once in every planned test, from the specimen and seed of sample `like`. Errors
+/// Runs every rival, and the model of `none`, once in every planned test, from the specimen and seed of sample `like`. Errors
 /// of a measurement: the noise that the campaign states for the observables at values of their
 /// size, and `scatter` (of a single run, in units of that noise) for the measurement and both runs:
 /// see SeparationOf(). None for fewer than two rivals, without a known size of the errors, where no
 /// plan is a campaign that this build accepts, or where no plan is finished by all rivals. Errors:
 /// those of the runs.
+/// The best is that with the largest distance between the rivals; their distance from none of them
+/// is told beside it.
 absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
-                                            const std::vector<Rival>& rivals, int like,
+                                            const std::vector<Rival>& rivals,
+                                            const std::optional<NoneOfThese>& none, int like,
                                             double scatter);
 
 }  // namespace calib::ctl

@@ -3,6 +3,7 @@
 // of, over a grid of their settings.
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ struct PlannedExperiment {
   /// Chance to tell the two closest of the rivals apart at the 1 % level.
   double expected_power = 0;
   double distance = 0;  ///< between these two, in sd of a measurement
+  /// The same of the rivals against none of them (NoneOfThese); where that was asked for.
+  std::optional<double> distance_from_none{}, power_against_none{};
 };
 
 struct TestPlan {

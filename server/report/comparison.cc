@@ -31,23 +31,18 @@ ResidualCurve CurveOf(const Group& group, Eigen::Index first, Eigen::Index count
 }
 
 // r^T Sigma^-1 r of readings first .. first + count - 1.
-double ChiSquared(const Group& group, Eigen::Index first, Eigen::Index count) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(group.covariance.block(first, first, count, count));
-  return factor.matrixL().solve(group.residual.segment(first, count)).squaredNorm();
+double ChiSquared(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& residual,
+                  Eigen::Index first, Eigen::Index count) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(covariance.block(first, first, count, count));
+  return factor.matrixL().solve(residual.segment(first, count)).squaredNorm();
 }
 
-// Variance of the mean error of readings first .. first + count - 1: the sum of Sigma over count^2.
-double VarianceOfMean(const Group& group, Eigen::Index first, Eigen::Index count) {
-  return group.covariance.block(first, first, count, count).sum() /
-         static_cast<double>(count * count);
-}
-
-// n^2 / sum of the correlations of the errors.
-double EffectiveReadings(const Group& group) {
-  const Eigen::VectorXd inverse = group.covariance.diagonal().cwiseSqrt().cwiseInverse();
-  const double sum = inverse.dot(group.covariance * inverse);
-  const auto n = static_cast<double>(inverse.size());
-  return n * n / sum;
+// n^2 / sum of the correlations of the errors of readings first .. first + count - 1.
+double EffectiveReadings(const Group& group, Eigen::Index first, Eigen::Index count) {
+  const Eigen::MatrixXd covariance = group.covariance.block(first, first, count, count);
+  const Eigen::VectorXd inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  const auto n = static_cast<double>(count);
+  return n * n / inverse.dot(covariance * inverse);
 }
 
 double UpperTail(double chi2, double degrees) {
@@ -60,7 +55,8 @@ double NormalDeviate(double chi2, double degrees) {
   return (std::cbrt(chi2 / degrees) - (1 - spread)) / std::sqrt(spread);
 }
 
-void AddSegments(const Group& group, bool heldout, bool judged, std::vector<SegmentMisfit>& out) {
+// expected: covariance of the residuals if the model is right.
+void AddSegments(const Group& group, const Eigen::MatrixXd& expected, bool heldout, bool judged, std::vector<SegmentMisfit>& out) {
   const auto size = static_cast<Eigen::Index>(group.readings.size());
   const auto segment = [&group](Eigen::Index i) -> const std::string& {
     return group.experiment->segment[group.readings[static_cast<std::size_t>(i)]];
@@ -78,7 +74,9 @@ void AddSegments(const Group& group, bool heldout, bool judged, std::vector<Segm
         .to = group.experiment->control[group.readings[static_cast<std::size_t>(end - 1)]],
         .bias = group.residual.segment(first, count).mean(),
         .z = std::nullopt,
+        .p_value = std::nullopt,
         .readings = static_cast<int>(count),
+        .effective_readings = EffectiveReadings(group, first, count),
         .rms_error = std::sqrt(
             group.residual.segment(first, count)
                 .cwiseQuotient(group.covariance.diagonal().segment(first, count).cwiseSqrt())
@@ -86,8 +84,12 @@ void AddSegments(const Group& group, bool heldout, bool judged, std::vector<Segm
             static_cast<double>(count)),
         .chi2_share = std::nullopt};
     if (judged) {
-      misfit.z = misfit.bias / std::sqrt(VarianceOfMean(group, first, count));
-      misfit.chi2_share = ChiSquared(group, first, count);  // divided by their sum in the end
+      const double of_sum = expected.block(first, first, count, count).sum();
+      misfit.z = misfit.bias * static_cast<double>(count) / std::sqrt(of_sum);
+      misfit.p_value = UpperTail(ChiSquared(expected, group.residual, first, count),
+                                 static_cast<double>(count));
+      // Divided by their sum in the end.
+      misfit.chi2_share = ChiSquared(group.covariance, group.residual, first, count);
       misfit.pattern = PatternOf(CurveOf(group, first, count));
     }
     out.push_back(std::move(misfit));
@@ -173,19 +175,21 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
                               .scatter_from = group.scatter_from,
                               .z = std::nullopt,
                               .p_value = std::nullopt,
-                              .effective_readings = EffectiveReadings(group)};
+                              .effective_readings =
+                                  EffectiveReadings(group, 0, group.residual.size())};
+      const Eigen::MatrixXd expected = group.covariance + group.of_prediction;
       Sums& sums = validation ? heldout : fitted;
       sums.squared += squared;
       sums.readings += misfit.readings;
       if (judged) {
-        const double chi2 = ChiSquared(group, 0, group.residual.size());
+        const double chi2 = ChiSquared(expected, group.residual, 0, group.residual.size());
         misfit.pattern = PatternOf(CurveOf(group, 0, group.residual.size()));
         misfit.z = NormalDeviate(chi2, n);
         misfit.p_value = UpperTail(chi2, n);
         sums.chi2 += chi2;
       }
       comparison.by_observable.push_back(std::move(misfit));
-      AddSegments(group, validation, judged, comparison.by_segment);
+      AddSegments(group, expected, validation, judged, comparison.by_segment);
     }
   }
   comparison.rms_error = std::sqrt(fitted.squared / fitted.readings);
@@ -204,6 +208,9 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
   } else {
     comparison.note =
         "There are fewer readings than parameters: nothing is left to judge the fit by.";
+  }
+  if (judged && view.posterior.has_predictive_p()) {
+    comparison.predictive_p = view.posterior.predictive_p();
   }
   comparison.warnings = campaign::NoiseWarnings(view.campaign);
   ToShares(comparison.by_segment);

@@ -24,8 +24,10 @@ struct ObservableMisfit {
   std::string scatter_from{};  ///< realizations | repeats | emulator; empty: none is known
   std::optional<double>
       z;  ///< chi-squared of the group as a standard normal deviate [Wilson & Hilferty 1931]
-  std::optional<double>
-      p_value;  ///< probability of a chi-squared at least as large if the model is right
+  /// Probability of a chi-squared at least as large if the model is right. At the posterior mean:
+  /// too large by as many degrees of freedom as the parameters take of these readings. Of held-out
+  /// readings the errors of the prediction are among those of the residuals.
+  std::optional<double> p_value{};
   /// Independent readings that would fix the mean of the residual as well: n^2 / sum of the
   /// correlations of the errors.
   double effective_readings = 0;
@@ -39,7 +41,9 @@ struct SegmentMisfit {
   double bias = 0;          ///< mean of model minus measurement [SI]
   std::optional<double>
       z;  ///< bias over its standard deviation, correlation of the errors included
+  std::optional<double> p_value{};  ///< as ObservableMisfit::p_value, of this stage alone
   int readings = 0;
+  double effective_readings = 0;    ///< as ObservableMisfit::effective_readings
   double rms_error = 0;  ///< rms of residual / standard deviation
   /// Of the chi-squared of everything fitted, or of everything held out.
   std::optional<double> chi2_share;
@@ -76,6 +80,8 @@ struct Comparison {
   double rms_error = 0;  ///< over all calibrated readings; NaN: nothing to compare yet
   std::optional<double> reduced_chi2;  ///< chi-squared / (readings - parameters)
   std::optional<double> p_value;
+  /// Of chi-squared by a replicate at draws from the posterior, all fitted data: the record's.
+  std::optional<double> predictive_p{};
   std::optional<double> heldout_rms_error;  ///< over all validation readings
   std::vector<ObservableMisfit> by_observable;
   std::vector<SegmentMisfit> by_segment;

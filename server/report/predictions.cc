@@ -8,6 +8,8 @@
 namespace calib::report {
 namespace {
 
+constexpr double kFewestRuns = 2;  // effective, of a covariance
+
 // [observable][reading][sample of positive weight]
 using Ensemble = std::vector<std::vector<std::vector<double>>>;
 
@@ -54,6 +56,38 @@ Counted PosteriorDraws(const CampaignView& view) {
   return counted;
 }
 
+// values: [reading][run]. Runs that have not reached every reading do not count.
+void SpreadOf(const std::vector<std::vector<double>>& values, const std::vector<double>& weights,
+              ObservablePrediction& out) {
+  const auto readings = static_cast<Eigen::Index>(values.size());
+  double sum = 0;
+  double squares = 0;
+  std::vector<std::size_t> whole;
+  for (std::size_t s = 0; s < weights.size(); ++s) {
+    if (std::any_of(values.begin(), values.end(),
+                    [s](const std::vector<double>& v) { return !std::isfinite(v[s]); })) {
+      continue;
+    }
+    whole.push_back(s);
+    sum += weights[s];
+  }
+  for (const std::size_t s : whole) squares += weights[s] * weights[s] / (sum * sum);
+  if (!(squares > 0) || 1 / squares < kFewestRuns) return;
+  Eigen::MatrixXd runs(readings, static_cast<Eigen::Index>(whole.size()));
+  Eigen::VectorXd share(runs.cols());
+  for (Eigen::Index k = 0; k < runs.cols(); ++k) {
+    const std::size_t s = whole[static_cast<std::size_t>(k)];
+    share[k] = weights[s] / sum;
+    for (Eigen::Index i = 0; i < readings; ++i) {
+      runs(i, k) = values[static_cast<std::size_t>(i)][s];
+    }
+  }
+  const Eigen::VectorXd mean = runs * share;
+  runs.colwise() -= mean;
+  out.of_runs = runs * share.asDiagonal() * runs.transpose() / (1 - squares);
+  out.runs = 1 / squares;
+}
+
 ExperimentPrediction FromRuns(const CampaignView& view, const campaign::Experiment& experiment,
                               const Counted& counted, bool band) {
   Ensemble ensemble(
@@ -74,6 +108,9 @@ ExperimentPrediction FromRuns(const CampaignView& view, const campaign::Experime
       out.q05.push_back(band ? WeightedQuantile(values, counted.weights, 0.05) : std::nan(""));
       out.q95.push_back(band ? WeightedQuantile(values, counted.weights, 0.95) : std::nan(""));
     }
+    if (band && experiment.role == campaign::Role::kValidate) {
+      SpreadOf(observable, counted.weights, out);
+    }
     prediction.observables.push_back(std::move(out));
   }
   return prediction;
@@ -86,7 +123,7 @@ ExperimentPrediction FromBands(const v1::Posterior& posterior,
   for (const campaign::MeasuredObservable& observable : experiment.observables) {
     const std::vector<double> none(experiment.control.size(), std::nan(""));
     ObservablePrediction& out =
-        prediction.observables.emplace_back(ObservablePrediction{none, none, none});
+        prediction.observables.emplace_back(ObservablePrediction{.mean = none, .q05 = none, .q95 = none});
     for (const v1::Posterior::Band& band : posterior.bands()) {
       if (band.experiment() != experiment.name || band.observable() != observable.name) continue;
       for (int i = 0; i < band.load_step_size(); ++i) {

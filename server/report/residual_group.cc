@@ -1,5 +1,6 @@
 #include "server/report/residual_group.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "inference/scatter/scatter.h"
@@ -25,22 +26,35 @@ Eigen::MatrixXd NoiseCovariance(const Eigen::VectorXd& sd, const Eigen::VectorXd
 // The measured specimen is one packing of many; so is the model's where no mean over several runs
 // can be given.
 // in: travelled, of every reading of the experiment.
-void AddScatter(const CampaignView& view, const std::vector<double>& travelled,
-                ResidualGroup& group) {
+// out: covariance of a single run by packings; empty: not known.
+Eigen::MatrixXd AddScatter(const CampaignView& view, const std::vector<double>& travelled,
+                           ResidualGroup& group) {
   const v1::Posterior::Scatter* record =
       FindScatter(view.posterior, group.experiment->name, group.observable->name);
-  if (record == nullptr) return;
+  if (record == nullptr) return {};
   const inference::GroupScatter scatter =
       GroupScatterOf(*record, Eigen::Map<const Eigen::VectorXd>(
                                   travelled.data(), static_cast<Eigen::Index>(travelled.size())));
   std::vector<Eigen::Index> kept;
   for (const std::size_t i : group.readings) kept.push_back(static_cast<Eigen::Index>(i));
   const double times = scatter.share + (view.posterior.posterior_from() == "none" ? 1 : 0);
-  const Eigen::MatrixXd covariance = times * inference::ScatterCovariance(scatter)(kept, kept);
+  const Eigen::MatrixXd of_run = inference::ScatterCovariance(scatter)(kept, kept);
+  const Eigen::MatrixXd covariance = times * of_run;
   const Eigen::VectorXd ratio = covariance.diagonal().cwiseQuotient(group.covariance.diagonal());
   group.scatter = std::sqrt(ratio.mean());
   group.scatter_from = record->from();
   group.covariance += covariance;
+  return of_run;
+}
+
+// Runs at draws of the posterior differ by their parameters and by their packings; the mean has the
+// first as a whole, and of both what so many runs leave.
+Eigen::MatrixXd OfPrediction(const ObservablePrediction& prediction,
+                             const Eigen::MatrixXd& by_packings) {
+  const double all = prediction.of_runs.trace();
+  const double packings = by_packings.size() > 0 ? by_packings.trace() : 0;
+  const double by_parameters = all > 0 ? std::max(0.0, all - packings) / all : 0;
+  return (by_parameters + 1 / prediction.runs) * prediction.of_runs;
 }
 
 }  // namespace
@@ -52,6 +66,7 @@ ResidualGroup MakeResidualGroup(const CampaignView& view, const campaign::Experi
                       .readings = {},
                       .residual = {},
                       .covariance = {},
+                      .of_prediction = {},
                       .model = {}};
   std::vector<double> residual;
   std::vector<double> sd;
@@ -78,7 +93,12 @@ ResidualGroup MakeResidualGroup(const CampaignView& view, const campaign::Experi
     group.covariance = NoiseCovariance(Eigen::Map<const Eigen::VectorXd>(sd.data(), size), path,
                                        group.observable->correlation_length);
   }
-  if (size > 0) AddScatter(view, distance, group);
+  group.of_prediction = Eigen::MatrixXd::Zero(size, size);
+  const Eigen::MatrixXd of_specimen = size > 0 ? AddScatter(view, distance, group) : Eigen::MatrixXd();
+  if (experiment.role == campaign::Role::kValidate && prediction.of_runs.size() > 0 &&
+      group.readings.size() == experiment.control.size()) {
+    group.of_prediction = OfPrediction(prediction, of_specimen);
+  }
   group.model = Eigen::Map<const Eigen::VectorXd>(model.data(), size);
   return group;
 }

@@ -19,6 +19,9 @@ struct ResidualGroup {
   Eigen::MatrixXd covariance;         ///< of noise and packing scatter together
   double scatter = 0;                 ///< rms of its sd over that of the noise
   std::string scatter_from{};
+  /// Of the mean of the model's runs, for data that were not fitted: how far its parameters may be
+  /// off, and that the runs are finitely many. Zero where it is not known.
+  Eigen::MatrixXd of_prediction;
   Eigen::VectorXd model;
 };
 

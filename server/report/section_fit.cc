@@ -257,18 +257,19 @@ std::string SegmentTable(const ReportData& data) {
       "explain.</p>\n"
       "<div class=\"scroll\"><table><tr><th>experiment</th><th class=\"l\">observable</th><th "
       "class=\"l\">stage</th><th>bias</th>"
-      "<th>z</th><th>error, sd</th><th>share of the misfit</th><th class=\"l\">shape</th></tr>\n";
+      "<th>z</th><th>error, sd</th><th>p</th><th>share of the misfit</th><th class=\"l\">shape</th></tr>\n";
   for (const SegmentMisfit& segment : data.comparison.by_segment) {
     const dem::ObservableInfo* info = dem::FindObservable(segment.observable);
     const bool bad = segment.z && std::abs(*segment.z) > kClear;
     html += fmt::format(
         "<tr><td>{}{}</td><td class=\"l\">{}</td><td class=\"l\">{}</td><td>{}</td><td "
-        "class=\"{}\">{}</td><td>{}</td><td>{}</td><td class=\"l\">{}</td></tr>\n",
+        "class=\"{}\">{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"l\">{}</td></tr>\n",
         Escape(segment.experiment), segment.heldout ? " (held out)" : "",
         Escape(NameForPeople(segment.observable)), Escape(NameForPeople(segment.segment)),
         Escape(NumberWithUnit(segment.bias, segment.observable, info != nullptr ? info->unit : "1",
                               3)),
         bad ? "bad" : "", segment.z ? Number(*segment.z, 3) : "–", Number(segment.rms_error, 3),
+        segment.p_value ? Number(*segment.p_value, 2) : "–",
         segment.chi2_share ? Percent(*segment.chi2_share, 2) : "–",
         segment.pattern.name == "none" ? "" : Escape(segment.pattern.name));
   }

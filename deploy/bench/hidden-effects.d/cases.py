@@ -20,7 +20,7 @@ class Case:
     seed: int                   # of packing, parameters and noise
     effects: tuple = ()         # hidden
     parameters: tuple = ()      # (dotted name, SI value) of the hidden effects
-    staging: str = 'base'       # how the measurement was made: base | rate | step | grains
+    staging: str = 'base'       # how the measurement was made: base | rate | step | damping | grains
     verb: str = 'diagnose'      # or improve
     removed: str = ''           # effect that the diagnosis may not know
     strength: int = 0           # lambda of a single hidden effect
@@ -33,7 +33,7 @@ def matrix(measured, repeats, controls):
     """measured: what the laboratory found of the strengths (laboratory.py)."""
     strengths = {effect: {int(k): values for k, (values, *_) in of['strengths'].items()} for effect, of in measured.items()}
     cases = [Case(f'control-r{r + 1}', ('no hidden effect',), 1000 + r) for r in range(controls)]
-    for staging in ('rate', 'step', 'grains'):
+    for staging in ('rate', 'step', 'damping', 'grains'):
         cases += [Case(f'control-{staging}-r{r + 1}', ('no hidden effect, other staging',), 2000 + 100 * len(staging) + r,
                        staging=staging) for r in range(max(1, repeats))]
     for number, (effect, by_lambda) in enumerate(sorted(strengths.items())):

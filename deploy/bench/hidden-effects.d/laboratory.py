@@ -7,7 +7,7 @@ READINGS, STRAIN = 24, 0.08
 PRESSURES = {'low': ('0.1 MPa', 'calibrate'), 'high': ('0.4 MPa', 'calibrate'), 'held': ('0.2 MPa', 'validate')}
 PACKINGS = 8                                       # of a campaign; the sd among four is known to 40 % only
 DRAWS = 5                                          # of base parameters, until the hidden effect can be as strong as wanted
-STAGING = {'rate': 0.1, 'step': 0.004, 'grains': 300}
+STAGING = {'rate': 0.1, 'step': 0.004, 'damping': 0.3, 'grains': 300}
 
 
 class Failed(Exception):
@@ -89,7 +89,7 @@ parameters:
     realizations: {realizations}
     data: {{file: {name}.csv, strain: logarithmic}}
     control: {{column: axial_strain, noise: 1e-5}}
-    staging: {{rate: {staging['rate']} 1/s, step: {staging['step']}, damping: [0.3, 0.9], unbalanced: 1e-3}}
+    staging: {{rate: {staging['rate']} 1/s, step: {staging['step']}, damping: [{staging['damping']}, 0.9], unbalanced: 1e-3}}
     observables:
       q_over_p: {{noise: {{relative: {NOISE['q_over_p'][0]}, floor: {NOISE['q_over_p'][1]}}}}}
       volumetric_strain: {{noise: {{absolute: {NOISE['volumetric_strain'][1]}}}}}
@@ -119,7 +119,7 @@ parameters:
         rnd = random.Random(case.seed)
         truth, parameters = self.draw_truth(case, rnd)
         staging = {**STAGING, 'grains': 340}
-        staging.update({'rate': {'rate': 0.2}, 'step': {'step': 0.002}, 'grains': {'grains': 600}}.get(case.staging, {}))
+        staging.update({'rate': {'rate': 0.2}, 'step': {'step': 0.002}, 'damping': {'damping': 0.6}, 'grains': {'grains': 600}}.get(case.staging, {}))
         work = self.path(case, 'making')
         os.makedirs(work, exist_ok=True)
         path = axial_strains()

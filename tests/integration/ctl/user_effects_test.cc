@@ -1,6 +1,10 @@
 // An effect written as a formula, from the campaign file to the verdict, as a user meets it.
 #include <algorithm>
+#include <map>
+#include <random>
+#include <sstream>
 
+#include "server/campaign/sha256.h"
 #include "tests/integration/ctl/calibctl_fixture.h"
 
 namespace calib::ctl {
@@ -102,6 +106,122 @@ TEST_F(UserEffects, AreCandidatesAndJoinTheModel) {
   EXPECT_NE(twice.code, 0);
   EXPECT_NE(twice.err.find("part of the model already"), std::string::npos) << twice.err;
   EXPECT_EQ(Call("compare c1 --state s --json").code, 0);
+}
+
+// A friction that grows with the strain, hidden in a measurement at two pressures; a third is held
+// out.
+class HiddenFormula : public CalibctlFixture {
+ protected:
+  HiddenFormula() {
+    for (const char* name : {"low", "high", "held"}) Write(Readings(name), Measured(Json(), ""));
+    Write("truth.yaml", Campaign("effects: [hardening], ", "  hardening.c: default\n"));
+    Write("base.yaml", Campaign("", ""));
+    const Json states =
+        Call("simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.3 --set "
+             "hardening.c=80 --json")
+            .json()["states"];
+    for (const char* name : {"low", "high", "held"}) Write(Readings(name), Measured(states, name));
+  }
+
+  static std::string Readings(const std::string& name) { return name + ".csv"; }
+
+  static std::string Measured(const Json& states, const std::string& name) {
+    std::ostringstream file;
+    file << "axial_strain,q_over_p,volumetric_strain\n";
+    if (states.is_null()) {
+      for (int k = 1; k <= 20; ++k) file << 0.001 * k << ",0.5,0.001\n";
+    }
+    std::mt19937 random(4);
+    std::normal_distribution<double> normal;
+    for (const Json& state : states) {
+      if (state["experiment"] != name) continue;
+      file << state["axial_strain"].get<double>() << ','
+           << state["q_over_p"].get<double>() + 0.02 * normal(random) << ','
+           << state["volumetric_strain"].get<double>() + 0.0002 * normal(random) << '\n';
+    }
+    return file.str();
+  }
+
+  static std::string Campaign(const std::string& effects, const std::string& parameters) {
+    std::string text = "name: hidden formula\nmodel: {contact: hertz_mindlin, " + effects +
+                       R"(density: 2650000 kg/m^3,
+  fixed: {poisson_ratio: 0.3},
+  user_effects: {hardening: {scales: friction_coefficient, formula: "1 + c * axial_strain",
+    parameters: {c: {null: 0, prior: {prior: uniform, min: -50, max: 150}, steps: [20, 60]}}}}}
+parameters:
+)" + parameters + R"(  young_modulus: {prior: log_uniform, min: 1e8, max: 2e9}
+  friction_coefficient: {prior: uniform, min: 0.1, max: 0.8}
+experiments:
+)";
+    const std::map<std::string, std::string> pressures = {
+        {"low", "100 kPa"}, {"high", "400 kPa"}, {"held", "200 kPa"}};
+    for (const auto& [name, pressure] : pressures) {
+      text += "  - name: " + name + "\n    test: triaxial_drained\n    confining_pressure: " +
+              pressure + R"(
+    packing: {generate: {particles: 64, porosity: 0.4, radii: {mean: 1 mm, spread: 0.2}, seed: 5}}
+    data: {file: )" + name +
+              R"(.csv, strain: logarithmic}
+    control: {column: axial_strain, noise: 1e-5}
+    observables: {q_over_p: {noise: {absolute: 0.02}}, volumetric_strain: {noise: {absolute: 0.0002}}}
+)" + (name == "held" ? "    role: validate\n" : "");
+    }
+    return text + R"(noise: given
+inference: {method: iterative_bayesian_filter, samples: 24, max_iterations: 2}
+seed: 3
+)";
+  }
+
+  std::int64_t Evaluations(const std::string& state) const {
+    std::int64_t sum = 0;
+    for (const Json& c : Call("list --state " + state + " --json").json()) {
+      sum += c["model_evaluations"].get<std::int64_t>();
+    }
+    return sum;
+  }
+};
+
+TEST_F(HiddenFormula, IsNamedAddedAndHeldOutDataAreOpenedAfterTheVerdict) {
+  ASSERT_EQ(Call("run base.yaml --state s --workers 2 --json").code, 0) << Read("err");
+
+  // A budget that no screen can be paid from: the base model alone, and why.
+  const Answer poor = Call("improve c1 --state s --workers 2 --max-evaluations 5 --json");
+  ASSERT_EQ(poor.code, 0) << poor.err;
+  ASSERT_EQ(poor.json()["steps"].size(), 1U) << poor.out;
+  EXPECT_NE(poor.json()["steps"][0]["reason"].get<std::string>().find("--max-evaluations"),
+            std::string::npos)
+      << poor.out;
+  EXPECT_LE(poor.json()["model_evaluations"], 5) << poor.out;
+
+  // Killed on the way, it goes on; asked again, it makes no run and says the same.
+  CallWith("timeout -s KILL 4", "improve c1 --state s --workers 2 --json");
+  const Answer improved = Call("improve c1 --state s --workers 2 --json");
+  ASSERT_EQ(improved.code, 0) << improved.err;
+  const std::int64_t evaluations = Evaluations("s");
+  EXPECT_EQ(Call("improve c1 --state s --workers 2 --json").out, improved.out);
+  EXPECT_EQ(Evaluations("s"), evaluations);
+
+  Json verdict = improved.json();
+  const Json steps = verdict["steps"];
+  ASSERT_GE(steps.size(), 2U) << improved.out;
+  EXPECT_EQ(steps[0]["next_effect"], "hardening") << improved.out;
+  EXPECT_LT(steps.back()["rms_error"].get<double>(), 0.7 * steps[0]["rms_error"].get<double>());
+  EXPECT_LT(steps.back()["heldout_rms_error"].get<double>(),
+            steps[0]["heldout_rms_error"].get<double>());
+  const Answer diagnosed = Call("diagnose c1 --state s --workers 2 --json");
+  const Json first = diagnosed.json()["candidates"][0];
+  Json named = first["confusable_with"];
+  named.push_back(first["effect"]);
+  EXPECT_NE(std::find(named.begin(), named.end(), "hardening"), named.end()) << diagnosed.out;
+
+  // What was stored before held-out data were opened is the answer without them.
+  for (Json& step : verdict["steps"]) {
+    const bool end = step == steps.front() || step == steps.back();
+    EXPECT_EQ(step["heldout_rms_error"].is_null(), !end) << step;
+    step["heldout_rms_error"] = nullptr;
+  }
+  const std::string digest = verdict["verdict_digest"];
+  verdict["verdict_digest"] = "";
+  EXPECT_EQ(campaign::Sha256Hex(verdict.dump(2) + "\n"), digest);
 }
 
 }  // namespace

@@ -22,10 +22,22 @@ TEST(YamlText, ReadsBackToTheSameTree) {
   EXPECT_EQ(again.root->entries[1].value.items[0].entries[1].value.items[0].scalar, "-1");
 }
 
+dem::Staging Staged(std::optional<double> rate, std::optional<double> step) {
+  dem::Staging staging;
+  staging.rate = rate;
+  staging.step = step;
+  if (step) {
+    staging.damping_loading = 0.4;
+    staging.damping_settling = 0.9;
+  }
+  return staging;
+}
+
 TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
   const auto text = Derive(
       "name: a\nmodel: {contact: linear}\nparameters: {young_modulus: default}\n"
-      "experiments:\n  - {name: x, staging: {rate: 0.2 1/s}}\n  - {name: y, role: validate}\n",
+      "experiments:\n  - {name: x, staging: {rate: 0.2 1/s}}\n  - {name: z}\n"
+      "  - {name: y, role: validate}\n",
       {.name = "a + rolling_resistance",
        .lineage = {.parent = "c1", .purpose = "warm_fit"},
        .effects = {"rolling_resistance"},
@@ -35,7 +47,7 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
        .first_proposal = FirstProposal{.prior_share = 0.5,
                                        .places = {{"young_modulus", {.center = 1e9, .sd = 1e7}}}},
        .replicates = 0,
-       .rate_factor = 2});
+       .staging = {{"x", Staged(0.4, std::nullopt)}, {"z", Staged(std::nullopt, 0.001)}}});
   ASSERT_TRUE(text.ok()) << text.status();
   EXPECT_EQ(
       *text,
@@ -43,7 +55,8 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
       "model: {contact: linear, effects: [rolling_resistance]}\n"
       "parameters: {young_modulus: default, rolling_resistance.friction: {prior: uniform, min: "
       "0, max: 1}}\n"
-      "experiments: [{name: x, staging: {rate: 0.4}}]\n"
+      "experiments: [{name: x, staging: {rate: 0.4}}, {name: z, staging: {step: 0.001, damping: "
+      "[0.4, 0.9]}}]\n"
       "lineage: {parent: c1, purpose: warm_fit}\n"
       "inference:\n"
       "  method: iterative_bayesian_filter\n"

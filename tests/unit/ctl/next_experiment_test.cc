@@ -41,6 +41,11 @@ TEST(NextExperiment, RunsOfOneModelAreNotApart) {
 TEST(NextExperiment, WhatIsFarApartIsInUnitsOfTheErrors) {
   const std::vector<Eigen::VectorXd> tenth = {Eigen::VectorXd::Constant(9, 0.1)};
   EXPECT_NEAR(SeparationOf(tenth, 0), 0.09, 1e-12);  // noise alone
+  // A shift that a misfit of unknown cause makes too, of sd 0.2: over 1 + 9 x 0.04.
+  EXPECT_NEAR(SeparationOf(tenth, 0, {0.2}), 0.09 / 1.36, 1e-12);
+  // Of another shape than it, as if there were none.
+  const std::vector<Eigen::VectorXd> turning = {Eigen::Vector2d(0.3, -0.3)};
+  EXPECT_NEAR(SeparationOf(turning, 0, {5}), 0.18, 1e-12);
   Eigen::VectorXd bump = Eigen::VectorXd::Zero(kReadings);
   bump[3] = 200;
   bump[4] = -200;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "server/report/weighted_statistics.h"
 #include "tests/unit/report/example_view.h"
@@ -79,6 +80,45 @@ TEST(Comparison, HeldOutDataAreReportedApart) {
     if (!m.heldout) share += *m.chi2_share;
   }
   EXPECT_NEAR(share, 1, 1e-12);
+}
+
+// Draws from a posterior that knows the model up to a shift: how far the prediction may be off by
+// it belongs to the errors of what was not fitted.
+TEST(Comparison, HeldOutReadingsOfARightModelAreAsUnlikelyAsTheySay) {
+  constexpr int kTimes = 400;
+  constexpr int kRuns = 20;
+  int below = 0;
+  int segments_below = 0;
+  std::mt19937_64 engine(5);
+  std::normal_distribution<double> normal;
+  for (int time = 0; time < kTimes; ++time) {
+    CampaignView view = FourReadings(0);
+    campaign::Experiment& held = view.campaign.experiments.front();
+    held.role = campaign::Role::kValidate;
+    const double shift = normal(engine);
+    for (std::size_t i = 0; i < 4; ++i) {
+      held.observables[0].values[i] = static_cast<double>(i + 1) + shift + 0.5 * normal(engine);
+    }
+    view.samples.assign(kRuns, view.samples.front());
+    const StateHistory pattern = view.states[{"a", 0}];
+    for (int run = 0; run < kRuns; ++run) {
+      view.samples[static_cast<std::size_t>(run)].set_index(run);
+      const double own = normal(engine);
+      StateHistory history = pattern;
+      for (int i = 0; i < 4; ++i) {
+        history.states[static_cast<std::size_t>(i)].set_values(0, i + 1 + own);
+      }
+      view.states[{"a", run}] = history;
+    }
+    const Comparison c = Compare(view, PredictReadings(view));
+    below += *c.by_observable[0].p_value < 0.05 ? 1 : 0;
+    segments_below += *c.by_segment[1].p_value < 0.05 ? 1 : 0;
+  }
+  // Five in a hundred, +- 3 sd and what twenty runs do not know of a variance. Without the errors of
+  // the prediction: more than half.
+  EXPECT_GT(below, 0.02 * kTimes);
+  EXPECT_LT(below, 0.10 * kTimes);
+  EXPECT_LT(segments_below, 0.10 * kTimes);
 }
 
 TEST(WeightedStatistics, QuantilesAndHistogram) {
