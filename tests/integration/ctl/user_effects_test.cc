@@ -108,7 +108,7 @@ TEST_F(UserEffects, AreCandidatesAndJoinTheModel) {
   EXPECT_EQ(Call("compare c1 --state s --json").code, 0);
 }
 
-// A friction that grows with the strain, hidden in a measurement at two pressures; a third is held
+// A friction that falls with the strain, hidden in a measurement at two pressures; a third is held
 // out.
 class HiddenFormula : public CalibctlFixture {
  protected:
@@ -117,8 +117,8 @@ class HiddenFormula : public CalibctlFixture {
     Write("truth.yaml", Campaign("effects: [hardening], ", "  hardening.c: default\n"));
     Write("base.yaml", Campaign("", ""));
     const Json states =
-        Call("simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.3 --set "
-             "hardening.c=80 --json")
+        Call("simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.6 --set "
+             "hardening.c=-20 --json")
             .json()["states"];
     for (const char* name : {"low", "high", "held"}) Write(Readings(name), Measured(states, name));
   }
@@ -129,7 +129,7 @@ class HiddenFormula : public CalibctlFixture {
     std::ostringstream file;
     file << "axial_strain,q_over_p,volumetric_strain\n";
     if (states.is_null()) {
-      for (int k = 1; k <= 20; ++k) file << 0.001 * k << ",0.5,0.001\n";
+      for (int k = 1; k <= 20; ++k) file << 0.002 * k << ",0.5,0.001\n";
     }
     std::mt19937 random(4);
     std::normal_distribution<double> normal;
@@ -147,7 +147,7 @@ class HiddenFormula : public CalibctlFixture {
                        R"(density: 2650000 kg/m^3,
   fixed: {poisson_ratio: 0.3},
   user_effects: {hardening: {scales: friction_coefficient, formula: "1 + c * axial_strain",
-    parameters: {c: {null: 0, prior: {prior: uniform, min: -50, max: 150}, steps: [20, 60]}}}}}
+    parameters: {c: {null: 0, prior: {prior: uniform, min: -24, max: 100}, steps: [-8, -16]}}}}}
 parameters:
 )" + parameters + R"(  young_modulus: {prior: log_uniform, min: 1e8, max: 2e9}
   friction_coefficient: {prior: uniform, min: 0.1, max: 0.8}
