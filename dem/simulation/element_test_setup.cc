@@ -36,8 +36,8 @@ const ElementTestEntry& ElementTestNamed(const std::string& test) {
 Staging ResolveStaging(const Scenario& scenario, double mean_diameter) {
   const Staging& given = scenario.staging;
   const bool adaptive = given.adaptive && !scenario.loading_rate;
-  const double quasi_static_rate = kInertialNumber / mean_diameter *
-                                   std::sqrt(PressureScale(scenario) / scenario.model.density);
+  const double quasi_static_rate =
+      kInertialNumber / mean_diameter * std::sqrt(PressureScale(scenario) / scenario.model.density);
   return {.rate = given.rate.value_or(quasi_static_rate),
           .step = given.step.value_or(adaptive ? kAdaptiveStep : kStep),
           .damping_loading = given.damping_loading.value_or(kDampingLoading),

@@ -77,8 +77,8 @@ void SetStaging(const dem::Staging& staging, YamlNode& out) {
   if (staging.rate) YamlAt(node, "rate") = YamlNumber(*staging.rate);
   if (staging.step) YamlAt(node, "step") = YamlNumber(*staging.step);
   if (staging.damping_loading && staging.damping_settling) {
-    YamlAt(node, "damping") = YamlList(
-        {YamlNumber(*staging.damping_loading), YamlNumber(*staging.damping_settling)});
+    YamlAt(node, "damping") =
+        YamlList({YamlNumber(*staging.damping_loading), YamlNumber(*staging.damping_settling)});
   }
 }
 

@@ -141,9 +141,8 @@ std::string ComparisonText(const report::Comparison& comparison) {
          m.z ? Number(*m.z, 2) : "–", m.p_value ? Number(*m.p_value, 2) : "–",
          m.z ? Verdict(m.rms_error, m.p_value) : ""});
   }
-  TextTable segments(
-      {"<experiment", "<observable", "<stage", "model − measured", "z", "error", "p", "chi2",
-       "<shape"});
+  TextTable segments({"<experiment", "<observable", "<stage", "model − measured", "z", "error", "p",
+                      "chi2", "<shape"});
   for (const report::SegmentMisfit& m : comparison.by_segment) {
     segments.AddRow({m.experiment + (m.heldout ? " (held out)" : ""), m.observable, m.segment,
                      report::NumberWithUnit(m.bias, m.observable, UnitOf(m.observable), 3),

@@ -505,9 +505,8 @@ class Inquiry {
     const std::vector<Rival> rivals =
         diagnosis_.verdict == "ambiguous" ? RivalsOfGroup() : BestTwo();
     const auto like = static_cast<std::size_t>(base_.BestRuns(1).front());
-    auto next =
-        PlanNextExperiment(laboratory_, rivals, None(rivals), base_.runs().sample[like],
-                           response_.scatter);
+    auto next = PlanNextExperiment(laboratory_, rivals, None(rivals), base_.runs().sample[like],
+                                   response_.scatter);
     if (!next.ok()) return next.status();
     diagnosis_.next_experiment = std::move(next->next);
     if (!diagnosis_.next_experiment) {

@@ -125,11 +125,12 @@ std::string InWords(const PlannedExperiment& planned) {
 // That no effect of the group is the one that is missing.
 std::string AgainstNone(const PlannedExperiment& planned) {
   if (!planned.power_against_none) return "";
-  return Wrapped(fmt::format("That it is none of these, but a misfit of the present size of unknown "
-                             "cause, would show with a power of {} ({} sd apart).",
-                             report::Percent(*planned.power_against_none, 3),
-                             Number(*planned.distance_from_none, 3)),
-                 "", "");
+  return Wrapped(
+      fmt::format("That it is none of these, but a misfit of the present size of unknown "
+                  "cause, would show with a power of {} ({} sd apart).",
+                  report::Percent(*planned.power_against_none, 3),
+                  Number(*planned.distance_from_none, 3)),
+      "", "");
 }
 
 std::string NextText(const NextExperiment& next) {

@@ -181,7 +181,8 @@ std::vector<std::size_t> EffectScreen::RunsOfEach(
   const double share = kScreenShare * static_cast<double>(base_.runs().sample.size());
   const double most =
       std::max(share, static_cast<double>(kMostRuns * effects.size()) / experiments);
-  auto left = static_cast<std::int64_t>(most) - static_cast<std::int64_t>(NumericalChanges().size());
+  auto left =
+      static_cast<std::int64_t>(most) - static_cast<std::int64_t>(NumericalChanges().size());
   std::vector<std::size_t> runs(effects.size(), 0);
   for (std::size_t e = 0; e < effects.size(); ++e) {
     if (IsCalculated(*effects[e])) continue;

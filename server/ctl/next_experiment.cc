@@ -228,8 +228,8 @@ absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
     double from_none = std::numeric_limits<double>::infinity();
     for (std::size_t a = 0; a < rivals.size(); ++a) {
       const auto departures = DeparturesOf(curves[a][p], curves.back()[p], pattern);
-      from_none = std::min(
-          from_none, std::sqrt(SeparationOf(departures, scatter, ShiftsOf(*none, pattern))));
+      from_none = std::min(from_none,
+                           std::sqrt(SeparationOf(departures, scatter, ShiftsOf(*none, pattern))));
     }
     plans[p].experiment.distance_from_none = from_none;
     plans[p].experiment.power_against_none = PowerAt(from_none);

@@ -56,7 +56,8 @@ double NormalDeviate(double chi2, double degrees) {
 }
 
 // expected: covariance of the residuals if the model is right.
-void AddSegments(const Group& group, const Eigen::MatrixXd& expected, bool heldout, bool judged, std::vector<SegmentMisfit>& out) {
+void AddSegments(const Group& group, const Eigen::MatrixXd& expected, bool heldout, bool judged,
+                 std::vector<SegmentMisfit>& out) {
   const auto size = static_cast<Eigen::Index>(group.readings.size());
   const auto segment = [&group](Eigen::Index i) -> const std::string& {
     return group.experiment->segment[group.readings[static_cast<std::size_t>(i)]];
@@ -86,8 +87,8 @@ void AddSegments(const Group& group, const Eigen::MatrixXd& expected, bool heldo
     if (judged) {
       const double of_sum = expected.block(first, first, count, count).sum();
       misfit.z = misfit.bias * static_cast<double>(count) / std::sqrt(of_sum);
-      misfit.p_value = UpperTail(ChiSquared(expected, group.residual, first, count),
-                                 static_cast<double>(count));
+      misfit.p_value =
+          UpperTail(ChiSquared(expected, group.residual, first, count), static_cast<double>(count));
       // Divided by their sum in the end.
       misfit.chi2_share = ChiSquared(group.covariance, group.residual, first, count);
       misfit.pattern = PatternOf(CurveOf(group, first, count));
@@ -165,18 +166,18 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
       if (group.readings.empty()) continue;
       const double squared =
           group.residual.cwiseAbs2().cwiseQuotient(group.covariance.diagonal()).sum();
-      ObservableMisfit misfit{.experiment = experiment.name,
-                              .observable = group.observable->name,
-                              .heldout = validation,
-                              .readings = static_cast<int>(group.readings.size()),
-                              .rms_error = std::sqrt(squared / n),
-                              .rms_residual = std::sqrt(group.residual.squaredNorm() / n),
-                              .scatter = group.scatter,
-                              .scatter_from = group.scatter_from,
-                              .z = std::nullopt,
-                              .p_value = std::nullopt,
-                              .effective_readings =
-                                  EffectiveReadings(group, 0, group.residual.size())};
+      ObservableMisfit misfit{
+          .experiment = experiment.name,
+          .observable = group.observable->name,
+          .heldout = validation,
+          .readings = static_cast<int>(group.readings.size()),
+          .rms_error = std::sqrt(squared / n),
+          .rms_residual = std::sqrt(group.residual.squaredNorm() / n),
+          .scatter = group.scatter,
+          .scatter_from = group.scatter_from,
+          .z = std::nullopt,
+          .p_value = std::nullopt,
+          .effective_readings = EffectiveReadings(group, 0, group.residual.size())};
       const Eigen::MatrixXd expected = group.covariance + group.of_prediction;
       Sums& sums = validation ? heldout : fitted;
       sums.squared += squared;

@@ -43,8 +43,8 @@ struct SegmentMisfit {
       z;  ///< bias over its standard deviation, correlation of the errors included
   std::optional<double> p_value{};  ///< as ObservableMisfit::p_value, of this stage alone
   int readings = 0;
-  double effective_readings = 0;    ///< as ObservableMisfit::effective_readings
-  double rms_error = 0;  ///< rms of residual / standard deviation
+  double effective_readings = 0;  ///< as ObservableMisfit::effective_readings
+  double rms_error = 0;           ///< rms of residual / standard deviation
   /// Of the chi-squared of everything fitted, or of everything held out.
   std::optional<double> chi2_share;
   ResidualPattern pattern = {};  ///< none where the errors are not known

@@ -122,8 +122,8 @@ ExperimentPrediction FromBands(const v1::Posterior& posterior,
   prediction.samples = posterior.emulator().runs();
   for (const campaign::MeasuredObservable& observable : experiment.observables) {
     const std::vector<double> none(experiment.control.size(), std::nan(""));
-    ObservablePrediction& out =
-        prediction.observables.emplace_back(ObservablePrediction{.mean = none, .q05 = none, .q95 = none});
+    ObservablePrediction& out = prediction.observables.emplace_back(
+        ObservablePrediction{.mean = none, .q05 = none, .q95 = none});
     for (const v1::Posterior::Band& band : posterior.bands()) {
       if (band.experiment() != experiment.name || band.observable() != observable.name) continue;
       for (int i = 0; i < band.load_step_size(); ++i) {

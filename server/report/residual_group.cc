@@ -94,7 +94,8 @@ ResidualGroup MakeResidualGroup(const CampaignView& view, const campaign::Experi
                                        group.observable->correlation_length);
   }
   group.of_prediction = Eigen::MatrixXd::Zero(size, size);
-  const Eigen::MatrixXd of_specimen = size > 0 ? AddScatter(view, distance, group) : Eigen::MatrixXd();
+  const Eigen::MatrixXd of_specimen =
+      size > 0 ? AddScatter(view, distance, group) : Eigen::MatrixXd();
   if (experiment.role == campaign::Role::kValidate && prediction.of_runs.size() > 0 &&
       group.readings.size() == experiment.control.size()) {
     group.of_prediction = OfPrediction(prediction, of_specimen);

@@ -257,7 +257,8 @@ std::string SegmentTable(const ReportData& data) {
       "explain.</p>\n"
       "<div class=\"scroll\"><table><tr><th>experiment</th><th class=\"l\">observable</th><th "
       "class=\"l\">stage</th><th>bias</th>"
-      "<th>z</th><th>error, sd</th><th>p</th><th>share of the misfit</th><th class=\"l\">shape</th></tr>\n";
+      "<th>z</th><th>error, sd</th><th>p</th><th>share of the misfit</th><th "
+      "class=\"l\">shape</th></tr>\n";
   for (const SegmentMisfit& segment : data.comparison.by_segment) {
     const dem::ObservableInfo* info = dem::FindObservable(segment.observable);
     const bool bad = segment.z && std::abs(*segment.z) > kClear;

@@ -117,8 +117,9 @@ class HiddenFormula : public CalibctlFixture {
     Write("truth.yaml", Campaign("effects: [hardening], ", "  hardening.c: default\n"));
     Write("base.yaml", Campaign("", ""));
     const Json states =
-        Call("simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.6 --set "
-             "hardening.c=-20 --json")
+        Call(
+            "simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.6 --set "
+            "hardening.c=-20 --json")
             .json()["states"];
     for (const char* name : {"low", "high", "held"}) Write(Readings(name), Measured(states, name));
   }
@@ -156,10 +157,11 @@ experiments:
     const std::map<std::string, std::string> pressures = {
         {"low", "100 kPa"}, {"high", "400 kPa"}, {"held", "200 kPa"}};
     for (const auto& [name, pressure] : pressures) {
-      text += "  - name: " + name + "\n    test: triaxial_drained\n    confining_pressure: " +
-              pressure + R"(
+      text += "  - name: " + name +
+              "\n    test: triaxial_drained\n    confining_pressure: " + pressure + R"(
     packing: {generate: {particles: 64, porosity: 0.4, radii: {mean: 1 mm, spread: 0.2}, seed: 5}}
-    data: {file: )" + name +
+    data: {file: )" +
+              name +
               R"(.csv, strain: logarithmic}
     control: {column: axial_strain, noise: 1e-5}
     observables: {q_over_p: {noise: {absolute: 0.02}}, volumetric_strain: {noise: {absolute: 0.0002}}}
