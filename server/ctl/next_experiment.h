@@ -54,14 +54,13 @@ struct NextPlan {
   std::string why_none{};  ///< a clause; empty where there is one
 };
 
-/// Runs every rival, and the model of `none`, once in every planned test, from the specimen and seed of sample `like`. Errors
-/// of a measurement: the noise that the campaign states for the observables at values of their
-/// size, and `scatter` (of a single run, in units of that noise) for the measurement and both runs:
-/// see SeparationOf(). None for fewer than two rivals, without a known size of the errors, where no
-/// plan is a campaign that this build accepts, or where no plan is finished by all rivals. Errors:
-/// those of the runs.
-/// The best is that with the largest distance between the rivals; their distance from none of them
-/// is told beside it.
+/// Runs every rival, and the model of `none`, once in every planned test, from the specimen and
+/// seed of sample `like`. Errors of a measurement: the noise that the campaign states for the
+/// observables at values of their size, and `scatter` (of a single run, in units of that noise) for
+/// the measurement and both runs: see SeparationOf(). None for fewer than two rivals, without a
+/// known size of the errors, where no plan is a campaign that this build accepts, or where no plan
+/// is finished by all rivals. Errors: those of the runs. The best is that with the largest distance
+/// between the rivals; their distance from none of them is told beside it.
 absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
                                             const std::vector<Rival>& rivals,
                                             const std::optional<NoneOfThese>& none, int like,
