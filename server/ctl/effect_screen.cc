@@ -57,6 +57,33 @@ double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, do
   return dem::RayAdmits(effect, ray, step, contact, state) ? step : ray.steps[1];
 }
 
+std::vector<std::size_t> SharesOfRuns(const std::vector<const dem::EffectInfo*>& effects,
+                                      const std::vector<bool>& calculated, std::size_t samples,
+                                      int experiments, std::size_t numerical) {
+  const double most = std::max(kScreenShare * static_cast<double>(samples),
+                               static_cast<double>(kMostRuns * effects.size()) / experiments);
+  auto left = static_cast<std::int64_t>(most) - static_cast<std::int64_t>(numerical);
+  std::vector<std::size_t> runs(effects.size(), 0);
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    if (calculated[e]) continue;
+    runs[e] = 1;
+    --left;
+  }
+  // Another ray is another signature; what instruments do is nearly in proportion to its strength.
+  const auto grade = [](const dem::EffectInfo& effect) {
+    if (effect.rays.size() > 1) return 0;
+    return effect.kind == "measurement" ? 2 : 1;
+  };
+  for (int wanted = 0; wanted <= 2; ++wanted) {
+    for (std::size_t e = 0; e < effects.size() && left > 0; ++e) {
+      if (runs[e] == 0 || grade(*effects[e]) != wanted) continue;
+      runs[e] = 2;
+      --left;
+    }
+  }
+  return runs;
+}
+
 std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& effect,
                                                       std::size_t rows) {
   std::vector<Step> steps;
@@ -177,31 +204,10 @@ std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
 
 std::vector<std::size_t> EffectScreen::RunsOfEach(
     const std::vector<const dem::EffectInfo*>& effects) const {
-  const int experiments = std::max(1, base_.fitted_experiments());
-  const double share = kScreenShare * static_cast<double>(base_.runs().sample.size());
-  const double most =
-      std::max(share, static_cast<double>(kMostRuns * effects.size()) / experiments);
-  auto left =
-      static_cast<std::int64_t>(most) - static_cast<std::int64_t>(NumericalChanges().size());
-  std::vector<std::size_t> runs(effects.size(), 0);
-  for (std::size_t e = 0; e < effects.size(); ++e) {
-    if (IsCalculated(*effects[e])) continue;
-    runs[e] = 1;
-    --left;
-  }
-  // Another ray is another signature; what instruments do is nearly in proportion to its strength.
-  const auto grade = [](const dem::EffectInfo& effect) {
-    if (effect.rays.size() > 1) return 0;
-    return effect.kind == "measurement" ? 2 : 1;
-  };
-  for (int wanted = 0; wanted <= 2; ++wanted) {
-    for (std::size_t e = 0; e < effects.size() && left > 0; ++e) {
-      if (runs[e] == 0 || grade(*effects[e]) != wanted) continue;
-      runs[e] = 2;
-      --left;
-    }
-  }
-  return runs;
+  std::vector<bool> calculated;
+  for (const dem::EffectInfo* effect : effects) calculated.push_back(IsCalculated(*effect));
+  return SharesOfRuns(effects, calculated, base_.runs().sample.size(),
+                      std::max(1, base_.fitted_experiments()), NumericalChanges().size());
 }
 
 std::int64_t EffectScreen::Planned(const std::vector<std::string>& without) const {

@@ -31,6 +31,14 @@ using SquareOfDifference = std::function<double(const Eigen::VectorXd&)>;
 double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
                   const std::string& contact, const dem::ReferenceState& state);
 
+/// Runs that each effect is given, 1 or 2, 0 where it is calculated, in a campaign of so many samples
+/// and fitted experiments: with `numerical` runs at most the larger of a quarter of the campaign's
+/// evaluations and four for each effect, but one run of each in any case. A second one goes first
+/// to effects with another ray of strength, last to what instruments do.
+std::vector<std::size_t> SharesOfRuns(const std::vector<const dem::EffectInfo*>& effects,
+                                      const std::vector<bool>& calculated, std::size_t samples,
+                                      int experiments, std::size_t numerical);
+
 class EffectScreen {
  public:
   explicit EffectScreen(const FittedCampaign& base) : base_(base) {}
@@ -43,11 +51,9 @@ class EffectScreen {
   /// Model evaluations that MeasureNuisance() and MeasureSignatures() take together.
   std::int64_t Planned(const std::vector<std::string>& without) const;
 
-  /// One signature of each effect that the fitted tests can show. `without` take no part. With
-  /// MeasureNuisance() at most the larger of a quarter of the campaign's evaluations and four for
-  /// each effect, but one run of each effect in any case: what is left of them goes to a second one
-  /// where it tells most, another ray of strength first, what instruments do last. The first
-  /// strength is the catalogue's; the second is that of SecondStep(), or as a user's effect says.
+  /// One signature of each effect that the fitted tests can show, of as many runs as SharesOfRuns()
+  /// says. `without` take no part. The first strength is the catalogue's; the second is that of
+  /// SecondStep(), or as a user's effect says.
   absl::StatusOr<std::vector<inference::Signature>> MeasureSignatures(
       const std::vector<std::string>& without, const SquareOfDifference& square_of);
 

@@ -57,6 +57,42 @@ TEST(SecondStep, IsAdmissible) {
 
 // The engine refuses shapes and crushing wherever a test pours spheres: no run of a screen may ask
 // for them.
+TEST(SharesOfRuns, KeepTheCapAndGoWhereTheyTellMost) {
+  std::vector<const dem::EffectInfo*> effects;
+  std::vector<bool> calculated;
+  for (const dem::EffectInfo& effect : dem::Effects()) {
+    effects.push_back(&effect);
+    calculated.push_back(effect.name == "load_cell_error");
+  }
+  constexpr std::size_t kNumerical = 3;
+  for (const int experiments : {1, 2, 3}) {
+    for (const std::size_t samples : {24U, 96U, 400U}) {
+      const auto runs = SharesOfRuns(effects, calculated, samples, experiments, kNumerical);
+      std::size_t sum = kNumerical;
+      bool instruments = true;  // all of them twice
+      bool rays = true;
+      for (std::size_t e = 0; e < effects.size(); ++e) {
+        sum += runs[e];
+        EXPECT_GE(runs[e], calculated[e] ? 0U : 1U) << effects[e]->name;
+        if (calculated[e]) {
+          EXPECT_EQ(runs[e], 0U);
+        } else if (effects[e]->rays.size() > 1) {
+          rays = rays && runs[e] == 2;
+        } else if (effects[e]->kind == "measurement") {
+          instruments = instruments && runs[e] == 2;
+        }
+      }
+      EXPECT_LE(sum * static_cast<std::size_t>(experiments),
+                std::max(4 * effects.size(), samples * static_cast<std::size_t>(experiments) / 4))
+          << experiments << " experiments, " << samples << " samples";
+      EXPECT_TRUE(rays || !instruments);
+      if (samples == 400) {
+        EXPECT_TRUE(rays && instruments);
+      }
+    }
+  }
+}
+
 TEST(WhyNotShown, GrainsOfAPouredTestKeepTheirShape) {
   campaign::Campaign campaign;
   campaign.experiments.resize(1);
