@@ -44,7 +44,7 @@ bool HasLogPrior(const campaign::Campaign& campaign, const std::string& name) {
 // How far the means of two halves of the runs lie apart, in sd of the posterior.
 std::string HalvesCell(const v1::Posterior::Parameter& p) {
   return fmt::format("<td>{}</td>",
-                     std::isfinite(p.split_half()) ? Number(p.split_half(), 2) + " sd" : "–");
+                     std::isfinite(p.split_half()) ? Number(p.split_half(), 2) : "–");
 }
 
 std::string Row(const v1::Posterior::Parameter& p, bool log, bool halves) {
@@ -53,13 +53,12 @@ std::string Row(const v1::Posterior::Parameter& p, bool log, bool halves) {
     return Escape(Number(value * unit.factor, digits));
   };
   return fmt::format(
-      "<tr><td>{}</td><td "
-      "class=\"l\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</"
+      "<tr><td>{}{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</"
       "td>"
       "{}<td>{} – {}</td><td class=\"l\">{}</td><td class=\"l{}\">{}</td></tr>\n",
-      Escape(NameForPeople(p.name())), Escape(unit.label.empty() ? "–" : unit.label),
-      shown(p.mean(), 4), shown(p.sd(), 2), Percent(p.cov(), 2), shown(p.q05(), 4),
-      shown(p.q50(), 4), shown(p.q95(), 4), halves ? HalvesCell(p) : "", shown(p.prior_min(), 3),
+      Escape(NameForPeople(p.name())), unit.label.empty() ? "" : ", " + Escape(unit.label),
+      shown(p.mean(), 4), shown(p.sd(), 2), Percent(p.cov(), 2), shown(p.q05(), 3),
+      shown(p.q50(), 3), shown(p.q95(), 3), halves ? HalvesCell(p) : "", shown(p.prior_min(), 3),
       shown(p.prior_max(), 3), RangeBar(p, log), p.at_bound() ? " bad" : "",
       p.at_bound() ? "at a bound" : "");
 }
@@ -71,19 +70,19 @@ std::string ParameterSection(const ReportData& data) {
   const bool halves = std::any_of(parameters.begin(), parameters.end(),
                                   [](const auto& p) { return std::isfinite(p.split_half()); });
   std::string html = fmt::format(
-      "<h2>Identified parameters</h2>\n<div class=\"scroll\"><table>\n<tr><th>parameter</th><th "
-      "class=\"l\">unit</th><th>mean</th>"
+      "<h2>Identified parameters</h2>\n<div class=\"scroll\"><table>\n<tr><th>parameter</th>"
+      "<th>mean</th>"
       "<th>± "
       "sd</th><th>cov</th><th>5&#8201;%</th><th>50&#8201;%</th><th>95&#8201;%</th>{}<th>prior</"
       "th><th class=\"l\">in the prior</th><th></th></tr>\n",
-      halves ? "<th>halves apart</th>" : "");
+      halves ? "<th>halves, sd</th>" : "");
   for (const auto& parameter : parameters) {
     html += Row(parameter, HasLogPrior(data.view.campaign, parameter.name()), halves);
   }
   html += "</table></div>\n";
   if (halves) {
     html +=
-        "<p class=\"sub\">Halves apart: how far the means lie apart that either half of the runs "
+        "<p class=\"sub\">Halves: how far the means lie apart that either half of the runs "
         "gives alone, in sd of the posterior; about one or more asks for more runs.</p>\n";
   }
   if (!data.view.campaign.model.parameters.empty()) {

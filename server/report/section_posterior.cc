@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/report/html.h"
 #include "server/report/plot/plot.h"
@@ -67,6 +68,19 @@ std::vector<double> Weights(const CampaignView& view) {
   return weights;
 }
 
+// The prior's range, or where the posterior is much narrower the part in which it lies.
+std::pair<double, double> ShownRange(const std::vector<double>& values,
+                                     const std::vector<double>& weights, double low, double high) {
+  constexpr double kTail = 0.002;
+  constexpr double kMargin = 0.2;  // of its width, on either side
+  constexpr double kNarrow = 0.3;  // of the prior's range
+  const double first = WeightedQuantile(values, weights, kTail);
+  const double last = WeightedQuantile(values, weights, 1 - kTail);
+  const double width = last - first;
+  if (!(width > 0) || width > kNarrow * (high - low)) return {low, high};
+  return {std::max(low, first - kMargin * width), std::min(high, last + kMargin * width)};
+}
+
 std::string Marginal(const ParameterPlot& parameter, const std::vector<double>& weights) {
   // Log parameters are counted in bins of equal ratio, so that a log-uniform prior is flat in the
   // picture.
@@ -74,12 +88,12 @@ std::string Marginal(const ParameterPlot& parameter, const std::vector<double>& 
     return parameter.log ? std::log(value) : value;
   };
   const auto back = [&parameter](double value) { return parameter.log ? std::exp(value) : value; };
-  const double low = coordinate(parameter.min);
-  const double high = coordinate(parameter.max);
   std::vector<double> values;
   for (const double value : parameter.draws.empty() ? parameter.samples : parameter.draws) {
     values.push_back(coordinate(value));
   }
+  const auto [low, high] =
+      ShownRange(values, weights, coordinate(parameter.min), coordinate(parameter.max));
   const std::vector<double> density = WeightedHistogram(values, weights, low, high, kBins);
   std::vector<double> edges;
   for (int i = 0; i <= kBins; ++i) edges.push_back(back(low + (high - low) * i / kBins));
@@ -96,7 +110,10 @@ std::string Marginal(const ParameterPlot& parameter, const std::vector<double>& 
   }
   double top = *std::max_element(density.begin(), density.end());
   for (const double h : prior_y) top = std::isfinite(h) ? std::max(top, h) : top;
-  Plot plot({.width = 330, .height = 190, .left = 14, .right = 14}, parameter.MakeAxis(5),
+  ParameterPlot shown = parameter;
+  shown.min = back(low);
+  shown.max = back(high);
+  Plot plot({.width = 330, .height = 190, .left = 14, .right = 14}, shown.MakeAxis(5),
             Axis("", 0, 1.06 * top, 3, Axis::Scale::kLinear, true));
   plot.HideLabels(false, true);
   plot.AddColumns(edges, density);
@@ -153,7 +170,8 @@ std::string PosteriorSection(const ReportData& data) {
   const bool drawn = posterior.draws_size() > 0;
   const bool emulated = posterior.posterior_from() == "emulator";
   std::string html = fmt::format(
-      "<h2>Posterior</h2>\n<p class=\"sub\">Columns: {} over the prior's range."
+      "<h2>Posterior</h2>\n<p class=\"sub\">Columns: {} over the prior's range, or the part of it "
+      "where a narrow posterior lies."
       "<span class=\"key\" style=\"color:var(--prior)\"></span>prior.</p>\n<div class=\"grid\">\n",
       emulated ? "draws from the posterior, sampled on an emulator of the runs,"
       : drawn  ? "draws from the posterior, one per chain,"

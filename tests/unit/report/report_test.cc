@@ -79,7 +79,7 @@ TEST(Report, ShowsHowThePosteriorJudgesItself) {
   view.posterior.clear_predictive_p();
   const std::string before = RenderReport(view);
   EXPECT_THAT(before, Not(HasSubstr("Fit and errors")));
-  EXPECT_THAT(before, Not(HasSubstr("halves apart")));
+  EXPECT_THAT(before, Not(HasSubstr("halves, sd")));
   view.posterior.set_predictive_p(0.034);
   view.posterior.mutable_parameters(1)->set_split_half(0.21);
   v1::Posterior::NoiseScale& scale = *view.posterior.add_noise_scale();
@@ -93,8 +93,8 @@ TEST(Report, ShowsHowThePosteriorJudgesItself) {
   EXPECT_THAT(html, HasSubstr("Of data sets drawn from the posterior 3.4"));
   EXPECT_THAT(html, HasSubstr("Errors of tx02.q_over_p, tx02.&lt;b&gt; are 1.4 times as large as "
                               "stated (5–95&#8201;%: 1.1 to 1.9)"));
-  EXPECT_THAT(html, HasSubstr("<th>halves apart</th>"));
-  EXPECT_THAT(html, HasSubstr("<td>0.21 sd</td>"));
+  EXPECT_THAT(html, HasSubstr("<th>halves, sd</th>"));
+  EXPECT_THAT(html, HasSubstr("<td>0.21</td>"));
   EXPECT_THAT(html, Not(HasSubstr("nan")));
 }
 
