@@ -122,15 +122,12 @@ std::string InWords(const PlannedExperiment& planned) {
   return text + (planned.unloading ? ", one unloading and reloading half-way" : "");
 }
 
-// That no effect of the group is the one that is missing.
+// And from a misfit that none of them makes.
 std::string AgainstNone(const PlannedExperiment& planned) {
   if (!planned.power_against_none) return "";
-  return Wrapped(
-      fmt::format("That it is none of these, but a misfit of the present size of unknown "
-                  "cause, would show with a power of {} ({} sd apart).",
-                  report::Percent(*planned.power_against_none, 3),
-                  Number(*planned.distance_from_none, 3)),
-      "", "");
+  return fmt::format(
+      ", and them from a misfit of unknown cause as large as the present one with {} ({} sd)",
+      report::Percent(*planned.power_against_none, 3), Number(*planned.distance_from_none, 3));
 }
 
 std::string NextText(const NextExperiment& next) {
@@ -138,14 +135,14 @@ std::string NextText(const NextExperiment& next) {
   for (const std::string& name : next.separates) names += (names.empty() ? "" : " and ") + name;
   std::string text =
       "\n" +
-      Wrapped(fmt::format("Next experiment: {}. It separates {} with a power of {} ({} sd apart); "
-                          "an evaluation "
-                          "costs "
-                          "about {} core seconds. For the campaign file:",
-                          InWords(next.best), names, report::Percent(next.best.expected_power, 3),
-                          Number(next.best.distance, 3), Number(next.core_seconds, 2)),
-              "", "") +
-      AgainstNone(next.best) + "\n" + next.snippet;
+      Wrapped(
+          fmt::format("Next experiment: {}. It separates {} with a power of {} ({} sd apart){}; "
+                      "an evaluation costs about {} core seconds. For the campaign file:",
+                      InWords(next.best), names, report::Percent(next.best.expected_power, 3),
+                      Number(next.best.distance, 3), AgainstNone(next.best),
+                      Number(next.core_seconds, 2)),
+          "", "") +
+      "\n" + next.snippet;
   if (next.considered.size() > 1) text += "\nAlso tried:\n";
   for (std::size_t k = 1; k < next.considered.size(); ++k) {
     text += fmt::format("  {}: {} sd apart\n", InWords(next.considered[k]),
