@@ -205,6 +205,7 @@ std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
 std::vector<std::size_t> EffectScreen::RunsOfEach(
     const std::vector<const dem::EffectInfo*>& effects) const {
   std::vector<bool> calculated;
+  calculated.reserve(effects.size());
   for (const dem::EffectInfo* effect : effects) calculated.push_back(IsCalculated(*effect));
   return SharesOfRuns(effects, calculated, base_.runs().sample.size(),
                       std::max(1, base_.fitted_experiments()), NumericalChanges().size());

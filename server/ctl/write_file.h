@@ -20,7 +20,7 @@ class OutputFile {
   /// PERMISSION_DENIED with the path and the reason.
   static absl::StatusOr<OutputFile> Open(const std::string& path);
   OutputFile(OutputFile&& other) noexcept
-      : path_(other.path_), part_(std::exchange(other.part_, "")) {}
+      : path_(std::move(other.path_)), part_(std::exchange(other.part_, "")) {}
   OutputFile& operator=(OutputFile&&) = delete;
   /// Without Put() the file stays as it was.
   ~OutputFile();

@@ -38,7 +38,7 @@ Eigen::MatrixXd AddScatter(const CampaignView& view, const std::vector<double>& 
   std::vector<Eigen::Index> kept;
   for (const std::size_t i : group.readings) kept.push_back(static_cast<Eigen::Index>(i));
   const double times = scatter.share + (view.posterior.posterior_from() == "none" ? 1 : 0);
-  const Eigen::MatrixXd of_run = inference::ScatterCovariance(scatter)(kept, kept);
+  Eigen::MatrixXd of_run = inference::ScatterCovariance(scatter)(kept, kept);
   const Eigen::MatrixXd covariance = times * of_run;
   const Eigen::VectorXd ratio = covariance.diagonal().cwiseQuotient(group.covariance.diagonal());
   group.scatter = std::sqrt(ratio.mean());
