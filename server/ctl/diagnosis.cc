@@ -496,7 +496,7 @@ class Inquiry {
     }
     NoneOfThese none{.base = BaseRival()};
     for (const auto& [observable, of] : squares) {
-      none.missed[observable] = std::sqrt(of.first / of.second);
+      none.missed[observable] = std::sqrt(std::max(0.0, of.first / of.second - 1));
     }
     return none;
   }

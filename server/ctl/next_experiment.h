@@ -35,7 +35,7 @@ double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatt
 /// "None of these": the campaign's own model with a smooth misfit as large as the one that is there.
 struct NoneOfThese {
   Rival base{};
-  /// By observable: rms of what it misses of the fitted readings, in units of their noise.
+  /// By observable: rms of what it misses of the fitted readings beyond their noise, in units of it.
   std::map<std::string, double> missed{};
 };
 
