@@ -21,7 +21,11 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
                                                               const Options& options) {
   EmulatedLikelihood likelihood;
   const PrincipalComponents& components = emulator.components();
+  const auto place = [&](Index t) {  // of a reading in what the emulator learned from
+    return options.reversed ? components.mean.size() - 1 - t : t;
+  };
   likelihood.mean_ = components.mean;
+  if (options.reversed) likelihood.mean_.reverseInPlace();
   likelihood.scatter_variance_ = options.scatter_share * emulator.scatter_sd().array().square();
   likelihood.correlation_factor_ = Eigen::LLT<Eigen::MatrixXd>(emulator.correlation()).matrixL();
 
@@ -38,12 +42,13 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
     Eigen::MatrixXd covariance = options.correlated_noise ? ErrorCorrelation(data, key, members)
                                                           : Eigen::MatrixXd::Identity(size, size);
     Eigen::MatrixXd basis(size, components.basis.cols());
+    form.log_constants.resize(size);
     for (Index i = 0; i < size; ++i) {
       const int t = members[static_cast<std::size_t>(i)];
-      covariance(i, i) += components.remainder[t];
-      basis.row(i) = components.basis.row(t);
-      form.log_normaliser -=
-          std::log(data.readings[static_cast<std::size_t>(t)].sd) + kLogSqrtTwoPi;
+      covariance(i, i) += components.remainder[place(t)];
+      basis.row(i) = components.basis.row(place(t));
+      form.log_constants[i] =
+          -std::log(data.readings[static_cast<std::size_t>(t)].sd) - kLogSqrtTwoPi;
     }
     const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
     if (factor.info() != Eigen::Success) {
@@ -51,28 +56,47 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
           absl::StrCat("readings of observable ", key.second, " of experiment ", key.first,
                        " lie too close for their correlation length: leave out some."));
     }
-    form.log_normaliser -= factor.matrixLLT().diagonal().array().log().sum();
+    form.log_constants.array() -= factor.matrixLLT().diagonal().array().log();
     form.whitening = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
     form.whitened_basis = form.whitening * basis;
-    form.gram = form.whitened_basis.transpose() * form.whitened_basis;
     form.readings.assign(members.begin(), members.end());
-    likelihood.Project(form, Eigen::VectorXd::Zero(components.mean.size()), form.projection,
-                       form.square);
+    form.residual = likelihood.Whiten(form, Eigen::VectorXd::Zero(components.mean.size()));
+    form.Sum();
     likelihood.forms_.push_back(std::move(form));
   }
   return likelihood;
 }
 
-void EmulatedLikelihood::Project(const Form& form, const Eigen::VectorXd& z,
-                                 Eigen::VectorXd& projection, double& square) const {
+void EmulatedLikelihood::Form::Sum() {
+  gram = whitened_basis.transpose() * whitened_basis;
+  log_normaliser = log_constants.sum();
+  projection = whitened_basis.transpose() * residual;
+  square = residual.squaredNorm();
+}
+
+// W is lower: what the first readings of a group are whitened by does not depend on the others.
+EmulatedLikelihood EmulatedLikelihood::First(Index readings) const {
+  EmulatedLikelihood first = *this;
+  for (Form& form : first.forms_) {
+    const auto end = std::lower_bound(form.readings.begin(), form.readings.end(), readings);
+    const Index kept = end - form.readings.begin();
+    form.readings.resize(static_cast<std::size_t>(kept));
+    form.whitening = form.whitening.topLeftCorner(kept, kept).eval();
+    form.whitened_basis.conservativeResize(kept, Eigen::NoChange);
+    form.log_constants.conservativeResize(kept);
+    form.residual.conservativeResize(kept);
+    form.Sum();
+  }
+  return first;
+}
+
+Eigen::VectorXd EmulatedLikelihood::Whiten(const Form& form, const Eigen::VectorXd& z) const {
   Eigen::VectorXd residual(static_cast<Index>(form.readings.size()));
   for (Index i = 0; i < residual.size(); ++i) {
     const Index t = form.readings[static_cast<std::size_t>(i)];
     residual[i] = z[t] - mean_[t];
   }
-  const Eigen::VectorXd whitened = form.whitening * residual;
-  projection = form.whitened_basis.transpose() * whitened;
-  square = whitened.squaredNorm();
+  return form.whitening * residual;
 }
 
 // What depends on the prediction: with G = (WB)^T WB, g = (WB)^T W r - G m, S = D chol(C), M = I +
@@ -141,14 +165,12 @@ double EmulatedLikelihood::LogDensity(const ScorePrediction& prediction, Index r
   const Index q = prediction.mean.cols();
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(q, q);
   Eigen::VectorXd projection = Eigen::VectorXd::Zero(q);
-  Eigen::VectorXd one;
   double sum = 0;
   for (const Form& form : forms_) {
-    double square = 0;
-    Project(form, z, one, square);
+    const Eigen::VectorXd residual = Whiten(form, z);
     gram += form.gram;
-    projection += one;
-    sum += form.log_normaliser - 0.5 * square;
+    projection += form.whitened_basis.transpose() * residual;
+    sum += form.log_normaliser - 0.5 * residual.squaredNorm();
   }
   return sum +
          Combine(prediction.mean.row(row), prediction.sd.row(row), gram, projection).LogDensity();

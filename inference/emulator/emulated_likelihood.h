@@ -22,6 +22,7 @@ class EmulatedLikelihood {
   struct Options {
     bool correlated_noise = true;  ///< use data.correlations
     double scatter_share = 1;
+    bool reversed = false;  ///< data are Reversed() ones of those the emulator learned from
   };
   /// in: data that ValidateData accepts for kGiven; emulator of the same T readings
   /// Keeps no reference. Errors: INVALID_ARGUMENT when correlated readings lie so close that their
@@ -29,6 +30,10 @@ class EmulatedLikelihood {
   static absl::StatusOr<EmulatedLikelihood> Create(const DataSet& data,
                                                    const StateEmulator& emulator,
                                                    const Options& options);
+
+  /// The likelihood of the first `readings` of the processing order alone, [0, T]; noise groups keep
+  /// their places.
+  EmulatedLikelihood First(Eigen::Index readings) const;
 
   /// Noise groups (NoiseGroupsOf), one variance factor each.
   int groups() const { return groups_; }
@@ -55,12 +60,16 @@ class EmulatedLikelihood {
     Eigen::MatrixXd whitening;       // W, lower
     Eigen::MatrixXd whitened_basis;  // W B
     Eigen::MatrixXd gram;            // B^T W^T W B
-    double log_normaliser = 0;       // - sum ln sd - ln det W^-1 - n/2 ln 2 pi
-    Eigen::VectorXd projection;  // (W B)^T W r, r the residual of the measured readings at m = 0
-    double square = 0;           // |W r|^2
+    Eigen::VectorXd log_constants;   // - ln sd - ln (W^-1)_kk - 1/2 ln 2 pi of each reading
+    double log_normaliser = 0;       // their sum
+    Eigen::VectorXd residual;        // W r, r the residual of the measured readings at m = 0
+    Eigen::VectorXd projection;      // (W B)^T W r
+    double square = 0;               // |W r|^2
+
+    void Sum();  // what is summed over readings, from what there is for each
   };
-  void Project(const Form& form, const Eigen::VectorXd& z, Eigen::VectorXd& projection,
-               double& square) const;
+  // W r at readings z.
+  Eigen::VectorXd Whiten(const Form& form, const Eigen::VectorXd& z) const;
   struct Combined {
     double quadratic = 0;  // of chi^2, beside |W r|^2
     double log_determinant = 0;

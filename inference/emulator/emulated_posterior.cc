@@ -4,7 +4,7 @@
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -12,9 +12,10 @@
 #include "absl/strings/str_format.h"
 #include "inference/data/gaussian_likelihood.h"
 #include "inference/emulator/emulated_likelihood.h"
+#include "inference/emulator/emulated_path.h"
+#include "inference/emulator/emulated_target.h"
 #include "inference/filter/parameter_summary.h"
 #include "inference/filter/weighted_moments.h"
-#include "inference/prior/standard_normal.h"
 #include "inference/sampling/philox.h"
 #include "inference/scatter/moved_draws.h"
 #include "inference/tmcmc/tmcmc.h"
@@ -23,15 +24,6 @@ namespace calib::inference {
 namespace {
 
 using Eigen::Index;
-
-Eigen::MatrixXd ToStandard(const JointPrior& priors, const Eigen::MatrixXd& parameters) {
-  Eigen::MatrixXd result(parameters.rows(), static_cast<Index>(priors.size()));
-  for (Index j = 0; j < result.cols(); ++j) {
-    const Prior& prior = priors[static_cast<std::size_t>(j)];
-    for (Index i = 0; i < result.rows(); ++i) result(i, j) = prior.ToStandard(parameters(i, j));
-  }
-  return result;
-}
 
 absl::StatusOr<Runs> CollectRuns(const JointPrior& priors, const DataSet& data,
                                  std::span<const Iteration> iterations) {
@@ -67,99 +59,6 @@ absl::StatusOr<Runs> CollectRuns(const JointPrior& priors, const DataSet& data,
   runs.histories.conservativeResize(used, t);
   return runs;
 }
-
-// An inverse gamma of shape and rate 1/2 is the law of 1 / z^2, z standard normal.
-bool IsDefault(const VarianceFactorPrior& prior) { return prior.shape == 0.5 && prior.rate == 0.5; }
-
-// f per noise group; the columns after the parameters hold z.
-Eigen::MatrixXd Factors(const std::vector<NoiseGroup>& groups, const Eigen::MatrixXd& points,
-                        Index d) {
-  Eigen::MatrixXd factors = points.rightCols(points.cols() - d);
-  for (Index g = 0; g < factors.cols(); ++g) {
-    const VarianceFactorPrior& prior = groups[static_cast<std::size_t>(g)].prior;
-    for (Index i = 0; i < factors.rows(); ++i) {
-      double& z = factors(i, g);
-      constexpr double kFarthest = 8;  // sd of z
-      const double u =
-          IsDefault(prior) ? 0 : std::exp(LogNormalCdf(std::clamp(z, -kFarthest, kFarthest)));
-      z = IsDefault(prior) ? 1 / std::max(z * z, 1e-12)
-                           : prior.rate / boost::math::gamma_q_inv(prior.shape, u);
-    }
-  }
-  return factors;
-}
-
-// The noise group of each reading; no entries without groups.
-std::vector<Index> GroupOfReadings(const std::vector<NoiseGroup>& groups, const DataSet& data) {
-  std::map<std::pair<int, int>, Index> of_curve;
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    for (const auto& member : groups[g].members) of_curve[member] = static_cast<Index>(g);
-  }
-  std::vector<Index> group;
-  if (groups.empty()) return group;
-  for (const Reading& reading : data.readings) {
-    group.push_back(of_curve.at({reading.experiment, reading.observable}));
-  }
-  return group;
-}
-
-// What the emulator does not know of the mean history at each point, the sum over readings of its
-// variance in units of the noise there: q variances of scores in each row of sd, and factors of the
-// noise variance (none: as stated).
-class Ignorance {
- public:
-  Ignorance(const PrincipalComponents& components, const std::vector<Index>& group)
-      : shares_(Eigen::MatrixXd::Zero(1, components.basis.cols())) {
-    for (const Index g : group) {
-      if (g >= shares_.rows()) {
-        shares_.conservativeResizeLike(Eigen::MatrixXd::Zero(g + 1, shares_.cols()));
-      }
-    }
-    for (Index k = 0; k < components.basis.rows(); ++k) {
-      const Index g = group.empty() ? 0 : group[static_cast<std::size_t>(k)];
-      shares_.row(g) += components.basis.row(k).cwiseAbs2();
-    }
-  }
-
-  Eigen::VectorXd operator()(const Eigen::MatrixXd& sd, const Eigen::MatrixXd& factors) const {
-    const Eigen::MatrixXd by_group = sd.cwiseAbs2() * shares_.transpose();
-    return factors.cols() == 0 ? Eigen::VectorXd(by_group.rowwise().sum())
-                               : Eigen::VectorXd(by_group.cwiseQuotient(factors).rowwise().sum());
-  }
-
- private:
-  Eigen::MatrixXd shares_;  // groups x q: squares of the basis, summed over the group's readings
-};
-
-// The columns that are sampled, and the held values in their places.
-struct Held {
-  std::vector<Index> free;
-  Eigen::RowVectorXd values;  // d, those of the free ones overwritten
-
-  Held(const JointPrior& priors, std::span<const Iteration> iterations)
-      : values(Eigen::RowVectorXd::Zero(static_cast<Index>(priors.size()))) {
-    const auto& frozen = iterations.empty() ? std::vector<std::optional<double>>{}
-                                            : iterations.back().proposal.frozen;
-    for (std::size_t j = 0; j < priors.size(); ++j) {
-      const auto column = static_cast<Index>(j);
-      if (frozen.empty() || !frozen[j]) {
-        free.push_back(column);
-      } else {
-        values[column] = *frozen[j];
-      }
-    }
-  }
-  bool any() const { return static_cast<Index>(free.size()) < values.size(); }
-  bool holds(Index j) const { return std::find(free.begin(), free.end(), j) == free.end(); }
-  // points: columns of the free parameters first.
-  Eigen::MatrixXd Complete(const Eigen::MatrixXd& points) const {
-    if (!any()) return points.leftCols(values.size());
-    Eigen::MatrixXd all = values.replicate(points.rows(), 1);
-    for (std::size_t k = 0; k < free.size(); ++k)
-      all.col(free[k]) = points.col(static_cast<Index>(k));
-    return all;
-  }
-};
 
 // Histories of the model at the draws: the mean history and what is not known of it.
 void AddPredictive(const DataSet& data, const StateEmulator& emulator,
@@ -218,14 +117,14 @@ void AddScatter(const DataSet& data, const StateEmulator& emulator, EmulatedResu
 // Draws of the posterior under errors whose scatter is that of refits [refit_spread.h]. prediction:
 // at the draws.
 void Widen(const JointPrior& priors, const DataSet& data, const EmulatorOptions& options,
-           const StateEmulator& emulator, const ScorePrediction& prediction, const Held& held,
-           EmulatedResult& result) {
+           const StateEmulator& emulator, const ScorePrediction& prediction,
+           const std::vector<Index>& free, EmulatedResult& result) {
   Eigen::VectorXd sd(static_cast<Index>(data.readings.size()));
   for (Index k = 0; k < sd.size(); ++k) sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
   const Eigen::MatrixXd histories =
       prediction.mean * emulator.components().basis.transpose() * sd.asDiagonal();
-  MovedDraws moved = MoveByRefits(priors, data, *options.replicates, result.draws, histories,
-                                  held.free, options.seed);
+  MovedDraws moved =
+      MoveByRefits(priors, data, *options.replicates, result.draws, histories, free, options.seed);
   result.draws = std::move(moved.draws);
   result.widened = moved.widened;
 }
@@ -258,6 +157,28 @@ void StateErrors(const TrainedEmulator& trained, const Eigen::VectorXd& variance
   result.runs = trained.runs;
   result.components = static_cast<int>(trained.emulator.components().basis.cols());
   result.local = trained.local;
+}
+
+absl::Status AddPaths(const EmulatedTarget& target, const EmulatedLikelihood& likelihood,
+                      const DataSet& data, const StateEmulator& emulator,
+                      const EmulatorOptions& options, const std::stop_token& stop,
+                      EmulatedResult& result) {
+  const EmulatedPathOptions path{.draws = options.path_draws,
+                                 .target_cv = options.target_cv,
+                                 .steps = options.steps,
+                                 .seed = options.seed};
+  auto forward = EmulatedPath(target, likelihood, data, path, stop);
+  if (!forward.ok()) return forward.status();
+  result.path = *std::move(forward);
+  if (!options.reversed_path) return absl::OkStatus();
+  const DataSet reversed = Reversed(data);
+  const auto of_reversed = EmulatedLikelihood::Create(
+      reversed, emulator, {.scatter_share = options.training.scatter_share, .reversed = true});
+  if (!of_reversed.ok()) return of_reversed.status();
+  auto backward = EmulatedPath(target, *of_reversed, reversed, path, stop);
+  if (!backward.ok()) return backward.status();
+  result.reversed_path = *std::move(backward);
+  return absl::OkStatus();
 }
 
 // Of no use anywhere: not one prior draw lies where the emulator knows the model's history.
@@ -333,6 +254,9 @@ absl::Status EmulatorOptions::Validate() const {
   }
   if (draws < 100 || draws > 100000) return wrong("draws", draws, "100 to 1e5");
   if (!(target_cv > 0 && target_cv <= 2)) return wrong("target_cv", target_cv, "above 0 up to 2");
+  if (path_draws != 0 && (path_draws < 100 || path_draws > 100000)) {
+    return wrong("path_draws", path_draws, "0 (no path) or 100 to 1e5");
+  }
   if (steps < 1) return wrong("steps", steps, "1 or more");
   if (!(max_error > 0)) return wrong("max_error", max_error, "above 0");
   if (!(max_uncovered > 0)) return wrong("max_uncovered", max_uncovered, "above 0");
@@ -358,42 +282,22 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
 
   const auto d = static_cast<Index>(priors.size());
   int known = 0;  // points sampled where the emulator knows the model's history
-  const Held held(priors, iterations);
-  const auto free = static_cast<Index>(held.free.size());
-  JointPrior sampled = held.any() ? priors.Of(held.free) : priors;
-  std::vector<NoiseGroup> groups;
-  if (options.noise == NoiseMode::kInferred) {
-    groups = NoiseGroupsOf(data);
-    std::vector<Prior> scales;
-    for (const NoiseGroup& group : groups) {
-      Prior& z = scales.emplace_back(Prior{.kind = PriorKind::kNormal, .mean = 0, .sd = 1});
-      if (IsDefault(group.prior)) z.min = 0;
-    }
-    sampled = sampled.With(scales);
-  }
-  const std::vector<Index> group = GroupOfReadings(groups, data);
-  const Ignorance ignorance(trained->emulator.components(), group);
+  const EmulatedTarget target(priors, data, options.noise, options.max_error, trained->emulator,
+                              iterations);
   const TmcmcOptions sampler{.samples = options.draws,
                              .target_cv = options.target_cv,
                              .steps = options.steps,
                              .seed = options.seed};
   const auto state = RunTmcmc(
-      sampled, sampler,
+      target.prior(), sampler,
       [&](const Eigen::MatrixXd& points) {
-        const ScorePrediction prediction =
-            trained->emulator.Predict(ToStandard(priors, held.Complete(points)));
-        const Eigen::MatrixXd factors = Factors(groups, points, free);
-        Eigen::VectorXd values = likelihood->LogLikelihood(prediction, factors);
-        const Eigen::VectorXd unknown = ignorance(prediction.sd, factors);
-        // Where no run has been, nothing can be said: a model that fits nowhere would otherwise
-        // prefer the corner of which the emulator knows least.
-        const double most =
-            options.max_error * options.max_error * static_cast<double>(data.readings.size());
+        const EmulatedPoints at = target.At(points);
+        Eigen::VectorXd values = likelihood->LogLikelihood(at.prediction, at.factors);
         for (Index i = 0; i < values.size(); ++i) {
-          if (unknown[i] > most) {
-            values[i] = -std::numeric_limits<double>::infinity();
-          } else {
+          if (target.IsKnown(at.unknown[i])) {
             ++known;
+          } else {
+            values[i] = -std::numeric_limits<double>::infinity();
           }
         }
         return values;
@@ -406,17 +310,18 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   if (!state.ok()) return state.status();
 
   EmulatedResult result;
-  result.draws = held.Complete(state->samples);
+  result.draws = target.Complete(state->samples);
   result.log_evidence = state->log_evidence;
   result.log_evidence_se = state->LogEvidenceStandardError();
-  ScorePrediction prediction = trained->emulator.Predict(ToStandard(priors, result.draws));
-  const double unknown = ignorance(prediction.sd, Factors(groups, state->samples, free)).sum();
+  ScorePrediction prediction = target.Predict(result.draws);
+  const Eigen::MatrixXd factors = target.Factors(state->samples);
+  const double unknown = target.Unknown(prediction.sd, factors).sum();
   if (options.noise == NoiseMode::kGiven) {
     result.predictive_p = PredictiveP(*likelihood, prediction, data.readings.size());
   }
   if (options.replicates && options.noise == NoiseMode::kGiven) {
-    Widen(priors, data, options, trained->emulator, prediction, held, result);
-    prediction = trained->emulator.Predict(ToStandard(priors, result.draws));
+    Widen(priors, data, options, trained->emulator, prediction, target.free(), result);
+    prediction = target.Predict(result.draws);
   }
   const Index n = result.draws.rows();
   const Eigen::VectorXd log_weights =
@@ -424,9 +329,10 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   for (Index j = 0; j < d; ++j) {
     result.parameters.push_back(
         Summarize(priors[static_cast<std::size_t>(j)], log_weights, result.draws.col(j)));
-    if (!held.holds(j)) continue;
+    const std::optional<double> held = target.Held(j);
+    if (!held) continue;
     ParameterSummary& fixed = result.parameters.back();
-    fixed.mean = held.values[j];
+    fixed.mean = *held;
     fixed.sd = fixed.cov = fixed.q05 = fixed.q50 = fixed.q95 =
         std::numeric_limits<double>::quiet_NaN();
     fixed.at_bound = false;
@@ -435,7 +341,6 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
       WeightedCovariance(log_weights, result.draws, WeightedMean(log_weights, result.draws)));
   Eigen::VectorXd variance = Eigen::VectorXd::Ones(static_cast<Index>(data.readings.size()));
   if (options.noise == NoiseMode::kInferred) {
-    const Eigen::MatrixXd factors = Factors(groups, state->samples, free);
     result.variance_factors.resize(factors.cols());
     result.noise_scale.resize(factors.cols(), 3);
     for (Index g = 0; g < factors.cols(); ++g) {
@@ -446,8 +351,8 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
             std::sqrt(WeightedQuantile(log_weights, factors.col(g), kQuantiles[k]));
       }
     }
-    for (std::size_t k = 0; k < group.size(); ++k) {
-      variance[static_cast<Index>(k)] = result.variance_factors[group[k]];
+    for (std::size_t k = 0; k < target.group().size(); ++k) {
+      variance[static_cast<Index>(k)] = result.variance_factors[target.group()[k]];
     }
   }
   StateErrors(*trained, variance, result);
@@ -456,6 +361,12 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   AddScatter(data, trained->emulator, result);
   AddPredictive(data, trained->emulator, prediction, options.seed, result);
   Judge(options, result);
+  if (options.path_draws > 0 && result.adequate) {
+    if (auto along = AddPaths(target, *likelihood, data, trained->emulator, options, stop, result);
+        !along.ok()) {
+      return along;
+    }
+  }
   return result;
 }
 

@@ -39,6 +39,9 @@ struct EmulatorOptions {
   double max_unknown = 1;      ///< > 0
   /// The posterior is widened until it covers refits of these, where there are any (kGiven).
   std::optional<Replicates> replicates = {};
+  /// Draws carried along the readings for EmulatedResult::path, 0: no path; and for reversed_path.
+  int path_draws = 0;  ///< 0 or [100, 1e5]
+  bool reversed_path = false;
   std::uint64_t seed = 0;
   absl::Status Validate() const;
 };
@@ -82,6 +85,10 @@ struct EmulatedResult {
   /// scatter_factor scatter_factor^T + diag(scatter_white).
   Eigen::MatrixXd scatter_factor;  ///< T x q
   Eigen::VectorXd scatter_white;   ///< T
+
+  /// The posterior along the readings, forward and from the last to the first (emulated_path.h);
+  /// empty: not asked for, or not adequate.
+  PosteriorPath path, reversed_path;
 
   int runs = 0;  ///< the emulator learned from
   int components = 0;

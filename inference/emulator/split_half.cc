@@ -46,6 +46,7 @@ SplitHalf SplitHalfOfEmulator(const JointPrior& priors, const DataSet& data,
   EmulatorOptions of_half = options;
   of_half.draws = kDraws;
   of_half.replicates.reset();  // they move draws, not means
+  of_half.path_draws = 0;
   Eigen::MatrixXd means(2, d);
   double log_evidence[2];
   for (int which = 0; which < 2; ++which) {

@@ -27,6 +27,7 @@ enum class StreamPurpose : std::uint64_t {
   kAudit = 26,
   kDesignOrder = 27,
   kHalves = 28,
+  kEmulatedPath = 29,
 };
 
 /// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,

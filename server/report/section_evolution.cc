@@ -141,7 +141,10 @@ std::string EvolutionSection(const ReportData& data) {
         "taken in one load step after the "
         "other: a parameter that keeps drifting is asked to play different roles in different "
         "stages.";
-    if (view.posterior.posterior_from() != "weights") {
+    const bool emulated = view.posterior.posterior_from() == "emulator";
+    if (emulated) {
+      html += " On the emulator, like the posterior that it ends in.";
+    } else if (view.posterior.posterior_from() != "weights") {
       html +=
           " By the weighted samples alone, few of which count at the end: look at the effective "
           "sample size beside.";
@@ -150,7 +153,8 @@ std::string EvolutionSection(const ReportData& data) {
     for (int k = 0; k < view.posterior.parameters_size(); ++k) {
       html += AlongPath(view, view.posterior.path(), "load steps taken in", k);
     }
-    html += EssAlongPath(view) + "</div>\n";
+    if (!emulated) html += EssAlongPath(view);  // the emulator's draws are renewed on the way
+    html += "</div>\n";
   }
   if (view.posterior.reversed_path_size() > 1) {
     html +=

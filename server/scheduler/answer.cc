@@ -15,6 +15,9 @@ namespace {
 /// Of a factor on intervals.
 constexpr double kWorthSaying = 1.1;
 
+/// Carried along the readings: means to about 0.07 sd.
+constexpr int kPathDraws = 400;
+
 constexpr const char* kNothingGiven =
     "No standard deviations, quantiles or held-out judgement are given. ";
 
@@ -58,6 +61,8 @@ void AskEmulator(const Definition& definition, std::span<const inference::Iterat
   options.training.scatter_share =
       definition.mean_data ? 0 : LargestScatterShare(definition.campaign);
   options.replicates = definition.replicates;
+  options.path_draws = kPathDraws;
+  options.reversed_path = filter.reversed_path;
   const inference::DataSet& data = definition.mean_data ? *definition.mean_data : definition.data;
   auto emulated = inference::EmulatedPosterior(definition.priors, data, options, iterations);
   if (emulated.ok()) {

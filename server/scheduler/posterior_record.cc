@@ -223,8 +223,9 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
     AddEmulator(definition, *answer.emulated, message);
   }
   AddScatter(definition, answer, message);
-  AddPath(definition, posterior.path, *message.mutable_path());
-  AddPath(definition, posterior.reversed_path, *message.mutable_reversed_path());
+  AddPath(definition, emulated ? answer.emulated->path : posterior.path, *message.mutable_path());
+  AddPath(definition, emulated ? answer.emulated->reversed_path : posterior.reversed_path,
+          *message.mutable_reversed_path());
   AddNoiseScale(definition, emulated ? answer.emulated->noise_scale : posterior.noise_scale,
                 message);
   const std::optional<double>& predictive_p =

@@ -65,6 +65,60 @@ TEST(EmulatedPosterior, AgreesWithTheConjugatePosterior) {
   }
 }
 
+// The path against the conjugate posterior of the first readings alone, from the first to the last
+// and the other way, its evidence too; the last row is the posterior.
+TEST(EmulatedPosterior, PathAgreesWithTheConjugatePosteriorOfEveryStep) {
+  constexpr int kReadings = 30;
+  for (const int d : {2, 5}) {
+    const LinearModel model(kReadings, d, 0.2, 77);
+    const Iteration runs = PriorRuns(model, 60);
+    constexpr int kDraws = 1600;
+    const auto result =
+        EmulatedPosterior(model.priors, model.Data(),
+                          {.path_draws = kDraws, .reversed_path = true, .seed = 1}, {&runs, 1});
+    ASSERT_TRUE(result.ok()) << result.status();
+    ASSERT_TRUE(result->adequate) << result->reason;
+    for (const bool reversed : {false, true}) {
+      const PosteriorPath& path = reversed ? result->reversed_path : result->path;
+      ASSERT_EQ(path.mean.rows(), kReadings);
+      double square = 0;        // of the mean's errors over its sd
+      double square_of_sd = 0;  // of ln(sd / exact)
+      double worst_evidence = 0;
+      for (int n = 1; n <= kReadings; ++n) {
+        LinearModel part = model;
+        const auto rows = [&](const Eigen::MatrixXd& all) {
+          return Eigen::MatrixXd(reversed ? all.bottomRows(n) : all.topRows(n));
+        };
+        part.design = rows(model.design);
+        part.values = rows(model.values);
+        part.sd = rows(model.sd);
+        EXPECT_EQ(path.load_step[static_cast<std::size_t>(n) - 1],
+                  reversed ? kReadings - n : n - 1);
+        const Eigen::VectorXd mean = part.PosteriorMean();
+        const Eigen::MatrixXd covariance = part.PosteriorCovariance();
+        for (int j = 0; j < d; ++j) {
+          const double sd = std::sqrt(covariance(j, j));
+          const double found = std::abs(path.mean(n - 1, j)) * path.cov(n - 1, j);
+          square += std::pow((path.mean(n - 1, j) - mean[j]) / sd, 2) / (kReadings * d);
+          square_of_sd += std::pow(std::log(found / sd), 2) / (kReadings * d);
+        }
+        worst_evidence =
+            std::max(worst_evidence, std::abs(path.log_evidence[n - 1] - part.LogEvidence()));
+      }
+      std::cout << "d = " << d << (reversed ? ", reversed" : ", forward") << ": rms of the means "
+                << std::sqrt(square) << " sd, of ln sd " << std::sqrt(square_of_sd)
+                << ", log evidence off by at most " << worst_evidence << '\n';
+      EXPECT_LT(std::sqrt(square), 2 / std::sqrt(kDraws));
+      EXPECT_LT(std::sqrt(square_of_sd), 2 / std::sqrt(kDraws));
+      EXPECT_LT(worst_evidence, 0.5);
+      for (int j = 0; j < d; ++j) {
+        const ParameterSummary& whole = result->parameters[static_cast<std::size_t>(j)];
+        EXPECT_NEAR(path.mean(kReadings - 1, j), whole.mean, 6 / std::sqrt(kDraws) * whole.sd);
+      }
+    }
+  }
+}
+
 // The stated noise is wrong by a factor of three: the inferred factor is about nine and widens the
 // posterior.
 TEST(EmulatedPosterior, InfersTheNoise) {
