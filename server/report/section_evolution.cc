@@ -49,6 +49,24 @@ std::string OverIterations(const CampaignView& view, int k) {
          "</figure>\n";
 }
 
+// The first steps are as wide as the prior: the axis covers the band from a fifth of the path on with
+// a quarter of its height beyond, and what lies beyond is drawn at its edge. The range of the axis.
+std::vector<double> ShowLaterSteps(std::vector<double>& mean, std::vector<double>& low,
+                                   std::vector<double>& high) {
+  std::vector<double> shown = low;
+  shown.insert(shown.end(), high.begin(), high.end());
+  if (mean.empty()) return shown;
+  const auto from = static_cast<std::ptrdiff_t>(mean.size() / 5);
+  const double bottom = *std::min_element(low.begin() + from, low.end());
+  const double top = *std::max_element(high.begin() + from, high.end());
+  const double margin = 0.25 * (top - bottom);
+  if (!std::isfinite(margin)) return shown;
+  for (std::vector<double>* values : {&mean, &low, &high}) {
+    for (double& value : *values) value = std::clamp(value, bottom - margin, top + margin);
+  }
+  return {bottom - margin, top + margin};
+}
+
 // Mean +- sd of one parameter while the readings are taken in one after the other.
 using Path = google::protobuf::RepeatedPtrField<v1::Posterior::PathPoint>;
 
@@ -66,8 +84,7 @@ std::string AlongPath(const CampaignView& view, const Path& path, const std::str
     high.push_back((point.mean(k) + sd) * unit.factor);
   }
   const std::vector<double> x = Counting(mean.size());
-  std::vector<double> shown = low;
-  shown.insert(shown.end(), high.begin(), high.end());
+  const std::vector<double> shown = ShowLaterSteps(mean, low, high);
   Plot plot({.width = 330, .height = 200},
             Axis(axis, 0, static_cast<double>(x.size()), 5, Axis::Scale::kLinear, true),
             Axis::Covering(LabelWithUnit(parameter.name(), unit), shown, 4));
@@ -140,7 +157,9 @@ std::string EvolutionSection(const ReportData& data) {
         "<h3>Along the loading path</h3>\n<p class=\"sub\">What the readings say when they are "
         "taken in one load step after the "
         "other: a parameter that keeps drifting is asked to play different roles in different "
-        "stages.";
+        "stages. The band is one standard deviation to either side; the first steps may reach "
+        "beyond "
+        "the plot, they are cut at its edge.";
     const bool emulated = view.posterior.posterior_from() == "emulator";
     if (emulated) {
       html += " On the emulator, like the posterior that it ends in.";
