@@ -44,35 +44,27 @@ struct Cloud {
     before[i] = from.before[j];
     next[i] = from.next[j];
   }
+
+  // Keeps the first rows.
+  void Shrink(Index rows) {
+    const auto keep = [rows](auto& values) { values.conservativeResize(rows, Eigen::NoChange); };
+    keep(samples);
+    keep(at.prediction.mean);
+    keep(at.prediction.sd);
+    keep(at.factors);
+    for (Eigen::VectorXd* values : {&at.unknown, &log_prior, &before, &next}) {
+      values->conservativeResize(rows);
+    }
+  }
 };
 
 class PathSampler {
  public:
   PathSampler(const EmulatedTarget& target, const EmulatedPathOptions& options)
-      : target_(target),
-        options_(options),
-        first_scale_(2.38 / std::sqrt(static_cast<double>(target.prior().size()))),
-        scale_(first_scale_) {
-    const auto d = static_cast<Index>(target.prior().size());
-    Eigen::MatrixXd samples(options.draws, d);
-    for (Index i = 0; i < samples.rows(); ++i) {
-      PhiloxStream stream = Stream(i);
-      samples.row(i) = target.prior().Draw(stream);
-    }
-    ++move_;
-    cloud_ = Place(samples);
-    cloud_.before = cloud_.next = Eigen::VectorXd::Zero(samples.rows());
-    cloud_.log_weights.setZero(samples.rows());
-    for (Index i = 0; i < samples.rows(); ++i) {
-      if (!target.IsKnown(cloud_.at.unknown[i])) cloud_.log_weights[i] = kNever;
-    }
-    known_ = (cloud_.log_weights.array() == 0).count();
-    log_evidence_ =
-        std::log(static_cast<double>(known_)) - std::log(static_cast<double>(samples.rows()));
-    cloud_.log_weights = NormalizedLogWeights(cloud_.log_weights);
+      : target_(target), options_(options), scale_(FirstScale(target.prior().size())) {
+    DrawKnown();
   }
 
-  Index known() const { return known_; }
   double log_evidence() const { return log_evidence_; }
   const Cloud& cloud() const { return cloud_; }
 
@@ -119,6 +111,36 @@ class PathSampler {
     return cloud;
   }
 
+  // Draws of the prior where the emulator knows the model, as many as are wanted or as a bounded
+  // number of tries gives; the share of the prior that is known begins the evidence.
+  void DrawKnown() {
+    constexpr int kMostBatches = 50;
+    const Index wanted = options_.draws;
+    Index taken = 0;
+    Index known = 0;
+    Index drawn = 0;
+    for (int batch = 0; batch < kMostBatches && taken < wanted; ++batch) {
+      Eigen::MatrixXd samples(wanted, static_cast<Index>(target_.prior().size()));
+      for (Index i = 0; i < wanted; ++i) {
+        PhiloxStream stream = Stream(i);
+        samples.row(i) = target_.prior().Draw(stream);
+      }
+      ++move_;
+      drawn += wanted;
+      Cloud from = Place(samples);
+      from.before = from.next = Eigen::VectorXd::Zero(wanted);
+      if (batch == 0) cloud_ = from;
+      for (Index i = 0; i < wanted; ++i) {
+        if (!target_.IsKnown(from.at.unknown[i])) continue;
+        ++known;
+        if (taken < wanted) cloud_.TakeRow(taken++, from, i);
+      }
+    }
+    cloud_.Shrink(taken);
+    cloud_.log_weights = Eigen::VectorXd::Constant(taken, -std::log(static_cast<double>(taken)));
+    log_evidence_ = std::log(static_cast<double>(known)) - std::log(static_cast<double>(drawn));
+  }
+
   // Systematic: one uniform number for all, weights summing to one.
   void Resample(const Eigen::VectorXd& weights) {
     const Cloud from = cloud_;
@@ -146,11 +168,7 @@ class PathSampler {
       PhiloxStream stream = Stream(i);
       for (double& z : normal) z = stream.Normal();
       const Eigen::VectorXd jump = scale_ * (factor * normal);
-      for (Index j = 0; j < proposals.cols(); ++j) {
-        const Prior& marginal = prior[static_cast<std::size_t>(j)];
-        proposals(i, j) =
-            marginal.FromStandard(marginal.ToStandard(cloud_.samples(i, j)) + jump[j]);
-      }
+      proposals.row(i) = prior.FromStandard(prior.ToStandard(cloud_.samples.row(i)) + jump);
       log_u[i] = std::log(stream.Uniform());
       // Outside the support: stays where it is, and nothing is asked of the emulator out there.
       if (prior.LogStandardDensity(proposals.row(i)) == kNever) {
@@ -172,19 +190,15 @@ class PathSampler {
       cloud_.TakeRow(i, proposed, i);
       ++accepted;
     }
-    constexpr double kGain = 2;
     constexpr double kWanted = 0.3;
-    scale_ = std::clamp(scale_ * std::exp(kGain * (accepted / static_cast<double>(n) - kWanted)),
-                        1e-3 * first_scale_, 2 * first_scale_);
+    scale_ = NextScale(scale_, prior.size(), accepted / static_cast<double>(n), kWanted);
   }
 
   const EmulatedTarget& target_;
   const EmulatedPathOptions& options_;
-  double first_scale_;  // [Roberts et al. 1997]
   double scale_;
   std::uint64_t move_ = 0;
   Cloud cloud_;
-  Index known_ = 0;
   double log_evidence_ = 0;
 };
 
@@ -195,9 +209,10 @@ absl::StatusOr<PosteriorPath> EmulatedPath(const EmulatedTarget& target,
                                            const DataSet& data, const EmulatedPathOptions& options,
                                            const std::stop_token& stop) {
   PathSampler sampler(target, options);
-  if (sampler.known() < 2) {
+  constexpr Index kFewest = 50;
+  if (sampler.cloud().size() < kFewest) {
     return absl::FailedPreconditionError(
-        "Nowhere in the prior does the emulator know the mean history of the model.");
+        "Almost nowhere in the prior does the emulator know the mean history of the model.");
   }
   const StepOffsets steps = LoadSteps(data);
   PosteriorPath path;

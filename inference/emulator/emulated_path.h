@@ -29,8 +29,8 @@ struct EmulatedPathOptions {
 /// up to here), of the same prior as EmulatedResult::log_evidence.
 /// in: likelihood of `data`, in whose order the readings are taken in. Deterministic in
 /// options.seed.
-/// Errors: FAILED_PRECONDITION where fewer than two draws of the prior lie where the emulator knows
-/// the model; CANCELLED.
+/// Errors: FAILED_PRECONDITION where fewer than 50 of 50 options.draws draws of the prior lie where
+/// the emulator knows the model; CANCELLED.
 absl::StatusOr<PosteriorPath> EmulatedPath(const EmulatedTarget& target,
                                            const EmulatedLikelihood& likelihood,
                                            const DataSet& data, const EmulatedPathOptions& options,

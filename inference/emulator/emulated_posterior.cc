@@ -159,6 +159,7 @@ void StateErrors(const TrainedEmulator& trained, const Eigen::VectorXd& variance
   result.local = trained.local;
 }
 
+// A path that cannot be had leaves the posterior as it is.
 absl::Status AddPaths(const EmulatedTarget& target, const EmulatedLikelihood& likelihood,
                       const DataSet& data, const StateEmulator& emulator,
                       const EmulatorOptions& options, const std::stop_token& stop,
@@ -168,6 +169,7 @@ absl::Status AddPaths(const EmulatedTarget& target, const EmulatedLikelihood& li
                                  .steps = options.steps,
                                  .seed = options.seed};
   auto forward = EmulatedPath(target, likelihood, data, path, stop);
+  if (absl::IsFailedPrecondition(forward.status())) return absl::OkStatus();
   if (!forward.ok()) return forward.status();
   result.path = *std::move(forward);
   if (!options.reversed_path) return absl::OkStatus();

@@ -87,7 +87,7 @@ struct EmulatedResult {
   Eigen::VectorXd scatter_white;   ///< T
 
   /// The posterior along the readings, forward and from the last to the first (emulated_path.h);
-  /// empty: not asked for, or not adequate.
+  /// empty: not asked for, not adequate, or the emulator knows too little of the prior to begin.
   PosteriorPath path, reversed_path;
 
   int runs = 0;  ///< the emulator learned from

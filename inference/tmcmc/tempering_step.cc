@@ -77,4 +77,12 @@ Eigen::MatrixXd WeightedCovarianceFactor(const Eigen::MatrixXd& rows,
   return factor.matrixL();
 }
 
+double FirstScale(std::size_t d) { return 2.38 / std::sqrt(static_cast<double>(d)); }
+
+double NextScale(double scale, std::size_t d, double accepted, double wanted) {
+  constexpr double kGain = 2;
+  const double first = FirstScale(d);
+  return std::clamp(scale * std::exp(kGain * (accepted - wanted)), 1e-3 * first, 2 * first);
+}
+
 }  // namespace calib::inference

@@ -1,8 +1,9 @@
 #pragma once
-// The two numerical choices of a tempering stage: how far the exponent goes, and the shape of the
+// The numerical choices of a tempering stage: how far the exponent goes, and shape and scale of the
 // proposal.
 
 #include <Eigen/Dense>
+#include <cstddef>
 
 namespace calib::inference {
 
@@ -26,5 +27,13 @@ TemperingStep NextExponent(const Eigen::VectorXd& log_likelihood, double exponen
 /// move.
 Eigen::MatrixXd WeightedCovarianceFactor(const Eigen::MatrixXd& rows,
                                          const Eigen::VectorXd& weights);
+
+/// Of the factor of the proposal's covariance, 2.38 / sqrt(d) [Roberts et al. 1997].
+double FirstScale(std::size_t d);
+
+/// Steers the scale to the acceptance wanted, within [1e-3, 2] of the first. What a step did to all
+/// N samples is known only after it, so the next step's proposal does not depend on the sample it
+/// moves, up to 1/N. accepted: share of the samples, [0, 1].
+double NextScale(double scale, std::size_t d, double accepted, double wanted);
 
 }  // namespace calib::inference

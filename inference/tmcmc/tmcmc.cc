@@ -64,17 +64,6 @@ void Accept(const JointPrior& priors, const Eigen::VectorXd& log_likelihood, Tmc
   ++state.step;
 }
 
-// Steers the scale to the acceptance wanted. What a step did to all N samples is known only after
-// it, so the next step's proposal does not depend on the sample it moves, up to 1/N.
-void AdaptScale(const TmcmcOptions& options, int accepted, TmcmcState& state) {
-  const auto n = static_cast<double>(state.samples.rows());
-  const double first =
-      2.38 / std::sqrt(static_cast<double>(state.samples.cols()));  // [Roberts et al. 1997]
-  constexpr double kGain = 2;
-  state.scale = std::clamp(state.scale * std::exp(kGain * (accepted / n - options.acceptance)),
-                           1e-3 * first, 2 * first);
-}
-
 // Likelihood of the proposals inside the prior's support, -inf for the others.
 Eigen::VectorXd EvaluateInSupport(const TmcmcState& state,
                                   const BatchLogLikelihood& log_likelihood) {
@@ -179,7 +168,7 @@ absl::StatusOr<TmcmcState> StartTmcmc(const JointPrior& priors, const TmcmcOptio
     state.proposals.row(i) = priors.Draw(stream);
   }
   state.accept_above = Eigen::VectorXd::Constant(options.samples, -kInfinity);
-  state.scale = 2.38 / std::sqrt(static_cast<double>(priors.size()));
+  state.scale = FirstScale(priors.size());
   return state;
 }
 
@@ -218,7 +207,8 @@ absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
   } else {
     const int before = next.accepted;
     Accept(priors, finite, next);
-    AdaptScale(options, next.accepted - before, next);
+    next.scale = NextScale(next.scale, priors.size(),
+                           (next.accepted - before) / static_cast<double>(n), options.acceptance);
   }
   next.evaluated += n;
   const int steps = StepsPerStage(options, priors.size());
