@@ -42,13 +42,12 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
     Eigen::MatrixXd covariance = options.correlated_noise ? ErrorCorrelation(data, key, members)
                                                           : Eigen::MatrixXd::Identity(size, size);
     Eigen::MatrixXd basis(size, components.basis.cols());
-    form.log_constants.resize(size);
+    form.log_sd.resize(size);
     for (Index i = 0; i < size; ++i) {
       const int t = members[static_cast<std::size_t>(i)];
       covariance(i, i) += components.remainder[place(t)];
       basis.row(i) = components.basis.row(place(t));
-      form.log_constants[i] =
-          -std::log(data.readings[static_cast<std::size_t>(t)].sd) - kLogSqrtTwoPi;
+      form.log_sd[i] = std::log(data.readings[static_cast<std::size_t>(t)].sd) + kLogSqrtTwoPi;
     }
     const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
     if (factor.info() != Eigen::Success) {
@@ -56,7 +55,7 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
           absl::StrCat("readings of observable ", key.second, " of experiment ", key.first,
                        " lie too close for their correlation length: leave out some."));
     }
-    form.log_constants.array() -= factor.matrixLLT().diagonal().array().log();
+    form.log_pivots = factor.matrixLLT().diagonal().array().log();
     form.whitening = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
     form.whitened_basis = form.whitening * basis;
     form.readings.assign(members.begin(), members.end());
@@ -69,7 +68,13 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
 
 void EmulatedLikelihood::Form::Sum() {
   gram = whitened_basis.transpose() * whitened_basis;
-  log_normaliser = log_constants.sum();
+  // One after the other: the last bits of a likelihood move proposals, and runs that follow them
+  // part.
+  log_normaliser = 0;
+  for (const double log_of_sd : log_sd) log_normaliser -= log_of_sd;
+  double pivots = 0;
+  for (const double log_of_pivot : log_pivots) pivots += log_of_pivot;
+  log_normaliser -= pivots;
   projection = whitened_basis.transpose() * residual;
   square = residual.squaredNorm();
 }
@@ -83,7 +88,8 @@ EmulatedLikelihood EmulatedLikelihood::First(Index readings) const {
     form.readings.resize(static_cast<std::size_t>(kept));
     form.whitening = form.whitening.topLeftCorner(kept, kept).eval();
     form.whitened_basis.conservativeResize(kept, Eigen::NoChange);
-    form.log_constants.conservativeResize(kept);
+    form.log_sd.conservativeResize(kept);
+    form.log_pivots.conservativeResize(kept);
     form.residual.conservativeResize(kept);
     form.Sum();
   }

@@ -60,8 +60,9 @@ class EmulatedLikelihood {
     Eigen::MatrixXd whitening;       // W, lower
     Eigen::MatrixXd whitened_basis;  // W B
     Eigen::MatrixXd gram;            // B^T W^T W B
-    Eigen::VectorXd log_constants;   // - ln sd - ln (W^-1)_kk - 1/2 ln 2 pi of each reading
-    double log_normaliser = 0;       // their sum
+    Eigen::VectorXd log_sd;          // ln sd + 1/2 ln 2 pi of each reading
+    Eigen::VectorXd log_pivots;      // ln (W^-1)_kk
+    double log_normaliser = 0;       // - sum of both
     Eigen::VectorXd residual;        // W r, r the residual of the measured readings at m = 0
     Eigen::VectorXd projection;      // (W B)^T W r
     double square = 0;               // |W r|^2
