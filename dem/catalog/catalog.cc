@@ -47,7 +47,8 @@ void Append(std::string& text, const ParameterInfo& p) {
   for (const auto& [contact, null] : p.null_by_contact) {
     absl::StrAppend(&text, " ", contact, ":null ", null);
   }
-  absl::StrAppend(&text, p.alternative_to.empty() ? "" : " alternative to ", p.alternative_to, ": ",
+  absl::StrAppend(&text, p.of_pairs ? " of pairs" : "",
+                  p.alternative_to.empty() ? "" : " alternative to ", p.alternative_to, ": ",
                   p.description, "\n");
 }
 

@@ -63,6 +63,7 @@ struct ParameterInfo {
   ReferenceScale scale;                           ///< see ScaleOf()
   std::map<std::string, ReferenceScale> scale_by_contact;  ///< where it depends on the contact law
   std::optional<DefaultPrior> scaled_prior;  ///< of value / scale, 0.01 .. 10 and wider; PriorOf()
+  bool of_pairs = false;  ///< pairs of materials may have values of their own, A-B.EFFECT.NAME
 };
 
 struct ContactInfo {

@@ -370,6 +370,7 @@ std::optional<CommonChain> CommonChainOf(const Model& model, double thickness) {
     }
     const KernelContext context{
         .contact = model.contact,
+        .effect = name,
         .density = model.density,
         .thickness = thickness,
         .law = parameters,

@@ -48,10 +48,11 @@ class Materials;
 
 /// What a law or an effect may know when it is made: its own parameters and the law it joins.
 struct KernelContext {
-  std::string contact;   ///< name of the contact law
-  double density = 0;    ///< of the grains [kg/m^3]
-  double thickness = 0;  ///< of disks [m]; 0: the grains are spheres
-  ParameterSet law;      ///< parameters of the law, defaults filled in
+  std::string contact;      ///< name of the contact law
+  std::string effect = {};  ///< its name; empty: the law itself
+  double density = 0;       ///< of the grains [kg/m^3]
+  double thickness = 0;     ///< of disks [m]; 0: the grains are spheres
+  ParameterSet law;         ///< parameters of the law, defaults filled in
   ParameterSet
       parameters;  ///< of the law, or of the effect (without its prefix), defaults filled in
   const Materials* materials = nullptr;  ///< while the kernel is made; null: there is one material

@@ -59,6 +59,7 @@ ContactModel::ContactModel(const Model& model, double thickness)
     if (std::find(model.effects.begin(), model.effects.end(), name) != model.effects.end()) {
       const KernelContext context{
           .contact = model.contact,
+          .effect = name,
           .density = model.density,
           .thickness = thickness,
           .law = law_parameters,

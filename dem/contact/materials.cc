@@ -24,7 +24,7 @@ bool IsMaterialPair(const Model& model, const std::string& name) {
   };
   const std::size_t dash = name.find('-');
   return dash != std::string::npos && has(name.substr(0, dash)) && has(name.substr(dash + 1)) &&
-         name.substr(0, dash) != name.substr(dash + 1);
+         name != absl::StrCat(kOwnMaterial, "-", kOwnMaterial);
 }
 
 Materials::Materials(const Model& model, const ParameterSet& own, double thickness)
@@ -71,16 +71,23 @@ int Materials::IndexOf(const std::string& name) const {
   return static_cast<int>(it - names_.begin());
 }
 
+std::optional<double> Materials::Said(int a, int b, const std::string& name) const {
+  const std::string& one = names_[static_cast<std::size_t>(a)];
+  const std::string& other = names_[static_cast<std::size_t>(b)];
+  for (const std::string& pair : {absl::StrCat(one, "-", other), absl::StrCat(other, "-", one)}) {
+    const auto it = parameters_.find(absl::StrCat(pair, ".", name));
+    if (it != parameters_.end()) {
+      return it->second;
+    }
+  }
+  return std::nullopt;
+}
+
 void Materials::TakePairs(const std::string& name, std::vector<double>& values) const {
   for (int a = 0; a < count(); ++a) {
     for (int b = 0; b < count(); ++b) {
-      const auto it =
-          parameters_.find(absl::StrCat(names_[static_cast<std::size_t>(a)], "-",
-                                        names_[static_cast<std::size_t>(b)], ".", name));
-      if (it != parameters_.end()) {
-        values[static_cast<std::size_t>(Pair(a, b))] = it->second;
-        values[static_cast<std::size_t>(Pair(b, a))] = it->second;
-      }
+      double& value = values[static_cast<std::size_t>(Pair(a, b))];
+      value = Said(a, b, name).value_or(value);
     }
   }
 }
@@ -108,6 +115,16 @@ void Materials::Complete(ContactBlock& b) const {
       b.effective_mass[k] = b.mass_factor * (mi * mj / (mi + mj));
     }
   }
+}
+
+std::vector<double> PairValues(const KernelContext& context, const std::string& parameter) {
+  const double own = context.parameters.Get(parameter);
+  if (context.materials == nullptr) {
+    return {own};
+  }
+  std::vector<double> values(static_cast<std::size_t>(context.materials->pairs()), own);
+  context.materials->TakePairs(absl::StrCat(context.effect, ".", parameter), values);
+  return values;
 }
 
 }  // namespace calib::dem

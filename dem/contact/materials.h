@@ -2,6 +2,7 @@
 // Bodies of several materials: what each is made of, and what holds between two of them.
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,7 @@ inline constexpr int kMostMaterials = 16;
 /// The model's own material first, then its others in their order.
 std::vector<std::string> MaterialNames(const Model& model);
 
-/// Whether a name is "A-B" of two different materials of the model.
+/// Whether a name is "A-B" of two materials of the model, or "A-A" of one that is not its own.
 bool IsMaterialPair(const Model& model, const std::string& name);
 
 /// Stiffness of two bodies one behind the other, from those of contacts among equals: 2ab/(a + b),
@@ -32,8 +33,9 @@ inline double InSeries(double a, double b) { return a == b ? a : 2.0 * (a / (a +
 /// Immutable. Parameters of the model say what a material has: NAME.P with a parameter P of the
 /// contact law or with density [kg/m^3]; what is left out is that of `grains`. A pair A-B has
 /// InSeries() stiffnesses and dampings and the smaller friction of its two materials, unless A-B.P
-/// gives it one of its own: friction_coefficient [-]; damping, where the law has it; damping_ratio
-/// [-], where viscous_damping acts (else that of the effect).
+/// gives it one of its own: friction_coefficient [-]; damping, where the law has it. Parameters of
+/// effects hold for all pairs; those that are of_pairs may have other values for a pair, A-A too,
+/// A-B.EFFECT.P.
 class Materials {
  public:
   /// thickness: of disks [m]; 0: spheres. Preconditions: MaterialProblems() finds nothing wrong.
@@ -58,6 +60,9 @@ class Materials {
   [[nodiscard]] double friction(int pair) const {  ///< tan(phi_mu) [-]
     return friction_[static_cast<std::size_t>(pair)];
   }
+
+  /// What the model says of two materials under this name, A-B.NAME or B-A.NAME; else nothing.
+  [[nodiscard]] std::optional<double> Said(int a, int b, const std::string& name) const;
 
   /// Puts what the model says of pairs under this name in place of the values, one per pair.
   void TakePairs(const std::string& name, std::vector<double>& values) const;
@@ -94,5 +99,9 @@ std::vector<Value> ForPairs(const KernelContext& context, const Alone& alone, co
   }
   return values;
 }
+
+/// A parameter of an effect, one value per pair of materials, Materials::Pair() its index; of a
+/// model with one material that one value.
+std::vector<double> PairValues(const KernelContext& context, const std::string& parameter);
 
 }  // namespace calib::dem

@@ -1,34 +1,53 @@
 // `adhesion_dmt`: a constant attraction of touching grains.
 
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "dem/catalog/registry.h"
+#include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 #include "dem/effects/shared/parameters.h"
 
 namespace calib::dem {
 namespace {
 
+CALIB_DEM_INLINE void AttractLane(double work, int k, ContactBlock& b) {
+  const double pull_off = 2.0 * std::numbers::pi * work * b.effective_radius[k];
+  const double pull = b.overlap[k] > 0 ? pull_off : 0.0;
+  b.normal_force[k] -= pull;
+  b.attraction[k] += pull;
+}
+
 CALIB_DEM_CLONES void Attract(double work, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
-    const double pull_off = 2.0 * std::numbers::pi * work * b.effective_radius[k];
-    const double pull = b.overlap[k] > 0 ? pull_off : 0.0;
-    b.normal_force[k] -= pull;
-    b.attraction[k] += pull;
+    AttractLane(work, k, b);
+  }
+}
+
+CALIB_DEM_CLONES void AttractPairs(const double* work, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    AttractLane(work[b.materials[k]], k, b);
   }
 }
 
 class DmtKernel final : public ContactKernel {
  public:
-  explicit DmtKernel(double work) : work_(work) {}
-  void Apply(ContactBlock& block, int /*first*/) const override { Attract(work_, block); }
+  explicit DmtKernel(std::vector<double> work) : work_(std::move(work)) {}
+  void Apply(ContactBlock& block, int /*first*/) const override {
+    if (block.mixed) {
+      AttractPairs(work_.data(), block);
+    } else {
+      Attract(work_.front(), block);
+    }
+  }
 
  private:
-  double work_;  ///< [J/m^2]
+  std::vector<double> work_;  ///< per pair of materials [J/m^2]
 };
 
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
-  return std::make_unique<DmtKernel>(context.parameters.Get("work_of_adhesion"));
+  return std::make_unique<DmtKernel>(PairValues(context, "work_of_adhesion"));
 }
 
 }  // namespace

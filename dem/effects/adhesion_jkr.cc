@@ -1,9 +1,13 @@
 // `adhesion_jkr`: elastic grains with adhesion inside their circle of contact.
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "dem/catalog/registry.h"
+#include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 #include "dem/effects/shared/parameters.h"
 #include "dem/elementary/power.h"
@@ -12,7 +16,7 @@ namespace calib::dem {
 namespace {
 
 struct Adhesion {
-  double work = 0;        ///< W [J/m^2] > 0
+  double work = 0;        ///< W [J/m^2]; 0: none
   double modulus = 0;     ///< E* [Pa]
   double tangential = 0;  ///< ks/a of the law [Pa]
 };
@@ -35,40 +39,63 @@ inline double SmallestRadius(const Adhesion& law, double radius) {
   return Power(std::numbers::pi * law.work * radius * radius / (8.0 * law.modulus), 1.0 / 3.0);
 }
 
+CALIB_DEM_INLINE void AdhereLane(const Adhesion& law, int k, ContactBlock& b) {
+  const double radius = b.effective_radius[k];
+  const double smallest = SmallestRadius(law, radius);
+  const double width = smallest * smallest / radius;  // unit of overlap
+  const double u = b.overlap[k] / width;
+  const double z = ContactWidth(u > -3.0 ? u : -3.0);
+  const double z3 = z * z * z;
+  const double unit = std::numbers::pi * law.work * radius;
+  const double positive = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
+  const double hertz_radius = std::sqrt(radius * positive);
+  const double hertz = 4.0 / 3.0 * law.modulus * hertz_radius * positive;
+  const double on = u > -3.0 ? 1.0 : 0.0;
+  const double more = smallest * (z * z) - hertz_radius;  // of the contact radius
+  b.normal_force[k] += on * (unit * (z3 * z3 / 6.0 - z3) - hertz);
+  b.normal_stiffness[k] += on * (2.0 * law.modulus * more);  // bounds the tangent from above
+  b.tangential_stiffness[k] += on * (law.tangential * more);
+  b.attraction[k] += on * (1.5 * unit);
+  b.holds[k] += on;
+}
+
 CALIB_DEM_CLONES void Adhere(const Adhesion law, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
-    const double radius = b.effective_radius[k];
-    const double smallest = SmallestRadius(law, radius);
-    const double width = smallest * smallest / radius;  // unit of overlap
-    const double u = b.overlap[k] / width;
-    const double z = ContactWidth(u > -3.0 ? u : -3.0);
-    const double z3 = z * z * z;
-    const double unit = std::numbers::pi * law.work * radius;
-    const double positive = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
-    const double hertz_radius = std::sqrt(radius * positive);
-    const double hertz = 4.0 / 3.0 * law.modulus * hertz_radius * positive;
-    const double on = u > -3.0 ? 1.0 : 0.0;
-    const double more = smallest * (z * z) - hertz_radius;  // of the contact radius
-    b.normal_force[k] += on * (unit * (z3 * z3 / 6.0 - z3) - hertz);
-    b.normal_stiffness[k] += on * (2.0 * law.modulus * more);  // bounds the tangent from above
-    b.tangential_stiffness[k] += on * (law.tangential * more);
-    b.attraction[k] += on * (1.5 * unit);
-    b.holds[k] += on;
+    AdhereLane(law, k, b);
+  }
+}
+
+void AdherePairs(const Adhesion* laws, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    const Adhesion& law = laws[b.materials[k]];
+    if (law.work > 0) {
+      AdhereLane(law, k, b);
+    }
   }
 }
 
 class JkrKernel final : public ContactKernel {
  public:
-  explicit JkrKernel(const Adhesion& law) : law_(law) {}
+  explicit JkrKernel(std::vector<Adhesion> laws) : laws_(std::move(laws)) {}
   [[nodiscard]] double Reach(double largest_radius) const override {
     const double radius = 0.5 * largest_radius;
-    const double smallest = SmallestRadius(law_, radius);
-    return 3.0 * smallest * smallest / radius;  // grows with R*^(1/3)
+    double reach = 0;
+    for (const Adhesion& law : laws_) {
+      const double smallest = SmallestRadius(law, radius);
+      reach = std::max(reach, 3.0 * smallest * smallest / radius);  // grows with R*^(1/3)
+    }
+    return reach;
   }
-  void Apply(ContactBlock& block, int /*first*/) const override { Adhere(law_, block); }
+  void Apply(ContactBlock& block, int /*first*/) const override {
+    if (block.mixed) {
+      AdherePairs(laws_.data(), block);
+    } else {
+      Adhere(laws_.front(), block);
+    }
+  }
 
  private:
-  Adhesion law_;
+  std::vector<Adhesion> laws_;  ///< per pair of materials
 };
 
 class NoAdhesion final : public ContactKernel {
@@ -77,20 +104,32 @@ class NoAdhesion final : public ContactKernel {
 };
 
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
-  const double work = context.parameters.Get("work_of_adhesion");
-  if (work == 0) {
+  const std::vector<double> work = PairValues(context, "work_of_adhesion");
+  if (std::all_of(work.begin(), work.end(), [](double one) { return one == 0; })) {
     return std::make_unique<NoAdhesion>();
   }
-  const double e = context.law.Get("young_modulus");
-  const double nu = context.law.Get("poisson_ratio");
-  return std::make_unique<JkrKernel>(Adhesion{.work = work,
-                                              .modulus = e / (2.0 * (1.0 - nu * nu)),
-                                              .tangential = 2.0 * e / ((1.0 + nu) * (2.0 - nu))});
+  std::vector<Adhesion> laws = ForPairs<Adhesion>(
+      context,
+      [](const ParameterSet& law) {
+        const double e = law.Get("young_modulus");
+        const double nu = law.Get("poisson_ratio");
+        return Adhesion{.modulus = e / (2.0 * (1.0 - nu * nu)),
+                        .tangential = 2.0 * e / ((1.0 + nu) * (2.0 - nu))};
+      },
+      [](const Adhesion& a, const Adhesion& b) {
+        return Adhesion{.modulus = InSeries(a.modulus, b.modulus),
+                        .tangential = InSeries(a.tangential, b.tangential)};
+      });
+  for (std::size_t pair = 0; pair < laws.size(); ++pair) {
+    laws[pair].work = work[pair];
+  }
+  return std::make_unique<JkrKernel>(std::move(laws));
 }
 
 }  // namespace
 
-/// With the contact radius a, E* = E/(2(1-nu^2)) and R* = r1 r2/(r1 + r2):
+/// With the contact radius a, E* = E/(2(1-nu^2)) (of two materials: in series) and R* = r1 r2/(r1 +
+/// r2):
 ///   u = a^2/R* - sqrt(2 pi W a/E*),   F = 4 E* a^3/(3 R*) - sqrt(8 pi W E* a^3)
 /// Pull-off 3/2 pi W R*. A contact forms at u = 0 with F = -4/3 pi W R* and, once formed, holds
 /// down to u = -3 a_c^2/R*, a_c^3 = pi W R*^2/(8 E*), where F = -5/6 pi W R*: making and breaking

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "dem/catalog/registry.h"
+#include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 #include "dem/elementary/functions.h"
 #include "dem/elementary/power.h"
@@ -13,7 +16,6 @@ namespace calib::dem {
 namespace {
 
 struct Liquid {
-  double tension = 0;  ///< gamma cos(theta) [N/m]
   double stretch = 1;  ///< 1 + theta/2
   double volume = 0;   ///< of every bridge [m^3]
   double ratio = 0;    ///< of volume to R^3; one of the two is zero
@@ -25,32 +27,51 @@ inline double RuptureGap(const Liquid& liquid, double radius) {
   return liquid.stretch * Power(volume, 1.0 / 3.0);
 }
 
-CALIB_DEM_CLONES void Bridge(const Liquid liquid, ContactBlock& b) {
+/// tension: gamma cos(theta) [N/m] > 0
+CALIB_DEM_INLINE void BridgeLane(const Liquid& liquid, double tension, int k, ContactBlock& b) {
+  const double radius = 2.0 * b.effective_radius[k];
+  const double gap = b.overlap[k] < 0 ? -b.overlap[k] : 0.0;
+  const double volume = liquid.volume + liquid.ratio * (radius * radius * radius);
+  const double scaled = gap * std::sqrt(radius / volume);
+  const double bridge =
+      2.0 * std::numbers::pi * tension * radius / (1.0 + 1.05 * scaled + 2.5 * (scaled * scaled));
+  const double on = gap < RuptureGap(liquid, radius) ? 1.0 : 0.0;
+  const double pull = on * bridge;
+  b.normal_force[k] -= pull;
+  b.attraction[k] += pull;
+  b.holds[k] += tension > 0 ? on : 0.0;
+}
+
+CALIB_DEM_CLONES void Bridge(const Liquid liquid, double tension, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
-    const double radius = 2.0 * b.effective_radius[k];
-    const double gap = b.overlap[k] < 0 ? -b.overlap[k] : 0.0;
-    const double volume = liquid.volume + liquid.ratio * (radius * radius * radius);
-    const double scaled = gap * std::sqrt(radius / volume);
-    const double bridge = 2.0 * std::numbers::pi * liquid.tension * radius /
-                          (1.0 + 1.05 * scaled + 2.5 * (scaled * scaled));
-    const double on = gap < RuptureGap(liquid, radius) ? 1.0 : 0.0;
-    const double pull = on * bridge;
-    b.normal_force[k] -= pull;
-    b.attraction[k] += pull;
-    b.holds[k] += on;
+    BridgeLane(liquid, tension, k, b);
+  }
+}
+
+CALIB_DEM_CLONES void BridgePairs(const Liquid liquid, const double* tension, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    BridgeLane(liquid, tension[b.materials[k]], k, b);
   }
 }
 
 class BridgeKernel final : public ContactKernel {
  public:
-  explicit BridgeKernel(const Liquid& liquid) : liquid_(liquid) {}
+  BridgeKernel(const Liquid& liquid, std::vector<double> tension)
+      : liquid_(liquid), tension_(std::move(tension)) {}
   [[nodiscard]] double Reach(double largest_radius) const override {
     return RuptureGap(liquid_, largest_radius);
   }
-  void Apply(ContactBlock& block, int /*first*/) const override { Bridge(liquid_, block); }
+  void Apply(ContactBlock& block, int /*first*/) const override {
+    if (block.mixed) {
+      BridgePairs(liquid_, tension_.data(), block);
+    } else {
+      Bridge(liquid_, tension_.front(), block);
+    }
+  }
 
  private:
   Liquid liquid_;
+  std::vector<double> tension_;  ///< per pair of materials, gamma cos(theta) [N/m]; 0: dry
 };
 
 class NoBridges final : public ContactKernel {
@@ -59,18 +80,21 @@ class NoBridges final : public ContactKernel {
 };
 
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
-  const double tension = context.parameters.Get("surface_tension");
-  if (tension == 0) {
+  std::vector<double> tension = PairValues(context, "surface_tension");
+  if (std::all_of(tension.begin(), tension.end(), [](double one) { return one == 0; })) {
     return std::make_unique<NoBridges>();
   }
   const double angle = context.parameters.Get("contact_angle");
-  Liquid liquid{.tension = tension * Cosine(angle), .stretch = 1.0 + 0.5 * angle};
+  for (double& one : tension) {
+    one *= Cosine(angle);
+  }
+  Liquid liquid{.stretch = 1.0 + 0.5 * angle};
   if (const auto volume = context.parameters.Find("liquid_volume")) {
     liquid.volume = *volume;
   } else {
     liquid.ratio = context.parameters.Get("volume_ratio");
   }
-  return std::make_unique<BridgeKernel>(liquid);
+  return std::make_unique<BridgeKernel>(liquid, std::move(tension));
 }
 
 std::vector<ParameterInfo> Parameters() {
@@ -80,6 +104,7 @@ std::vector<ParameterInfo> Parameters() {
   tension.max = 1e6;
   tension.default_prior = {.kind = "log_uniform", .min = 1e-3, .max = 10};
   tension.null_value = 0;
+  tension.of_pairs = true;
   tension.scale = {.pressure = 1, .diameter = 1};  // force over p d^2 is then pi
   tension.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.003, .max = 10};
   tension.description = "gamma of the liquid (water 0.073)";

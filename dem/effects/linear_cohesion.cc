@@ -1,33 +1,52 @@
 // `linear_cohesion`: attraction in proportion to the area of contact.
 
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "dem/catalog/registry.h"
+#include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 
 namespace calib::dem {
 namespace {
 
+CALIB_DEM_INLINE void AttractLane(double density, int k, ContactBlock& b) {
+  const double u = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
+  const double pull = 2.0 * std::numbers::pi * density * (b.effective_radius[k] * u);
+  b.normal_force[k] -= pull;
+  b.attraction[k] += pull;
+}
+
 CALIB_DEM_CLONES void Attract(double density, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
-    const double u = b.overlap[k] > 0 ? b.overlap[k] : 0.0;
-    const double pull = 2.0 * std::numbers::pi * density * (b.effective_radius[k] * u);
-    b.normal_force[k] -= pull;
-    b.attraction[k] += pull;
+    AttractLane(density, k, b);
+  }
+}
+
+CALIB_DEM_CLONES void AttractPairs(const double* density, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    AttractLane(density[b.materials[k]], k, b);
   }
 }
 
 class CohesionKernel final : public ContactKernel {
  public:
-  explicit CohesionKernel(double density) : density_(density) {}
-  void Apply(ContactBlock& block, int /*first*/) const override { Attract(density_, block); }
+  explicit CohesionKernel(std::vector<double> density) : density_(std::move(density)) {}
+  void Apply(ContactBlock& block, int /*first*/) const override {
+    if (block.mixed) {
+      AttractPairs(density_.data(), block);
+    } else {
+      Attract(density_.front(), block);
+    }
+  }
 
  private:
-  double density_;  ///< [J/m^3]
+  std::vector<double> density_;  ///< per pair of materials [J/m^3]
 };
 
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
-  return std::make_unique<CohesionKernel>(context.parameters.Get("energy_density"));
+  return std::make_unique<CohesionKernel>(PairValues(context, "energy_density"));
 }
 
 }  // namespace
@@ -46,6 +65,7 @@ EffectEntry LinearCohesion() {
   density.max = 1e12;
   density.default_prior = {.kind = "log_uniform", .min = 1e3, .max = 1e8};
   density.null_value = 0;
+  density.of_pairs = true;
   // With Hertz contacts carrying p d^2 the attraction is about the tenth part of the force there.
   density.scale = {.factor = 0.03, .pressure = 1.0 / 3.0, .modulus = 2.0 / 3.0};
   density.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 10};

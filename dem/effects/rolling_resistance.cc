@@ -1,6 +1,8 @@
 // `rolling_resistance`: a bending moment against relative rolling, elastic up to a limit.
 
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "dem/catalog/registry.h"
 #include "dem/contact/contact_kinematics.h"
@@ -39,20 +41,20 @@ CALIB_DEM_CLONES void IntegrateRolling(const MomentResponse& response, ContactBl
 
 class RollingKernel final : public ContactKernel {
  public:
-  explicit RollingKernel(const MomentLaw& law) : law_(law) {}
+  explicit RollingKernel(std::vector<MomentLaw> laws) : laws_(std::move(laws)) {}
   [[nodiscard]] int HistorySize() const override { return 3; }
   void Apply(ContactBlock& block, int first) const override {
     MomentResponse response;
-    EvaluateMoment(law_, block, response);
+    EvaluateMoment(laws_, block, response);
     IntegrateRolling(response, block, first);
   }
 
  private:
-  MomentLaw law_;
+  std::vector<MomentLaw> laws_;  ///< per pair of materials
 };
 
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
-  return std::make_unique<RollingKernel>(MomentLawFrom(context));
+  return std::make_unique<RollingKernel>(MomentLawsFrom(context));
 }
 
 }  // namespace

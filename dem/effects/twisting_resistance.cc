@@ -33,20 +33,20 @@ CALIB_DEM_CLONES void IntegrateTwisting(const MomentResponse& response, ContactB
 
 class TwistingKernel final : public ContactKernel {
  public:
-  explicit TwistingKernel(const MomentLaw& law) : law_(law) {}
+  explicit TwistingKernel(std::vector<MomentLaw> laws) : laws_(std::move(laws)) {}
   [[nodiscard]] int HistorySize() const override { return 1; }
   void Apply(ContactBlock& block, int first) const override {
     MomentResponse response;
-    EvaluateMoment(law_, block, response);
+    EvaluateMoment(laws_, block, response);
     IntegrateTwisting(response, block, first);
   }
 
  private:
-  MomentLaw law_;
+  std::vector<MomentLaw> laws_;  ///< per pair of materials
 };
 
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
-  return std::make_unique<TwistingKernel>(MomentLawFrom(context));
+  return std::make_unique<TwistingKernel>(MomentLawsFrom(context));
 }
 
 /// A collision happens in a plane, and a shaken box is one: nothing twists about a normal in it.

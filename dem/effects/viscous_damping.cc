@@ -71,13 +71,8 @@ CALIB_DEM_CLONES void DampPairsShear(const double* twice_ratio, ContactBlock& b)
 }
 
 /// 2 beta per pair of materials.
-std::vector<double> RatiosOf(const KernelContext& context, const Dashpot& dashpot) {
-  if (context.materials == nullptr) {
-    return {};
-  }
-  std::vector<double> ratios(static_cast<std::size_t>(context.materials->pairs()),
-                             0.5 * dashpot.twice_ratio);
-  context.materials->TakePairs("damping_ratio", ratios);
+std::vector<double> TwiceRatios(const KernelContext& context) {
+  std::vector<double> ratios = PairValues(context, "ratio");
   for (double& ratio : ratios) {
     ratio *= 2.0;
   }
@@ -87,7 +82,7 @@ std::vector<double> RatiosOf(const KernelContext& context, const Dashpot& dashpo
 class NormalDashpot final : public ContactKernel {
  public:
   explicit NormalDashpot(const KernelContext& context)
-      : dashpot_(DashpotFrom(context)), twice_ratio_(RatiosOf(context, dashpot_)) {}
+      : dashpot_(DashpotFrom(context)), twice_ratio_(TwiceRatios(context)) {}
   void Apply(ContactBlock& block, int /*first*/) const override {
     if (block.mixed) {
       DampPairsNormal(twice_ratio_.data(), block);
@@ -104,7 +99,7 @@ class NormalDashpot final : public ContactKernel {
 class ShearDashpot final : public ContactKernel {
  public:
   explicit ShearDashpot(const KernelContext& context)
-      : dashpot_(DashpotFrom(context)), twice_ratio_(RatiosOf(context, dashpot_)) {}
+      : dashpot_(DashpotFrom(context)), twice_ratio_(TwiceRatios(context)) {}
   void Apply(ContactBlock& block, int /*first*/) const override {
     if (block.mixed) {
       DampPairsShear(twice_ratio_.data(), block);
@@ -150,6 +145,7 @@ EffectEntry ViscousDamping() {
   ratio.max = 10;
   ratio.default_prior = {.kind = "log_uniform", .min = 0.01, .max = 10};
   ratio.null_value = 0;
+  ratio.of_pairs = true;
   ratio.description = "damping ratio beta of both dashpots; 1 is critical for two equal grains";
   return {.info = {.name = "viscous_damping",
                    .kind = "contact",

@@ -35,19 +35,6 @@ const ParameterInfo& PairFriction() {
   return info;
 }
 
-const ParameterInfo& PairDampingRatio() {
-  static const ParameterInfo info = [] {
-    ParameterInfo ratio;
-    ratio.name = "damping_ratio";
-    ratio.unit = "1";
-    ratio.max = 10;
-    ratio.default_prior = {.kind = "log_uniform", .min = 0.01, .max = 10};
-    ratio.description = "viscous_damping.ratio between two materials";
-    return ratio;
-  }();
-  return info;
-}
-
 const ParameterInfo* Named(const std::vector<ParameterInfo>& infos, const std::string& name) {
   const auto it = std::find_if(infos.begin(), infos.end(),
                                [&](const ParameterInfo& info) { return info.name == name; });
@@ -58,20 +45,63 @@ bool Has(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// Of materials A and B as "A-B" or "B-A".
+/// "A-A" and not "A-B".
+bool OfEquals(const std::string& pair) {
+  const std::size_t dash = pair.find('-');
+  return pair.substr(0, dash) == pair.substr(dash + 1);
+}
+
+/// Of materials A and B as "A-B" or "B-A", or of A among its equals as "A-A".
 const ParameterInfo* PairParameter(const Model& model, const std::string& pair,
                                    const std::string& name) {
   if (!IsMaterialPair(model, pair)) {
     return nullptr;
   }
+  if (name.find('.') != std::string::npos) {
+    const ParameterInfo* info = FindParameter(model.contact, model.effects, name);
+    return info != nullptr && info->of_pairs ? info : nullptr;
+  }
+  if (OfEquals(pair)) {
+    return nullptr;  // the material's own: A.friction_coefficient
+  }
   if (name == "friction_coefficient") {
     return &PairFriction();
   }
-  if (name == "damping_ratio" && Has(model.effects, "viscous_damping")) {
-    return &PairDampingRatio();
-  }
   const ContactInfo* law = FindContact(model.contact);
   return name == "damping" && law != nullptr ? Named(law->parameters, name) : nullptr;
+}
+
+/// Names that PairParameter() may know.
+std::vector<std::string> PairNames(const Model& model) {
+  std::vector<std::string> names = {"friction_coefficient", "damping"};
+  for (const std::string& effect : model.effects) {
+    if (const EffectInfo* info = FindEffect(effect)) {
+      for (const ParameterInfo& parameter : info->parameters) {
+        if (parameter.of_pairs) {
+          names.push_back(absl::StrCat(effect, ".", parameter.name));
+        }
+      }
+    }
+  }
+  return names;
+}
+
+/// Of a pair that is given two parameters of which one says what the other says.
+std::vector<std::string> PairAlternatives(const Model& model, const std::string& pair) {
+  std::vector<std::string> problems;
+  for (const std::string& name : PairNames(model)) {
+    const ParameterInfo* info = PairParameter(model, pair, name);
+    if (info == nullptr || info->alternative_to.empty()) {
+      continue;
+    }
+    const std::string one = absl::StrCat(pair, ".", name);
+    const std::string other = absl::StrCat(one.substr(0, one.rfind('.') + 1), info->alternative_to);
+    if (model.parameters.contains(one) && model.parameters.contains(other)) {
+      problems.push_back(
+          absl::StrCat(one, " and ", other, " are alternatives: only one of them may be given"));
+    }
+  }
+  return problems;
 }
 
 }  // namespace
@@ -108,9 +138,9 @@ std::vector<std::string> MaterialParameters(const Model& model) {
   }
   const std::vector<std::string> names = MaterialNames(model);
   for (std::size_t a = 0; a < names.size(); ++a) {
-    for (std::size_t b = a + 1; b < names.size(); ++b) {
+    for (std::size_t b = a; b < names.size(); ++b) {
       const std::string pair = absl::StrCat(names[a], "-", names[b]);
-      for (const char* name : {"friction_coefficient", "damping_ratio", "damping"}) {
+      for (const std::string& name : PairNames(model)) {
         if (PairParameter(model, pair, name) != nullptr) {
           dotted.push_back(absl::StrCat(pair, ".", name));
         }
@@ -156,7 +186,7 @@ std::vector<std::string> MaterialProblems(const Model& model) {
   if (model.materials.empty()) {
     return problems;
   }
-  for (const char* effect : {"adhesion_jkr", "wall_friction", "nonspherical_shape"}) {
+  for (const char* effect : {"wall_friction", "nonspherical_shape"}) {
     if (Has(model.effects, effect)) {
       problems.push_back(absl::StrCat("effect ", effect,
                                       " knows one material only; leave it out or model.materials",
@@ -167,10 +197,21 @@ std::vector<std::string> MaterialProblems(const Model& model) {
   }
   const std::vector<std::string> names = MaterialNames(model);
   for (std::size_t a = 0; a < names.size(); ++a) {
-    for (std::size_t b = a + 1; b < names.size(); ++b) {
-      for (const char* name : {".friction_coefficient", ".damping_ratio", ".damping"}) {
-        const std::string one = absl::StrCat(names[a], "-", names[b], name);
-        const std::string other = absl::StrCat(names[b], "-", names[a], name);
+    for (std::size_t b = a; b < names.size(); ++b) {
+      const std::string pair = absl::StrCat(names[a], "-", names[b]);
+      const std::string reverse = absl::StrCat(names[b], "-", names[a]);
+      for (const std::string& problem : PairAlternatives(model, pair)) {
+        problems.push_back(problem);
+      }
+      if (a == b) {
+        continue;
+      }
+      for (const std::string& problem : PairAlternatives(model, reverse)) {
+        problems.push_back(problem);
+      }
+      for (const std::string& name : PairNames(model)) {
+        const std::string one = absl::StrCat(pair, ".", name);
+        const std::string other = absl::StrCat(reverse, ".", name);
         if (model.parameters.contains(one) && model.parameters.contains(other)) {
           problems.push_back(absl::StrCat(one, " and ", other, " are the same; give one of them"));
         }

@@ -17,6 +17,13 @@ bool Has(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+// A material, or a pair in either order.
+bool SameOwner(const std::string& one, const std::string& other) {
+  const std::size_t dash = one.find('-');
+  return one == other || (dash != std::string::npos &&
+                          absl::StrCat(one.substr(dash + 1), "-", one.substr(0, dash)) == other);
+}
+
 // The values that stand under a material or a pair.
 void ReadValues(MapReader& section, const std::string& owner, dem::Model& model) {
   auto values = section.Map(owner);
@@ -30,14 +37,13 @@ void ReadValues(MapReader& section, const std::string& owner, dem::Model& model)
       std::vector<std::string> offered;
       for (const std::string& known : dem::MaterialParameters(model)) {
         const std::size_t dot = known.find('.');
-        // Pairs have the same values whatever their order.
-        const bool pair = owner.find('-') != std::string::npos;
-        if (pair ? known.find('-') != std::string::npos : known.substr(0, dot) == owner) {
-          if (!Has(offered, known.substr(dot + 1))) offered.push_back(known.substr(dot + 1));
-        }
+        if (SameOwner(known.substr(0, dot), owner)) offered.push_back(known.substr(dot + 1));
       }
       values->Problem(
-          key, absl::StrCat("is nothing that ", owner, " may have; ", Suggestion(key, offered)));
+          key, absl::StrCat("is nothing that ", owner, " may have; ",
+                            offered.empty() ? "among equals it has values of effects only, and the "
+                                              "model has no effect of pairs"
+                                            : Suggestion(key, offered)));
       continue;
     }
     const auto value =

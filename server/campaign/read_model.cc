@@ -54,7 +54,7 @@ std::vector<std::string> NamesOf(const Entries& entries) {
 // entry may name its alternative or be named by it.
 std::vector<std::string> AlternativesOf(const ModelParameter& parameter,
                                         const std::vector<ModelParameter>& all) {
-  const auto prefix = [](const std::string& name) { return name.substr(0, name.find('.') + 1); };
+  const auto prefix = [](const std::string& name) { return name.substr(0, name.rfind('.') + 1); };
   std::vector<std::string> names;
   for (const ModelParameter& other : all) {
     const bool named = other.info->name == parameter.info->alternative_to ||
@@ -138,6 +138,7 @@ std::string InOtherOrder(const dem::Model& model, const std::string& name) {
   const std::string pair = name.substr(0, name.find('.'));
   if (!dem::IsMaterialPair(model, pair)) return "";
   const std::size_t dash = pair.find('-');
+  if (pair.substr(0, dash) == pair.substr(dash + 1)) return "";
   return absl::StrCat(pair.substr(dash + 1), "-", pair.substr(0, dash), name.substr(pair.size()));
 }
 

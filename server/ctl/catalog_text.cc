@@ -77,6 +77,13 @@ std::string EffectText(const dem::EffectInfo& effect) {
   if (!effect.excludes.empty()) {
     text += Wrapped(absl::StrJoin(effect.excludes, ", "), "  not together with: ", kIndent);
   }
+  std::vector<std::string> of_pairs;
+  for (const dem::ParameterInfo& p : effect.parameters) {
+    if (p.of_pairs) of_pairs.push_back(absl::StrCat(effect.name, ".", p.name));
+  }
+  if (!of_pairs.empty()) {
+    text += Wrapped(absl::StrJoin(of_pairs, ", "), "  of model.pairs too: ", kIndent);
+  }
   return text + ParameterTable(effect.parameters);
 }
 

@@ -39,6 +39,7 @@ Json Scale(const dem::ReferenceScale& scale) {
 // Of an effect: what makes its strength comparable, too.
 Json EffectParameter(const dem::ParameterInfo& p) {
   Json json = Parameter(p);
+  json["of_pairs"] = p.of_pairs;
   json["reference_scale"] = Scale(p.scale);
   if (!p.scale_by_contact.empty()) {
     Json& by_contact = json["reference_scale_by_contact"] = Json::object();

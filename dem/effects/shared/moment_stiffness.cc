@@ -1,33 +1,35 @@
 #include "dem/effects/shared/moment_stiffness.h"
 
 #include <algorithm>
+#include <optional>
 
+#include "absl/strings/str_cat.h"
+#include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 
 namespace calib::dem {
+namespace {
 
-MomentLaw MomentLawFrom(const KernelContext& context) {
-  const bool linear = context.contact == "linear";
+MomentLaw LawOf(bool linear, double friction, std::optional<double> ratio,
+                std::optional<double> stiffness) {
   MomentLaw law;
   law.limit_by_smaller = linear;
   // An infinite coefficient would make inf * 0 of an unloaded contact; the largest number does the
   // same and stays finite.
-  law.friction = std::min(context.parameters.Get("friction"), 1e100);
+  law.friction = std::min(friction, 1e100);
   if (law.friction == 0) {
     return law;  // no stiffness either, so that the time step is that of the model without
   }
-  if (const auto ratio = context.parameters.Find("stiffness_ratio")) {
+  if (ratio) {
     law.ratio = *ratio;
-  } else if (linear) {
-    law.ratio = context.parameters.Get("stiffness");
   } else {
-    law.constant = context.parameters.Get("stiffness");
+    (linear ? law.ratio : law.constant) = stiffness.value();
   }
   return law;
 }
 
-CALIB_DEM_CLONES void EvaluateMoment(const MomentLaw& law, const ContactBlock& b,
-                                     MomentResponse& response) {
+CALIB_DEM_CLONES void EvaluateOfAll(const MomentLaw& law, const ContactBlock& b,
+                                    MomentResponse& response) {
   double* const __restrict stiffness = response.stiffness;
   double* const __restrict limit = response.limit;
   const double constant = law.constant;
@@ -43,6 +45,58 @@ CALIB_DEM_CLONES void EvaluateMoment(const MomentLaw& law, const ContactBlock& b
       const double smaller = b.radius_i[k] < b.radius_j[k] ? b.radius_i[k] : b.radius_j[k];
       limit[k] = friction * ((b.normal_force[k] > 0 ? b.normal_force[k] : 0.0) * smaller);
     }
+  }
+}
+
+CALIB_DEM_CLONES void EvaluateOfPairs(const MomentLaw* laws, const ContactBlock& b,
+                                      MomentResponse& response) {
+  for (int k = 0; k < kBlock; ++k) {
+    const MomentLaw& law = laws[b.materials[k]];
+    response.stiffness[k] =
+        law.constant + law.ratio * (b.radius_i[k] * b.radius_j[k] * b.tangential_stiffness[k]);
+    const double mean = 0.5 * (b.radius_i[k] + b.radius_j[k]);
+    const double smaller = b.radius_i[k] < b.radius_j[k] ? b.radius_i[k] : b.radius_j[k];
+    const double load = b.normal_force[k] > 0 ? b.normal_force[k] : 0.0;
+    response.limit[k] = law.friction * (load * (law.limit_by_smaller ? smaller : mean));
+  }
+}
+
+}  // namespace
+
+MomentLaw MomentLawFrom(const KernelContext& context) {
+  return LawOf(context.contact == "linear", context.parameters.Get("friction"),
+               context.parameters.Find("stiffness_ratio"), context.parameters.Find("stiffness"));
+}
+
+std::vector<MomentLaw> MomentLawsFrom(const KernelContext& context) {
+  if (context.materials == nullptr) {
+    return {MomentLawFrom(context)};
+  }
+  const Materials& materials = *context.materials;
+  std::vector<MomentLaw> laws;
+  for (int a = 0; a < materials.count(); ++a) {
+    for (int b = 0; b < materials.count(); ++b) {
+      const auto said = [&](const char* parameter) {
+        return materials.Said(a, b, absl::StrCat(context.effect, ".", parameter));
+      };
+      const auto ratio = said("stiffness_ratio");
+      const auto stiffness = said("stiffness");
+      const bool own = ratio || stiffness;
+      laws.push_back(LawOf(context.contact == "linear",
+                           said("friction").value_or(context.parameters.Get("friction")),
+                           own ? ratio : context.parameters.Find("stiffness_ratio"),
+                           own ? stiffness : context.parameters.Find("stiffness")));
+    }
+  }
+  return laws;
+}
+
+void EvaluateMoment(const std::vector<MomentLaw>& laws, const ContactBlock& block,
+                    MomentResponse& response) {
+  if (block.mixed) {
+    EvaluateOfPairs(laws.data(), block, response);
+  } else {
+    EvaluateOfAll(laws.front(), block, response);
   }
 }
 
@@ -78,6 +132,7 @@ std::vector<ParameterInfo> MomentParameters(const std::string& motion) {
                          " moment over Fn (r1+r2)/2 (hertz_mindlin) or Fn min(r1,r2) (linear); "
                          "infinite: no limit";
   friction.null_value = 0;
+  stiffness.of_pairs = ratio.of_pairs = friction.of_pairs = true;
   return {stiffness, ratio, friction};
 }
 

@@ -21,6 +21,10 @@ struct MomentLaw {
 /// 2018, Table 1]
 MomentLaw MomentLawFrom(const KernelContext& context);
 
+/// One per pair of materials, Materials::Pair() its index; of a model with one material that one. A
+/// pair that has a stiffness or a stiffness_ratio of its own has it instead of either.
+std::vector<MomentLaw> MomentLawsFrom(const KernelContext& context);
+
 /// stiffness, stiffness_ratio, friction; `motion` ("rolling", "twisting") completes the
 /// descriptions.
 std::vector<ParameterInfo> MomentParameters(const std::string& motion);
@@ -35,7 +39,9 @@ struct MomentResponse {
   ContactBlock::Lane limit;
 };
 
-/// Evaluates the law on a block whose normal force and tangential stiffness are known.
-void EvaluateMoment(const MomentLaw& law, const ContactBlock& block, MomentResponse& response);
+/// Evaluates the laws of MomentLawsFrom() on a block whose normal force and tangential stiffness are
+/// known.
+void EvaluateMoment(const std::vector<MomentLaw>& laws, const ContactBlock& block,
+                    MomentResponse& response);
 
 }  // namespace calib::dem

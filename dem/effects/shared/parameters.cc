@@ -26,6 +26,7 @@ ParameterInfo WorkOfAdhesion() {
   work.scaled_prior = DefaultPrior{.kind = "log_uniform", .min = 0.01, .max = 10};
   work.description =
       "W, energy to part two surfaces, per area (twice the surface energy of one material)";
+  work.of_pairs = true;
   return work;
 }
 

@@ -80,6 +80,29 @@ TEST(MaterialsCampaign, ValuesArePartOfTheModelAndUsesOfTheExperiments) {
   EXPECT_EQ(scenario.materials.grains.at("wood"), 0.25);
 }
 
+TEST(MaterialsCampaign, PairsHaveValuesOfEffectsOfTheirOwn) {
+  const std::string text = absl::StrReplaceAll(
+      Yaml(),
+      {{"  density: 2700", "  effects: [rolling_resistance, viscous_damping]\n  density: 2700"},
+       {"fixed: {",
+        "fixed: {rolling_resistance.stiffness_ratio: 1, "
+        "rolling_resistance.friction: 0.1, viscous_damping.ratio: 0.3, "},
+       {"steel-grains: {", "steel-grains: {rolling_resistance.friction: 0.02, "},
+       {"  wood.young_modulus: default",
+        "  wood.young_modulus: default\n"
+        "  wood-grains.viscous_damping.ratio: default\n"
+        "  wood-wood.rolling_resistance.friction: {prior: uniform, min: 0, max: 0.4}"}});
+  const ReadOutcome outcome = ReadCampaign(text, "c.yaml", ReaderOf(Files()));
+  for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
+  const Campaign& c = outcome.campaign;
+  EXPECT_DOUBLE_EQ(c.model.parameters.at("steel-grains.rolling_resistance.friction"), 0.02);
+  ASSERT_EQ(c.parameters.size(), 4U);
+  EXPECT_EQ(c.parameters[2].name, "wood-grains.viscous_damping.ratio");
+  EXPECT_EQ(c.parameters[3].name, "wood-wood.rolling_resistance.friction");
+  const dem::Scenario scenario = MakeScenario(c, c.experiments[1], {7e10, 1e10, 0.2, 0.3}, 0);
+  EXPECT_EQ(scenario.model.parameters.at("wood-grains.viscous_damping.ratio"), 0.2);
+}
+
 TEST(MaterialsCampaign, EveryMistakeIsOneSentence) {
   EXPECT_THAT(With("young_modulus: 210 GPa, density", "young_modulu: 210 GPa, density"),
               HasSubstr("model.materials.steel.young_modulu: is nothing that steel may have"));
@@ -87,9 +110,14 @@ TEST(MaterialsCampaign, EveryMistakeIsOneSentence) {
   EXPECT_THAT(With("steel-grains", "steel-glass"),
               HasSubstr("model.pairs.steel-glass: is no pair A-B of two materials; there are "
                         "grains, steel, wood"));
-  EXPECT_THAT(With("steel-grains: {friction_coefficient", "steel-grains: {damping_ratio"),
-              HasSubstr("model.pairs.steel-grains.damping_ratio: is nothing that steel-grains may "
-                        "have"));
+  EXPECT_THAT(
+      With("steel-grains: {friction_coefficient", "steel-grains: {viscous_damping.ratio"),
+      HasSubstr("model.pairs.steel-grains.viscous_damping.ratio: is nothing that steel-grains may "
+                "have"));
+  EXPECT_THAT(
+      With("steel-grains: {friction_coefficient: 0.2}", "wood-wood: {friction_coefficient: 0.2}"),
+      HasSubstr("model.pairs.wood-wood.friction_coefficient: is nothing that wood-wood may "
+                "have"));
   EXPECT_THAT(With("wood: {density: 700, ", "wood: {density: 700, young_modulus: 1 GPa, "),
               HasSubstr("wood.young_modulus is both calibrated and fixed"));
   EXPECT_THAT(With("fixed: {", "fixed: {steel.density: 7000, "),

@@ -151,7 +151,7 @@ TEST(MaterialPair, DampingRatioOfThePairSetsItsRestitution) {
   model.contact = "linear";
   model.effects = {"viscous_damping"};
   model.parameters["viscous_damping.ratio"] = 0.4;
-  model.parameters["steel-grains.damping_ratio"] = 0.1;
+  model.parameters["steel-grains.viscous_damping.ratio"] = 0.1;
   for (const double partner : {0.01, 0.03}) {
     const test::Run run = test::RunAll(
         Collide(model, {{"radius", 0.01}, {"partner_radius", partner}, {"impact_angle", 0}}));
@@ -317,6 +317,16 @@ TEST(Mixture, OfTwinsHasTheBitsOfOneMaterial) {
       "viscous_damping", {{"ratio", 0.2}});
   scenario.loading_rate = 1;
   ExpectSameBits(scenario, OfTwins(scenario));
+  scenario.loading_rate.reset();
+  scenario =
+      test::With(scenario, "twisting_resistance", {{"stiffness_ratio", 0.5}, {"friction", 0.1}});
+  scenario = test::With(scenario, "linear_cohesion", {{"energy_density", 1e5}});
+  scenario =
+      test::With(scenario, "capillary_bridges", {{"surface_tension", 5}, {"volume_ratio", 1e-3}});
+  ExpectSameBits(test::With(scenario, "adhesion_dmt", {{"work_of_adhesion", 5}}),
+                 OfTwins(test::With(scenario, "adhesion_dmt", {{"work_of_adhesion", 5}})));
+  ExpectSameBits(test::With(scenario, "adhesion_jkr", {{"work_of_adhesion", 5}}),
+                 OfTwins(test::With(scenario, "adhesion_jkr", {{"work_of_adhesion", 5}})));
   scenario = test::SmallTriaxial(test::LinearModel());
   ExpectSameBits(scenario, OfTwins(scenario));
 }
@@ -457,8 +467,9 @@ TEST(MaterialProblems, AreSaidOneByOne) {
               Contains(HasSubstr("soft.young_modulus is -1, allowed is [10000, ")));
   EXPECT_THAT(with([](Scenario& s) { s.model.parameters["hard.young_modulus"] = 1e9; }),
               Contains(HasSubstr("no parameter \"hard.young_modulus\"")));
-  EXPECT_THAT(with([](Scenario& s) { s.model.parameters["grains-soft.damping_ratio"] = 0.1; }),
-              Contains(HasSubstr("no parameter")));  // without viscous_damping
+  EXPECT_THAT(
+      with([](Scenario& s) { s.model.parameters["grains-soft.viscous_damping.ratio"] = 0.1; }),
+      Contains(HasSubstr("no parameter")));  // without viscous_damping
   EXPECT_THAT(with([](Scenario& s) {
                 s.model.parameters["grains-soft.friction_coefficient"] = 0.1;
                 s.model.parameters["soft-grains.friction_coefficient"] = 0.1;
@@ -479,10 +490,10 @@ TEST(MaterialProblems, AreSaidOneByOne) {
   EXPECT_THAT(with([](Scenario& s) { s.packing.material.assign(s.packing.x.size(), "hard"); }),
               Contains(HasSubstr("grains of the packing are of material \"hard\"")));
   EXPECT_THAT(with([](Scenario& s) {
-                s.model.effects.emplace_back("adhesion_jkr");
-                s.model.parameters["adhesion_jkr.work_of_adhesion"] = 0.1;
+                s.model.effects.emplace_back("nonspherical_shape");
+                s.model.parameters["nonspherical_shape.aspect"] = 1.2;
               }),
-              Contains(HasSubstr("adhesion_jkr knows one material only")));
+              Contains(HasSubstr("nonspherical_shape knows one material only")));
 }
 
 }  // namespace
