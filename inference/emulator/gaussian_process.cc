@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "inference/emulator/bounded_minimizer.h"
 #include "inference/emulator/matern_kernel.h"
@@ -13,38 +14,43 @@ namespace {
 
 using Eigen::Index;
 
+constexpr Index kBlock = 256;  // of points: their cross-covariances stay in the cache
+
 // Standard deviation about the mean, and one where there is no spread to scale by.
 double Spread(const Eigen::VectorXd& values, double mean) {
   const double sd = std::sqrt((values.array() - mean).square().mean());
   return sd > 1e-12 * (std::abs(mean) + std::numeric_limits<double>::min()) ? sd : 1;
 }
 
-struct HyperParameters {
-  Eigen::VectorXd x;
-  double value = std::numeric_limits<double>::infinity();
-};
+// Smooth and wiggly.
+std::vector<Eigen::VectorXd> FixedStarts(Index d) {
+  struct Start {
+    double length, signal, scatter;
+  };
+  std::vector<Eigen::VectorXd> starts;
+  for (const Start& start : {Start{4, 1, 1e-3}, Start{1, 0.3, 1e-2}}) {
+    starts.emplace_back(d + 2) << Eigen::VectorXd::Constant(d, std::log(start.length)),
+        std::log(start.signal), std::log(start.scatter);
+  }
+  return starts;
+}
 
-HyperParameters MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs,
-                             double max_scatter) {
+Minimum MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs,
+                     double max_scatter, const std::vector<Eigen::VectorXd>& starts) {
   const Index d = inputs.cols();
   const KernelObjective objective(inputs, outputs);
   Eigen::VectorXd lower(d + 2);
   Eigen::VectorXd upper(d + 2);
   lower << Eigen::VectorXd::Constant(d, std::log(0.2)), std::log(1e-8), std::log(1e-9);
   upper << Eigen::VectorXd::Constant(d, std::log(100.0)), std::log(1e3), std::log(max_scatter);
-  HyperParameters best;
-  struct Start {
-    double length, signal, scatter;
-  };
-  for (const Start& start : {Start{4, 1, 1e-3}, Start{1, 0.3, 1e-2}}) {
-    Eigen::VectorXd x(d + 2);
-    x << Eigen::VectorXd::Constant(d, std::log(start.length)), std::log(start.signal),
-        std::log(std::min(start.scatter, max_scatter));
+  Minimum best{.x = {}, .value = std::numeric_limits<double>::infinity()};
+  for (const Eigen::VectorXd& start : starts) {
+    const Eigen::VectorXd x = start.cwiseMax(lower).cwiseMin(upper);
     Eigen::VectorXd gradient(d + 2);
     if (!std::isfinite(objective(x, gradient))) continue;
     const Minimum minimum =
         MinimizeInBox(objective, x, lower, upper, {.max_iterations = 40, .tolerance = 1e-2});
-    if (minimum.value < best.value) best = {.x = minimum.x, .value = minimum.value};
+    if (minimum.value < best.value) best = minimum;
   }
   return best;
 }
@@ -69,7 +75,11 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
       (inputs.rowwise() - process.input_mean_).array().rowwise() / process.input_sd_.array();
   const Eigen::VectorXd scaled = (outputs.array() - process.output_mean_) / process.output_sd_;
 
-  const HyperParameters hyper = MostProbable(process.train_, scaled, options.max_scatter);
+  assert(options.like == nullptr || !options.like->constant());
+  const Minimum hyper = MostProbable(
+      process.train_, scaled, options.max_scatter,
+      options.like == nullptr ? FixedStarts(d)
+                              : std::vector<Eigen::VectorXd>{options.like->HyperParameters()});
   if (!std::isfinite(hyper.value)) {
     return absl::FailedPreconditionError(
         "the emulator's covariance matrix cannot be factorised: are the runs' parameters all the "
@@ -101,6 +111,13 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   return process;
 }
 
+Eigen::VectorXd GaussianProcess::HyperParameters() const {
+  Eigen::VectorXd x(lengths_.size() + 2);
+  x << lengths_.transpose().array().log().matrix(), std::log(signal_),
+      std::log(scatter_variance_ / (output_sd_ * output_sd_));
+  return x;
+}
+
 void GaussianProcess::SetConstant(const Eigen::VectorXd& outputs) {
   const auto n = static_cast<double>(outputs.size());
   constant_ = true;
@@ -120,7 +137,6 @@ GaussianProcessPrediction GaussianProcess::Predict(const Eigen::MatrixXd& inputs
       .mean = Eigen::VectorXd::Constant(m, output_mean_),
       .variance = Eigen::VectorXd::Constant(m, constant_variance_)};
   if (constant_) return prediction;
-  constexpr Index kBlock = 256;  // the cross-covariances of a block stay in the cache
   for (Index first = 0; first < m; first += kBlock) {
     const Index size = std::min(kBlock, m - first);
     const GaussianProcessPrediction block = PredictBlock(inputs.middleRows(first, size));
@@ -130,13 +146,33 @@ GaussianProcessPrediction GaussianProcess::Predict(const Eigen::MatrixXd& inputs
   return prediction;
 }
 
+Eigen::VectorXd GaussianProcess::PredictMean(const Eigen::MatrixXd& inputs) const {
+  const Index m = inputs.rows();
+  Eigen::VectorXd mean = Eigen::VectorXd::Constant(m, output_mean_);
+  for (Index first = 0; !constant_ && first < m; first += kBlock) {
+    const Index size = std::min(kBlock, m - first);
+    mean.segment(first, size) = MeanFrom(CrossCovariances(Scaled(inputs.middleRows(first, size))));
+  }
+  return mean;
+}
+
+Eigen::MatrixXd GaussianProcess::Scaled(const Eigen::MatrixXd& inputs) const {
+  return (inputs.rowwise() - input_mean_).array().rowwise() / input_sd_.array();
+}
+
+Eigen::MatrixXd GaussianProcess::CrossCovariances(const Eigen::MatrixXd& points) const {
+  return KernelMatrix(train_, points, {.lengths = lengths_, .signal = signal_});
+}
+
+Eigen::VectorXd GaussianProcess::MeanFrom(const Eigen::MatrixXd& cross) const {
+  return (cross.transpose() * alpha_ * output_sd_).array() + output_mean_;
+}
+
 GaussianProcessPrediction GaussianProcess::PredictBlock(const Eigen::MatrixXd& inputs) const {
-  const Eigen::MatrixXd points =
-      (inputs.rowwise() - input_mean_).array().rowwise() / input_sd_.array();
-  Eigen::MatrixXd cross =
-      KernelMatrix(train_, points, {.lengths = lengths_, .signal = signal_});  // n x m
+  const Eigen::MatrixXd points = Scaled(inputs);
+  Eigen::MatrixXd cross = CrossCovariances(points);
   GaussianProcessPrediction prediction;
-  prediction.mean = (cross.transpose() * alpha_ * output_sd_).array() + output_mean_;
+  prediction.mean = MeanFrom(cross);
   cholesky_.triangularView<Eigen::Lower>().solveInPlace(cross);
   prediction.variance = kTrendVariance * (1 + points.rowwise().squaredNorm().array()) + signal_;
   prediction.variance -= cross.colwise().squaredNorm().transpose();

@@ -18,11 +18,16 @@ struct GaussianProcessPrediction {
   Eigen::VectorXd variance;  ///< of the function itself, without the scatter of a run
 };
 
+class GaussianProcess;
+
 struct GaussianProcessOptions {
   /// Whether a constant takes the place of a function that explains the outputs no better. A search
   /// says no: it must know where it has not looked yet.
   bool may_be_constant = true;
   double max_scatter = 2;  ///< variance of the scatter over that of the outputs, [1e-8, 2]
+  /// Not constant, of nearly the same runs: its hyper-parameters are where the search begins, in
+  /// place of both starts.
+  const GaussianProcess* like = nullptr;
 };
 
 /// output = f(input) + scatter,  f ~ GP(0, k),  scatter ~ N(0, scatter variance) independent,
@@ -34,7 +39,7 @@ struct GaussianProcessOptions {
 /// between the runs. Inputs are shifted and scaled to zero mean and unit standard deviation over
 /// the training set, outputs likewise, so that hyper-parameters have order one. l_j, s and the
 /// scatter are those of highest posterior density: marginal likelihood times weak log-normal
-/// priors, from two fixed starts (smooth, wiggly). Thread safety: const after Fit.
+/// priors, from two fixed starts (smooth, wiggly) or from options.like. Thread safety: const after Fit.
 class GaussianProcess {
  public:
   /// in: inputs n x d, outputs n, n >= 4, all finite.
@@ -46,6 +51,9 @@ class GaussianProcess {
   /// Mean and variance of f at the rows of an m x d matrix; O(m n^2).
   GaussianProcessPrediction Predict(const Eigen::MatrixXd& inputs) const;
 
+  /// The mean alone, the same bits; O(m n d).
+  Eigen::VectorXd PredictMean(const Eigen::MatrixXd& inputs) const;
+
   /// Closed form [Rasmussen & Williams 2006, Eqs. 5.10-5.12]: error_i = alpha_i / (K^-1)_ii,
   /// variance_i = 1 / (K^-1)_ii.
   const LeaveOneOut& leave_one_out() const { return leave_one_out_; }
@@ -55,7 +63,11 @@ class GaussianProcess {
   Eigen::VectorXd lengths() const { return lengths_.cwiseProduct(input_sd_); }
 
  private:
+  Eigen::VectorXd HyperParameters() const;  // logarithms: lengths, signal, scatter; scaled
   void SetConstant(const Eigen::VectorXd& outputs);
+  Eigen::MatrixXd Scaled(const Eigen::MatrixXd& inputs) const;
+  Eigen::MatrixXd CrossCovariances(const Eigen::MatrixXd& points) const;  // scaled; n x m
+  Eigen::VectorXd MeanFrom(const Eigen::MatrixXd& cross) const;
   GaussianProcessPrediction PredictBlock(const Eigen::MatrixXd& inputs) const;
 
   bool constant_ = false;

@@ -4,10 +4,8 @@
 #include <Eigen/Dense>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
-
-#include "absl/status/statusor.h"
-#include "inference/prior/joint_prior.h"
 
 namespace calib::inference {
 
@@ -31,46 +29,14 @@ struct SobolOptions {
 /// Outputs (m x k) at m points of the unit cube (m x d).
 using UnitFunction = std::function<Eigen::MatrixXd(const Eigen::MatrixXd&)>;
 
+/// `replicates` sets of N points in the unit cube of 2 d dimensions, N x 2d each: matrices A and B
+/// of Saltelli et al. 2010, side by side. Made once, they serve any number of functions.
+std::vector<Eigen::MatrixXd> SobolSets(int dimensions, const SobolOptions& options);
+
 /// First order by Saltelli et al. 2010, Table 2 (b), total by Jansen 1999, each from N (d + 2)
-/// evaluations per set. One entry per output. Pure function of its arguments if f is one.
-std::vector<SobolIndices> EstimateSobolIndices(int dimensions, const SobolOptions& options,
+/// evaluations per set; two sets at least. One entry per output. Pure function of its arguments if f
+/// is one.
+std::vector<SobolIndices> EstimateSobolIndices(std::span<const Eigen::MatrixXd> sets,
                                                const UnitFunction& f);
-
-/// An output of a model that was run N times, emulated.
-struct OutputSensitivity {
-  /// Over the prior; empty where the prior's parameters are not independent or nothing is explained.
-  SobolIndices indices;
-  /// 1 - mean square leave-one-out error / variance of the runs; NaN where all runs are equal.
-  double explained = 0;
-  double mean = 0;  ///< of the emulated output over the points
-  double sd = 0;    ///< likewise, and the emulator's leave-one-out error in quadrature
-  /// d, of the output's rank with each parameter's, over the points; empty where nothing is
-  /// explained, NaN for a parameter that does not vary over them.
-  Eigen::VectorXd correlation;
-  Eigen::VectorXd correlation_error;  ///< d
-
-  /// Whether the emulator tells enough of the output to say what moves it.
-  bool Explains() const;
-};
-
-/// Share of the runs' variance below which an emulator explains nothing.
-constexpr double kLeastExplained = 0.05;
-
-struct SensitivityOptions {
-  SobolOptions sobol;
-  bool indices = true;  ///< false: correlations alone
-  int max_runs = 120;   ///< that the emulator learns from, evenly chosen, >= 20
-  int folds = 8;  ///< parts of the runs left out in turn for the emulator's share of errors, >= 2
-};
-
-/// Of each column of outputs (N x k, finite) from N runs at parameters (N x d): a Gaussian process
-/// in standardised parameters, its Sobol indices over the prior, and the rank correlations with the
-/// parameters over points (m x d, e.g. draws of the posterior). Errors join the sampling's and the
-/// emulator's: the latter by a jackknife over `folds` parts of the runs [Efron & Tibshirani 1993,
-/// ch. 11]; a part whose emulator is constant says that nothing moves the output, 0. Errors: INVALID_ARGUMENT for shapes; FAILED_PRECONDITION with fewer than max(20, 3 d)
-/// runs.
-absl::StatusOr<std::vector<OutputSensitivity>> AnalyseSensitivity(
-    const JointPrior& priors, const Eigen::MatrixXd& parameters, const Eigen::MatrixXd& outputs,
-    const Eigen::MatrixXd& points, const SensitivityOptions& options);
 
 }  // namespace calib::inference

@@ -96,7 +96,7 @@ absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
   const bool logarithmic = ValuesDone(state, done, values);
   auto process = GaussianProcess::Fit(done, values, kProcess);
   if (!process.ok()) return process.status();
-  const Eigen::VectorXd at_done = process->Predict(done).mean;
+  const Eigen::VectorXd at_done = process->PredictMean(done);
   const double best = at_done.minCoeff();
   Eigen::MatrixXd others;
   Eigen::VectorXd least;
@@ -105,7 +105,7 @@ absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
     Eigen::MatrixXd all(done.rows() + others.rows(), d);
     all << done, others;
     Eigen::VectorXd believed(all.rows());
-    believed << values, process->Predict(others).mean.cwiseMax(least);
+    believed << values, process->PredictMean(others).cwiseMax(least);
     process = GaussianProcess::Fit(all, believed, kProcess);
     if (!process.ok()) return process.status();
   }

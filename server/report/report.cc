@@ -19,7 +19,8 @@ std::string RenderReport(const CampaignView& view, const Story& story) {
   std::string body = SummarySection(data);
   if (view.posterior.parameters_size() > 0) {
     body += ParameterSection(data) + FitSection(data) + MissingPhysicsSection(data) +
-            DiagnosisSection(data) + PosteriorSection(data) + EvolutionSection(data);
+            DiagnosisSection(data) + PosteriorSection(data) + SensitivitySection(data) +
+            EvolutionSection(data);
   } else {
     body += "<p>No iteration is complete yet, so there is no posterior to show.</p>\n";
   }

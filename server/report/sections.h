@@ -34,6 +34,8 @@ std::string PosteriorSection(
     const ReportData& data);  ///< section_posterior.cc: marginals and pairs
 std::string EvolutionSection(
     const ReportData& data);  ///< section_evolution.cc: iterations and loading path
+std::string SensitivitySection(
+    const ReportData& data);  ///< section_sensitivity.cc: which parameters move what
 std::string RecordSection(const ReportData& data);  ///< section_record.cc: campaign and provenance
 
 /// The unit in which a calibrated parameter is shown throughout.

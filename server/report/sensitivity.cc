@@ -112,6 +112,11 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
   const Eigen::MatrixXd posterior_points = PosteriorPoints(view);
   result.points_from = posterior_points.rows() > 2 ? view.posterior.posterior_from() : "none";
   const inference::SensitivityOptions options{.sobol = {.seed = view.campaign.seed % 1000}};
+  const std::vector<Eigen::MatrixXd> sets =
+      result.independent ? inference::SobolSets(static_cast<int>(d), options.sobol)
+                         : std::vector<Eigen::MatrixXd>();
+  const inference::RankedPoints over_prior = inference::Ranked(priors, prior_points);
+  const inference::RankedPoints over_posterior = inference::Ranked(priors, posterior_points);
 
   absl::Status last = absl::FailedPreconditionError(
       "there are no finished runs, so that nothing can be said of what moves them");
@@ -143,19 +148,18 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
         continue;
       }
       Eigen::MatrixXd parameters(n, d);
-      Eigen::MatrixXd outputs(n, 1);
+      Eigen::VectorXd outputs(n);
       for (Index i = 0; i < n; ++i) {
         const v1::Sample& sample =
             view.samples[static_cast<std::size_t>(columns[k].samples[static_cast<std::size_t>(i)])];
         for (Index j = 0; j < d; ++j) parameters(i, j) = sample.parameters(static_cast<int>(j));
-        outputs(i, 0) = columns[k].values[static_cast<std::size_t>(i)];
+        outputs[i] = columns[k].values[static_cast<std::size_t>(i)];
       }
-      auto over_prior =
-          inference::AnalyseSensitivity(priors, parameters, outputs, prior_points, options);
-      if (!over_prior.ok()) {
-        last = over_prior.status();
-        result.left_out.push_back(absl::StrCat(experiment.name, ": ", names[k].name, ": ",
-                                               std::string(over_prior.status().message())));
+      const auto emulated = inference::EmulatedOutput::Fit(priors, parameters, outputs, options);
+      if (!emulated.ok()) {
+        last = emulated.status();
+        result.left_out.push_back(
+            absl::StrCat(experiment.name, ": ", names[k].name, ": ", std::string(last.message())));
         continue;
       }
       Quantity& quantity = result.quantities.emplace_back();
@@ -163,12 +167,9 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
       quantity.name = names[k].name;
       quantity.unit = names[k].unit;
       quantity.runs = static_cast<int>(n);
-      quantity.prior = std::move(over_prior->front());
+      quantity.prior = emulated->Over(priors, over_prior, sets);
       if (result.points_from == "none" || !quantity.prior.Explains()) continue;
-      auto over_posterior =
-          inference::AnalyseSensitivity(priors, parameters, outputs, posterior_points,
-                                        {.sobol = options.sobol, .indices = false});
-      if (over_posterior.ok()) quantity.posterior = std::move(over_posterior->front());
+      quantity.posterior = emulated->Over(priors, over_posterior, {});
     }
   }
   if (result.quantities.empty()) return last;

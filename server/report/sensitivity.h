@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "inference/sensitivity/sobol_indices.h"
+#include "inference/sensitivity/emulated_output.h"
 #include "server/report/campaign_view.h"
 
 namespace calib::report {

@@ -39,6 +39,16 @@ TEST(Report, EveryPictureHasATitleForScreenReaders) {
   EXPECT_EQ(count("<svg "), count("<title") - 1);  // the page has one too
 }
 
+TEST(Report, SaysWhichParametersMoveTheBulkProperties) {
+  CampaignView view = testing::ExampleView("sand");
+  const std::string html = RenderReport(view);
+  EXPECT_THAT(html, HasSubstr("<h2>What moves what</h2>"));
+  EXPECT_THAT(html, HasSubstr("share of friction angle in the peak friction angle of tx02"));
+  EXPECT_THAT(html, HasSubstr("share of friction angle in the final volumetric strain of tx02"));
+  view.samples.resize(10);
+  EXPECT_THAT(RenderReport(view), HasSubstr("an emulator needs at least 20 finished runs"));
+}
+
 TEST(Report, AHostileNameStaysText) {
   const std::string name = "</title><script>alert(1)</script><img src=x onerror='alert(2)'>\"&";
   CampaignView view = testing::ExampleView(name);

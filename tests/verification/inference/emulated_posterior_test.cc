@@ -337,6 +337,46 @@ TEST(EmulatedPosterior, RefusesAPosteriorWhereNoRunIs) {
   EXPECT_NE(partly->reason.find("where few runs are"), std::string::npos) << partly->reason;
 }
 
+// Runs in a thousandth of the prior: enough of its draws lie there to begin a posterior, too few to
+// carry a path.
+TEST(EmulatedPosterior, OfWhichNoPathCanBeginIsGivenWithoutOne) {
+  const auto strength = [](double x, double y, int k) {
+    return 3 + std::sin(3 * x) + 0.5 * std::sin(5 * y + 0.2 * k);
+  };
+  const auto posterior = [&](double half_width) {
+    const Prior wide{.kind = PriorKind::kUniform, .min = -half_width, .max = half_width};
+    DataSet data;
+    for (int k = 0; k < 20; ++k) {
+      data.readings.push_back(
+          {.load_step = k, .control = 0.01 * k, .value = strength(0.1, 0.1, k), .sd = 0.05});
+    }
+    Iteration runs;
+    runs.parameters = Halton(60, 2).array() - 0.5;
+    runs.predictions.resize(60, 20);
+    for (Eigen::Index i = 0; i < 60; ++i) {
+      for (int k = 0; k < 20; ++k) {
+        runs.predictions(i, k) = strength(runs.parameters(i, 0), runs.parameters(i, 1), k);
+      }
+    }
+    return EmulatedPosterior(JointPrior({wide, wide}), data,
+                             {.path_draws = 100, .reversed_path = true, .seed = 3}, {&runs, 1});
+  };
+  const auto near = posterior(0.5);
+  ASSERT_TRUE(near.ok()) << near.status();
+  ASSERT_TRUE(near->adequate) << near->reason;
+  EXPECT_EQ(near->path.mean.rows(), 20);
+  EXPECT_EQ(near->reversed_path.mean.rows(), 20);
+  const auto far = posterior(16);
+  ASSERT_TRUE(far.ok()) << far.status();
+  ASSERT_TRUE(far->adequate) << far->reason;
+  EXPECT_EQ(far->path.mean.rows(), 0);
+  EXPECT_EQ(far->reversed_path.mean.rows(), 0);
+  for (std::size_t j = 0; j < 2; ++j) {
+    const ParameterSummary& other = near->parameters[j];
+    EXPECT_NEAR(far->parameters[j].mean, other.mean, 0.3 * other.sd) << "the posterior stays";
+  }
+}
+
 TEST(EmulatedPosterior, RecognisesTooFewRuns) {
   const ToyCurve toy{.d = 5, .scatter = 0.001};
   Iteration runs;

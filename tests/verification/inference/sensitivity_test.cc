@@ -11,7 +11,7 @@
 
 #include "inference/sampling/halton.h"
 #include "inference/sampling/philox.h"
-#include "inference/sensitivity/sobol_indices.h"
+#include "inference/sensitivity/emulated_output.h"
 
 namespace calib::inference {
 namespace {
@@ -47,7 +47,8 @@ std::vector<Prior> Cube() {
 
 TEST(SobolIndices, OfTheIshigamiFunction) {
   const Known known;
-  const auto indices = EstimateSobolIndices(3, {.points = 1024}, [](const Eigen::MatrixXd& unit) {
+  const auto sets = SobolSets(3, {.points = 1024});
+  const auto indices = EstimateSobolIndices(sets, [](const Eigen::MatrixXd& unit) {
     Eigen::MatrixXd y(unit.rows(), 2);
     for (Eigen::Index i = 0; i < unit.rows(); ++i) {
       const Eigen::VectorXd x = (2 * unit.row(i).array() - 1) * std::numbers::pi;
