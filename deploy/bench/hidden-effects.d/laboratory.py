@@ -50,7 +50,7 @@ class Laboratory:
         campaign = self.call(case, 'run', self.path(case, 'campaign.yaml'), '--workers', '1')
         options = ['--without', case.removed] if case.removed else []
         verdict = self.call(case, 'diagnose', campaign['campaign'], '--workers', '1', *options)
-        document = {'run': campaign, 'diagnose': verdict}
+        document = {'run': campaign, 'diagnose': verdict, 'compare': self.call(case, 'compare', campaign['campaign'])}
         if case.verb == 'improve' and improve:
             document['improve'] = self.call(case, 'improve', campaign['campaign'], '--workers', '1', '--max-effects', '2')
             final = document['improve']['final_campaign']
@@ -155,13 +155,17 @@ parameters:
         # Last: a folder with a campaign is a complete measurement.
         self.write(self.path(case, 'campaign.yaml'), self.campaign(1, STAGING['grains'], STAGING, (), (), PACKINGS))
 
-    def outcome(self, case):
-        """Verdict first, then the truth: its digest must be the one written down when the measurement was made."""
-        verdict = json.load(open(self.path(case, 'verdict.json')))
+    def verdict(self, case):
+        return json.load(open(self.path(case, 'verdict.json')))
+
+    def truth(self, case):
+        """Of a case that has its verdict; the digest must be the one written down when the measurement was made."""
+        if not self.finished(case):
+            raise Failed(f'{case.name}: sealed until there is a verdict')
         sealed = open(self.sealed(case, '.json')).read()
         if digest(sealed) != open(self.path(case, 'truth.sha256')).read().strip():
             raise Failed(f'{case.name}: the sealed truth has been changed')
-        return {'case': case, 'verdict': verdict, 'truth': json.loads(sealed), 'lambda': self.visible_at_truth(case)}
+        return json.loads(sealed)
 
     # ---- strengths ----------------------------------------------------------------------------------------------------
     def catalogue(self):
@@ -236,7 +240,7 @@ parameters:
         if not os.path.exists(path):
             if jobs == 0:
                 return None
-            truth = self.outcome(case)['truth']
+            truth = self.truth(case)
             base = {name: truth['parameters'][name] for name in ('young_modulus', 'friction_coefficient')}
             values = {name: value for name, value in truth['parameters'].items() if name not in base}
             self.write(path, json.dumps(self.visibility(jobs).visible(tuple(truth['effects']), values, base)))
