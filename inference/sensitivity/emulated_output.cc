@@ -98,6 +98,18 @@ Said Ask(const GaussianProcess& process, const JointPrior& priors, const RankedP
   return result;
 }
 
+// Of nine tenths of each column's entries.
+Eigen::RowVectorXd MiddleRange(const Eigen::MatrixXd& points) {
+  Eigen::RowVectorXd range(points.cols());
+  const auto tail = static_cast<std::ptrdiff_t>(points.rows() / 20);
+  for (Index j = 0; j < points.cols(); ++j) {
+    Eigen::VectorXd column = points.col(j);
+    std::sort(column.begin(), column.end());
+    range[j] = *(column.end() - 1 - tail) - *(column.begin() + tail);
+  }
+  return range;
+}
+
 bool MayHaveIndices(const JointPrior& priors) {
   return priors.is_independent() && !priors.is_constrained();
 }
@@ -142,6 +154,7 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
   EmulatedOutput emulated(*std::move(whole));
   const double average = values.mean();
   const double variance = (values.array() - average).square().mean();
+  emulated.range_ = inputs.colwise().maxCoeff() - inputs.colwise().minCoeff();
   emulated.missed_ =
       emulated.whole_.leave_one_out().error.squaredNorm() / static_cast<double>(used);
   emulated.explained_ =
@@ -162,7 +175,9 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
 
 OutputSensitivity EmulatedOutput::Over(const JointPrior& priors, const RankedPoints& points,
                                        std::span<const Eigen::MatrixXd> sets) const {
-  if (!MayHaveIndices(priors)) sets = {};
+  constexpr double kReach = 2;
+  const bool out_of_reach = (MiddleRange(points.standard).array() > kReach * range_.array()).any();
+  if (!MayHaveIndices(priors) || out_of_reach) sets = {};
   Said whole =
       Ask(whole_, priors, points, parts_.empty() ? std::span<const Eigen::MatrixXd>() : sets);
   OutputSensitivity out{.indices = {},
@@ -170,8 +185,9 @@ OutputSensitivity EmulatedOutput::Over(const JointPrior& priors, const RankedPoi
                         .mean = whole.mean,
                         .sd = std::hypot(whole.sd, std::sqrt(missed_)),
                         .correlation = {},
-                        .correlation_error = {}};
-  if (parts_.empty()) return out;
+                        .correlation_error = {},
+                        .out_of_reach = out_of_reach};
+  if (parts_.empty() || out_of_reach) return out;
   out.correlation = std::move(whole.correlation);
   out.indices = std::move(whole.indices);
 

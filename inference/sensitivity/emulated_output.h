@@ -15,17 +15,20 @@ namespace calib::inference {
 
 /// An output of a model that was run N times, emulated.
 struct OutputSensitivity {
-  /// Over the prior; empty where none were asked for, the prior's parameters are not independent or
-  /// nothing is explained.
+  /// Over the prior; empty where none were asked for, the prior's parameters are not independent,
+  /// nothing is explained or the points are out of reach.
   SobolIndices indices;
   /// 1 - mean square leave-one-out error / variance of the runs; NaN where all runs are equal.
   double explained = 0;
   double mean = 0;  ///< of the emulated output over the points
   double sd = 0;    ///< likewise, and the emulator's leave-one-out error in quadrature
   /// d, of the output's rank with each parameter's, over the points; empty where nothing is
-  /// explained, NaN for a parameter that does not vary over them.
+  /// explained or the points are out of reach, NaN for a parameter that does not vary over them.
   Eigen::VectorXd correlation;
   Eigen::VectorXd correlation_error;  ///< d
+  /// Nine tenths of the points spread, in some parameter, over more than twice the range of the
+  /// runs: what the emulator says there is its trend, of which no run knows.
+  bool out_of_reach = false;
 
   /// Whether the emulator tells enough of the output to say what moves it.
   bool Explains() const;
@@ -74,6 +77,7 @@ class EmulatedOutput {
 
   GaussianProcess whole_;
   std::vector<GaussianProcess> parts_;  // empty where nothing is explained
+  Eigen::RowVectorXd range_;            // of the runs, standardised
   double missed_ = 0;                   // mean square leave-one-out error
   double explained_ = 0;
 };

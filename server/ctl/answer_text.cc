@@ -203,6 +203,9 @@ std::string SensitivityText(const report::Sensitivity& sensitivity) {
                           report::NumberWithUnit(q.posterior.mean, q.name, q.unit, 4),
                           report::NumberWithUnit(q.posterior.sd, q.name, q.unit, 2));
     }
+    if (q.prior.out_of_reach) {
+      text += "The runs cover too little of the prior to say what moves it there.\n";
+    }
     TextTable table({"<parameter", "first order", "total", "rank corr., prior", "posterior"});
     for (int j = 0; j < static_cast<int>(sensitivity.parameters.size()); ++j) {
       table.AddRow({sensitivity.parameters[static_cast<std::size_t>(j)],

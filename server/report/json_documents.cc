@@ -221,6 +221,7 @@ std::string SensitivityJson(const std::string& campaign, const Sensitivity& s) {
          {"prior",
           {{"mean", q.prior.mean},
            {"sd", q.prior.sd},
+           {"out_of_reach", q.prior.out_of_reach},
            {"correlation", by_parameter(q.prior.correlation, q.prior.correlation_error, "rank")}}},
          {"posterior",
           posterior ? Json{{"mean", q.posterior.mean},

@@ -44,6 +44,7 @@ std::string Cell(const std::string& parameter, const Quantity& q, int j) {
     html += ShareBar(parameter, q, indices.total[j]) + fmt::format("{:.2f}", indices.total[j]);
     if (Has(indices.total_error, j)) html += fmt::format(" ± {:.2f}", indices.total_error[j]);
   }
+  if (q.prior.out_of_reach) html += "<span class=\"sub\">prior: –</span>";
   return html + Correlation("prior", q.prior, j) + Correlation("posterior", q.posterior, j) +
          "</td>";
 }

@@ -41,8 +41,14 @@ TEST(Report, EveryPictureHasATitleForScreenReaders) {
 
 TEST(Report, SaysWhichParametersMoveTheBulkProperties) {
   CampaignView view = testing::ExampleView("sand");
+  EXPECT_THAT(RenderReport(view), HasSubstr("prior: –")) << "the runs lie together";
+  view.campaign.parameters[0].prior = {
+      .kind = inference::PriorKind::kUniform, .min = 0.4e9, .max = 8e9};
+  view.campaign.parameters[1].prior = {
+      .kind = inference::PriorKind::kUniform, .min = 0.17, .max = 0.8};
   const std::string html = RenderReport(view);
   EXPECT_THAT(html, HasSubstr("<h2>What moves what</h2>"));
+  EXPECT_THAT(html, Not(HasSubstr("prior: –")));
   EXPECT_THAT(html, HasSubstr("share of friction angle in the peak friction angle of tx02"));
   EXPECT_THAT(html, HasSubstr("share of friction angle in the final volumetric strain of tx02"));
   view.samples.resize(10);

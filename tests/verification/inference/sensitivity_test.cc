@@ -118,6 +118,24 @@ TEST(SobolIndices, RepeatedPointsDoNotMakeCorrelationsMoreCertain) {
   EXPECT_NEAR(often->front().correlation_error[0], once->front().correlation_error[0], 0.01);
 }
 
+// Runs near a posterior know nothing of the prior, however well a trend through them fits.
+TEST(SobolIndices, AreNotGivenWhereNoRunIs) {
+  const std::vector<Prior> marginals(2, Prior{.kind = PriorKind::kUniform, .min = 0, .max = 1});
+  for (const double width : {1.0, 0.6, 0.1}) {
+    const Eigen::MatrixXd runs = 0.5 + width * (Halton(40, 2).array() - 0.5);
+    const Eigen::MatrixXd outputs = runs.col(0) + 0.2 * runs.col(1);
+    const auto over_prior = AnalyseSensitivity(marginals, runs, outputs, Halton(200, 2), {});
+    const auto near_runs = AnalyseSensitivity(marginals, runs, outputs, runs, {});
+    ASSERT_TRUE(over_prior.ok() && near_runs.ok());
+    const bool covers = width > 0.5;
+    EXPECT_EQ(over_prior->front().out_of_reach, !covers) << width;
+    EXPECT_EQ(over_prior->front().indices.total.size(), covers ? 2 : 0) << width;
+    EXPECT_EQ(over_prior->front().correlation.size(), covers ? 2 : 0) << width;
+    EXPECT_FALSE(near_runs->front().out_of_reach) << width;
+    EXPECT_GT(near_runs->front().correlation[0], 0.9) << width;
+  }
+}
+
 TEST(SobolIndices, RanksTellTheDirectionAndTiedPriorsHaveCorrelationsOnly) {
   const std::vector<Prior> marginals(2, Prior{.kind = PriorKind::kUniform, .min = 0, .max = 1});
   const JointPrior priors =
