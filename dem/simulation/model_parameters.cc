@@ -1,6 +1,7 @@
 #include "dem/simulation/model_parameters.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
@@ -86,19 +87,37 @@ std::vector<std::string> PairNames(const Model& model) {
   return names;
 }
 
-/// Of a pair that is given two parameters of which one says what the other says.
-std::vector<std::string> PairAlternatives(const Model& model, const std::string& pair) {
+/// What is wrong with the values of two materials, or of one among its equals, whatever the order in
+/// which each of them names the pair.
+std::vector<std::string> PairProblems(const Model& model, const std::string& a,
+                                      const std::string& b) {
+  const auto given = [&](const std::string& name) {
+    std::vector<std::string> dotted;
+    for (const std::string& pair : {absl::StrCat(a, "-", b), absl::StrCat(b, "-", a)}) {
+      if (const std::string full = absl::StrCat(pair, ".", name); model.parameters.contains(full)) {
+        dotted.push_back(full);
+      }
+      if (a == b) {
+        break;
+      }
+    }
+    return dotted;
+  };
   std::vector<std::string> problems;
   for (const std::string& name : PairNames(model)) {
-    const ParameterInfo* info = PairParameter(model, pair, name);
-    if (info == nullptr || info->alternative_to.empty()) {
+    const std::vector<std::string> own = given(name);
+    if (own.size() > 1) {
+      problems.push_back(absl::StrCat(own[0], " and ", own[1], " are the same; give one of them"));
+    }
+    const ParameterInfo* info = PairParameter(model, absl::StrCat(a, "-", b), name);
+    if (own.empty() || info == nullptr || info->alternative_to.empty()) {
       continue;
     }
-    const std::string one = absl::StrCat(pair, ".", name);
-    const std::string other = absl::StrCat(one.substr(0, one.rfind('.') + 1), info->alternative_to);
-    if (model.parameters.contains(one) && model.parameters.contains(other)) {
-      problems.push_back(
-          absl::StrCat(one, " and ", other, " are alternatives: only one of them may be given"));
+    const std::vector<std::string> other =
+        given(absl::StrCat(name.substr(0, name.rfind('.') + 1), info->alternative_to));
+    if (!other.empty()) {
+      problems.push_back(absl::StrCat(own[0], " and ", other[0],
+                                      " are alternatives: only one of them may be given"));
     }
   }
   return problems;
@@ -198,23 +217,8 @@ std::vector<std::string> MaterialProblems(const Model& model) {
   const std::vector<std::string> names = MaterialNames(model);
   for (std::size_t a = 0; a < names.size(); ++a) {
     for (std::size_t b = a; b < names.size(); ++b) {
-      const std::string pair = absl::StrCat(names[a], "-", names[b]);
-      const std::string reverse = absl::StrCat(names[b], "-", names[a]);
-      for (const std::string& problem : PairAlternatives(model, pair)) {
-        problems.push_back(problem);
-      }
-      if (a == b) {
-        continue;
-      }
-      for (const std::string& problem : PairAlternatives(model, reverse)) {
-        problems.push_back(problem);
-      }
-      for (const std::string& name : PairNames(model)) {
-        const std::string one = absl::StrCat(pair, ".", name);
-        const std::string other = absl::StrCat(reverse, ".", name);
-        if (model.parameters.contains(one) && model.parameters.contains(other)) {
-          problems.push_back(absl::StrCat(one, " and ", other, " are the same; give one of them"));
-        }
+      for (std::string& problem : PairProblems(model, names[a], names[b])) {
+        problems.push_back(std::move(problem));
       }
     }
   }

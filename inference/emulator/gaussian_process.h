@@ -39,7 +39,8 @@ struct GaussianProcessOptions {
 /// between the runs. Inputs are shifted and scaled to zero mean and unit standard deviation over
 /// the training set, outputs likewise, so that hyper-parameters have order one. l_j, s and the
 /// scatter are those of highest posterior density: marginal likelihood times weak log-normal
-/// priors, from two fixed starts (smooth, wiggly) or from options.like. Thread safety: const after Fit.
+/// priors, from two fixed starts (smooth, wiggly) or from options.like. Thread safety: const after
+/// Fit.
 class GaussianProcess {
  public:
   /// in: inputs n x d, outputs n, n >= 4, all finite.

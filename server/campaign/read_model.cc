@@ -222,8 +222,11 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
     return std::any_of(campaign.parameters.begin(), campaign.parameters.end(),
                        [&name](const CalibratedParameter& p) { return p.name == name; });
   };
+  const auto fixed = [&](const std::string& name) {
+    return model.parameters.contains(name) || model.parameters.contains(InOtherOrder(model, name));
+  };
   const auto given = [&](const std::string& name) {
-    return calibrated(name) || model.parameters.contains(name);
+    return calibrated(name) || calibrated(InOtherOrder(model, name)) || fixed(name);
   };
   for (const CalibratedParameter& parameter : campaign.parameters) {
     const std::string& name = parameter.name;
@@ -247,7 +250,9 @@ void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
     for (const std::string& other : AlternativesOf(parameter, all)) {
       said.push_back(other);
       or_others += " (or " + other + ")";
-      if (given(parameter.name) && given(other)) {
+      // Two values of a material that are both fixed have been refused with the materials.
+      const bool refused = parameter.of_material && fixed(parameter.name) && fixed(other);
+      if (given(parameter.name) && given(other) && !refused) {
         campaign_map.Problem("parameters", absl::StrCat(parameter.name, " and ", other,
                                                         " say the same thing; give one of them"));
       }

@@ -29,8 +29,8 @@ done = {one.case for one in elsewhere}
 improved = {one.case for one in elsewhere if not math.isnan(one.heldout)}
 
 
-def wanted(case):
-    return any(fnmatch.fnmatch(case.name, pattern) for pattern in arguments.only.split(','))
+def wanted(name):
+    return any(fnmatch.fnmatch(name, pattern) for pattern in arguments.only.split(','))
 
 
 def finished_elsewhere(case):
@@ -54,7 +54,7 @@ def run(case):
 still = arguments.table or arguments.list or arguments.visible
 if not still:
     lab.measure_detectability()
-matrix = [c for c in cases.matrix(lab.strengths(0 if still else arguments.jobs), arguments.repeats, arguments.controls) if wanted(c)]
+matrix = [c for c in cases.matrix(lab.strengths(0 if still else arguments.jobs), arguments.repeats, arguments.controls) if wanted(c.name)]
 if arguments.list:
     print('\n'.join(c.name for c in matrix))
     sys.exit(0)
@@ -67,7 +67,7 @@ elif not arguments.table:
         list(pool.map(run, [c for c in matrix if not finished_elsewhere(c)]))
 records = [judge.record(c, lab.verdict(c), lab.truth(c), lab.visible_at_truth(c)) for c in matrix if lab.finished(c)]
 here = {one.case for one in records}
-records += [one for one in elsewhere if one.case not in here]
+records += [one for one in elsewhere if one.case not in here and wanted(one.case)]
 if arguments.record:
     judge.write(records, arguments.record)
 print(judge.table(records))

@@ -1,10 +1,14 @@
 #include "tests/support/dem/scenarios.h"
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <map>
 #include <sstream>
+
+#include "dem/dynamics/assembly.h"
+#include "dem/dynamics/flow.h"
 
 namespace calib::dem::test {
 
@@ -86,6 +90,25 @@ Packing TwoSpheres(double r, double distance, const double n[3]) {
     packing.clump.push_back(-1);
   }
   return packing;
+}
+
+double AccelerationDownASlope(const Model& model, const std::string& material, double angle) {
+  const double r = 0.005;
+  const double g = 9.81;
+  Packing packing;
+  packing.length[0] = packing.length[1] = packing.length[2] = 100 * r;
+  packing.x = packing.y = {0};
+  packing.z = {r};
+  packing.radius = {r};
+  packing.clump = {-1};
+  Assembly assembly(packing, model.density, ContactModel(model),
+                    {.gravity = {g * std::sin(angle), 0, -g * std::cos(angle)},
+                     .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1})},
+                     .material = material},
+                    1);
+  Flow flow(assembly, {.drop_height = 1e-6, .low = {-1, -1, -1}, .high = {1, 1, 1}}, {});
+  if (flow.Advance(0.05) != StageEnd::kDone) return std::nan("");
+  return assembly.particles().vx[0] / flow.time();
 }
 
 std::string ReadFile(const std::string& path) {

@@ -103,6 +103,30 @@ TEST(MaterialsCampaign, PairsHaveValuesOfEffectsOfTheirOwn) {
   EXPECT_EQ(scenario.model.parameters.at("wood-grains.viscous_damping.ratio"), 0.2);
 }
 
+TEST(MaterialsCampaign, AlternativesOfAPairAreOneProblemInWhateverOrder) {
+  const auto with = [](const std::string& pairs, const std::string& parameters) {
+    return ProblemsOf(
+        absl::StrReplaceAll(
+            Yaml(),
+            {{"  density: 2700", "  effects: [rolling_resistance]\n  density: 2700"},
+             {"fixed: {",
+              "fixed: {rolling_resistance.stiffness_ratio: 1, "
+              "rolling_resistance.friction: 0.1, "},
+             {"steel-grains: {", "steel-grains: {" + pairs},
+             {"  wood.young_modulus: default", "  wood.young_modulus: default\n" + parameters}}),
+        Files());
+  };
+  EXPECT_EQ(with("rolling_resistance.stiffness: 1 N m/rad, ", ""), "");
+  EXPECT_EQ(
+      with("rolling_resistance.stiffness: 1 N m/rad, rolling_resistance.stiffness_ratio: 1, ", ""),
+      "c.yaml:7: model.materials: steel-grains.rolling_resistance.stiffness_ratio and "
+      "steel-grains.rolling_resistance.stiffness are alternatives: only one of them may be "
+      "given\n");
+  EXPECT_THAT(with("rolling_resistance.stiffness: 1 N m/rad, ",
+                   "  grains-steel.rolling_resistance.stiffness_ratio: default\n"),
+              HasSubstr("say the same thing; give one of them"));
+}
+
 TEST(MaterialsCampaign, EveryMistakeIsOneSentence) {
   EXPECT_THAT(With("young_modulus: 210 GPa, density", "young_modulu: 210 GPa, density"),
               HasSubstr("model.materials.steel.young_modulu: is nothing that steel may have"));

@@ -242,28 +242,12 @@ TEST(MaterialStack, EveryContactIsPressedInAsItsPairSays) {
 }
 
 TEST(MaterialIncline, GrainSlidesByTheFrictionOfThePair) {
-  const double r = 0.005;
-  const double g = 9.81;
-  const double alpha = 1.0;
   Model model = Metals();
   model.parameters["young_modulus"] = 1e9;
   model.parameters["steel.young_modulus"] = 3e9;
   model.parameters["grains-steel.friction_coefficient"] = 0.2;
-  Packing packing;
-  packing.length[0] = packing.length[1] = packing.length[2] = 100 * r;
-  packing.x = packing.y = {0};
-  packing.z = {r};
-  packing.radius = {r};
-  packing.clump = {-1};
-  Assembly assembly(packing, model.density, ContactModel(model),
-                    {.gravity = {g * std::sin(alpha), 0, -g * std::cos(alpha)},
-                     .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1})},
-                     .material = "steel"},
-                    1);
-  Flow flow(assembly, {.drop_height = 1e-6, .low = {-1, -1, -1}, .high = {1, 1, 1}}, {});
-  ASSERT_EQ(flow.Advance(0.05), StageEnd::kDone) << flow.reason();
-  const double expected = g * (std::sin(alpha) - 0.2 * std::cos(alpha)) * flow.time();
-  EXPECT_NEAR(assembly.particles().vx[0], expected, 2e-3 * expected);
+  const double expected = 9.81 * (std::sin(1.0) - 0.2 * std::cos(1.0));
+  EXPECT_NEAR(test::AccelerationDownASlope(model, "steel", 1.0), expected, 2e-3 * expected);
 }
 
 /// The scenario with a material beside its own that has the same values.

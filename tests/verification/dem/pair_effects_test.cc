@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -12,8 +11,6 @@
 #include "dem/catalog/catalog.h"
 #include "dem/contact/contact_model.h"
 #include "dem/contact/materials.h"
-#include "dem/dynamics/assembly.h"
-#include "dem/dynamics/flow.h"
 #include "dem/simulation/model_parameters.h"
 #include "tests/support/dem/scenarios.h"
 
@@ -184,36 +181,22 @@ TEST(PairEffects, JkrTakesWorkAndModulusOfThePair) {
 TEST(PairEffects, RollingFrictionWithTheFloorIsThatOfThePair) {
   // A grain that rolls down an incline of another material does so with 5/7 g (sin a - eta cos a),
   // since the floor's moment eta N r takes eta g cos a from its 7/5 m v'.
-  const double r = 0.005;
   const double g = 9.81;
   const double alpha = 0.25;
-  const auto speed = [&](double pair) {
+  const auto acceleration = [&](double pair) {
     Model model =
         Three({"rolling_resistance"}, {{"rolling_resistance.stiffness_ratio", 1},
                                        {"rolling_resistance.friction", 10},
                                        {"grains-steel.rolling_resistance.friction", pair}});
     model.parameters["young_modulus"] = 1e9;
     model.parameters["steel.young_modulus"] = 3e9;
-    Packing packing;
-    packing.length[0] = packing.length[1] = packing.length[2] = 100 * r;
-    packing.x = packing.y = {0};
-    packing.z = {r};
-    packing.radius = {r};
-    packing.clump = {-1};
-    Assembly assembly(packing, model.density, ContactModel(model),
-                      {.gravity = {g * std::sin(alpha), 0, -g * std::cos(alpha)},
-                       .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1})},
-                       .material = "steel"},
-                      1);
-    Flow flow(assembly, {.drop_height = 1e-6, .low = {-1, -1, -1}, .high = {1, 1, 1}}, {});
-    EXPECT_EQ(flow.Advance(0.05), StageEnd::kDone) << flow.reason();
-    return assembly.particles().vx[0] / flow.time();
+    return test::AccelerationDownASlope(model, "steel", alpha);
   };
   const double free = 5.0 / 7.0 * g * std::sin(alpha);
-  EXPECT_NEAR(speed(0), free, 3e-3 * free);
+  EXPECT_NEAR(acceleration(0), free, 3e-3 * free);
   const double braked = 5.0 / 7.0 * g * (std::sin(alpha) - 0.1 * std::cos(alpha));
-  EXPECT_NEAR(speed(0.1), braked, 1e-2 * braked);
-  EXPECT_NEAR(speed(0.5), 0, 1e-2) << "the floor holds it";
+  EXPECT_NEAR(acceleration(0.1), braked, 1e-2 * braked);
+  EXPECT_NEAR(acceleration(0.5), 0, 1e-2) << "the floor holds it";
 }
 
 TEST(PairEffects, MistakesAreSaid) {
@@ -231,6 +214,12 @@ TEST(PairEffects, MistakesAreSaid) {
   model.parameters["rubber-rubber.rolling_resistance.stiffness_ratio"] = 1;
   EXPECT_THAT(MaterialProblems(model), Contains(HasSubstr("are alternatives")));
   model.parameters.erase("rubber-rubber.rolling_resistance.stiffness");
+  model.parameters["grains-steel.rolling_resistance.stiffness"] = 1;
+  EXPECT_THAT(MaterialProblems(model), IsEmpty());
+  model.parameters["steel-grains.rolling_resistance.stiffness_ratio"] = 1;
+  EXPECT_THAT(MaterialProblems(model), Contains(HasSubstr("are alternatives")))
+      << "whatever the order";
+  model.parameters.erase("steel-grains.rolling_resistance.stiffness_ratio");
   model.parameters["steel-rubber.rolling_resistance.friction"] = 0.1;
   model.parameters["rubber-steel.rolling_resistance.friction"] = 0.1;
   EXPECT_THAT(MaterialProblems(model), Contains(HasSubstr("are the same; give one of them")));
