@@ -10,12 +10,20 @@ void Prepare(const ParameterSet& parameters, Preparation& preparation) {
   preparation.aspect = parameters.Get("aspect");
 }
 
+/// Specimens, and poured grains that stay to the end: none are taken out or put in.
+std::vector<std::string> TestsOfShape() {
+  std::vector<std::string> tests = ElementTestNames();
+  tests.insert(tests.end(), {"angle_of_repose", "calibration_device", "rotating_drum"});
+  return tests;
+}
+
 }  // namespace
 
 /// Every sphere becomes a rigid clump of two equal overlapping spheres of the same volume (of the
 /// union), length over width `aspect`, directions at random; the specimen is brought to the new
-/// shape at constant porosity before consolidation (simulation/shape_change.h). Null by definition
-/// at aspect 1: spheres. One-sided. [Favier et al. 1999; Ng 2004, J. Eng. Mech. 130, 193]
+/// shape at constant porosity before consolidation (simulation/shape_change.h). Poured grains are
+/// set loosely with their shape and fall into place. Null by definition at aspect 1: spheres.
+/// One-sided. [Favier et al. 1999; Ng 2004, J. Eng. Mech. 130, 193]
 EffectEntry NonsphericalShape() {
   ParameterInfo aspect;
   aspect.name = "aspect";
@@ -37,7 +45,7 @@ EffectEntry NonsphericalShape() {
                                 "(2004) 193",
                    .two_sided = false,
                    .rays = {{.parameter = "aspect", .steps = {0.1, 0.3}}},
-                   .excited_by = ElementTestNames()},
+                   .excited_by = TestsOfShape()},
           .place = 10,
           .prepare = &Prepare};
 }

@@ -11,6 +11,7 @@
 #include "absl/strings/str_split.h"
 #include "dem/elementary/functions.h"
 #include "dem/particles/elongation.h"
+#include "dem/particles/random_numbers.h"
 
 namespace calib::dem {
 namespace {
@@ -142,6 +143,48 @@ double ReachOf(const ClumpTemplate& shape) {
         reach, Hypotenuse(sphere.centre[0], sphere.centre[1], sphere.centre[2]) + sphere.radius);
   }
   return reach;
+}
+
+Rotation DrawRotation(std::uint64_t seed, int grain, int draw) {
+  const auto u = Uniform(seed, kOrientationDraw, grain, draw);
+  const double a = std::sqrt(1.0 - u[0]);
+  const double b = std::sqrt(u[0]);
+  const double x = a * Sine(2.0 * std::numbers::pi * u[1]);
+  const double y = a * Cosine(2.0 * std::numbers::pi * u[1]);
+  const double z = b * Sine(2.0 * std::numbers::pi * u[2]);
+  const double w = b * Cosine(2.0 * std::numbers::pi * u[2]);
+  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
+           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
+           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
+}
+
+Sphere Placed(const Sphere& member, const Rotation& rotation, double radius,
+              const std::array<double, 3>& centre) {
+  Sphere placed{.centre = centre, .radius = radius * member.radius};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    placed.centre[axis] +=
+        radius * (rotation[axis][0] * member.centre[0] + rotation[axis][1] * member.centre[1] +
+                  rotation[axis][2] * member.centre[2]);
+  }
+  return placed;
+}
+
+Packing Replaced(const Packing& spheres, const ClumpTemplate& shape, std::uint64_t seed) {
+  Packing packing;
+  std::copy(std::begin(spheres.length), std::end(spheres.length), std::begin(packing.length));
+  for (std::size_t i = 0; i < spheres.x.size(); ++i) {
+    const Rotation rotation = DrawRotation(seed, static_cast<int>(i), 0);
+    for (const Sphere& member : shape.spheres) {
+      const Sphere placed =
+          Placed(member, rotation, spheres.radius[i], {spheres.x[i], spheres.y[i], spheres.z[i]});
+      packing.x.push_back(placed.centre[0]);
+      packing.y.push_back(placed.centre[1]);
+      packing.z.push_back(placed.centre[2]);
+      packing.radius.push_back(placed.radius);
+      packing.clump.push_back(static_cast<int>(i));
+    }
+  }
+  return packing;
 }
 
 }  // namespace calib::dem

@@ -1,6 +1,8 @@
 #pragma once
 // The shape of rigid clumps that replace spheres: a few overlapping spheres.
 
+#include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -33,5 +35,20 @@ ClumpTemplate Between(const ClumpTemplate& shape, double share);
 
 /// Largest distance of a surface from the origin, in radii of the sphere that it replaces.
 double ReachOf(const ClumpTemplate& shape);
+
+/// Rows of a rotation matrix.
+using Rotation = std::array<std::array<double, 3>, 3>;
+
+/// Rotation of a grain, uniform over all: a unit quaternion from three numbers of draw `draw`
+/// [Shoemake 1992, Graphics Gems III, p. 124].
+Rotation DrawRotation(std::uint64_t seed, int grain, int draw);
+
+/// A sphere of the shape in a grain of that radius (of the sphere of its volume) and centre [m].
+Sphere Placed(const Sphere& member, const Rotation& rotation, double radius,
+              const std::array<double, 3>& centre);
+
+/// Every sphere of the packing as a clump of the shape, about its centre; rotations from the seed.
+/// Clump ids are the indices of the spheres.
+Packing Replaced(const Packing& spheres, const ClumpTemplate& shape, std::uint64_t seed);
 
 }  // namespace calib::dem

@@ -1,17 +1,21 @@
 #include "dem/particles/loose_fill.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
+#include "dem/elementary/functions.h"
 #include "dem/particles/random_numbers.h"
 
 namespace calib::dem {
 namespace {
 
 constexpr int kMostLayers = 1'000'000;
-constexpr double kPitch = 1.08;   // largest diameters
-constexpr double kJitter = 0.03;  // largest radii, either way
+constexpr int kThrows = 200;         // of a grain into a region that can grow
+constexpr int kMostThrows = 20'000;  // into one that cannot
+constexpr double kPitch = 1.08;      // largest diameters
+constexpr double kJitter = 0.03;     // largest radii, either way
 
 void Shuffle(std::vector<double>& radii, std::uint64_t seed) {
   for (std::size_t k = radii.size(); k > 1; --k) {
@@ -20,7 +24,136 @@ void Shuffle(std::vector<double>& radii, std::uint64_t seed) {
   }
 }
 
+/// Spheres by the cells of a grid that is as deep as it has to be.
+class Lookup {
+ public:
+  Lookup(const FillRegion& region, double largest)
+      : region_(region),
+        nx_(Count(region.width, largest)),
+        ny_(Count(region.depth, largest)),
+        size_{region.width / nx_, region.depth / ny_, 2 * largest} {}
+
+  /// Whether a sphere touches none of those that are there.
+  [[nodiscard]] bool Free(const Sphere& sphere) const {
+    const auto at = CellOf(sphere);
+    for (int k = std::max(0, at[2] - 1); k <= at[2] + 1; ++k) {
+      for (int j = at[1] - 1; j <= at[1] + 1; ++j) {
+        for (int i = std::max(0, at[0] - 1); i <= std::min(nx_ - 1, at[0] + 1); ++i) {
+          for (const Sphere& other : Cell(i, j, k)) {
+            if (Touches(sphere, other)) {
+              return false;
+            }
+          }
+        }
+      }
+    }
+    return true;
+  }
+
+  void Add(const Sphere& sphere) {
+    const auto at = CellOf(sphere);
+    const std::size_t index = Index(at[0], Around(at[1]), at[2]);
+    if (cells_.size() <= index) {
+      cells_.resize(index + 1);
+    }
+    cells_[index].push_back(sphere);
+  }
+
+ private:
+  static int Count(double length, double largest) {
+    return std::max(1, static_cast<int>(length / (2 * largest)));
+  }
+  [[nodiscard]] int Around(int j) const { return ((j % ny_) + ny_) % ny_; }
+  [[nodiscard]] std::size_t Index(int i, int j, int k) const {
+    return static_cast<std::size_t>((k * ny_ + j) * nx_ + i);
+  }
+  [[nodiscard]] std::array<int, 3> CellOf(const Sphere& s) const {
+    const auto cell = [](double x, double size) { return static_cast<int>(std::floor(x / size)); };
+    return {std::clamp(cell(s.centre[0] - region_.low.x, size_[0]), 0, nx_ - 1),
+            cell(s.centre[1] - region_.low.y, size_[1]),
+            std::max(0, cell(s.centre[2] - region_.low.z, size_[2]))};
+  }
+  [[nodiscard]] const std::vector<Sphere>& Cell(int i, int j, int k) const {
+    static const std::vector<Sphere> kNone;
+    const bool beyond = !region_.repeats && (j < 0 || j >= ny_);
+    const std::size_t index = Index(i, Around(j), k);
+    return beyond || index >= cells_.size() ? kNone : cells_[index];
+  }
+  [[nodiscard]] bool Touches(const Sphere& a, const Sphere& b) const {
+    double dy = a.centre[1] - b.centre[1];
+    if (region_.repeats) {
+      dy -= std::round(dy / region_.depth) * region_.depth;
+    }
+    return Hypotenuse(a.centre[0] - b.centre[0], dy, a.centre[2] - b.centre[2]) <
+           a.radius + b.radius;
+  }
+
+  const FillRegion& region_;
+  int nx_, ny_;
+  std::array<double, 3> size_;
+  std::vector<std::vector<Sphere>> cells_;
+};
+
+/// Whether a region of that height holds the whole sphere.
+bool Holds(const FillRegion& region, double height, const Sphere& s) {
+  const double up = s.centre[2] - region.low.z;
+  const double back = s.centre[1] - region.low.y;
+  return up >= s.radius && up + s.radius <= height &&
+         (region.repeats || (back >= s.radius && back + s.radius <= region.depth)) &&
+         region.holds({s.centre[0], s.centre[1], s.centre[2]}, s.radius);
+}
+
 }  // namespace
+
+Packing RandomFill(std::vector<double> radii, const ClumpTemplate& shape, const FillRegion& region,
+                   std::uint64_t seed) {
+  Packing packing;
+  Shuffle(radii, seed);
+  const double largest = *std::max_element(radii.begin(), radii.end());
+  const double length = 2 * ReachOf(shape) * largest;
+  double thickest = 0;
+  for (const Sphere& member : shape.spheres) {
+    thickest = std::max(thickest, member.radius);
+  }
+  Lookup placed(region, largest * thickest);
+  double height = region.height > 0 ? region.height : 2 * length;
+  for (int grain = 0; grain < static_cast<int>(radii.size()); ++grain) {
+    const double radius = radii[static_cast<std::size_t>(grain)];
+    std::vector<Sphere> members;
+    for (int draw = 0; members.empty(); ++draw) {
+      if (region.height > 0 && draw == kMostThrows) {
+        return packing;
+      }
+      if (!(region.height > 0) && draw % kThrows == kThrows - 1) {
+        if (height > kMostLayers * length) {
+          return packing;
+        }
+        height += length;
+      }
+      const auto u = Uniform(seed, kFillDraw, grain, draw);
+      const Rotation rotation = DrawRotation(seed, grain, draw);
+      for (const Sphere& member : shape.spheres) {
+        members.push_back(
+            Placed(member, rotation, radius,
+                   {region.low.x + u[0] * region.width, region.low.y + u[1] * region.depth,
+                    region.low.z + u[2] * height}));
+        if (!Holds(region, height, members.back()) || !placed.Free(members.back())) {
+          members.clear();
+          break;
+        }
+      }
+    }
+    for (const Sphere& member : members) {
+      placed.Add(member);
+      packing.x.push_back(member.centre[0]);
+      packing.y.push_back(member.centre[1]);
+      packing.z.push_back(member.centre[2]);
+      packing.radius.push_back(member.radius);
+      packing.clump.push_back(grain);
+    }
+  }
+  return packing;
+}
 
 Packing LooseFill(std::vector<double> radii, const FillRegion& region, std::uint64_t seed) {
   Packing packing;

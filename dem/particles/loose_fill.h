@@ -1,11 +1,12 @@
 #pragma once
-// Grains set loosely into a container, from which they fall into place.
+// Grains set loosely into a container, in which they fall into place.
 
 #include <cstdint>
 #include <functional>
 #include <vector>
 
 #include "dem/geometry/vector3.h"
+#include "dem/particles/clump_template.h"
 #include "dem/particles/packing.h"
 
 namespace calib::dem {
@@ -16,7 +17,8 @@ struct FillRegion {
   double depth = 0;   ///< along y [m]; 0: one layer of grains at low.y, in the plane of x and z
   double height = 0;  ///< of the region [m]; 0: as high as needed
   std::function<bool(const Vec3& centre, double radius)>
-      holds{};  ///< whether a grain may stand there
+      holds{};           ///< whether a sphere may stand there
+  bool repeats = false;  ///< along y, every `depth`: grains may lie across that border
 };
 
 /// The radii in an order drawn from the seed, set on a cubic lattice whose pitch is 1.08 largest
@@ -24,6 +26,15 @@ struct FillRegion {
 /// Fewer grains than radii come back where the region is too small. The same arguments give the
 /// same bits.
 Packing LooseFill(std::vector<double> radii, const FillRegion& region, std::uint64_t seed);
+
+/// Grains of a shape, their radii in an order drawn from the seed, thrown one after another to
+/// random places and directions where they touch no other (random sequential addition). A region
+/// of unlimited height is filled from below: it grows by a grain's length whenever a grain finds no
+/// place in 200 throws. Fewer grains come back where one finds none in 20 000 throws into a limited
+/// region. Clump ids count the grains. The same arguments give the same bits. Precondition: depth >
+/// 0.
+Packing RandomFill(std::vector<double> radii, const ClumpTemplate& shape, const FillRegion& region,
+                   std::uint64_t seed);
 
 /// z of the highest point of any grain [m]. Precondition: there is one.
 double TopOf(const Packing& packing);

@@ -28,15 +28,14 @@ StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
   const double speed =
       run.SettingOr("lift_speed", 0.15 * std::sqrt(run.gravity() * run.mean_diameter()));
   const Vec3 axis{4 * radius, 4 * radius, 0};
-  Packing grains = LooseFill(
-      run.radii(),
+  Packing grains = run.Fill(
       {.low = {axis.x - radius, axis.y - radius, 0},
        .width = 2 * radius,
        .depth = 2 * radius,
        .holds = [&](const Vec3& c,
                     double r) { return Hypotenuse(c.x - axis.x, c.y - axis.y) + r < inner; }},
       run.seed() + static_cast<std::uint64_t>(std::llround(1e6 * point.target)) * 1'000'003U);
-  if (grains.x.size() < run.radii().size()) {
+  if (run.CountOf(grains) < run.radii().size()) {
     return run.Fail("cylinder_diameter is too small: no grain fits into the cylinder");
   }
   const double top = TopOf(grains);

@@ -88,10 +88,11 @@ struct Masses {
   double top = 0;     ///< of that, a height
 };
 
-Masses Weigh(const ParticleArrays& p, const Device& device) {
+/// A sphere carries the mass of its grain (RigidClumps), of which it is one of `spheres`.
+Masses Weigh(const ParticleArrays& p, int spheres, const Device& device) {
   Masses masses;
   for (std::size_t g = 0; g < p.x.size(); ++g) {
-    const double mass = 1.0 / p.inverse_mass[g];
+    const double mass = 1.0 / (spheres * p.inverse_mass[g]);
     masses.total += mass;
     if (p.z[g] > device.outlet) {
       masses.hopper += mass;
@@ -118,7 +119,8 @@ StageEnd Measure(GravityRun& run, const Device& device, const ControlPoint& poin
   const double opened = flow.time();
   const double longest = run.SettingOr("duration", LongestFlow(run, device));
   std::vector<double> time = {0};
-  std::vector<double> hopper = {Weigh(assembly.particles(), device).hopper};
+  std::vector<double> hopper = {
+      Weigh(assembly.particles(), run.spheres_per_grain(), device).hopper};
   double last_on_slide = 0;
   StageEnd end = StageEnd::kDone;
   int still = 0;
@@ -126,7 +128,7 @@ StageEnd Measure(GravityRun& run, const Device& device, const ControlPoint& poin
   const double look = run.fall_time() / kLooks;
   flow.SetBeforeStep([&](double now, double) {
     if (now - opened >= look * static_cast<double>(time.size())) {
-      masses = Weigh(assembly.particles(), device);
+      masses = Weigh(assembly.particles(), run.spheres_per_grain(), device);
       time.push_back(now - opened);
       hopper.push_back(masses.hopper);
       last_on_slide = masses.slide >= kOnSlide * masses.total ? time.back() : last_on_slide;
@@ -140,7 +142,7 @@ StageEnd Measure(GravityRun& run, const Device& device, const ControlPoint& poin
   if (end != StageEnd::kDone) {
     return end;
   }
-  masses = Weigh(assembly.particles(), device);
+  masses = Weigh(assembly.particles(), run.spheres_per_grain(), device);
   if (masses.buries >= kOnSlide * masses.total) {
     return run.Fail(absl::StrCat(
         "repetition ", point.target, ", pile: it has grown over the slide's lower end, up to ",
@@ -167,8 +169,7 @@ StageEnd Measure(GravityRun& run, const Device& device, const ControlPoint& poin
 StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point) {
   const double d = run.largest_diameter();
   const double half = device.hopper_x;
-  Packing grains = LooseFill(
-      run.radii(),
+  Packing grains = run.Fill(
       {.low = {-half, 0, device.outlet},
        .width = 2 * half,
        .depth = device.depth,
@@ -178,9 +179,10 @@ StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point
              const double room =
                  std::min(half, 0.5 * device.opening + up / Tangent(kHopperSlope)) - r;
              return std::abs(c.x) < room;
-           }},
+           },
+       .repeats = true},
       run.seed() + static_cast<std::uint64_t>(std::llround(1e6 * point.target)) * 1'000'003U);
-  if (grains.x.size() < run.radii().size()) {
+  if (run.CountOf(grains) < run.radii().size()) {
     return run.Fail("the hopper is too small for the grains");
   }
   const double top = TopOf(grains);

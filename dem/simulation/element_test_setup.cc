@@ -25,6 +25,16 @@ double PressureScale(const Scenario& scenario) {
                                  : pressure;
 }
 
+bool Chosen(const Scenario& scenario, const EffectEntry& effect) {
+  const auto& chosen = scenario.model.effects;
+  return std::find(chosen.begin(), chosen.end(), effect.info.name) != chosen.end();
+}
+
+ParameterSet ParametersOf(const Scenario& scenario, const EffectEntry& effect) {
+  return ResolveParameters(effect.info.parameters, effect.info.name + ".",
+                           scenario.model.parameters);
+}
+
 }  // namespace
 
 const ElementTestEntry& ElementTestNamed(const std::string& test) {
@@ -48,21 +58,23 @@ Staging ResolveStaging(const Scenario& scenario, double mean_diameter) {
 }
 
 Alterations AlterationsOf(const Scenario& scenario) {
-  Alterations result;
-  const bool rig = ElementTestNamed(scenario.test).rig_load != RigLoad::kNone;
-  const auto& chosen = scenario.model.effects;
+  Alterations result{.apparatus = {}, .preparation = PreparationOf(scenario)};
+  if (ElementTestNamed(scenario.test).rig_load == RigLoad::kNone) {
+    return result;
+  }
   for (const EffectEntry& effect : EffectEntries()) {
-    const std::string& name = effect.info.name;
-    if (std::find(chosen.begin(), chosen.end(), name) == chosen.end()) {
-      continue;
+    if (effect.alter != nullptr && Chosen(scenario, effect)) {
+      effect.alter(ParametersOf(scenario, effect), result.apparatus);
     }
-    const ParameterSet parameters =
-        ResolveParameters(effect.info.parameters, name + ".", scenario.model.parameters);
-    if (effect.alter != nullptr && rig) {
-      effect.alter(parameters, result.apparatus);
-    }
-    if (effect.prepare != nullptr) {
-      effect.prepare(parameters, result.preparation);
+  }
+  return result;
+}
+
+Preparation PreparationOf(const Scenario& scenario) {
+  Preparation result;
+  for (const EffectEntry& effect : EffectEntries()) {
+    if (effect.prepare != nullptr && Chosen(scenario, effect)) {
+      effect.prepare(ParametersOf(scenario, effect), result);
     }
   }
   return result;

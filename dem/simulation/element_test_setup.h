@@ -1,5 +1,5 @@
 #pragma once
-// What is known of an element test before its grains move: its entry and what effects ask.
+// What is known of a test before its grains move: its entry and what effects ask.
 
 #include <string>
 
@@ -19,6 +19,10 @@ struct Alterations {
   Preparation preparation;
 };
 
+/// Of a test in the periodic cell.
 Alterations AlterationsOf(const Scenario& scenario);
+
+/// What the effects of the model ask of the initial state alone; of any test.
+Preparation PreparationOf(const Scenario& scenario);
 
 }  // namespace calib::dem

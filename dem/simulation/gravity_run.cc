@@ -8,7 +8,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "dem/particles/clump_template.h"
 #include "dem/particles/material_shares.h"
+#include "dem/simulation/element_test_setup.h"
 #include "dem/simulation/test_meshes.h"
 
 namespace calib::dem {
@@ -17,7 +19,8 @@ GravityRun::GravityRun(const Scenario& scenario, RunRecord& record, std::stop_to
     : scenario_(scenario),
       record_(record),
       stop_(std::move(stop)),
-      observables_(FindTest(scenario.test)->observables) {
+      observables_(FindTest(scenario.test)->observables),
+      aspect_(PreparationOf(scenario).aspect) {
   double sum = 0;
   for (const double r : radii()) {
     sum += 2 * r;
@@ -94,6 +97,11 @@ double GravityRun::solid() const {
 std::string GravityRun::MaterialOf(const std::string& body) const {
   const auto it = scenario_.materials.bodies.find(body);
   return it == scenario_.materials.bodies.end() ? "" : it->second;
+}
+
+Packing GravityRun::Fill(const FillRegion& region, std::uint64_t seed) const {
+  return aspect_ > 1 ? RandomFill(radii(), DumbbellTemplate(aspect_), region, seed)
+                     : LooseFill(radii(), region, seed);
 }
 
 void GravityRun::Mix(Packing& grains) const {

@@ -65,6 +65,11 @@ class GravityRun {
   [[nodiscard]] double largest_diameter() const { return largest_diameter_; }
   [[nodiscard]] double gravity() const { return Setting("gravity"); }
   [[nodiscard]] double density() const { return scenario_.model.density; }
+  /// Length over width of the grains (nonspherical_shape); 1: spheres. What the test chooses of its
+  /// device does not depend on it.
+  [[nodiscard]] double aspect() const { return aspect_; }
+  /// Spheres that a grain is made of.
+  [[nodiscard]] int spheres_per_grain() const { return aspect_ > 1 ? 2 : 1; }
   /// Volume of all grains [m^3].
   [[nodiscard]] double solid() const;
   [[nodiscard]] std::uint64_t seed() const { return scenario_.seed; }
@@ -76,6 +81,13 @@ class GravityRun {
 
   /// Draws the materials of grains where the scenario mixes some.
   void Mix(Packing& grains) const;
+
+  /// The grains in a region: LooseFill of spheres, RandomFill of others.
+  [[nodiscard]] Packing Fill(const FillRegion& region, std::uint64_t seed) const;
+  /// How many of the grains a filling has.
+  [[nodiscard]] std::size_t CountOf(const Packing& filling) const {
+    return filling.x.size() / static_cast<std::size_t>(spheres_per_grain());
+  }
 
   /// Grains between walls; surroundings get the test's gravity and the walls' material. Grains
   /// without materials are mixed first.
@@ -114,6 +126,7 @@ class GravityRun {
   RunRecord& record_;
   std::stop_token stop_;
   const std::vector<std::string>& observables_;
+  double aspect_ = 1;
   double mean_diameter_ = 0;
   double largest_diameter_ = 0;
   std::string reason_;

@@ -20,18 +20,18 @@ constexpr double kSolidFraction = 0.58;  ///< of the fill
 constexpr double kWider = 1.05;          ///< step of a chosen radius, until all grains find room
 constexpr double kMiddle = 0.6;          ///< share of the surface's width that is looked at
 
-/// The drum's grains, set loosely within a circle of that radius about (radius, radius).
-Packing Fill(const GravityRun& run, double radius, double length) {
-  const double inner = radius * Cosine(std::numbers::pi / kSides);
-  return LooseFill(
-      run.radii(),
-      {.low = {0, 0, 0},
-       .width = 2 * radius,
-       .depth = length,
-       .height = 2 * radius,
-       .holds = [&](const Vec3& c,
-                    double r) { return Hypotenuse(c.x - radius, c.z - radius) + r < inner; }},
-      run.seed());
+/// Within a circle of that radius about (radius, radius).
+FillRegion Inside(double radius, double length) {
+  return {.low = {0, 0, 0},
+          .width = 2 * radius,
+          .depth = length,
+          .height = 2 * radius,
+          .holds =
+              [radius](const Vec3& c, double r) {
+                return Hypotenuse(c.x - radius, c.z - radius) + r <
+                       radius * Cosine(std::numbers::pi / kSides);
+              },
+          .repeats = true};
 }
 
 StageEnd Turn(GravityRun& run, const Assembly& filled, const FlowOptions& options,
@@ -80,13 +80,13 @@ StageEnd RunRotatingDrum(GravityRun& run) {
   const double area = solid / kSolidFraction / length / kFill;
   const bool chosen = !(run.Setting("drum_diameter") > 0);
   double radius = 0.5 * run.SettingOr("drum_diameter", 2 * std::sqrt(area / std::numbers::pi));
-  Packing grains = Fill(run, radius, length);
-  while (chosen && grains.x.size() < run.radii().size()) {
+  while (chosen && LooseFill(run.radii(), Inside(radius, length), run.seed()).x.size() <
+                       run.radii().size()) {  // of spheres, whatever the shape
     radius *= kWider;
-    grains = Fill(run, radius, length);
   }
-  if (grains.x.size() < run.radii().size()) {
-    return run.Fail(absl::StrCat("a drum of ", 2 * radius, " m holds only ", grains.x.size(),
+  Packing grains = run.Fill(Inside(radius, length), run.seed());
+  if (run.CountOf(grains) < run.radii().size()) {
+    return run.Fail(absl::StrCat("a drum of ", 2 * radius, " m holds only ", run.CountOf(grains),
                                  " of ", run.radii().size(),
                                  " grains, set loosely into it: make drum_diameter or drum_length "
                                  "larger, or take fewer grains"));

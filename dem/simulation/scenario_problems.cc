@@ -236,7 +236,9 @@ void CheckShapes(const Scenario& scenario, bool poured, Problems& problems) {
                                     " pours single spheres (clump -1), this packing has clumps"));
   }
   for (const char* name : {"nonspherical_shape", "particle_crushing"}) {
-    if (poured && chosen(name)) {
+    const auto& tests = FindEffect(name)->excited_by;
+    if (poured && chosen(name) &&
+        std::find(tests.begin(), tests.end(), scenario.test) == tests.end()) {
       problems.push_back(absl::StrCat("effect ", name, " is not there in test ", scenario.test,
                                       ", which pours single spheres"));
     }

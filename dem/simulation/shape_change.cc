@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -12,7 +11,6 @@
 #include "dem/elementary/functions.h"
 #include "dem/neighbor/packing_overlap.h"
 #include "dem/particles/elongation.h"
-#include "dem/particles/random_numbers.h"
 
 namespace calib::dem {
 namespace {
@@ -97,45 +95,6 @@ void WrapBodies(Packing& packing) {
   into(packing.x, packing.length[0]);
   into(packing.y, packing.length[1]);
   into(packing.z, packing.length[2]);
-}
-
-using Turn = std::array<std::array<double, 3>, 3>;
-
-/// Rotation of grain i, uniform over all: a unit quaternion from three numbers [Shoemake 1992,
-/// Graphics Gems III, p. 124].
-Turn DrawTurn(std::uint64_t seed, int grain) {
-  const auto u = Uniform(seed, kOrientationDraw, grain, 0);
-  const double a = std::sqrt(1.0 - u[0]);
-  const double b = std::sqrt(u[0]);
-  const double x = a * Sine(2.0 * std::numbers::pi * u[1]);
-  const double y = a * Cosine(2.0 * std::numbers::pi * u[1]);
-  const double z = b * Sine(2.0 * std::numbers::pi * u[2]);
-  const double w = b * Cosine(2.0 * std::numbers::pi * u[2]);
-  return {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
-}
-
-/// Every sphere as a clump of a shape, about its centre.
-Packing Replaced(const Packing& spheres, const ClumpTemplate& shape, std::uint64_t seed) {
-  Packing packing;
-  std::copy(std::begin(spheres.length), std::end(spheres.length), std::begin(packing.length));
-  for (std::size_t i = 0; i < spheres.x.size(); ++i) {
-    const Turn turn = DrawTurn(seed, static_cast<int>(i));
-    for (const Sphere& member : shape.spheres) {
-      const auto along = [&](std::size_t axis) {
-        return spheres.radius[i] *
-               (turn[axis][0] * member.centre[0] + turn[axis][1] * member.centre[1] +
-                turn[axis][2] * member.centre[2]);
-      };
-      packing.x.push_back(spheres.x[i] + along(0));
-      packing.y.push_back(spheres.y[i] + along(1));
-      packing.z.push_back(spheres.z[i] + along(2));
-      packing.radius.push_back(spheres.radius[i] * member.radius);
-      packing.clump.push_back(static_cast<int>(i));
-    }
-  }
-  return packing;
 }
 
 /// Takes the clumps where they have come to, with their mean centre in the cell, and gives them the

@@ -23,12 +23,14 @@ target_compile_options(calib_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -
                                              -ffp-contract=off
                                              # g++ 12 at -O3 sees overlaps in std::string that are not there (GCC bug 105651)
                                              $<$<CONFIG:Release>:-Wno-restrict>)
-if(CALIB_PRECOMPILE)  # g++ 12 forgets there that standard headers are system headers, and warns of their insides
+target_compile_options(calib_flags INTERFACE -Werror)
+if(CALIB_PRECOMPILE)
+  # g++ 12 forgets there that standard headers are system headers, and warns of their insides. Names of one file's
+  # anonymous namespace are seen by the next one.
   target_compile_options(calib_flags INTERFACE
+    -Wno-shadow $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overread> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>)
-else()
-  target_compile_options(calib_flags INTERFACE -Werror)
 endif()
 target_include_directories(calib_flags INTERFACE ${CMAKE_SOURCE_DIR})
 
@@ -60,10 +62,11 @@ function(calib_program name)
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_flags)
 endfunction()
 
-# calib_test(NAME LABEL label SOURCES ... LINKS ... [TIMEOUT s]): one GoogleTest binary, one ctest entry with a label
+# calib_test(NAME LABEL label SOURCES ... LINKS ... [TIMEOUT s] [APART]): one GoogleTest binary, one ctest entry with a label
 # (unit, property, verification, integration, fault, browser, data, layering, bench), or several: verification physics.
+# Where CALIB_PRECOMPILE is on, its files are compiled together but for those of APART, whose anonymous names would meet.
 function(calib_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "LABEL;SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "APART" "TIMEOUT" "LABEL;SOURCES;LINKS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -73,6 +76,9 @@ function(calib_test name)
     target_link_libraries(calib_test_main PUBLIC GTest::gmock GTest::gtest PRIVATE calib_flags)
   endif()
   add_executable(${name} ${ARG_SOURCES})
+  if(CALIB_PRECOMPILE AND NOT ARG_APART)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  endif()
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_test_main calib_flags)
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT ${ARG_TIMEOUT})

@@ -19,7 +19,7 @@ std::map<std::string, std::string> Files() {
           {"box.csv", "time,intruder_height\n0.1,0.02\n0.2,0.03\n"}};
 }
 
-std::string Yaml() {
+std::string MaterialsYaml() {
   return R"(name: metals
 model:
   contact: hertz_mindlin
@@ -54,13 +54,13 @@ inference: {samples: 10}
 }
 
 std::string With(const std::string& from, const std::string& to) {
-  const std::string spoiled = absl::StrReplaceAll(Yaml(), {{from, to}});
-  EXPECT_NE(spoiled, Yaml()) << from;
+  const std::string spoiled = absl::StrReplaceAll(MaterialsYaml(), {{from, to}});
+  EXPECT_NE(spoiled, MaterialsYaml()) << from;
   return ProblemsOf(spoiled, Files());
 }
 
 TEST(MaterialsCampaign, ValuesArePartOfTheModelAndUsesOfTheExperiments) {
-  const ReadOutcome outcome = ReadCampaign(Yaml(), "c.yaml", ReaderOf(Files()));
+  const ReadOutcome outcome = ReadCampaign(MaterialsYaml(), "c.yaml", ReaderOf(Files()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   const Campaign& c = outcome.campaign;
   EXPECT_THAT(c.model.materials, ElementsAre("steel", "wood"));
@@ -82,7 +82,7 @@ TEST(MaterialsCampaign, ValuesArePartOfTheModelAndUsesOfTheExperiments) {
 
 TEST(MaterialsCampaign, PairsHaveValuesOfEffectsOfTheirOwn) {
   const std::string text = absl::StrReplaceAll(
-      Yaml(),
+      MaterialsYaml(),
       {{"  density: 2700", "  effects: [rolling_resistance, viscous_damping]\n  density: 2700"},
        {"fixed: {",
         "fixed: {rolling_resistance.stiffness_ratio: 1, "
@@ -107,7 +107,7 @@ TEST(MaterialsCampaign, AlternativesOfAPairAreOneProblemInWhateverOrder) {
   const auto with = [](const std::string& pairs, const std::string& parameters) {
     return ProblemsOf(
         absl::StrReplaceAll(
-            Yaml(),
+            MaterialsYaml(),
             {{"  density: 2700", "  effects: [rolling_resistance]\n  density: 2700"},
              {"fixed: {",
               "fixed: {rolling_resistance.stiffness_ratio: 1, "
@@ -186,7 +186,8 @@ TEST(MaterialsCampaign, APairHasOneSourceInWhateverOrder) {
 // E.g. `predict` of a test without the grains that the material is of.
 TEST(MaterialsCampaign, OfATableOrDerivedOneMaterialsMayHaveNoPart) {
   const std::string unused = absl::StrReplaceAll(
-      Yaml(), {{"partner: steel", "partner: wood"}, {"intruder: steel", "intruder: wood"}});
+      MaterialsYaml(),
+      {{"partner: steel", "partner: wood"}, {"intruder: steel", "intruder: wood"}});
   const std::string said = "material steel has no part in any of the experiments";
   EXPECT_THAT(ProblemsOf(unused, Files()), HasSubstr(said));
   EXPECT_EQ(ProblemsOf(unused + "lineage: {parent: c1, purpose: warm_fit}\n", Files()), "");
@@ -199,8 +200,9 @@ TEST(MaterialsCampaign, OfATableOrDerivedOneMaterialsMayHaveNoPart) {
 
 TEST(MaterialsCampaign, SamplesOfOnePackingHaveOneMixture) {
   const Campaign c =
-      ReadCampaign(absl::StrReplaceAll(Yaml(), {{"    materials: {walls",
-                                                 "    realizations: 2\n    materials: {walls"}}) +
+      ReadCampaign(absl::StrReplaceAll(
+                       MaterialsYaml(),
+                       {{"    materials: {walls", "    realizations: 2\n    materials: {walls"}}) +
                        "seed: 40\n",
                    "c.yaml", ReaderOf(Files()))
           .campaign;

@@ -19,7 +19,7 @@ std::map<std::string, std::string> Files() {
   return {{"silo.csv", "opening,mass_flow_rate\n40,0.9\n20,0.2\n30.5,0.5\n20,0.21\n"}};
 }
 
-std::string Yaml() {
+std::string PouredYaml() {
   return R"(name: silo
 model:
   contact: hertz_mindlin
@@ -42,7 +42,7 @@ inference: {samples: 10}
 }
 
 TEST(PouredCampaign, TakesSizesOnlyAndReadingsInAnyOrder) {
-  const ReadOutcome outcome = ReadCampaign(Yaml(), "c.yaml", ReaderOf(Files()));
+  const ReadOutcome outcome = ReadCampaign(PouredYaml(), "c.yaml", ReaderOf(Files()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
   const Experiment& experiment = outcome.campaign.experiments[0];
@@ -60,8 +60,8 @@ TEST(PouredCampaign, RealizationsOfAFilePourItsGrainsAnew) {
   auto files = Files();
   files["packing.txt"] = testing::GoodFiles().at("packing.txt");
   const std::string yaml = absl::StrReplaceAll(
-      Yaml(), {{"{generate: {particles: 200, radii: {mean: 2 mm, spread: 0.1}, seed: 4}}\n",
-                "{file: packing.txt}\n    realizations: 2\n"}});
+      PouredYaml(), {{"{generate: {particles: 200, radii: {mean: 2 mm, spread: 0.1}, seed: 4}}\n",
+                      "{file: packing.txt}\n    realizations: 2\n"}});
   const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(files));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
@@ -75,7 +75,8 @@ TEST(PouredCampaign, RealizationsOfAFilePourItsGrainsAnew) {
 
 TEST(PouredCampaign, TakesAGradingCurve) {
   const std::string yaml = absl::StrReplaceAll(
-      Yaml(), {{"radii: {mean: 2 mm, spread: 0.1}", "diameters: {median: 4 mm, log_sd: 0.2}"}});
+      PouredYaml(),
+      {{"radii: {mean: 2 mm, spread: 0.1}", "diameters: {median: 4 mm, log_sd: 0.2}"}});
   const ReadOutcome outcome = ReadCampaign(yaml, "c.yaml", ReaderOf(Files()));
   for (const Problem& problem : outcome.problems) ADD_FAILURE() << ToString(problem);
   ASSERT_EQ(outcome.campaign.experiments.size(), 1U);
@@ -86,15 +87,15 @@ TEST(PouredCampaign, TakesAGradingCurve) {
 
 TEST(PouredCampaign, RefusesWhatHasNoMeaningThere) {
   const std::string packed = absl::StrReplaceAll(
-      Yaml(), {{"particles: 200", "particles: 200, porosity: 0.4"},
-               {"    control: opening", "    staging: {rate: 0.1}\n    control: opening"}});
+      PouredYaml(), {{"particles: 200", "particles: 200, porosity: 0.4"},
+                     {"    control: opening", "    staging: {rate: 0.1}\n    control: opening"}});
   EXPECT_EQ(ProblemsOf(packed, Files()),
             "c.yaml:14: experiments[1].packing.generate.porosity: has no meaning here: the test "
             "pours the grains itself\n"
             "c.yaml:16: experiments[1].staging: has no meaning in silo_discharge; remove it\n");
   auto files = Files();
   files["silo.csv"] = "opening,mass_flow_rate\n40,0.9\n-20,0.2\n";
-  EXPECT_THAT(ProblemsOf(Yaml(), files), HasSubstr("silo.csv:3: opening: is -0.02"));
+  EXPECT_THAT(ProblemsOf(PouredYaml(), files), HasSubstr("silo.csv:3: opening: is -0.02"));
 }
 
 // Their parameters could only come back as their priors.
@@ -102,16 +103,16 @@ TEST(PouredCampaign, AnEffectThatNoTestHasIsRefused) {
   for (const char* effect : {"initial_density.densification", "initial_fabric.stress_anisotropy"}) {
     const std::string name(effect, std::string(effect).find('.'));
     const std::string yaml = absl::StrReplaceAll(
-        Yaml(), {{"effects: [wall_friction]", "effects: [" + name + "]"},
-                 {"wall_friction.coefficient: {prior: uniform, min: 0.2, max: 0.9}",
-                  std::string(effect) + ": {prior: uniform, min: -0.01, max: 0.01}"}});
+        PouredYaml(), {{"effects: [wall_friction]", "effects: [" + name + "]"},
+                       {"wall_friction.coefficient: {prior: uniform, min: 0.2, max: 0.9}",
+                        std::string(effect) + ": {prior: uniform, min: -0.01, max: 0.01}"}});
     EXPECT_THAT(ProblemsOf(yaml, Files()),
                 HasSubstr("c.yaml:2: model: effect " + name +
                           " has no part in any of the experiments: it acts in triaxial_drained, "
                           "triaxial_undrained, oedometric, isotropic, simple_shear\n"));
   }
   const std::string impacts = absl::StrReplaceAll(
-      Yaml(),
+      PouredYaml(),
       {{"effects: [wall_friction]", "effects: [nonspherical_shape]"},
        {"wall_friction.coefficient: {prior: uniform, min: 0.2, max: 0.9}",
         "nonspherical_shape.aspect: {prior: uniform, min: 1, max: 2}"},
@@ -127,7 +128,8 @@ TEST(PouredCampaign, AnEffectThatNoTestHasIsRefused) {
 }
 
 std::string WithMesh(const std::string& meshes) {
-  return absl::StrReplaceAll(Yaml(), {{"    silo_width: 10 cm\n", "    meshes: " + meshes + "\n"}});
+  return absl::StrReplaceAll(PouredYaml(),
+                             {{"    silo_width: 10 cm\n", "    meshes: " + meshes + "\n"}});
 }
 
 TEST(PouredCampaign, AMeshIsReadInItsUnit) {
@@ -209,15 +211,15 @@ TEST(PouredCampaign, AVesselWithAHoleOrWithoutAnOutletIsRefused) {
 
 TEST(PouredCampaign, NumbersOfThingsAreWhole) {
   EXPECT_THAT(
-      ProblemsOf(absl::StrReplaceAll(Yaml(), {{"silo_width: 10 cm", "flat: 0.5"}}), Files()),
+      ProblemsOf(absl::StrReplaceAll(PouredYaml(), {{"silo_width: 10 cm", "flat: 0.5"}}), Files()),
       HasSubstr("c.yaml:13: experiments[1].flat: is 0.5, allowed are whole numbers from 0 "
                 "to 1\n"));
   const std::string heap =
-      absl::StrReplaceAll(Yaml(), {{"    silo_width: 10 cm\n", ""},
-                                   {"silo_discharge", "angle_of_repose"},
-                                   {"file: silo.csv, units: {opening: mm}", "file: heap.csv"},
-                                   {"control: opening", "control: repetition"},
-                                   {"mass_flow_rate:", "angle_of_repose:"}});
+      absl::StrReplaceAll(PouredYaml(), {{"    silo_width: 10 cm\n", ""},
+                                         {"silo_discharge", "angle_of_repose"},
+                                         {"file: silo.csv, units: {opening: mm}", "file: heap.csv"},
+                                         {"control: opening", "control: repetition"},
+                                         {"mass_flow_rate:", "angle_of_repose:"}});
   EXPECT_EQ(ProblemsOf(heap, {{"heap.csv", "repetition,angle_of_repose\n1,0.5\n2,0.5\n"}}), "");
   EXPECT_EQ(
       ProblemsOf(heap, {{"heap.csv", "repetition,angle_of_repose\n1,0.5\n1.5,0.5\n"}}),
@@ -226,11 +228,11 @@ TEST(PouredCampaign, NumbersOfThingsAreWhole) {
 
 TEST(PouredCampaign, ADrumThatCarriesItsGrainsAroundIsRefused) {
   const std::string drum =
-      absl::StrReplaceAll(Yaml(), {{"silo_width: 10 cm", "drum_diameter: 80 mm"},
-                                   {"silo_discharge", "rotating_drum"},
-                                   {"file: silo.csv, units: {opening: mm}", "file: drum.csv"},
-                                   {"control: opening", "control: rotation_speed"},
-                                   {"mass_flow_rate:", "angle_of_repose:"}});
+      absl::StrReplaceAll(PouredYaml(), {{"silo_width: 10 cm", "drum_diameter: 80 mm"},
+                                         {"silo_discharge", "rotating_drum"},
+                                         {"file: silo.csv, units: {opening: mm}", "file: drum.csv"},
+                                         {"control: opening", "control: rotation_speed"},
+                                         {"mass_flow_rate:", "angle_of_repose:"}});
   EXPECT_EQ(ProblemsOf(drum, {{"drum.csv", "rotation_speed,angle_of_repose\n2,0.5\n15,0.6\n"}}),
             "");
   EXPECT_EQ(

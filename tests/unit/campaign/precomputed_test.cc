@@ -25,7 +25,7 @@ std::map<std::string, std::string> Tables() {
        "0.38\n"}};
 }
 
-std::string Yaml() {
+std::string BeadsYaml() {
   return R"(name: beads
 model:
   precomputed:
@@ -52,8 +52,8 @@ inference: {method: sqmc}
 }
 
 TEST(Precomputed, ReadsBothTablesInSi) {
-  const ReadOutcome outcome = ReadCampaign(Yaml(), "c.yaml", ReaderOf(Tables()));
-  ASSERT_EQ(ProblemsOf(Yaml(), Tables()), "");
+  const ReadOutcome outcome = ReadCampaign(BeadsYaml(), "c.yaml", ReaderOf(Tables()));
+  ASSERT_EQ(ProblemsOf(BeadsYaml(), Tables()), "");
   const Campaign& c = outcome.campaign;
   ASSERT_TRUE(c.precomputed.has_value());
   EXPECT_EQ(c.samples, 2);
@@ -71,7 +71,7 @@ TEST(Precomputed, ReadsBothTablesInSi) {
 TEST(Precomputed, CountsStepsFromOneToo) {
   auto files = Tables();
   files["sta.csv"] = "sample,step,p_MPa,porosity\n0,1,1.1,0.4\n0,2,2.1,0.39\n0,3,1.4,0.393\n";
-  const ReadOutcome outcome = ReadCampaign(Yaml(), "c.yaml", ReaderOf(files));
+  const ReadOutcome outcome = ReadCampaign(BeadsYaml(), "c.yaml", ReaderOf(files));
   ASSERT_THAT(outcome.problems, IsEmpty());
   EXPECT_DOUBLE_EQ(outcome.campaign.precomputed->values[0][0][0], 1.1e6);
 }
@@ -79,51 +79,52 @@ TEST(Precomputed, CountsStepsFromOneToo) {
 TEST(Precomputed, SaysWhichTableIsWrong) {
   auto files = Tables();
   files["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n0,120,-5000\n";
-  EXPECT_THAT(ProblemsOf(Yaml(), files),
+  EXPECT_THAT(ProblemsOf(BeadsYaml(), files),
               HasSubstr("par.csv:3: sample: sample 0 stands here for the second time"));
-  EXPECT_THAT(ProblemsOf(Yaml(), files),
+  EXPECT_THAT(ProblemsOf(BeadsYaml(), files),
               HasSubstr("sta.csv:5: sample: sample 1 is not in par.csv"));
   files = Tables();
   files["sta.csv"] = "sample,step,p_MPa,porosity\n0,0,1.1,0.4\n0,7,2.1,0.39\n";
-  EXPECT_THAT(ProblemsOf(Yaml(), files),
+  EXPECT_THAT(ProblemsOf(BeadsYaml(), files),
               HasSubstr("the steps run from 0 to 7, but oedo has 3 readings"));
   files["sta.csv"] = "sample,step,p_MPa,porosity\n0,1,1.1,0.4\n0,2,2.1,0.39\n";
-  EXPECT_THAT(ProblemsOf(Yaml(), files),
+  EXPECT_THAT(ProblemsOf(BeadsYaml(), files),
               HasSubstr("the steps run from 1 to 2, but oedo has 3 readings"));
   files["sta.csv"] =
       "sample,step,p_MPa,porosity\n0,0,1.1,0.4\n0,1,2.1,0.39\n0,1,99,0.39\n0,2,1.4,0.393\n";
-  EXPECT_EQ(ProblemsOf(Yaml(), files),
+  EXPECT_EQ(ProblemsOf(BeadsYaml(), files),
             "sta.csv:4: step: step 1 of sample 0 stands here for the second time\n");
   files = Tables();
   files["par.csv"] = "sample,E_GPa,km_nNm,E_GPa\n0,100,8000,1\n1,120,-5000,1\n";
-  EXPECT_EQ(ProblemsOf(Yaml(), files), "par.csv:1: E_GPa: is the name of more than one column\n");
+  EXPECT_EQ(ProblemsOf(BeadsYaml(), files),
+            "par.csv:1: E_GPa: is the name of more than one column\n");
   files = Tables();
   files["par.csv"] = "sample,E,km_nNm\n0,100,8000\n";
-  EXPECT_THAT(ProblemsOf(Yaml(), files),
+  EXPECT_THAT(ProblemsOf(BeadsYaml(), files),
               HasSubstr("par.csv:1: E_GPa: is not a column of this file"));
 }
 
 TEST(Precomputed, ARepeatedSampleBesideOthersIsNamedToo) {
   auto files = Tables();
   files["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n0,120,-5000\n1,130,4000\n";
-  EXPECT_EQ(ProblemsOf(Yaml(), files),
+  EXPECT_EQ(ProblemsOf(BeadsYaml(), files),
             "par.csv:3: sample: sample 0 stands here for the second time\n");
 }
 
 TEST(Precomputed, OneSetOfParametersIsNoSample) {
   auto files = Tables();
   files["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n1,100,-8000\n";
-  EXPECT_EQ(ProblemsOf(Yaml(), files),
+  EXPECT_EQ(ProblemsOf(BeadsYaml(), files),
             "par.csv: all 2 rows hold the same parameters: young_modulus 1e+11 Pa, "
             "rolling_stiffness 8e-06 N m/rad; a calibration needs runs at different ones\n");
 }
 
 TEST(Precomputed, RepeatedSetsAreWarnedOf) {
-  EXPECT_THAT(RepeatedRunWarnings(ReadCampaign(Yaml(), "c.yaml", ReaderOf(Tables())).campaign),
+  EXPECT_THAT(RepeatedRunWarnings(ReadCampaign(BeadsYaml(), "c.yaml", ReaderOf(Tables())).campaign),
               IsEmpty());
   auto files = Tables();
   files["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n1,100,8000\n2,120,5000\n3,100,8000\n";
-  const auto outcome = ReadCampaign(Yaml(), "c.yaml", ReaderOf(files));
+  const auto outcome = ReadCampaign(BeadsYaml(), "c.yaml", ReaderOf(files));
   ASSERT_THAT(outcome.problems, IsEmpty());
   EXPECT_THAT(RepeatedRunWarnings(outcome.campaign),
               ::testing::ElementsAre(
@@ -131,7 +132,7 @@ TEST(Precomputed, RepeatedSetsAreWarnedOf) {
 }
 
 TEST(Precomputed, AMisspeltNameIsNotPassedOver) {
-  std::string yaml = Yaml();
+  std::string yaml = BeadsYaml();
   yaml.replace(yaml.find("[rolling_stiffness]"), 19, "[roling_stiffness]");
   EXPECT_THAT(ProblemsOf(yaml, Tables()),
               HasSubstr("absolute: 'roling_stiffness' is not used in this campaign; did you mean "
@@ -139,7 +140,7 @@ TEST(Precomputed, AMisspeltNameIsNotPassedOver) {
 }
 
 TEST(Precomputed, RefusesWhatOnlyASimulationNeeds) {
-  std::string yaml = Yaml();
+  std::string yaml = BeadsYaml();
   yaml.replace(yaml.find("    control:"), 0, "    packing: {file: p.txt}\n");
   EXPECT_EQ(ProblemsOf(yaml, Tables()),
             "c.yaml:19: experiments[1].packing: has no meaning with precomputed runs; remove it\n");
@@ -148,7 +149,7 @@ TEST(Precomputed, RefusesWhatOnlyASimulationNeeds) {
 TEST(Precomputed, ZeroReadingsHaveNoSizeToScaleErrorsWith) {
   auto files = Tables();
   files["exp.dat"].replace(files["exp.dat"].find("1.0"), 3, "0.0");
-  EXPECT_EQ(ProblemsOf(Yaml(), files),
+  EXPECT_EQ(ProblemsOf(BeadsYaml(), files),
             "c.yaml:20: experiments[1].observables.mean_stress: is zero in exp.dat:2, but "
             "ess_target scales errors with "
             "the reading; leave the row out or use noise: given\n");

@@ -12,20 +12,20 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kReadings = 30;
+constexpr Index kPathReadings = 30;
 
 Eigen::VectorXd Smooth() {
-  Eigen::VectorXd v(kReadings);
-  for (Index k = 0; k < kReadings; ++k) {
-    v[k] = std::sin(std::numbers::pi * (static_cast<double>(k) + 0.5) / kReadings);
+  Eigen::VectorXd v(kPathReadings);
+  for (Index k = 0; k < kPathReadings; ++k) {
+    v[k] = std::sin(std::numbers::pi * (static_cast<double>(k) + 0.5) / kPathReadings);
   }
   return v.normalized();
 }
 
 Eigen::MatrixXd Chain() {
-  Eigen::MatrixXd chain(kReadings, kReadings);
-  for (Index i = 0; i < kReadings; ++i) {
-    for (Index j = 0; j < kReadings; ++j) {
+  Eigen::MatrixXd chain(kPathReadings, kPathReadings);
+  for (Index i = 0; i < kPathReadings; ++i) {
+    for (Index j = 0; j < kPathReadings; ++j) {
       chain(i, j) = std::exp(-static_cast<double>(std::abs(i - j)) / 2);
     }
   }
@@ -35,13 +35,13 @@ Eigen::MatrixXd Chain() {
 // A chain, and `beyond` times as much again along a smooth direction.
 Eigen::MatrixXd Departures(Index runs, double beyond, std::uint64_t seed) {
   const Eigen::MatrixXd lower = Eigen::LLT<Eigen::MatrixXd>(Chain()).matrixL();
-  Eigen::MatrixXd result(runs, kReadings);
+  Eigen::MatrixXd result(runs, kPathReadings);
   for (Index r = 0; r < runs; ++r) {
     PhiloxStream stream({.seed = seed,
                          .purpose = StreamPurpose::kTest,
                          .iteration = 2,
                          .sample = static_cast<std::uint64_t>(r)});
-    Eigen::VectorXd normal(kReadings);
+    Eigen::VectorXd normal(kPathReadings);
     for (double& value : normal) value = stream.Normal();
     result.row(r) = lower * normal + std::sqrt(beyond) * stream.Normal() * Smooth();
   }
@@ -57,7 +57,7 @@ std::vector<int> Groups(Index runs, int groups) {
 TEST(ShrunkCovariance, ManyRunsOverruleTheClosedForm) {
   const Eigen::MatrixXd truth = Chain() + 40 * Smooth() * Smooth().transpose();
   const auto found = ShrinkCovariance(Departures(20000, 40, 1), Groups(20000, 500), Chain(),
-                                      Eigen::MatrixXd::Identity(kReadings, kReadings));
+                                      Eigen::MatrixXd::Identity(kPathReadings, kPathReadings));
   EXPECT_LT(found.target_weight, 0.02);
   EXPECT_LT((found.covariance - truth).norm() / truth.norm(), 0.03);
 }
@@ -66,7 +66,7 @@ TEST(ShrunkCovariance, FewRunsKeepAClosedFormThatIsRight) {
   double weight = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     weight += ShrinkCovariance(Departures(40, 0, 100 + seed), Groups(40, 8), Chain(),
-                               Chain() + Eigen::MatrixXd::Identity(kReadings, kReadings))
+                               Chain() + Eigen::MatrixXd::Identity(kPathReadings, kPathReadings))
                   .target_weight /
               20;
   }
@@ -80,8 +80,9 @@ TEST(ShrunkCovariance, FewRunsShowWhatTheClosedFormMisses) {
   double along = 0;
   double weight = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    const auto found = ShrinkCovariance(Departures(40, 10, 200 + seed), Groups(40, 8), Chain(),
-                                        Chain() + Eigen::MatrixXd::Identity(kReadings, kReadings));
+    const auto found =
+        ShrinkCovariance(Departures(40, 10, 200 + seed), Groups(40, 8), Chain(),
+                         Chain() + Eigen::MatrixXd::Identity(kPathReadings, kPathReadings));
     along += v.dot(found.covariance * v) / 20;
     weight += found.target_weight / 20;
   }
@@ -94,7 +95,7 @@ TEST(ShrunkCovariance, FewRunsShowWhatTheClosedFormMisses) {
 TEST(ShrunkCovariance, RunsOfAGroupAreOneWitness) {
   const Eigen::MatrixXd single = Departures(8, 10, 3);
   const Eigen::MatrixXd copies = single.replicate(5, 1);
-  const Eigen::MatrixXd unit = Chain() + Eigen::MatrixXd::Identity(kReadings, kReadings);
+  const Eigen::MatrixXd unit = Chain() + Eigen::MatrixXd::Identity(kPathReadings, kPathReadings);
   const auto from_single = ShrinkCovariance(single, Groups(8, 8), Chain(), unit);
   const auto from_copies = ShrinkCovariance(copies, Groups(40, 8), Chain(), unit);
   EXPECT_NEAR(from_copies.target_weight, from_single.target_weight, 1e-9);

@@ -76,7 +76,7 @@ TEST(SettingTrend, CompareTellsThatTheBiasGoesWithTheRate) {
   ASSERT_EQ(c.trends.size(), 1U);
   EXPECT_EQ(c.trends[0].with, "loading_rate");
   EXPECT_NEAR(c.trends[0].per_decade, 0.499 / 2, 1e-6);
-  EXPECT_THAT(WhereItFails(c), testing::Contains(testing::HasSubstr(
+  EXPECT_THAT(WhereItFails(c), ::testing::Contains(::testing::HasSubstr(
                                    "model minus measurement grows with loading rate, by 0.25 per "
                                    "factor ten")));
 }

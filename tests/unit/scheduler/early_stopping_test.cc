@@ -26,10 +26,6 @@ testing::SmallCampaign Campaign(const std::string& extra, double noise = 0.01) {
 constexpr double kAllowed = 1e-3;
 constexpr const char* kStopping = "early_stopping: {discard_at_most: 1e-3}\n";
 
-v1::Posterior LastPosterior(SimulatedService& service) {
-  return *PosteriorFromJson(*service.Read().Iterations(1)->back().posterior);
-}
-
 TEST(EarlyStopping, SavesStatesAndLosesNoMoreThanItStates) {
   SimulatedService full("full");
   full.Submit(Campaign(""));

@@ -10,12 +10,12 @@
 namespace calib::scheduler {
 namespace {
 
-constexpr int kSamples = 40;
+constexpr int kRungSamples = 40;
 constexpr int kLoadSteps = 12;
 
 testing::SmallCampaign Campaign(const std::string& stopping, const std::string& method,
                                 double noise = 0.02, const std::string& inference = "") {
-  return testing::MakeSmallCampaign({.samples = kSamples,
+  return testing::MakeSmallCampaign({.samples = kRungSamples,
                                      .max_iterations = method == "sqmc" ? 1 : 2,
                                      .load_steps = kLoadSteps,
                                      .failure_attempts = 100,
@@ -33,10 +33,6 @@ constexpr const char* kNoLossAtRungs = "discard_at_most: 1e-300, rungs: [0.25, 0
 /// Guiding weights of which a tenth is effective: fewer scouts, tighter bounds.
 constexpr const char* kSharp = "  ess_target: 0.1\n";
 constexpr const char* kAtRungs = "discard_at_most: 1e-3, rungs: [0.25, 0.5, 0.8]";
-
-v1::Posterior LastPosterior(SimulatedService& service) {
-  return *PosteriorFromJson(*service.Read().Iterations(1)->back().posterior);
-}
 
 TEST(Rungs, SameBitsAsDepthFirstWhereNothingMayBeLost) {
   for (const std::string method : {"sqmc", "iterative_bayesian_filter"}) {
@@ -59,7 +55,7 @@ TEST(Rungs, SaveLoadStepsOfTheFirstIterationWithinTheStatedLoss) {
   SimulatedService depth("depth_saving");
   depth.Submit(Campaign("discard_at_most: 1e-3", "sqmc", 0.02, kSharp));
   depth.RunToEnd(1, true);
-  EXPECT_EQ(depth.computed, kSamples * kLoadSteps) << "nothing to compare with";
+  EXPECT_EQ(depth.computed, kRungSamples * kLoadSteps) << "nothing to compare with";
   const auto full = Value(depth.Read().Samples(1));
   struct Setting {
     std::string stopping;
@@ -127,11 +123,11 @@ TEST(Rungs, ARestingRunGoesOnWhereItsCheckpointIs) {
   // One worker brings all samples to the first rung.
   const std::int64_t home = service.Connect("home", 1);
   std::string run;
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < kRungSamples; ++i) {
     const v1::Lease lease = service.Next(home, v1::ServerMessage::kLease).lease();
     ASSERT_TRUE(lease.has_rest_after());
     EXPECT_EQ(lease.rest_after(), 2) << "three of twelve load steps";
-    if (i == kSamples - 1) service.Connect("other", 2);
+    if (i == kRungSamples - 1) service.Connect("other", 2);
     service.SendStates(home, lease, 0, 3);
     service.SendEnd(home, lease.attempt(), v1::Finished::OUTCOME_RESTING);
   }

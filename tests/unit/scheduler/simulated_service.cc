@@ -371,4 +371,12 @@ std::string SimulatedService::Runs(std::int64_t campaign) {
   return text;
 }
 
+v1::Posterior LastPosterior(SimulatedService& service) {
+  v1::Posterior last;
+  for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
+    if (iteration.posterior.has_value()) last = *PosteriorFromJson(*iteration.posterior);
+  }
+  return last;
+}
+
 }  // namespace calib::scheduler

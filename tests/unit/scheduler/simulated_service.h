@@ -123,4 +123,7 @@ class SimulatedService {
   std::int64_t last_session_ = 0;
 };
 
+/// The posterior of the last iteration of campaign 1 that has one.
+v1::Posterior LastPosterior(SimulatedService& service);
+
 }  // namespace calib::scheduler

@@ -15,14 +15,14 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr int kSamples = 8;
+constexpr int kStarted = 8;
 constexpr int kLoadSteps = 6;
 
 /// An iteration of which the first samples come to their ends and the others diverge.
 void RunIteration(SimulatedService& service, int survivors, const std::string& noise = "given",
                   const std::string& method = "iterative_bayesian_filter") {
   testing::SmallCampaign campaign =
-      testing::MakeSmallCampaign({.samples = kSamples,
+      testing::MakeSmallCampaign({.samples = kStarted,
                                   .max_iterations = method == "sqmc" ? 1 : 2,
                                   .load_steps = kLoadSteps,
                                   .method = method});
@@ -33,7 +33,7 @@ void RunIteration(SimulatedService& service, int survivors, const std::string& n
   set("noise: given", "noise: " + noise);
   service.Submit(campaign);
   const std::int64_t worker = service.Connect("w", 1);
-  for (int k = 0; k < kSamples; ++k) {
+  for (int k = 0; k < kStarted; ++k) {
     const v1::Lease lease = service.Next(worker, v1::ServerMessage::kLease).lease();
     if (k < survivors) service.SendStates(worker, lease, 0, kLoadSteps);
     service.SendEnd(
@@ -54,7 +54,7 @@ TEST(FewSurvivors, TheCampaignSaysHowManyAreLeftAndWhatWouldHelp) {
           progress.reason,
           AllOf(HasSubstr("of 8 samples " + std::to_string(survivors)),
                 HasSubstr("2 parameters need more than 2"),
-                HasSubstr(std::to_string(kSamples - survivors) + " did not come to their ends"),
+                HasSubstr(std::to_string(kStarted - survivors) + " did not come to their ends"),
                 HasSubstr("`calibctl samples` says why"), HasSubstr("narrow the priors"),
                 HasSubstr("Run more samples")));
     }

@@ -25,14 +25,6 @@ testing::SmallCampaign Campaign(int samples, int most_stages, const std::string&
                                      .extra = extra});
 }
 
-v1::Posterior LastPosterior(SimulatedService& service) {
-  v1::Posterior last;
-  for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
-    if (iteration.posterior.has_value()) last = *PosteriorFromJson(*iteration.posterior);
-  }
-  return last;
-}
-
 std::vector<store::EvaluationRecord> EvaluationsOf(SimulatedService& service, int experiment) {
   auto evaluations = Value(service.Read().Evaluations(1));
   std::erase_if(evaluations, [experiment](const store::EvaluationRecord& evaluation) {

@@ -146,6 +146,8 @@ TEST(RunCheckpoint, TestsUnderGravityGoOnBitForBit) {
   Scenario drum = Pour("rotating_drum", 150, {2, 4});
   drum.settings = {{"turns", 0.1}};
   ExpectToGoOn(drum);
+  drum.settings["turns"] = 0.02;
+  ExpectToGoOn(With(drum, "nonspherical_shape", {{"aspect", 1.4}}));
   ExpectToGoOn(Pour("shaken_box", 30, {0.05, 0.1, 0.2}));
   Scenario silo = Pour("silo_discharge", 100, {0.02, 0.028});
   silo.settings = {{"flat", 1}, {"silo_width", 0.056}, {"duration", 0.2}};

@@ -429,6 +429,73 @@ TEST(ShakenBox, TheIntruderRises) {
   EXPECT_LT(Value(run, "shaken_box", "exit_time", 2), 2.0);
 }
 
+/// The test with grains of that length over width.
+Scenario Elongated(const Scenario& spheres, double aspect) {
+  return test::With(spheres, "nonspherical_shape", {{"aspect", aspect}});
+}
+
+TEST(PouredShapes, AspectOneIsSpheresBitForBit) {
+  for (const char* name : {"angle_of_repose", "calibration_device", "rotating_drum"}) {
+    Scenario spheres = Pour(name, 100, {1});
+    spheres.settings = name == std::string("rotating_drum")
+                           ? std::map<std::string, double>{{"turns", 0.1}}
+                           : std::map<std::string, double>{};
+    const test::Run one = test::RunAll(Elongated(spheres, 1));
+    const test::Run without = test::RunAll(spheres);
+    ASSERT_EQ(without.states.size(), 1U) << name << ": " << without.summary.reason;
+    EXPECT_EQ(one.states[0].values, without.states[0].values) << name;
+  }
+}
+
+// Grains that are not round roll less and lock: their heap is steeper. [Zhao et al. 2017 for
+// simulations, Rowe 1962 for the reason]
+TEST(PouredShapes, ElongatedGrainsStandSteeperThanSpheres) {
+  Scenario spheres = Pour("angle_of_repose", 300, {1});
+  spheres.model = Beads(0.5, 0.1);
+  const double flat = Value(test::RunAll(spheres), "angle_of_repose", "angle_of_repose", 0);
+  const double steep =
+      Value(test::RunAll(Elongated(spheres, 1.5)), "angle_of_repose", "angle_of_repose", 0);
+  std::printf("angle of repose %.1f deg of spheres, %.1f deg at aspect 1.5\n", flat / kDegree,
+              steep / kDegree);
+  EXPECT_GT(steep, 1.2 * flat);
+  EXPECT_LT(steep, 45 * kDegree);
+}
+
+// Of nearly the same shape and of the same mass: the same flow, if each grain is weighed once.
+TEST(PouredShapes, GrainsOfTwoSpheresAreWeighedOnce) {
+  const Scenario spheres = Pour("calibration_device", 200, {1, 2});
+  double rate[2] = {0, 0};
+  for (int shape = 0; shape < 2; ++shape) {
+    const test::Run run = test::RunAll(shape == 0 ? spheres : Elongated(spheres, 1.02));
+    for (std::size_t k = 0; k < 2; ++k) {
+      rate[shape] += Value(run, "calibration_device", "mass_flow_rate", k) / 2;
+    }
+  }
+  std::printf("device: rate %.4f kg/s of spheres, %.4f at aspect 1.02\n", rate[0], rate[1]);
+  EXPECT_NEAR(rate[1] / rate[0], 1, 0.15);
+}
+
+TEST(PouredShapes, TheDrumIsThatOfTheSpheres) {
+  Scenario drum = Elongated(Pour("rotating_drum", 100, {2}), 1.8);
+  drum.settings = {{"turns", 0.1}};
+  const double slope = Value(test::RunAll(drum), "rotating_drum", "angle_of_repose", 0);
+  std::printf("drum: %.1f deg at aspect 1.8\n", slope / kDegree);
+  EXPECT_GT(slope, 10 * kDegree);
+  EXPECT_LT(slope, 60 * kDegree);
+  drum.settings["drum_diameter"] = 6 * kDiameter;
+  const test::Run run = test::RunAll(drum);
+  EXPECT_EQ(run.summary.outcome, Outcome::kDiverged);
+  EXPECT_THAT(run.summary.reason, testing::HasSubstr("set loosely into it"));
+}
+
+TEST(PouredShapes, WhereGrainsAreTakenOutOrPutInTheyAreSpheres) {
+  for (const char* name : {"silo_discharge", "transfer_chute", "shaken_box"}) {
+    EXPECT_THAT(ScenarioProblems(Elongated(Pour(name, 100, {1}), 1.5)),
+                testing::Contains(testing::HasSubstr("pours single spheres")))
+        << name;
+  }
+}
+
 TEST(GravityTests, ThreadsChangeNoBit) {
   Scenario silo = Pour("silo_discharge", 400, {6 * kDiameter});
   silo.settings = {{"duration", 0.1}};
