@@ -65,7 +65,9 @@ class Lookup {
   }
   [[nodiscard]] int Around(int j) const { return ((j % ny_) + ny_) % ny_; }
   [[nodiscard]] std::size_t Index(int i, int j, int k) const {
-    return static_cast<std::size_t>((k * ny_ + j) * nx_ + i);
+    const auto layer = static_cast<std::size_t>(k) * static_cast<std::size_t>(ny_);
+    return (layer + static_cast<std::size_t>(j)) * static_cast<std::size_t>(nx_) +
+           static_cast<std::size_t>(i);
   }
   [[nodiscard]] std::array<int, 3> CellOf(const Sphere& s) const {
     const auto cell = [](double x, double size) { return static_cast<int>(std::floor(x / size)); };

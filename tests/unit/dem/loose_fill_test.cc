@@ -23,6 +23,7 @@ FillRegion Tube(double height) {
 
 std::vector<double> Radii(int grains) {
   std::vector<double> radii;
+  radii.reserve(static_cast<std::size_t>(grains));
   for (int k = 0; k < grains; ++k) {
     radii.push_back(0.4 + 0.2 * k / grains);
   }
