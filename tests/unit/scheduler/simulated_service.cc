@@ -10,6 +10,7 @@
 
 #include "dem/catalog/catalog.h"
 #include "server/campaign/sha256.h"
+#include "server/scheduler/posterior_record.h"
 
 namespace calib::scheduler {
 namespace {
