@@ -12,8 +12,8 @@ namespace calib::dem {
 namespace {
 
 constexpr int kMostLayers = 1'000'000;
-constexpr int kThrows = 200;         // of a grain into a region that can grow
-constexpr int kMostThrows = 20'000;  // into one that cannot
+constexpr int kThrows = 200;         // of a grain, until a region that may grow does
+constexpr int kMostThrows = 20'000;  // until there is no room
 constexpr double kPitch = 1.08;      // largest diameters
 constexpr double kJitter = 0.03;     // largest radii, either way
 
@@ -123,13 +123,10 @@ Packing RandomFill(std::vector<double> radii, const ClumpTemplate& shape, const 
     const double radius = radii[static_cast<std::size_t>(grain)];
     std::vector<Sphere> members;
     for (int draw = 0; members.empty(); ++draw) {
-      if (region.height > 0 && draw == kMostThrows) {
+      if (draw == kMostThrows) {
         return packing;
       }
       if (!(region.height > 0) && draw % kThrows == kThrows - 1) {
-        if (height > kMostLayers * length) {
-          return packing;
-        }
         height += length;
       }
       const auto u = Uniform(seed, kFillDraw, grain, draw);

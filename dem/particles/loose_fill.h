@@ -30,9 +30,8 @@ Packing LooseFill(std::vector<double> radii, const FillRegion& region, std::uint
 /// Grains of a shape, their radii in an order drawn from the seed, thrown one after another to
 /// random places and directions where they touch no other (random sequential addition). A region
 /// of unlimited height is filled from below: it grows by a grain's length whenever a grain finds no
-/// place in 200 throws. Fewer grains come back where one finds none in 20 000 throws into a limited
-/// region. Clump ids count the grains. The same arguments give the same bits. Precondition: depth >
-/// 0.
+/// place in 200 throws. Fewer grains come back where one finds none in 20 000 throws. Clump ids
+/// count the grains. The same arguments give the same bits. Precondition: depth > 0.
 Packing RandomFill(std::vector<double> radii, const ClumpTemplate& shape, const FillRegion& region,
                    std::uint64_t seed);
 

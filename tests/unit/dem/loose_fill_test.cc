@@ -91,6 +91,9 @@ TEST(RandomFill, SameSeedSameBitsAndAFullRegionSaysSo) {
   const Packing full = RandomFill(Radii(1000), shape, Tube(3), 9);
   EXPECT_GT(full.x.size(), 100U);
   EXPECT_LT(full.x.size(), 2000U);
+  FillRegion none = Tube(0);  // of unlimited height, but too narrow
+  none.holds = [](const Vec3&, double) { return false; };
+  EXPECT_TRUE(RandomFill(Radii(3), shape, none, 9).x.empty());
 }
 
 }  // namespace
