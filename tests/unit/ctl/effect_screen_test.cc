@@ -109,6 +109,10 @@ TEST(WhyNotShown, GrainsOfAPouredTestKeepTheirShape) {
   for (const char* effect : {"nonspherical_shape", "particle_crushing"}) {
     EXPECT_EQ(why(effect), "test silo_discharge pours single spheres, which it leaves whole");
   }
+  campaign.experiments[0].test = "angle_of_repose";
+  EXPECT_EQ(why("nonspherical_shape"), "");
+  EXPECT_EQ(why("particle_crushing"),
+            "test angle_of_repose pours single spheres, which it leaves whole");
   campaign.experiments[0].test = "collision";
   EXPECT_EQ(why("particle_crushing"), "");
 }
