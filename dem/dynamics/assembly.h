@@ -66,12 +66,16 @@ class Assembly {
            int threads);
 
   /// Takes out the grains at these indices of particles(), ascending. To be followed by
-  /// EvaluateForces. Precondition: single spheres (no clumps).
+  /// EvaluateForces. Precondition: of a clump all spheres or none.
   void Remove(const std::vector<int>& grains);
 
   /// Lets grains join, with the next free ids. To be followed by EvaluateForces. Preconditions:
   /// single spheres (no clumps); the skin and the step were chosen for grains like these.
   void Insert(const std::vector<NewGrain>& grains);
+
+  /// Takes a clump (index in clumps().all()) out of its contacts and sets it down at rest, farther
+  /// by `shift` [m]. To be followed by EvaluateForces.
+  void Relocate(int clump, const Vec3& shift);
 
   /// Velocities, activity and friction of walls may be set between steps.
   [[nodiscard]] const WallContacts& walls() const { return walls_; }

@@ -1,6 +1,7 @@
 // Grains that join and leave.
 #include <algorithm>
 #include <cassert>
+#include <numeric>
 
 #include "dem/dynamics/assembly.h"
 
@@ -27,10 +28,14 @@ void Keep(const std::vector<int>& to, ParticleArrays& p) {
       if (!p.material.empty()) {
         p.material[kept] = p.material[g];
       }
+      if (!p.body.empty()) {
+        p.body[kept] = p.body[g];
+      }
       p.id[kept++] = p.id[g];
     }
   }
   p.id.resize(kept);
+  p.body.resize(p.body.empty() ? 0 : kept);
   p.material.resize(p.material.empty() ? 0 : kept);
 }
 
@@ -56,7 +61,6 @@ void Assembly::Renumber(const std::vector<int>& to) {
 }
 
 void Assembly::Remove(const std::vector<int>& grains) {
-  assert(clumps_.empty());
   if (grains.empty()) {
     return;
   }
@@ -64,14 +68,41 @@ void Assembly::Remove(const std::vector<int>& grains) {
   for (const int g : grains) {
     const auto q = static_cast<std::size_t>(g);
     to[q] = kGone;
-    solid_volume_ -= 1.0 / (particles_.inverse_mass[q] * DensityOf(MaterialOf(q)));
+    const int clump = particles_.body.empty() ? -1 : particles_.body[q];
+    if (clump < 0 || clumps_.all()[static_cast<std::size_t>(clump)].members.front() == g) {
+      solid_volume_ -= 1.0 / (particles_.inverse_mass[q] * DensityOf(MaterialOf(q)));
+    }
   }
   int next = 0;
   for (int& index : to) {
     index = index == kGone ? kGone : next++;
   }
   Renumber(to);
+  clumps_.Renumber(to, particles_.body);
   Keep(to, particles_);
+}
+
+void Assembly::Relocate(int clump, const Vec3& shift) {
+  Clump& body = clumps_.mutable_all()[static_cast<std::size_t>(clump)];
+  std::vector<int> to(particles_.x.size());
+  std::iota(to.begin(), to.end(), 0);
+  for (const int member : body.members) {
+    to[static_cast<std::size_t>(member)] = kGone;
+  }
+  Renumber(to);  // forgets its contacts
+  ParticleArrays& p = particles_;
+  for (const int member : body.members) {
+    const auto m = static_cast<std::size_t>(member);
+    p.x[m] += shift.x;
+    p.y[m] += shift.y;
+    p.z[m] += shift.z;
+    for (auto* a : {&p.vx, &p.vy, &p.vz, &p.wx, &p.wy, &p.wz}) {
+      (*a)[m] = 0;
+    }
+  }
+  body.centre = {body.centre[0] + shift.x, body.centre[1] + shift.y, body.centre[2] + shift.z};
+  body.velocity = {};
+  body.momentum = {};
 }
 
 void Assembly::Insert(const std::vector<NewGrain>& grains) {

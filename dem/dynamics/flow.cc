@@ -71,7 +71,15 @@ void Flow::TakeOut() {
   std::vector<int> out;
   for (int g = 0; g < p.size(); ++g) {
     const auto q = static_cast<std::size_t>(g);
-    if (p.z[q] < drain_) {
+    if (!p.body.empty() && p.body[q] >= 0) {
+      const Clump& body = assembly_->clumps().all()[static_cast<std::size_t>(p.body[q])];
+      if (body.centre[2] < drain_) {
+        out.push_back(g);
+        if (body.members.front() == g) {
+          drained_.push_back({.time = time_, .mass = body.mass, .y = body.centre[1]});
+        }
+      }
+    } else if (p.z[q] < drain_) {
       out.push_back(g);
       drained_.push_back({.time = time_, .mass = 1.0 / p.inverse_mass[q], .y = p.y[q]});
     }

@@ -1,6 +1,7 @@
 #include "dem/dynamics/rigid_clumps.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <map>
 
@@ -382,6 +383,23 @@ void RigidClumps::Fold(std::vector<std::array<double, 6>>& stiffness) const {
       own = {};
     }
     stiffness[static_cast<std::size_t>(c.members.front())] = sum;
+  }
+}
+
+void RigidClumps::Renumber(const std::vector<int>& to, std::vector<int>& body) {
+  std::vector<int> now;
+  int next = 0;
+  for (Clump& clump : clumps_) {
+    const bool leaves = to[static_cast<std::size_t>(clump.members.front())] < 0;
+    now.push_back(leaves ? -1 : next++);
+    for (int& member : clump.members) {
+      member = to[static_cast<std::size_t>(member)];
+      assert((member < 0) == leaves);
+    }
+  }
+  std::erase_if(clumps_, [](const Clump& clump) { return clump.members.front() < 0; });
+  for (int& of : body) {
+    of = of < 0 ? -1 : now[static_cast<std::size_t>(of)];
   }
 }
 

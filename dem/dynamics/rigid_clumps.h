@@ -63,6 +63,10 @@ class RigidClumps {
   /// Remembers where wrapping has put the members. To be called after each search.
   void Rewrap(const PeriodicCell& cell, const ParticleArrays& particles);
 
+  /// New indices of the members, < 0 for those that leave; whole clumps leave. body: the clump of
+  /// each sphere by its old index, renumbered with them.
+  void Renumber(const std::vector<int>& to, std::vector<int>& body);
+
   /// Collects stiffness (or damping) of members, three translations and three rotations each, at
   /// the first member: translations add up, rotations gain what translation does on the arms.
   void Fold(std::vector<std::array<double, 6>>& stiffness) const;

@@ -10,10 +10,11 @@ void Prepare(const ParameterSet& parameters, Preparation& preparation) {
   preparation.aspect = parameters.Get("aspect");
 }
 
-/// Specimens, and poured grains that stay to the end: none are taken out or put in.
+/// Specimens, and poured grains but those that are fed in or in one plane.
 std::vector<std::string> TestsOfShape() {
   std::vector<std::string> tests = ElementTestNames();
-  tests.insert(tests.end(), {"angle_of_repose", "calibration_device", "rotating_drum"});
+  tests.insert(tests.end(),
+               {"angle_of_repose", "calibration_device", "rotating_drum", "silo_discharge"});
   return tests;
 }
 
@@ -45,7 +46,8 @@ EffectEntry NonsphericalShape() {
                                 "(2004) 193",
                    .two_sided = false,
                    .rays = {{.parameter = "aspect", .steps = {0.1, 0.3}}},
-                   .excited_by = TestsOfShape()},
+                   .excited_by = TestsOfShape(),
+                   .needs_space = true},
           .place = 10,
           .prepare = &Prepare};
 }

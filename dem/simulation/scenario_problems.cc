@@ -306,6 +306,12 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
       problems.push_back(absl::StrCat("test ", scenario.test, " has no setting \"", name, "\""));
     }
   }
+  if (Given(scenario, "flat") >= 0.5 &&
+      std::find(scenario.model.effects.begin(), scenario.model.effects.end(),
+                "nonspherical_shape") != scenario.model.effects.end()) {
+    problems.emplace_back(
+        "effect nonspherical_shape needs room to all sides: leave flat out, or the effect");
+  }
   if (test->name == "silo_discharge" && Given(scenario, "thickness") > 0 &&
       Given(scenario, "flat") < 0.5) {
     problems.emplace_back(

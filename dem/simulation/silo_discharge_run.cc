@@ -75,6 +75,16 @@ void BreakArch(const std::vector<int>& arch, Assembly& assembly) {
   for (std::size_t g = 0; g < p.z.size(); ++g) {
     top = std::max(top, p.z[g] + p.radius[g]);
   }
+  if (!assembly.clumps().empty()) {
+    const int clump = p.body[q];
+    double lowest = top;
+    for (const int member : assembly.clumps().all()[static_cast<std::size_t>(clump)].members) {
+      const auto m = static_cast<std::size_t>(member);
+      lowest = std::min(lowest, p.z[m] - p.radius[m]);
+    }
+    assembly.Relocate(clump, {0, 0, top + 0.1 * p.radius[q] - lowest});
+    return;
+  }
   const NewGrain grain{.centre = {p.x[q], p.y[q], top + 1.1 * p.radius[q]},
                        .radius = p.radius[q],
                        .material = p.material.empty() ? 0 : p.material[q]};
@@ -204,26 +214,24 @@ StageEnd RunSiloDischarge(GravityRun& run) {
   vessel = Shifted(std::move(vessel), {m, m, 0});
   const bool own = vessel.size() > 0;
   const MeshInterior interior(vessel);
-  Packing grains =
-      LooseFill(run.radii(),
-                {.low = {m - 0.5 * silo.width, silo.flat ? m : m - 0.5 * silo.width, 0},
-                 .width = silo.width,
-                 .depth = silo.flat ? 0 : silo.width,
-                 .height = own ? BoundsOf(vessel).high.z : 0,
-                 .holds =
-                     [&](const Vec3& c, double r) {
-                       if (own) {
-                         return interior.Holds(c, r);
-                       }
-                       return silo.flat ? std::abs(c.x - m) + r < 0.5 * silo.width
-                                        : Hypotenuse(c.x - m, c.y - m) + r < inner;
-                     }},
-                run.seed());
-  if (own && grains.x.size() < run.radii().size()) {
+  Packing grains = run.Fill({.low = {m - 0.5 * silo.width, silo.flat ? m : m - 0.5 * silo.width, 0},
+                             .width = silo.width,
+                             .depth = silo.flat ? 0 : silo.width,
+                             .height = own ? BoundsOf(vessel).high.z : 0,
+                             .holds =
+                                 [&](const Vec3& c, double r) {
+                                   if (own) {
+                                     return interior.Holds(c, r);
+                                   }
+                                   return silo.flat ? std::abs(c.x - m) + r < 0.5 * silo.width
+                                                    : Hypotenuse(c.x - m, c.y - m) + r < inner;
+                                 }},
+                            run.seed());
+  if (own && run.CountOf(grains) < run.radii().size()) {
     return run.Fail(absl::StrCat("mesh silo is too small: of ", run.radii().size(), " grains ",
-                                 grains.x.size(), " find room, poured loosely"));
+                                 run.CountOf(grains), " find room, poured loosely"));
   }
-  if (grains.x.size() < run.radii().size()) {
+  if (run.CountOf(grains) < run.radii().size()) {
     return run.Fail("silo_width is too small: no grain fits into the silo");
   }
   const double top = TopOf(grains);

@@ -152,9 +152,8 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
   bool moving = false;
   for (const campaign::Experiment& e : campaign.experiments) {
     const dem::TestInfo* const test = dem::FindTest(e.test);
-    const bool acts = std::find(effect.excited_by.begin(), effect.excited_by.end(), e.test) !=
-                      effect.excited_by.end();
-    if (effect.kind == "particle" && test != nullptr && test->poured && !acts) {
+    if (effect.kind == "particle" && test != nullptr && test->poured &&
+        !campaign::CanShow(e, effect)) {
       return absl::StrCat("test ", e.test, " pours single spheres, which it leaves whole");
     }
     if (e.role != campaign::Role::kCalibrate) continue;

@@ -152,6 +152,8 @@ TEST(RunCheckpoint, TestsUnderGravityGoOnBitForBit) {
   Scenario silo = Pour("silo_discharge", 100, {0.02, 0.028});
   silo.settings = {{"flat", 1}, {"silo_width", 0.056}, {"duration", 0.2}};
   ExpectToGoOn(silo);
+  silo.settings = {{"silo_width", 0.04}, {"duration", 0.2}};
+  ExpectToGoOn(With(silo, "nonspherical_shape", {{"aspect", 1.4}}));
 }
 
 TEST(RunCheckpoint, DevicesAndChutesGoOnBitForBit) {
