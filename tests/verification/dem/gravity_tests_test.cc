@@ -447,8 +447,7 @@ TEST(PouredShapes, AspectOneIsSpheresBitForBit) {
   }
 }
 
-// Grains that are not round roll less and lock: their heap is steeper. [Zhao et al. 2017 for
-// simulations, Rowe 1962 for the reason]
+// Grains that are not round roll less and lock: their heap is steeper.
 TEST(PouredShapes, ElongatedGrainsStandSteeperThanSpheres) {
   Scenario spheres = Pour("angle_of_repose", 300, {1});
   spheres.model = Beads(0.5, 0.1);
@@ -475,7 +474,7 @@ TEST(PouredShapes, GrainsOfTwoSpheresAreWeighedOnce) {
   EXPECT_NEAR(rate[1] / rate[0], 1, 0.15);
 }
 
-TEST(PouredShapes, TheDrumIsThatOfTheSpheres) {
+TEST(PouredShapes, ADrumTurnsElongatedGrainsAndSaysWhenItIsTooSmall) {
   Scenario drum = Elongated(Pour("rotating_drum", 100, {2}), 1.8);
   drum.settings = {{"turns", 0.1}};
   const double slope = Value(test::RunAll(drum), "rotating_drum", "angle_of_repose", 0);
