@@ -258,6 +258,13 @@ DataSet Restricted(const DataSet& data, const std::vector<int>& readings) {
   return part;
 }
 
+DataSet WithLargerErrors(const DataSet& data, double factor) {
+  DataSet scaled = data;
+  for (Reading& reading : scaled.readings) reading.sd *= factor;
+  for (GroupCovariance& covariance : scaled.covariances) covariance.matrix *= factor * factor;
+  return scaled;
+}
+
 DataSet WithRelativeErrors(const DataSet& data, double sigma) {
   DataSet scaled = data;
   scaled.correlations.clear();

@@ -109,6 +109,9 @@ DataSet Restricted(const DataSet& data, const std::vector<int>& readings);
 /// The same readings in reversed processing order.
 DataSet Reversed(const DataSet& data);
 
+/// The same readings with every error `factor` times as large and correlated as before. factor > 0.
+DataSet WithLargerErrors(const DataSet& data, double factor);
+
 /// The same readings with independent errors of variance sigma w_j y^2, the Sigma of kEssTarget, so
 /// that the likelihood of kGiven serves both. sigma > 0; multiplies the variance. Needs
 /// ValidateData(data, kEssTarget).

@@ -1,6 +1,7 @@
 #include "server/ctl/warm_points.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "dem/catalog/catalog.h"
@@ -13,6 +14,8 @@ namespace {
 using Eigen::Index;
 
 constexpr int kDraws = 1000;  // of the emulated posterior
+// Of the misfit of the closest run: errors that points are chosen by, where they are larger.
+constexpr double kShareOfMisfit = 0.5;
 
 // As the inference sees runs: predictions in the units of the readings.
 inference::Iteration IterationOf(const report::RunTable& runs, const inference::DataSet& data) {
@@ -61,6 +64,14 @@ report::RunTable SpreadOnTop(const report::RunTable& without, const campaign::Ca
     if (from[j] >= 0) table.parameters.col(static_cast<Index>(j)) = without.parameters.col(from[j]);
   }
   return table;
+}
+
+// How much larger errors must be to be that share of what the closest run misses the readings by.
+double Widening(const report::RunTable& runs) {
+  if (runs.histories.rows() == 0) return 1;
+  const double rms = std::sqrt(runs.histories.rowwise().squaredNorm().minCoeff() /
+                               static_cast<double>(runs.histories.cols()));
+  return std::max(1.0, kShareOfMisfit * rms);
 }
 
 }  // namespace
@@ -159,7 +170,12 @@ absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
                                            const report::ScatteredReadings& readings,
                                            const report::RunTable& runs, int batch, int count) {
   const inference::JointPrior priors = campaign::Priors(campaign);
-  const auto emulated = Emulate(campaign, readings, runs);
+  report::ScatteredReadings wider = readings;
+  report::RunTable in_wider = runs;
+  const double widening = Widening(runs);
+  wider.of_mean = inference::WithLargerErrors(readings.of_mean, widening);
+  in_wider.histories /= widening;
+  const auto emulated = Emulate(campaign, wider, in_wider);
   inference::Proposal proposal;  // the prior
   if (emulated.ok() && emulated->draws.rows() > 0) {
     auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
