@@ -118,7 +118,7 @@ void ExpectTheShapesOfTable4(const std::vector<Fit>& fits) {
 TEST(TmcmcRestitution, EvidenceOfModelOne) {
   const auto reference = ReadRestitution("evidence_M1.json").at("results")[0];
   // CALIB_SEEDS sets how many. The few chains that found the needle of small errors descend from
-  // few draws, and so does the estimate of how few: over 16 seeds errors are 1.3 times what is
+  // few draws, and so does the estimate of how few: over 64 seeds errors are 1.3 times what is
   // stated.
   const char* text = std::getenv("CALIB_SEEDS");
   const std::uint64_t seeds = text != nullptr ? std::max(2, std::atoi(text)) : 4;
