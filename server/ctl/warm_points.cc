@@ -1,11 +1,11 @@
 #include "server/ctl/warm_points.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "dem/catalog/catalog.h"
 #include "dem/simulation/model_parameters.h"
+#include "inference/emulator/search_widening.h"
 #include "server/ctl/reading_effects.h"
 
 namespace calib::ctl {
@@ -14,8 +14,6 @@ namespace {
 using Eigen::Index;
 
 constexpr int kDraws = 1000;  // of the emulated posterior
-// Of the misfit of the closest run: errors that points are chosen by, where they are larger.
-constexpr double kShareOfMisfit = 0.5;
 
 // As the inference sees runs: predictions in the units of the readings.
 inference::Iteration IterationOf(const report::RunTable& runs, const inference::DataSet& data) {
@@ -66,12 +64,13 @@ report::RunTable SpreadOnTop(const report::RunTable& without, const campaign::Ca
   return table;
 }
 
-// How much larger errors must be to be that share of what the closest run misses the readings by.
-double Widening(const report::RunTable& runs) {
-  if (runs.histories.rows() == 0) return 1;
-  const double rms = std::sqrt(runs.histories.rowwise().squaredNorm().minCoeff() /
-                               static_cast<double>(runs.histories.cols()));
-  return std::max(1.0, kShareOfMisfit * rms);
+inference::EmulatorOptions OptionsOf(const campaign::Campaign& campaign,
+                                     const report::ScatteredReadings& readings) {
+  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
+  if (readings.measured) options.training.scatter_share = 0;
+  options.training.relevant_runs =
+      std::max<int>(20, static_cast<int>(5 * campaign.parameters.size()));
+  return options;
 }
 
 }  // namespace
@@ -158,24 +157,20 @@ std::optional<report::RunTable> RunsMisread(const report::RunTable& without,
 absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& campaign,
                                                   const report::ScatteredReadings& readings,
                                                   const report::RunTable& runs) {
-  const inference::JointPrior priors = campaign::Priors(campaign);
-  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
-  if (readings.measured) options.training.scatter_share = 0;
-  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
   const std::vector<inference::Iteration> iterations = {IterationOf(runs, readings.of_mean)};
-  return inference::EmulatedPosterior(priors, readings.of_mean, options, iterations);
+  return inference::EmulatedPosterior(campaign::Priors(campaign), readings.of_mean,
+                                      OptionsOf(campaign, readings), iterations);
 }
 
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
                                            const report::ScatteredReadings& readings,
                                            const report::RunTable& runs, int batch, int count) {
   const inference::JointPrior priors = campaign::Priors(campaign);
-  report::ScatteredReadings wider = readings;
-  report::RunTable in_wider = runs;
-  const double widening = Widening(runs);
-  wider.of_mean = inference::WithLargerErrors(readings.of_mean, widening);
-  in_wider.histories /= widening;
-  const auto emulated = Emulate(campaign, wider, in_wider);
+  const std::vector<inference::Iteration> iterations = {IterationOf(runs, readings.of_mean)};
+  const inference::DataSet data = inference::WithLargerErrors(
+      readings.of_mean, inference::SearchWidening(readings.of_mean, iterations));
+  const auto emulated =
+      inference::EmulatedPosterior(priors, data, OptionsOf(campaign, readings), iterations);
   inference::Proposal proposal;  // the prior
   if (emulated.ok() && emulated->draws.rows() > 0) {
     auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "inference/emulator/search_widening.h"
 #include "inference/emulator/split_half.h"
 #include "inference/filter/widened_posterior.h"
 
@@ -20,6 +21,18 @@ constexpr int kPathDraws = 400;
 
 constexpr const char* kNothingGiven =
     "No standard deviations, quantiles or held-out judgement are given. ";
+
+inference::EmulatorOptions EmulatorOptionsOf(const Definition& definition) {
+  const inference::FilterOptions& filter = definition.campaign.filter;
+  inference::EmulatorOptions options{.noise = filter.noise, .training = {}, .seed = filter.seed};
+  options.training.scatter_share =
+      definition.mean_data ? 0 : LargestScatterShare(definition.campaign);
+  return options;
+}
+
+const inference::DataSet& EmulatedData(const Definition& definition) {
+  return definition.mean_data ? *definition.mean_data : definition.data;
+}
 
 void ExplainEmulator(const Answer& answer, std::vector<std::string>& warnings) {
   const inference::EmulatedResult& emulated = *answer.emulated;
@@ -56,14 +69,11 @@ std::vector<inference::ParameterSummary> Answer::Parameters() const {
 
 void AskEmulator(const Definition& definition, std::span<const inference::Iteration> iterations,
                  Answer& answer) {
-  const inference::FilterOptions& filter = definition.campaign.filter;
-  inference::EmulatorOptions options{.noise = filter.noise, .training = {}, .seed = filter.seed};
-  options.training.scatter_share =
-      definition.mean_data ? 0 : LargestScatterShare(definition.campaign);
+  inference::EmulatorOptions options = EmulatorOptionsOf(definition);
   options.replicates = definition.replicates;
   options.path_draws = kPathDraws;
-  options.reversed_path = filter.reversed_path;
-  const inference::DataSet& data = definition.mean_data ? *definition.mean_data : definition.data;
+  options.reversed_path = definition.campaign.filter.reversed_path;
+  const inference::DataSet& data = EmulatedData(definition);
   auto emulated = inference::EmulatedPosterior(definition.priors, data, options, iterations);
   if (emulated.ok()) {
     if (emulated->adequate) {
@@ -86,6 +96,24 @@ void AskEmulator(const Definition& definition, std::span<const inference::Iterat
         answer.weighted.degeneracy, " ", kNothingGiven,
         "An emulator of the runs is not possible: ", std::string(emulated.status().message())));
   }
+}
+
+Eigen::MatrixXd DrawsToGoOnFrom(const Definition& definition,
+                                std::span<const inference::Iteration> iterations,
+                                const Answer& answer) {
+  const inference::DataSet& data = EmulatedData(definition);
+  const double widening = definition.campaign.filter.noise == inference::NoiseMode::kGiven
+                              ? inference::SearchWidening(data, iterations)
+                              : 1;
+  if (widening > 1) {
+    auto wider =
+        inference::EmulatedPosterior(definition.priors, inference::WithLargerErrors(data, widening),
+                                     EmulatorOptionsOf(definition), iterations);
+    if (wider.ok() && wider->draws.rows() > 0) {
+      return std::move(wider->draws);
+    }
+  }
+  return answer.emulated.has_value() ? answer.emulated->draws : Eigen::MatrixXd();
 }
 
 namespace {

@@ -37,6 +37,13 @@ struct Answer {
 void AskEmulator(const Definition& definition, std::span<const inference::Iteration> iterations,
                  Answer& answer);
 
+/// Draws to propose the next samples from, where the weights do not suffice: those of the answer's
+/// emulator, or of one by errors wider where the noise is given and the model far from the readings
+/// (inference::SearchWidening). No rows: neither knows the model anywhere in the prior.
+Eigen::MatrixXd DrawsToGoOnFrom(const Definition& definition,
+                                std::span<const inference::Iteration> iterations,
+                                const Answer& answer);
+
 /// Of the filters. Deterministic. Errors as inference::ComputePosterior; an emulator that cannot be
 /// had is no error but a warning.
 absl::StatusOr<Answer> FindAnswer(const Definition& definition,

@@ -61,10 +61,12 @@ class FilterMethod final : public Method {
   absl::StatusOr<inference::Proposal> NextProposal(
       const Answer& answer, const History& history,
       const std::vector<std::optional<double>>& frozen) const {
-    if (answer.emulated.has_value() && answer.emulated->draws.rows() > 0) {
-      return inference::FitProposalToDraws(definition_.priors, campaign_.filter,
-                                           answer.emulated->draws, history.iterations.size(),
-                                           frozen);
+    if (answer.emulated.has_value()) {
+      const Eigen::MatrixXd draws = DrawsToGoOnFrom(definition_, history.iterations, answer);
+      if (draws.rows() > 0) {
+        return inference::FitProposalToDraws(definition_.priors, campaign_.filter, draws,
+                                             history.iterations.size(), frozen);
+      }
     }
     return inference::FitProposal(definition_.priors, definition_.data, campaign_.filter,
                                   history.iterations, frozen);

@@ -5,33 +5,14 @@
 #include <cmath>
 
 #include "server/ctl/reading_effects.h"
+#include "tests/support/square_campaign.h"
 
 namespace calib::ctl {
 namespace {
 
 using Eigen::Index;
 
-// Two parameters in the unit square and one reading.
-campaign::Campaign Square() {
-  campaign::Experiment experiment;
-  experiment.name = "tx";
-  experiment.test = "triaxial_drained";
-  experiment.settings["confining_pressure"] = 1e5;
-  experiment.control_name = "axial_strain";
-  experiment.control = {0.01, 0.02};
-  experiment.path = {{.target = 0.01, .load_step = 0}, {.target = 0.02, .load_step = 1}};
-  experiment.segment = {"initial_loading", "initial_loading"};
-  experiment.observables.push_back({.name = "q_over_p", .values = {1, 1}, .sd = {0.1, 0.1}});
-  campaign::Campaign campaign;
-  campaign.experiments.push_back(experiment);
-  for (const char* name : {"a", "b"}) {
-    campaign.parameters.push_back(
-        {.name = name,
-         .unit = "1",
-         .prior = {.kind = inference::PriorKind::kUniform, .min = 0, .max = 1}});
-  }
-  return campaign;
-}
+campaign::Campaign Square() { return testing::SquareCampaign(); }
 
 // Runs whose first reading is predicted as 1 + a - 0.3, the second as 1 + b - 0.7: truth (0.3,
 // 0.7).

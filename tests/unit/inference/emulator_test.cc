@@ -14,6 +14,7 @@
 #include "inference/emulator/gaussian_process.h"
 #include "inference/emulator/matern_kernel.h"
 #include "inference/emulator/principal_components.h"
+#include "inference/emulator/search_widening.h"
 #include "inference/sampling/halton.h"
 #include "inference/sampling/philox.h"
 
@@ -240,6 +241,19 @@ TEST(StateEmulator, RunsThatDifferInNothingAreNothingToEmulate) {
         StateEmulator::Fit(inputs, Eigen::MatrixXd::Constant(20, 5, value), all, {});
     EXPECT_EQ(emulator.status().code(), absl::StatusCode::kFailedPrecondition) << value;
   }
+}
+
+// Of runs that miss two readings by 3 and 4 sd, by 30 and 40, and by NaN: half of the rms of the closest.
+TEST(SearchWidening, IsHalfOfWhatTheClosestRunMissesTheReadingsBy) {
+  DataSet data;
+  data.readings = {{.value = 1, .sd = 0.1}, {.value = -2, .sd = 0.5}};
+  Iteration iteration;
+  iteration.predictions.resize(3, 2);
+  iteration.predictions << 4, 18, 1.3, 0, std::numeric_limits<double>::quiet_NaN(), -2;
+  EXPECT_NEAR(SearchWidening(data, {&iteration, 1}), 0.5 * std::sqrt((9. + 16) / 2), 1e-12);
+  iteration.predictions.row(1) << 1.05, -2;
+  EXPECT_EQ(SearchWidening(data, {&iteration, 1}), 1) << "not below the readings' own errors";
+  EXPECT_EQ(SearchWidening(data, {}), 1);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "server/scheduler/posterior_record.h"
+#include "tests/support/square_campaign.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
 namespace calib::scheduler {
@@ -94,6 +95,31 @@ TEST(Answer, WithTooFewRunsToEmulateNoIntervalIsGiven) {
   ASSERT_EQ(posterior.warnings_size(), 1);
   EXPECT_THAT(posterior.warnings(0), HasSubstr("No standard deviations, quantiles"));
   EXPECT_EQ(HeldOutDraws(service, 4), 0);
+}
+
+// The first reading is predicted as 1 + a - 0.3, the second as 1 + b - 0.7, or as 2.6 whatever b is: that one is missed by
+// 16 sd, so that a is looked for by errors of 0.57 instead of 0.1.
+TEST(Answer, FarFromTheReadingsTheNextSamplesAreLookedForWidely) {
+  const auto definition = MakeDefinition(testing::SquareCampaign());
+  inference::Iteration iteration;
+  iteration.parameters.resize(30, 2);
+  for (Eigen::Index i = 0; i < 30; ++i) {  // a lattice of golden ratios
+    iteration.parameters(i, 0) = std::fmod(0.5 + 0.754877666 * static_cast<double>(i), 1);
+    iteration.parameters(i, 1) = std::fmod(0.5 + 0.569840291 * static_cast<double>(i), 1);
+  }
+  iteration.predictions = iteration.parameters.rowwise() + Eigen::RowVector2d(0.7, 0.3);
+  const auto near = FindAnswer(*definition, {&iteration, 1});
+  ASSERT_TRUE(near.ok() && near->emulated.has_value()) << near.status();
+  EXPECT_EQ(DrawsToGoOnFrom(*definition, {&iteration, 1}, *near), near->emulated->draws);
+
+  iteration.predictions.col(1).setConstant(2.6);
+  const auto far = FindAnswer(*definition, {&iteration, 1});
+  ASSERT_TRUE(far.ok() && far->emulated.has_value()) << far.status();
+  const auto spread = [](const Eigen::MatrixXd& draws) {
+    return std::sqrt((draws.col(0).array() - draws.col(0).mean()).square().mean());
+  };
+  EXPECT_LT(spread(far->emulated->draws), 0.15);
+  EXPECT_GT(spread(DrawsToGoOnFrom(*definition, {&iteration, 1}, *far)), 0.2);
 }
 
 TEST(Answer, ARestartInTheMiddleChangesNoBit) {

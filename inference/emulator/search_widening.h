@@ -1,0 +1,17 @@
+#pragma once
+// By which errors the next runs of a model are chosen.
+
+#include <span>
+
+#include "inference/data/data_set.h"
+#include "inference/filter/iterative_filter.h"
+
+namespace calib::inference {
+
+/// How many times as large as those of the readings: half of what the closest run misses them by (root mean square
+/// over the readings, in their sd), at least once. A model that is far from its readings is known to their own errors
+/// nowhere but at its runs; an emulated posterior by those lies beside them, or in the corner that is known least. Rows
+/// with NaN do not count; 1 where no other is left. Predictions in the units of the readings.
+double SearchWidening(const DataSet& data, std::span<const Iteration> iterations);
+
+}  // namespace calib::inference
