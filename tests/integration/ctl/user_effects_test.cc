@@ -168,7 +168,7 @@ experiments:
 )" + (name == "held" ? "    role: validate\n" : "");
     }
     return text + R"(noise: given
-inference: {method: iterative_bayesian_filter, samples: 24, max_iterations: 2}
+inference: {method: iterative_bayesian_filter, samples: 30, max_iterations: 3}
 seed: 3
 )";
   }
