@@ -92,24 +92,32 @@ void CountSamples(const store::CampaignRecord& record,
   }
 }
 
-/// The last posterior, or nothing before the first.
-absl::StatusOr<std::optional<v1::Posterior>> LastPosterior(store::Reader& reader,
-                                                           std::int64_t campaign) {
+struct Concluded {
+  std::optional<v1::Posterior> last;  ///< nothing before the first
+  double best_misfit = 0;             ///< the smallest of all iterations, 0: none has one
+};
+
+absl::StatusOr<Concluded> ConcludedIterations(store::Reader& reader, std::int64_t campaign) {
   const auto iterations = reader.Iterations(campaign);
   if (!iterations.ok()) {
     return iterations.status();
   }
-  std::optional<v1::Posterior> last;
+  Concluded concluded;
   for (const store::IterationRecord& iteration : *iterations) {
-    if (iteration.posterior.has_value()) {
-      auto posterior = scheduler::PosteriorFromJson(*iteration.posterior);
-      if (!posterior.ok()) {
-        return posterior.status();
-      }
-      last = *std::move(posterior);
+    if (!iteration.posterior.has_value()) {
+      continue;
     }
+    auto posterior = scheduler::PosteriorFromJson(*iteration.posterior);
+    if (!posterior.ok()) {
+      return posterior.status();
+    }
+    const double misfit = posterior->best_misfit();
+    if (misfit > 0 && (concluded.best_misfit == 0 || misfit < concluded.best_misfit)) {
+      concluded.best_misfit = misfit;
+    }
+    concluded.last = *std::move(posterior);
   }
-  return last;
+  return concluded;
 }
 
 }  // namespace
@@ -132,9 +140,9 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   const auto record = reader.Campaign(campaign);
   const auto evaluations = reader.Evaluations(campaign);
   const auto effort = reader.EffortOf(campaign);
-  const auto posterior = LastPosterior(reader, campaign);
+  const auto concluded = ConcludedIterations(reader, campaign);
   for (const absl::Status& status :
-       {record.status(), evaluations.status(), effort.status(), posterior.status()}) {
+       {record.status(), evaluations.status(), effort.status(), concluded.status()}) {
     if (!status.ok()) {
       return status;
     }
@@ -149,14 +157,16 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_samples(record->submitted.samples);
   CountSamples(*record, *evaluations, status);
   status.set_eta_seconds(-1);
-  if (posterior->has_value()) {
-    status.set_effective_sample_size((*posterior)->ess());
-    status.set_best_misfit((*posterior)->best_misfit());
+  if (concluded->last.has_value()) {
+    status.set_effective_sample_size(concluded->last->ess());
+    status.set_best_misfit(concluded->best_misfit);
   }
   // Nothing is known of it before all its samples have a reading in common.
   if (live.has_value() && record->progress.phase == "calibrating" && live->view.best_misfit > 0) {
     status.set_effective_sample_size(live->view.effective_samples);
-    status.set_best_misfit(live->view.best_misfit);
+    if (concluded->best_misfit == 0) {  // that of whole curves, where there is one
+      status.set_best_misfit(live->view.best_misfit);
+    }
   }
   if (live.has_value()) {
     status.set_eta_seconds(live->eta_seconds);

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "server/scheduler/posterior_record.h"
+#include "server/service/queries.h"
 #include "tests/support/square_campaign.h"
 #include "tests/unit/scheduler/simulated_service.h"
 
@@ -120,6 +122,21 @@ TEST(Answer, FarFromTheReadingsTheNextSamplesAreLookedForWidely) {
   };
   EXPECT_LT(spread(far->emulated->draws), 0.15);
   EXPECT_GT(spread(DrawsToGoOnFrom(*definition, {&iteration, 1}, *far)), 0.2);
+}
+
+TEST(Answer, TheBestMisfitOfACampaignIsThatOfAllItsIterations) {
+  SimulatedService service("answer_best_misfit");
+  RunCampaign(service, 4, 0.001);
+  std::vector<double> misfits;
+  for (const store::IterationRecord& iteration : Value(service.Read().Iterations(1))) {
+    if (iteration.posterior.has_value()) {
+      misfits.push_back(PosteriorFromJson(*iteration.posterior)->best_misfit());
+    }
+  }
+  ASSERT_EQ(misfits.size(), 2U);
+  ASSERT_LT(misfits[0], misfits[1]) << "with these few samples the second comes no closer";
+  store::Reader reader = service.Read();
+  EXPECT_EQ(Value(service::StatusOf(reader, 1, std::nullopt)).best_misfit(), misfits[0]);
 }
 
 TEST(Answer, ARestartInTheMiddleChangesNoBit) {
