@@ -87,7 +87,7 @@ campaign::Campaign Extended(const Eigen::VectorXd& measured, std::uint64_t seed)
       experiment.control.push_back(strain);
       experiment.path.push_back({.target = strain, .load_step = i});
       experiment.segment.emplace_back("initial_loading");
-      const Index at = 2 * (test * kReadings + i);
+      const Index at = 2 * static_cast<Index>(test * kReadings + i);
       ratio.values.push_back(measured[at]);
       ratio.sd.push_back(0.02 * measured[at]);
       volume.values.push_back(measured[at + 1]);
