@@ -6,13 +6,8 @@
 #include <limits>
 
 namespace calib::inference {
-namespace {
 
-constexpr double kShareOfMisfit = 0.5;
-
-}  // namespace
-
-double SearchWidening(const DataSet& data, std::span<const Iteration> iterations) {
+double SearchWidening(const DataSet& data, std::span<const Iteration> iterations, double share) {
   const auto t = static_cast<Eigen::Index>(data.readings.size());
   Eigen::RowVectorXd value(t);
   Eigen::RowVectorXd sd(t);
@@ -28,7 +23,7 @@ double SearchWidening(const DataSet& data, std::span<const Iteration> iterations
     }
   }
   if (!std::isfinite(least)) return 1;
-  return std::max(1.0, kShareOfMisfit * std::sqrt(least / static_cast<double>(t)));
+  return std::max(1.0, share * std::sqrt(least / static_cast<double>(t)));
 }
 
 }  // namespace calib::inference

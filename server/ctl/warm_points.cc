@@ -14,6 +14,9 @@ namespace {
 using Eigen::Index;
 
 constexpr int kDraws = 1000;  // of the emulated posterior
+// Of what the closest run misses the readings by: the errors by which points are drawn. Batches are few, so
+// that it is half of what the iterations of a calibration take.
+constexpr double kShareOfMisfit = 0.25;
 
 // As the inference sees runs: predictions in the units of the readings.
 inference::Iteration IterationOf(const report::RunTable& runs, const inference::DataSet& data) {
@@ -168,7 +171,7 @@ absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
   const inference::JointPrior priors = campaign::Priors(campaign);
   const std::vector<inference::Iteration> iterations = {IterationOf(runs, readings.of_mean)};
   const inference::DataSet data = inference::WithLargerErrors(
-      readings.of_mean, inference::SearchWidening(readings.of_mean, iterations));
+      readings.of_mean, inference::SearchWidening(readings.of_mean, iterations, kShareOfMisfit));
   const auto emulated =
       inference::EmulatedPosterior(priors, data, OptionsOf(campaign, readings), iterations);
   inference::Proposal proposal;  // the prior
