@@ -5,7 +5,6 @@
 
 #include "dem/catalog/catalog.h"
 #include "dem/simulation/model_parameters.h"
-#include "inference/emulator/search_widening.h"
 #include "server/ctl/reading_effects.h"
 
 namespace calib::ctl {
@@ -14,9 +13,6 @@ namespace {
 using Eigen::Index;
 
 constexpr int kDraws = 1000;  // of the emulated posterior
-// Of what the closest run misses the readings by: the errors by which points are drawn. Batches are few, so
-// that it is half of what the iterations of a calibration take.
-constexpr double kShareOfMisfit = 0.25;
 
 // As the inference sees runs: predictions in the units of the readings.
 inference::Iteration IterationOf(const report::RunTable& runs, const inference::DataSet& data) {
@@ -65,15 +61,6 @@ report::RunTable SpreadOnTop(const report::RunTable& without, const campaign::Ca
     if (from[j] >= 0) table.parameters.col(static_cast<Index>(j)) = without.parameters.col(from[j]);
   }
   return table;
-}
-
-inference::EmulatorOptions OptionsOf(const campaign::Campaign& campaign,
-                                     const report::ScatteredReadings& readings) {
-  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
-  if (readings.measured) options.training.scatter_share = 0;
-  options.training.relevant_runs =
-      std::max<int>(20, static_cast<int>(5 * campaign.parameters.size()));
-  return options;
 }
 
 }  // namespace
@@ -160,20 +147,19 @@ std::optional<report::RunTable> RunsMisread(const report::RunTable& without,
 absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& campaign,
                                                   const report::ScatteredReadings& readings,
                                                   const report::RunTable& runs) {
+  const inference::JointPrior priors = campaign::Priors(campaign);
+  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
+  if (readings.measured) options.training.scatter_share = 0;
+  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
   const std::vector<inference::Iteration> iterations = {IterationOf(runs, readings.of_mean)};
-  return inference::EmulatedPosterior(campaign::Priors(campaign), readings.of_mean,
-                                      OptionsOf(campaign, readings), iterations);
+  return inference::EmulatedPosterior(priors, readings.of_mean, options, iterations);
 }
 
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
                                            const report::ScatteredReadings& readings,
                                            const report::RunTable& runs, int batch, int count) {
   const inference::JointPrior priors = campaign::Priors(campaign);
-  const std::vector<inference::Iteration> iterations = {IterationOf(runs, readings.of_mean)};
-  const inference::DataSet data = inference::WithLargerErrors(
-      readings.of_mean, inference::SearchWidening(readings.of_mean, iterations, kShareOfMisfit));
-  const auto emulated =
-      inference::EmulatedPosterior(priors, data, OptionsOf(campaign, readings), iterations);
+  const auto emulated = Emulate(campaign, readings, runs);
   inference::Proposal proposal;  // the prior
   if (emulated.ok() && emulated->draws.rows() > 0) {
     auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,

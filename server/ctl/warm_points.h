@@ -43,9 +43,8 @@ absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& camp
                                                   const report::RunTable& runs);
 
 /// `count` points, SI: draws from the posterior that an emulator of the runs gives, where it knows
-/// the model's history somewhere in the prior, by errors wider where the model is far from the
-/// readings (inference::SearchWidening); else from the prior. batch: number of batches so far,
-/// decides the random numbers. Errors: those of inference::FitProposalToDraws and DrawSamples.
+/// the model's history somewhere in the prior; else from the prior. batch: number of batches so
+/// far, decides the random numbers. Errors: those of inference::FitProposalToDraws and DrawSamples.
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
                                            const report::ScatteredReadings& readings,
                                            const report::RunTable& runs, int batch, int count);

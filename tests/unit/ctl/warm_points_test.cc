@@ -44,20 +44,6 @@ TEST(WarmPoints, LieAboutThePosteriorThatAnEmulatorOfTheRunsGives) {
   EXPECT_EQ(*points, *NextPoints(Square(), Readings(), Runs(30), 1, 40)) << "same bits";
 }
 
-// The second reading is missed by 16 sd whatever b is: errors are taken eight times 1 / sqrt(2) as
-// large, so that the first tells a to 0.57 instead of to 0.1.
-TEST(WarmPoints, ReachAsFarAsTheMisfitThatIsLeft) {
-  report::RunTable runs = Runs(30);
-  runs.histories.col(1).setConstant(16);
-  const auto points = NextPoints(Square(), Readings(), runs, 1, 40);
-  ASSERT_TRUE(points.ok()) << points.status();
-  const auto far = [](const Eigen::MatrixXd& among) {
-    return ((among.col(0).array() - 0.3).abs() > 0.4).count();
-  };
-  EXPECT_GE(far(*points), 5);  // of 40; a posterior of sd 0.1 has some defensive draws there
-  EXPECT_LT(far(*NextPoints(Square(), Readings(), Runs(30), 1, 40)), 5);
-}
-
 TEST(WarmPoints, ComeFromThePriorWhereThereIsTooLittleToGoBy) {
   const auto points = NextPoints(Square(), Readings(), Runs(4), 1, 6);
   ASSERT_TRUE(points.ok()) << points.status();
