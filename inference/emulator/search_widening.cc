@@ -6,8 +6,13 @@
 #include <limits>
 
 namespace calib::inference {
+namespace {
 
-double SearchWidening(const DataSet& data, std::span<const Iteration> iterations, double share) {
+constexpr double kShareOfMisfit = 0.5;
+
+}  // namespace
+
+double SearchWidening(const DataSet& data, std::span<const Iteration> iterations) {
   const auto t = static_cast<Eigen::Index>(data.readings.size());
   Eigen::RowVectorXd value(t);
   Eigen::RowVectorXd sd(t);
@@ -23,7 +28,7 @@ double SearchWidening(const DataSet& data, std::span<const Iteration> iterations
     }
   }
   if (!std::isfinite(least)) return 1;
-  return std::max(1.0, share * std::sqrt(least / static_cast<double>(t)));
+  return std::max(1.0, kShareOfMisfit * std::sqrt(least / static_cast<double>(t)));
 }
 
 }  // namespace calib::inference

@@ -8,12 +8,11 @@
 
 namespace calib::inference {
 
-/// How many times as large as those of the readings: a share of what the closest run misses them by (root
-/// mean square over the readings, in their sd), at least once. A model that is far from its readings is
-/// known to their own errors nowhere but at its runs; an emulated posterior by those lies beside them, or
-/// in the corner that is known least. Rows with NaN do not count; 1 where no other is left. Predictions in
-/// the units of the readings. share: [0, 1]; the larger, the wider runs are spread, and the more of them it
-/// takes to come close where the readings can be reached.
-double SearchWidening(const DataSet& data, std::span<const Iteration> iterations, double share);
+/// How many times as large as those of the readings: half of what the closest run misses them by
+/// (root mean square over the readings, in their sd), at least once. A model that is far from its
+/// readings is known to their own errors nowhere but at its runs; an emulated posterior by those
+/// lies beside them, or in the corner that is known least. Rows with NaN do not count; 1 where no
+/// other is left. Predictions in the units of the readings.
+double SearchWidening(const DataSet& data, std::span<const Iteration> iterations);
 
 }  // namespace calib::inference

@@ -19,9 +19,6 @@ constexpr double kWorthSaying = 1.1;
 /// Carried along the readings: means to about 0.07 sd.
 constexpr int kPathDraws = 400;
 
-/// Of what the closest run misses the readings by: the errors by which the next samples are drawn.
-constexpr double kShareOfMisfit = 0.5;
-
 constexpr const char* kNothingGiven =
     "No standard deviations, quantiles or held-out judgement are given. ";
 
@@ -106,7 +103,7 @@ Eigen::MatrixXd DrawsToGoOnFrom(const Definition& definition,
                                 const Answer& answer) {
   const inference::DataSet& data = EmulatedData(definition);
   const double widening = definition.campaign.filter.noise == inference::NoiseMode::kGiven
-                              ? inference::SearchWidening(data, iterations, kShareOfMisfit)
+                              ? inference::SearchWidening(data, iterations)
                               : 1;
   if (widening > 1) {
     auto wider =

@@ -5,7 +5,8 @@
 
 namespace calib::testing {
 
-/// Parameters a and b, uniform from 0 to 1; q_over_p measured as 1 with an sd of 0.1, twice, in a drained triaxial test.
+/// Parameters a and b, uniform from 0 to 1; q_over_p measured as 1 with an sd of 0.1, twice, in a
+/// drained triaxial test.
 inline campaign::Campaign SquareCampaign() {
   campaign::Experiment experiment;
   experiment.name = "tx";

@@ -243,17 +243,18 @@ TEST(StateEmulator, RunsThatDifferInNothingAreNothingToEmulate) {
   }
 }
 
-// Of runs that miss two readings by 3 and 4 sd, by 30 and 40, and by NaN: the share asked for, a half, of the rms of the closest.
-TEST(SearchWidening, IsAShareOfWhatTheClosestRunMissesTheReadingsBy) {
+// Of runs that miss two readings by 3 and 4 sd, by 30 and 40, and by NaN: half of the rms of the
+// closest.
+TEST(SearchWidening, IsHalfOfWhatTheClosestRunMissesTheReadingsBy) {
   DataSet data;
   data.readings = {{.value = 1, .sd = 0.1}, {.value = -2, .sd = 0.5}};
   Iteration iteration;
   iteration.predictions.resize(3, 2);
   iteration.predictions << 4, 18, 1.3, 0, std::numeric_limits<double>::quiet_NaN(), -2;
-  EXPECT_NEAR(SearchWidening(data, {&iteration, 1}, 0.5), 0.5 * std::sqrt((9. + 16) / 2), 1e-12);
+  EXPECT_NEAR(SearchWidening(data, {&iteration, 1}), 0.5 * std::sqrt((9. + 16) / 2), 1e-12);
   iteration.predictions.row(1) << 1.05, -2;
-  EXPECT_EQ(SearchWidening(data, {&iteration, 1}, 0.5), 1) << "not below the readings' own errors";
-  EXPECT_EQ(SearchWidening(data, {}, 0.5), 1);
+  EXPECT_EQ(SearchWidening(data, {&iteration, 1}), 1) << "not below the readings' own errors";
+  EXPECT_EQ(SearchWidening(data, {}), 1);
 }
 
 }  // namespace

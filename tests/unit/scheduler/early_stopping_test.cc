@@ -26,8 +26,8 @@ testing::SmallCampaign Campaign(const std::string& extra, double noise = 0.01) {
 constexpr double kAllowed = 1e-3;
 constexpr const char* kStopping = "early_stopping: {discard_at_most: 1e-3}\n";
 
-// The noise is such that the model comes within two sd of its readings: further off, samples are looked
-// for so widely that the weights that guide leave none to stop.
+// The noise is such that the model comes within two sd of its readings: further off, samples are
+// looked for so widely that the weights that guide leave none to stop (0.01: none).
 TEST(EarlyStopping, SavesStatesAndLosesNoMoreThanItStates) {
   constexpr double kNoise = 0.02;
   SimulatedService full("full");
