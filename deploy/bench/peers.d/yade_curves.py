@@ -47,24 +47,39 @@ zero = [servo.strain[k] for k in range(3)]
 drained = job["drained"]
 servo.stressMask = 3 if drained else 0
 servo.maxStrainRate = (1, 1, 0.1)
-servo.maxUnbalanced = servo.relStressTol = 1e9
+servo.doneHook = ''  # which would end each run at its first step, since the strain asked for is held while grains settle
 sides = (-pressure, -pressure) if drained else (zero[0], zero[1])
+
+
+goal_strain, straining, left = 0.0, False, 0
+
+
+def inspect():
+    """Every 20 steps: settles once the axial strain is there; ends the run once it has settled, after 20 000 steps in any case."""
+    global straining, left
+    if straining:
+        if abs(servo.strain[2] - goal_strain) <= 1e-7:
+            straining, newton.damping, left = False, 0.9, 1000
+        return
+    stress = getStress()
+    held = not drained or max(abs(stress[k, k] + pressure) for k in (0, 1)) < 1e-3 * pressure
+    left -= 1
+    if left == 0 or (held and unbalancedForce() < 5e-4):
+        O.pause()
+
+
+# Within the run: a call of O.run(20, wait=True) sleeps for 40 ms at a time.
+O.engines += [PyRunner(command='inspect()', iterPeriod=20)]
 
 
 def walk_to(goal):
     """Strains to the axial strain and settles there; the stress tensor."""
-    newton.damping = 0.2
+    global goal_strain, straining
+    newton.damping, goal_strain, straining = 0.2, goal, True
     servo.goal = (*sides, goal)
-    while abs(servo.strain[2] - goal) > 1e-7:
-        O.run(20, True)
-    newton.damping = 0.9
-    for _ in range(1000):
-        O.run(20, True)
-        stress = getStress()
-        held = not drained or max(abs(stress[k, k] + pressure) for k in (0, 1)) < 1e-3 * pressure
-        if held and unbalancedForce() < 5e-4:
-            break
-    return stress
+    O.run()
+    O.wait()
+    return getStress()
 
 
 with open(job["out"], "w") as file:
