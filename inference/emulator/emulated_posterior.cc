@@ -60,6 +60,14 @@ absl::StatusOr<Runs> CollectRuns(const JointPrior& priors, const DataSet& data,
   return runs;
 }
 
+// The readings are zero in the emulator's units.
+Eigen::VectorXd MisfitOf(const StateEmulator& emulator, const ScorePrediction& prediction) {
+  const PrincipalComponents& components = emulator.components();
+  const Eigen::MatrixXd histories =
+      (prediction.mean * components.basis.transpose()).rowwise() + components.mean;
+  return (histories.rowwise().squaredNorm() / static_cast<double>(histories.cols())).cwiseSqrt();
+}
+
 // Histories of the model at the draws: the mean history and what is not known of it.
 void AddPredictive(const DataSet& data, const StateEmulator& emulator,
                    const ScorePrediction& prediction, std::uint64_t seed, EmulatedResult& result) {
@@ -360,6 +368,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   StateErrors(*trained, variance, result);
   result.emulator_sd =
       std::sqrt(unknown / (static_cast<double>(n) * static_cast<double>(data.readings.size())));
+  result.misfit = MisfitOf(trained->emulator, prediction);
   AddScatter(data, trained->emulator, result);
   AddPredictive(data, trained->emulator, prediction, options.seed, result);
   Judge(options, result);

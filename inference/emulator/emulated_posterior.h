@@ -48,6 +48,8 @@ struct EmulatorOptions {
 
 struct EmulatedResult {
   Eigen::MatrixXd draws;  ///< equally weighted, draws x d
+  /// Of each draw: root mean square of its mean history's distance from the readings, in their sd.
+  Eigen::VectorXd misfit;
   std::vector<ParameterSummary> parameters;
   Eigen::MatrixXd correlation;       ///< d x d
   double log_evidence = 0;           ///< ln p(data), emulator error included

@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <vector>
 
 namespace calib::inference {
 namespace {
 
 constexpr double kShareOfMisfit = 0.5;
+constexpr std::ptrdiff_t kTenth = 10;
 
 }  // namespace
 
@@ -29,6 +32,23 @@ double SearchWidening(const DataSet& data, std::span<const Iteration> iterations
   }
   if (!std::isfinite(least)) return 1;
   return std::max(1.0, kShareOfMisfit * std::sqrt(least / static_cast<double>(t)));
+}
+
+Eigen::MatrixXd ClosestDraws(const EmulatedResult& emulated) {
+  std::vector<Eigen::Index> rows(static_cast<std::size_t>(emulated.draws.rows()));
+  if (rows.empty()) return Eigen::MatrixXd(0, emulated.draws.cols());
+  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
+  const auto end = rows.begin() + std::max<std::ptrdiff_t>(1, std::ssize(rows) / kTenth);
+  const auto closer = [&misfit = emulated.misfit](Eigen::Index a, Eigen::Index b) {
+    return misfit[a] < misfit[b] || (misfit[a] == misfit[b] && a < b);
+  };
+  std::partial_sort(rows.begin(), end, rows.end(), closer);
+  std::sort(rows.begin(), end);
+  Eigen::MatrixXd closest(end - rows.begin(), emulated.draws.cols());
+  for (Eigen::Index k = 0; k < closest.rows(); ++k) {
+    closest.row(k) = emulated.draws.row(rows[static_cast<std::size_t>(k)]);
+  }
+  return closest;
 }
 
 }  // namespace calib::inference

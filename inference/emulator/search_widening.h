@@ -1,9 +1,11 @@
 #pragma once
-// By which errors the next runs of a model are chosen.
+// Where the next runs go while a model is far from its readings.
 
+#include <Eigen/Dense>
 #include <span>
 
 #include "inference/data/data_set.h"
+#include "inference/emulator/emulated_posterior.h"
 #include "inference/filter/iterative_filter.h"
 
 namespace calib::inference {
@@ -14,5 +16,9 @@ namespace calib::inference {
 /// lies beside them, or in the corner that is known least. Rows with NaN do not count; 1 where no
 /// other is left. Predictions in the units of the readings.
 double SearchWidening(const DataSet& data, std::span<const Iteration> iterations);
+
+/// The tenth of the draws, at least one, whose mean histories come closest to the readings
+/// (EmulatedResult::misfit), in the order of the draws. No rows where there are no draws.
+Eigen::MatrixXd ClosestDraws(const EmulatedResult& emulated);
 
 }  // namespace calib::inference

@@ -283,24 +283,46 @@ absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& da
   return proposal;
 }
 
-absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const FilterOptions& options,
-                                            const Eigen::MatrixXd& draws, std::size_t iterations,
-                                            const std::vector<std::optional<double>>& frozen) {
-  if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
-  const Eigen::Index n = draws.rows();
-  if (n == 0 || draws.cols() != static_cast<Eigen::Index>(priors.size())) {
-    return absl::InvalidArgumentError(absl::StrCat("a proposal cannot be fitted to ", n, " x ",
-                                                   draws.cols(), " draws of ", priors.size(),
-                                                   " parameters."));
-  }
-  const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
-  const Eigen::VectorXd equal = Eigen::VectorXd::Constant(n, -std::log(static_cast<double>(n)));
+namespace {
+
+// Fitted to equally weighted draws of the free parameters.
+absl::StatusOr<Proposal> FitToEqual(const JointPrior& priors, const FilterOptions& options,
+                                    const std::vector<Eigen::Index>& free,
+                                    const Eigen::MatrixXd& draws, std::size_t iterations) {
+  const auto n = static_cast<double>(draws.rows());
+  const Eigen::VectorXd equal = Eigen::VectorXd::Constant(draws.rows(), -std::log(n));
   WeightedPoints points = Standardized(priors, free, draws, equal).weighted;
   points.counts *= std::min(1.0, kWorthOfDraws / points.counts.sum());
-  auto proposal = FitMixture(options, points, iterations);
+  return FitMixture(options, points, iterations);
+}
+
+}  // namespace
+
+absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const FilterOptions& options,
+                                            const Eigen::MatrixXd& draws, std::size_t iterations,
+                                            const std::vector<std::optional<double>>& frozen,
+                                            const Eigen::MatrixXd& closest) {
+  if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
+  const auto d = static_cast<Eigen::Index>(priors.size());
+  if (draws.rows() == 0 || draws.cols() != d || (closest.rows() > 0 && closest.cols() != d)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "a proposal cannot be fitted to ", draws.rows(), " x ", draws.cols(), " draws and ",
+        closest.rows(), " x ", closest.cols(), " closest of ", d, " parameters."));
+  }
+  const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
+  auto proposal = FitToEqual(priors, options, free, draws, iterations);
   if (!proposal.ok()) return proposal;
   for (MixtureComponent& component : proposal->components) {
     component.covariance *= kWidening * kWidening;
+  }
+  if (closest.rows() > 0) {
+    auto near = FitToEqual(priors, options, free, closest, iterations);
+    if (!near.ok()) return near;
+    for (MixtureComponent& component : proposal->components) component.weight *= 0.5;
+    for (MixtureComponent& component : near->components) {
+      component.weight *= 0.5;
+      proposal->components.push_back(std::move(component));
+    }
   }
   Complete(priors, free, frozen, *proposal);
   return proposal;

@@ -186,13 +186,15 @@ absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& da
 
 /// The proposal of the next iteration where weights carry next to nothing: a mixture fitted to
 /// equally weighted draws (n x d, SI) of an emulated posterior, its covariances widened fourfold,
-/// so that the next runs surround the posterior and the emulator interpolates there. The defensive
-/// share of the prior joins as always. `iterations`: how many there are so far, which chooses the
-/// random stream. Draws have no states: FilterOptions::mixture has no effect. Errors:
-/// INVALID_ARGUMENT for shapes; those of the mixture.
+/// so that the next runs surround the posterior and the emulator interpolates there. Half of it is
+/// fitted to `closest` (m x d, m may be 0), as wide as those lie. The defensive share of the prior
+/// joins as always. `iterations`: how many there are so far, which chooses the random stream. Draws
+/// have no states: FilterOptions::mixture has no effect. Errors: INVALID_ARGUMENT for shapes; those
+/// of the mixture.
 absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const FilterOptions& options,
                                             const Eigen::MatrixXd& draws, std::size_t iterations,
-                                            const std::vector<std::optional<double>>& frozen = {});
+                                            const std::vector<std::optional<double>>& frozen = {},
+                                            const Eigen::MatrixXd& closest = {});
 
 /// True when every posterior mean moved by less than options.tolerance relative to itself [Table 1,
 /// step 7], or, where it lies closer to zero than a tenth of the prior's sd, relative to that

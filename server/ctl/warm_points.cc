@@ -5,6 +5,7 @@
 
 #include "dem/catalog/catalog.h"
 #include "dem/simulation/model_parameters.h"
+#include "inference/emulator/search_widening.h"
 #include "server/ctl/reading_effects.h"
 
 namespace calib::ctl {
@@ -144,30 +145,45 @@ std::optional<report::RunTable> RunsMisread(const report::RunTable& without,
   return table;
 }
 
+namespace {
+
+absl::StatusOr<inference::EmulatedResult> EmulateBy(
+    const campaign::Campaign& campaign, const inference::DataSet& data, double scatter_share,
+    const std::vector<inference::Iteration>& iterations) {
+  const inference::JointPrior priors = campaign::Priors(campaign);
+  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
+  options.training.scatter_share = scatter_share;
+  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
+  return inference::EmulatedPosterior(priors, data, options, iterations);
+}
+
+double ScatterShare(const report::ScatteredReadings& readings) { return readings.measured ? 0 : 1; }
+
+}  // namespace
+
 absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& campaign,
                                                   const report::ScatteredReadings& readings,
                                                   const report::RunTable& runs) {
-  const inference::JointPrior priors = campaign::Priors(campaign);
-  inference::EmulatorOptions options{.training = {}, .draws = kDraws, .seed = campaign.filter.seed};
-  if (readings.measured) options.training.scatter_share = 0;
-  options.training.relevant_runs = std::max<int>(20, static_cast<int>(5 * priors.size()));
-  const std::vector<inference::Iteration> iterations = {IterationOf(runs, readings.of_mean)};
-  return inference::EmulatedPosterior(priors, readings.of_mean, options, iterations);
+  return EmulateBy(campaign, readings.of_mean, ScatterShare(readings),
+                   {IterationOf(runs, readings.of_mean)});
 }
 
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
                                            const report::ScatteredReadings& readings,
                                            const report::RunTable& runs, int batch, int count) {
   const inference::JointPrior priors = campaign::Priors(campaign);
-  const auto emulated = Emulate(campaign, readings, runs);
-  inference::Proposal proposal;  // the prior
-  if (emulated.ok() && emulated->draws.rows() > 0) {
-    auto fitted = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
-                                                static_cast<std::size_t>(batch));
-    if (!fitted.ok()) return fitted.status();
-    proposal = *std::move(fitted);
+  const std::vector<inference::Iteration> iterations = {IterationOf(runs, readings.of_mean)};
+  const inference::DataSet wider = inference::WithLargerErrors(
+      readings.of_mean, inference::SearchWidening(readings.of_mean, iterations));
+  const auto emulated = EmulateBy(campaign, wider, ScatterShare(readings), iterations);
+  if (!emulated.ok() || emulated->draws.rows() == 0) {
+    return inference::DrawSamples({}, priors, campaign.filter, batch, count);
   }
-  return inference::DrawSamples(proposal, priors, campaign.filter, batch, count);
+  const auto about = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
+                                                   static_cast<std::size_t>(batch), {},
+                                                   inference::ClosestDraws(*emulated));
+  if (!about.ok()) return about.status();
+  return inference::DrawSamples(*about, priors, campaign.filter, batch, count);
 }
 
 }  // namespace calib::ctl

@@ -98,9 +98,9 @@ void AskEmulator(const Definition& definition, std::span<const inference::Iterat
   }
 }
 
-Eigen::MatrixXd DrawsToGoOnFrom(const Definition& definition,
-                                std::span<const inference::Iteration> iterations,
-                                const Answer& answer) {
+SearchDraws DrawsToGoOnFrom(const Definition& definition,
+                            std::span<const inference::Iteration> iterations,
+                            const Answer& answer) {
   const inference::DataSet& data = EmulatedData(definition);
   const double widening = definition.campaign.filter.noise == inference::NoiseMode::kGiven
                               ? inference::SearchWidening(data, iterations)
@@ -110,10 +110,12 @@ Eigen::MatrixXd DrawsToGoOnFrom(const Definition& definition,
         inference::EmulatedPosterior(definition.priors, inference::WithLargerErrors(data, widening),
                                      EmulatorOptionsOf(definition), iterations);
     if (wider.ok() && wider->draws.rows() > 0) {
-      return std::move(wider->draws);
+      Eigen::MatrixXd closest = inference::ClosestDraws(*wider);
+      return {.draws = std::move(wider->draws), .closest = std::move(closest)};
     }
   }
-  return answer.emulated.has_value() ? answer.emulated->draws : Eigen::MatrixXd();
+  return {.draws = answer.emulated.has_value() ? answer.emulated->draws : Eigen::MatrixXd(),
+          .closest = {}};
 }
 
 namespace {

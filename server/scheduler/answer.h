@@ -37,12 +37,17 @@ struct Answer {
 void AskEmulator(const Definition& definition, std::span<const inference::Iteration> iterations,
                  Answer& answer);
 
-/// Draws to propose the next samples from, where the weights do not suffice: those of the answer's
-/// emulator, or of one by errors wider where the noise is given and the model far from the readings
-/// (inference::SearchWidening). No rows: neither knows the model anywhere in the prior.
-Eigen::MatrixXd DrawsToGoOnFrom(const Definition& definition,
-                                std::span<const inference::Iteration> iterations,
-                                const Answer& answer);
+/// What the next samples are proposed from.
+struct SearchDraws {
+  Eigen::MatrixXd draws;    ///< n x d, SI; no rows: the model is known nowhere in the prior
+  Eigen::MatrixXd closest;  ///< m x d: those that half of the samples lie about; none: near already
+};
+
+/// Where the weights do not suffice: draws of the answer's emulator, or, where the noise is given
+/// and the model far from the readings, of one by errors wider (inference::SearchWidening), with
+/// those among them that it expects closest.
+SearchDraws DrawsToGoOnFrom(const Definition& definition,
+                            std::span<const inference::Iteration> iterations, const Answer& answer);
 
 /// Of the filters. Deterministic. Errors as inference::ComputePosterior; an emulator that cannot be
 /// had is no error but a warning.

@@ -62,10 +62,10 @@ class FilterMethod final : public Method {
       const Answer& answer, const History& history,
       const std::vector<std::optional<double>>& frozen) const {
     if (answer.emulated.has_value()) {
-      const Eigen::MatrixXd draws = DrawsToGoOnFrom(definition_, history.iterations, answer);
-      if (draws.rows() > 0) {
-        return inference::FitProposalToDraws(definition_.priors, campaign_.filter, draws,
-                                             history.iterations.size(), frozen);
+      const SearchDraws from = DrawsToGoOnFrom(definition_, history.iterations, answer);
+      if (from.draws.rows() > 0) {
+        return inference::FitProposalToDraws(definition_.priors, campaign_.filter, from.draws,
+                                             history.iterations.size(), frozen, from.closest);
       }
     }
     return inference::FitProposal(definition_.priors, definition_.data, campaign_.filter,

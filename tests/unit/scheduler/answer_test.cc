@@ -112,7 +112,9 @@ TEST(Answer, FarFromTheReadingsTheNextSamplesAreLookedForWidely) {
   iteration.predictions = iteration.parameters.rowwise() + Eigen::RowVector2d(0.7, 0.3);
   const auto near = FindAnswer(*definition, {&iteration, 1});
   ASSERT_TRUE(near.ok() && near->emulated.has_value()) << near.status();
-  EXPECT_EQ(DrawsToGoOnFrom(*definition, {&iteration, 1}, *near), near->emulated->draws);
+  const SearchDraws by_own = DrawsToGoOnFrom(*definition, {&iteration, 1}, *near);
+  EXPECT_EQ(by_own.draws, near->emulated->draws);
+  EXPECT_EQ(by_own.closest.rows(), 0);
 
   iteration.predictions.col(1).setConstant(2.6);
   const auto far = FindAnswer(*definition, {&iteration, 1});
@@ -121,7 +123,10 @@ TEST(Answer, FarFromTheReadingsTheNextSamplesAreLookedForWidely) {
     return std::sqrt((draws.col(0).array() - draws.col(0).mean()).square().mean());
   };
   EXPECT_LT(spread(far->emulated->draws), 0.15);
-  EXPECT_GT(spread(DrawsToGoOnFrom(*definition, {&iteration, 1}, *far)), 0.2);
+  const SearchDraws wider = DrawsToGoOnFrom(*definition, {&iteration, 1}, *far);
+  EXPECT_GT(spread(wider.draws), 0.2);
+  ASSERT_EQ(wider.closest.rows(), wider.draws.rows() / 10);
+  EXPECT_LT((wider.closest.col(0).array() - 0.3).abs().maxCoeff(), 0.1) << "the best a";
 }
 
 TEST(Answer, TheBestMisfitOfACampaignIsThatOfAllItsIterations) {
