@@ -97,7 +97,8 @@ struct EffectInfo {
   bool two_sided = false;              ///< parameters of the rays may leave their null either way
   std::vector<StrengthRay> rays = {};  ///< 1 .. 3, for paired runs with and without the effect
   std::vector<std::string> excited_by = {};  ///< tests whose curves it can change; empty: all
-  bool across_pressures = false;  ///< shows only between experiments at different pressures
+  /// Shows only where pressure differs: between tests at one pressure each, or in any other.
+  bool across_pressures = false;
   bool needs_motion = false;  ///< shows only where grains move while they are read: not in staged
                               ///< tests, whose readings are taken at rest
   bool needs_space = false;   ///< shows only where grains move in three dimensions: not in a plane
@@ -138,6 +139,7 @@ struct TestInfo {
   bool poured = false;  ///< takes only the sizes of the packing's grains, which it pours itself; no
                         ///< consolidation, no staging
   bool separate_points = false;  ///< every value of the control is a run of its own, in any order
+  bool one_pressure = false;     ///< a stress is held at confining_pressure throughout
   std::optional<ControlRange> control_range = {};  ///< empty: strains below 1, stresses above 0
   std::vector<MeshInfo> meshes = {};
 };

@@ -40,7 +40,8 @@ ElementTestEntry SimpleShear() {
                                "porosity", "void_ratio", "coordination_number"},
                .control = "shear_strain",
                .may_reverse = true,
-               .reference = "Lees & Edwards, J. Phys. C 5 (1972) 1921; ASTM D6528"},
+               .reference = "Lees & Edwards, J. Phys. C 5 (1972) 1921; ASTM D6528",
+               .one_pressure = true},
       .plan = &Plan};
 }
 

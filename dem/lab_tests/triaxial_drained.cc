@@ -21,7 +21,8 @@ ElementTestEntry TriaxialDrained() {
                    .observables = ElementObservables(),
                    .control = "axial_strain",
                    .may_reverse = true,
-                   .reference = "Cheng et al. 2018, sec. 4"},
+                   .reference = "Cheng et al. 2018, sec. 4",
+                   .one_pressure = true},
           .plan = &Plan,
           .rig_load = RigLoad::kDeviatoric};
 }

@@ -11,7 +11,7 @@ namespace calib::inference {
 namespace {
 
 constexpr double kShareOfMisfit = 0.5;
-constexpr std::ptrdiff_t kTenth = 10;
+constexpr std::ptrdiff_t kDrawsPerClosest = 10;
 
 }  // namespace
 
@@ -38,7 +38,7 @@ Eigen::MatrixXd ClosestDraws(const EmulatedResult& emulated) {
   std::vector<Eigen::Index> rows(static_cast<std::size_t>(emulated.draws.rows()));
   if (rows.empty()) return Eigen::MatrixXd(0, emulated.draws.cols());
   std::iota(rows.begin(), rows.end(), Eigen::Index{0});
-  const auto end = rows.begin() + std::max<std::ptrdiff_t>(1, std::ssize(rows) / kTenth);
+  const auto end = rows.begin() + std::max<std::ptrdiff_t>(1, std::ssize(rows) / kDrawsPerClosest);
   const auto closer = [&misfit = emulated.misfit](Eigen::Index a, Eigen::Index b) {
     return misfit[a] < misfit[b] || (misfit[a] == misfit[b] && a < b);
   };

@@ -148,6 +148,7 @@ absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
 
 std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect) {
   std::set<double> pressures;
+  bool varied = false;  // the pressure, within a test
   bool shown = false;
   bool moving = false;
   for (const campaign::Experiment& e : campaign.experiments) {
@@ -159,6 +160,7 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
     if (e.role != campaign::Role::kCalibrate) continue;
     const auto pressure = e.settings.find("confining_pressure");
     if (pressure != e.settings.end()) pressures.insert(pressure->second);
+    varied = varied || (test != nullptr && !test->one_pressure);
     moving = moving || !campaign::ReadAtRest(e);
     shown = shown || campaign::CanShow(e, effect);
   }
@@ -167,8 +169,8 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
            "it shows in tests with a loading_rate, in collisions and in flows";
   }
   if (!shown) return "none of the fitted tests can show it";
-  if (effect.across_pressures && pressures.size() < 2) {
-    return "it shows only between tests at different pressures";
+  if (effect.across_pressures && pressures.size() < 2 && !varied) {
+    return "it shows only between tests at different pressures, or in one whose pressure changes";
   }
   return "";
 }

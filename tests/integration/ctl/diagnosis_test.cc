@@ -80,6 +80,50 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
   EXPECT_EQ(Evaluations(), evaluations);
 }
 
+// Collisions do not scatter: a refit has to come within the noise by itself. A dashpot of 0.1, which
+// the model does not know, measured to 1 %.
+TEST_F(Diagnosis, ADashpotIsNamedFromCollisions) {
+  const auto campaign = [](const std::string& effects, const std::string& fixed) {
+    return "name: impacts\nmodel: {contact: hertz_mindlin, effects: [" + effects +
+           "], density: 2500 kg/m^3, fixed: {poisson_ratio: 0.25" + fixed + R"(}}
+parameters:
+  young_modulus: {prior: log_uniform, min: 0.02 GPa, max: 1 GPa}
+  friction_coefficient: {prior: uniform, min: 0.05, max: 1}
+experiments:
+  - name: wall
+    test: collision
+    radius: 5 mm
+    impact_speed: 1 m/s
+    data: {file: wall.csv}
+    control: impact_angle
+    observables:
+      normal_restitution: {noise: {absolute: 0.01}}
+      tangential_restitution: {noise: {absolute: 0.01}}
+      contact_duration: {noise: {relative: 0.01}}
+inference: {method: iterative_bayesian_filter, samples: 24, max_iterations: 3}
+seed: 5
+)";
+  };
+  Write("wall.csv",
+        "impact_angle,normal_restitution,tangential_restitution,contact_duration\n"
+        "0,1,1,1\n0.2,1,1,1\n0.4,1,1,1\n0.6,1,1,1\n0.8,1,1,1\n1,1,1,1\n1.2,1,1,1\n");
+  Write("truth.yaml", campaign("viscous_damping", ", viscous_damping.ratio: 0.1"));
+  ASSERT_EQ(Call("simulate truth.yaml --set young_modulus='0.2 GPa' --set friction_coefficient=0.3 "
+                 "-o wall.csv")
+                .code,
+            0)
+      << Read("err");
+  Write("model.yaml", campaign("", ""));
+  ASSERT_EQ(Call("run model.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  const Answer answer = Call("diagnose c1 --state s --workers 2 --json");
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const Json json = answer.json();
+  EXPECT_EQ(json["verdict"], "missing_effect") << json["sentence"];
+  EXPECT_EQ(json["effect"], "viscous_damping");
+  ASSERT_FALSE(json["candidates"].empty());
+  EXPECT_NEAR(json["candidates"][0]["amplitude"]["viscous_damping.ratio"].get<double>(), 0.1, 0.01);
+}
+
 // Two openings of a silo of twenty disks.
 TEST_F(Diagnosis, APouredTestIsScreenedForWhatItCanHave) {
   Write("silo.dat", "opening discharged_mass\n0.02 0.001\n0.03 0.0012\n");

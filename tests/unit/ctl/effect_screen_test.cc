@@ -119,5 +119,26 @@ TEST(WhyNotShown, GrainsOfAPouredTestMayKeepTheirShape) {
   EXPECT_EQ(why("particle_crushing"), "");
 }
 
+TEST(WhyNotShown, WhatDependsOnPressureShowsWhereThatDiffers) {
+  campaign::Campaign campaign;
+  campaign.experiments.resize(2);
+  for (campaign::Experiment& experiment : campaign.experiments) {
+    experiment.test = "triaxial_drained";
+    experiment.settings["confining_pressure"] = 2e5;
+  }
+  const auto why = [&campaign] {
+    return WhyNotShown(campaign, *dem::FindEffect("pressure_dependent_friction"));
+  };
+  EXPECT_EQ(why(),
+            "it shows only between tests at different pressures, or in one whose pressure changes");
+  campaign.experiments[1].settings["confining_pressure"] = 4e5;
+  EXPECT_EQ(why(), "");
+  campaign.experiments.resize(1);
+  for (const char* test : {"oedometric", "isotropic", "triaxial_undrained", "collision"}) {
+    campaign.experiments[0].test = test;
+    EXPECT_EQ(why(), "") << test;
+  }
+}
+
 }  // namespace
 }  // namespace calib::ctl

@@ -257,5 +257,20 @@ TEST(SearchWidening, IsHalfOfWhatTheClosestRunMissesTheReadingsBy) {
   EXPECT_EQ(SearchWidening(data, {}), 1);
 }
 
+TEST(ClosestDraws, AreTheTenthThatMissesLeast) {
+  EmulatedResult emulated;
+  emulated.draws.resize(25, 1);
+  emulated.misfit.resize(25);
+  for (Eigen::Index i = 0; i < 25; ++i) {
+    emulated.draws(i, 0) = static_cast<double>(i);
+    emulated.misfit[i] = std::abs(static_cast<double>(i) - 11.6);
+  }
+  EXPECT_EQ(ClosestDraws(emulated), Eigen::Vector2d(11, 12));
+  emulated.draws.conservativeResize(4, 1);
+  emulated.misfit.conservativeResize(4);
+  EXPECT_EQ(ClosestDraws(emulated), Eigen::MatrixXd::Constant(1, 1, 3));
+  EXPECT_EQ(ClosestDraws({}).rows(), 0);
+}
+
 }  // namespace
 }  // namespace calib::inference

@@ -94,10 +94,8 @@ TEST(LogImportance, DefensiveShareBoundsTheWeights) {
   EXPECT_NEAR(log_weights.array().exp().mean(), 1, 0.15);
 }
 
-// One normal lump of draws, in standard coordinates: mean kept, sd doubled.
-TEST(FitProposalToDraws, SurroundsTheDraws) {
-  const FilterOptions options{.seed = 3};
-  const int n = 2000;
+// n draws of one normal lump, in standard coordinates.
+Eigen::MatrixXd Lump(int n, double a, double b, double sd) {
   Eigen::MatrixXd draws(n, 2);
   for (int i = 0; i < n; ++i) {
     PhiloxStream stream({.seed = 9,
@@ -105,10 +103,16 @@ TEST(FitProposalToDraws, SurroundsTheDraws) {
                          .iteration = 0,
                          .sample = static_cast<std::uint64_t>(i)});
     for (int j = 0; j < 2; ++j) {
-      draws(i, j) = Priors()[j].FromStandard((j == 0 ? 0.5 : -0.2) + 0.1 * stream.Normal());
+      draws(i, j) = Priors()[j].FromStandard((j == 0 ? a : b) + sd * stream.Normal());
     }
   }
-  const auto proposal = FitProposalToDraws(Priors(), options, draws, 1);
+  return draws;
+}
+
+// Mean kept, sd doubled.
+TEST(FitProposalToDraws, SurroundsTheDraws) {
+  const FilterOptions options{.seed = 3};
+  const auto proposal = FitProposalToDraws(Priors(), options, Lump(2000, 0.5, -0.2, 0.1), 1);
   ASSERT_TRUE(proposal.ok()) << proposal.status();
   ASSERT_EQ(proposal->components.size(), 1);
   EXPECT_NEAR(proposal->components[0].mean[0], 0.5, 0.02);
@@ -120,10 +124,29 @@ TEST(FitProposalToDraws, SurroundsTheDraws) {
   EXPECT_NEAR(proposal->log_acceptance, 0, 1e-3);
 }
 
+// The closest keep their sd and have half of the weight.
+TEST(FitProposalToDraws, HalfOfItLiesAboutTheClosest) {
+  const auto proposal = FitProposalToDraws(Priors(), {.seed = 3}, Lump(2000, 0.5, -0.2, 0.1), 1, {},
+                                           Lump(200, 0.6, -0.3, 0.02));
+  ASSERT_TRUE(proposal.ok()) << proposal.status();
+  ASSERT_EQ(proposal->components.size(), 2);
+  const auto& [wide, close] = std::pair(proposal->components[0], proposal->components[1]);
+  EXPECT_NEAR(wide.weight, 0.5, 1e-9);
+  EXPECT_NEAR(close.weight, 0.5, 1e-9);
+  EXPECT_NEAR(std::sqrt(wide.covariance(0, 0)), 0.2, 0.02);
+  EXPECT_NEAR(close.mean[0], 0.6, 0.005);
+  EXPECT_NEAR(close.mean[1], -0.3, 0.005);
+  EXPECT_NEAR(std::sqrt(close.covariance(0, 0)), 0.02, 0.004);
+}
+
 TEST(FitProposalToDraws, NothingToFitTo) {
   EXPECT_EQ(FitProposalToDraws(Priors(), {}, Eigen::MatrixXd(0, 2), 1).status().code(),
             absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(FitProposalToDraws(Priors(), {}, Eigen::MatrixXd::Zero(5, 3), 1).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(FitProposalToDraws(Priors(), {}, Lump(50, 0, 0, 1), 1, {}, Eigen::MatrixXd::Zero(5, 3))
+                .status()
+                .code(),
             absl::StatusCode::kInvalidArgument);
 }
 
