@@ -75,6 +75,7 @@ struct HyperbolicCurve {
     Eigen::VectorXd sd = Eigen::VectorXd::Constant(readings, noise * kVolumeSd / 0.01);
     sd.head(kSteps) = noise * curve.head(kSteps);
     std::vector<double> strains;
+    strains.reserve(kSteps);
     for (int t = 0; t < kSteps; ++t) strains.push_back(Strain(t));
     return WithErrors(curve, sd, strains, seed);
   }

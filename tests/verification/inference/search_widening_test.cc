@@ -69,9 +69,10 @@ struct Case {
     data = curve.Measure(truth, noise, 400 + seed);
     for (int t = 0; t < HyperbolicCurve::kSteps; ++t) {
       const double angle = 2 * std::numbers::pi * (t + 1) / HyperbolicCurve::kSteps;
-      for (const auto& [first, wave] : {std::pair{0, std::sin(angle)},
-                                        std::pair{HyperbolicCurve::kSteps, std::cos(angle)}}) {
-        Reading& reading = data.readings[static_cast<std::size_t>(first + t)];
+      for (const auto& [first, wave] :
+           {std::pair{0, std::sin(angle)}, std::pair{HyperbolicCurve::kSteps, std::cos(angle)}}) {
+        Reading& reading =
+            data.readings[static_cast<std::size_t>(first) + static_cast<std::size_t>(t)];
         reading.value += off * std::numbers::sqrt2 * wave * reading.sd;
       }
     }
@@ -80,8 +81,7 @@ struct Case {
   /// The least misfit of a mean curve, by a random search about the truth that narrows.
   double Least() const {
     const std::vector<Prior> priors = curve.Priors();
-    PhiloxStream stream(
-        {.seed = 0, .purpose = StreamPurpose::kTest, .iteration = 4, .sample = 0});
+    PhiloxStream stream({.seed = 0, .purpose = StreamPurpose::kTest, .iteration = 4, .sample = 0});
     Eigen::VectorXd best = truth;
     double least = RmsMisfit(data, curve.Mean(best));
     double reach = 1;
