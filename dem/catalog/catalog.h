@@ -139,7 +139,8 @@ struct TestInfo {
   bool poured = false;  ///< takes only the sizes of the packing's grains, which it pours itself; no
                         ///< consolidation, no staging
   bool separate_points = false;  ///< every value of the control is a run of its own, in any order
-  bool one_pressure = false;     ///< a stress is held at confining_pressure throughout
+  bool one_pressure = false;     ///< a stress is held at confining_pressure throughout (of
+                                 ///< simple_shear unless constant_volume)
   std::optional<ControlRange> control_range = {};  ///< empty: strains below 1, stresses above 0
   std::vector<MeshInfo> meshes = {};
 };

@@ -73,7 +73,8 @@ std::string EffectText(const dem::EffectInfo& effect) {
   }
   if (effect.needs_space)
     text += "  only where grains move in three dimensions: not with flat: 1\n";
-  if (effect.across_pressures) text += "  only where the pressure differs, between experiments or within one\n";
+  if (effect.across_pressures)
+    text += "  only where the pressure differs, between experiments or within one\n";
   if (!effect.excludes.empty()) {
     text += Wrapped(absl::StrJoin(effect.excludes, ", "), "  not together with: ", kIndent);
   }

@@ -42,9 +42,11 @@ absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& camp
                                                   const report::ScatteredReadings& readings,
                                                   const report::RunTable& runs);
 
-/// `count` points, SI: draws from the posterior that an emulator of the runs gives, where it knows
-/// the model's history somewhere in the prior; else from the prior. batch: number of batches so
-/// far, decides the random numbers. Errors: those of inference::FitProposalToDraws and DrawSamples.
+/// `count` points, SI, where an emulator of the runs knows the model's history somewhere in the
+/// prior: half of them about the draws of its posterior that it expects closest, half about all of
+/// them, by errors wider while the model is far from the readings (inference/emulator:
+/// search_widening.h); else from the prior. batch: number of batches so far, decides the random
+/// numbers. Errors: those of inference::FitProposalToDraws and DrawSamples.
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
                                            const report::ScatteredReadings& readings,
                                            const report::RunTable& runs, int batch, int count);

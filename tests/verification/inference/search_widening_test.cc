@@ -14,7 +14,7 @@
 #include <iostream>
 #include <limits>
 #include <numbers>
-#include <optional>
+#include <utility>
 #include <vector>
 
 #include "inference/emulator/emulated_posterior.h"
