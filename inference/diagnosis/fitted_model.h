@@ -21,6 +21,10 @@ struct FittedModel {
   /// run; the measurement is judged by `covariance`.
   std::vector<int> group{};                ///< S
   std::vector<Eigen::MatrixXd> without{};  ///< T x T each
+  /// Packings that the covariance of scatter is known from, all of them in `draws`; 0: it is known.
+  /// Without entries of `without` draws lie too close to it, and p values stay large: whatever is
+  /// seen may be scatter that two or three packings do not show.
+  int packings = 0;
   /// T x q each, q < T: shapes along the path that the misfit of a missing effect may have. The part
   /// of the residual in their span is judged beside all of it; needs draws.
   std::vector<Eigen::MatrixXd> shapes{};

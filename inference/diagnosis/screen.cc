@@ -10,6 +10,8 @@
 #include <numeric>
 #include <set>
 
+#include "inference/diagnosis/drawn_tail.h"
+#include "inference/diagnosis/fall_tail.h"
 #include "inference/diagnosis/whitened.h"
 #include "inference/sampling/philox.h"
 
@@ -98,26 +100,6 @@ void Holm(std::vector<Score>& scores) {
   }
 }
 
-// Chance of a fall at least as large: counted where the simulations reach, beyond the tenth largest
-// of them the tail of a chi-squared that meets them there. freedom: of what the fall is the largest
-// over; of differences of one effect, which are all but parallel, one.
-double TailOf(double gain, std::vector<double> simulated, int freedom) {
-  const auto n = static_cast<double>(simulated.size());
-  constexpr std::size_t kEnough = 10;
-  const auto above =
-      std::count_if(simulated.begin(), simulated.end(), [&](double s) { return s >= gain; });
-  const double counted = (1 + static_cast<double>(above)) / (1 + n);
-  if (static_cast<std::size_t>(above) >= kEnough || simulated.size() < 2 * kEnough) return counted;
-  std::nth_element(simulated.begin(), simulated.begin() + (kEnough - 1), simulated.end(),
-                   std::greater<>());
-  const double anchor = simulated[kEnough - 1];
-  if (!(anchor > 0)) return counted;
-  const double shape = 0.5 * freedom;
-  const double width = anchor / (2 * boost::math::gamma_q_inv(shape, (1.0 + kEnough) / (1 + n)));
-  const double tail = boost::math::gamma_q(shape, 0.5 * gain / width);
-  return std::max(tail, std::numeric_limits<double>::min());
-}
-
 // Square of what an effect changes, without what chance adds to differences of single runs: from
 // products of different ones, each taken to the last strength. Of a single one its own square.
 double SquareOfEffect(const std::vector<Eigen::VectorXd>& differences,
@@ -140,25 +122,9 @@ Eigen::MatrixXd SpanOf(const Eigen::MatrixXd& shapes, const Whitened& model) {
          Eigen::MatrixXd::Identity(shapes.rows(), shapes.cols());
 }
 
-// The gamma law with the mean and the variance of what was drawn.
-class GammaTail {
- public:
-  explicit GammaTail(const Eigen::VectorXd& drawn) : mean_(drawn.mean()) {
-    variance_ = (drawn.array() - mean_).square().sum() / static_cast<double>(drawn.size() - 1);
-  }
-  bool varies() const { return variance_ > 0; }
-  double operator()(double square) const {
-    return varies() ? boost::math::gamma_q(mean_ * mean_ / variance_, square * mean_ / variance_)
-                    : 1;
-  }
-
- private:
-  double mean_, variance_;
-};
-
 // How many independent judgements the columns of `squares` (draws in rows) amount to: by how much
 // oftener than one of them their smallest p value is below a tenth.
-double IndependentJudgements(const Eigen::MatrixXd& squares, const std::vector<GammaTail>& tails) {
+double IndependentJudgements(const Eigen::MatrixXd& squares, const std::vector<DrawnTail>& tails) {
   constexpr double kSmall = 0.1;
   double below = 0;
   for (Index s = 0; s < squares.rows(); ++s) {
@@ -206,12 +172,18 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
           (SpanOf(model.shapes[k], group.model).transpose() * residuals).colwise().squaredNorm();
     }
   }
-  std::vector<GammaTail> tails;
-  for (Index k = 0; k < squares.cols(); ++k) tails.emplace_back(squares.col(k));
+  std::vector<DrawnTail> tails;
+  for (Index k = 0; k < squares.cols(); ++k) {
+    if (model.without.empty()) {
+      tails.emplace_back(squares.col(k), std::vector<int>{}, std::max(0, model.packings - 1));
+    } else {
+      tails.emplace_back(squares.col(k), model.group);
+    }
+  }
   if (!tails.front().varies()) {
     return absl::InvalidArgumentError("diagnosis: the draws do not vary");
   }
-  adequacy.degrees = squares.col(0).mean();
+  adequacy.degrees = tails.front().mean();
   adequacy.p_chi2 = tails.front()(adequacy.chi2);
   const Eigen::VectorXd residual = whitened->points.col(adequacy.best);
   for (std::size_t k = 0; k < model.shapes.size(); ++k) {
@@ -277,10 +249,9 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   const double excess = ExplainableMisfit(*adequacy);
   // In sd along a direction: either sign of every difference of every candidate is a chance.
   const auto reach = [&](std::size_t differences) {
-    const boost::math::normal normal;
-    const auto chances = static_cast<double>(2 * candidates.size() * differences);
-    return boost::math::quantile(normal, 1 - options.level / chances) +
-           boost::math::quantile(normal, 0.9);
+    const auto chances = static_cast<double>(candidates.size() * differences);
+    return SdAsked(options.level / chances, model) +
+           boost::math::quantile(boost::math::normal(), 0.9);
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     Score score{.name = candidates[c].name};
@@ -296,7 +267,10 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
           fit.amplitude * candidates[c].differences[static_cast<std::size_t>(fit.difference)];
       score.rms = std::sqrt(left.squaredNorm() / static_cast<double>(t));
     }
-    score.p_value = TailOf(score.gain, simulated[c], 1);
+    score.p_value = ChanceOfFall(score.gain, {.simulated = simulated[c],
+                                              .freedom = 1,
+                                              .packings = model.packings,
+                                              .left_out = !model.without.empty()});
     std::vector<Eigen::VectorXd> rests;  // that the parameters do not imitate
     for (const Direction& direction : directions[c]) {
       // The point that imitates the effect best, seen from the fitted one.
@@ -379,8 +353,11 @@ absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedM
     for (const double gain : own) gains.push_back(std::max(0.0, gain));
   }
   const Whitened larger = in_coordinates_of(*whitened);
-  return TailOf(std::max(0.0, chi2 - larger.squares.minCoeff()), gains,
-                std::max(1, extended.parameters - base.parameters));
+  return ChanceOfFall(std::max(0.0, chi2 - larger.squares.minCoeff()),
+                      {.simulated = std::move(gains),
+                       .freedom = std::max(1, extended.parameters - base.parameters),
+                       .packings = base.packings,
+                       .left_out = !base.without.empty()});
 }
 
 absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, int block) {

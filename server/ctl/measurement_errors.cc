@@ -5,9 +5,14 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
+#include <set>
+#include <utility>
 
 #include "inference/sampling/philox.h"
-#include "inference/scatter/shrunk_covariance.h"
+#include "inference/scatter/packing_scatter.h"
+#include "inference/scatter/scatter.h"
+#include "server/campaign/scatter_fit.h"
 
 namespace calib::ctl {
 namespace {
@@ -52,33 +57,31 @@ Eigen::VectorXd ScatterOfMissed(const FittedCampaign& base, const inference::Dat
   return scatter;
 }
 
-// Scatter as the runs show it, as far as their number supports it; the closed form is part of
-// of_mean.covariance so far. The answer is the group of each run, none where packings are too few.
-std::vector<int> RefineScatter(const Eigen::MatrixXd& departures, const std::vector<int>& packing,
-                               const Eigen::MatrixXd& closed_form, DrawnErrors& of_mean) {
-  const Eigen::MatrixXd unit = of_mean.covariance;
-  const Eigen::MatrixXd rest = unit - closed_form;
-  std::map<int, int> groups;
-  for (const int one : packing) groups.emplace(one, static_cast<int>(groups.size()));
-  if (groups.size() < kFewestPackings) return {};
-  of_mean.without.resize(groups.size());
-  for (const auto& [left_out, number] : groups) {
-    std::vector<Index> rows;
-    std::vector<int> others;
-    for (std::size_t i = 0; i < packing.size(); ++i) {
-      if (packing[i] == left_out) continue;
-      rows.push_back(static_cast<Index>(i));
-      others.push_back(packing[i]);
-    }
-    of_mean.without[static_cast<std::size_t>(number)] =
-        rest + inference::ShrinkCovariance(departures(rows, Eigen::all), others, closed_form, unit)
-                   .covariance;
+// The closed form of the scatter, a chain along the path for each observable, from the replicates
+// on all packings but one; none where fewer than two remain.
+std::optional<Eigen::MatrixXd> ClosedFormWithout(int left_out, const FittedCampaign& base,
+                                                 const inference::DataSet& plain) {
+  const report::ScatteredReadings& readings = base.readings();
+  const int packings = PackingsApart(base.view().campaign);
+  std::vector<Index> replicates;
+  for (std::size_t r = 0; r < readings.departure_stream.size(); ++r) {
+    if (readings.departure_stream[r] % packings == left_out) continue;
+    replicates.push_back(static_cast<Index>(r));
   }
-  of_mean.covariance =
-      rest + inference::ShrinkCovariance(departures, packing, closed_form, unit).covariance;
-  std::vector<int> group;
-  for (const int one : packing) group.push_back(groups.at(one));
-  return group;
+  if (replicates.size() < 2) return std::nullopt;
+  const Eigen::MatrixXd departures = readings.departures(replicates, Eigen::all);
+  Eigen::MatrixXd closed_form = Eigen::MatrixXd::Zero(departures.cols(), departures.cols());
+  for (const auto& group : inference::GroupsOf(plain)) {
+    const std::vector<int>& own = group.second;
+    closed_form(own, own) = inference::ScatterCovariance(
+        campaign::FitGroupScatter(base.view().campaign, plain, group,
+                                  inference::MomentsOfReplicates(departures(Eigen::all, own))));
+  }
+  Eigen::VectorXd inverse(closed_form.rows());
+  for (Index k = 0; k < inverse.size(); ++k) {
+    inverse[k] = 1 / readings.of_mean.readings[static_cast<std::size_t>(k)].sd;
+  }
+  return Eigen::MatrixXd(inverse.asDiagonal() * closed_form * inverse.asDiagonal());
 }
 
 // Noise, nuisance and scatter of measurements; `missed` holds what the emulator misses of single
@@ -179,9 +182,20 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
     const Eigen::VectorXd noise = NoiseSd(base, plain);
     const Eigen::MatrixXd closed_form =
         NoiseCorrelation(data) - noise.asDiagonal() * NoiseCorrelation(plain) * noise.asDiagonal();
-    if (static_cast<Index>(packing.size()) == of_runs.rows()) {
-      group = RefineScatter(of_runs * ScatterOfMissed(base, plain).asDiagonal(), packing,
-                            closed_form, errors.of_mean);
+    errors.packings = static_cast<int>(readings.departures.rows());
+    const std::set<int> apart(packing.begin(), packing.end());
+    if (static_cast<Index>(packing.size()) == of_runs.rows() && apart.size() >= kFewestPackings) {
+      inference::PackingScatter scatter = inference::ScatterBetweenPackings(
+          of_runs * ScatterOfMissed(base, plain).asDiagonal(), packing,
+          [&](std::optional<int> left_out) {
+            const auto own = left_out ? ClosedFormWithout(*left_out, base, plain) : std::nullopt;
+            return own.value_or(closed_form);
+          },
+          errors.of_mean.covariance - closed_form);
+      errors.of_mean.covariance = std::move(scatter.covariance);
+      errors.of_mean.without = std::move(scatter.without);
+      errors.packings = static_cast<int>(apart.size());
+      group = std::move(scatter.group);
     }
     errors.of_run.covariance =
         unit.asDiagonal() * NoiseCorrelation(readings.of_run) * unit.asDiagonal();

@@ -22,6 +22,7 @@ struct MeasurementErrors {
   DrawnErrors of_mean;  ///< from the mean history at the right point
   DrawnErrors of_run;   ///< from a run there; drawn: from the closest of a few
   double scatter = 0;   ///< of a single run, in sd of the readings' noise alone
+  int packings = 0;     ///< that scatter was measured on, see inference::FittedModel
 };
 
 /// How many groups of runs share no packing in any fitted experiment with another group: run i is
@@ -33,8 +34,8 @@ int PackingsApart(const campaign::Campaign& campaign);
 /// that a measurement may differ by for numerical reasons, of unit variance. Scatter is what
 /// several packings were measured to differ by, a chain along the path for each observable, and,
 /// as far as their number supports it, what the emulator misses of the runs on them
-/// (inference/scatter/shrunk_covariance.h); draws on a packing are judged by the covariance
-/// without it. Where neither packings were varied nor repeats made, what the emulator does not
+/// (inference/scatter/packing_scatter.h); draws on a packing are judged by the covariance without
+/// it. Where neither packings were varied nor repeats made, what the emulator does not
 /// explain of single runs. packing: of each run that the emulator was validated on, any numbers.
 MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
                                        const inference::StateEmulator& emulator,

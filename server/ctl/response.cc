@@ -178,6 +178,7 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedMod
   }
   MeasurementErrors errors = errors_at(best);
   response.scatter = errors.scatter;
+  response.model.packings = errors.packings;
   response.model.covariance = std::move(errors.of_mean.covariance);
   response.model.draws = std::move(errors.of_mean.draws);
   response.model.group = std::move(errors.of_mean.group);

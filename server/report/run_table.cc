@@ -62,17 +62,26 @@ Eigen::RowVectorXd HistoryOf(const CampaignView& view, int sample, const inferen
 }
 
 // Of the first replicates, as many as every experiment has packings.
-Eigen::MatrixXd DeparturesOfReplicates(const CampaignView& view, const inference::DataSet& data) {
+void AddDepartures(const CampaignView& view, const inference::DataSet& data,
+                   ScatteredReadings& readings) {
   const Places places = PlacesOf(data);
   const std::size_t packings = campaign::PackingsOfAll(view.campaign);
-  std::vector<Eigen::RowVectorXd> rows;
+  std::size_t replicates = 0;
+  std::vector<Eigen::RowVectorXd> rows;  // of those that came to their ends
+  std::vector<int> streams;
   for (const v1::Sample& sample : view.samples) {
-    if (sample.purpose() != "replicate" || rows.size() == packings) continue;
-    rows.push_back(HistoryOf(view, sample.index(), data, places));
+    if (sample.purpose() != "replicate" || replicates == packings) continue;
+    ++replicates;
+    Eigen::RowVectorXd row = HistoryOf(view, sample.index(), data, places);
+    if (!row.allFinite()) continue;
+    rows.push_back(std::move(row));
+    streams.push_back(campaign::StreamOf(view.campaign, sample.index()));
   }
   Eigen::MatrixXd runs(static_cast<Index>(rows.size()), static_cast<Index>(data.readings.size()));
   for (std::size_t r = 0; r < rows.size(); ++r) runs.row(static_cast<Index>(r)) = rows[r];
-  return inference::ScaledDepartures(runs, campaign::ScatterShares(view.campaign, data));
+  readings.departures =
+      inference::ScaledDepartures(runs, campaign::ScatterShares(view.campaign, data));
+  if (readings.departures.rows() > 0) readings.departure_stream = std::move(streams);
 }
 
 }  // namespace
@@ -102,10 +111,11 @@ ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
     of_mean.push_back(of_run.back());
     if (record->from() == "realizations") of_mean.back().share += 1.0 / record->runs();
   }
-  return {.of_mean = inference::WithScatter(data, of_mean, 0),
-          .of_run = inference::WithScatter(data, of_run, 1),
-          .departures = DeparturesOfReplicates(view, data),
-          .measured = !of_run.empty()};
+  ScatteredReadings readings{.of_mean = inference::WithScatter(data, of_mean, 0),
+                             .of_run = inference::WithScatter(data, of_run, 1),
+                             .measured = !of_run.empty()};
+  AddDepartures(view, data, readings);
+  return readings;
 }
 
 RunTable RunsOf(const CampaignView& view) {

@@ -32,6 +32,7 @@ struct ScatteredReadings {
   /// Of the best estimate on every packing, for fits to some of the readings: R x T, see
   /// inference::Replicates; none where fewer than two runs came to their ends.
   Eigen::MatrixXd departures{};
+  std::vector<int> departure_stream{};  ///< R, campaign::StreamOf of each
   /// False where packings were not varied and no repeats made: both are MakeDataSet, and the
   /// scatter of repeats is what an emulator of the runs says it is.
   bool measured = false;

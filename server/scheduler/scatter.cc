@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "server/campaign/scatter_fit.h"
 #include "server/scheduler/history.h"
 
 namespace calib::scheduler {
@@ -15,40 +16,6 @@ using campaign::Role;
 using Eigen::Index;
 
 constexpr std::size_t kMostReplicates = 16;
-
-// Loading stages and path lengths of a group's readings.
-struct Place {
-  std::vector<int> stage;
-  Eigen::VectorXd control;
-};
-
-Place PlaceOf(const campaign::Experiment& experiment, const inference::DataSet& data,
-              const std::vector<int>& readings) {
-  Place place{.stage = {}, .control = Eigen::VectorXd(static_cast<Index>(readings.size()))};
-  std::map<std::string, int> stages;
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    const inference::Reading& reading = data.readings[static_cast<std::size_t>(readings[i])];
-    const auto step = static_cast<std::size_t>(reading.load_step);
-    const std::string name = step < experiment.segment.size() ? experiment.segment[step] : "";
-    place.stage.push_back(stages.try_emplace(name, static_cast<int>(stages.size())).first->second);
-    place.control[static_cast<Index>(i)] = reading.control;
-  }
-  return place;
-}
-
-ObservableScatter Fit(const campaign::Campaign& campaign, const inference::DataSet& data,
-                      const std::pair<const std::pair<int, int>, std::vector<int>>& group,
-                      const inference::ScatterMoments& moments) {
-  const campaign::Experiment& experiment =
-      campaign.experiments[static_cast<std::size_t>(group.first.first)];
-  const Place place = PlaceOf(experiment, data, group.second);
-  ObservableScatter scatter;
-  scatter.group = inference::FitScatter(moments, place.stage, place.control);
-  scatter.group.experiment = group.first.first;
-  scatter.group.observable = group.first.second;
-  scatter.group.share = campaign::ScatterShare(experiment);
-  return scatter;
-}
 
 // Replicates x readings of one role, NaN where a run did not come.
 absl::StatusOr<Eigen::MatrixXd> ReplicateRuns(const campaign::Campaign& campaign,
@@ -150,10 +117,11 @@ absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std
       if (count < 2) {
         continue;
       }
-      result.observables.push_back(Fit(definition.campaign, data, group,
-                                       inference::MomentsOfReplicates(finished.topRows(count))));
-      result.observables.back().from = varies ? "realizations" : "repeats";
-      result.observables.back().runs = static_cast<int>(count);
+      result.observables.push_back({.group = campaign::FitGroupScatter(
+                                        definition.campaign, data, group,
+                                        inference::MomentsOfReplicates(finished.topRows(count))),
+                                    .from = varies ? "realizations" : "repeats",
+                                    .runs = static_cast<int>(count)});
     }
   }
   return result;
@@ -175,9 +143,10 @@ std::vector<ObservableScatter> ScatterOfEmulator(const Definition& definition,
             factor.row(t).dot(factor.row(group.second[static_cast<std::size_t>(i) + 1]));
       }
     }
-    result.push_back(Fit(definition.campaign, definition.data, group, moments));
-    result.back().from = "emulator";
-    result.back().runs = emulated.runs;
+    result.push_back(
+        {.group = campaign::FitGroupScatter(definition.campaign, definition.data, group, moments),
+         .from = "emulator",
+         .runs = emulated.runs});
   }
   return result;
 }

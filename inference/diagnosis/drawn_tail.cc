@@ -1,0 +1,91 @@
+#include "inference/diagnosis/drawn_tail.h"
+
+#include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <boost/math/special_functions/gamma.hpp>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <map>
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+// Nodes of the integral over Student's law: ten per decade of either tail, of the upper one down to
+// 1e-9, beyond which no p value means anything. Right to a tenth there, to a hundredth at 0.01.
+constexpr int kPerDecade = 10;
+constexpr int kDecadesBelow = 2;
+constexpr int kDecadesAbove = 9;
+
+double GammaTail(double mean, double variance, double square) {
+  const double shape = mean * mean / variance;
+  const double ratio = square / mean;
+  // Chernoff's bound of either tail, before the function leaves the range of a double.
+  constexpr double kNothing = 600;
+  if (!(shape * (ratio - 1 - std::log(ratio)) < kNothing)) return ratio > 1 ? 0 : 1;
+  return boost::math::gamma_q(shape, shape * ratio);
+}
+
+double Variance(const Eigen::ArrayXd& values) {
+  return (values - values.mean()).square().sum() / static_cast<double>(values.size() - 1);
+}
+
+}  // namespace
+
+DrawnTail::DrawnTail(const Eigen::VectorXd& drawn, const std::vector<int>& group, int freedom)
+    : mean_(drawn.mean()), variance_(Variance(drawn)), freedom_(freedom) {
+  assert(freedom >= 0 && (freedom == 0 || group.empty()));
+  assert(group.empty() || static_cast<Index>(group.size()) == drawn.size());
+  std::map<int, std::vector<Index>> rows;
+  for (std::size_t i = 0; i < group.size(); ++i) rows[group[i]].push_back(static_cast<Index>(i));
+  if (rows.size() < 2 || !varies()) return;
+  Eigen::ArrayXd logarithm(static_cast<Index>(rows.size()));
+  double chance = 0;  // of the logarithms, since a group's draws are not all there could be
+  Index g = 0;
+  for (const auto& [number, own] : rows) {
+    const Eigen::ArrayXd squares = drawn(own);
+    logarithm[g++] = std::log(squares.mean());
+    if (own.size() < 2) continue;
+    const double relative = Variance(squares) / (squares.mean() * squares.mean());
+    within_ += relative / static_cast<double>(rows.size());
+    chance += relative / static_cast<double>(own.size() * rows.size());
+  }
+  const double between = Variance(logarithm) - chance;
+  if (!(between > 0) || !(within_ > 0)) return;
+  const auto groups = static_cast<double>(rows.size());
+  const double width = std::sqrt(between * (1 + 1 / groups));
+  const boost::math::students_t law(groups - 1);
+  const auto add_side = [&](double sign, int decades) {
+    double beyond = 0.5;
+    for (int k = 1; k <= kPerDecade * decades; ++k) {
+      const bool last = k == kPerDecade * decades;
+      const double next = last ? 0 : 0.5 * std::pow(10.0, -static_cast<double>(k) / kPerDecade);
+      const double t = boost::math::quantile(boost::math::complement(law, 0.5 * (beyond + next)));
+      means_.emplace_back(std::exp(logarithm.mean() + sign * width * t), beyond - next);
+      beyond = next;
+    }
+  };
+  add_side(-1, kDecadesBelow);
+  add_side(1, kDecadesAbove);
+}
+
+double DrawnTail::operator()(double square) const {
+  if (!varies()) return 1;
+  if (freedom_ > 0) {
+    const boost::math::fisher_f law(2 * mean_ * mean_ / variance_, freedom_);
+    return boost::math::cdf(boost::math::complement(law, square / mean_));
+  }
+  if (means_.empty()) return GammaTail(mean_, variance_, square);
+  double sum = 0;
+  for (const auto& [mean, weight] : means_) {
+    const double variance = within_ * mean * mean;
+    if (!(variance > 0)) continue;  // so small a mean that no square is smaller
+    sum += weight * (std::isfinite(variance) ? GammaTail(mean, variance, square) : 1);
+  }
+  return std::min(1.0, sum);
+}
+
+}  // namespace calib::inference
