@@ -1,37 +1,66 @@
 // `contact_plasticity`: contacts that unload stiffer than they load.
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include "dem/catalog/registry.h"
+#include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 
 namespace calib::dem {
 namespace {
 
+CALIB_DEM_INLINE void YieldLane(double stiffer, int k, double* largest, ContactBlock& b) {
+  const double force = b.normal_force[k];
+  const double most = force > largest[k] ? force : largest[k];
+  const double unloading = force - stiffer * (most - force);
+  largest[k] = most;
+  b.normal_force[k] = unloading > 0 ? unloading : 0.0;
+  b.normal_stiffness[k] *= force < most ? 1.0 + stiffer : 1.0;
+}
+
 CALIB_DEM_CLONES void Yield(double stiffer, ContactBlock& b, int first) {
   double* const largest = b.history[first];
 #pragma GCC ivdep
   for (int k = 0; k < kBlock; ++k) {
-    const double force = b.normal_force[k];
-    const double most = force > largest[k] ? force : largest[k];
-    const double unloading = force - stiffer * (most - force);
-    largest[k] = most;
-    b.normal_force[k] = unloading > 0 ? unloading : 0.0;
-    b.normal_stiffness[k] *= force < most ? 1.0 + stiffer : 1.0;
+    YieldLane(stiffer, k, largest, b);
+  }
+}
+
+CALIB_DEM_CLONES void YieldPairs(const double* stiffer, ContactBlock& b, int first) {
+  double* const largest = b.history[first];
+#pragma GCC ivdep
+  for (int k = 0; k < kBlock; ++k) {
+    YieldLane(stiffer[b.materials[k]], k, largest, b);
   }
 }
 
 class PlasticityKernel final : public ContactKernel {
  public:
-  explicit PlasticityKernel(double stiffer) : stiffer_(stiffer) {}
+  explicit PlasticityKernel(std::vector<double> stiffer) : stiffer_(std::move(stiffer)) {}
   [[nodiscard]] int HistorySize() const override { return 1; }
-  [[nodiscard]] double Stiffening() const override { return 1.0 + stiffer_; }
-  void Apply(ContactBlock& block, int first) const override { Yield(stiffer_, block, first); }
+  [[nodiscard]] double Stiffening() const override {
+    return 1.0 + *std::max_element(stiffer_.begin(), stiffer_.end());
+  }
+  void Apply(ContactBlock& block, int first) const override {
+    if (block.mixed) {
+      YieldPairs(stiffer_.data(), block, first);
+    } else {
+      Yield(stiffer_.front(), block, first);
+    }
+  }
 
  private:
-  double stiffer_;  ///< kappa - 1
+  std::vector<double> stiffer_;  ///< kappa - 1 per pair of materials
 };
 
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
-  return std::make_unique<PlasticityKernel>(context.parameters.Get("stiffness_ratio") - 1.0);
+  std::vector<double> stiffer = PairValues(context, "stiffness_ratio");
+  for (double& ratio : stiffer) {
+    ratio -= 1.0;
+  }
+  return std::make_unique<PlasticityKernel>(std::move(stiffer));
 }
 
 }  // namespace
@@ -52,6 +81,7 @@ EffectEntry ContactPlasticity() {
   ratio.max = 100;
   ratio.default_prior = {.kind = "log_uniform", .min = 1, .max = 11};
   ratio.null_value = 1;
+  ratio.of_pairs = true;
   ratio.description = "kappa = k2/k1, stiffness of unloading over that of first loading";
   return {.info = {.name = "contact_plasticity",
                    .kind = "contact",

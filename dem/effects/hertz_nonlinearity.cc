@@ -1,6 +1,10 @@
 // `hertz_nonlinearity`: an exponent of the contact force other than that of the law.
 
+#include <utility>
+#include <vector>
+
 #include "dem/catalog/registry.h"
+#include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 #include "dem/effects/shared/parameters.h"
 #include "dem/elementary/power.h"
@@ -9,42 +13,62 @@ namespace calib::dem {
 namespace {
 
 struct Exponent {
-  double force = 0;               ///< (n - m)/m
-  double stiffness = 1;           ///< n/m
-  double reference_pressure = 0;  ///< [Pa]
-  double least = 0;               ///< F/F(u_ref) below which the factor is held
+  double force = 0;      ///< (n - m)/m
+  double stiffness = 1;  ///< n/m
+  double least = 0;      ///< F/F(u_ref) below which the factor is held
 };
 
-CALIB_DEM_CLONES void Bend(const Exponent law, ContactBlock& b) {
+CALIB_DEM_INLINE void BendLane(const Exponent& law, double reference_pressure, int k,
+                               ContactBlock& b) {
+  const double size = 4.0 * b.effective_radius[k];
+  const double load = b.normal_force[k] / (reference_pressure * size * size);
+  const double factor = Power(load > law.least ? load : law.least, law.force);
+  b.normal_force[k] *= factor;
+  b.normal_stiffness[k] *= law.stiffness * factor;
+  b.tangential_stiffness[k] *= law.stiffness * factor;
+}
+
+CALIB_DEM_CLONES void Bend(const Exponent law, double reference_pressure, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
-    const double size = 4.0 * b.effective_radius[k];
-    const double load = b.normal_force[k] / (law.reference_pressure * size * size);
-    const double factor = Power(load > law.least ? load : law.least, law.force);
-    b.normal_force[k] *= factor;
-    b.normal_stiffness[k] *= law.stiffness * factor;
-    b.tangential_stiffness[k] *= law.stiffness * factor;
+    BendLane(law, reference_pressure, k, b);
+  }
+}
+
+CALIB_DEM_CLONES void BendPairs(const Exponent* law, double reference_pressure, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    BendLane(law[b.materials[k]], reference_pressure, k, b);
   }
 }
 
 class NonlinearityKernel final : public ContactKernel {
  public:
-  explicit NonlinearityKernel(const Exponent& law) : law_(law) {}
-  void Apply(ContactBlock& block, int /*first*/) const override { Bend(law_, block); }
+  NonlinearityKernel(std::vector<Exponent> laws, double reference_pressure)
+      : laws_(std::move(laws)), reference_pressure_(reference_pressure) {}
+  void Apply(ContactBlock& block, int /*first*/) const override {
+    if (block.mixed) {
+      BendPairs(laws_.data(), reference_pressure_, block);
+    } else {
+      Bend(laws_.front(), reference_pressure_, block);
+    }
+  }
 
  private:
-  Exponent law_;
+  std::vector<Exponent> laws_;  ///< per pair of materials
+  double reference_pressure_;   ///< [Pa]
 };
 
 double ExponentOf(const std::string& contact) { return contact == "linear" ? 1.0 : 1.5; }
 
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
   const double base = ExponentOf(context.contact);
-  const double exponent = context.parameters.Get("exponent");
-  return std::make_unique<NonlinearityKernel>(
-      Exponent{.force = (exponent - base) / base,
-               .stiffness = exponent / base,
-               .reference_pressure = context.parameters.Get("reference_pressure"),
-               .least = exponent < base ? 1e-3 : 1e-12});
+  std::vector<Exponent> laws;
+  for (const double exponent : PairValues(context, "exponent")) {
+    laws.push_back({.force = (exponent - base) / base,
+                    .stiffness = exponent / base,
+                    .least = exponent < base ? 1e-3 : 1e-12});
+  }
+  return std::make_unique<NonlinearityKernel>(std::move(laws),
+                                              context.parameters.Get("reference_pressure"));
 }
 
 }  // namespace
@@ -68,6 +92,7 @@ EffectEntry HertzNonlinearity() {
   exponent.max = 4;
   exponent.default_prior = {.kind = "uniform", .min = 0.75, .max = 3};
   exponent.null_value = 1.5;
+  exponent.of_pairs = true;
   exponent.null_by_contact = {{"linear", 1.0}, {"hertz_mindlin", 1.5}};
   exponent.description =
       "n in F ~ u^n; 1 linear, 1.5 Hertz, 2 to 3 rough or conical; null 1 with linear, 1.5 with "

@@ -1,6 +1,10 @@
 // `pressure_dependent_friction`: friction that falls or grows with the load of a contact.
 
+#include <utility>
+#include <vector>
+
 #include "dem/catalog/registry.h"
+#include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 #include "dem/effects/shared/parameters.h"
 #include "dem/elementary/power.h"
@@ -8,32 +12,48 @@
 namespace calib::dem {
 namespace {
 
-struct PressureLaw {
-  double exponent = 0;   ///< -m
-  double reference = 0;  ///< p_ref [Pa]
-};
+CALIB_DEM_INLINE void ScaleLimitLane(double exponent, double reference, int k, ContactBlock& b) {
+  const double size = 4.0 * b.effective_radius[k];
+  const double ratio = (b.normal_force[k] + b.attraction[k]) / (reference * (size * size));
+  b.sliding_limit[k] *= Power(ratio > 1e-6 ? ratio : 1e-6, exponent);
+}
 
-CALIB_DEM_CLONES void ScaleLimit(const PressureLaw law, ContactBlock& b) {
+CALIB_DEM_CLONES void ScaleLimit(double exponent, double reference, ContactBlock& b) {
   for (int k = 0; k < kBlock; ++k) {
-    const double size = 4.0 * b.effective_radius[k];
-    const double ratio = (b.normal_force[k] + b.attraction[k]) / (law.reference * (size * size));
-    b.sliding_limit[k] *= Power(ratio > 1e-6 ? ratio : 1e-6, law.exponent);
+    ScaleLimitLane(exponent, reference, k, b);
+  }
+}
+
+CALIB_DEM_CLONES void ScaleLimitPairs(const double* exponent, double reference, ContactBlock& b) {
+  for (int k = 0; k < kBlock; ++k) {
+    ScaleLimitLane(exponent[b.materials[k]], reference, k, b);
   }
 }
 
 class PressureFriction final : public ContactKernel {
  public:
-  explicit PressureFriction(const PressureLaw& law) : law_(law) {}
-  void Apply(ContactBlock& block, int /*first*/) const override { ScaleLimit(law_, block); }
+  PressureFriction(std::vector<double> exponents, double reference)
+      : exponents_(std::move(exponents)), reference_(reference) {}
+  void Apply(ContactBlock& block, int /*first*/) const override {
+    if (block.mixed) {
+      ScaleLimitPairs(exponents_.data(), reference_, block);
+    } else {
+      ScaleLimit(exponents_.front(), reference_, block);
+    }
+  }
 
  private:
-  PressureLaw law_;
+  std::vector<double> exponents_;  ///< -m per pair of materials
+  double reference_;               ///< p_ref [Pa]
 };
 
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
-  return std::make_unique<PressureFriction>(
-      PressureLaw{.exponent = -context.parameters.Get("exponent"),
-                  .reference = context.parameters.Get("reference_pressure")});
+  std::vector<double> exponents = PairValues(context, "exponent");
+  for (double& exponent : exponents) {
+    exponent = -exponent;
+  }
+  return std::make_unique<PressureFriction>(std::move(exponents),
+                                            context.parameters.Get("reference_pressure"));
 }
 
 }  // namespace
@@ -53,6 +73,7 @@ EffectEntry PressureDependentFriction() {
   exponent.max = 0.9;
   exponent.default_prior = {.kind = "uniform", .min = -0.6, .max = 0.6};
   exponent.null_value = 0;
+  exponent.of_pairs = true;
   exponent.description = "m; friction falls with pressure where it is positive";
   return {.info = {.name = "pressure_dependent_friction",
                    .kind = "contact",

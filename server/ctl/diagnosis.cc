@@ -13,6 +13,7 @@
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/extension.h"
 #include "server/ctl/fitted_campaign.h"
+#include "server/ctl/measurement_errors.h"
 #include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
 #include "server/ctl/strengths.h"
@@ -27,6 +28,33 @@ constexpr std::size_t kWarmFits = 4;  // to begin with: two batches each pick th
 // Of measurements that a right model makes one in a thousand is closer.
 constexpr double kTooGood = 0.999;
 constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
+
+constexpr int kMorePackings = 8;  // that a diagnosis is content with
+
+// What a scatter known from few packings does to the verdict; empty where it is known from enough,
+// or where packings were not varied.
+std::string FewPackings(const inference::FittedModel& model) {
+  if (model.packings < 2) return "";
+  if (model.packings < kFewestPackings) {
+    return absl::StrCat("The scatter between packings is known from ", model.packings,
+                        " of them, and any misfit may be more of it: with fewer than ",
+                        kFewestPackings,
+                        " nothing is called missing (`realizations: ", kMorePackings,
+                        "` or more lets smaller effects be seen).");
+  }
+  if (model.without.empty()) {
+    return absl::StrCat(
+        "The experiments have different numbers of packings, so that a misfit must "
+        "be very large to count: give all of them the same `realizations`, ",
+        kMorePackings, " or more.");
+  }
+  if (model.packings < kMorePackings) {
+    return absl::StrCat("The scatter between packings is known from ", model.packings,
+                        " of them, so that a misfit must be large to count: `realizations: ",
+                        kMorePackings, "` or more lets smaller effects be seen.");
+  }
+  return "";
+}
 
 class Inquiry {
  public:
@@ -159,6 +187,9 @@ class Inquiry {
     diagnosis_.adequacy = *adequacy;
     diagnosis_.emulator_error = response_.emulator_error;
     diagnosis_.scatter = response_.scatter;
+    diagnosis_.packings = response_.model.packings;
+    const std::string few = FewPackings(response_.model);
+    if (!few.empty()) diagnosis_.warnings.push_back(few);
     if (adequacy->p_chi2 > kTooGood) {
       diagnosis_.warnings.emplace_back(
           "The model is closer to the readings than the stated errors and the scatter explain: "

@@ -248,7 +248,8 @@ std::string DiagnosisJson(const Diagnosis& d) {
                  {"rms", d.rms},
                  {"left_out_error", OrNull(d.left_out_error)},
                  {"emulator_error", d.emulator_error},
-                 {"scatter", d.scatter}}}};
+                 {"scatter", d.scatter},
+                 {"packings", d.packings}}}};
   json["only_adequacy"] = d.only_adequacy;
   json["units"] = d.units;
   json["sentence"] = Sentence(d);

@@ -19,9 +19,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kDraws = 400;               // of measurements
-constexpr int kRunsAbout = 5;               // runs of a campaign or a warm fit about its best point
-constexpr std::size_t kFewestPackings = 4;  // whose runs say more than the closed form
+constexpr Index kDraws = 400;  // of measurements
+constexpr int kRunsAbout = 5;  // runs of a campaign or a warm fit about its best point
 
 // Correlated errors of the readings, one as variance.
 Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
@@ -184,7 +183,8 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
         NoiseCorrelation(data) - noise.asDiagonal() * NoiseCorrelation(plain) * noise.asDiagonal();
     errors.packings = static_cast<int>(readings.departures.rows());
     const std::set<int> apart(packing.begin(), packing.end());
-    if (static_cast<Index>(packing.size()) == of_runs.rows() && apart.size() >= kFewestPackings) {
+    if (static_cast<Index>(packing.size()) == of_runs.rows() &&
+        static_cast<int>(apart.size()) >= kFewestPackings) {
       inference::PackingScatter scatter = inference::ScatterBetweenPackings(
           of_runs * ScatterOfMissed(base, plain).asDiagonal(), packing,
           [&](std::optional<int> left_out) {

@@ -25,6 +25,10 @@ struct MeasurementErrors {
   int packings = 0;     ///< that scatter was measured on, see inference::FittedModel
 };
 
+/// Packings whose runs say more of the scatter than a closed form, and without one of which enough
+/// is left to judge it by.
+inline constexpr int kFewestPackings = 4;
+
 /// How many groups of runs share no packing in any fitted experiment with another group: run i is
 /// of group StreamOf(i) mod that. Experiments of 4 and 6 packings have 2, not 4; 1 where packings
 /// were not varied.

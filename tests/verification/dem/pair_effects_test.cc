@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -176,6 +177,72 @@ TEST(PairEffects, JkrTakesWorkAndModulusOfThePair) {
   const double hertz = HertzForce(dry, kSteel, kGrains);
   EXPECT_NEAR(some.block.normal_force[Lane(kSteel, kGrains)], hertz, 1e-11 * hertz);
   EXPECT_EQ(some.block.holds[Lane(kGrains, kSteel)], 0);
+}
+
+// F = F_b (F_b/(p_ref d*^2))^((n - m)/m), d* = 4 R* = d.
+TEST(PairEffects, ExponentIsThatOfThePair) {
+  const double reference = 1e5;
+  const Model model =
+      Three({"hertz_nonlinearity"}, {{"hertz_nonlinearity.exponent", 1.5},
+                                     {"hertz_nonlinearity.reference_pressure", reference},
+                                     {"steel-rubber.hertz_nonlinearity.exponent", 2.5},
+                                     {"grains-grains.hertz_nonlinearity.exponent", 1}});
+  const Pairs pairs(model);
+  const auto expect = [&](int a, int b, double exponent) {
+    const double base = HertzForce(model, a, b);
+    const double unit = reference * 4 * kRadius * kRadius;
+    const double force = base * std::pow(base / unit, (exponent - 1.5) / 1.5);
+    const double stiffness = exponent * force / kOverlap;
+    EXPECT_NEAR(pairs.block.normal_force[Lane(a, b)], force, 1e-9 * force) << a << b;
+    EXPECT_NEAR(pairs.block.normal_stiffness[Lane(a, b)], stiffness, 1e-9 * stiffness) << a << b;
+  };
+  expect(kGrains, kSteel, 1.5);
+  expect(kSteel, kRubber, 2.5);
+  expect(kRubber, kSteel, 2.5);
+  expect(kGrains, kGrains, 1);
+}
+
+// tan(phi_mu) Fn (Fn/(d*^2 p_ref))^(-m).
+TEST(PairEffects, FrictionFallsWithThePressureOfThePair) {
+  const double reference = 1e5;
+  const Model model = Three({"pressure_dependent_friction"},
+                            {{"pressure_dependent_friction.exponent", 0},
+                             {"pressure_dependent_friction.reference_pressure", reference},
+                             {"steel-grains.pressure_dependent_friction.exponent", 0.3},
+                             {"rubber-rubber.pressure_dependent_friction.exponent", -0.2}});
+  const Pairs pairs(model);
+  const auto expect = [&](int a, int b, double exponent) {
+    const double force = HertzForce(model, a, b);
+    const double limit =
+        0.5 * force * std::pow(force / (4 * kRadius * kRadius * reference), -exponent);
+    EXPECT_NEAR(pairs.block.sliding_limit[Lane(a, b)], limit, 1e-9 * limit) << a << b;
+  };
+  expect(kSteel, kSteel, 0);
+  expect(kGrains, kSteel, 0.3);
+  expect(kSteel, kGrains, 0.3);
+  expect(kRubber, kRubber, -0.2);
+}
+
+// Loaded to twice the overlap, then unloaded to it: F_b - (kappa - 1)(F_max - F_b).
+TEST(PairEffects, PlasticityIsThatOfThePair) {
+  const Model model =
+      Three({"contact_plasticity"}, {{"contact_plasticity.stiffness_ratio", 1},
+                                     {"rubber-steel.contact_plasticity.stiffness_ratio", 1.2},
+                                     {"grains-grains.contact_plasticity.stiffness_ratio", 50}});
+  const ContactModel contact(model);
+  Pairs pairs(model, 2 * kOverlap);
+  for (double& dx : pairs.block.dx) dx = 2 * kRadius - kOverlap;
+  contact.Evaluate(pairs.block);
+  const auto expect = [&](int a, int b, double ratio) {
+    const double now = HertzForce(model, a, b);
+    const double most = std::pow(2.0, 1.5) * now;
+    const double force = std::max(0.0, now - (ratio - 1) * (most - now));
+    EXPECT_NEAR(pairs.block.normal_force[Lane(a, b)], force, 1e-9 * now) << a << b;
+  };
+  expect(kSteel, kGrains, 1);
+  expect(kSteel, kRubber, 1.2);
+  expect(kRubber, kSteel, 1.2);
+  expect(kGrains, kGrains, 50);
 }
 
 TEST(PairEffects, RollingFrictionWithTheFloorIsThatOfThePair) {

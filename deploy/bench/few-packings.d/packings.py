@@ -1,0 +1,114 @@
+"""Curves on many packings for tests/verification/inference/few_packings_test.cc, and that test on them. See ../few-packings."""
+import argparse, concurrent.futures, csv, math, os, pathlib, subprocess, sys, tempfile
+
+EXAMPLE = pathlib.Path(__file__).resolve().parents[2] / 'examples/hidden_effect'
+FITTED = ('tx100', 'tx400')
+OBSERVABLES = ('stress_ratio', 'volumetric_strain')
+MODULUS, FRICTION = 8e8, 0.42
+FEW = 16  # packings that responses are averaged over
+# Signatures to screen: what other tests call weak and strong, near and far from each other.
+EFFECTS = {
+    'rolling_resistance': {'stiffness': 0.1, 'friction': 0.1},
+    'adhesion_jkr': {'work_of_adhesion': 0.5},
+    'contact_plasticity': {'stiffness_ratio': 2},
+    'membrane_stiffness': {'stiffness': 1e5},
+    'pressure_dependent_friction': {'exponent': -0.1},
+}
+
+
+def curve(options, seed, modulus=MODULUS, friction=FRICTION, effect=None):
+    """Rows of both fitted experiments on one packing, as floats; run once, then read from options.keep."""
+    done = options.keep / f'{options.particles}-{seed}-{modulus:g}-{friction:g}-{effect or "none"}.csv'
+    if not done.exists():
+        text = (EXAMPLE / 'campaign.yaml').read_text()
+        for old, new in [('particles: 200', f'particles: {options.particles}'), ('seed: 1}', f'seed: {seed}}}'),
+                         *((f'file: {name}.csv', f'file: {EXAMPLE / name}.csv') for name in ('tx100', 'tx200', 'tx400'))]:
+            assert old in text, old
+            text = text.replace(old, new)
+        if effect:
+            fixed = ''.join(f', {effect}.{name}: {value}' for name, value in EFFECTS[effect].items())
+            text = text.replace('effects: []', f'effects: [{effect}]').replace('poisson_ratio: 0.2}', f'poisson_ratio: 0.2{fixed}}}')
+        with tempfile.TemporaryDirectory() as folder:
+            campaign, states = pathlib.Path(folder, 'campaign.yaml'), pathlib.Path(folder, 'states.csv')
+            campaign.write_text(text)
+            subprocess.run([options.bin / 'calibctl', 'simulate', campaign, '--set', f'young_modulus={modulus}', '--set',
+                            f'friction_coefficient={friction}', '-o', states], check=True, stdout=subprocess.DEVNULL)
+            part = done.with_suffix('.part')
+            part.write_text(states.read_text())
+            part.rename(done)
+    with open(done) as file:
+        return [row for row in csv.DictReader(file) if row['experiment'] in FITTED]
+
+
+def values(rows):
+    return [float(row[name]) for name in OBSERVABLES for row in rows]
+
+
+def mean(curves):
+    return [sum(column) / len(curves) for column in zip(*curves)]
+
+
+def difference(a, b):
+    return [x - y for x, y in zip(a, b)]
+
+
+def path_lengths(rows):
+    """Since the start of each experiment, in axial strain; and the loading stage, which turns where the strain does."""
+    lengths, stages = [], []
+    for k, row in enumerate(rows):
+        first = k == 0 or rows[k - 1]['experiment'] != row['experiment']
+        step = 0 if first else float(row['axial_strain']) - float(rows[k - 1]['axial_strain'])
+        if first:
+            length, stage, forward = 0, 0, True
+        elif (step > 0) != forward:
+            stage, forward = stage + 1, not forward
+        length += abs(step)
+        lengths.append(length)
+        stages.append(stage)
+    return lengths, stages
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--bin', type=pathlib.Path, required=True)
+    parser.add_argument('--packings', type=int, default=160)
+    parser.add_argument('--particles', type=int, default=200)
+    parser.add_argument('--measurements', type=int, default=300)
+    parser.add_argument('--jobs', type=int, default=2)
+    parser.add_argument('--keep', type=pathlib.Path, default=pathlib.Path(tempfile.gettempdir(), 'calib-few-packings'))
+    options = parser.parse_args()
+    if options.packings < 20:
+        parser.error('--packings: at least 20, so that sixteen and a measurement can be drawn from them')
+    options.keep.mkdir(parents=True, exist_ok=True)
+    seeds = range(1001, 1001 + options.packings)
+    few = seeds[:FEW]
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        def all_of(some, **what):
+            return list(pool.map(lambda seed: values(curve(options, seed, **what)), some))
+        runs = all_of(seeds)
+        responses = [difference(mean(all_of(few, modulus=1.25 * MODULUS)), mean(all_of(few, modulus=0.75 * MODULUS))),
+                     difference(mean(all_of(few, friction=0.5)), mean(all_of(few, friction=0.35)))]
+        effects = [difference(mean(all_of(few, effect=effect)), mean(runs[:FEW])) for effect in EFFECTS]
+    rows = curve(options, seeds[0])
+    centre = mean(runs)
+    # Noise as in the campaign file: 1.5 % with a floor of 0.015, 0.06 % of strain.
+    sd = [math.hypot(0.015 * value, 0.015) if k < len(rows) else 6e-4 for k, value in enumerate(centre)]
+    in_sd = lambda curves: [[value / unit for value, unit in zip(curve, sd)] for curve in curves]
+    lengths, stages = path_lengths(rows)
+    group = [2 * OBSERVABLES.index(name) + FITTED.index(row['experiment']) for name in OBSERVABLES for row in rows]
+    runs = in_sd([difference(run, centre) for run in runs])
+    scatter = math.sqrt(sum(value * value for run in runs for value in run) / (len(runs) * len(sd)))
+    print(f'{len(runs)} packings of {options.particles} grains, {len(sd)} readings; packings differ by {scatter:.2f} sd of the noise')
+    table = options.keep / 'packings.txt'
+    with open(table, 'w') as file:
+        for matrix in (runs, in_sd(responses), in_sd(effects), [group, stages * 2, lengths * 2]):
+            print(len(matrix), len(matrix[0]), file=file)
+            for row in matrix:
+                print(*(f'{value:.10g}' for value in row), file=file)
+    test = [options.bin / 'inference_few_packings_test', '--gtest_filter=FewPackings.MisfitOfARightModelIsAsRareAsItsPValueSays']
+    environment = {**os.environ, 'CALIB_PACKINGS': str(table), 'CALIB_MEASUREMENTS': str(options.measurements)}
+    return subprocess.run(test, env=environment).returncode
+
+
+if __name__ == '__main__':
+    sys.exit(main())
