@@ -164,7 +164,7 @@ class Inquiry {
           "Every fitted test is run on one packing: by how much another one differs is not in the "
           "errors, "
           "and may be taken for a missing effect unless the packing is the measured one. "
-          "realizations: 4 or more show it.");
+          "realizations: 8 or more show it.");
     }
   }
 
