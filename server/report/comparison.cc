@@ -1,11 +1,11 @@
 #include "server/report/comparison.h"
 
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <map>
 #include <utility>
 
+#include "inference/scatter/chi_squared_law.h"
 #include "server/campaign/noise_check.h"
 #include "server/report/residual_group.h"
 #include "server/report/setting_trend.h"
@@ -45,18 +45,27 @@ double EffectiveReadings(const Group& group, Eigen::Index first, Eigen::Index co
   return n * n / inverse.dot(covariance * inverse);
 }
 
-double UpperTail(double chi2, double degrees) {
-  return boost::math::gamma_q(0.5 * degrees, 0.5 * chi2);
+// Covariance of the residuals if the model is right, and the part of it that packings show.
+struct Expected {
+  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd scatter;  // zero where packings were not varied
+};
+
+// A mean over R packings is off by 1/R of their scatter; of held-out data the prediction has it.
+Expected ExpectedOf(const Group& group, const CampaignView& view, bool validation) {
+  Expected expected{.covariance = group.covariance + group.of_prediction,
+                    .scatter = Eigen::MatrixXd::Zero(group.residual.size(), group.residual.size())};
+  if (group.packings < 2) return expected;
+  const bool mean = view.posterior.posterior_from() != "none";
+  const double of_model = mean ? 1.0 / group.packings : 1;
+  const double share = campaign::ScatterShare(*group.experiment);
+  const bool predicted = mean && validation;
+  expected.scatter = (share + (predicted ? 0 : of_model)) * group.of_packings;
+  if (mean && !validation) expected.covariance += of_model * group.of_packings;
+  return expected;
 }
 
-// Cube root of chi-squared over its degrees of freedom is nearly normal [Wilson & Hilferty 1931].
-double NormalDeviate(double chi2, double degrees) {
-  const double spread = 2 / (9 * degrees);
-  return (std::cbrt(chi2 / degrees) - (1 - spread)) / std::sqrt(spread);
-}
-
-// expected: covariance of the residuals if the model is right.
-void AddSegments(const Group& group, const Eigen::MatrixXd& expected, bool heldout, bool judged,
+void AddSegments(const Group& group, const Expected& expected, bool heldout, bool judged,
                  std::vector<SegmentMisfit>& out) {
   const auto size = static_cast<Eigen::Index>(group.readings.size());
   const auto segment = [&group](Eigen::Index i) -> const std::string& {
@@ -85,10 +94,14 @@ void AddSegments(const Group& group, const Eigen::MatrixXd& expected, bool heldo
             static_cast<double>(count)),
         .chi2_share = std::nullopt};
     if (judged) {
-      const double of_sum = expected.block(first, first, count, count).sum();
-      misfit.z = misfit.bias * static_cast<double>(count) / std::sqrt(of_sum);
+      const Eigen::MatrixXd own = expected.covariance.block(first, first, count, count);
+      const Eigen::MatrixXd scatter = expected.scatter.block(first, first, count, count);
+      const auto n = static_cast<double>(count);
+      misfit.z = inference::NormalDeviateOfMean(misfit.bias * n / std::sqrt(own.sum()),
+                                                scatter.sum() / own.sum(), group.packings);
       misfit.p_value =
-          UpperTail(ChiSquared(expected, group.residual, first, count), static_cast<double>(count));
+          inference::UpperTail(ChiSquared(expected.covariance, group.residual, first, count), n,
+                               inference::WhatIsKnown(own, scatter, group.packings));
       // Divided by their sum in the end.
       misfit.chi2_share = ChiSquared(group.covariance, group.residual, first, count);
       misfit.pattern = PatternOf(CurveOf(group, first, count));
@@ -140,6 +153,7 @@ struct Sums {
   double squared = 0;  // of residual / sd
   double chi2 = 0;
   int readings = 0;
+  inference::KnownFrom known{};
 };
 
 }  // namespace
@@ -178,16 +192,20 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
           .z = std::nullopt,
           .p_value = std::nullopt,
           .effective_readings = EffectiveReadings(group, 0, group.residual.size())};
-      const Eigen::MatrixXd expected = group.covariance + group.of_prediction;
+      const Expected expected = ExpectedOf(group, view, validation);
       Sums& sums = validation ? heldout : fitted;
       sums.squared += squared;
       sums.readings += misfit.readings;
       if (judged) {
-        const double chi2 = ChiSquared(expected, group.residual, 0, group.residual.size());
+        const double chi2 =
+            ChiSquared(expected.covariance, group.residual, 0, group.residual.size());
+        const inference::KnownFrom known =
+            inference::WhatIsKnown(expected.covariance, expected.scatter, group.packings);
         misfit.pattern = PatternOf(CurveOf(group, 0, group.residual.size()));
-        misfit.z = NormalDeviate(chi2, n);
-        misfit.p_value = UpperTail(chi2, n);
+        misfit.z = inference::NormalDeviate(chi2, n, known);
+        misfit.p_value = inference::UpperTail(chi2, n, known);
         sums.chi2 += chi2;
+        sums.known += known;
       }
       comparison.by_observable.push_back(std::move(misfit));
       AddSegments(group, expected, validation, judged, comparison.by_segment);
@@ -200,7 +218,7 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
   const int degrees = fitted.readings - static_cast<int>(view.campaign.parameters.size());
   if (judged && degrees > 0) {
     comparison.reduced_chi2 = fitted.chi2 / degrees;
-    comparison.p_value = UpperTail(fitted.chi2, degrees);
+    comparison.p_value = inference::UpperTail(fitted.chi2, degrees, fitted.known);
   } else if (!judged) {
     comparison.note =
         "The size of the errors was not stated independently (noise is inferred or tempered to an "

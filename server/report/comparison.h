@@ -23,8 +23,9 @@ struct ObservableMisfit {
   double scatter = 0;          ///< rms of the scatter's sd over that of the noise; 0: none is known
   std::string scatter_from{};  ///< realizations | repeats | emulator; empty: none is known
   std::optional<double>
-      z;  ///< chi-squared of the group as a standard normal deviate [Wilson & Hilferty 1931]
-  /// Probability of a chi-squared at least as large if the model is right. At the posterior mean:
+      z;  ///< chi-squared of the group as a standard normal deviate (inference::NormalDeviate)
+  /// Probability of a chi-squared at least as large if the model is right, scatter known from the
+  /// packings that were run (inference::UpperTail). At the posterior mean:
   /// too large by as many degrees of freedom as the parameters take of these readings. Of held-out
   /// readings the errors of the prediction are among those of the residuals.
   std::optional<double> p_value{};
@@ -40,7 +41,8 @@ struct SegmentMisfit {
   double from = 0, to = 0;  ///< control at the first and last reading (strain [-] or stress [Pa])
   double bias = 0;          ///< mean of model minus measurement [SI]
   std::optional<double>
-      z;  ///< bias over its standard deviation, correlation of the errors included
+      z;  ///< bias over its standard deviation, correlation of the errors included, as a standard
+          ///< normal deviate (inference::NormalDeviateOfMean)
   std::optional<double> p_value{};  ///< as ObservableMisfit::p_value, of this stage alone
   int readings = 0;
   double effective_readings = 0;  ///< as ObservableMisfit::effective_readings

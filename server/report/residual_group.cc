@@ -44,6 +44,10 @@ Eigen::MatrixXd AddScatter(const CampaignView& view, const std::vector<double>& 
   group.scatter = std::sqrt(ratio.mean());
   group.scatter_from = record->from();
   group.covariance += covariance;
+  if (record->from() == "realizations") {
+    group.of_packings = of_run;
+    group.packings = record->runs();
+  }
   return of_run;
 }
 

@@ -22,6 +22,10 @@ struct ResidualGroup {
   /// Of the mean of the model's runs, for data that were not fitted: how far its parameters may be
   /// off, and that the runs are finitely many. Zero where it is not known.
   Eigen::MatrixXd of_prediction;
+  /// Covariance of a single run by packings, and how many it is known from; 0 x 0 and 0 where
+  /// packings were not varied.
+  Eigen::MatrixXd of_packings{};
+  int packings = 0;
   Eigen::VectorXd model;
 };
 

@@ -20,6 +20,7 @@
 
 #include "inference/diagnosis/screen.h"
 #include "inference/sampling/philox.h"
+#include "inference/scatter/chi_squared_law.h"
 #include "inference/scatter/packing_scatter.h"
 #include "inference/scatter/scatter.h"
 
@@ -106,17 +107,45 @@ Packings ReadPackings(const char* file) {
   return read;
 }
 
+PhiloxStream NumberedStream(std::uint64_t seed, int sample) {
+  return PhiloxStream({.seed = seed,
+                       .purpose = StreamPurpose::kDiagnosisNull,
+                       .iteration = 0,
+                       .sample = static_cast<std::uint64_t>(sample)});
+}
+
+std::vector<Index> InOrder(const Packings& all) {
+  std::vector<Index> order(static_cast<std::size_t>(all.runs.rows()));
+  std::iota(order.begin(), order.end(), Index{0});
+  return order;
+}
+
+/// The first `count` of them, drawn anew.
+void Shuffle(std::vector<Index>& order, int count, int number) {
+  PhiloxStream stream = NumberedStream(13, number);
+  for (int i = 0; i < count; ++i) {
+    const auto place = static_cast<std::size_t>(i);
+    const auto left = static_cast<double>(order.size() - place);
+    const auto step = static_cast<std::size_t>(stream.Uniform() * left);
+    std::swap(order[place], order[std::min(place + step, order.size() - 1)]);
+  }
+}
+
+std::vector<Index> ReadingsOf(const Packings& all, int observable) {
+  std::vector<Index> own;
+  for (std::size_t k = 0; k < all.observable.size(); ++k) {
+    if (all.observable[k] == observable) own.push_back(static_cast<Index>(k));
+  }
+  return own;
+}
+
 /// A chain for each observable, about the mean over `count` packings.
 Eigen::MatrixXd ClosedForm(const Packings& all, const Eigen::MatrixXd& runs, double count) {
   Eigen::MatrixXd form = Eigen::MatrixXd::Zero(runs.cols(), runs.cols());
   for (const int one : std::set<int>(all.observable.begin(), all.observable.end())) {
-    std::vector<Index> own;
+    const std::vector<Index> own = ReadingsOf(all, one);
     std::vector<int> stage;
-    for (std::size_t k = 0; k < all.observable.size(); ++k) {
-      if (all.observable[k] != one) continue;
-      own.push_back(static_cast<Index>(k));
-      stage.push_back(all.stage[k]);
-    }
+    for (const Index k : own) stage.push_back(all.stage[static_cast<std::size_t>(k)]);
     form(own, own) =
         (1 + 1 / count) * ScatterCovariance(FitScatter(MomentsOfReplicates(runs(Eigen::all, own)),
                                                        stage, all.control(own)));
@@ -146,10 +175,7 @@ FittedModel ModelOf(const Packings& all, const std::vector<Index>& order, int co
         return ClosedForm(all, runs(rows, Eigen::all), packings);
       },
       Eigen::MatrixXd::Identity(t, t) + 1e4 * all.responses.transpose() * all.responses);
-  PhiloxStream stream({.seed = 12,
-                       .purpose = StreamPurpose::kDiagnosisNull,
-                       .iteration = 0,
-                       .sample = static_cast<std::uint64_t>(seed)});
+  PhiloxStream stream = NumberedStream(12, seed);
   FittedModel model{.histories = mean - all.runs.row(order[own.size()]),
                     .covariance = std::move(scatter.covariance),
                     .parameters = static_cast<int>(all.responses.rows()),
@@ -195,19 +221,9 @@ void Judge(const FittedModel& model, const Packings& all, Judged& judged) {
 /// With each packing judged without itself, and with scatter taken as known from all of them.
 std::pair<Judged, Judged> JudgeMany(const Packings& all, int count, int measurements) {
   std::pair<Judged, Judged> judged;
-  std::vector<Index> order(static_cast<std::size_t>(all.runs.rows()));
-  std::iota(order.begin(), order.end(), Index{0});
+  std::vector<Index> order = InOrder(all);
   for (int m = 0; m < measurements; ++m) {
-    PhiloxStream stream({.seed = 13,
-                         .purpose = StreamPurpose::kDiagnosisNull,
-                         .iteration = 0,
-                         .sample = static_cast<std::uint64_t>(m)});
-    for (int i = 0; i <= count; ++i) {
-      const auto left = static_cast<double>(order.size() - static_cast<std::size_t>(i));
-      std::swap(order[static_cast<std::size_t>(i)],
-                order[static_cast<std::size_t>(i) +
-                      static_cast<std::size_t>(0.999999 * stream.Uniform() * left)]);
-    }
+    Shuffle(order, count + 1, m);
     FittedModel model = ModelOf(all, order, count, m);
     Judge(model, all, judged.first);
     model.without.clear();
@@ -223,15 +239,47 @@ double Below(const std::vector<double>& p_values, double level) {
          static_cast<double>(p_values.size());
 }
 
-TEST(FewPackings, MisfitOfARightModelIsAsRareAsItsPValueSays) {
+Packings PackingsAsAsked() {
   const char* file = std::getenv("CALIB_PACKINGS");
+  return file != nullptr ? ReadPackings(file) : MadeUp(60);
+}
+
+/// The same with runs whose scatter has the closed form: a chain along the path of either
+/// observable.
+Packings ChainsAsAsked() {
+  Packings chains = PackingsAsAsked();
+  if (std::getenv("CALIB_PACKINGS") != nullptr) return chains;
+  constexpr double kSd = 3;
+  constexpr double kLength = 0.3;
+  for (Index p = 0; p < chains.runs.rows(); ++p) {
+    PhiloxStream stream = NumberedStream(14, static_cast<int>(p));
+    for (Index k = 0; k < chains.runs.cols(); ++k) {
+      const double step = k == 0 ? 0 : chains.control[k] - chains.control[k - 1];
+      const double kept = step > 0 ? std::exp(-step / kLength) : 0;  // else another observable
+      const double before = k == 0 ? 0 : chains.runs(p, k - 1);
+      chains.runs(p, k) = kept * before + kSd * std::sqrt(1 - kept * kept) * stream.Normal();
+    }
+  }
+  return chains;
+}
+
+int MeasurementsAsAsked() {
   const char* number = std::getenv("CALIB_MEASUREMENTS");
-  const Packings all = file != nullptr ? ReadPackings(file) : MadeUp(60);
-  const int measurements = number != nullptr ? std::atoi(number) : 100;
+  return number != nullptr ? std::atoi(number) : 100;
+}
+
+/// What chance allows of a right rate in one of a thousand.
+double MostOf(double rate, int measurements) {
+  return rate + 3.3 * std::sqrt(rate * (1 - rate) / measurements) + 1.0 / measurements;
+}
+
+TEST(FewPackings, MisfitOfARightModelIsAsRareAsItsPValueSays) {
+  const Packings all = PackingsAsAsked();
+  const int measurements = MeasurementsAsAsked();
   std::cout << "packings | known: p < 0.01, 0.05, 0.5, screen p < 0.01, 0.05"
                " | left out: the same\n";
   for (const int count : {4, 8, 16}) {
-    if (file == nullptr && count == 16) continue;
+    if (std::getenv("CALIB_PACKINGS") == nullptr && count == 16) continue;
     const auto [without, known] = JudgeMany(all, count, measurements);
     std::cout << count;
     for (const Judged* judged : {&known, &without}) {
@@ -241,13 +289,10 @@ TEST(FewPackings, MisfitOfARightModelIsAsRareAsItsPValueSays) {
       for (const double level : {0.01, 0.05}) std::cout << ' ' << Below(judged->screen, level);
     }
     std::cout << '\n';
-    // What chance allows of a right rate in one of a thousand.
-    const auto most = [measurements](double rate) {
-      return rate + 3.3 * std::sqrt(rate * (1 - rate) / measurements) + 1.0 / measurements;
-    };
     for (const double level : {0.01, 0.05}) {
-      EXPECT_LE(Below(without.adequacy, level), most(level)) << count << " packings";
-      EXPECT_LE(Below(without.screen, level), most(level)) << count << " packings";
+      EXPECT_LE(Below(without.adequacy, level), MostOf(level, measurements))
+          << count << " packings";
+      EXPECT_LE(Below(without.screen, level), MostOf(level, measurements)) << count << " packings";
     }
     EXPECT_GT(Below(without.adequacy, 0.5), 0.25) << "no misfit would ever be seen";
     if (count == 4) {
@@ -256,10 +301,52 @@ TEST(FewPackings, MisfitOfARightModelIsAsRareAsItsPValueSays) {
   }
 }
 
+// What `compare` says of one observable: by the chain alone, no parameter fitted.
+TEST(FewPackings, ChiSquaredOfAnObservableIsAsRareAsItsPValueSays) {
+  const Packings all = ChainsAsAsked();
+  const int measurements = 2 * MeasurementsAsAsked();
+  std::cout << "packings | covariance known: p < 0.01, 0.05, 0.5 | from the packings: the same\n";
+  for (const int count : {2, 4, 8, 16}) {
+    std::vector<double> known;
+    std::vector<double> judged;
+    std::vector<Index> order = InOrder(all);
+    for (int m = 0; m < measurements; ++m) {
+      Shuffle(order, count + 1, m);
+      const std::vector<Index> own(order.begin(), order.begin() + count);
+      const Eigen::MatrixXd runs = all.runs(own, Eigen::all);
+      const Eigen::MatrixXd scatter = ClosedForm(all, runs, count);
+      PhiloxStream stream = NumberedStream(12, m);
+      Eigen::VectorXd residual = all.runs.row(order[own.size()]) - runs.colwise().mean();
+      for (double& one : residual) one += stream.Normal();
+      for (const int observable : std::set<int>(all.observable.begin(), all.observable.end())) {
+        const std::vector<Index> readings = ReadingsOf(all, observable);
+        const Eigen::MatrixXd part = scatter(readings, readings);
+        const Eigen::MatrixXd covariance =
+            part + Eigen::MatrixXd::Identity(part.rows(), part.cols());
+        const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+        const double chi2 = factor.matrixL().solve(residual(readings)).squaredNorm();
+        const auto n = static_cast<double>(readings.size());
+        known.push_back(UpperTail(chi2, n, WhatIsKnown(covariance, part, 0)));
+        judged.push_back(UpperTail(chi2, n, WhatIsKnown(covariance, part, count)));
+      }
+    }
+    std::cout << count;
+    for (const std::vector<double>* p : {&known, &judged}) {
+      std::cout << " | ";
+      for (const double level : {0.01, 0.05, 0.5}) std::cout << Below(*p, level) << ' ';
+    }
+    std::cout << '\n';
+    // Observables of one packing go together: as many witnesses as measurements.
+    for (const double level : {0.01, 0.05}) {
+      EXPECT_LE(Below(judged, level), MostOf(level, measurements)) << count << " packings";
+    }
+    EXPECT_GT(Below(judged, 0.5), 0.2) << "no misfit would ever be seen";
+  }
+}
+
 TEST(FewPackings, AnEffectIsSeen) {
   const Packings all = MadeUp(60);
-  std::vector<Index> order(60);
-  std::iota(order.begin(), order.end(), Index{0});
+  std::vector<Index> order = InOrder(all);
   int seen = 0;
   for (int m = 0; m < 40; ++m) {
     std::rotate(order.begin(), order.begin() + 9, order.end());
@@ -272,8 +359,7 @@ TEST(FewPackings, AnEffectIsSeen) {
 
 TEST(FewPackings, TwoOrThreePackingsProveNothing) {
   const Packings all = MadeUp(60);
-  std::vector<Index> order(60);
-  std::iota(order.begin(), order.end(), Index{0});
+  std::vector<Index> order = InOrder(all);
   int rejected = 0;
   for (int m = 0; m < 40; ++m) {
     std::rotate(order.begin(), order.begin() + 4, order.end());
