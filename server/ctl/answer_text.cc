@@ -24,7 +24,10 @@ std::string UnitOf(const std::string& observable) {
 // What an rms of residual / sd means.
 std::string Verdict(double rms, const std::optional<double>& p_value) {
   if (p_value && *p_value < 0.01) return "misses by more than the errors explain";
-  if (rms > 1.5) return "misses by more than one expects";
+  if (rms > 1.5) {
+    return p_value && *p_value > 0.05 ? "far off, but no rarer than the scatter allows"
+                                      : "misses by more than one expects";
+  }
   if (rms < 0.3) return "closer than the stated errors: are they too large?";
   return "fits within its errors";
 }

@@ -8,12 +8,11 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/excitation.h"
 #include "server/campaign/noise_check.h"
+#include "server/ctl/diagnosis_support.h"
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/extension.h"
 #include "server/ctl/fitted_campaign.h"
-#include "server/ctl/measurement_errors.h"
 #include "server/ctl/reading_effects.h"
 #include "server/ctl/response.h"
 #include "server/ctl/strengths.h"
@@ -28,33 +27,6 @@ constexpr std::size_t kWarmFits = 4;  // to begin with: two batches each pick th
 // Of measurements that a right model makes one in a thousand is closer.
 constexpr double kTooGood = 0.999;
 constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
-
-constexpr int kMorePackings = 8;  // that a diagnosis is content with
-
-// What a scatter known from few packings does to the verdict; empty where it is known from enough,
-// or where packings were not varied.
-std::string FewPackings(const inference::FittedModel& model) {
-  if (model.packings < 2) return "";
-  if (model.packings < kFewestPackings) {
-    return absl::StrCat("The scatter between packings is known from ", model.packings,
-                        " of them, and any misfit may be more of it: with fewer than ",
-                        kFewestPackings,
-                        " nothing is called missing (`realizations: ", kMorePackings,
-                        "` or more lets smaller effects be seen).");
-  }
-  if (model.without.empty()) {
-    return absl::StrCat(
-        "The experiments have different numbers of packings, so that a misfit must "
-        "be very large to count: give all of them the same `realizations`, ",
-        kMorePackings, " or more.");
-  }
-  if (model.packings < kMorePackings) {
-    return absl::StrCat("The scatter between packings is known from ", model.packings,
-                        " of them, so that a misfit must be large to count: `realizations: ",
-                        kMorePackings, "` or more lets smaller effects be seen.");
-  }
-  return "";
-}
 
 class Inquiry {
  public:
@@ -72,9 +44,9 @@ class Inquiry {
     for (const report::PriorConflict& conflict : report::PriorConflicts(base_.view())) {
       diagnosis_.warnings.push_back(report::InWords(conflict));
     }
-    if (auto possible = CheckPossible(); !possible.ok()) return possible;
+    if (auto possible = CheckDiagnosable(base_); !possible.ok()) return possible;
     const bool elsewhere = base_.view().campaign.precomputed.has_value();
-    WarnOfWeakSupport();
+    for (std::string& doubt : DoubtsOf(base_)) diagnosis_.warnings.push_back(std::move(doubt));
     if (!options_.only_adequacy && !elsewhere) {
       if (auto affordable = CheckBudget(); !affordable.ok()) return affordable;
       auto nuisance = screen_.MeasureNuisance();
@@ -113,61 +85,6 @@ class Inquiry {
   }
 
  private:
-  absl::Status CheckPossible() const {
-    const report::CampaignView& view = base_.view();
-    const std::string& id = base_.id();
-    if (view.posterior.posterior_from().empty()) {
-      return absl::FailedPreconditionError(absl::StrCat(
-          "no iteration of ", id, " is complete, so nothing can be said about its model"));
-    }
-    if (view.campaign.filter.noise != inference::NoiseMode::kGiven) {
-      return absl::FailedPreconditionError(
-          absl::StrCat("campaign ", id,
-                       " states no size of the errors (noise is inferred or "
-                       "tempered), so its model cannot be judged; give the noise"));
-    }
-    const std::size_t readings = base_.readings().of_mean.readings.size();
-    const std::size_t parameters = view.campaign.parameters.size();
-    if (readings <= parameters) {
-      return absl::FailedPreconditionError(
-          absl::StrCat(readings, " readings cannot judge a model with ", parameters,
-                       " calibrated parameters: give longer curves or more tests"));
-    }
-    if (base_.runs().sample.empty()) {
-      return absl::FailedPreconditionError(absl::StrCat("no sample of ", id, " has finished"));
-    }
-    return absl::OkStatus();
-  }
-
-  // What makes any verdict doubtful, whatever it is.
-  void WarnOfWeakSupport() {
-    constexpr std::size_t kPerParameter = 5;
-    const report::CampaignView& view = base_.view();
-    const std::size_t readings = base_.readings().of_mean.readings.size();
-    const std::size_t parameters = view.campaign.parameters.size();
-    if (readings < kPerParameter * (parameters + 1)) {
-      diagnosis_.warnings.push_back(
-          absl::StrCat("Only ", readings, " readings are fitted with ", parameters,
-                       parameters == 1 ? " parameter" : " parameters",
-                       ": little can be seen with so few, neither a missing effect nor "
-                       "that there is none. Give longer curves or more tests."));
-    }
-    const auto& experiments = view.campaign.experiments;
-    const bool one_packing =
-        std::all_of(experiments.begin(), experiments.end(), [](const campaign::Experiment& e) {
-          return e.role != campaign::Role::kCalibrate || e.specimens.size() <= 1;
-        });
-    const bool has_grains =
-        std::none_of(experiments.begin(), experiments.end(), &campaign::MakesItsBodies);
-    if (one_packing && has_grains && !view.campaign.precomputed) {
-      diagnosis_.warnings.emplace_back(
-          "Every fitted test is run on one packing: by how much another one differs is not in the "
-          "errors, "
-          "and may be taken for a missing effect unless the packing is the measured one. "
-          "realizations: 8 or more show it.");
-    }
-  }
-
   absl::Status CheckBudget() const {
     if (!options_.max_evaluations) return absl::OkStatus();
     const std::int64_t screen = screen_.Planned(options_.without);

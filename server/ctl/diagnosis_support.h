@@ -1,0 +1,25 @@
+#pragma once
+// What a diagnosis stands on: whether a campaign can be judged at all, and what makes any verdict
+// doubtful.
+
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "inference/diagnosis/fitted_model.h"
+#include "server/ctl/fitted_campaign.h"
+
+namespace calib::ctl {
+
+/// FAILED_PRECONDITION with a sentence where nothing can be said: no complete iteration, no stated
+/// errors, no more readings than parameters, no finished sample.
+absl::Status CheckDiagnosable(const FittedCampaign& base);
+
+/// Sentences: few readings, one packing only.
+std::vector<std::string> DoubtsOf(const FittedCampaign& base);
+
+/// A sentence on what a scatter known from few packings does to the verdict; empty where it is
+/// known from enough, or where packings were not varied.
+std::string FewPackings(const inference::FittedModel& model);
+
+}  // namespace calib::ctl
