@@ -48,7 +48,7 @@ struct Vessel {
 
 /// 64 diameters wide and filled with 16 000 grains [Hadjidoukas 2014, sec. 5.3], or as slender with
 /// fewer; an outlet of eight diameters.
-Vessel Silo(int grains) {
+Vessel Silo(int grains, int seed) {
   const double d = kDiameter;
   const double width = 64 * d * std::sqrt(grains / 16'000.0);
   const double m = 0.5 * width + d;
@@ -58,7 +58,7 @@ Vessel Silo(int grains) {
       {.low = {d, m, 0},
        .width = width,
        .holds = [&](const Vec3& c, double r) { return std::abs(c.x - m) + r < 0.5 * width; }},
-      1);
+      seed);
   const double top = TopOf(vessel.grains) + d;
   const double depth = 0.5 * width;
   const auto plate = [&](double x1, double z1, double x2, double z2) {
@@ -74,7 +74,7 @@ Vessel Silo(int grains) {
 
 /// A cone of 30 degrees about the vertical below a cylinder, 128 triangles of which grains touch
 /// most.
-Vessel Hopper(int grains) {
+Vessel Hopper(int grains, int seed) {
   const double d = kDiameter;
   const double outlet = 4 * d;
   const double radius = 0.75 * d * std::cbrt(grains);
@@ -92,7 +92,7 @@ Vessel Hopper(int grains) {
                                        outlet + std::min(c.z / cone, 1.0) * (radius - outlet);
                                    return std::hypot(c.x - m, c.y - m) + 1.2 * r < flat * here;
                                  }},
-                            1);
+                            seed);
   AddFrustum({.centre = {m, m, 0},
               .height = cone,
               .lower_radius = outlet,
@@ -171,13 +171,13 @@ Flowing FillAndOpen(Vessel vessel) {
 }
 
 /// Every iteration is one step of the flow.
-void Discharge(benchmark::State& state, Vessel (*make)(int)) {
+void Discharge(benchmark::State& state, Vessel (*make)(int, int)) {
   // The library calls a benchmark several times; filling takes longer than what is timed.
-  static std::map<std::pair<Vessel (*)(int), int>, Flowing> all;
+  static std::map<std::pair<Vessel (*)(int, int), int>, Flowing> all;
   const auto grains = static_cast<int>(state.range(0));
   const auto key = std::pair(make, grains);
   if (!all.contains(key)) {
-    all.emplace(key, FillAndOpen(make(grains)));
+    all.emplace(key, FillAndOpen(make(grains, 1)));
   }
   const Flowing& flowing = all.at(key);
   if (!flowing.failure.empty()) {
@@ -205,8 +205,43 @@ void Discharge(benchmark::State& state, Vessel (*make)(int)) {
   state.counters["steps/s"] = rate(assembly.steps() - steps);
 }
 
+/// What is left of the grains in a vessel until a third is: in $CALIB_BENCH_STATE left.txt, a line
+/// per kEvery with the time [s] and the number of grains above the drain. deploy/bench/peers lets
+/// another code go on from the same state.
+void Emptying(benchmark::State& state, Vessel (*make)(int, int)) {
+  constexpr double kEvery = 2e-3;  // s
+  constexpr double kLongest = 10;  // s
+  const auto grains = static_cast<int>(state.range(0));
+  for (auto once : state) {
+    Flowing flowing = FillAndOpen(make(grains, static_cast<int>(state.range(1))));
+    Flow flow(flowing.assembly, flowing.options, {});
+    flow.SetDrain(kDrain);
+    std::ofstream left;
+    if (const char* folder = std::getenv("CALIB_BENCH_STATE"); folder != nullptr) {
+      left.open(std::string(folder) + "/left.txt");
+    }
+    int still = flowing.assembly.particles().size();
+    const int first = still;
+    StageEnd end = flowing.failure.empty() ? StageEnd::kDone : StageEnd::kDiverged;
+    while (end == StageEnd::kDone && 3 * still > first && flow.time() < kLongest) {
+      left << flow.time() << ' ' << still << '\n';
+      end = flow.Advance(kEvery);
+      still = flowing.assembly.particles().size();
+    }
+    if (end != StageEnd::kDone) {
+      state.SkipWithError((flowing.failure + flow.reason()).c_str());
+      return;
+    }
+    state.counters["seconds"] = flow.time();
+    state.counters["left"] = still;
+  }
+}
+
 BENCHMARK_CAPTURE(Discharge, silo, &Silo)->Arg(500)->Arg(16'000)->Iterations(kSteps);
 BENCHMARK_CAPTURE(Discharge, hopper, &Hopper)->Arg(500)->Arg(10'000)->Iterations(kSteps);
+BENCHMARK_CAPTURE(Emptying, hopper, &Hopper)
+    ->ArgsProduct({{500, 2000}, {1, 2, 3, 4, 5, 6, 7, 8}})
+    ->Iterations(1);
 
 }  // namespace
 }  // namespace calib::dem

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times YADE, LAMMPS, LIGGGHTS and this engine on the same packings: see deploy/bench/peers.
 
-usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|flow|together|evaluation|curves]
+usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|flow|together|emptying|evaluation|curves]
            [--cases base,rolling,linear] [--tests '0.2 MPa,oedometric'] [--keep FOLDER] [--quick]
 Every round runs all codes once, one after the other, so that what disturbs the machine disturbs all of them; the tables
 hold medians over the rounds. One thread is timed by processor time, so that other work on the machine takes nothing
@@ -26,6 +26,11 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 DATA = os.path.join(os.environ["CALIB_DATA"], "toyoura_triaxial")
 SKIN = {1000: 2e-4, 5000: 1e-4, 10000: 8e-5}  # m, near the fastest of LAMMPS and LIGGGHTS
 STEP = {1000: 4e-5, 5000: 1.5e-5, 10000: 1e-5}  # s, of LAMMPS and LIGGGHTS
+# Vessels that empty, as in tests/bench/flow_bench.cc. LIGGGHTS' dashpot is sqrt(5/6) b times ours at a restitution of
+# exp(-pi b/sqrt(1 - b^2)); ours has a damping ratio of 0.2.
+DRAIN = -0.02  # m
+DASHPOT = 0.2 / math.sqrt(5 / 6)
+RESTITUTION = math.exp(-math.pi * DASHPOT / math.sqrt(1 - DASHPOT ** 2))
 
 # One drained triaxial evaluation: 50 stages to 20 %, packing and stages in files beside it.
 TRIAXIAL = """name: complete evaluation
@@ -144,8 +149,9 @@ class Work:
         found = json.loads(text[text.index("{"):])["benchmarks"][0]
         return found["cpu_time"] / 1e6, found["contact_updates/s"] * found["cpu_time"] / 1e9
 
-    def liggghts_flow(self, skin):
-        """Processor time of a step [ms] and its contacts, from the state that our_flow() left."""
+    def liggghts(self, skin, steps, before=0, every=100000):
+        """Lets LIGGGHTS go on from the state that ours left. Processor time of one of the last steps [ms], the time step [s], and what it printed:
+        step, grains, twice the contacts between grains, grains above the drain."""
         with open(self.path("flow.txt")) as file:
             step, *box = (float(word) for word in file.readline().split())
             grains = [line.split() for line in file]
@@ -158,13 +164,30 @@ class Work:
             print("\nVelocities\n", file=file)
             for number, words in enumerate(grains, 1):
                 print(number, *words[4:], 0, 0, 0, file=file)
+        given = {"data": self.path("flow.data"), "vessel": self.path("vessel.stl"), "skin": skin, "dt": step, "restitution": RESTITUTION,
+                 "every": every, "drain": DRAIN, "before": before, "steps": steps}
         (wall, cpu), _, text = run(
-            ["liggghts", "-in", os.path.join(HERE, "flow.liggghts"), "-log", "none", "-var", "data", self.path("flow.data"), "-var",
-             "vessel", self.path("vessel.stl"), "-var", "skin", str(skin), "-var", "dt", str(step), "-var", "steps", "1000"],
+            ["liggghts", "-in", os.path.join(HERE, "flow.liggghts"), "-log", "none", *(a for k, v in given.items() for a in ("-var", k, str(v)))],
             {"OMP_NUM_THREADS": "1"})
         loop = [float(word) for word in re.findall(r"^Loop time of ([\d.eE+-]+)", text, re.M)][-1]
-        rows = [line.split() for line in text.splitlines() if re.fullmatch(r"\s*\d+(\s+[\d.eE+-]+){2}\s*", line)][-2:]
-        return loop * min(cpu / wall, 1.0), 0.5 * statistics.mean(float(row[2]) for row in rows)
+        rows = [[float(word) for word in line.split()] for line in text.splitlines() if re.fullmatch(r"\s*\d+(\s+[\d.eE+-]+){3}\s*", line)]
+        return loop * min(cpu / wall, 1.0) * 1e3 / steps, step, rows
+
+    def liggghts_flow(self, skin):
+        """Processor time of a step [ms], and its contacts, from the state that our_flow() left."""
+        time, _, rows = self.liggghts(skin, 1000, before=300)
+        return time, 0.5 * statistics.mean(row[2] for row in rows[-2:])
+
+    def emptying(self, grains, seed):
+        """[(time [s], grains left)] of ours and of LIGGGHTS from the same state, a vessel that empties."""
+        run([os.path.join(self.binaries, "dem_bench"), f"--benchmark_filter=Emptying/hopper/{grains}/{seed}/"], {"CALIB_BENCH_STATE": self.folder})
+        with open(self.path("left.txt")) as file:
+            ours = [tuple(float(word) for word in line.split()) for line in file]
+        with open(self.path("flow.txt")) as file:
+            step = float(file.readline().split()[0])
+        every = max(1, round((ours[1][0] - ours[0][0]) / step))
+        _, step, rows = self.liggghts(6e-4, every * (len(ours) + len(ours) // 5), every=every)
+        return ours, [(row[0] * step, row[3]) for row in rows]
 
     def ours_at_once(self, grains, runs):
         """Million contact updates per second and core of that many runs at once, by the processor time of each."""
@@ -275,6 +298,33 @@ def flow(work, repeats):
         print(f"| {what} | {times} | {statistics.median(p[0] / o[0] for p, o in pairs):.2f} | {pairs[0][0][1]:.0f} | {pairs[0][1][1]:.0f} |")
 
 
+def flow_rate(curve):
+    """Grains per second while between a fifth and three fifths of them have left: least squares."""
+    first = curve[0][1]
+    steady = [(time, left) for time, left in curve if 0.4 * first <= left <= 0.8 * first]
+    times, lefts = zip(*steady)
+    mean = statistics.mean(times)
+    return -sum((t - mean) * left for t, left in steady) / sum((t - mean) ** 2 for t in times)
+
+
+def emptying(work, repeats):
+    grains = 500 if work.quick else 2000
+    pairs = []
+    for seed in range(1, min(repeats, 8) + 1):
+        ours, theirs = (flow_rate(curve) for curve in work.emptying(grains, seed))
+        pairs.append((ours, theirs))
+        print(f"emptying {seed}: LIGGGHTS {theirs:.0f} grains/s, calib {ours:.0f}", file=sys.stderr, flush=True)
+    print(f"\nA hopper of triangles (30 degrees, outlet of 8 diameters) with {grains} grains that empties, Hertz-Mindlin with a dashpot, from the same "
+          "state; grains per second while a fifth to three fifths have left:\n")
+    print("| filling | LIGGGHTS | calib | ratio |")
+    print("|---|---|---|---|")
+    for seed, (ours, theirs) in enumerate(pairs, 1):
+        print(f"| {seed} | {theirs:.0f} | {ours:.0f} | {ours / theirs:.3f} |")
+    if len(pairs) > 1:
+        ratios = [ours / theirs for ours, theirs in pairs]
+        print(f"\nmean ratio {statistics.mean(ratios):.4f} +- {statistics.stdev(ratios) / math.sqrt(len(ratios)):.4f}")
+
+
 def agreement(rows, column):
     """difference of the two mean curves: rms over the largest value, share of states within two standard errors"""
     ours, theirs = (list(zip(*(v[column] for v in rows[code]))) for code in ("calib", "YADE"))
@@ -315,7 +365,7 @@ def main():
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--grains", default="1000,5000,10000")
     parser.add_argument("--threads", default="1,2")
-    parser.add_argument("--only", choices=("speed", "together", "flow", "evaluation", "curves"), help="one of the parts")
+    parser.add_argument("--only", choices=("speed", "together", "flow", "emptying", "evaluation", "curves"), help="one of the parts")
     parser.add_argument("--cases", default=",".join(curves.CASES), help="of the part curves")
     parser.add_argument("--tests", default=",".join(curves.TESTS), help="of the part curves")
     parser.add_argument("--keep", help="folder for the curves of the part curves, so that it may be stopped and run again")
@@ -339,6 +389,7 @@ def main():
         parts = {"speed": lambda: speed(work, grains, [int(word) for word in arguments.threads.split(",")], repeats),
                  "together": lambda: together(work, grains, repeats),
                  "flow": lambda: flow(work, repeats),
+                 "emptying": lambda: emptying(work, repeats),
                  "evaluation": lambda: evaluation(work, repeats),
                  "curves": lambda: curves.curves(work, run, os.environ["CALIB_DATA"], cases, tests, repeats, arguments.keep or folder)}
         for name, part in parts.items():
