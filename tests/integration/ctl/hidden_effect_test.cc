@@ -126,6 +126,7 @@ TEST_F(HiddenEffect, IsNotFoundWhereNothingIsHidden) {
   const Answer diagnosis = Call("diagnose c1 --state s --workers 2 --json");
   ASSERT_EQ(diagnosis.code, 0) << diagnosis.err;
   EXPECT_EQ(diagnosis.json()["verdict"], "adequate") << diagnosis.out;
+  EXPECT_EQ(diagnosis.json()["adequacy"]["packings"], 8);
   EXPECT_FALSE(diagnosis.json()["detectable"].empty()) << "it says what could have been seen";
 }
 
