@@ -34,6 +34,8 @@ inline double Power(double x, double y) {
   for (int n = 14; n >= 1; --n) {
     e = 1.0 + e * f / n;
   }
+  // An int, which vectors convert: 23 .. 2023 after the shift.
+  // NOLINTNEXTLINE(bugprone-misplaced-widening-cast)
   const auto whole = static_cast<std::uint64_t>(static_cast<int>(shifted - kRound) + 1023);
   return e * std::bit_cast<double>(whole << 52U);
 }

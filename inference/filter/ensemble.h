@@ -32,8 +32,8 @@ struct Ensemble {
   /// Samples outside the prior's support of iterations without log_proposal, which count as draws
   /// from the prior: a table made for a wider one.
   Eigen::Index strangers = 0;
-  std::optional<double> sigma;     ///< kEssTarget
-  Tempering tempering;             ///< kEssTarget: how sigma was found (exponent = 1 / sigma)
+  std::optional<double> sigma;  ///< kEssTarget
+  Tempering tempering;          ///< kEssTarget: how sigma was found (exponent = 1 / sigma)
 };
 
 /// Validates everything and evaluates. Errors as documented on ComputePosterior.

@@ -212,7 +212,7 @@ void Emptying(benchmark::State& state, Vessel (*make)(int, int)) {
   constexpr double kEvery = 2e-3;  // s
   constexpr double kLongest = 10;  // s
   const auto grains = static_cast<int>(state.range(0));
-  for (auto once : state) {
+  while (state.KeepRunning()) {
     Flowing flowing = FillAndOpen(make(grains, static_cast<int>(state.range(1))));
     Flow flow(flowing.assembly, flowing.options, {});
     flow.SetDrain(kDrain);

@@ -28,8 +28,8 @@ Prior StrengthOf(const campaign::Campaign& campaign) { return campaign.parameter
 TEST(StrengthScale, WidensTheDistanceFromTheNullAndNothingElse) {
   const auto base = With("hertz_mindlin", "contact_plasticity", "stiffness_ratio",
                          {.kind = PriorKind::kUniform, .min = 1, .max = 5});
-  const auto* ratio = dem::FindParameter("hertz_mindlin", base.model.effects,
-                                         "contact_plasticity.stiffness_ratio");
+  const auto* ratio =
+      dem::FindParameter("hertz_mindlin", base.model.effects, "contact_plasticity.stiffness_ratio");
   ASSERT_NE(ratio, nullptr);
   ASSERT_EQ(ratio->null_value, 1);
   const auto wide = WithStrengthScaled(base, "contact_plasticity", 2);
@@ -64,7 +64,8 @@ TEST(StrengthScale, NormalPriorsKeepTheirShape) {
   const auto base = With("hertz_mindlin", "load_cell_error", "gain",
                          {.kind = PriorKind::kNormal, .mean = 0.02, .sd = 0.01});
   const auto scaled = WithStrengthScaled(base, "load_cell_error", 4);
-  const auto* info = dem::FindParameter("hertz_mindlin", base.model.effects, "load_cell_error.gain");
+  const auto* info =
+      dem::FindParameter("hertz_mindlin", base.model.effects, "load_cell_error.gain");
   ASSERT_NE(info, nullptr);
   const double null = info->null_value.value_or(std::nan(""));
   EXPECT_DOUBLE_EQ(StrengthOf(scaled).mean, null + 4 * (0.02 - null));

@@ -168,8 +168,8 @@ TEST(ModelProbabilities, ExactEvidenceGivesTheRatioOfEvidences) {
 }
 
 TEST(ModelProbabilities, ErrorsOfTheEvidenceWidenTheProbabilities) {
-  const std::vector<EvidenceEstimate> evidence = {
-      {.log_evidence = 0, .standard_error = 0.6}, {.log_evidence = 1, .standard_error = 0.8}};
+  const std::vector<EvidenceEstimate> evidence = {{.log_evidence = 0, .standard_error = 0.6},
+                                                  {.log_evidence = 1, .standard_error = 0.8}};
   const auto models = ModelProbabilities(evidence);
   EXPECT_NEAR(models[0].probability + models[1].probability, 1, 1e-12);
   EXPECT_NEAR(models[0].log_bayes_factor_se, 1, 1e-12);

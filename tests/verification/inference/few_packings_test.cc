@@ -145,6 +145,7 @@ Eigen::MatrixXd ClosedForm(const Packings& all, const Eigen::MatrixXd& runs, dou
   for (const int one : std::set<int>(all.observable.begin(), all.observable.end())) {
     const std::vector<Index> own = ReadingsOf(all, one);
     std::vector<int> stage;
+    stage.reserve(own.size());
     for (const Index k : own) stage.push_back(all.stage[static_cast<std::size_t>(k)]);
     form(own, own) =
         (1 + 1 / count) * ScatterCovariance(FitScatter(MomentsOfReplicates(runs(Eigen::all, own)),
