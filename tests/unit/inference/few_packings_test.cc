@@ -7,6 +7,7 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -42,8 +43,8 @@ Eigen::VectorXd Squares(const std::vector<double>& factors, int each, int dimens
 }
 
 std::vector<int> GroupNumbers(int count, int each) {
-  std::vector<int> group;
-  for (int i = 0; i < count * each; ++i) group.push_back(i / each);
+  std::vector<int> group(static_cast<std::size_t>(count * each));
+  for (std::size_t i = 0; i < group.size(); ++i) group[i] = static_cast<int>(i) / each;
   return group;
 }
 
