@@ -23,9 +23,13 @@ constexpr int kDecadesAbove = 9;
 double GammaTail(double mean, double variance, double square) {
   const double shape = mean * mean / variance;
   const double ratio = square / mean;
-  // Chernoff's bound of either tail, before the function leaves the range of a double.
-  constexpr double kNothing = 600;
-  if (!(shape * (ratio - 1 - std::log(ratio)) < kNothing)) return ratio > 1 ? 0 : 1;
+  // Chernoff's bound of either tail, before the function leaves the range of a double; and a law so
+  // narrow that its series does not end.
+  constexpr double kNothing = 740;
+  constexpr double kNarrow = 1e9;
+  if (shape > kNarrow || !(shape * (ratio - 1 - std::log(ratio)) < kNothing)) {
+    return ratio > 1 ? 0 : 1;
+  }
   return boost::math::gamma_q(shape, shape * ratio);
 }
 

@@ -104,8 +104,8 @@ class Inquiry {
     diagnosis_.adequacy = *adequacy;
     diagnosis_.emulator_error = response_.emulator_error;
     diagnosis_.scatter = response_.scatter;
-    diagnosis_.packings = response_.model.packings;
-    const std::string few = FewPackings(response_.model);
+    diagnosis_.packings = static_cast<int>(base_.readings().departures.rows());
+    const std::string few = FewPackings(response_.model, diagnosis_.packings);
     if (!few.empty()) diagnosis_.warnings.push_back(few);
     if (adequacy->p_chi2 > kTooGood) {
       diagnosis_.warnings.emplace_back(

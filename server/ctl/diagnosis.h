@@ -61,7 +61,7 @@ struct Diagnosis {
   /// it was not fitted to, in sd of a measurement; none where there is nothing to leave out.
   std::optional<double> left_out_error{};
   double emulator_error = 0, scatter = 0;
-  int packings = 0;  ///< that the scatter is known from; 0: of one, from single runs
+  int packings = 0;  ///< that the best estimate was run on; 0: scatter is that of single runs
   std::int64_t screen_evaluations = 0, warm_evaluations = 0;
   std::optional<NextExperiment> next_experiment;
   bool only_adequacy = false;  ///< no effect was tried

@@ -67,23 +67,23 @@ std::vector<std::string> DoubtsOf(const FittedCampaign& base) {
   return doubts;
 }
 
-std::string FewPackings(const inference::FittedModel& model) {
-  if (model.packings < 2) return "";
-  if (model.packings < kFewestPackings) {
-    return absl::StrCat("The scatter between packings is known from ", model.packings,
+std::string FewPackings(const inference::FittedModel& model, int measured) {
+  if (measured < 2) return "";
+  if (measured < kFewestPackings) {
+    return absl::StrCat("The scatter between packings is known from ", measured,
                         " of them, and any misfit may be more of it: with fewer than ",
                         kFewestPackings,
                         " nothing is called missing (`realizations: ", kMorePackings,
                         "` or more lets smaller effects be seen).");
   }
   if (model.without.empty()) {
-    return absl::StrCat(
-        "The experiments have different numbers of packings, so that a misfit must "
-        "be very large to count: give all of them the same `realizations`, ",
-        kMorePackings, " or more.");
+    return absl::StrCat("Of the packings of all experiments together fewer than ", kFewestPackings,
+                        " can be told apart, so that a misfit must be very large to count: give "
+                        "every experiment the same `realizations`, ",
+                        kMorePackings, " or more.");
   }
-  if (model.packings < kMorePackings) {
-    return absl::StrCat("The scatter between packings is known from ", model.packings,
+  if (measured < kMorePackings) {
+    return absl::StrCat("The scatter between packings is known from ", measured,
                         " of them, so that a misfit must be large to count: `realizations: ",
                         kMorePackings, "` or more lets smaller effects be seen.");
   }

@@ -19,7 +19,8 @@ absl::Status CheckDiagnosable(const FittedCampaign& base);
 std::vector<std::string> DoubtsOf(const FittedCampaign& base);
 
 /// A sentence on what a scatter known from few packings does to the verdict; empty where it is
-/// known from enough, or where packings were not varied.
-std::string FewPackings(const inference::FittedModel& model);
+/// known from enough, or where packings were not varied. measured: packings that the best estimate
+/// was run on.
+std::string FewPackings(const inference::FittedModel& model, int measured);
 
 }  // namespace calib::ctl

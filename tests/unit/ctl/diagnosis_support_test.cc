@@ -8,21 +8,20 @@ namespace {
 
 using ::testing::HasSubstr;
 
-inference::FittedModel Known(int packings, int left_out) {
+inference::FittedModel LeftOut(int packings) {
   inference::FittedModel model;
-  model.packings = packings;
-  for (int i = 0; i < left_out; ++i) model.without.emplace_back(1, 1);
+  for (int i = 0; i < packings; ++i) model.without.emplace_back(1, 1);
   return model;
 }
 
 TEST(FewPackings, AreSaidWithWhatTheyCost) {
-  EXPECT_EQ(FewPackings(Known(0, 0)), "") << "packings were not varied";
-  EXPECT_THAT(FewPackings(Known(3, 0)),
+  EXPECT_EQ(FewPackings(LeftOut(0), 0), "") << "packings were not varied";
+  EXPECT_THAT(FewPackings(LeftOut(0), 3),
               HasSubstr("with fewer than 4 nothing is called missing (`realizations: 8`"));
-  EXPECT_THAT(FewPackings(Known(4, 4)),
-              HasSubstr("known from 4 of them, so that a misfit must be"));
-  EXPECT_THAT(FewPackings(Known(6, 0)), HasSubstr("different numbers of packings"));
-  EXPECT_EQ(FewPackings(Known(8, 8)), "");
+  EXPECT_THAT(FewPackings(LeftOut(4), 4),
+              HasSubstr("known from 4 of them, so that a misfit must be large"));
+  EXPECT_THAT(FewPackings(LeftOut(0), 6), HasSubstr("fewer than 4 can be told apart"));
+  EXPECT_EQ(FewPackings(LeftOut(7), 8), "") << "one has no run near the best point";
 }
 
 }  // namespace
