@@ -7,6 +7,7 @@
 
 #include "dem/catalog/catalog.h"
 #include "server/ctl/diagnosis.h"
+#include "server/ctl/measurement_errors.h"
 #include "server/ctl/text_table.h"
 #include "server/report/people_units.h"
 #include "server/report/stored_diagnosis.h"
@@ -173,6 +174,12 @@ std::string ByReason(const std::string& begin,
 }
 
 std::string Sentence(const Diagnosis& d) {
+  if (d.verdict == "adequate" && d.packings > 1 && d.packings < kFewestPackings) {
+    return fmt::format(
+        "Adequate, as far as {} packings tell, which is next to nothing: what is left may be "
+        "scatter.",
+        d.packings);
+  }
   if (d.verdict == "adequate") {
     return "Adequate: noise, scatter and the emulator's error explain what is left.";
   }

@@ -23,6 +23,15 @@ TEST(DiagnosisText, AGroupComesWithTheAnglesBetweenItsEffects) {
   EXPECT_THAT(text, Not(HasSubstr("61")));
 }
 
+TEST(DiagnosisText, ThreePackingsMakeNoModelAdequate) {
+  ctl::Diagnosis diagnosis;
+  diagnosis.verdict = "adequate";
+  diagnosis.packings = 3;
+  EXPECT_THAT(DiagnosisText(diagnosis), HasSubstr("as far as 3 packings tell"));
+  diagnosis.packings = 4;
+  EXPECT_THAT(DiagnosisText(diagnosis), Not(HasSubstr("packings tell")));
+}
+
 TEST(DiagnosisText, ARefitThatIsFurtherOffThanItsOwnBaseModelHasFoundNothing) {
   ctl::Diagnosis diagnosis;
   diagnosis.verdict = "unexplained";
