@@ -15,7 +15,7 @@ namespace {
 using Eigen::Index;
 
 // Nodes of the integral over Student's law: ten per decade of either tail, of the upper one down to
-// 1e-9, beyond which no p value means anything. Right to a tenth there, to a hundredth at 0.01.
+// 1e-9, beyond which no p value means anything (DrawnTail.OfGroupsFarApartIsStudents).
 constexpr int kPerDecade = 10;
 constexpr int kDecadesBelow = 2;
 constexpr int kDecadesAbove = 9;
