@@ -76,9 +76,12 @@ def main():
     parser.add_argument('--measurements', type=int, default=300)
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--keep', type=pathlib.Path, default=pathlib.Path(tempfile.gettempdir(), 'calib-few-packings'))
+    parser.add_argument('--check', action='store_true', help='options only: nothing is run')
     options = parser.parse_args()
     if options.packings < 20:
         parser.error('--packings: at least 20, so that sixteen and a measurement can be drawn from them')
+    if options.check:
+        return 0
     options.keep.mkdir(parents=True, exist_ok=True)
     seeds = range(1001, 1001 + options.packings)
     few = seeds[:FEW]

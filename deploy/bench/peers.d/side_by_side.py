@@ -370,6 +370,7 @@ def main():
     parser.add_argument("--tests", default=",".join(curves.TESTS), help="of the part curves")
     parser.add_argument("--keep", help="folder for the curves of the part curves, so that it may be stopped and run again")
     parser.add_argument("--quick", action="store_true", help="few steps, one repeat: shows that all programs run")
+    parser.add_argument("--check", action="store_true", help="options only: nothing is run")
     arguments = parser.parse_args()
     repeats = 1 if arguments.quick else arguments.repeats
     grains = [int(word) for word in arguments.grains.split(",")]
@@ -380,6 +381,8 @@ def main():
     for given, known in ((cases, curves.CASES), (tests, curves.TESTS)):
         if not set(given) <= set(known):
             parser.error(f"{sorted(set(given) - set(known))}: there are {sorted(known)}")
+    if arguments.check:
+        return
     if arguments.quick:
         cases, tests = cases[:1], tests[:1]
     if arguments.keep:
