@@ -48,7 +48,7 @@ experiments:
     packing: {{file: {packing}}}
     data: {{file: {data}, strain: logarithmic}}
     control: axial_strain
-    staging: {{rate: 0.1 1/s, step: 0.002, damping: [0.2, 0.9], unbalanced: 5e-4}}
+    staging: {{rate: {rate} 1/s, step: 0.002, damping: [0.2, 0.9], unbalanced: 5e-4}}
     observables: {{axial_stress: {{noise: {{absolute: 1 MPa}}}}}}
 """
 
@@ -92,7 +92,8 @@ def our_curve(work, run, job, model, test):
         for strain in job["strains"]:
             print(repr(strain), job["pressure"], sep=",", file=file)
     with open(campaign, "w") as file:
-        file.write(CAMPAIGN.format(model=model, test=test, pressure=job["pressure"], packing=job["packing"], data=data))
+        file.write(CAMPAIGN.format(model=model, test=test, pressure=job["pressure"], packing=job["packing"], data=data,
+                                   rate=job["rate"]))
     run([os.path.join(work.binaries, "calibctl"), "simulate", campaign, "--set", f"friction_coefficient={job['friction']}", "-o", out],
         {"OMP_NUM_THREADS": "1"})
     with open(out) as file:
@@ -129,7 +130,7 @@ def kept(path, compute):
         return json.load(file)
 
 
-def curves(work, run, data, names, tests, repeats, folder):
+def curves(work, run, data, names, tests, repeats, folder, rate):
     """Prints the table, a line as soon as its case is done. Curves are kept in the folder, which must be for these programs only."""
     print(f"\nMean curves of {repeats} repeats, YADE and calib from the same packings: rms difference (two standard deviations of it), "
           "stresses over the largest value; tolerance: the larger of the two standard deviations and the floor.\n")
@@ -140,12 +141,12 @@ def curves(work, run, data, names, tests, repeats, folder):
         told, model = CASES[name]
         for test in tests:
             kind, pressure, file, relative, strain = TESTS[test]
-            job = {**told, "drained": kind == "triaxial_drained", "pressure": pressure, "packing": work.path("curve_packing.txt"),
+            job = {**told, "drained": kind == "triaxial_drained", "pressure": pressure, "rate": rate, "packing": work.path("curve_packing.txt"),
                    "strains": strains_of(data, name, file, work.quick)}
             ours, theirs = [], []
             for repeat in range(repeats):
                 moved_packing(work.packing(1000), job["packing"], repeat)
-                stem = os.path.join(folder, f"{name}_{test}_{repeat}_".replace(" ", ""))
+                stem = os.path.join(folder, f"{name}_{test}_{rate:g}_{repeat}_".replace(" ", ""))
                 ours.append(kept(stem + "calib.json", lambda: our_curve(work, run, job, model, kind)))
                 theirs.append(kept(stem + "yade.json", lambda: yade_curve(work, run, job)))
                 print(f"curves: {name}, {test}, repeat {repeat + 1}", file=sys.stderr, flush=True)

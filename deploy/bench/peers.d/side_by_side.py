@@ -2,7 +2,7 @@
 """Times YADE, LAMMPS, LIGGGHTS and this engine on the same packings: see deploy/bench/peers.
 
 usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|flow|together|emptying|evaluation|curves]
-           [--cases base,rolling,linear] [--tests '0.2 MPa,oedometric'] [--keep FOLDER] [--quick]
+           [--cases base,rolling,linear] [--tests '0.2 MPa,oedometric'] [--rate 0.1] [--keep FOLDER] [--quick]
 Every round runs all codes once, one after the other, so that what disturbs the machine disturbs all of them; the tables
 hold medians over the rounds. One thread is timed by processor time, so that other work on the machine takes nothing
 from anybody; two threads by wall time, which wants an idle machine. Prints Markdown.
@@ -368,6 +368,7 @@ def main():
     parser.add_argument("--only", choices=("speed", "together", "flow", "emptying", "evaluation", "curves"), help="one of the parts")
     parser.add_argument("--cases", default=",".join(curves.CASES), help="of the part curves")
     parser.add_argument("--tests", default=",".join(curves.TESTS), help="of the part curves")
+    parser.add_argument("--rate", type=float, default=0.1, help="of strain in the part curves [1/s]; the stored curves have 0.1")
     parser.add_argument("--keep", help="folder for the curves of the part curves, so that it may be stopped and run again")
     parser.add_argument("--quick", action="store_true", help="few steps, one repeat: shows that all programs run")
     parser.add_argument("--check", action="store_true", help="options only: nothing is run")
@@ -381,6 +382,8 @@ def main():
     for given, known in ((cases, curves.CASES), (tests, curves.TESTS)):
         if not set(given) <= set(known):
             parser.error(f"{sorted(set(given) - set(known))}: there are {sorted(known)}")
+    if not arguments.rate > 0:
+        parser.error("--rate: must be above 0")
     if arguments.check:
         return
     if arguments.quick:
@@ -394,7 +397,8 @@ def main():
                  "flow": lambda: flow(work, repeats),
                  "emptying": lambda: emptying(work, repeats),
                  "evaluation": lambda: evaluation(work, repeats),
-                 "curves": lambda: curves.curves(work, run, os.environ["CALIB_DATA"], cases, tests, repeats, arguments.keep or folder)}
+                 "curves": lambda: curves.curves(work, run, os.environ["CALIB_DATA"], cases, tests, repeats, arguments.keep or folder,
+                                             arguments.rate)}
         for name, part in parts.items():
             if arguments.only == name or (arguments.only is None and name != "curves"):  # those take an hour
                 part()

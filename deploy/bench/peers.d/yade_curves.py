@@ -2,7 +2,7 @@
 # One drained triaxial or oedometric test in a periodic cell. JOB holds: law (mindlin | linear), young [Pa], poisson (ks/kn for
 # linear), friction (coefficient), rolling (absent, or [stiffness in N m/rad, limit in mean radii]), packing (file), drained
 # (lateral stresses held; else lateral strains), pressure [Pa], strains (axial, logarithmic, from the end of consolidation), out.
-# Staging: 0.1/s in stages of at most 0.002 with damping 0.2, each settled with damping 0.9 until the unbalanced force is below
+# Staging: `rate` [1/s] in stages of at most 0.002 with damping 0.2, each settled with damping 0.9 until the unbalanced force is below
 # 5e-4 and held stresses within 1e-3. Writes to out, a line per strain: axial strain, volumetric strain (both logarithmic,
 # compression positive), axial stress, lateral stress [Pa].
 import json
@@ -46,7 +46,7 @@ O.wait()
 zero = [servo.strain[k] for k in range(3)]
 drained = job["drained"]
 servo.stressMask = 3 if drained else 0
-servo.maxStrainRate = (1, 1, 0.1)
+servo.maxStrainRate = (1, 1, job["rate"])
 servo.doneHook = ''  # which would end each run at its first step, since the strain asked for is held while grains settle
 sides = (-pressure, -pressure) if drained else (zero[0], zero[1])
 

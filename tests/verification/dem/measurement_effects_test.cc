@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 
 #include "dem/catalog/catalog.h"
+#include "dem/particles/packing.h"
 #include "dem/simulation/element_test_run.h"
 #include "tests/support/dem/scenarios.h"
 
@@ -190,18 +192,27 @@ double FabricAnisotropy(const Scenario& scenario) {
   return fabric;
 }
 
+// Packings of 800 grains differ: axial less lateral is 0.047 on average with a standard deviation of
+// 0.017 (sixteen, by hand), so three are taken.
 TEST(InitialFabric, ContactsRememberTheDirectionOfConsolidation) {
   Scenario s = test::SmallTriaxial(test::HertzModel());
-  s.packing = test::SmallPacking(800);
   s.path = {{.target = 0, .load_step = 0}};
-  const double own = FabricAnisotropy(s);
-  const double axial = FabricAnisotropy(With(s, "initial_fabric", {{"stress_anisotropy", 0.5}}));
-  const double lateral = FabricAnisotropy(With(s, "initial_fabric", {{"stress_anisotropy", -0.5}}));
+  double own = 0;
+  double axial = 0;
+  double lateral = 0;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const auto packing = GeneratePacking(
+        {.particles = 800, .porosity = 0.42, .mean_radius = 1e-3, .seed = seed}, 1, {});
+    ASSERT_TRUE(packing.ok()) << packing.status();
+    s.packing = *packing;
+    own += FabricAnisotropy(s) / 3;
+    axial += FabricAnisotropy(With(s, "initial_fabric", {{"stress_anisotropy", 0.5}})) / 3;
+    lateral += FabricAnisotropy(With(s, "initial_fabric", {{"stress_anisotropy", -0.5}})) / 3;
+  }
   std::printf("fabric anisotropy %.4f own, %.4f axial, %.4f lateral\n", own, axial, lateral);
-  // One packing of some 1600 contacts: each figure has a standard error of about 0.008.
   EXPECT_GT(axial, own);
   EXPECT_LT(lateral, own);
-  EXPECT_GT(axial - lateral, 0.03);
+  EXPECT_GT(axial - lateral, 0.02);
 }
 
 }  // namespace
