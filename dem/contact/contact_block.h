@@ -62,6 +62,8 @@ struct alignas(64) ContactBlock {
   // Response, filled by the kernels in the order of ContactStage.
   Lane normal_force;          ///< repulsion positive [N]
   Lane normal_stiffness;      ///< tangent dFn/du [N/m]
+  Lane may_stiffen = {};      ///< what it may grow by from one step to the next, as where contacts
+                              ///< unload stiffer than they load, for the time step [N/m] >= 0
   Lane tangential_stiffness;  ///< ks [N/m]
   Lane attraction;            ///< part of the normal force that pulls, which friction does not feel
                               ///< missing: its limit is tan(phi_mu) (normal_force + attraction) [N]

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "dem/dynamics/leapfrog.h"
 #include "dem/dynamics/pair_blocks.h"
 #include "dem/dynamics/rigid_clumps.h"
+#include "dem/dynamics/stable_step.h"
 #include "dem/dynamics/stiffness_blocks.h"
 #include "dem/dynamics/wall_contacts.h"
 #include "dem/geometry/periodic_cell.h"
@@ -24,8 +26,9 @@ namespace calib::dem {
 
 /// Stiffness seen by the slowest-allowed time step and by the servo.
 struct StiffnessEstimate {
+  FastestRates fastest;  ///< of all bodies together; zero without contacts
   double critical_step =
-      0;  ///< min over grains of sqrt(m/K), translation and rotation [s]; 0: no contact
+      0;  ///< min over grains and axes of sqrt(m/K), translation and rotation [s]; 0: no contact
   double elastic_step = 0;    ///< the same without dashpots [s]
   double step_by_forces = 0;  ///< the same without moment stiffness either [s]
   bool by_twisting = false;   ///< of the moment stiffnesses twisting is larger than rolling
@@ -108,6 +111,9 @@ class Assembly {
   /// bounds the step where contacts are few or about to form.
   [[nodiscard]] double NominalCriticalStep() const { return nominal_critical_step_; }
 
+  /// The fastest rates of those two grains.
+  [[nodiscard]] const FastestRates& NominalRates() const { return nominal_rates_; }
+
   /// The same at any overlap, in radii > 0.
   [[nodiscard]] double CriticalStepAt(double overlap) const;
 
@@ -189,8 +195,8 @@ class Assembly {
     archive(searched_[0], searched_[1], searched_[2], searched_length_, searched_tilt_, moved_,
             skin_, largest_radius_, touching_, history_, places_, forces_, shift_, sums_, stress_,
             shear_stress_, contacts_);
-    archive(clumps_, bodies_, solid_volume_, mean_diameter_, nominal_critical_step_, steps_,
-            contact_updates_);
+    archive(clumps_, bodies_, solid_volume_, mean_diameter_, nominal_critical_step_,
+            nominal_rates_.spring, nominal_rates_.dashpot, steps_, contact_updates_);
     if (model_.materials() != nullptr) {
       archive(p.material);
     }
@@ -237,9 +243,14 @@ class Assembly {
   [[nodiscard]] double ShearSinceSearch() const;
   void TakeBranchesBetweenBodies();
   [[nodiscard]] ChunkStiffness StiffnessOfChunk(int chunk) const;
+  [[nodiscard]] double FastestOf(const std::vector<OwnStiffness>& own) const;
+  void JudgeSmallestGrains();
   [[nodiscard]] absl::Status FormulasFinite() const;
   /// NominalCriticalStep() if contacts had no moment stiffness [s].
   [[nodiscard]] double NominalStepByForces() const;
+  /// Calls with the smallest grain of each material and each pair of it with another (0 where there is
+  /// one only).
+  void VisitSmallestGrains(const std::function<void(std::size_t grain, int pair)>& visit) const;
   /// Of the smallest grain, of each material where there are several; overlap: in radii.
   [[nodiscard]] double LeastNominalStep(double overlap, bool with_moments) const;
 
@@ -300,6 +311,7 @@ class Assembly {
   double solid_volume_ = 0;
   double mean_diameter_ = 0;
   double nominal_critical_step_ = 0;
+  FastestRates nominal_rates_;
   std::int64_t steps_ = 0;
   std::int64_t contact_updates_ = 0;
 };

@@ -19,16 +19,74 @@ double DampedRate(double w, double damping) {
   return damping > 0 ? damping + std::sqrt(damping * damping + w * w) : w;
 }
 
-/// Translation and rotation of a chunk's places to those of its grains.
-void AddRows(std::span<const int> grains, const std::vector<GrainLoad>& rows,
-             std::vector<std::array<double, 6>>& to) {
+/// A chunk's places to their grains.
+void AddRows(std::span<const int> grains, const std::vector<OwnStiffness>& rows,
+             std::vector<OwnStiffness>& to) {
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    std::array<double, 6>& sum = to[static_cast<std::size_t>(grains[k])];
-    for (std::size_t a = 0; a < 3; ++a) {
-      sum[a] += rows[k].force[a];
-      sum[a + 3] += rows[k].torque[a];
+    OwnStiffness& sum = to[static_cast<std::size_t>(grains[k])];
+    for (std::size_t a = 0; a < 4; ++a) {
+      sum.translation[a] += rows[k].translation[a];
+      sum.rotation[a] += rows[k].rotation[a];
+      sum.moment[a] += rows[k].moment[a];
+      sum.shared[a] += rows[k].shared[a];
+      sum.shared_off[a] += rows[k].shared_off[a];
+      sum.shared_turn[a] += rows[k].shared_turn[a];
+      sum.shared_turn_off[a] += rows[k].shared_turn_off[a];
     }
   }
+}
+
+/// Springs or dashpots of a contact [N/m], [N m/rad].
+struct Held {
+  double normal = 0;
+  double tangential = 0;
+  double rolling = 0;
+  double twisting = 0;
+};
+
+/// What lane k does to the grain on the side of i, whose share of it is 1 where the other never moves
+/// (a wall), 2 where it is a grain like it.
+void AddLane(const ContactBlock& w, int k, const Held& by, double share, OwnStiffness& to) {
+  const double n[3] = {w.nx[k], w.ny[k], w.nz[k]};
+  const double r = w.radius_i[k];
+  double* const couple[3] = {to.shared + 3, to.shared_off + 3, to.shared_turn + 3};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double n2 = n[a] * n[a];
+    const double across = 1.0 - n2;
+    const double both = n[a] * n[(a + 1) % 3];
+    const double translation = by.normal * n2 + by.tangential * across;
+    const double moment = by.rolling * across + by.twisting * n2;
+    const double rotation = by.tangential * across * (r * r) + moment;
+    to.translation[a] += translation;
+    to.rotation[a] += rotation;
+    to.moment[a] += moment;
+    to.shared[a] += share * translation;
+    to.shared_turn[a] += share * rotation;
+    to.shared_off[a] += share * (by.normal - by.tangential) * both;
+    to.shared_turn_off[a] += share * (by.twisting - by.rolling - by.tangential * (r * r)) * both;
+    *couple[a] += share * by.tangential * r * n[a];
+  }
+}
+
+Held SpringsOf(const ContactBlock& b, int k) {
+  return {b.normal_stiffness[k] + b.may_stiffen[k], b.tangential_stiffness[k],
+          b.rolling_stiffness[k], b.twisting_stiffness[k]};
+}
+
+Held DashpotsOf(const ContactBlock& b, int k) {
+  return {.normal = b.normal_damping[k], .tangential = b.tangential_damping[k]};
+}
+
+/// Translations and rotations about the axes only.
+std::vector<std::array<double, 6>> AlongAxes(const std::vector<OwnStiffness>& of) {
+  std::vector<std::array<double, 6>> axes(of.size());
+  for (std::size_t g = 0; g < of.size(); ++g) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      axes[g][a] = of[g].translation[a];
+      axes[g][a + 3] = of[g].rotation[a];
+    }
+  }
+  return axes;
 }
 
 /// Where new contacts are judged, in radii.
@@ -36,11 +94,10 @@ constexpr double kNominalOverlap = 1e-4;
 
 enum class Moments { kWith, kWithout };
 
-/// sqrt(m/K) of a grain, held by one like it at an overlap given in radii; pair: of materials,
-/// where there are several.
-double NominalStep(const ContactModel& model, const ParticleArrays& p, std::size_t grain,
-                   double overlap, int pair, Moments moments) {
-  ContactBlock block{};
+/// The contact of a grain with one like it at an overlap given in radii; pair: of materials, where
+/// there are several.
+void NominalContact(const ContactModel& model, const ParticleArrays& p, std::size_t grain,
+                    double overlap, int pair, ContactBlock& block) {
   block.mixed = model.materials() != nullptr;
   for (int k = 0; k < kBlock; ++k) {
     block.radius_i[k] = block.radius_j[k] = p.radius[grain];
@@ -48,6 +105,13 @@ double NominalStep(const ContactModel& model, const ParticleArrays& p, std::size
     block.materials[k] = pair;
   }
   model.Evaluate(block);
+}
+
+/// sqrt(m/K) of a grain in that contact.
+double NominalStep(const ContactModel& model, const ParticleArrays& p, std::size_t grain,
+                   double overlap, int pair, Moments moments) {
+  ContactBlock block{};
+  NominalContact(model, p, grain, overlap, pair, block);
   if (moments == Moments::kWithout) {
     block.rolling_stiffness[0] = block.twisting_stiffness[0] = 0.0;
   }
@@ -64,16 +128,16 @@ double NominalStep(const ContactModel& model, const ParticleArrays& p, std::size
 
 }  // namespace
 
-double Assembly::LeastNominalStep(double overlap, bool with_moments) const {
+void Assembly::VisitSmallestGrains(
+    const std::function<void(std::size_t grain, int pair)>& visit) const {
   const ParticleArrays& p = particles_;
-  const Moments moments = with_moments ? Moments::kWith : Moments::kWithout;
   const Materials* materials = model_.materials();
   if (materials == nullptr) {
     const auto smallest = std::min_element(p.radius.begin(), p.radius.end()) - p.radius.begin();
-    return NominalStep(model_, p, static_cast<std::size_t>(smallest), overlap, 0, moments);
+    visit(static_cast<std::size_t>(smallest), 0);
+    return;
   }
   // The smallest grain of each material against every material.
-  double least = std::numeric_limits<double>::infinity();
   for (int a = 0; a < materials->count(); ++a) {
     std::size_t smallest = p.radius.size();
     for (std::size_t g = 0; g < p.radius.size(); ++g) {
@@ -82,11 +146,56 @@ double Assembly::LeastNominalStep(double overlap, bool with_moments) const {
       }
     }
     for (int b = 0; b < materials->count() && smallest < p.radius.size(); ++b) {
-      least = std::min(least,
-                       NominalStep(model_, p, smallest, overlap, materials->Pair(a, b), moments));
+      visit(smallest, materials->Pair(a, b));
     }
   }
+}
+
+double Assembly::LeastNominalStep(double overlap, bool with_moments) const {
+  const Moments moments = with_moments ? Moments::kWith : Moments::kWithout;
+  double least = std::numeric_limits<double>::infinity();
+  VisitSmallestGrains([&](std::size_t grain, int pair) {
+    least = std::min(least, NominalStep(model_, particles_, grain, overlap, pair, moments));
+  });
   return least;
+}
+
+void Assembly::JudgeSmallestGrains() {
+  nominal_critical_step_ = CriticalStepAt(kNominalOverlap);
+  nominal_rates_ = {};
+  VisitSmallestGrains([this](std::size_t grain, int pair) {
+    ContactBlock b{};
+    NominalContact(model_, particles_, grain, kNominalOverlap, pair, b);
+    OwnStiffness spring{};
+    OwnStiffness dashpot{};
+    AddLane(b, 0, SpringsOf(b, 0), 2, spring);
+    AddLane(b, 0, DashpotsOf(b, 0), 2, dashpot);
+    const double m = particles_.inverse_mass[grain];
+    const double i = particles_.inverse_inertia[grain];
+    nominal_rates_.spring = std::max(nominal_rates_.spring, OwnRate(spring, m, i));
+    nominal_rates_.dashpot = std::max(nominal_rates_.dashpot, OwnRate(dashpot, m, i));
+  });
+}
+
+/// At most the largest rate of all bodies together, from the shares of each (dem/dynamics/stable_step).
+double Assembly::FastestOf(const std::vector<OwnStiffness>& own) const {
+  const ParticleArrays& p = particles_;
+  double fastest = 0;
+  for (std::size_t g = 0; g < own.size(); ++g) {
+    if (p.body.empty() || p.body[g] < 0) {
+      fastest = std::max(fastest, OwnRate(own[g], p.inverse_mass[g], p.inverse_inertia[g]));
+    }
+  }
+  std::vector<MemberStiffness> members;
+  for (const Clump& clump : clumps_.all()) {
+    members.clear();
+    for (std::size_t s = 0; s < clump.members.size(); ++s) {
+      members.push_back({&own[static_cast<std::size_t>(clump.members[s])], clump.arm[s]});
+    }
+    const auto first = static_cast<std::size_t>(clump.members.front());
+    fastest = std::max(fastest, OwnRate(members, p.inverse_mass[first], p.inverse_inertia[first]));
+  }
+  return fastest;
 }
 
 double Assembly::CriticalStepAt(double overlap) const { return LeastNominalStep(overlap, true); }
@@ -127,10 +236,9 @@ ChunkStiffness Assembly::StiffnessOfChunk(int chunk) const {
 absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
   const ParticleArrays& p = particles_;
   const auto n = p.x.size();
-  std::vector<std::array<double, 6>> stiffness(n, {0, 0, 0, 0, 0, 0});  // translation, rotation
-  std::vector<std::array<double, 6>> damping;  // as stiffness; empty without dashpots
-  std::vector<std::array<double, 3>> moments;  // part of the rotation's; empty without any
-  double rolling = 0;                          // sum over contacts [N m/rad]
+  std::vector<OwnStiffness> springs(n, OwnStiffness{});
+  std::vector<OwnStiffness> dashpots;  // empty without any
+  double rolling = 0;                  // sum over contacts [N m/rad]
   double twisting = 0;
   std::array<double, 3> modulus = {0, 0, 0};
   std::array<double, 3> viscosity = {0, 0, 0};
@@ -149,18 +257,10 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
                        chunk.deepest_there, " m, more than half the smaller radius"));
     }
     const std::span<const int> grains = places_.GrainsOf(static_cast<int>(c));
-    AddRows(grains, chunk.spring, stiffness);
+    AddRows(grains, chunk.spring, springs);
     if (!chunk.dashpot.empty()) {
-      damping.resize(n, {0, 0, 0, 0, 0, 0});
-      AddRows(grains, chunk.dashpot, damping);
-    }
-    if (!chunk.moment.empty()) {
-      moments.resize(n, {0, 0, 0});
-      for (std::size_t k = 0; k < grains.size(); ++k) {
-        for (std::size_t a = 0; a < 3; ++a) {
-          moments[static_cast<std::size_t>(grains[k])][a] += chunk.moment[k].torque[a];
-        }
-      }
+      dashpots.resize(n, OwnStiffness{});
+      AddRows(grains, chunk.dashpot, dashpots);
     }
     rolling += chunk.rolling;
     twisting += chunk.twisting;
@@ -176,32 +276,19 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
         status = absl::OutOfRangeError(absl::StrCat("grain ", p.id[i], " overlaps a wall by ",
                                                     w.overlap[k], " m, more than half its radius"));
       }
-      const double n2[3] = {w.nx[k] * w.nx[k], w.ny[k] * w.ny[k], w.nz[k] * w.nz[k]};
-      const double r2 = w.radius_i[k] * w.radius_i[k];
-      const bool damped = w.normal_damping[k] + w.tangential_damping[k] > 0;
-      if (damped) {
-        damping.resize(n, {0, 0, 0, 0, 0, 0});
+      AddLane(w, k, SpringsOf(w, k), 1, springs[i]);
+      if (w.normal_damping[k] + w.tangential_damping[k] > 0) {
+        dashpots.resize(n, OwnStiffness{});
+        AddLane(w, k, DashpotsOf(w, k), 1, dashpots[i]);
       }
-      if (w.rolling_stiffness[k] + w.twisting_stiffness[k] > 0) {
-        moments.resize(n, {0, 0, 0});
-        rolling += w.rolling_stiffness[k];
-        twisting += w.twisting_stiffness[k];
-      }
-      for (std::size_t a = 0; a < 3; ++a) {
-        const double across = 1.0 - n2[a];
-        if (!moments.empty()) {
-          moments[i][a] += w.rolling_stiffness[k] * across + w.twisting_stiffness[k] * n2[a];
-        }
-        stiffness[i][a] += w.normal_stiffness[k] * n2[a] + w.tangential_stiffness[k] * across;
-        stiffness[i][a + 3] += w.tangential_stiffness[k] * across * r2 +
-                               w.rolling_stiffness[k] * across + w.twisting_stiffness[k] * n2[a];
-        if (damped) {
-          damping[i][a] += w.normal_damping[k] * n2[a] + w.tangential_damping[k] * across;
-          damping[i][a + 3] += w.tangential_damping[k] * across * r2;
-        }
-      }
+      rolling += w.rolling_stiffness[k];
+      twisting += w.twisting_stiffness[k];
     }
   });
+  estimate.fastest.spring = FastestOf(springs);
+  estimate.fastest.dashpot = dashpots.empty() ? 0.0 : FastestOf(dashpots);
+  std::vector<std::array<double, 6>> stiffness = AlongAxes(springs);
+  std::vector<std::array<double, 6>> damping = AlongAxes(dashpots);
   const auto largest_rate = [&p, n](const std::vector<std::array<double, 6>>& of) {
     double rate2 = 0;  // K/m
     for (std::size_t g = 0; g < n; ++g) {
@@ -213,11 +300,11 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
     return std::sqrt(rate2);
   };
   std::vector<std::array<double, 6>> by_forces;
-  if (!moments.empty()) {
+  if (rolling + twisting > 0) {
     by_forces = stiffness;
     for (std::size_t g = 0; g < n; ++g) {
       for (std::size_t a = 0; a < 3; ++a) {
-        by_forces[g][a + 3] = std::max(0.0, by_forces[g][a + 3] - moments[g][a]);
+        by_forces[g][a + 3] = std::max(0.0, by_forces[g][a + 3] - springs[g].moment[a]);
       }
     }
     clumps_.Fold(by_forces);

@@ -13,6 +13,11 @@ namespace {
 /// Steps between two looks at stiffness, balance and finiteness.
 constexpr std::int64_t kInspection = 20;
 
+/// The same where stiffness has grown by more than kGrowth since the last one, as where grains come
+/// into contact all at once.
+constexpr std::int64_t kSoon = 5;
+constexpr double kGrowth = 1.25;
+
 /// Stress-controlled axes beside a driven one may have to move several times faster than it.
 constexpr double kServoRateOverDriven = 10;
 
@@ -21,10 +26,6 @@ constexpr double kLoadingTolerance = 1e-2;
 
 /// How many times shorter moments make the step before a settling that fails says so.
 constexpr double kDelayToTell = 10;
-
-/// Steps over the critical one of a single grain at which two that move against each other become
-/// unstable.
-constexpr double kUnstable = 1.4142135623730951;
 
 /// Strain of an axis under a held stress from which on its cell is said to have collapsed.
 constexpr double kCollapse = 0.05;
@@ -67,6 +68,8 @@ void StrainingSpeed::Adapt(double unbalanced, double settled) {
 QuasiStatic::QuasiStatic(Assembly& assembly, const StageOptions& options, std::stop_token stop)
     : assembly_(&assembly), options_(options), stop_(std::move(stop)) {}
 
+void QuasiStatic::LookBeforeNextStep() { since_inspection_ = interval_; }
+
 StageEnd QuasiStatic::Diverge(std::string reason) {
   reason_ = std::move(reason);
   return StageEnd::kDiverged;
@@ -90,8 +93,7 @@ StageEnd QuasiStatic::Begin() {
 /// is stable stays what it is.
 void QuasiStatic::GuardFirstSteps() {
   StiffnessEstimate estimate;
-  if (assembly_->EstimateStiffness(estimate).ok() && estimate.critical_step > 0 &&
-      dt_ > kUnstable * estimate.critical_step) {
+  if (assembly_->EstimateStiffness(estimate).ok() && dt_ > StableStep(estimate.fastest, damping_)) {
     Adopt(estimate);
   }
 }
@@ -124,14 +126,29 @@ StageEnd QuasiStatic::Inspect() {
 }
 
 void QuasiStatic::Adopt(const StiffnessEstimate& estimate) {
-  const double largest = std::min(kMaxStrainPerStep / (options_.rate * speed_.factor()),
-                                  assembly_->NominalCriticalStep());
-  dt_ = options_.step_share *
-        (estimate.critical_step > 0 ? std::min(largest, estimate.critical_step) : largest);
+  interval_ = estimate.fastest.spring > kGrowth * stiffness_.spring ? kSoon : kInspection;
+  stiffness_ = estimate.fastest;
+  elastic_modulus_ = estimate.modulus;
+  viscosity_ = estimate.viscosity;
+  ChooseStep();
+}
+
+/// Local damping makes forces larger where they slow grains down, and the largest stable step shorter.
+void QuasiStatic::SetDamping(double damping) {
+  if (damping != damping_) {
+    damping_ = damping;
+    ChooseStep();
+  }
+}
+
+void QuasiStatic::ChooseStep() {
+  dt_ = options_.step_share * std::min({kMaxStrainPerStep / (options_.rate * speed_.factor()),
+                                        StableStep(assembly_->NominalRates(), damping_),
+                                        StableStep(stiffness_, damping_)});
   for (std::size_t a = 0; a < 3; ++a) {
     // A dashpot answers a strain rate at once, in the same step: the servo must see it as
     // stiffness.
-    modulus_[a] = estimate.modulus[a] + 2.0 * estimate.viscosity[a] / dt_;
+    modulus_[a] = elastic_modulus_[a] + 2.0 * viscosity_[a] / dt_;
   }
 }
 
@@ -179,6 +196,12 @@ StageEnd QuasiStatic::Step(const CellTarget& target, double damping) {
   if (stop_.stop_requested()) {
     return StageEnd::kStopped;
   }
+  if (since_inspection_ >= interval_) {
+    if (const StageEnd end = Inspect(); end != StageEnd::kDone) {
+      return end;
+    }
+  }
+  SetDamping(damping);
   const PeriodicCell& cell = assembly_->cell();
   Motion motion{.stretch = {0, 0, 0}, .dt = dt_, .damping = damping};
   bool reached[3] = {false, false, false};
@@ -217,7 +240,7 @@ StageEnd QuasiStatic::Step(const CellTarget& target, double damping) {
   if (auto s = assembly_->EvaluateForces(); !s.ok()) {
     return Diverge(WhyNoForces(target, std::string(s.message())));
   }
-  if (++since_inspection_ >= kInspection) {
+  if (++since_inspection_ >= interval_) {
     return Inspect();
   }
   if (first_interval_) {

@@ -35,9 +35,8 @@ struct StageOptions {
       5e-4;  ///< mean unbalanced over mean contact force that ends a settling [-] > 0
   double stress_tolerance =
       1e-3;                 ///< relative error of held stresses at the end of a settling [-] > 0
-  double step_share = 0.8;  ///< time step over the smallest sqrt(m/K) of all grains; two grains
-                            ///< that move against each other allow sqrt(2). [Cundall & Strack 1979;
-                            ///< O'Sullivan & Bray 2004]
+  double step_share = 0.9;  ///< time step over the largest that is stable with the damping of the
+                            ///< moment (StableStep) [-], 0 .. 1
   double least_volume = 0;  ///< a settling ends where the cell has shrunk to this [m^3]
   bool adaptive = false;    ///< strained stages go faster than `rate` where forces stay balanced
   std::int64_t max_settling_steps = 200'000;  ///< a settling that takes longer has diverged
@@ -104,6 +103,10 @@ class QuasiStatic {
     intervention_ = std::move(intervention);
   }
 
+  /// To be called when what contacts do has been changed from outside, as dashpots that begin to act:
+  /// stiffness is looked at anew before the next step.
+  void LookBeforeNextStep();
+
   [[nodiscard]] StageOptions& options() { return options_; }
   [[nodiscard]] Assembly& assembly() { return *assembly_; }
   [[nodiscard]] double time_step() const { return dt_; }
@@ -111,7 +114,8 @@ class QuasiStatic {
   /// For archives: all that options, follow and intervention do not bring with them.
   template <class Archive>
   void Visit(Archive& archive) {
-    archive(servo_, modulus_, dt_, since_inspection_, begun_);
+    archive(servo_, stiffness_.spring, stiffness_.dashpot, elastic_modulus_, viscosity_, modulus_,
+            damping_, dt_, since_inspection_, interval_, begun_);
     if (options_.adaptive) {
       archive(speed_);
     }
@@ -126,6 +130,8 @@ class QuasiStatic {
   StageEnd Step(const CellTarget& target, double damping);
   StageEnd Inspect();
   void Adopt(const StiffnessEstimate& estimate);
+  void SetDamping(double damping);
+  void ChooseStep();
   void GuardFirstSteps();
   [[nodiscard]] std::string WhyNoForces(const CellTarget& target, const std::string& problem) const;
   StageEnd Diverge(std::string reason);
@@ -138,11 +144,16 @@ class QuasiStatic {
   StageOptions options_;
   std::stop_token stop_;
   std::array<StressServo, 3> servo_;
-  std::array<double, 3> modulus_ = {0, 0, 0};
+  FastestRates stiffness_;                             ///< by the last inspection
+  std::array<double, 3> elastic_modulus_ = {0, 0, 0};  ///< the same [Pa]
+  std::array<double, 3> viscosity_ = {0, 0, 0};        ///< the same [Pa s]
+  std::array<double, 3> modulus_ = {0, 0, 0};          ///< what servos see in steps of dt_ [Pa]
+  double damping_ = 0;                                 ///< that dt_ was chosen for
   StrainingSpeed speed_;
   bool straining_ = false;  ///< a strained stage is loading; stays true if it stopped or diverged
   double dt_ = 0;
   std::int64_t since_inspection_ = 0;
+  std::int64_t interval_ = 1;  ///< steps between inspections now
   bool begun_ = false;
   bool first_interval_ = false;  ///< up to the first inspection after forces were first evaluated
   Follow follow_;

@@ -13,6 +13,7 @@ constexpr int kQuad = 4;
 /// Stiffnesses or damping coefficients of the lanes; those of moments may be zero.
 struct Coefficients {
   const double* normal;
+  const double* more;  ///< what `normal` may grow by
   const double* tangential;
   const double* rolling;
   const double* twisting;
@@ -23,22 +24,74 @@ struct LanePlaces {
   const std::uint16_t* j;
 };
 
-CALIB_DEM_INLINE void AddRow(const Quad& translation, const Quad& rotation, GrainLoad& to) {
-  Quad t;
-  Quad r;
-  LoadQuad(to.force, t);
-  LoadQuad(to.torque, r);
-  t += translation;
-  r += rotation;
-  StoreQuad(t, to.force);
-  StoreQuad(r, to.torque);
+CALIB_DEM_INLINE void AddTo(const Quad& value, double* to) {
+  Quad sum;
+  LoadQuad(to, sum);
+  sum += value;
+  StoreQuad(sum, to);
 }
 
-/// Of a contact with normal n along axis a, against translation: c_n n_a^2 + c_s (1 - n_a^2);
-/// against rotation: (c_s r^2 + c_r)(1 - n_a^2) + c_t n_a^2. keep: above zero where a lane counts.
-/// along: adds translation times squared branch of each axis, in four sums.
+/// One row of OwnStiffness at the places of four lanes.
+CALIB_DEM_INLINE void AddRow(const Quad& a, const Quad& b, const Quad& c, const Quad& d,
+                             const std::uint16_t* place, double (OwnStiffness::*part)[4],
+                             OwnStiffness* to) {
+  Quad row[4] = {a, b, c, d};
+  Transpose(row);
+  for (int l = 0; l < kQuad; ++l) {
+    AddTo(row[l], to[place[l]].*part);
+  }
+}
+
+/// Four contacts.
+struct FourContacts {
+  Quad n[3];        ///< normal
+  Quad along[3];    ///< n n of xx, yy, zz; zero where a lane does not count
+  Quad across[3];   ///< 1 - n n; likewise
+  Quad both[3];     ///< n n of xy, yz, zx; likewise
+  Quad normal;      ///< coefficient, with what it may grow by
+  Quad tangential;  ///< likewise
+  Quad rolling;
+  Quad twisting;
+};
+
+/// What they do to the grains at `place`, of radius r, on whose side their normals point away times
+/// `away` (1 or -1); share: 1 + t of dem/dynamics/stable_step.
+CALIB_DEM_INLINE void AddSide(const FourContacts& c, const Quad& r, const Quad& away,
+                              const Quad& share, const std::uint16_t* place, OwnStiffness* to) {
+  const Quad none = {0, 0, 0, 0};
+  const Quad shear = c.tangential * r * r;
+  Quad translation[3];
+  Quad rotation[3];
+  Quad moment[3];
+  Quad off[3];
+  Quad turn_off[3];
+  Quad couple[3];
+  for (int a = 0; a < 3; ++a) {
+    translation[a] = c.normal * c.along[a] + c.tangential * c.across[a];
+    moment[a] = c.rolling * c.across[a] + c.twisting * c.along[a];
+    rotation[a] = c.tangential * c.across[a] * r * r + moment[a];
+    off[a] = share * (c.normal - c.tangential) * c.both[a];
+    turn_off[a] = share * (c.twisting - c.rolling - shear) * c.both[a];
+    couple[a] = away * share * c.tangential * r * (c.along[a] + c.across[a]) * c.n[a];
+  }
+  AddRow(translation[0], translation[1], translation[2], none, place, &OwnStiffness::translation,
+         to);
+  AddRow(rotation[0], rotation[1], rotation[2], none, place, &OwnStiffness::rotation, to);
+  AddRow(moment[0], moment[1], moment[2], none, place, &OwnStiffness::moment, to);
+  AddRow(share * translation[0], share * translation[1], share * translation[2], couple[0], place,
+         &OwnStiffness::shared, to);
+  AddRow(off[0], off[1], off[2], couple[1], place, &OwnStiffness::shared_off, to);
+  AddRow(share * rotation[0], share * rotation[1], share * rotation[2], couple[2], place,
+         &OwnStiffness::shared_turn, to);
+  AddRow(turn_off[0], turn_off[1], turn_off[2], none, place, &OwnStiffness::shared_turn_off, to);
+}
+
+/// Of a contact with normal n, against translation: c_n n n' + c_s (1 - n n'); against rotation: (c_s
+/// r^2 + c_r)(1 - n n') + c_t n n'; the couple: c_s r n. keep: above zero where a lane counts. along:
+/// adds translation times squared branch of each axis, in four sums, without what the contact may
+/// stiffen by.
 CALIB_DEM_CLONES void AddTerms(const LanePlaces place, const Coefficients c, const ContactBlock& b,
-                               const double* keep, GrainLoad* to, double (*along)[kQuad]) {
+                               const double* keep, OwnStiffness* to, double (*along)[kQuad]) {
   const Quad zero = {0, 0, 0, 0};
   const Quad one = {1, 1, 1, 1};
   const double* const n[3] = {b.nx, b.ny, b.nz};
@@ -48,44 +101,36 @@ CALIB_DEM_CLONES void AddTerms(const LanePlaces place, const Coefficients c, con
     LoadQuad(along[a], sum[a]);
   }
   for (int k = 0; k < kBlock; k += kQuad) {
+    FourContacts four;
     Quad on;
     Quad normal;
-    Quad tangential;
-    Quad rolling;
-    Quad twisting;
+    Quad more;
     Quad ri;
     Quad rj;
     LoadQuad(keep + k, on);
     LoadQuad(c.normal + k, normal);
-    LoadQuad(c.tangential + k, tangential);
-    LoadQuad(c.rolling + k, rolling);
-    LoadQuad(c.twisting + k, twisting);
+    LoadQuad(c.more + k, more);
+    LoadQuad(c.tangential + k, four.tangential);
+    LoadQuad(c.rolling + k, four.rolling);
+    LoadQuad(c.twisting + k, four.twisting);
     LoadQuad(b.radius_i + k, ri);
     LoadQuad(b.radius_j + k, rj);
-    Quad translation[4];
-    Quad rotation_i[4];
-    Quad rotation_j[4];
+    four.normal = normal + more;
     for (int a = 0; a < 3; ++a) {
-      Quad component;
+      LoadQuad(n[a] + k, four.n[a]);
+    }
+    for (int a = 0; a < 3; ++a) {
       Quad branch;
-      LoadQuad(n[a] + k, component);
       LoadQuad(d[a] + k, branch);
-      const Quad n2 = component * component;
-      const Quad across = one - n2;
-      const Quad moment = rolling * across + twisting * n2;
-      translation[a] = on > zero ? normal * n2 + tangential * across : zero;
-      rotation_i[a] = on > zero ? tangential * across * ri * ri + moment : zero;
-      rotation_j[a] = on > zero ? tangential * across * rj * rj + moment : zero;
-      sum[a] += translation[a] * branch * branch;
+      const Quad n2 = four.n[a] * four.n[a];
+      four.along[a] = on > zero ? n2 : zero;
+      four.across[a] = on > zero ? one - n2 : zero;
+      four.both[a] = on > zero ? four.n[a] * four.n[(a + 1) % 3] : zero;
+      sum[a] += (normal * four.along[a] + four.tangential * four.across[a]) * branch * branch;
     }
-    translation[3] = rotation_i[3] = rotation_j[3] = zero;
-    Transpose(translation);
-    Transpose(rotation_i);
-    Transpose(rotation_j);
-    for (int l = 0; l < kQuad; ++l) {
-      AddRow(translation[l], rotation_i[l], to[place.i[k + l]]);
-      AddRow(translation[l], rotation_j[l], to[place.j[k + l]]);
-    }
+    const Quad ratio = ri * ri * ri / (rj * rj * rj);
+    AddSide(four, ri, one, one + ratio, place.i + k, to);
+    AddSide(four, rj, -one, one + one / ratio, place.j + k, to);
   }
   for (int a = 0; a < 3; ++a) {
     StoreQuad(sum[a], along[a]);
@@ -118,9 +163,10 @@ CALIB_DEM_CLONES bool Look(const ContactBlock& b, const std::uint8_t* touching, 
   return deep != 0;
 }
 
-void AddTo(const LanePlaces place, const Coefficients& c, const ContactBlock& b, const double* keep,
-           int places, std::vector<GrainLoad>& to, std::array<double, 3>& along) {
-  to.resize(static_cast<std::size_t>(places), GrainLoad{});
+void AddAll(const LanePlaces place, const Coefficients& c, const ContactBlock& b,
+            const double* keep, int places, std::vector<OwnStiffness>& to,
+            std::array<double, 3>& along) {
+  to.resize(static_cast<std::size_t>(places), OwnStiffness{});
   alignas(32) double sums[3][kQuad] = {};
   AddTerms(place, c, b, keep, to.data(), sums);
   for (std::size_t a = 0; a < 3; ++a) {
@@ -145,22 +191,19 @@ void AddStiffness(const PairLanes& lanes, int b, const ContactBlock& block,
   }
   const auto begin = static_cast<std::ptrdiff_t>(b) * kBlock;
   const LanePlaces place = {lanes.place_i.data() + begin, lanes.place_j.data() + begin};
-  AddTo(place,
-        {block.normal_stiffness, block.tangential_stiffness, block.rolling_stiffness,
-         block.twisting_stiffness},
-        block, keep, places, chunk.spring, chunk.modulus);
+  AddAll(place,
+         {block.normal_stiffness, block.may_stiffen, block.tangential_stiffness,
+          block.rolling_stiffness, block.twisting_stiffness},
+         block, keep, places, chunk.spring, chunk.modulus);
   if (SumOf(block.normal_damping, keep) + SumOf(block.tangential_damping, keep) > 0) {
-    AddTo(place, {block.normal_damping, block.tangential_damping, kNone, kNone}, block, keep,
-          places, chunk.dashpot, chunk.viscosity);
+    AddAll(place, {block.normal_damping, kNone, block.tangential_damping, kNone, kNone}, block,
+           keep, places, chunk.dashpot, chunk.viscosity);
   }
   const double rolling = SumOf(block.rolling_stiffness, keep);
   const double twisting = SumOf(block.twisting_stiffness, keep);
   if (rolling + twisting > 0) {
     chunk.rolling += rolling;
     chunk.twisting += twisting;
-    std::array<double, 3> nothing{};
-    AddTo(place, {kNone, kNone, block.rolling_stiffness, block.twisting_stiffness}, block, keep,
-          places, chunk.moment, nothing);
   }
 }
 

@@ -8,15 +8,14 @@
 
 #include "dem/contact/contact_block.h"
 #include "dem/dynamics/pair_blocks.h"
+#include "dem/dynamics/stable_step.h"
 
 namespace calib::dem {
 
-/// Of a chunk of pairs. At its places: `force` the stiffness against translation along each axis
-/// [N/m], `torque` that against rotation about each axis [N m/rad]; of dashpots the same per rate.
+/// Of a chunk of pairs, at its places: what springs hold its grains by; of dashpots the same per rate.
 struct ChunkStiffness {
-  std::vector<GrainLoad> spring;
-  std::vector<GrainLoad> dashpot;  ///< empty where none acts
-  std::vector<GrainLoad> moment;   ///< the part of moments in `spring`; empty where none acts
+  std::vector<OwnStiffness> spring;
+  std::vector<OwnStiffness> dashpot;            ///< empty where none acts
   std::array<double, 3> modulus = {0, 0, 0};    ///< sum of stiffness times squared branch [N m]
   std::array<double, 3> viscosity = {0, 0, 0};  ///< the same of dashpots [N m s]
   double rolling = 0;                           ///< sum over contacts [N m/rad]

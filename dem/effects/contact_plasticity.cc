@@ -17,7 +17,9 @@ CALIB_DEM_INLINE void YieldLane(double stiffer, int k, double* largest, ContactB
   const double unloading = force - stiffer * (most - force);
   largest[k] = most;
   b.normal_force[k] = unloading > 0 ? unloading : 0.0;
-  b.normal_stiffness[k] *= force < most ? 1.0 + stiffer : 1.0;
+  const double loading = b.normal_stiffness[k];
+  b.normal_stiffness[k] = force < most ? loading * (1.0 + stiffer) : loading;
+  b.may_stiffen[k] = force < most ? 0.0 : loading * stiffer;
 }
 
 CALIB_DEM_CLONES void Yield(double stiffer, ContactBlock& b, int first) {

@@ -143,6 +143,7 @@ class ElementTestRun {
       return summary;
     }
     assembly_.SetViscous(true);
+    stages_.LookBeforeNextStep();
     if (end != StageEnd::kDone) {
       return Finish(end, "consolidation");
     }

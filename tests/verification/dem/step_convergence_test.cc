@@ -18,7 +18,7 @@ namespace {
 constexpr double kPressure = 5e5;
 
 struct Walk {
-  double share = 0.8;   ///< time step over the smallest sqrt(m/K)
+  double share = 0.9;   ///< time step over the largest stable one
   double rate = 0.1;    ///< of density scaled by a thousand [1/s]
   double stage = 2e-3;  ///< axial strain between two settlings
 };
@@ -128,11 +128,11 @@ TEST(StepConvergence, HalvedStepsAndRatesGiveTheSameCurve) {
   const Model model = test::HertzModel();
   std::vector<Curve> curves;
   for (const Walk& walk :
-       {Walk{.share = 0.4}, Walk{}, Walk{.rate = 0.05}, Walk{.rate = 0.2}, Walk{.stage = 1e-3}}) {
+       {Walk{.share = 0.45}, Walk{}, Walk{.rate = 0.05}, Walk{.rate = 0.2}, Walk{.stage = 1e-3}}) {
     curves.push_back(Mean(packing, model, walk, 0.05, kRepeats));
   }
   const auto shifts = Compare(
-      curves, {"step 0.4", "step 0.8", "half the rate", "twice the rate", "half the stage"});
+      curves, {"half the step", "as it is", "half the rate", "twice the rate", "half the stage"});
   for (std::size_t k = 1; k < curves.size(); ++k) {
     const double chance = 3 * std::sqrt(2.0 / kRepeats);
     EXPECT_LT(shifts[k].ratio, 0.01 + chance * curves[0].scatter) << k;
@@ -150,7 +150,7 @@ TEST(StepConvergenceSlow, PublishedPacking) {
       test::LoadPacking(test::DataFolder() + "/toyoura_triaxial/packing_1000.txt");
   std::vector<Curve> curves;
   std::vector<std::string> names;
-  for (const double share : {0.2, 0.4, 0.8}) {
+  for (const double share : {0.225, 0.45, 0.9}) {
     curves.push_back(Mean(packing, test::CaseModel("base"), {.share = share}, 0.08, kRepeats));
     names.push_back("step " + std::to_string(share));
   }
