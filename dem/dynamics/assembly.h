@@ -105,7 +105,7 @@ class Assembly {
 
   /// Stiffnesses of the present contacts; their memory is not touched. Errors: OUT_OF_RANGE when
   /// two grains overlap by more than half the smaller radius: the model is too soft for the stress.
-  [[nodiscard]] absl::Status EstimateStiffness(StiffnessEstimate& estimate) const;
+  [[nodiscard]] absl::Status EstimateStiffness(StiffnessEstimate& estimate);
 
   /// Critical step of two touching grains of the smallest size at an overlap of 1e-4 radii [s]:
   /// bounds the step where contacts are few or about to form.
@@ -242,7 +242,7 @@ class Assembly {
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
   void TakeBranchesBetweenBodies();
-  [[nodiscard]] ChunkStiffness StiffnessOfChunk(int chunk) const;
+  void JudgeChunk(int chunk);
   [[nodiscard]] double FastestOf(const std::vector<OwnStiffness>& own) const;
   void JudgeSmallestGrains();
   [[nodiscard]] absl::Status FormulasFinite() const;
@@ -305,6 +305,14 @@ class Assembly {
     LaneMemory old_history;
   };
   Searching searching_;
+
+  /// What an estimate of stiffness works in, kept from one to the next.
+  struct Judging {
+    std::vector<ChunkStiffness> chunks;
+    std::vector<OwnStiffness> springs, dashpots;  ///< per grain; dashpots: empty where none acts
+    std::vector<std::array<double, 6>> stiffness, damping, by_forces;  ///< along and about the axes
+  };
+  Judging judging_;
 
   RigidClumps clumps_;
   int bodies_ = 0;

@@ -78,15 +78,14 @@ Held DashpotsOf(const ContactBlock& b, int k) {
 }
 
 /// Translations and rotations about the axes only.
-std::vector<std::array<double, 6>> AlongAxes(const std::vector<OwnStiffness>& of) {
-  std::vector<std::array<double, 6>> axes(of.size());
+void TakeAxes(const std::vector<OwnStiffness>& of, std::vector<std::array<double, 6>>& axes) {
+  axes.resize(of.size());
   for (std::size_t g = 0; g < of.size(); ++g) {
     for (std::size_t a = 0; a < 3; ++a) {
       axes[g][a] = of[g].translation[a];
       axes[g][a + 3] = of[g].rotation[a];
     }
   }
-  return axes;
 }
 
 /// Where new contacts are judged, in radii.
@@ -203,9 +202,10 @@ double Assembly::CriticalStepAt(double overlap) const { return LeastNominalStep(
 double Assembly::NominalStepByForces() const { return LeastNominalStep(kNominalOverlap, false); }
 
 /// What pair chunk `chunk` adds to the estimate.
-ChunkStiffness Assembly::StiffnessOfChunk(int chunk) const {
+void Assembly::JudgeChunk(int chunk) {
   constexpr int kBlocks = kPairChunk / kBlock;
-  ChunkStiffness stiffness;
+  ChunkStiffness& stiffness = judging_.chunks[static_cast<std::size_t>(chunk)];
+  stiffness.Clear();
   ContactBlock b;
   b.viscous = viscous_ ? 1.0 : 0.0;
   const auto width = static_cast<std::size_t>(model_.history_size());
@@ -230,23 +230,21 @@ ChunkStiffness Assembly::StiffnessOfChunk(int chunk) const {
     AddStiffness(lanes_, block, b, touching_.data() + static_cast<std::ptrdiff_t>(block) * kBlock,
                  places, stiffness);
   }
-  return stiffness;
 }
 
-absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
+absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) {
   const ParticleArrays& p = particles_;
   const auto n = p.x.size();
-  std::vector<OwnStiffness> springs(n, OwnStiffness{});
-  std::vector<OwnStiffness> dashpots;  // empty without any
-  double rolling = 0;                  // sum over contacts [N m/rad]
+  auto& [chunks, springs, dashpots, stiffness, damping, by_forces] = judging_;
+  springs.assign(n, OwnStiffness{});
+  dashpots.clear();
+  double rolling = 0;  // sum over contacts [N m/rad]
   double twisting = 0;
   std::array<double, 3> modulus = {0, 0, 0};
   std::array<double, 3> viscosity = {0, 0, 0};
   absl::Status status;
-  std::vector<ChunkStiffness> chunks(sums_.size());
-  ForEachChunk(static_cast<int>(chunks.size()), threads_, [&](int chunk) {
-    chunks[static_cast<std::size_t>(chunk)] = StiffnessOfChunk(chunk);
-  });
+  chunks.resize(sums_.size());
+  ForEachChunk(static_cast<int>(chunks.size()), threads_, [this](int chunk) { JudgeChunk(chunk); });
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     const ChunkStiffness& chunk = chunks[c];
     if (chunk.too_deep >= 0 && status.ok()) {
@@ -287,8 +285,8 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
   });
   estimate.fastest.spring = FastestOf(springs);
   estimate.fastest.dashpot = dashpots.empty() ? 0.0 : FastestOf(dashpots);
-  std::vector<std::array<double, 6>> stiffness = AlongAxes(springs);
-  std::vector<std::array<double, 6>> damping = AlongAxes(dashpots);
+  TakeAxes(springs, stiffness);
+  TakeAxes(dashpots, damping);
   const auto largest_rate = [&p, n](const std::vector<std::array<double, 6>>& of) {
     double rate2 = 0;  // K/m
     for (std::size_t g = 0; g < n; ++g) {
@@ -299,7 +297,7 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) const {
     }
     return std::sqrt(rate2);
   };
-  std::vector<std::array<double, 6>> by_forces;
+  by_forces.clear();
   if (rolling + twisting > 0) {
     by_forces = stiffness;
     for (std::size_t g = 0; g < n; ++g) {

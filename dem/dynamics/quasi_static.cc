@@ -282,6 +282,9 @@ StageEnd QuasiStatic::Settle(const CellTarget& asked) {
   if (const StageEnd end = Begin(); end != StageEnd::kDone) {
     return end;
   }
+  for (StressServo& servo : servo_) {
+    servo.Forget();
+  }
   FollowGap gap;
   CellTarget target = Current(asked, gap);
   double unbalanced = 0;

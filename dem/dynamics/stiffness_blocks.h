@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "dem/contact/contact_block.h"
@@ -22,6 +23,16 @@ struct ChunkStiffness {
   double twisting = 0;
   int too_deep = -1;         ///< first slot that overlaps by more than half the smaller radius
   double deepest_there = 0;  ///< its overlap [m]
+
+  /// As new, but with the memory it has.
+  void Clear() {
+    std::vector<OwnStiffness> rows[2] = {std::move(spring), std::move(dashpot)};
+    *this = {};
+    spring = std::move(rows[0]);
+    dashpot = std::move(rows[1]);
+    spring.clear();
+    dashpot.clear();
+  }
 };
 
 /// Adds the lanes of block `b` that touch; the block's stiffnesses are set. places: of the chunk.

@@ -6,7 +6,9 @@ namespace calib::dem {
 /// Proportional-integral control of the compression rate, in units of what the affine stiffness K
 /// would need in one step: rate = (0.3 e + 0.005 sum e) / (K dt), e = target - stress. The integral
 /// removes the lag that a steadily straining specimen would otherwise have; it is overdamped down
-/// to a real stiffness of a fifth of K.
+/// to a real stiffness of a fifth of K. What an axis needs while others are driven it no longer needs
+/// when they stop: the integral is to be forgotten then, or it drives the stress away from its target
+/// and unwinds only over hundreds of steps.
 class StressServo {
  public:
   struct Reading {
@@ -36,6 +38,9 @@ class StressServo {
     integral_ = trial;
     return rate;
   }
+
+  /// Nothing is driven any more.
+  void Forget() { integral_ = 0; }
 
  private:
   static constexpr double kProportional = 0.3;
