@@ -48,7 +48,7 @@ experiments:
     packing: {file: packing.txt}
     data: {file: triaxial_data.csv, strain: logarithmic}
     control: axial_strain
-    staging: {rate: 0.1 1/s, step: 0.004, damping: [0.2, 0.9], unbalanced: 1e-3}
+    staging: {rate: 0.1 1/s, step: 0.004, unbalanced: 1e-3}
     observables: {stress_ratio: {noise: {absolute: 0.1}}, volumetric_strain: {noise: {absolute: 1e-3}}}
 """
 
