@@ -242,7 +242,8 @@ class Assembly {
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
   void TakeBranchesBetweenBodies();
-  void JudgeChunk(int chunk);
+  void JudgeChunk(int chunk, ChunkStiffness& stiffness) const;
+  void SetStepsAlongAxes(StiffnessEstimate& estimate);
   [[nodiscard]] double FastestOf(const std::vector<OwnStiffness>& own) const;
   void JudgeSmallestGrains();
   [[nodiscard]] absl::Status FormulasFinite() const;
@@ -308,9 +309,9 @@ class Assembly {
 
   /// What an estimate of stiffness works in, kept from one to the next.
   struct Judging {
-    std::vector<ChunkStiffness> chunks;
-    std::vector<OwnStiffness> springs, dashpots;  ///< per grain; dashpots: empty where none acts
-    std::vector<std::array<double, 6>> stiffness, damping, by_forces;  ///< along and about the axes
+    std::vector<ChunkStiffness> chunks;  ///< a few at a time
+    std::vector<OwnStiffness> springs;   ///< per grain
+    std::vector<OwnStiffness> dashpots;  ///< likewise; empty where none acts
   };
   Judging judging_;
 

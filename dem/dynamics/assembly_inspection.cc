@@ -77,16 +77,8 @@ Held DashpotsOf(const ContactBlock& b, int k) {
   return {.normal = b.normal_damping[k], .tangential = b.tangential_damping[k]};
 }
 
-/// Translations and rotations about the axes only.
-void TakeAxes(const std::vector<OwnStiffness>& of, std::vector<std::array<double, 6>>& axes) {
-  axes.resize(of.size());
-  for (std::size_t g = 0; g < of.size(); ++g) {
-    for (std::size_t a = 0; a < 3; ++a) {
-      axes[g][a] = of[g].translation[a];
-      axes[g][a + 3] = of[g].rotation[a];
-    }
-  }
-}
+/// Chunks of pairs whose stiffnesses are kept at a time, of each of several threads.
+constexpr int kChunksOfThread = 4;
 
 /// Where new contacts are judged, in radii.
 constexpr double kNominalOverlap = 1e-4;
@@ -202,9 +194,8 @@ double Assembly::CriticalStepAt(double overlap) const { return LeastNominalStep(
 double Assembly::NominalStepByForces() const { return LeastNominalStep(kNominalOverlap, false); }
 
 /// What pair chunk `chunk` adds to the estimate.
-void Assembly::JudgeChunk(int chunk) {
+void Assembly::JudgeChunk(int chunk, ChunkStiffness& stiffness) const {
   constexpr int kBlocks = kPairChunk / kBlock;
-  ChunkStiffness& stiffness = judging_.chunks[static_cast<std::size_t>(chunk)];
   stiffness.Clear();
   ContactBlock b;
   b.viscous = viscous_ ? 1.0 : 0.0;
@@ -232,10 +223,43 @@ void Assembly::JudgeChunk(int chunk) {
   }
 }
 
+/// The steps that the axes of single bodies allow; clumps become their first spheres in judging_.
+void Assembly::SetStepsAlongAxes(StiffnessEstimate& estimate) {
+  auto& [chunks, springs, dashpots] = judging_;
+  clumps_.Fold(springs);
+  if (!dashpots.empty()) {
+    clumps_.Fold(dashpots);
+  }
+  double elastic2 = 0;  // squares of the fastest rates
+  double by_forces2 = 0;
+  double damped = 0;
+  for (std::size_t g = 0; g < springs.size(); ++g) {
+    const double inverse_mass = particles_.inverse_mass[g];
+    const double inverse_inertia = particles_.inverse_inertia[g];
+    const OwnStiffness& own = springs[g];
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double translation2 = own.translation[a] * inverse_mass;
+      const double rotation2 = own.rotation[a] * inverse_inertia;
+      const double turned_by_forces = std::max(0.0, own.rotation[a] - own.moment[a]);
+      elastic2 = std::max({elastic2, translation2, rotation2});
+      by_forces2 = std::max({by_forces2, translation2, turned_by_forces * inverse_inertia});
+      if (!dashpots.empty()) {
+        damped = std::max(
+            {damped, DampedRate(std::sqrt(translation2), dashpots[g].translation[a] * inverse_mass),
+             DampedRate(std::sqrt(rotation2), dashpots[g].rotation[a] * inverse_inertia)});
+      }
+    }
+  }
+  const auto step = [](double rate) { return rate > 0 ? 1.0 / rate : 0.0; };
+  estimate.elastic_step = step(std::sqrt(elastic2));
+  estimate.step_by_forces = step(std::sqrt(by_forces2));
+  estimate.critical_step = step(std::max(std::sqrt(elastic2), damped));
+}
+
 absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) {
   const ParticleArrays& p = particles_;
   const auto n = p.x.size();
-  auto& [chunks, springs, dashpots, stiffness, damping, by_forces] = judging_;
+  auto& [chunks, springs, dashpots] = judging_;
   springs.assign(n, OwnStiffness{});
   dashpots.clear();
   double rolling = 0;  // sum over contacts [N m/rad]
@@ -243,10 +267,16 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) {
   std::array<double, 3> modulus = {0, 0, 0};
   std::array<double, 3> viscosity = {0, 0, 0};
   absl::Status status;
-  chunks.resize(sums_.size());
-  ForEachChunk(static_cast<int>(chunks.size()), threads_, [this](int chunk) { JudgeChunk(chunk); });
-  for (std::size_t c = 0; c < chunks.size(); ++c) {
-    const ChunkStiffness& chunk = chunks[c];
+  const int count = static_cast<int>(sums_.size());
+  const int together = std::min(count, threads_ > 1 ? kChunksOfThread * threads_ : 1);
+  chunks.resize(static_cast<std::size_t>(together));
+  for (int c = 0; c < count; ++c) {
+    if (c % together == 0) {
+      ForEachChunk(std::min(together, count - c), threads_, [this, c, &chunks](int k) {
+        JudgeChunk(c + k, chunks[static_cast<std::size_t>(k)]);
+      });
+    }
+    const ChunkStiffness& chunk = chunks[static_cast<std::size_t>(c % together)];
     if (chunk.too_deep >= 0 && status.ok()) {
       const auto slot = static_cast<std::size_t>(chunk.too_deep);
       status = absl::OutOfRangeError(
@@ -254,7 +284,7 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) {
                        p.id[static_cast<std::size_t>(list_.second[slot])], " overlap by ",
                        chunk.deepest_there, " m, more than half the smaller radius"));
     }
-    const std::span<const int> grains = places_.GrainsOf(static_cast<int>(c));
+    const std::span<const int> grains = places_.GrainsOf(c);
     AddRows(grains, chunk.spring, springs);
     if (!chunk.dashpot.empty()) {
       dashpots.resize(n, OwnStiffness{});
@@ -285,45 +315,8 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) {
   });
   estimate.fastest.spring = FastestOf(springs);
   estimate.fastest.dashpot = dashpots.empty() ? 0.0 : FastestOf(dashpots);
-  TakeAxes(springs, stiffness);
-  TakeAxes(dashpots, damping);
-  const auto largest_rate = [&p, n](const std::vector<std::array<double, 6>>& of) {
-    double rate2 = 0;  // K/m
-    for (std::size_t g = 0; g < n; ++g) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        rate2 =
-            std::max({rate2, of[g][a] * p.inverse_mass[g], of[g][a + 3] * p.inverse_inertia[g]});
-      }
-    }
-    return std::sqrt(rate2);
-  };
-  by_forces.clear();
-  if (rolling + twisting > 0) {
-    by_forces = stiffness;
-    for (std::size_t g = 0; g < n; ++g) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        by_forces[g][a + 3] = std::max(0.0, by_forces[g][a + 3] - springs[g].moment[a]);
-      }
-    }
-    clumps_.Fold(by_forces);
-  }
-  clumps_.Fold(stiffness);
-  if (!damping.empty()) {
-    clumps_.Fold(damping);
-  }
-  double rate = largest_rate(stiffness);
-  const double slow = by_forces.empty() ? rate : largest_rate(by_forces);
-  estimate.step_by_forces = slow > 0 ? 1.0 / slow : 0.0;
-  estimate.elastic_step = rate > 0 ? 1.0 / rate : 0.0;
   estimate.by_twisting = twisting > rolling;
-  for (std::size_t g = 0; g < damping.size(); ++g) {
-    for (std::size_t a = 0; a < 6; ++a) {
-      const double inverse = a < 3 ? p.inverse_mass[g] : p.inverse_inertia[g];
-      rate =
-          std::max(rate, DampedRate(std::sqrt(stiffness[g][a] * inverse), damping[g][a] * inverse));
-    }
-  }
-  estimate.critical_step = rate > 0 ? 1.0 / rate : 0.0;
+  SetStepsAlongAxes(estimate);
   for (std::size_t a = 0; a < 3; ++a) {
     estimate.modulus[a] = modulus[a] / cell_.Volume();
     estimate.viscosity[a] = viscosity[a] / cell_.Volume();

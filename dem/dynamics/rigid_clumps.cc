@@ -368,17 +368,18 @@ void RigidClumps::Rewrap(const PeriodicCell& cell, const ParticleArrays& p) {
   }
 }
 
-void RigidClumps::Fold(std::vector<std::array<double, 6>>& stiffness) const {
+void RigidClumps::Fold(std::vector<OwnStiffness>& stiffness) const {
   for (const Clump& c : clumps_) {
-    std::array<double, 6> sum{};
+    OwnStiffness sum{};
     for (std::size_t s = 0; s < c.members.size(); ++s) {
-      auto& own = stiffness[static_cast<std::size_t>(c.members[s])];
+      OwnStiffness& own = stiffness[static_cast<std::size_t>(c.members[s])];
       const Vector& arm = c.arm[s];
-      const double leverage =
-          (own[0] + own[1] + own[2]) * (arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
+      const double leverage = (own.translation[0] + own.translation[1] + own.translation[2]) *
+                              (arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]);
       for (std::size_t a = 0; a < 3; ++a) {
-        sum[a] += own[a];
-        sum[a + 3] += own[a + 3] + leverage;
+        sum.translation[a] += own.translation[a];
+        sum.rotation[a] += own.rotation[a] + leverage;
+        sum.moment[a] += own.moment[a];
       }
       own = {};
     }

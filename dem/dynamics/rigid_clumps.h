@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dem/dynamics/leapfrog.h"
+#include "dem/dynamics/stable_step.h"
 #include "dem/geometry/periodic_cell.h"
 #include "dem/geometry/vector3.h"
 #include "dem/particles/packing.h"
@@ -67,9 +68,9 @@ class RigidClumps {
   /// each sphere by its old index, renumbered with them.
   void Renumber(const std::vector<int>& to, std::vector<int>& body);
 
-  /// Collects stiffness (or damping) of members, three translations and three rotations each, at
+  /// Collects what holds members when all others stay (OwnStiffness, not the shares) at
   /// the first member: translations add up, rotations gain what translation does on the arms.
-  void Fold(std::vector<std::array<double, 6>>& stiffness) const;
+  void Fold(std::vector<OwnStiffness>& stiffness) const;
 
   /// For archives: all state.
   template <class Archive>

@@ -105,17 +105,24 @@ CALIB_DEM_CLONES void AddTerms(const LanePlaces place, const Coefficients c, con
     Quad on;
     Quad normal;
     Quad more;
+    Quad tangential;
+    Quad rolling;
+    Quad twisting;
     Quad ri;
     Quad rj;
     LoadQuad(keep + k, on);
     LoadQuad(c.normal + k, normal);
     LoadQuad(c.more + k, more);
-    LoadQuad(c.tangential + k, four.tangential);
-    LoadQuad(c.rolling + k, four.rolling);
-    LoadQuad(c.twisting + k, four.twisting);
+    LoadQuad(c.tangential + k, tangential);
+    LoadQuad(c.rolling + k, rolling);
+    LoadQuad(c.twisting + k, twisting);
     LoadQuad(b.radius_i + k, ri);
     LoadQuad(b.radius_j + k, rj);
-    four.normal = normal + more;
+    normal = on > zero ? normal : zero;  // what does not touch may hold anything
+    four.normal = on > zero ? normal + more : zero;
+    four.tangential = on > zero ? tangential : zero;
+    four.rolling = on > zero ? rolling : zero;
+    four.twisting = on > zero ? twisting : zero;
     for (int a = 0; a < 3; ++a) {
       LoadQuad(n[a] + k, four.n[a]);
     }
@@ -128,7 +135,7 @@ CALIB_DEM_CLONES void AddTerms(const LanePlaces place, const Coefficients c, con
       four.both[a] = on > zero ? four.n[a] * four.n[(a + 1) % 3] : zero;
       sum[a] += (normal * four.along[a] + four.tangential * four.across[a]) * branch * branch;
     }
-    const Quad ratio = ri * ri * ri / (rj * rj * rj);
+    const Quad ratio = on > zero ? ri * ri * ri / (rj * rj * rj) : one;
     AddSide(four, ri, one, one + ratio, place.i + k, to);
     AddSide(four, rj, -one, one + one / ratio, place.j + k, to);
   }
