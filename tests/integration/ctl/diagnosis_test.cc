@@ -230,14 +230,18 @@ TEST_F(Diagnosis, DeletesACampaignWithAllThatComesFromIt) {
   EXPECT_TRUE(Call("list --state s --json").json().empty());
 }
 
-// Errors so small that the model misses, at a porosity that cannot be 0.02 higher.
+// Errors so small that the model misses, at a porosity that cannot be 0.02 higher (this packing comes to
+// rest at 0.438 at most).
 class Misfit : public Diagnosis {
  protected:
   Misfit() {
-    Write("small.yaml",
-          calib::testing::SixtyFourGrains("{q_over_p: {noise: {absolute: 0.02}}, "
-                                          "volumetric_strain: {noise: {absolute: 0.0001}}}",
-                                          12, 2));
+    std::string text = calib::testing::SixtyFourGrains(
+        "{q_over_p: {noise: {absolute: 0.02}}, "
+        "volumetric_strain: {noise: {absolute: 0.0001}}}",
+        12, 2);
+    const std::string seed = "seed: 3";
+    text.replace(text.find(seed), seed.size(), "seed: 6");
+    Write("small.yaml", text);
   }
   static bool Warns(const Json& diagnosis, const std::string& what) {
     return diagnosis["warnings"].dump().find(what) != std::string::npos;
@@ -254,7 +258,7 @@ TEST_F(Misfit, ATestThatCannotBePreparedIsLeftOutOfTheNextOnes) {
   const Json& considered = json["next_experiment"]["considered"];
   EXPECT_GE(considered.size(), 3U) << considered;
   for (const Json& planned : considered) {
-    EXPECT_NE(planned["settings"].value("porosity", 0.0), 0.44) << considered;
+    EXPECT_LT(planned["settings"].value("porosity", 0.0), 0.43) << considered;
   }
 }
 
