@@ -225,7 +225,8 @@ void Assembly::JudgeChunk(int chunk, ChunkStiffness& stiffness) const {
 
 /// The steps that the axes of single bodies allow; clumps become their first spheres in judging_.
 void Assembly::SetStepsAlongAxes(StiffnessEstimate& estimate) {
-  auto& [chunks, springs, dashpots] = judging_;
+  std::vector<OwnStiffness>& springs = judging_.springs;
+  std::vector<OwnStiffness>& dashpots = judging_.dashpots;
   clumps_.Fold(springs);
   if (!dashpots.empty()) {
     clumps_.Fold(dashpots);
@@ -259,7 +260,9 @@ void Assembly::SetStepsAlongAxes(StiffnessEstimate& estimate) {
 absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) {
   const ParticleArrays& p = particles_;
   const auto n = p.x.size();
-  auto& [chunks, springs, dashpots] = judging_;
+  std::vector<ChunkStiffness>& chunks = judging_.chunks;
+  std::vector<OwnStiffness>& springs = judging_.springs;
+  std::vector<OwnStiffness>& dashpots = judging_.dashpots;
   springs.assign(n, OwnStiffness{});
   dashpots.clear();
   double rolling = 0;  // sum over contacts [N m/rad]
