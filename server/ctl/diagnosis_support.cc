@@ -9,7 +9,9 @@
 namespace calib::ctl {
 namespace {
 
-constexpr int kMorePackings = 8;  // that a diagnosis is content with
+// That a diagnosis is content with: what eight did not show, or not clearly, sixteen showed in three of
+// four cases (deploy/bench/hidden-effects.d, engine 13).
+constexpr int kMorePackings = 16;
 
 }  // namespace
 
@@ -59,10 +61,11 @@ std::vector<std::string> DoubtsOf(const FittedCampaign& base) {
   const bool has_grains =
       std::none_of(experiments.begin(), experiments.end(), &campaign::MakesItsBodies);
   if (one_packing && has_grains && !view.campaign.precomputed) {
-    doubts.emplace_back(
+    doubts.push_back(absl::StrCat(
         "Every fitted test is run on one packing: by how much another one differs is not in the "
         "errors, and may be taken for a missing effect unless the packing is the measured one. "
-        "realizations: 8 or more show it.");
+        "realizations: ",
+        kMorePackings, " or more show it."));
   }
   return doubts;
 }
