@@ -17,11 +17,12 @@ inference::FittedModel LeftOut(int packings) {
 TEST(FewPackings, AreSaidWithWhatTheyCost) {
   EXPECT_EQ(FewPackings(LeftOut(0), 0), "") << "packings were not varied";
   EXPECT_THAT(FewPackings(LeftOut(0), 3),
-              HasSubstr("with fewer than 4 nothing is called missing (`realizations: 8`"));
+              HasSubstr("with fewer than 4 nothing is called missing (`realizations: 16`"));
   EXPECT_THAT(FewPackings(LeftOut(4), 4),
               HasSubstr("known from 4 of them, so that a misfit must be large"));
   EXPECT_THAT(FewPackings(LeftOut(0), 6), HasSubstr("fewer than 4 can be told apart"));
-  EXPECT_EQ(FewPackings(LeftOut(7), 8), "") << "one has no run near the best point";
+  EXPECT_THAT(FewPackings(LeftOut(8), 8), HasSubstr("`realizations: 16` or more"));
+  EXPECT_EQ(FewPackings(LeftOut(15), 16), "") << "one has no run near the best point";
 }
 
 }  // namespace
