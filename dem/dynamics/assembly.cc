@@ -41,8 +41,8 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model,
     TakeMaterials(packing);
     walls_.SetMaterial(model_.materials()->IndexOf(surroundings.material));
   }
-  clumps_ = RigidClumps(packing, density, particles_);
-  assert(thickness_ == 0 || (planar_ && clumps_.all().empty()));
+  clumps_ = RigidClumps(packing, ClumpMatterOf(density), particles_);
+  assert(thickness_ == 0 || planar_);
   double radii = 0;
   for (std::size_t g = 0; g < particles_.radius.size(); ++g) {
     if (particles_.body.empty() || particles_.body[g] < 0) {

@@ -53,6 +53,7 @@ struct NewGrain {
   Vec3 centre{}, velocity{};  ///< [m, m/s]
   double radius = 0;          ///< [m] > 0
   int material = 0;           ///< index in Materials
+  int clump = -1;             ///< >= 0: one rigid body with those of this number that join with it
 };
 
 /// Copyable: a copy is a snapshot that goes on to the same bits. Not thread-safe; uses `threads`
@@ -72,8 +73,9 @@ class Assembly {
   /// EvaluateForces. Precondition: of a clump all spheres or none.
   void Remove(const std::vector<int>& grains);
 
-  /// Lets grains join, with the next free ids. To be followed by EvaluateForces. Preconditions:
-  /// single spheres (no clumps); the skin and the step were chosen for grains like these.
+  /// Lets grains join, with the next free ids. To be followed by EvaluateForces. Preconditions: the
+  /// skin and the step were chosen for grains like these; those of one clump follow one another, have
+  /// one velocity and the model's own material.
   void Insert(const std::vector<NewGrain>& grains);
 
   /// Takes a clump (index in clumps().all()) out of its contacts and sets it down at rest, farther
@@ -222,6 +224,9 @@ class Assembly {
   void PrepareBlock(ContactBlock& block) const;
   void TakeMaterials(const Packing& packing);
   [[nodiscard]] double DensityOf(int material) const;
+  [[nodiscard]] ClumpMatter ClumpMatterOf(double density) const {
+    return {.density = density, .planar = planar_, .thickness = thickness_};
+  }
   [[nodiscard]] int MaterialOf(std::size_t grain) const {
     return particles_.material.empty() ? 0 : particles_.material[grain];
   }

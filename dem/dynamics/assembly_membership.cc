@@ -106,8 +106,14 @@ void Assembly::Relocate(int clump, const Vec3& shift) {
 }
 
 void Assembly::Insert(const std::vector<NewGrain>& grains) {
-  assert(clumps_.empty());
   ParticleArrays& p = particles_;
+  const bool clumps = std::any_of(grains.begin(), grains.end(),
+                                  [](const NewGrain& grain) { return grain.clump >= 0; });
+  if (clumps && p.body.empty()) {
+    p.body.assign(p.x.size(), -1);
+  }
+  std::vector<std::vector<int>> bodies;
+  int last = -1;
   for (const NewGrain& grain : grains) {
     assert(grain.radius > 0 && grain.radius <= largest_radius_ * (1 + 1e-12));
     const double density = DensityOf(grain.material);
@@ -128,7 +134,21 @@ void Assembly::Insert(const std::vector<NewGrain>& grains) {
     if (model_.materials() != nullptr) {
       p.material.push_back(static_cast<std::uint8_t>(grain.material));
     }
-    solid_volume_ += inertia.mass / density;
+    if (!p.body.empty() || clumps) {
+      p.body.push_back(-1);
+    }
+    if (grain.clump < 0) {
+      solid_volume_ += inertia.mass / density;
+    } else if (grain.clump == last) {
+      bodies.back().push_back(p.size() - 1);
+    } else {
+      bodies.push_back({p.size() - 1});
+    }
+    last = grain.clump;
+  }
+  for (const std::vector<int>& body : bodies) {
+    clumps_.Add(body, cell_.length, ClumpMatterOf(density_), p);
+    solid_volume_ += clumps_.all().back().volume;
   }
   stale_ = true;
   loads_fit_ = false;

@@ -4,9 +4,12 @@
 #include <cassert>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "dem/contact/simd.h"
 #include "dem/dynamics/chunks.h"
+#include "dem/elementary/functions.h"
+#include "dem/particles/disk_pair.h"
 #include "dem/particles/union_of_spheres.h"
 
 namespace calib::dem {
@@ -82,7 +85,44 @@ Quaternion FromAxes(const std::array<Vector, 3>& axes) {
   return {unit.w, unit.x, unit.y, unit.z};
 }
 
-Clump MakeClump(const std::vector<int>& members, const Packing& packing, double density,
+/// In the plane turning about y is all there is: the same moment about every axis does that alone.
+void TakePlanarMoments(const std::vector<Sphere>& spheres, const ClumpMatter& matter, Clump& c) {
+  double moment = 0;
+  if (matter.thickness > 0) {
+    const Sphere& a = spheres.front();
+    const Sphere& b = spheres.back();
+    assert(spheres.size() == 2 && a.radius == b.radius);
+    const PlateMoments plate = MomentsOfDiskPair(
+        a.radius,
+        std::min(a.radius, 0.5 * Hypotenuse(b.centre[0] - a.centre[0], b.centre[2] - a.centre[2])));
+    c.volume = matter.thickness * plate.area;
+    moment = matter.thickness * plate.polar;
+    for (std::size_t k = 0; k < 3; ++k) {
+      c.centre[k] = 0.5 * (a.centre[k] + b.centre[k]);
+    }
+  } else {
+    const SolidMoments solid = MomentsOfUnion(spheres);
+    c.volume = solid.volume;
+    moment = solid.inertia[1][1];
+    c.centre = solid.centroid;
+  }
+  c.centre[1] = spheres.front().centre[1];  // to the last bit
+  c.orientation = {1, 0, 0, 0};
+  c.inertia.fill(matter.density * moment);
+}
+
+void TakeMoments(const std::vector<Sphere>& spheres, const ClumpMatter& matter, Clump& c) {
+  const SolidMoments moments = MomentsOfUnion(spheres);
+  const PrincipalMoments principal = Diagonalize(moments.inertia);
+  c.volume = moments.volume;
+  c.centre = moments.centroid;
+  c.orientation = FromAxes(principal.axes);
+  for (std::size_t a = 0; a < 3; ++a) {
+    c.inertia[a] = matter.density * principal.moment[a];
+  }
+}
+
+Clump MakeClump(const std::vector<int>& members, const double* length, const ClumpMatter& matter,
                 ParticleArrays& p) {
   Clump c;
   c.members = members;
@@ -93,20 +133,17 @@ Clump MakeClump(const std::vector<int>& members, const Packing& packing, double 
     const auto k = static_cast<std::size_t>(m);
     Vector centre = {p.x[k], p.y[k], p.z[k]};
     for (std::size_t a = 0; a < 3; ++a) {
-      const double turns = std::round((centre[a] - base[a]) / packing.length[a]);
-      centre[a] -= turns * packing.length[a];
+      const double turns = std::round((centre[a] - base[a]) / length[a]);
+      centre[a] -= turns * length[a];
     }
     spheres.push_back({.centre = centre, .radius = p.radius[k]});
   }
-  const SolidMoments moments = MomentsOfUnion(spheres);
-  const PrincipalMoments principal = Diagonalize(moments.inertia);
-  c.volume = moments.volume;
-  c.mass = density * moments.volume;
-  c.centre = moments.centroid;
-  c.orientation = FromAxes(principal.axes);
-  for (std::size_t a = 0; a < 3; ++a) {
-    c.inertia[a] = density * principal.moment[a];
+  if (matter.planar) {
+    TakePlanarMoments(spheres, matter, c);
+  } else {
+    TakeMoments(spheres, matter, c);
   }
+  c.mass = matter.density * c.volume;
   for (std::size_t s = 0; s < spheres.size(); ++s) {
     Vector arm{};
     for (std::size_t a = 0; a < 3; ++a) {
@@ -300,7 +337,8 @@ void FillWithRest(BodyLanes& b) {
 
 }  // namespace
 
-RigidClumps::RigidClumps(const Packing& packing, double density, ParticleArrays& particles) {
+RigidClumps::RigidClumps(const Packing& packing, const ClumpMatter& matter,
+                         ParticleArrays& particles) {
   std::map<int, std::vector<int>> members;  // by the id in the packing
   for (int k = 0; k < particles.size(); ++k) {
     const int id =
@@ -322,11 +360,19 @@ RigidClumps::RigidClumps(const Packing& packing, double density, ParticleArrays&
   }
   particles.body.assign(particles.x.size(), -1);
   for (const std::vector<int>& body : bodies) {
-    for (const int m : body) {
-      particles.body[static_cast<std::size_t>(m)] = static_cast<int>(clumps_.size());
-    }
-    clumps_.push_back(MakeClump(body, packing, density, particles));
+    Add(body, packing.length, matter, particles);
   }
+}
+
+void RigidClumps::Add(const std::vector<int>& members, const double* length,
+                      const ClumpMatter& matter, ParticleArrays& particles) {
+  for (const int m : members) {
+    particles.body[static_cast<std::size_t>(m)] = static_cast<int>(clumps_.size());
+  }
+  Clump clump = MakeClump(members, length, matter, particles);
+  const auto first = static_cast<std::size_t>(members.front());
+  clump.velocity = {particles.vx[first], particles.vy[first], particles.vz[first]};
+  clumps_.push_back(std::move(clump));
 }
 
 void RigidClumps::Advance(const Motion& motion, const Vec3& gravity, const PeriodicCell& cell,

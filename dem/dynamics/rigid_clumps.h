@@ -36,6 +36,14 @@ struct Clump {
   }
 };
 
+/// What the bodies of an assembly are made of.
+struct ClumpMatter {
+  double density = 0;   ///< [kg/m^3] > 0
+  bool planar = false;  ///< they turn about y only; centres of members in one plane y
+  double thickness =
+      0;  ///< planar: of disks, of which each body has two equal ones [m]; 0: spheres
+};
+
 /// Bodies of an assembly; none where every grain is a sphere of its own. Mass and inertia are those
 /// of the union, so that overlapping members count once. Leapfrog: forces and momenta at half
 /// steps, orientation by the angular velocity at mid-step [Fincham 1992, Mol. Simul. 8, 165], with
@@ -46,8 +54,14 @@ class RigidClumps {
 
   /// Takes the clumps of the packing (two and more spheres of one id) and gives their members the
   /// mass and the smallest moment of the body. particles: MakeParticles of the packing. Members lie
-  /// at the images nearest to their first. density [kg/m^3] > 0.
-  RigidClumps(const Packing& packing, double density, ParticleArrays& particles);
+  /// at the images nearest to their first.
+  RigidClumps(const Packing& packing, const ClumpMatter& matter, ParticleArrays& particles);
+
+  /// One more, of particles at these indices, ascending, that belong to none, in a cell of these
+  /// lengths [m]: it does not turn yet and has the velocity of its first member. particles.body as
+  /// long as the other arrays.
+  void Add(const std::vector<int>& members, const double* length, const ClumpMatter& matter,
+           ParticleArrays& particles);
 
   [[nodiscard]] bool empty() const { return clumps_.empty(); }
   [[nodiscard]] const std::vector<Clump>& all() const { return clumps_; }

@@ -10,11 +10,11 @@ void Prepare(const ParameterSet& parameters, Preparation& preparation) {
   preparation.aspect = parameters.Get("aspect");
 }
 
-/// Specimens, and poured grains but those that are fed in or in one plane.
+/// Specimens, and poured grains.
 std::vector<std::string> TestsOfShape() {
   std::vector<std::string> tests = ElementTestNames();
-  tests.insert(tests.end(),
-               {"angle_of_repose", "calibration_device", "rotating_drum", "silo_discharge"});
+  tests.insert(tests.end(), {"angle_of_repose", "calibration_device", "rotating_drum", "shaken_box",
+                             "silo_discharge", "transfer_chute"});
   return tests;
 }
 
@@ -23,7 +23,9 @@ std::vector<std::string> TestsOfShape() {
 /// Every sphere becomes a rigid clump of two equal overlapping spheres of the same volume (of the
 /// union), length over width `aspect`, directions at random; the specimen is brought to the new
 /// shape at constant porosity before consolidation (simulation/shape_change.h). Poured grains are
-/// set loosely with their shape and fall into place. Null by definition at aspect 1: spheres.
+/// set loosely with their shape and fall into place, or are fed in along the belt; in a plane they turn
+/// about its normal only, and where a thickness makes disks they are two equal overlapping disks of
+/// the same area. Null by definition at aspect 1: spheres.
 /// One-sided. [Favier et al. 1999; Ng 2004, J. Eng. Mech. 130, 193]
 EffectEntry NonsphericalShape() {
   ParameterInfo aspect;
@@ -38,7 +40,8 @@ EffectEntry NonsphericalShape() {
                    .kind = "particle",
                    .description =
                        "Rigid clumps of two equal spheres of the volume of the sphere that they "
-                       "replace, at random directions and the packing's porosity; one-sided, "
+                       "replace (disks: of two of its area), at random directions and the "
+                       "packing's porosity; one-sided, "
                        "vanishes at aspect 1",
                    .contacts = {},
                    .parameters = {aspect},
@@ -46,8 +49,7 @@ EffectEntry NonsphericalShape() {
                                 "(2004) 193",
                    .two_sided = false,
                    .rays = {{.parameter = "aspect", .steps = {0.1, 0.3}}},
-                   .excited_by = TestsOfShape(),
-                   .needs_space = true},
+                   .excited_by = TestsOfShape()},
           .place = 10,
           .prepare = &Prepare};
 }

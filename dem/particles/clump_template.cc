@@ -158,6 +158,19 @@ Rotation DrawRotation(std::uint64_t seed, int grain, int draw) {
            {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}}};
 }
 
+Rotation DrawRotationInPlane(std::uint64_t seed, int grain, int draw) {
+  const double angle = 2.0 * std::numbers::pi * Uniform(seed, kOrientationDraw, grain, draw)[0];
+  const double c = Cosine(angle);
+  const double s = Sine(angle);
+  return {{{c, 0, s}, {0, 1, 0}, {-s, 0, c}}};
+}
+
+Rotation LaidDown(double angle) {
+  const double c = Cosine(angle);
+  const double s = Sine(angle);
+  return {{{-s, 0, c}, {c, 0, s}, {0, 1, 0}}};
+}
+
 Sphere Placed(const Sphere& member, const Rotation& rotation, double radius,
               const std::array<double, 3>& centre) {
   Sphere placed{.centre = centre, .radius = radius * member.radius};

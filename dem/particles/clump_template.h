@@ -26,7 +26,8 @@ inline constexpr int kMostSpheresOfAClump = 64;
 /// result is meaningful only if none was added.
 ClumpTemplate ParseClumpTemplate(const std::string& text, std::vector<PackingProblem>& problems);
 
-/// Two equal spheres along z, length over width `aspect` in (1, 2].
+/// Two equal spheres along z, length over width `aspect` in (1, 2]. In a plane of disks:
+/// DiskPairTemplate.
 ClumpTemplate DumbbellTemplate(double aspect);
 
 /// The shape on its way from a sphere of radius 1 (share 0) to the template (share 1), always of
@@ -42,6 +43,12 @@ using Rotation = std::array<std::array<double, 3>, 3>;
 /// Rotation of a grain, uniform over all: a unit quaternion from three numbers of draw `draw`
 /// [Shoemake 1992, Graphics Gems III, p. 124].
 Rotation DrawRotation(std::uint64_t seed, int grain, int draw);
+
+/// About y, by an angle uniform over all, from the first number of draw `draw`.
+Rotation DrawRotationInPlane(std::uint64_t seed, int grain, int draw);
+
+/// Turns z to the horizontal direction at `angle` from x towards y [rad].
+Rotation LaidDown(double angle);
 
 /// A sphere of the shape in a grain of that radius (of the sphere of its volume) and centre [m].
 Sphere Placed(const Sphere& member, const Rotation& rotation, double radius,

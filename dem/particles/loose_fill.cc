@@ -31,7 +31,8 @@ class Lookup {
       : region_(region),
         nx_(Count(region.width, largest)),
         ny_(Count(region.depth, largest)),
-        size_{region.width / nx_, region.depth / ny_, 2 * largest} {}
+        size_{region.width / nx_, region.depth > 0 ? region.depth / ny_ : 2 * largest,
+              2 * largest} {}
 
   /// Whether a sphere touches none of those that are there.
   [[nodiscard]] bool Free(const Sphere& sphere) const {
@@ -101,7 +102,8 @@ bool Holds(const FillRegion& region, double height, const Sphere& s) {
   const double up = s.centre[2] - region.low.z;
   const double back = s.centre[1] - region.low.y;
   return up >= s.radius && up + s.radius <= height &&
-         (region.repeats || (back >= s.radius && back + s.radius <= region.depth)) &&
+         (region.repeats || !(region.depth > 0) ||
+          (back >= s.radius && back + s.radius <= region.depth)) &&
          region.holds({s.centre[0], s.centre[1], s.centre[2]}, s.radius);
 }
 
@@ -130,7 +132,8 @@ Packing RandomFill(std::vector<double> radii, const ClumpTemplate& shape, const 
         height += length;
       }
       const auto u = Uniform(seed, kFillDraw, grain, draw);
-      const Rotation rotation = DrawRotation(seed, grain, draw);
+      const Rotation rotation = region.depth > 0 ? DrawRotation(seed, grain, draw)
+                                                 : DrawRotationInPlane(seed, grain, draw);
       for (const Sphere& member : shape.spheres) {
         members.push_back(
             Placed(member, rotation, radius,

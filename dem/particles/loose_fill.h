@@ -28,10 +28,11 @@ struct FillRegion {
 Packing LooseFill(std::vector<double> radii, const FillRegion& region, std::uint64_t seed);
 
 /// Grains of a shape, their radii in an order drawn from the seed, thrown one after another to
-/// random places and directions where they touch no other (random sequential addition). A region
+/// random places and directions where they touch no other (random sequential addition); in a plane
+/// they are turned about y only, by any angle, and members of the shape have to lie at y = 0. A region
 /// of unlimited height is filled from below: it grows by a grain's length whenever a grain finds no
 /// place in 200 throws. Fewer grains come back where one finds none in 20 000 throws. Clump ids
-/// count the grains. The same arguments give the same bits. Precondition: depth > 0.
+/// count the grains. The same arguments give the same bits.
 Packing RandomFill(std::vector<double> radii, const ClumpTemplate& shape, const FillRegion& region,
                    std::uint64_t seed);
 

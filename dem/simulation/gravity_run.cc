@@ -8,19 +8,31 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
-#include "dem/particles/clump_template.h"
+#include "dem/particles/disk_pair.h"
 #include "dem/particles/material_shares.h"
 #include "dem/simulation/element_test_setup.h"
 #include "dem/simulation/test_meshes.h"
 
 namespace calib::dem {
+namespace {
+
+ClumpTemplate ShapeOf(double aspect, bool disks) {
+  if (!(aspect > 1)) {
+    return {{{{0, 0, 0}, 1}}};
+  }
+  return disks ? DiskPairTemplate(aspect) : DumbbellTemplate(aspect);
+}
+
+}  // namespace
 
 GravityRun::GravityRun(const Scenario& scenario, RunRecord& record, std::stop_token stop)
     : scenario_(scenario),
       record_(record),
       stop_(std::move(stop)),
       observables_(FindTest(scenario.test)->observables),
-      aspect_(PreparationOf(scenario).aspect) {
+      aspect_(PreparationOf(scenario).aspect),
+      shape_(ShapeOf(aspect_, scenario.settings.contains("thickness") &&
+                                  scenario.settings.at("thickness") > 0)) {
   double sum = 0;
   for (const double r : radii()) {
     sum += 2 * r;
@@ -100,8 +112,7 @@ std::string GravityRun::MaterialOf(const std::string& body) const {
 }
 
 Packing GravityRun::Fill(const FillRegion& region, std::uint64_t seed) const {
-  return aspect_ > 1 ? RandomFill(radii(), DumbbellTemplate(aspect_), region, seed)
-                     : LooseFill(radii(), region, seed);
+  return aspect_ > 1 ? RandomFill(radii(), shape_, region, seed) : LooseFill(radii(), region, seed);
 }
 
 void GravityRun::Mix(Packing& grains) const {

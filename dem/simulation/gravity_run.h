@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 #include "dem/dynamics/archive.h"
 #include "dem/dynamics/flow.h"
+#include "dem/particles/clump_template.h"
 #include "dem/particles/loose_fill.h"
 #include "dem/simulation/run_record.h"
 #include "dem/simulation/scenario.h"
@@ -68,8 +69,12 @@ class GravityRun {
   /// Length over width of the grains (nonspherical_shape); 1: spheres. What the test chooses of its
   /// device does not depend on it.
   [[nodiscard]] double aspect() const { return aspect_; }
+  /// Of a grain whose radius is 1; of disks where the test's thickness makes them.
+  [[nodiscard]] const ClumpTemplate& shape() const { return shape_; }
   /// Spheres that a grain is made of.
-  [[nodiscard]] int spheres_per_grain() const { return aspect_ > 1 ? 2 : 1; }
+  [[nodiscard]] int spheres_per_grain() const { return static_cast<int>(shape_.spheres.size()); }
+  /// Longest way through a grain [m].
+  [[nodiscard]] double largest_length() const { return ReachOf(shape_) * largest_diameter_; }
   /// Volume of all grains [m^3].
   [[nodiscard]] double solid() const;
   [[nodiscard]] std::uint64_t seed() const { return scenario_.seed; }
@@ -127,6 +132,7 @@ class GravityRun {
   std::stop_token stop_;
   const std::vector<std::string>& observables_;
   double aspect_ = 1;
+  ClumpTemplate shape_;
   double mean_diameter_ = 0;
   double largest_diameter_ = 0;
   std::string reason_;

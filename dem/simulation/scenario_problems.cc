@@ -235,13 +235,11 @@ void CheckShapes(const Scenario& scenario, bool poured, Problems& problems) {
     problems.push_back(absl::StrCat("test ", scenario.test,
                                     " pours single spheres (clump -1), this packing has clumps"));
   }
+  if (poured && chosen("particle_crushing")) {
+    problems.push_back(absl::StrCat("effect particle_crushing is not there in test ", scenario.test,
+                                    ", which leaves the grains that it pours whole"));
+  }
   for (const char* name : {"nonspherical_shape", "particle_crushing"}) {
-    const auto& tests = FindEffect(name)->excited_by;
-    if (poured && chosen(name) &&
-        std::find(tests.begin(), tests.end(), scenario.test) == tests.end()) {
-      problems.push_back(absl::StrCat("effect ", name, " is not there in test ", scenario.test,
-                                      ", which pours single spheres"));
-    }
     if (clumps && chosen(name)) {
       problems.push_back(absl::StrCat("effect ", name,
                                       " needs a packing of single spheres (clump -1), this one has "
@@ -305,12 +303,6 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
                      [&](const ParameterInfo& info) { return info.name == name; })) {
       problems.push_back(absl::StrCat("test ", scenario.test, " has no setting \"", name, "\""));
     }
-  }
-  if (Given(scenario, "flat") >= 0.5 &&
-      std::find(scenario.model.effects.begin(), scenario.model.effects.end(),
-                "nonspherical_shape") != scenario.model.effects.end()) {
-    problems.emplace_back(
-        "effect nonspherical_shape needs room to all sides: leave flat out, or the effect");
   }
   if (test->name == "silo_discharge" && Given(scenario, "thickness") > 0 &&
       Given(scenario, "flat") < 0.5) {

@@ -45,16 +45,15 @@ StageEnd RunShakenBox(GravityRun& run) {
   if (!(2 * big < width)) {
     return run.Fail("box_width is too small for the intruder");
   }
-  Packing grains = LooseFill(run.radii(),
-                             {.low = {side, 0, 0},
-                              .width = width,
-                              .holds =
-                                  [&](const Vec3& c, double r) {
-                                    return c.x - r > side && c.x + r < side + width &&
-                                           Hypotenuse(c.x - intruder.x, c.z - start) > r + big;
-                                  }},
-                             run.seed());
-  if (grains.x.size() < run.radii().size()) {
+  Packing grains = run.Fill({.low = {side, 0, 0},
+                             .width = width,
+                             .holds =
+                                 [&](const Vec3& c, double r) {
+                                   return c.x - r > side && c.x + r < side + width &&
+                                          Hypotenuse(c.x - intruder.x, c.z - start) > r + big;
+                                 }},
+                            run.seed());
+  if (run.CountOf(grains) < run.radii().size()) {
     return run.Fail("box_width is too small: no grain fits into the box");
   }
   run.Mix(grains);

@@ -3,11 +3,14 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "dem/elementary/functions.h"
+#include "dem/particles/clump_template.h"
 #include "dem/particles/random_numbers.h"
 #include "dem/simulation/gravity_run.h"
 
@@ -28,7 +31,8 @@ constexpr int kFunnel = 2;             ///< among the walls
 constexpr double kWidth = 40;          ///< of the whole, along y
 
 constexpr double kPitch = 1.1;      ///< between the places of a row that is fed
-constexpr double kRowLength = 1.2;  ///< until a row has made room for the next
+constexpr double kRowLength = 1.2;  ///< until a row has made room for the next, in grain lengths
+constexpr double kAskew = 5 * std::numbers::pi / 180;  ///< of elongated grains to the belt, at most
 constexpr auto kPlaces = static_cast<std::size_t>((kBeltWidth - 1) / kPitch);
 
 /// Turns a mesh about the line through `pivot` along x.
@@ -117,6 +121,8 @@ class Feed {
  public:
   Feed(const GravityRun& run, const Chute& chute, double speed, double rate)
       : radii_(run.radii()),
+        shape_(run.shape()),
+        row_length_(kRowLength * run.largest_length()),
         chute_(chute),
         speed_(speed),
         density_(run.density()),
@@ -139,18 +145,27 @@ class Feed {
       const double y = chute_.middle +
                        (static_cast<double>(k) - 0.5 * static_cast<double>(kPlaces - 1)) * pitch +
                        0.04 * d * (2 * u[0] - 1);
-      row.push_back({.centre = {1.0 * d + 0.02 * d * (2 * u[1] - 1), y, chute_.belt_z + r},
-                     .velocity = {speed_, 0, 0},
-                     .radius = r});
+      const Rotation along = LaidDown(kAskew * (2 * u[2] - 1));
+      for (const Sphere& member : shape_.spheres) {
+        const Sphere placed =
+            Placed(member, along, r,
+                   {1.0 * d + 0.02 * d * (2 * u[1] - 1), y, chute_.belt_z + r * member.radius});
+        row.push_back({.centre = {placed.centre[0], placed.centre[1], placed.centre[2]},
+                       .velocity = {speed_, 0, 0},
+                       .radius = placed.radius,
+                       .clump = shape_.spheres.size() > 1 ? static_cast<int>(next_) : -1});
+      }
       fed_ += density_ * 4.0 / 3.0 * std::numbers::pi * r * r * r;
       ++next_;
     }
-    ready_ = time + kRowLength * d / speed_;
+    ready_ = time + row_length_ / speed_;
     assembly.Insert(row);
   }
 
  private:
   const std::vector<double>& radii_;
+  const ClumpTemplate& shape_;
+  double row_length_;
   const Chute& chute_;
   double speed_, density_, rate_;
   std::uint64_t seed_;
@@ -190,28 +205,34 @@ StageEnd Convey(GravityRun& run, const ControlPoint& point) {
   }
   mean_mass /= static_cast<double>(run.radii().size());
   const double rate = run.SettingOr("feed_rate", kBeltWidth / 3 * mean_mass * speed / d);
-  const double largest_rate = static_cast<double>(kPlaces) * mean_mass * speed / (kRowLength * d);
+  const double largest_rate =
+      static_cast<double>(kPlaces) * mean_mass * speed / (kRowLength * run.largest_length());
   if (rate > largest_rate) {
     return run.Fail(absl::StrCat("belt_speed ", speed, " m/s: feed_rate is ", rate,
                                  " kg/s, the belt carries at most ", largest_rate,
                                  " kg/s, a row of ", kPlaces, " grains every ", kRowLength,
-                                 " of the largest diameter"));
+                                 " of the largest grain's length"));
   }
   // The smallest and the largest grain stand far below as patterns for skin and step; they drain.
   const auto [smallest, largest] = std::minmax_element(run.radii().begin(), run.radii().end());
   Packing patterns;
-  for (const double r : {*smallest, *largest}) {
-    patterns.x.push_back(0.0);
-    patterns.y.push_back(chute.middle + (patterns.x.size() > 1 ? 5 * d : -5 * d));
-    patterns.z.push_back(-100 * d);
-    patterns.radius.push_back(r);
-    patterns.clump.push_back(-1);
+  for (const auto& [r, side] : {std::pair{*smallest, -5 * d}, std::pair{*largest, 5 * d}}) {
+    for (const Sphere& member : run.shape().spheres) {
+      const Sphere placed = Placed(member, LaidDown(0), r, {0.0, chute.middle + side, -100 * d});
+      patterns.x.push_back(placed.centre[0]);
+      patterns.y.push_back(placed.centre[1]);
+      patterns.z.push_back(placed.centre[2]);
+      patterns.radius.push_back(placed.radius);
+      patterns.clump.push_back(run.spheres_per_grain() == 1 ? -1 : side < 0 ? 0 : 1);
+    }
   }
   patterns.length[0] = (kBeltLength + 2 * kPlate) * d;
   patterns.length[1] = kWidth * d;
   patterns.length[2] = chute.belt_z + 5 * d;
   Assembly assembly = run.Make(patterns, {.walls = chute.walls});
-  assembly.Remove({0, 1});
+  std::vector<int> all(patterns.x.size());
+  std::iota(all.begin(), all.end(), 0);
+  assembly.Remove(all);
   Feed feed(run, chute, speed, rate);
   feed.Act(0, assembly);
   const double fall = chute.belt_z + speed * speed / (2 * run.gravity());

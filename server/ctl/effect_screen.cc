@@ -155,7 +155,7 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
     const dem::TestInfo* const test = dem::FindTest(e.test);
     if (effect.kind == "particle" && test != nullptr && test->poured &&
         !campaign::CanShow(e, effect)) {
-      return absl::StrCat("test ", e.test, " pours single spheres, which it leaves whole");
+      return absl::StrCat("test ", e.test, " pours its grains, which it leaves whole");
     }
     if (e.role != campaign::Role::kCalibrate) continue;
     const auto pressure = e.settings.find("confining_pressure");

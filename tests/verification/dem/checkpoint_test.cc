@@ -148,7 +148,10 @@ TEST(RunCheckpoint, TestsUnderGravityGoOnBitForBit) {
   ExpectToGoOn(drum);
   drum.settings["turns"] = 0.02;
   ExpectToGoOn(With(drum, "nonspherical_shape", {{"aspect", 1.4}}));
-  ExpectToGoOn(Pour("shaken_box", 30, {0.05, 0.1, 0.2}));
+  Scenario box = Pour("shaken_box", 30, {0.05, 0.1, 0.2});
+  ExpectToGoOn(box);
+  box.settings = {{"thickness", 0.004}};
+  ExpectToGoOn(With(box, "nonspherical_shape", {{"aspect", 1.4}}));
   Scenario silo = Pour("silo_discharge", 100, {0.02, 0.028});
   silo.settings = {{"flat", 1}, {"silo_width", 0.056}, {"duration", 0.2}};
   ExpectToGoOn(silo);
@@ -163,6 +166,7 @@ TEST(RunCheckpoint, DevicesAndChutesGoOnBitForBit) {
   Scenario chute = Pour("transfer_chute", 40, {0.8, 1.2});
   chute.settings = {{"funnel_angle", 0.1}};
   ExpectToGoOn(chute);
+  ExpectToGoOn(With(chute, "nonspherical_shape", {{"aspect", 1.4}}));
   TriangleMesh funnel;
   AddFrustum({.height = 0.03, .lower_radius = 0.013, .upper_radius = 0.03, .sides = 12}, funnel);
   chute.settings = {};

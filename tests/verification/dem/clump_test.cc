@@ -7,6 +7,7 @@
 
 #include "dem/catalog/catalog.h"
 #include "dem/dynamics/assembly.h"
+#include "dem/particles/disk_pair.h"
 #include "dem/particles/elongation.h"
 #include "dem/simulation/shape_change.h"
 #include "tests/support/dem/scenarios.h"
@@ -42,7 +43,7 @@ TEST(Clump, PendulumSwingsWithItsPeriod) {
   const double c = 2 * kRadius * std::cos(kAmplitude);
   const Packing packing = Spheres({{0.5, 0.5, 0.5}, {0.5 + s, 0.5, 0.5 - c}}, {7, 7});
   ParticleArrays p = MakeParticles(packing, kDensity);
-  RigidClumps clumps(packing, kDensity, p);
+  RigidClumps clumps(packing, {.density = kDensity}, p);
   ASSERT_EQ(clumps.all().size(), 1U);
   EXPECT_NEAR(clumps.all()[0].mass, 2 * kSphere, 1e-12 * kSphere);
   const PeriodicCell cell{.length = {1, 1, 1}};
@@ -144,7 +145,7 @@ TEST(Clump, RollsDownAnInclineWithFiveSeventhsOfGravity) {
 TEST(Clump, FreeTopPrecesses) {
   const Packing packing = Spheres({{0.5, 0.5, 0.5}, {0.5, 0.5, 0.5 + 2 * kRadius}}, {0, 0});
   ParticleArrays p = MakeParticles(packing, kDensity);
-  RigidClumps clumps(packing, kDensity, p);
+  RigidClumps clumps(packing, {.density = kDensity}, p);
   Clump& body = clumps.mutable_all()[0];
   const double axial = 0.8 * kSphere * kRadius * kRadius;
   const double transverse = 2.8 * kSphere * kRadius * kRadius;
@@ -173,6 +174,97 @@ TEST(Clump, FreeTopPrecesses) {
   EXPECT_NEAR((p.x[top] - body.centre[0]) / kRadius, expected[0], 1e-6);
   EXPECT_NEAR((p.y[top] - body.centre[1]) / kRadius, expected[1], 1e-6);
   EXPECT_NEAR((p.z[top] - body.centre[2]) / kRadius, expected[2], 1e-6);
+}
+
+// Two disks (or spheres) in a plane fall slantwise onto a smooth, hard floor. The impulse at the
+// touching member's arm x from the centre is J = 2 m v / (1 + m x^2/I), so that the speed after is
+// v - 2 v/(1 + m x^2/I) downwards and the spin 2 v x / (I/m + x^2).
+TEST(Clump, InAPlaneAPairBouncesAsItsMassAndMomentSay) {
+  constexpr double kSpeed = 0.01;
+  for (const double thickness : {0.0, 0.7 * kRadius}) {
+    const double offset = 0.6 * kRadius;
+    const double cos = 0.8;
+    const double height = kRadius + 0.6 * offset + 1e-7;
+    const Packing packing = Spheres({{0.2 - cos * offset, 0.49, height - 0.6 * offset},
+                                     {0.2 + cos * offset, 0.49, height + 0.6 * offset}},
+                                    {0, 0});
+    Model model = test::HertzModel();
+    model.parameters["friction_coefficient"] = 0;
+    Assembly assembly(packing, kDensity, ContactModel(model, thickness),
+                      {.walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1})},
+                       .planar = true,
+                       .thickness = thickness},
+                      1);
+    Clump& body = assembly.mutable_clumps().mutable_all()[0];
+    body.velocity = {0, 0, -kSpeed};
+    const double area = MomentsOfDiskPair(kRadius, offset).area;
+    if (thickness > 0) {
+      EXPECT_NEAR(body.mass, kDensity * thickness * area, 1e-12 * body.mass);
+    }
+    ASSERT_TRUE(assembly.EvaluateForces().ok());
+    const double dt = 0.02 * assembly.NominalCriticalStep();
+    bool met = false;
+    for (int step = 0; step < 1'000'000; ++step) {
+      assembly.Move({.dt = dt});
+      ASSERT_TRUE(assembly.EvaluateForces().ok());
+      const bool touches = assembly.walls().ForceOn(0).z != 0;
+      if (met && !touches) {
+        break;
+      }
+      met = met || touches;
+    }
+    ASSERT_TRUE(met);
+    const double x = -cos * offset;
+    const double gyration2 = body.inertia[1] / body.mass;
+    const double up = -kSpeed + 2 * kSpeed / (1 + x * x / gyration2);
+    const double spin = 2 * kSpeed * x / (gyration2 + x * x);
+    const ParticleArrays& p = assembly.particles();
+    std::printf("thickness %g: speed %.6f, closed form %.6f; spin %.5f, %.5f\n", thickness,
+                body.velocity[2], up, p.wy[0], -spin);
+    EXPECT_NEAR(body.velocity[2], up, 1e-3 * kSpeed);
+    EXPECT_NEAR(p.wy[0], -spin, 1e-3 * std::abs(spin));  // about y, from z to x
+    for (std::size_t k = 0; k < 2; ++k) {
+      EXPECT_EQ(p.y[k], 0.49);
+      EXPECT_EQ(p.wx[k], 0);
+      EXPECT_EQ(p.wz[k], 0);
+    }
+  }
+}
+
+// A dumbbell that joins later has the same bits as one that was there from the beginning.
+TEST(Clump, OneThatJoinsMovesLikeOneThatWasThere) {
+  const std::vector<std::array<double, 3>> places = {{0.2, 0.5, 1.01 * kRadius},
+                                                     {0.2, 0.5 + kRadius, 1.3 * kRadius}};
+  const auto floor = [] {
+    return Surroundings{.gravity = {0, 0, -9.81}, .walls = {MakePlane("floor", {}, {0, 0, 1})}};
+  };
+  Assembly there = Heavy(Spheres({places[0], places[1]}, {0, 0}), 0.4, floor());
+  Assembly joined = Heavy(Spheres({places[0], places[1]}, {0, 0}), 0.4, floor());
+  joined.Remove({0, 1});
+  std::vector<NewGrain> grains;
+  for (const auto& at : places) {
+    grains.push_back(
+        {.centre = {at[0], at[1], at[2]}, .velocity = {0.1, 0, 0}, .radius = kRadius, .clump = 7});
+  }
+  joined.Insert(grains);
+  there.mutable_clumps().mutable_all()[0].velocity = {0.1, 0, 0};
+  ASSERT_EQ(joined.clumps().all().size(), 1U);
+  EXPECT_EQ(joined.solid_volume(), there.solid_volume());
+  ASSERT_TRUE(there.EvaluateForces().ok());
+  ASSERT_TRUE(joined.EvaluateForces().ok());
+  const double dt = 0.1 * there.NominalCriticalStep();
+  for (int step = 0; step < 3000; ++step) {
+    for (Assembly* assembly : {&there, &joined}) {
+      assembly->Move({.dt = dt});
+      ASSERT_TRUE(assembly->EvaluateForces().ok());
+    }
+  }
+  const Clump& a = there.clumps().all()[0];
+  const Clump& b = joined.clumps().all()[0];
+  EXPECT_NE(a.momentum[0], 0);  // it has met the floor
+  EXPECT_EQ(a.centre, b.centre);
+  EXPECT_EQ(a.orientation, b.orientation);
+  EXPECT_EQ(a.momentum, b.momentum);
 }
 
 // An L of three overlapping spheres hits a dumbbell, elastic and frictionless: momentum, angular
