@@ -5,7 +5,7 @@ YOUNG, FRICTION = (0.6e9, 1.2e9), (0.3, 0.6)     # where the truth is drawn from
 NOISE = {'q_over_p': (0.015, 0.01), 'volumetric_strain': (0.0, 3e-4)}   # relative, absolute
 READINGS, STRAIN = 24, 0.08
 PRESSURES = {'low': ('0.1 MPa', 'calibrate'), 'high': ('0.4 MPa', 'calibrate'), 'held': ('0.2 MPa', 'validate')}
-PACKINGS = 8                                       # of a campaign; the sd among four is known to 40 % only
+PACKINGS = 16                                      # of a campaign; what diagnose recommends
 DRAWS = 5                                          # of base parameters, until the hidden effect can be as strong as wanted
 STAGING = {'rate': 0.1, 'step': 0.004, 'damping': 0.3, 'grains': 300}
 
@@ -52,7 +52,7 @@ class Laboratory:
         verdict = self.call(case, 'diagnose', campaign['campaign'], '--workers', '1', *options)
         document = {'run': campaign, 'diagnose': verdict, 'compare': self.call(case, 'compare', campaign['campaign'])}
         if case.verb == 'improve' and improve:
-            document['improve'] = self.call(case, 'improve', campaign['campaign'], '--workers', '1', '--max-effects', '2')
+            document['improve'] = self.call(case, 'improve', campaign['campaign'], '--workers', '1')
             final = document['improve']['final_campaign']
             document['final'] = self.call(case, 'posterior', final)
         self.write(self.path(case, 'verdict.json'), json.dumps(document, indent=1))
