@@ -1,7 +1,6 @@
 #include "inference/emulator/emulated_posterior.h"
 
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -138,12 +137,11 @@ void Widen(const JointPrior& priors, const DataSet& data, const EmulatorOptions&
 }
 
 double PredictiveP(const EmulatedLikelihood& likelihood, const ScorePrediction& prediction,
-                   std::size_t readings) {
+                   std::size_t readings, const KnownFrom& known) {
   const Eigen::VectorXd misfit = likelihood.Misfit(prediction);
   double sum = 0;
   for (const double chi_squared : misfit) {
-    sum +=
-        boost::math::gamma_q(0.5 * static_cast<double>(readings), 0.5 * std::max(0.0, chi_squared));
+    sum += UpperTail(std::max(0.0, chi_squared), static_cast<double>(readings), known);
   }
   return sum / static_cast<double>(misfit.size());
 }
@@ -327,7 +325,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   const Eigen::MatrixXd factors = target.Factors(state->samples);
   const double unknown = target.Unknown(prediction.sd, factors).sum();
   if (options.noise == NoiseMode::kGiven) {
-    result.predictive_p = PredictiveP(*likelihood, prediction, data.readings.size());
+    result.predictive_p = PredictiveP(*likelihood, prediction, data.readings.size(), options.known);
   }
   if (options.replicates && options.noise == NoiseMode::kGiven) {
     Widen(priors, data, options, trained->emulator, prediction, target.free(), result);

@@ -18,6 +18,7 @@
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/joint_prior.h"
+#include "inference/scatter/chi_squared_law.h"
 #include "inference/scatter/refit_spread.h"
 
 namespace calib::inference {
@@ -39,6 +40,8 @@ struct EmulatorOptions {
   double max_unknown = 1;      ///< > 0
   /// The posterior is widened until it covers refits of these, where there are any (kGiven).
   std::optional<Replicates> replicates = {};
+  /// Of the errors of a reading about a run, for predictive_p.
+  KnownFrom known = {};
   /// Draws carried along the readings for EmulatedResult::path, 0: no path; and for reversed_path.
   int path_draws = 0;  ///< 0 or [100, 1e5]
   bool reversed_path = false;
@@ -77,8 +80,9 @@ struct EmulatedResult {
   double widened = 1;
 
   /// kGiven: posterior predictive p-value of the misfit, the mean over the posterior (before refits
-  /// widen it) of P(chi^2_T >= chi^2(y, x)), the emulator's error and the shared scatter in the
-  /// covariance [Gelman et al. 1996]; see Posterior::predictive_p.
+  /// widen it) of P(chi^2_T >= chi^2(y, x)), or of Fisher's law where few packings show the scatter,
+  /// the emulator's error and the shared scatter in the covariance [Gelman et al. 1996]; see
+  /// Posterior::predictive_p.
   std::optional<double> predictive_p;
   /// As Posterior::split_half, of SplitHalfOfEmulator (split_half.h); empty: not asked for.
   Eigen::VectorXd split_half;

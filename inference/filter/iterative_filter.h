@@ -15,6 +15,7 @@
 #include "inference/data/data_set.h"
 #include "inference/mixture/gaussian_mixture.h"
 #include "inference/prior/joint_prior.h"
+#include "inference/scatter/chi_squared_law.h"
 
 namespace calib::inference {
 
@@ -126,7 +127,8 @@ struct Posterior {
   /// posterior sd, NaN for what is held. About 2 / sqrt(ess) where the weights are enough.
   Eigen::VectorXd split_half;
   /// kGiven: posterior predictive p-value of the misfit, sum_i w_i P(chi^2_T >= chi^2(y, x_i)):
-  /// the share of data sets replicated from the posterior that fit no better [Gelman et al. 1996].
+  /// the share of data sets replicated from the posterior that fit no better [Gelman et al. 1996];
+  /// of Fisher's law where few packings show the errors (chi_squared_law.h).
   std::optional<double> predictive_p;
   std::vector<std::string> warnings;  ///< whole sentences: diverged samples, tempering, ...
   /// Empty: the weights carry the posterior. Otherwise a sentence saying why not: fewer than 50
@@ -161,10 +163,12 @@ absl::StatusOr<Eigen::VectorXd> LogLikelihoodBound(const DataSet& data,
 /// p(data | held values); sd and quantiles of a held parameter are NaN. kEssTarget uses the last
 /// iteration alone, as the paper does; its log_evidence is that of the sigma found. Errors:
 /// INVALID_ARGUMENT for priors, data, options or shapes that do not fit; FAILED_PRECONDITION when
-/// no sample has a finite weight (all diverged or outside the prior).
+/// no sample has a finite weight (all diverged or outside the prior). known: of the data's errors,
+/// for predictive_p.
 absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataSet& data,
                                            const FilterOptions& options,
-                                           std::span<const Iteration> iterations);
+                                           std::span<const Iteration> iterations,
+                                           const KnownFrom& known = {});
 
 /// The exponent in (0, 1] of the likelihood whose weights guide what comes next (proposal, early
 /// stopping): the largest that leaves ess_target of one iteration's samples effective; 1 where the

@@ -162,7 +162,8 @@ Eigen::VectorXd WithoutStrangers(const Ensemble& ensemble, const Eigen::VectorXd
 
 absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataSet& data,
                                            const FilterOptions& options,
-                                           std::span<const Iteration> iterations) {
+                                           std::span<const Iteration> iterations,
+                                           const KnownFrom& known) {
   const auto ensemble = MakeEnsemble(priors, data, options, iterations);
   if (!ensemble.ok()) return ensemble.status();
   const Eigen::VectorXd unnormalized = ensemble->log_start + ensemble->log_likelihood;
@@ -196,7 +197,7 @@ absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataS
     posterior.noise_scale = *std::move(scale);
   }
   if (options.noise == NoiseMode::kGiven) {
-    posterior.predictive_p = PredictiveP(data, ensemble->log_likelihood, log_weights);
+    posterior.predictive_p = PredictiveP(data, ensemble->log_likelihood, log_weights, known);
   }
   posterior.split_half = SplitHalf(ensemble->parameters, log_weights, Halves(log_weights.size()),
                                    posterior.parameters);

@@ -36,10 +36,11 @@ Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
 
 // ln L = const - chi^2 / 2 with stated errors, the constant that of zero residuals.
 double PredictiveP(const DataSet& data, const Eigen::VectorXd& log_likelihood,
-                   const Eigen::VectorXd& log_weights) {
+                   const Eigen::VectorXd& log_weights, const KnownFrom& known) {
   // In double alone: in long double it was a sixth of the time of a posterior.
   using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
   const auto likelihood = GaussianLikelihood::Create(data, NoiseMode::kGiven);
+  const bool few = std::isfinite(known.Freedom());
   double p = 0;
   if (!likelihood.ok()) return std::numeric_limits<double>::quiet_NaN();
   const auto readings = static_cast<Eigen::Index>(data.readings.size());
@@ -49,7 +50,8 @@ double PredictiveP(const DataSet& data, const Eigen::VectorXd& log_likelihood,
     const double weight = std::exp(log_weights[i]);
     if (weight < 1e-12) continue;
     const double half = std::max(0.0, perfect - log_likelihood[i]);
-    p += weight * boost::math::gamma_q(0.5 * static_cast<double>(readings), half, Policy());
+    p += weight * (few ? UpperTail(2 * half, static_cast<double>(readings), known)
+                       : boost::math::gamma_q(0.5 * static_cast<double>(readings), half, Policy()));
   }
   return p;
 }

@@ -8,6 +8,7 @@
 #include "inference/data/data_set.h"
 #include "inference/data/gaussian_likelihood.h"
 #include "inference/filter/iterative_filter.h"
+#include "inference/scatter/chi_squared_law.h"
 
 namespace calib::inference {
 
@@ -18,9 +19,9 @@ Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
                            const Eigen::VectorXd& log_weights);
 
 /// Posterior::predictive_p of samples with these ln L by stated errors (NoiseMode::kGiven); NaN for
-/// data that have none. Both N, log_weights normalised.
+/// data that have none. Both N, log_weights normalised. known: of the errors.
 double PredictiveP(const DataSet& data, const Eigen::VectorXd& log_likelihood,
-                   const Eigen::VectorXd& log_weights);
+                   const Eigen::VectorXd& log_weights, const KnownFrom& known = {});
 
 /// Posterior::split_half: differences, d, of the means of the samples (N x d) of half 0 and of half
 /// 1 over the parameters' sd; NaN where a half has no weight. log_weights, halves: N.

@@ -71,6 +71,7 @@ void AskEmulator(const Definition& definition, std::span<const inference::Iterat
                  Answer& answer) {
   inference::EmulatorOptions options = EmulatorOptionsOf(definition);
   options.replicates = definition.replicates;
+  options.known = definition.known;
   options.path_draws = kPathDraws;
   options.reversed_path = definition.campaign.filter.reversed_path;
   const inference::DataSet& data = EmulatedData(definition);
@@ -143,8 +144,8 @@ std::string ConditionedOn(const Definition& definition,
 
 absl::StatusOr<Answer> FindAnswer(const Definition& definition,
                                   std::span<const inference::Iteration> iterations) {
-  auto weighted = inference::ComputePosterior(definition.priors, definition.data,
-                                              definition.campaign.filter, iterations);
+  auto weighted = inference::ComputePosterior(
+      definition.priors, definition.data, definition.campaign.filter, iterations, definition.known);
   if (!weighted.ok()) {
     return weighted.status();
   }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "inference/scatter/chi_squared_law.h"
 #include "inference/scatter/refit_spread.h"
 #include "inference/surrogate/cubic_rbf.h"
 #include "server/campaign/campaign.h"
@@ -46,6 +47,8 @@ struct Definition {
   std::optional<inference::DataSet> mean_data{};
   /// Where the scatter has been measured on several packings.
   std::optional<inference::Replicates> replicates{};
+  /// Of the errors of `data`, where packings are part of them.
+  inference::KnownFrom known{};
   inference::JointPrior priors;
   ReadingIndex readings;
   /// Of surrogate_msrs, kept from one plan to the next: nothing that the store does not give again

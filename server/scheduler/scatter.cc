@@ -159,11 +159,13 @@ Definition DefinitionWith(const Definition& definition, const MeasuredScatter& s
   }
   std::vector<inference::GroupScatter> groups;
   std::vector<inference::GroupScatter> of_mean;
+  int fewest = std::numeric_limits<int>::max();
   for (const ObservableScatter& one : scatter.observables) {
     const auto& experiment =
         definition.campaign.experiments[static_cast<std::size_t>(one.group.experiment)];
     if (experiment.role == Role::kCalibrate) {
       groups.push_back(one.group);
+      fewest = std::min(fewest, one.runs);
       // The mean over R packings is off by 1/R of the scatter, however many samples share them;
       // every sample on the only packing is a repeat of its own.
       of_mean.push_back(one.group);
@@ -172,6 +174,11 @@ Definition DefinitionWith(const Definition& definition, const MeasuredScatter& s
   }
   if (!groups.empty()) {
     with.data = inference::WithScatter(definition.data, groups, 1);
+    if (VariesPackings(definition.campaign)) {
+      const Eigen::MatrixXd covariance = inference::ErrorCovariance(with.data);
+      with.known = inference::WhatIsKnown(
+          covariance, covariance - inference::ErrorCovariance(definition.data), fewest);
+    }
     with.mean_data = inference::WithScatter(definition.data, of_mean, 0);
     if (scatter.departures.rows() > 0) {
       with.replicates = {.departures = scatter.departures,

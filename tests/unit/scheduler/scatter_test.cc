@@ -170,6 +170,39 @@ TEST(Realizations, ASpecimenOfManyGrainsSharesLittleOfTheScatterAndIsKnownBetter
   EXPECT_GT(like.posterior.parameters(0).cov(), 1.2 * run.posterior.parameters(0).cov());
 }
 
+// The p-value of the posterior asks how many packings the scatter is known from.
+TEST(Realizations, ErrorsAreKnownFromAsManyPackingsAsThereAre) {
+  const testing::SmallCampaign campaign = Campaign(4);
+  const campaign::ReadOutcome read =
+      campaign::ReadCampaign(campaign.yaml, "c.yaml", [&campaign](const std::string& path) {
+        const auto file = campaign.files.find(path);
+        return file != campaign.files.end() ? absl::StatusOr<std::string>(file->second)
+                                            : absl::NotFoundError(path);
+      });
+  ASSERT_TRUE(read.problems.empty());
+  const auto definition = MakeDefinition(read.campaign);
+  EXPECT_EQ(definition->known.packings, 0);
+  MeasuredScatter measured;
+  for (const auto& [group, readings] : inference::GroupsOf(definition->data)) {
+    const auto n = static_cast<Eigen::Index>(readings.size());
+    measured.observables.push_back({.group = {.experiment = group.first,
+                                              .observable = group.second,
+                                              .sd = Eigen::VectorXd::Ones(n),
+                                              .clock = Eigen::VectorXd::LinSpaced(n, 0, 1),
+                                              .length = 1,
+                                              .share = 1},
+                                    .from = "realizations",
+                                    .runs = 3});
+  }
+  ASSERT_FALSE(measured.observables.empty());
+  const Definition with = DefinitionWith(*definition, measured);
+  EXPECT_EQ(with.known.packings, 3);  // one of the four did not finish
+  EXPECT_EQ(with.known.readings, static_cast<double>(with.data.readings.size()));
+  // Two degrees of freedom where the scatter is all there is, more where noise stands beside it.
+  EXPECT_GE(with.known.Freedom(), 2);
+  EXPECT_TRUE(std::isfinite(with.known.Freedom()));
+}
+
 // The scatter joins the errors when the audited have long been chosen by the errors stated.
 TEST(Realizations, TheAuditOfEarlyStoppingHoldsBoundAndShareByTheSameErrors) {
   const Ended run = RunCampaign("realizations_audit",

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <boost/math/special_functions/beta.hpp>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <numbers>
@@ -205,6 +206,11 @@ TEST(PredictiveP, OfOneSampleIsItsChiSquaredTail) {
   const auto posterior = ComputePosterior(priors, data, {}, std::vector<Iteration>{one});
   ASSERT_TRUE(posterior.ok()) << posterior.status();
   EXPECT_NEAR(*posterior->predictive_p, boost::math::gamma_q(2.5, 0.5 * 30 / 4), 1e-12);
+  // Errors that three packings show: Fisher's law of 5 and 2 degrees of freedom at (30/4)/5.
+  const KnownFrom packings{.readings = 5, .scatter = 5, .packings = 3};
+  const auto few = ComputePosterior(priors, data, {}, std::vector<Iteration>{one}, packings);
+  ASSERT_TRUE(few.ok()) << few.status();
+  EXPECT_NEAR(*few->predictive_p, boost::math::ibeta(1, 2.5, 2 / (2 + 7.5)), 1e-12);
 }
 
 // Twins share their weight between the halves: no difference between the halves' means.
