@@ -293,8 +293,8 @@ Container Drum(int grains, int seed) {
   return drum;
 }
 
-/// A cylinder as wide as its filling is high, as the test `angle_of_repose` has it, on a floor with
-/// a rim of one diameter about it: grains that roll without resistance make no heap without.
+/// A cylinder about as wide as its filling is high, as the test `angle_of_repose` has it, on a
+/// floor with a rim of one diameter: grains that roll without resistance make no heap without.
 Container Cylinder(int grains, int seed) {
   const double d = kDiameter;
   const double radius = 5.25 * d * std::cbrt(grains / 1000.0);
