@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times YADE, LAMMPS, LIGGGHTS and this engine on the same packings: see deploy/bench/peers.
 
-usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|flow|together|emptying|evaluation|curves]
+usage: side_by_side.py FOLDER_OF_OUR_BINARIES [--repeats N] [--grains 1000,5000,10000] [--threads 1,2] [--only speed|flow|together|emptying|drum|heap|evaluation|curves]
            [--cases base,rolling,linear] [--tests '0.2 MPa,oedometric'] [--rate 0.1] [--keep FOLDER] [--quick]
 Every round runs all codes once, one after the other, so that what disturbs the machine disturbs all of them; the tables
 hold medians over the rounds. One thread is timed by processor time, so that other work on the machine takes nothing
@@ -21,12 +21,13 @@ import tempfile
 import time
 
 import curves
+import moving
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 DATA = os.path.join(os.environ["CALIB_DATA"], "toyoura_triaxial")
 SKIN = {1000: 2e-4, 5000: 1e-4, 10000: 8e-5}  # m, near the fastest of LAMMPS and LIGGGHTS
 STEP = {1000: 4e-5, 5000: 1.5e-5, 10000: 1e-5}  # s, of LAMMPS and LIGGGHTS
-# Vessels that empty, as in tests/bench/flow_bench.cc. LIGGGHTS' dashpot is sqrt(5/6) b times ours at a restitution of
+# Vessels that empty, turn or are lifted, as in tests/bench/flow_bench.cc. LIGGGHTS' dashpot is sqrt(5/6) b times ours at a restitution of
 # exp(-pi b/sqrt(1 - b^2)); ours has a damping ratio of 0.2.
 DRAIN = -0.02  # m
 DASHPOT = 0.2 / math.sqrt(5 / 6)
@@ -150,9 +151,8 @@ class Work:
         found = json.loads(text[text.index("{"):])["benchmarks"][0]
         return found["cpu_time"] / 1e6, found["contact_updates/s"] * found["cpu_time"] / 1e9
 
-    def liggghts(self, skin, steps, before=0, every=100000):
-        """Lets LIGGGHTS go on from the state that ours left. Processor time of one of the last steps [ms], the time step [s], and what it printed:
-        step, grains, twice the contacts between grains, grains above the drain."""
+    def state_for_liggghts(self):
+        """Writes the state that ours left as LIGGGHTS reads it, flow.data; the time step [s]."""
         with open(self.path("flow.txt")) as file:
             step, *box = (float(word) for word in file.readline().split())
             grains = [line.split() for line in file]
@@ -165,14 +165,23 @@ class Work:
             print("\nVelocities\n", file=file)
             for number, words in enumerate(grains, 1):
                 print(number, *words[4:], 0, 0, 0, file=file)
-        given = {"data": self.path("flow.data"), "vessel": self.path("vessel.stl"), "skin": skin, "dt": step, "restitution": RESTITUTION,
-                 "every": every, "drain": DRAIN, "before": before, "steps": steps}
-        (wall, cpu), _, text = run(
-            ["liggghts", "-in", os.path.join(HERE, "flow.liggghts"), "-log", "none", *(a for k, v in given.items() for a in ("-var", k, str(v)))],
-            {"OMP_NUM_THREADS": "1"})
+        return step
+
+    def liggghts(self, skin, steps, before=0, every=100000):
+        """Lets LIGGGHTS go on from the state that ours left. Processor time of one of the last steps [ms], the time step [s], and what it printed:
+        step, grains, twice the contacts between grains, grains above the drain."""
+        step = self.state_for_liggghts()
+        (wall, cpu), _, text = self.run_liggghts("flow.liggghts", {
+            "vessel": self.path("vessel.stl"), "skin": skin, "dt": step, "every": every, "drain": DRAIN, "before": before, "steps": steps})
         loop = [float(word) for word in re.findall(r"^Loop time of ([\d.eE+-]+)", text, re.M)][-1]
         rows = [[float(word) for word in line.split()] for line in text.splitlines() if re.fullmatch(r"\s*\d+(\s+[\d.eE+-]+){3}\s*", line)]
         return loop * min(cpu / wall, 1.0) * 1e3 / steps, step, rows
+
+    def run_liggghts(self, script, given):
+        """From the state of state_for_liggghts()."""
+        given = {"data": self.path("flow.data"), "restitution": RESTITUTION, **given}
+        return run(["liggghts", "-in", os.path.join(HERE, script), "-log", "none", *(a for k, v in given.items() for a in ("-var", k, str(v)))],
+                   {"OMP_NUM_THREADS": "1"})
 
     def liggghts_flow(self, skin):
         """Processor time of a step [ms], and its contacts, from the state that our_flow() left."""
@@ -366,7 +375,7 @@ def main():
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--grains", default="1000,5000,10000")
     parser.add_argument("--threads", default="1,2")
-    parser.add_argument("--only", choices=("speed", "together", "flow", "emptying", "evaluation", "curves"), help="one of the parts")
+    parser.add_argument("--only", choices=("speed", "together", "flow", "emptying", "drum", "heap", "evaluation", "curves"), help="one of the parts")
     parser.add_argument("--cases", default=",".join(curves.CASES), help="of the part curves")
     parser.add_argument("--tests", default=",".join(curves.TESTS), help="of the part curves")
     parser.add_argument("--rate", type=float, default=0.1, help="of strain in the part curves [1/s]; the stored curves have 0.1")
@@ -397,6 +406,8 @@ def main():
                  "together": lambda: together(work, grains, repeats),
                  "flow": lambda: flow(work, repeats),
                  "emptying": lambda: emptying(work, repeats),
+                 "drum": lambda: moving.drum(work, run, repeats),
+                 "heap": lambda: moving.heap(work, run, repeats),
                  "evaluation": lambda: evaluation(work, repeats),
                  "curves": lambda: curves.curves(work, run, os.environ["CALIB_DATA"], cases, tests, repeats, arguments.keep or folder,
                                              arguments.rate)}
