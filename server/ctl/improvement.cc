@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "server/campaign/sha256.h"
@@ -28,6 +29,19 @@ CalibratedModel Calibrated(const report::CampaignView& view, double rms_error) {
 
 void AddSentence(const std::string& sentence, std::string& text) {
   absl::StrAppend(&text, text.empty() || sentence.empty() ? "" : " ", sentence);
+}
+
+// Posterior means of all but an effect's parameters. What is needless is weak, so that the others are
+// near where they will be without it.
+std::map<std::string, double> MeansWithout(const std::string& effect,
+                                           const report::CampaignView& view) {
+  std::map<std::string, double> means;
+  for (const auto& parameter : view.posterior.parameters()) {
+    if (!absl::StartsWith(parameter.name(), effect + ".")) {
+      means[parameter.name()] = parameter.mean();
+    }
+  }
+  return means;
 }
 
 // No calibration takes more: all iterations, replicates and held-out draws.
@@ -170,10 +184,13 @@ absl::StatusOr<Diagnosis> Improvement::Judge(const report::CampaignView& view, b
 // the first that it is adequate without.
 absl::Status Improvement::Prune(const std::vector<std::string>& added) {
   if (steps_.back().verdict != "adequate") return absl::OkStatus();
+  const report::CampaignView full = *last_;
+  const double rms_error = steps_.back().rms_error;
   for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
     std::vector<std::string> others = added;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    auto without = Extended(*first_, others, ClosestRun{});
+    auto without =
+        Extended(*first_, others, {.values = MeansWithout(added[k], full), .rms = rms_error});
     if (absl::IsResourceExhausted(without.status())) return absl::OkStatus();
     if (!without.ok()) return without.status();
     if (without->posterior.posterior_from() == "none" || !Fits(*without)) continue;

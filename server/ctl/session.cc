@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "server/service/server.h"
 #include "server/service/state_folder.h"
@@ -26,13 +27,16 @@ bool HoldsState(const std::string& folder) {
   return std::filesystem::exists(std::filesystem::path(folder) / "calib.db", error);
 }
 
-std::string LastLine(const std::string& path) {
+// The last error that a log has; without one its last line.
+std::string LastWords(const std::string& path) {
   std::ifstream file(path);
   std::string last;
+  std::string last_error;
   for (std::string line; std::getline(file, line);) {
     if (!line.empty()) last = line;
+    if (absl::StrContains(line, " error ")) last_error = line;
   }
-  return last;
+  return last_error.empty() ? last : last_error;
 }
 
 }  // namespace
@@ -203,7 +207,7 @@ absl::Status Session::Check() {
   const std::string log = (std::filesystem::path(state_) / "worker-1.log").string();
   return absl::FailedPreconditionError(absl::StrCat("all local workers have ended with status ",
                                                     *workers_.front().Poll(), "; ", log,
-                                                    " ends with: ", LastLine(log)));
+                                                    " says: ", LastWords(log)));
 }
 
 }  // namespace calib::ctl

@@ -14,6 +14,7 @@ import csv, concurrent.futures, dataclasses, itertools, json, math, os, statisti
 import laboratory
 
 CENTER = {'young_modulus': 0.85e9, 'friction_coefficient': 0.45}
+REFERENCE = {'pressure': 0.2e6, 'diameter': 3e-3, 'modulus': 0.6e9}  # of the fitted tests; the softest grains of laboratory.YOUNG
 RANGE = {'young_modulus': 4 / 0.85, 'friction_coefficient': 1 / 0.45}  # factors either way, to the ends of the priors
 PAIRS, SCATTER = 4, 16                                           # packings of the differences, of a covariance
 FRICTIONS = (0.2, 0.45, 0.65, 1.0)                               # at which covariances are measured
@@ -234,17 +235,28 @@ class Strengths:
         return None
 
 
+def prior_of(info):
+    """Ends of the prior that the effect gets in these campaigns: the default one, or that of value over scale."""
+    scaled, scale = info['scaled_default_prior'], info['reference_scale']
+    if not scaled:
+        return info['default_prior']
+    unit = scale['factor']
+    for quantity, value in REFERENCE.items():
+        unit *= value ** scale[quantity]
+    return {end: scaled[end] * unit for end in ('min', 'max')}
+
+
 def values_at(multiple, detectable, infos):
     """Parameters of an effect at a multiple of what is called detectable, within its default prior."""
     own = {}
     for name, value in detectable.items():
         null = infos[name]['null_value']
         null = infos[name].get('null_by_contact', {}).get('hertz_mindlin', null)
-        moved = value if null is None else null + (value - null) * multiple  # what only shapes the effect is held
-        # Default priors of dimensionless parameters are taken as they are; others are scaled to the grains.
-        limits = infos[name]['default_prior'] if infos[name]['unit'] == '1' else infos[name]
-        low, high = limits.get('min'), limits.get('max')
-        own[name] = min(max(moved, -math.inf if low is None else low), math.inf if high is None else high)
+        if null is None:  # what only shapes the effect is held
+            own[name] = value
+            continue
+        limits = prior_of(infos[name])
+        own[name] = min(max(null + (value - null) * multiple, limits['min']), limits['max'])
     return own
 
 
