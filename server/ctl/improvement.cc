@@ -83,7 +83,7 @@ absl::Status Improvement::From(report::CampaignView view) {
   std::vector<std::string> added;
   for (;;) {
     const bool last = static_cast<int>(added.size()) >= limits_.effects || Spent();
-    const auto diagnosis = Judge(view, last || (!added.empty() && Fits(view)));
+    const auto diagnosis = Judge(view, last);
     if (!diagnosis.ok()) return diagnosis.status();
     ImproveStep& step = steps_.back();
     if (diagnosis->verdict == "adequate") {
