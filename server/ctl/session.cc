@@ -104,8 +104,8 @@ absl::Status Session::ServeOrJoin() {
     if (!address.ok()) return address.status();
     address_ = *std::move(address);
     auto client = Client::Connect(address_);
-    if (client.ok()) client_ = *std::move(client);
     last = client.status();
+    if (client.ok()) client_ = *std::move(client);
     if (server_ != nullptr) break;
   }
   host_stays_ = is_guest() && service::IsServedForGood(state_);
