@@ -28,7 +28,7 @@ struct Arguments {
   std::optional<int> iteration;
   std::optional<std::uint64_t> seed;
   std::vector<std::string> set;      ///< NAME=VALUE
-  std::vector<std::string> effects;  ///< to join the model
+  std::vector<std::string> effects;  ///< to join the model, or to be left out
   int max_effects = 3;
   std::optional<std::int64_t> max_evaluations;  ///< of improve
   std::string test;                             ///< file with the tests to predict

@@ -202,6 +202,8 @@ void AddVerbsOnCampaigns(Builder& b) {
           "model evaluations of all screens, refits and calibrations, those that diagnose "
           "has made already included; held-out tests of a calibration count and may exceed it")
       ->check(CLI::Range(1, 1'000'000'000));
+  improve->add_option("--without", b.arguments().effects, "effect that is not to be thought of")
+      ->allow_extra_args(false);
   auto* predict = b.AddOnCampaign(
       "predict", &Predict, "The posterior propagated to another test: mean, band, exceedance",
       " --test other.yaml");

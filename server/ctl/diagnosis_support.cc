@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "dem/formula/user_effect.h"
 #include "server/campaign/excitation.h"
 #include "server/ctl/measurement_errors.h"
 
@@ -37,6 +38,17 @@ absl::Status CheckDiagnosable(const FittedCampaign& base) {
   }
   if (base.runs().sample.empty()) {
     return absl::FailedPreconditionError(absl::StrCat("no sample of ", id, " has finished"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckLeftOut(const std::vector<std::string>& effects,
+                          const campaign::Campaign& campaign) {
+  for (const std::string& name : effects) {
+    if (dem::FindEffect(campaign.model.user_effects, name) == nullptr) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("there is no effect ", name, " to leave out; see `calibctl effects`"));
+    }
   }
   return absl::OkStatus();
 }

@@ -7,6 +7,7 @@
 
 #include "absl/status/status.h"
 #include "inference/diagnosis/fitted_model.h"
+#include "server/campaign/campaign.h"
 #include "server/ctl/fitted_campaign.h"
 
 namespace calib::ctl {
@@ -14,6 +15,10 @@ namespace calib::ctl {
 /// FAILED_PRECONDITION with a sentence where nothing can be said: no complete iteration, no stated
 /// errors, no more readings than parameters, no finished sample.
 absl::Status CheckDiagnosable(const FittedCampaign& base);
+
+/// INVALID_ARGUMENT for a name that is no effect of the catalogue or of the campaign.
+absl::Status CheckLeftOut(const std::vector<std::string>& effects,
+                          const campaign::Campaign& campaign);
 
 /// Sentences: few readings, one packing only.
 std::vector<std::string> DoubtsOf(const FittedCampaign& base);

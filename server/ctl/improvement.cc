@@ -20,6 +20,9 @@
 namespace calib::ctl {
 namespace {
 
+constexpr char kAdequate[] = "adequate";
+constexpr char kExplained[] = "Noise, scatter and the emulator's error explain what is left.";
+
 CalibratedModel Calibrated(const report::CampaignView& view, double rms_error) {
   return {.rms_error = rms_error,
           .has_posterior = view.posterior.posterior_from() != "none",
@@ -86,8 +89,8 @@ absl::Status Improvement::From(report::CampaignView view) {
     const auto diagnosis = Judge(view, last);
     if (!diagnosis.ok()) return diagnosis.status();
     ImproveStep& step = steps_.back();
-    if (diagnosis->verdict == "adequate") {
-      std::string reason = "Noise, scatter and the emulator's error explain what is left.";
+    if (diagnosis->verdict == kAdequate) {
+      std::string reason = kExplained;
       AddSentence(step.reason, reason);
       step.reason = std::move(reason);
       break;
@@ -106,6 +109,7 @@ absl::Status Improvement::From(report::CampaignView view) {
     view = **std::move(extended);
   }
   last_ = std::move(view);
+  if (auto status = Exchange(added); !status.ok()) return status;
   if (auto status = Prune(added); !status.ok()) return status;
   return Open();
 }
@@ -145,12 +149,12 @@ absl::StatusOr<std::optional<report::CampaignView>> Improvement::Forward(
   return std::optional<report::CampaignView>();
 }
 
-// Adds a step. A diagnosis that cannot be paid for is no more than the adequacy of the model.
-absl::StatusOr<Diagnosis> Improvement::Judge(const report::CampaignView& view, bool only_adequacy) {
+// A diagnosis that cannot be paid for is no more than the adequacy of the model; the reason says so.
+absl::StatusOr<Diagnosis> Improvement::Ask(const report::CampaignView& view, bool only_adequacy,
+                                           std::string& reason) {
   DiagnosisOptions options{
       .only_adequacy = only_adequacy, .nuisance = nuisance_, .next_experiment = false};
   options.max_evaluations = Left();
-  std::string reason;
   auto diagnosis = Diagnose(laboratory_, view, options);
   if (absl::IsResourceExhausted(diagnosis.status())) {
     reason = absl::StrCat("No effect was looked for, --max-evaluations forbids it: ",
@@ -158,39 +162,99 @@ absl::StatusOr<Diagnosis> Improvement::Judge(const report::CampaignView& view, b
     options.only_adequacy = true;
     diagnosis = Diagnose(laboratory_, view, options);
   }
+  if (!diagnosis.ok()) return diagnosis;
+  KeepFinding(client_, diagnosis->campaign, kDiagnosis, DiagnosisJson(*diagnosis));
+  if (!diagnosis->only_adequacy) nuisance_ = diagnosis->nuisance;
+  evaluations_ += diagnosis->screen_evaluations + diagnosis->warm_evaluations;
+  return diagnosis;
+}
+
+// Adds a step.
+absl::StatusOr<Diagnosis> Improvement::Judge(const report::CampaignView& view, bool only_adequacy) {
+  std::string reason;
+  auto diagnosis = Ask(view, only_adequacy, reason);
   if (!diagnosis.ok()) {
     if (steps_.empty() || !absl::IsFailedPrecondition(diagnosis.status())) return diagnosis;
     // It comes closer, but how well it could do is not known: no adequacy without support.
     reason = absl::StrCat("Its adequacy is not known: ", diagnosis.status().message(), ".");
     diagnosis = Diagnosis{};
     diagnosis->verdict = "unexplained";
-  } else {
-    KeepFinding(client_, diagnosis->campaign, kDiagnosis, DiagnosisJson(*diagnosis));
-    if (!diagnosis->only_adequacy) nuisance_ = diagnosis->nuisance;
   }
-  evaluations_ += diagnosis->screen_evaluations + diagnosis->warm_evaluations;
-  steps_.push_back({.campaign = view.status.campaign(),
-                    .effects = view.campaign.model.effects,
-                    .rms_error = ErrorOf(view),
-                    .heldout_rms_error = std::nullopt,
-                    .log_evidence = view.posterior.log_evidence(),
-                    .verdict = diagnosis->verdict,
-                    .next_effect = "",
-                    .reason = std::move(reason)});
+  steps_.push_back(StepOf(view, diagnosis->verdict, std::move(reason)));
   return diagnosis;
+}
+
+ImproveStep Improvement::StepOf(const report::CampaignView& view, const std::string& verdict,
+                                std::string reason) {
+  return {.campaign = view.status.campaign(),
+          .effects = view.campaign.model.effects,
+          .rms_error = ErrorOf(view),
+          .heldout_rms_error = std::nullopt,
+          .log_evidence = view.posterior.log_evidence(),
+          .verdict = verdict,
+          .next_effect = "",
+          .reason = std::move(reason)};
+}
+
+// What was taken first may stand for something else that could not be told from it then. Where the
+// last model is not adequate, what is missing beside the later effects is asked anew without an
+// earlier one, and another answer is taken where it makes the model adequate.
+absl::Status Improvement::Exchange(std::vector<std::string>& added) {
+  if (steps_.back().verdict == kAdequate) return absl::OkStatus();
+  const report::CampaignView full = *last_;
+  for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
+    const auto replaced = Replace(k, added, full);
+    if (absl::IsResourceExhausted(replaced.status())) return absl::OkStatus();
+    if (!replaced.ok()) return replaced.status();
+    if (*replaced) return absl::OkStatus();
+  }
+  return absl::OkStatus();
+}
+
+// Whether an adequate model with another effect in the place of added[doubted] was found; then it
+// is the last one. RESOURCE_EXHAUSTED: --max-evaluations forbids to look on.
+absl::StatusOr<bool> Improvement::Replace(std::size_t doubted, std::vector<std::string>& added,
+                                          const report::CampaignView& full) {
+  const std::string out = added[doubted];
+  std::vector<std::string> others = added;
+  others.erase(others.begin() + static_cast<std::ptrdiff_t>(doubted));
+  const auto without = Extended(*first_, others, {.values = MeansWithout(out, full)}, 1);
+  if (!without.ok()) return without.status();
+  std::string reason;
+  const auto missing = Ask(*without, false, reason);
+  if (absl::IsFailedPrecondition(missing.status())) return false;
+  if (!missing.ok()) return missing.status();
+  for (const std::string& in : EffectsToTry(*missing)) {
+    if (in == out || !WhyNotJoin(without->campaign, in).empty()) continue;
+    auto with = Extended(*without, {in}, ClosestRunWith(in, *missing));
+    if (!with.ok()) return with.status();
+    const auto judged = Ask(*with, false, reason);
+    if (absl::IsFailedPrecondition(judged.status())) continue;
+    if (!judged.ok()) return judged.status();
+    if (judged->verdict != kAdequate) continue;
+    steps_.push_back(StepOf(
+        *without, missing->verdict,
+        absl::StrCat("Asked anew what is missing without ", out, ": ", WhyNext(*missing, in))));
+    steps_.back().next_effect = in;
+    steps_.push_back(StepOf(*with, judged->verdict,
+                            absl::StrCat(kExplained, " So ", in, " stands where ", out, " did.")));
+    last_ = *std::move(with);
+    others.push_back(in);
+    added = std::move(others);
+    return true;
+  }
+  return false;
 }
 
 // An effect that was added early may be needless beside the later ones: the model is kept without
 // the first that it is adequate without.
 absl::Status Improvement::Prune(const std::vector<std::string>& added) {
-  if (steps_.back().verdict != "adequate") return absl::OkStatus();
+  if (steps_.back().verdict != kAdequate) return absl::OkStatus();
   const report::CampaignView full = *last_;
-  const double rms_error = steps_.back().rms_error;
   for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
     std::vector<std::string> others = added;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    auto without =
-        Extended(*first_, others, {.values = MeansWithout(added[k], full), .rms = rms_error});
+    auto without = Extended(*first_, others, {.values = MeansWithout(added[k], full)}, 1);
     if (absl::IsResourceExhausted(without.status())) return absl::OkStatus();
     if (!without.ok()) return without.status();
     if (without->posterior.posterior_from() == "none" || !Fits(*without)) continue;
@@ -220,18 +284,19 @@ bool Improvement::IsCloser(const report::CampaignView& a, const report::Campaign
   return ErrorOf(a) < ErrorOf(b);
 }
 
-// With a parameter more the parent's iterations may not do: then as many again, and once more. Of
-// these the closest is kept; that is told by what is fitted alone.
+// With a parameter more the parent's iterations may not do: then as many again, and once more, unless
+// most_times forbids. Of these the closest is kept; that is told by what is fitted alone.
 absl::StatusOr<report::CampaignView> Improvement::Extended(const report::CampaignView& view,
                                                            const std::vector<std::string>& effects,
-                                                           const ClosestRun& closest) {
+                                                           const ClosestRun& closest,
+                                                           int most_times) {
   const auto fitted =
       std::count_if(view.campaign.experiments.begin(), view.campaign.experiments.end(),
                     [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
   // One iteration, whatever is asked for: as much again is as many samples.
   const bool by_samples = view.campaign.method == campaign::Method::kSqmc;
   absl::StatusOr<report::CampaignView> closest_yet = absl::UnknownError("not run");
-  for (const int times : {1, 2, 3}) {
+  for (int times = 1; times <= most_times; ++times) {
     const std::int64_t samples =
         static_cast<std::int64_t>(view.campaign.samples) * (by_samples ? times : 1);
     const std::int64_t least = samples * fitted;
@@ -270,7 +335,7 @@ absl::StatusOr<report::CampaignView> Improvement::Extended(const report::Campaig
 
 bool Improvement::Fits(const report::CampaignView& view) {
   const auto quick = Diagnose(laboratory_, view, {.only_adequacy = true, .nuisance = nuisance_});
-  return quick.ok() && quick->verdict == "adequate";
+  return quick.ok() && quick->verdict == kAdequate;
 }
 
 // The verdict is stored by its digest before held-out data are looked at.

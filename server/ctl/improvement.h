@@ -2,6 +2,7 @@
 // compare -> diagnose -> extend until the misfit is explained or nothing helps. Held-out data are
 // looked at for the first and the last model alone, after the verdict.
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -32,6 +33,7 @@ struct ImprovementLimits {
   /// included, so that the same call ends the same way. What a calibration runs on held-out tests
   /// counts, and may exceed it.
   std::optional<std::int64_t> evaluations{};
+  std::vector<std::string> without{};  ///< effects that are not to be thought of
 };
 
 class Improvement {
@@ -60,12 +62,19 @@ class Improvement {
   static bool IsCloser(const report::CampaignView& a, const report::CampaignView& b);
   bool Spent() const { return limits_.evaluations && evaluations_ >= *limits_.evaluations; }
   std::optional<std::int64_t> Left() const;
+  absl::StatusOr<Diagnosis> Ask(const report::CampaignView& view, bool only_adequacy,
+                                std::string& reason);
   absl::StatusOr<Diagnosis> Judge(const report::CampaignView& view, bool only_adequacy);
   absl::StatusOr<std::optional<report::CampaignView>> Forward(const report::CampaignView& view,
                                                               const Diagnosis& diagnosis);
   absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
                                                 const std::vector<std::string>& effects,
-                                                const ClosestRun& closest);
+                                                const ClosestRun& closest, int most_times = 3);
+  static ImproveStep StepOf(const report::CampaignView& view, const std::string& verdict,
+                            std::string reason);
+  absl::Status Exchange(std::vector<std::string>& added);
+  absl::StatusOr<bool> Replace(std::size_t doubted, std::vector<std::string>& added,
+                               const report::CampaignView& full);
   absl::Status Prune(const std::vector<std::string>& added);
   bool Fits(const report::CampaignView& view);
   absl::Status Open();

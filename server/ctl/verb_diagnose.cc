@@ -1,8 +1,8 @@
 #include <iostream>
 
 #include "absl/strings/str_cat.h"
-#include "dem/formula/user_effect.h"
 #include "server/ctl/diagnosis.h"
+#include "server/ctl/diagnosis_support.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/findings.h"
 #include "server/ctl/interrupt.h"
@@ -36,11 +36,8 @@ int Diagnose(const Arguments& arguments) {
   Laboratory laboratory(**session, arguments);
   const auto view = laboratory.Finished(arguments.campaign);
   if (!view.ok()) return Fail(view.status());
-  for (const std::string& name : arguments.effects) {
-    if (dem::FindEffect(view->campaign.model.user_effects, name) == nullptr) {
-      return Fail(absl::InvalidArgumentError("there is no effect " + name +
-                                             " to leave out; see `calibctl effects`"));
-    }
+  if (auto status = CheckLeftOut(arguments.effects, view->campaign); !status.ok()) {
+    return Fail(status);
   }
   const auto diagnosis = Diagnose(laboratory, *view, {.without = arguments.effects});
   if (!diagnosis.ok()) return Fail(diagnosis.status());

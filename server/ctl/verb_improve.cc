@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_join.h"
+#include "server/ctl/diagnosis_support.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/improvement.h"
 #include "server/ctl/interrupt.h"
@@ -60,9 +61,13 @@ int Improve(const Arguments& arguments) {
   Laboratory laboratory(**session, arguments);
   auto view = laboratory.Finished(arguments.campaign);
   if (!view.ok()) return Fail(view.status());
-  Improvement improvement(
-      laboratory, (*session)->client(),
-      {.effects = arguments.max_effects, .evaluations = arguments.max_evaluations});
+  if (auto status = CheckLeftOut(arguments.effects, view->campaign); !status.ok()) {
+    return Fail(status);
+  }
+  Improvement improvement(laboratory, (*session)->client(),
+                          {.effects = arguments.max_effects,
+                           .evaluations = arguments.max_evaluations,
+                           .without = arguments.effects});
   if (auto status = improvement.From(*std::move(view)); !status.ok()) return Fail(status);
   std::cout << (arguments.json ? improvement.Json()
                                : ToText(improvement) + Next(arguments, improvement.steps().back()));

@@ -50,7 +50,7 @@ experiments:
     packing: {file: packing.txt}
     data: {file: triaxial_data.csv, strain: logarithmic}
     control: axial_strain
-    staging: {rate: 0.1 1/s, step: 0.004, unbalanced: 1e-3}
+    staging: {rate: RATE 1/s, step: 0.004, unbalanced: 1e-3}
     observables: {stress_ratio: {noise: {absolute: 0.1}}, volumetric_strain: {noise: {absolute: 1e-3}}}
 """
 
@@ -214,14 +214,14 @@ class Work:
             rates.append(found["contact_updates/s"] * found["real_time"] / found["cpu_time"] / 1e6)
         return statistics.mean(rates)
 
-    def yade_evaluation(self, repeat):
+    def yade_evaluation(self, repeat, rate):
         out = self.path("triaxial_yade.txt")
-        run(["yade", "-n", "-x", "-j1", os.path.join(HERE, "yade_triaxial.py"), self.packing(1000), out, str(repeat)])
+        run(["yade", "-n", "-x", "-j1", os.path.join(HERE, "yade_triaxial.py"), self.packing(1000), out, str(repeat), str(rate)])
         with open(out) as file:
             rows = [[float(word) for word in line.split()] for line in file]
         return rows[-1][5], int(rows[-1][3]), [row[2] for row in rows], [row[1] for row in rows]
 
-    def our_evaluation(self, repeat):
+    def our_evaluation(self, repeat, rate):
         campaign, out = self.path("triaxial.yaml"), self.path("triaxial.csv")
         with open(self.path("packing.txt"), "w") as file, open(self.packing(1000)) as source:
             file.write(source.readline())
@@ -236,7 +236,7 @@ class Work:
             for stage in range(1, 51):
                 print(0.004 * stage, 3, 0, sep=",", file=file)
         with open(campaign, "w") as file:
-            file.write(TRIAXIAL)
+            file.write(TRIAXIAL.replace("RATE", str(rate)))
         (_, cpu), _, _ = run([os.path.join(self.binaries, "calibctl"), "simulate", campaign, "--set", "friction_angle=29deg", "-o", out],
                          {"OMP_NUM_THREADS": "1"})
         with open(out) as file:
@@ -345,13 +345,13 @@ def agreement(rows, column):
     return math.sqrt(statistics.mean(d * d for d in differences)) / largest, within
 
 
-def evaluation(work, repeats):
+def evaluation(work, repeats, rate):
     rows = {"YADE": [], "calib": []}
     for repeat in range(repeats):
-        rows["YADE"].append(work.yade_evaluation(repeat))
-        rows["calib"].append(work.our_evaluation(repeat))
+        rows["YADE"].append(work.yade_evaluation(repeat, rate))
+        rows["calib"].append(work.our_evaluation(repeat, rate))
         print(f"evaluation {repeat + 1}: YADE {rows['YADE'][-1][0]:.1f} s, calib {rows['calib'][-1][0]:.1f} s", file=sys.stderr, flush=True)
-    print(f"\nOne drained triaxial evaluation, 1000 grains, linear contacts with rolling and twisting, 50 stages to 20 %, damping while settling 0.9 in YADE and 0.7 here, one thread, "
+    print(f"\nOne drained triaxial evaluation, 1000 grains, linear contacts with rolling and twisting, 50 stages to 20 % at {rate:g}/s, damping while settling 0.9 in YADE and 0.7 here, one thread, "
           f"{repeats} repeats of shifted grains:\n")
     print("| | processor time, median [s] | peak stress ratio, mean (least .. largest) | mean over 16-20 % | volumetric strain at 20 % |")
     print("|---|---|---|---|---|")
@@ -378,7 +378,7 @@ def main():
     parser.add_argument("--only", choices=("speed", "together", "flow", "emptying", "drum", "heap", "evaluation", "curves"), help="one of the parts")
     parser.add_argument("--cases", default=",".join(curves.CASES), help="of the part curves")
     parser.add_argument("--tests", default=",".join(curves.TESTS), help="of the part curves")
-    parser.add_argument("--rate", type=float, default=0.1, help="of strain in the part curves [1/s]; the stored curves have 0.1")
+    parser.add_argument("--rate", type=float, default=0.1, help="of strain in the parts evaluation and curves [1/s]; the stored curves have 0.1")
     parser.add_argument("--keep", help="folder for the curves of the part curves, so that it may be stopped and run again")
     parser.add_argument("--quick", action="store_true", help="few steps, one repeat: shows that all programs run")
     parser.add_argument("--check", action="store_true", help="options only: nothing is run")
@@ -408,7 +408,7 @@ def main():
                  "emptying": lambda: emptying(work, repeats),
                  "drum": lambda: moving.drum(work, run, repeats),
                  "heap": lambda: moving.heap(work, run, repeats),
-                 "evaluation": lambda: evaluation(work, repeats),
+                 "evaluation": lambda: evaluation(work, repeats, arguments.rate),
                  "curves": lambda: curves.curves(work, run, os.environ["CALIB_DATA"], cases, tests, repeats, arguments.keep or folder,
                                              arguments.rate)}
         for name, part in parts.items():

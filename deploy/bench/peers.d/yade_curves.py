@@ -3,7 +3,7 @@
 # linear), friction (coefficient), rolling (absent, or [stiffness in N m/rad, limit in mean radii]), packing (file), drained
 # (lateral stresses held; else lateral strains), pressure [Pa], strains (axial, logarithmic, from the end of consolidation), out.
 # Staging: `rate` [1/s] in stages of at most 0.002 with damping 0.2, each settled with damping 0.9 until the unbalanced force is below
-# 5e-4 and held stresses within 1e-3. Writes to out, a line per strain: axial strain, volumetric strain (both logarithmic,
+# 5e-4 and held stresses within 1e-3; compressed to the pressure at no more than 0.01/s (yade_triaxial.py says why). Writes to out, a line per strain: axial strain, volumetric strain (both logarithmic,
 # compression positive), axial stress, lateral stress [Pa].
 import json
 import sys
@@ -34,7 +34,7 @@ else:
     physics, law = Ip2_FrictMat_FrictMat_MindlinPhys(), Law2_ScGeom_MindlinPhys_Mindlin()
 pressure = job["pressure"]
 servo = PeriTriaxController(
-    stressMask=7, goal=(-pressure,) * 3, maxStrainRate=(1, 1, 1), dynCell=True, maxUnbalanced=5e-4, relStressTol=1e-3,
+    stressMask=7, goal=(-pressure,) * 3, maxStrainRate=(0.01,) * 3, dynCell=True, maxUnbalanced=5e-4, relStressTol=1e-3,
     doneHook='O.pause()')
 newton = NewtonIntegrator(damping=0.2)
 O.engines = [

@@ -1,7 +1,8 @@
-# Run by YADE: yade -n -x -jN yade_triaxial.py PACKING OUT REPEAT
+# Run by YADE: yade -n -x -jN yade_triaxial.py PACKING OUT REPEAT RATE
 # One drained triaxial test to 20 % at 0.5 MPa: linear contacts (E 1 GPa, ks/kn 0.25, 29 degrees) with rolling and twisting
-# (stiffness and limit 0.13), 50 stages of 0.4 % strained at 0.1/s with damping 0.2 and settled with damping 0.9 until the
-# unbalanced force is below 1e-3 and the lateral stresses within 1e-3. REPEAT shifts the grains by parts in 1e9.
+# (stiffness and limit 0.13), 50 stages of 0.4 % strained at RATE [1/s] with damping 0.2 and settled with damping 0.9 until the
+# unbalanced force is below 1e-3 and the lateral stresses within 1e-3. Compressed to 0.5 MPa at no more than 0.01/s: at 1/s, where that
+# takes as many steps, what it leaves shifts the curves by a percent. REPEAT shifts the grains by parts in 1e9.
 # Writes OUT: axial strain, volumetric strain (logarithmic, compression positive), stress ratio, steps so far, wall and
 # processor time.
 import random
@@ -10,7 +11,7 @@ import time
 
 from yade import pack
 
-packing, out, repeat = sys.argv[1], sys.argv[2], int(sys.argv[3])
+packing, out, repeat, rate = sys.argv[1], sys.argv[2], int(sys.argv[3]), float(sys.argv[4])
 shift = random.Random(repeat)
 spheres = pack.SpherePack()
 with open(packing) as file:
@@ -27,7 +28,7 @@ sand = O.materials.append(CohFrictMat(
     momentRotationLaw=True, etaRoll=0.13, etaTwist=0.13))
 spheres.toSimulation(material=sand)
 servo = PeriTriaxController(
-    stressMask=7, goal=(-5e5, -5e5, -5e5), maxStrainRate=(1, 1, 1), dynCell=True, maxUnbalanced=1e-3, relStressTol=1e-3,
+    stressMask=7, goal=(-5e5, -5e5, -5e5), maxStrainRate=(0.01,) * 3, dynCell=True, maxUnbalanced=1e-3, relStressTol=1e-3,
     doneHook='O.pause()')
 newton = NewtonIntegrator(damping=0.2)
 O.engines = [
@@ -42,7 +43,7 @@ O.run()
 O.wait()
 zero = [servo.strain[k] for k in range(3)]
 servo.stressMask = 3
-servo.maxStrainRate = (1, 1, 0.1)
+servo.maxStrainRate = (1, 1, rate)
 servo.doneHook = ''  # which would end each run at its first step, since the strain asked for is held while grains settle
 goal, straining, left = 0.0, False, 0
 

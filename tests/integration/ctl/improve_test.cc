@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <random>
 #include <sstream>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/integration/ctl/calibctl_fixture.h"
@@ -129,6 +131,97 @@ TEST_F(Improve, AFitThatIsTooGoodIsSaid) {
   };
   EXPECT_TRUE(said("closer to the readings than the stated errors")) << diagnosis["warnings"];
   EXPECT_TRUE(said("stated too large")) << "by the curve alone: " << diagnosis["warnings"];
+}
+
+// Two things hidden in the volume of 64 grains, `first` and `second`, and a third that is much like
+// both together, so that it is taken before either.
+class MistakenAtFirst : public CalibctlFixture {
+ protected:
+  static std::string Campaign(const std::string& effects, const std::string& parameters) {
+    std::string formulas;
+    for (const auto& [name, formula] :
+         {std::pair("first", "sin(2 * pi * axial_strain / 0.04)"),
+          std::pair("second", "sin(3 * pi * axial_strain / 0.04)"),
+          std::pair("both",
+                    "(sin(2 * pi * axial_strain / 0.04) / 2 + sin(3 * pi * axial_strain / 0.04) + "
+                    "sin(4 * pi * axial_strain / 0.04) / 2)")}) {
+      formulas += std::string("    ") + name + ": {adds: volumetric_strain, formula: \"a * " +
+                  formula +
+                  "\", parameters: {a: {null: 0, prior: {prior: uniform, min: -0.01, max: "
+                  "0.01}}}}\n";
+    }
+    return "name: two of three\nmodel:\n  contact: hertz_mindlin\n  effects: [" + effects +
+           "]\n  density: 2650000 kg/m^3\n  fixed: {poisson_ratio: 0.3}\n  user_effects:\n" +
+           formulas + "parameters:\n" + parameters +
+           R"(  young_modulus: {prior: log_uniform, min: 1e8, max: 2e9}
+  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
+experiments:
+  - name: tx
+    test: triaxial_drained
+    confining_pressure: 200 kPa
+    packing: {generate: {particles: 64, porosity: 0.4, radii: {mean: 1 mm, spread: 0.2}, seed: 5}}
+    data: {file: data.csv, strain: logarithmic}
+    control: {column: axial_strain, noise: 1e-5}
+    observables: {q_over_p: {noise: {absolute: 0.02}}, volumetric_strain: {noise: {absolute: 0.0002}}}
+noise: given
+inference: {method: iterative_bayesian_filter, samples: 16, max_iterations: 3}
+seed: 3
+)";
+  }
+
+  void Measure() const {
+    std::ostringstream path;
+    path << "axial_strain,q_over_p,volumetric_strain\n";
+    for (int k = 1; k <= 20; ++k) path << 0.002 * k << ",0.5,0.001\n";
+    Write("data.csv", path.str());
+    Write("truth.yaml", Campaign("first, second", "  first.a: default\n  second.a: default\n"));
+    const Json states =
+        Call(
+            "simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.5 --set "
+            "first.a=0.0015 --set second.a=0.0015 --json")
+            .json()["states"];
+    std::mt19937 random(4);
+    std::normal_distribution<double> normal;
+    std::ostringstream file;
+    file << "axial_strain,q_over_p,volumetric_strain\n";
+    for (const Json& state : states) {
+      file << state["axial_strain"].get<double>() << ','
+           << state["q_over_p"].get<double>() + 0.02 * normal(random) << ','
+           << state["volumetric_strain"].get<double>() + 0.0002 * normal(random) << '\n';
+    }
+    Write("data.csv", file.str());
+  }
+};
+
+TEST_F(MistakenAtFirst, AnEffectGivesWayToTheOneItWasTakenFor) {
+  Measure();
+  Write("base.yaml", Campaign("", ""));
+  ASSERT_EQ(Call("run base.yaml --state s --workers 2 --json").code, 0) << Read("err");
+  std::string without;
+  for (const Json& effect : Call("effects --json").json()) {
+    without += " --without " + effect["name"].get<std::string>();
+  }
+  const Answer wrong = Call("improve c1 --state s --workers 2 --without frction");
+  EXPECT_EQ(wrong.code, 2) << wrong.err;
+  EXPECT_NE(wrong.err.find("there is no effect frction to leave out"), std::string::npos)
+      << wrong.err;
+
+  const Answer improved = Call("improve c1 --state s --workers 2 --max-effects 2 --json" + without);
+  ASSERT_EQ(improved.code, 0) << improved.err;
+  const Json steps = improved.json()["steps"];
+  ASSERT_GE(steps.size(), 4U) << improved.out;
+  EXPECT_EQ(steps[0]["next_effect"], "both") << improved.out;
+  EXPECT_EQ(steps.back()["verdict"], "adequate") << improved.out;
+  std::vector<std::string> effects = steps.back()["effects"];
+  std::sort(effects.begin(), effects.end());
+  EXPECT_EQ(effects, (std::vector<std::string>{"first", "second"})) << improved.out;
+  const Json& asked = steps[steps.size() - 2];
+  EXPECT_EQ(asked["effects"], Json({"first"})) << improved.out;
+  EXPECT_EQ(asked["next_effect"], "second") << improved.out;
+  EXPECT_EQ(asked["reason"].get<std::string>().find("Asked anew what is missing without both: "),
+            0U)
+      << improved.out;
+  EXPECT_LT(steps.back()["rms_error"].get<double>(), 1.3) << improved.out;
 }
 
 }  // namespace
