@@ -207,12 +207,14 @@ absl::Status Improvement::Exchange(std::vector<std::string>& added) {
     if (absl::IsResourceExhausted(replaced.status())) return absl::OkStatus();
     if (!replaced.ok()) return replaced.status();
     if (*replaced) return absl::OkStatus();
+    AddSentence(absl::StrCat("Nothing else in the place of ", added[k], " makes it adequate."),
+                steps_.back().reason);
   }
   return absl::OkStatus();
 }
 
-// Whether an adequate model with another effect in the place of added[doubted] was found; then it
-// is the last one. RESOURCE_EXHAUSTED: --max-evaluations forbids to look on.
+// Whether an adequate model without added[doubted], or with another effect in its place, was found;
+// then it is the last one. RESOURCE_EXHAUSTED: --max-evaluations forbids to look on.
 absl::StatusOr<bool> Improvement::Replace(std::size_t doubted, std::vector<std::string>& added,
                                           const report::CampaignView& full) {
   const std::string out = added[doubted];
@@ -224,6 +226,13 @@ absl::StatusOr<bool> Improvement::Replace(std::size_t doubted, std::vector<std::
   const auto missing = Ask(*without, false, reason);
   if (absl::IsFailedPrecondition(missing.status())) return false;
   if (!missing.ok()) return missing.status();
+  if (missing->verdict == kAdequate) {
+    steps_.push_back(StepOf(*without, missing->verdict,
+                            absl::StrCat(kExplained, " It does without ", out, ".")));
+    last_ = *without;
+    added = std::move(others);
+    return true;
+  }
   for (const std::string& in : EffectsToTry(*missing)) {
     if (in == out || !WhyNotJoin(without->campaign, in).empty()) continue;
     auto with = Extended(*without, {in}, ClosestRunWith(in, *missing));

@@ -23,7 +23,9 @@ std::string Next(const Arguments& arguments, const report::CampaignView& view,
     return NextStep(CommandOf(arguments, "compare " + id),
                     "where the model fails; an effect of your own may be declared in the file");
   }
-  return NextStep(CommandOf(arguments, "improve " + id),
+  std::string improve = "improve " + id;
+  for (const std::string& name : arguments.effects) absl::StrAppend(&improve, " --without ", name);
+  return NextStep(CommandOf(arguments, improve),
                   "the effect added and fitted, judged on data that took no part");
 }
 

@@ -3,8 +3,8 @@
 # linear), friction (coefficient), rolling (absent, or [stiffness in N m/rad, limit in mean radii]), packing (file), drained
 # (lateral stresses held; else lateral strains), pressure [Pa], strains (axial, logarithmic, from the end of consolidation), out.
 # Staging: `rate` [1/s] in stages of at most 0.002 with damping 0.2, each settled with damping 0.9 until the unbalanced force is below
-# 5e-4 and held stresses within 1e-3; compressed to the pressure at no more than 0.01/s (yade_triaxial.py says why). Writes to out, a line per strain: axial strain, volumetric strain (both logarithmic,
-# compression positive), axial stress, lateral stress [Pa].
+# 5e-4 and held stresses within 1e-3; compressed to the pressure at no more than 0.01/s (yade_triaxial.py says why). Writes to out,
+# a line per strain: axial strain, volumetric strain (both logarithmic, compression positive), axial stress, lateral stress [Pa].
 import json
 import sys
 

@@ -9,7 +9,10 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "tests/support/sixty_four_grains.h"
 
@@ -27,6 +30,8 @@ using calib::testing::ReadAll;
 
 class CalibctlFixture : public ::testing::Test {
  protected:
+  static constexpr char kReadings[] = "axial_strain,q_over_p,volumetric_strain\n";
+
   CalibctlFixture() {
     std::string pattern =
         (std::filesystem::temp_directory_path() / "calibctl-test-XXXXXX").string();
@@ -62,6 +67,29 @@ experiments:
     control: impact_angle
     observables: {rebound_angle: {noise: {absolute: )" +
            noise + "}}}\ninference: " + inference + "\nseed: 3\n";
+  }
+
+  /// Readings of q_over_p and volumetric_strain at these axial strains, before they are measured.
+  static std::string UnmeasuredReadings(const std::vector<double>& strains) {
+    std::ostringstream file;
+    file << kReadings;
+    for (const double s : strains) file << s << ",0.5,0.001\n";
+    return file.str();
+  }
+
+  /// What simulate --json says of an experiment, measured with noise of 0.02 and 0.0002.
+  static std::string MeasuredReadings(const Json& states, const std::string& experiment) {
+    std::mt19937 random(4);
+    std::normal_distribution<double> normal;
+    std::ostringstream file;
+    file << kReadings;
+    for (const Json& state : states) {
+      if (state["experiment"] != experiment) continue;
+      file << state["axial_strain"].get<double>() << ','
+           << state["q_over_p"].get<double>() + 0.02 * normal(random) << ','
+           << state["volumetric_strain"].get<double>() + 0.0002 * normal(random) << '\n';
+    }
+    return file.str();
   }
 
   void Write(const std::string& name, const std::string& text) const {

@@ -1,6 +1,5 @@
 // What a user is told on the way to a hidden effect, on 64 grains.
 #include <algorithm>
-#include <random>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -10,6 +9,18 @@
 
 namespace calib::ctl {
 namespace {
+
+// What is calibrated on which test, up to the observables.
+const std::string kSpecimen = R"(  young_modulus: {prior: log_uniform, min: 1e8, max: 2e9}
+  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
+experiments:
+  - name: tx
+    test: triaxial_drained
+    confining_pressure: 200 kPa
+    packing: {generate: {particles: 64, porosity: 0.4, radii: {mean: 1 mm, spread: 0.2}, seed: 5}}
+    data: {file: data.csv, strain: logarithmic}
+    control: {column: axial_strain, noise: 1e-5}
+)";
 
 class Improve : public CalibctlFixture {
  protected:
@@ -23,17 +34,8 @@ model:
   fixed: {poisson_ratio: 0.3}
 parameters:
 )" + (effects.empty() ? "" : "  contact_plasticity.stiffness_ratio: default\n") +
-           R"(  young_modulus: {prior: log_uniform, min: 1e8, max: 2e9}
-  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
-experiments:
-  - name: tx
-    test: triaxial_drained
-    confining_pressure: 200 kPa
-    packing: {generate: {particles: 64, porosity: 0.4, radii: {mean: 1 mm, spread: 0.2}, seed: 5}}
-    data: {file: data.csv, strain: logarithmic}
-    control: {column: axial_strain, noise: 1e-5}
-    observables: {q_over_p: {noise: {absolute: )" +
-           noise + R"(}}, volumetric_strain: {noise: {absolute: 0.0002}}}
+           kSpecimen + R"(    observables: {q_over_p: {noise: {absolute: )" + noise +
+           R"(}}, volumetric_strain: {noise: {absolute: 0.0002}}}
 noise: given
 inference: {method: iterative_bayesian_filter, samples: 24, max_iterations: 2}
 seed: 3
@@ -48,26 +50,14 @@ seed: 3
       strains.push_back(s);
     }
     for (int k = 1; k <= 10; ++k) strains.push_back(0.01 + 0.0015 * k);
-    std::ostringstream path;
-    path << "axial_strain,q_over_p,volumetric_strain\n";
-    for (const double s : strains) path << s << ",0.5,0.001\n";
-    Write("data.csv", path.str());
+    Write("data.csv", UnmeasuredReadings(strains));
     Write("truth.yaml", Campaign("contact_plasticity", "0.02"));
     const Json states =
         Call(
             "simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.45 --set "
             "contact_plasticity.stiffness_ratio=3 --json")
             .json();
-    std::mt19937 random(4);
-    std::normal_distribution<double> normal;
-    std::ostringstream file;
-    file << "axial_strain,q_over_p,volumetric_strain\n";
-    for (const Json& state : states["states"]) {
-      file << state["axial_strain"].get<double>() << ','
-           << state["q_over_p"].get<double>() + 0.02 * normal(random) << ','
-           << state["volumetric_strain"].get<double>() + 0.0002 * normal(random) << '\n';
-    }
-    Write("data.csv", file.str());
+    Write("data.csv", MeasuredReadings(states["states"], "tx"));
   }
 };
 
@@ -152,17 +142,8 @@ class MistakenAtFirst : public CalibctlFixture {
     }
     return "name: two of three\nmodel:\n  contact: hertz_mindlin\n  effects: [" + effects +
            "]\n  density: 2650000 kg/m^3\n  fixed: {poisson_ratio: 0.3}\n  user_effects:\n" +
-           formulas + "parameters:\n" + parameters +
-           R"(  young_modulus: {prior: log_uniform, min: 1e8, max: 2e9}
-  friction_coefficient: {prior: uniform, min: 0.2, max: 0.8}
-experiments:
-  - name: tx
-    test: triaxial_drained
-    confining_pressure: 200 kPa
-    packing: {generate: {particles: 64, porosity: 0.4, radii: {mean: 1 mm, spread: 0.2}, seed: 5}}
-    data: {file: data.csv, strain: logarithmic}
-    control: {column: axial_strain, noise: 1e-5}
-    observables: {q_over_p: {noise: {absolute: 0.02}}, volumetric_strain: {noise: {absolute: 0.0002}}}
+           formulas + "parameters:\n" + parameters + kSpecimen +
+           R"(    observables: {q_over_p: {noise: {absolute: 0.02}}, volumetric_strain: {noise: {absolute: 0.0002}}}
 noise: given
 inference: {method: iterative_bayesian_filter, samples: 16, max_iterations: 3}
 seed: 3
@@ -170,26 +151,16 @@ seed: 3
   }
 
   void Measure() const {
-    std::ostringstream path;
-    path << "axial_strain,q_over_p,volumetric_strain\n";
-    for (int k = 1; k <= 20; ++k) path << 0.002 * k << ",0.5,0.001\n";
-    Write("data.csv", path.str());
+    std::vector<double> strains;
+    for (int k = 1; k <= 20; ++k) strains.push_back(0.002 * k);
+    Write("data.csv", UnmeasuredReadings(strains));
     Write("truth.yaml", Campaign("first, second", "  first.a: default\n  second.a: default\n"));
     const Json states =
         Call(
             "simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.5 --set "
             "first.a=0.0015 --set second.a=0.0015 --json")
             .json()["states"];
-    std::mt19937 random(4);
-    std::normal_distribution<double> normal;
-    std::ostringstream file;
-    file << "axial_strain,q_over_p,volumetric_strain\n";
-    for (const Json& state : states) {
-      file << state["axial_strain"].get<double>() << ','
-           << state["q_over_p"].get<double>() + 0.02 * normal(random) << ','
-           << state["volumetric_strain"].get<double>() + 0.0002 * normal(random) << '\n';
-    }
-    Write("data.csv", file.str());
+    Write("data.csv", MeasuredReadings(states, "tx"));
   }
 };
 

@@ -1,8 +1,7 @@
 // An effect written as a formula, from the campaign file to the verdict, as a user meets it.
 #include <algorithm>
 #include <map>
-#include <random>
-#include <sstream>
+#include <vector>
 
 #include "server/campaign/sha256.h"
 #include "tests/integration/ctl/calibctl_fixture.h"
@@ -113,7 +112,10 @@ TEST_F(UserEffects, AreCandidatesAndJoinTheModel) {
 class HiddenFormula : public CalibctlFixture {
  protected:
   HiddenFormula() {
-    for (const char* name : {"low", "high", "held"}) Write(Readings(name), Measured(Json(), ""));
+    std::vector<double> strains;
+    for (int k = 1; k <= 20; ++k) strains.push_back(0.002 * k);
+    for (const char* name : {"low", "high", "held"})
+      Write(Readings(name), UnmeasuredReadings(strains));
     Write("truth.yaml", Campaign("effects: [hardening], ", "  hardening.c: default\n"));
     Write("base.yaml", Campaign("", ""));
     const Json states =
@@ -121,27 +123,11 @@ class HiddenFormula : public CalibctlFixture {
             "simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.6 --set "
             "hardening.c=-20 --json")
             .json()["states"];
-    for (const char* name : {"low", "high", "held"}) Write(Readings(name), Measured(states, name));
+    for (const char* name : {"low", "high", "held"})
+      Write(Readings(name), MeasuredReadings(states, name));
   }
 
   static std::string Readings(const std::string& name) { return name + ".csv"; }
-
-  static std::string Measured(const Json& states, const std::string& name) {
-    std::ostringstream file;
-    file << "axial_strain,q_over_p,volumetric_strain\n";
-    if (states.is_null()) {
-      for (int k = 1; k <= 20; ++k) file << 0.002 * k << ",0.5,0.001\n";
-    }
-    std::mt19937 random(4);
-    std::normal_distribution<double> normal;
-    for (const Json& state : states) {
-      if (state["experiment"] != name) continue;
-      file << state["axial_strain"].get<double>() << ','
-           << state["q_over_p"].get<double>() + 0.02 * normal(random) << ','
-           << state["volumetric_strain"].get<double>() + 0.0002 * normal(random) << '\n';
-    }
-    return file.str();
-  }
 
   static std::string Campaign(const std::string& effects, const std::string& parameters) {
     std::string text = "name: hidden formula\nmodel: {contact: hertz_mindlin, " + effects +
