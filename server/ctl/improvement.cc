@@ -3,14 +3,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <iostream>
-#include <limits>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "server/campaign/sha256.h"
 #include "server/ctl/extension.h"
 #include "server/ctl/findings.h"
@@ -34,47 +30,7 @@ void AddSentence(const std::string& sentence, std::string& text) {
   absl::StrAppend(&text, text.empty() || sentence.empty() ? "" : " ", sentence);
 }
 
-// Posterior means of all but an effect's parameters. What is needless is weak, so that the others are
-// near where they will be without it.
-std::map<std::string, double> MeansWithout(const std::string& effect,
-                                           const report::CampaignView& view) {
-  std::map<std::string, double> means;
-  for (const auto& parameter : view.posterior.parameters()) {
-    if (!absl::StartsWith(parameter.name(), effect + ".")) {
-      means[parameter.name()] = parameter.mean();
-    }
-  }
-  return means;
-}
-
-// No calibration takes more: all iterations, replicates and held-out draws.
-std::int64_t MostEvaluations(const campaign::Campaign& campaign, int times) {
-  constexpr std::int64_t kReplicatesAndDraws = 100;
-  const auto samples = static_cast<std::int64_t>(campaign.samples) * campaign.max_iterations;
-  return (samples * times + kReplicatesAndDraws) *
-         static_cast<std::int64_t>(campaign.experiments.size());
-}
-
 }  // namespace
-
-struct Improvement::ClosestRun {
-  std::map<std::string, double> values{};
-  double rms = std::numeric_limits<double>::infinity();  // residual over noise sd
-};
-
-Improvement::ClosestRun Improvement::ClosestRunWith(const std::string& effect,
-                                                    const Diagnosis& diagnosis) {
-  for (const CandidateEffect& candidate : diagnosis.candidates) {
-    if (candidate.effect == effect && !candidate.closest.empty()) {
-      return {.values = candidate.closest, .rms = candidate.predicted_rms_error};
-    }
-  }
-  return {};
-}
-
-double Improvement::ErrorOf(const report::CampaignView& view) {
-  return report::Compare(view, report::PredictReadings(view)).rms_error;
-}
 
 std::optional<std::int64_t> Improvement::Left() const {
   if (!limits_.evaluations) return std::nullopt;
@@ -152,9 +108,11 @@ absl::StatusOr<std::optional<report::CampaignView>> Improvement::Forward(
 // A diagnosis that cannot be paid for is no more than the adequacy of the model; the reason says so.
 absl::StatusOr<Diagnosis> Improvement::Ask(const report::CampaignView& view, bool only_adequacy,
                                            std::string& reason) {
-  DiagnosisOptions options{
-      .only_adequacy = only_adequacy, .nuisance = nuisance_, .next_experiment = false};
-  options.max_evaluations = Left();
+  DiagnosisOptions options{.only_adequacy = only_adequacy,
+                           .nuisance = nuisance_,
+                           .without = limits_.without,
+                           .max_evaluations = Left(),
+                           .next_experiment = false};
   auto diagnosis = Diagnose(laboratory_, view, options);
   if (absl::IsResourceExhausted(diagnosis.status())) {
     reason = absl::StrCat("No effect was looked for, --max-evaluations forbids it: ",
@@ -220,7 +178,7 @@ absl::StatusOr<bool> Improvement::Replace(std::size_t doubted, std::vector<std::
   const std::string out = added[doubted];
   std::vector<std::string> others = added;
   others.erase(others.begin() + static_cast<std::ptrdiff_t>(doubted));
-  const auto without = Extended(*first_, others, {.values = MeansWithout(out, full)}, 1);
+  const auto without = Extended(*first_, others, ClosestRunWithout(out, full), 1);
   if (!without.ok()) return without.status();
   std::string reason;
   const auto missing = Ask(*without, false, reason);
@@ -263,7 +221,7 @@ absl::Status Improvement::Prune(const std::vector<std::string>& added) {
   for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
     std::vector<std::string> others = added;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    auto without = Extended(*first_, others, {.values = MeansWithout(added[k], full)}, 1);
+    auto without = Extended(*first_, others, ClosestRunWithout(added[k], full), 1);
     if (absl::IsResourceExhausted(without.status())) return absl::OkStatus();
     if (!without.ok()) return without.status();
     if (without->posterior.posterior_from() == "none" || !Fits(*without)) continue;
@@ -275,71 +233,13 @@ absl::Status Improvement::Prune(const std::vector<std::string>& added) {
   return absl::OkStatus();
 }
 
-bool Improvement::IsFound(const report::CampaignView& view, const ClosestRun& closest) {
-  // Over a posterior, of noise sd: where the emulator knows less, the mean may lie anywhere
-  // (inference/emulator/README.md).
-  constexpr double kKnown = 0.3;
-  // A right model at its posterior misses readings by their errors.
-  constexpr double kRight = 1;
-  if (view.posterior.posterior_from() == "none") return false;
-  const double unknown =
-      view.posterior.posterior_from() == "emulator" ? view.posterior.emulator().unknown() : 0;
-  return unknown <= kKnown && ErrorOf(view) <= std::max(closest.rms, kRight);
-}
-
-bool Improvement::IsCloser(const report::CampaignView& a, const report::CampaignView& b) {
-  const bool has_posterior = a.posterior.posterior_from() != "none";
-  if (has_posterior != (b.posterior.posterior_from() != "none")) return has_posterior;
-  return ErrorOf(a) < ErrorOf(b);
-}
-
-// With a parameter more the parent's iterations may not do: then as many again, and once more, unless
-// most_times forbids. Of these the closest is kept; that is told by what is fitted alone.
 absl::StatusOr<report::CampaignView> Improvement::Extended(const report::CampaignView& view,
                                                            const std::vector<std::string>& effects,
-                                                           const ClosestRun& closest,
-                                                           int most_times) {
-  const auto fitted =
-      std::count_if(view.campaign.experiments.begin(), view.campaign.experiments.end(),
-                    [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
-  // One iteration, whatever is asked for: as much again is as many samples.
-  const bool by_samples = view.campaign.method == campaign::Method::kSqmc;
-  absl::StatusOr<report::CampaignView> closest_yet = absl::UnknownError("not run");
-  for (int times = 1; times <= most_times; ++times) {
-    const std::int64_t samples =
-        static_cast<std::int64_t>(view.campaign.samples) * (by_samples ? times : 1);
-    const std::int64_t least = samples * fitted;
-    std::optional<std::int64_t> budget = Left();
-    if (budget && *budget < least) {
-      if (times > 1) break;
-      return absl::ResourceExhaustedError(absl::StrCat(
-          "an iteration takes ", least, " model evaluations, and ", *budget, " are left"));
-    }
-    const std::int64_t most = MostEvaluations(view.campaign, times);
-    if (budget && *budget >= most && !view.campaign.budget.model_evaluations) budget.reset();
-    if (budget && view.campaign.budget.model_evaluations) {
-      budget = std::min(*budget, *view.campaign.budget.model_evaluations);
-    }
-    const auto text = ExtensionText(
-        view, {.effects = effects,
-               .purpose = "extension",
-               .near = closest.values,
-               .samples = times > 1 && by_samples ? std::optional<int>(static_cast<int>(samples))
-                                                  : std::nullopt,
-               .iterations = times > 1 && !by_samples
-                                 ? std::optional<int>(times * view.campaign.max_iterations)
-                                 : std::nullopt,
-               .replicates = std::nullopt,
-               .model_evaluations = budget});
-    if (!text.ok()) return text.status();
-    auto extended =
-        laboratory_.Run(view, *text, "calibration with " + absl::StrJoin(effects, " + "));
-    if (!extended.ok()) return extended;
-    evaluations_ += extended->status.model_evaluations();
-    if (!closest_yet.ok() || IsCloser(*extended, *closest_yet)) closest_yet = std::move(extended);
-    if (IsFound(*closest_yet, closest)) break;
-  }
-  return closest_yet;
+                                                           const ClosestRun& closest, int times) {
+  ExtendedCalibration calibration(laboratory_, times, Left());
+  auto extended = calibration.Of(view, effects, closest);
+  evaluations_ += calibration.evaluations();
+  return extended;
 }
 
 bool Improvement::Fits(const report::CampaignView& view) {

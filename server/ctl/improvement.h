@@ -11,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "server/ctl/client.h"
 #include "server/ctl/diagnosis.h"
+#include "server/ctl/extended_calibration.h"
 #include "server/ctl/laboratory.h"
 #include "server/report/campaign_view.h"
 
@@ -53,13 +54,6 @@ class Improvement {
   std::string Json() const;
 
  private:
-  // Where the refit of an effect has come closest.
-  struct ClosestRun;
-  static ClosestRun ClosestRunWith(const std::string& effect, const Diagnosis& diagnosis);
-  static double ErrorOf(const report::CampaignView& view);
-  // Whether more samples are not needed: the posterior is known, and as close as it should be.
-  static bool IsFound(const report::CampaignView& view, const ClosestRun& closest);
-  static bool IsCloser(const report::CampaignView& a, const report::CampaignView& b);
   bool Spent() const { return limits_.evaluations && evaluations_ >= *limits_.evaluations; }
   std::optional<std::int64_t> Left() const;
   absl::StatusOr<Diagnosis> Ask(const report::CampaignView& view, bool only_adequacy,
@@ -69,7 +63,7 @@ class Improvement {
                                                               const Diagnosis& diagnosis);
   absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
                                                 const std::vector<std::string>& effects,
-                                                const ClosestRun& closest, int most_times = 3);
+                                                const ClosestRun& closest, int times = 3);
   static ImproveStep StepOf(const report::CampaignView& view, const std::string& verdict,
                             std::string reason);
   absl::Status Exchange(std::vector<std::string>& added);
