@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -14,6 +13,7 @@
 #include "server/ctl/extension.h"
 #include "server/ctl/fitted_campaign.h"
 #include "server/ctl/reading_effects.h"
+#include "server/ctl/refit_order.h"
 #include "server/ctl/response.h"
 #include "server/ctl/strengths.h"
 #include "server/ctl/verdict.h"
@@ -23,7 +23,6 @@
 namespace calib::ctl {
 namespace {
 
-constexpr std::size_t kWarmFits = 4;  // to begin with: two batches each pick those to continue
 // Of measurements that a right model makes one in a thousand is closer.
 constexpr double kTooGood = 0.999;
 constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
@@ -35,7 +34,7 @@ class Inquiry {
         options_(options),
         base_(laboratory, view),
         screen_(base_),
-        fits_(base_, screen_, response_) {}
+        fits_(base_, screen_, response_, options.level) {}
 
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();
@@ -263,50 +262,13 @@ class Inquiry {
     }
   }
 
-  // The first by the screen; of several that it cannot tell apart the first of them.
-  std::vector<std::string> WorthARefit() const {
-    std::vector<std::string> effects;
-    std::set<std::string> alike;
-    for (const CandidateEffect& candidate : diagnosis_.candidates) {
-      if (effects.size() == kWarmFits) break;
-      if (alike.count(candidate.effect) > 0) continue;
-      effects.push_back(candidate.effect);
-      alike.insert(candidate.confusable_with.begin(), candidate.confusable_with.end());
-    }
-    return effects;
-  }
-
-  // The others that the screen sees something of, by how much it expects of them.
-  std::vector<std::string> FurtherThan(const std::vector<std::string>& first) const {
-    std::vector<const CandidateEffect*> others;
-    for (const CandidateEffect& candidate : diagnosis_.candidates) {
-      if (candidate.p_value < options_.level &&
-          std::find(first.begin(), first.end(), candidate.effect) == first.end()) {
-        others.push_back(&candidate);
-      }
-    }
-    std::stable_sort(others.begin(), others.end(), [](const auto* a, const auto* b) {
-      return a->explained_fraction > b->explained_fraction;
-    });
-    std::vector<std::string> names;
-    names.reserve(others.size());
-    for (const CandidateEffect* other : others) names.push_back(other->effect);
-    return names;
-  }
-
   absl::Status FitWarm(const inference::FittedModel& base) {
     if (!base_.view().campaign.precomputed) {
       std::optional<std::int64_t> most = options_.max_evaluations;
       if (most) *most -= screen_.evaluations();
-      const std::vector<std::string> first = WorthARefit();
-      std::map<std::string, double> promised;
-      for (const CandidateEffect& candidate : diagnosis_.candidates) {
-        promised[candidate.effect] = candidate.predicted_rms_error / diagnosis_.rms;
-      }
-      if (auto status = fits_.Fit(first, FurtherThan(first), std::move(promised), most);
-          !status.ok()) {
-        return status;
-      }
+      const RefitOrder order =
+          OrderOfRefits(diagnosis_, base_.view().campaign.model.user_effects, options_.level);
+      if (auto status = fits_.Fit(order, most); !status.ok()) return status;
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (CandidateEffect& candidate : diagnosis_.candidates) Describe(candidate);

@@ -43,9 +43,6 @@ struct WarmFit {
   /// merely not been found.
   bool Found() const { return over_base.nats > 0; }
 
-  /// As close as noise and scatter allow: more runs are better spent on its rivals.
-  bool Satisfied() const { return adequacy.degrees > 0 && adequacy.chi2 <= adequacy.degrees; }
-
   /// Adequate, and clearly better than the base model. refits: of which this is one.
   bool Explains(double level, std::size_t refits) const {
     const bool better = gain_p_value ? *gain_p_value * static_cast<double>(refits) < level

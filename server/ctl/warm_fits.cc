@@ -15,11 +15,9 @@ namespace {
 using Eigen::Index;
 
 constexpr int kLeastSamples = 6;
-constexpr int kShares = 15;        // batches that the campaign's number of samples pays for
-constexpr double kPatience = 1.5;  // a batch more must bring a fit this much closer
-constexpr int kLeastBatches = 2;   // of each: the first is blind, the second a first attempt
-constexpr double kCloser = 0.9;    // times the rms so far: the batch was worth it
-constexpr int kMostIdle = 3;       // batches in a row that were not
+constexpr int kShares = 15;      // batches that the campaign's number of samples pays for
+constexpr double kCloser = 0.9;  // times the rms so far: the batch was worth it
+constexpr int kMostIdle = 3;     // batches in a row that were not
 // Of the mean history at the point that a fit is judged by, sd of the readings.
 constexpr double kMostUnknown = 1;
 
@@ -29,11 +27,6 @@ int BatchOf(const FittedCampaign& base) {
 }
 
 }  // namespace
-
-double PriceOf(double chi2, double base, double promised, int batches) {
-  const double share = std::min(1.0, promised);
-  return std::sqrt(std::min(chi2, base * share * share)) * std::pow(kPatience, batches);
-}
 
 std::map<std::string, double> PointOf(const report::CampaignView& view,
                                       const Eigen::MatrixXd& points, Index row) {
@@ -48,27 +41,24 @@ std::int64_t WarmFits::Least() const {
   return static_cast<std::int64_t>(kLeastBatches) * BatchOf(base_) * base_.fitted_experiments();
 }
 
-absl::Status WarmFits::Fit(std::vector<std::string> first, const std::vector<std::string>& later,
-                           std::map<std::string, double> promised,
-                           std::optional<std::int64_t> most) {
-  if (first.empty()) return absl::OkStatus();
-  promised_ = std::move(promised);
+absl::Status WarmFits::Fit(const RefitOrder& order, std::optional<std::int64_t> most) {
+  if (order.first.empty()) return absl::OkStatus();
+  const auto adequacy = inference::TestAdequacy(Base());
+  const double base_chi2 = adequacy.ok() ? adequacy->chi2 : std::numeric_limits<double>::infinity();
   samples_ = BatchOf(base_);
   const int batch = samples_ * base_.fitted_experiments();
   int allowed = static_cast<int>(base_.runs().sample.size()) * base_.fitted_experiments();
   if (most) allowed = static_cast<int>(std::min<std::int64_t>(allowed, *most));
-  first.resize(std::min(first.size(),
-                        static_cast<std::size_t>(std::max(1, allowed / (kLeastBatches * batch)))));
+  const auto fitting = static_cast<std::size_t>(std::max(1, allowed / (kLeastBatches * batch)));
+  std::vector<std::string> first = order.first;
+  first.resize(std::min(first.size(), fitting));
   if (auto status = Begin(first); !status.ok()) return status;
-  auto newcomer = later.begin();
   while (spent_ + batch <= allowed) {
-    if (const std::optional<std::string> next = Next()) {
-      if (auto status = Continue(*next); !status.ok()) return status;
-    } else if (newcomer != later.end() && spent_ + kLeastBatches * batch <= allowed) {
-      if (auto status = Begin({*newcomer++}); !status.ok()) return status;
-    } else {
-      break;
-    }
+    const bool may_begin = spent_ + kLeastBatches * batch <= allowed;
+    const auto next = NextRefit(order, Standings(), base_chi2, may_begin);
+    if (!next) break;
+    const auto status = Find(*next) == nullptr ? Begin({*next}) : Continue(*next);
+    if (!status.ok()) return status;
   }
   return absl::OkStatus();
 }
@@ -89,42 +79,19 @@ absl::Status WarmFits::Begin(const std::vector<std::string>& effects) {
   return absl::OkStatus();
 }
 
-double WarmFits::Chi2(const std::string& effect) const {
-  const WarmFit& fit = fits_.at(effect);
-  return fit.model.histories.rows() > 0 ? fit.adequacy.chi2
-                                        : std::numeric_limits<double>::infinity();
-}
-
-const WarmFit& WarmFits::Closest() const {
-  return fits_.at(*std::min_element(
-      begun_.begin(), begun_.end(),
-      [this](const std::string& a, const std::string& b) { return Chi2(a) < Chi2(b); }));
-}
-
-// The one that promises most; the best comes last once it is as close as noise and scatter allow:
-// it is its rivals that are not known yet.
-std::optional<std::string> WarmFits::Next() const {
-  const WarmFit& best = Closest();
-  // Without the effect it is the base model: a fit that is further off has merely not been found.
-  // One that is not as close as the screen expects has further to go.
-  const auto adequacy = inference::TestAdequacy(Base());
-  const double base = adequacy.ok() ? adequacy->chi2 : std::numeric_limits<double>::infinity();
-  std::optional<std::string> next;
-  double lowest = 0;
+std::vector<RefitStanding> WarmFits::Standings() const {
+  std::vector<RefitStanding> standings;
   for (const std::string& effect : begun_) {
     const WarmFit& fit = fits_.at(effect);
-    if (fit.stalled || fit.runs.histories.rows() == 0) continue;
-    const auto hope = promised_.find(effect);
-    const double share = hope == promised_.end() ? 1 : hope->second;
-    const double price = &fit == &best && fit.Satisfied()
-                             ? std::numeric_limits<double>::infinity()
-                             : PriceOf(Chi2(effect), base, share, fit.iterations);
-    if (!next || price < lowest) {
-      next = effect;
-      lowest = price;
-    }
+    const bool has_runs = fit.model.histories.rows() > 0;
+    standings.push_back(
+        {.effect = effect,
+         .chi2 = has_runs ? fit.adequacy.chi2 : std::numeric_limits<double>::infinity(),
+         .batches = fit.iterations,
+         .stalled = fit.stalled || fit.runs.histories.rows() == 0,
+         .explains = fit.Explains(level_, begun_.size())});
   }
-  return next;
+  return standings;
 }
 
 const WarmFit* WarmFits::Find(const std::string& effect) const {

@@ -18,6 +18,7 @@
 #include "inference/diagnosis/screen.h"
 #include "server/ctl/effect_screen.h"
 #include "server/ctl/fitted_campaign.h"
+#include "server/ctl/refit_order.h"
 #include "server/ctl/response.h"
 #include "server/ctl/warm_fit.h"
 
@@ -25,19 +26,16 @@ namespace calib::ctl {
 
 class WarmFits {
  public:
-  /// screen: its runs teach the emulators too. response: of the base model, made before Fit. All
-  /// must outlive it.
-  WarmFits(const FittedCampaign& base, const EffectScreen& screen, const Response& response)
-      : base_(base), screen_(screen), response_(response) {}
+  /// screen: its runs teach the emulators too. response: of the base model, made before Fit. level:
+  /// of the tests by which a fit explains the readings. All must outlive it.
+  WarmFits(const FittedCampaign& base, const EffectScreen& screen, const Response& response,
+           double level)
+      : base_(base), screen_(screen), response_(response), level_(level) {}
 
-  /// Two batches of each of `first`, as far as they go; then the most promising go on, until each
-  /// has stalled or as many evaluations have been made as the campaign has, or as `most` allows;
-  /// Least() in any case. Once all have stalled, those of `later` are begun with what is left, in
-  /// their order. promised: by effect, the rms error that the screen expects with it over that
-  /// without: how close a refit may come yet.
-  /// Errors: those of the runs.
-  absl::Status Fit(std::vector<std::string> first, const std::vector<std::string>& later,
-                   std::map<std::string, double> promised, std::optional<std::int64_t> most = {});
+  /// kLeastBatches of each of `first`, as far as they go; then batches go where NextRefit says, until
+  /// there is nothing left that goes on, or as many evaluations have been made as the campaign has,
+  /// or as `most` allows; Least() in any case. Errors: those of the runs.
+  absl::Status Fit(const RefitOrder& order, std::optional<std::int64_t> most = {});
   /// Model evaluations of two batches of one effect.
   std::int64_t Least() const;
 
@@ -62,11 +60,7 @@ class WarmFits {
   absl::StatusOr<std::string> FirstText(const std::string& effect) const;
   absl::Status Begin(const std::vector<std::string>& effects);
   absl::Status Continue(const std::string& effect);
-  double Chi2(const std::string& effect) const;
-  /// The begun fit that comes closest.
-  const WarmFit& Closest() const;
-  /// Empty when every fit has stalled.
-  std::optional<std::string> Next() const;
+  std::vector<RefitStanding> Standings() const;
   absl::StatusOr<Eigen::MatrixXd> PointsFor(const std::string& effect) const;
   report::RunTable RunsFor(const std::string& effect) const;
   void Judge(const std::string& effect);
@@ -76,19 +70,13 @@ class WarmFits {
   const FittedCampaign& base_;
   const EffectScreen& screen_;
   const Response& response_;
+  double level_;
   int samples_ = 0;  // of a batch
   int spent_ = 0;    // evaluations of the batches, reused ones too
   std::vector<std::string> begun_;
-  std::map<std::string, double> promised_;
   std::int64_t evaluations_ = 0;
   std::map<std::string, WarmFit> fits_;
 };
-
-/// What orders the refits, the lowest first: the rms that is left to explain where the fit stands or
-/// where the screen expects it to end, whichever is less, dearer with every batch that has been made.
-/// chi2, base: of the fit so far and of the model without the effect, >= 0, may be infinite;
-/// promised: rms the screen expects over the base model's, >= 0 (above 1: as 1).
-double PriceOf(double chi2, double base, double promised, int batches);
 
 /// Calibrated parameters of a campaign at a row of `points`, by name.
 std::map<std::string, double> PointOf(const report::CampaignView& view,
