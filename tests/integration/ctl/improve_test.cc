@@ -179,6 +179,8 @@ TEST_F(MistakenAtFirst, AnEffectGivesWayToTheOneItWasTakenFor) {
 
   const Answer improved = Call("improve c1 --state s --workers 2 --max-effects 2 --json" + without);
   ASSERT_EQ(improved.code, 0) << improved.err;
+  EXPECT_NE(improved.err.find("screen of both"), std::string::npos) << improved.err;
+  EXPECT_EQ(improved.err.find("screen of rolling_resistance"), std::string::npos) << improved.err;
   const Json steps = improved.json()["steps"];
   ASSERT_GE(steps.size(), 4U) << improved.out;
   EXPECT_EQ(steps[0]["next_effect"], "both") << improved.out;
