@@ -57,7 +57,7 @@ absl::Status WarmFits::Fit(const RefitOrder& order, std::optional<std::int64_t> 
     const bool may_begin = spent_ + kLeastBatches * batch <= allowed;
     const auto next = NextRefit(order, Standings(), base_chi2, may_begin);
     if (!next) break;
-    const auto status = Find(*next) == nullptr ? Begin({*next}) : Continue(*next);
+    auto status = Find(*next) == nullptr ? Begin({*next}) : Continue(*next);
     if (!status.ok()) return status;
   }
   return absl::OkStatus();
