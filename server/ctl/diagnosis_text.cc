@@ -78,6 +78,7 @@ Json PlannedJson(const PlannedExperiment& planned) {
           {"control_to", planned.path.back()},
           {"expected_power", planned.expected_power},
           {"distance_sd", planned.distance},
+          {"not_separated", planned.together},
           {"none_of_these",
            {{"distance_sd", OrNull(planned.distance_from_none)},
             {"expected_power", OrNull(planned.power_against_none)}}}};
@@ -131,23 +132,35 @@ std::string AgainstNone(const PlannedExperiment& planned) {
       report::Percent(*planned.power_against_none, 3), Number(*planned.distance_from_none, 3));
 }
 
+// Pairs of rivals that a planned test leaves together.
+std::string NotTold(const PlannedExperiment& planned) {
+  std::string text;
+  for (const auto& [a, b] : planned.together) {
+    text += (text.empty() ? ", but not " : " nor ") + a + " from " + b;
+  }
+  return text;
+}
+
 std::string NextText(const NextExperiment& next) {
   std::string names;
   for (const std::string& name : next.separates) names += (names.empty() ? "" : " and ") + name;
   std::string text =
       "\n" +
       Wrapped(
-          fmt::format("Next experiment: {}. It separates {} with a power of {} ({} sd apart){}; "
+          fmt::format("Next experiment: {}. It separates {} with a power of {} ({} sd apart){}{}; "
                       "an evaluation costs about {} core seconds. For the campaign file:",
                       InWords(next.best), names, report::Percent(next.best.expected_power, 3),
-                      Number(next.best.distance, 3), AgainstNone(next.best),
+                      Number(next.best.distance, 3), NotTold(next.best), AgainstNone(next.best),
                       Number(next.core_seconds, 2)),
           "", "") +
       "\n" + next.snippet;
   if (next.considered.size() > 1) text += "\nAlso tried:\n";
   for (std::size_t k = 1; k < next.considered.size(); ++k) {
-    text += fmt::format("  {}: {} sd apart\n", InWords(next.considered[k]),
-                        Number(next.considered[k].distance, 3));
+    const PlannedExperiment& planned = next.considered[k];
+    text += "  " + InWords(planned) + ": " +
+            (planned.expected_power < kToldApart
+                 ? "tells none of them apart\n"
+                 : fmt::format("{} sd apart{}\n", Number(planned.distance, 3), NotTold(planned)));
   }
   return text;
 }

@@ -13,6 +13,7 @@
 #include "server/campaign/derive.h"
 #include "server/campaign/yaml_text.h"
 #include "server/ctl/test_plans.h"
+#include "server/report/people_units.h"
 
 namespace calib::ctl {
 namespace {
@@ -159,6 +160,29 @@ double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatt
   return std::max(0.0, square - of_chance);
 }
 
+void Weigh(const std::vector<RivalPair>& pairs, PlannedExperiment& planned) {
+  planned.together.clear();
+  const RivalPair* told = nullptr;      // the closest that are told apart
+  const RivalPair* farthest = nullptr;  // where there are none
+  for (const RivalPair& pair : pairs) {
+    if (farthest == nullptr || pair.distance > farthest->distance) farthest = &pair;
+    if (pair.power < kToldApart) {
+      planned.together.emplace_back(pair.a, pair.b);
+    } else if (told == nullptr || pair.distance < told->distance) {
+      told = &pair;
+    }
+  }
+  const RivalPair* const pair = told != nullptr ? told : farthest;
+  planned.distance = pair == nullptr ? 0 : pair->distance;
+  planned.expected_power = pair == nullptr ? 0 : pair->power;
+}
+
+double ShareToldApart(const std::vector<RivalPair>& pairs) {
+  double sum = 0;
+  for (const RivalPair& pair : pairs) sum += pair.power;
+  return pairs.empty() ? 0 : sum / static_cast<double>(pairs.size());
+}
+
 absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
                                             const std::vector<Rival>& rivals,
                                             const std::optional<NoneOfThese>& none, int like,
@@ -195,7 +219,6 @@ absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
     if (!view.ok()) return view.status();
     next.evaluations += view->status.model_evaluations();
     core_hours += view->status.core_hours();
-    if (next.separates.size() < rivals.size()) next.separates.push_back(rival.name);
     auto& own = curves.emplace_back();
     for (const TestPlan& plan : plans) {
       const auto readings = static_cast<Index>(plan.experiment.path.size());
@@ -207,20 +230,23 @@ absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
                           ? core_hours * kSecondsPerHour / static_cast<double>(next.evaluations)
                           : 0;
   std::vector<std::size_t> finished;
+  std::vector<std::vector<RivalPair>> pairs(plans.size());
   for (std::size_t p = 0; p < plans.size(); ++p) {
-    double closest = std::numeric_limits<double>::infinity();
+    const bool all_end =
+        std::none_of(curves.begin(), curves.begin() + static_cast<std::ptrdiff_t>(rivals.size()),
+                     [p](const auto& own) { return own[p].empty(); });
+    if (!all_end) continue;
     for (std::size_t a = 0; a < rivals.size(); ++a) {
-      for (std::size_t b = 0; b < a; ++b) {
-        closest = curves[a][p].empty() || curves[b][p].empty()
-                      ? std::numeric_limits<double>::quiet_NaN()
-                      : std::min(closest,
-                                 std::sqrt(SeparationOf(
-                                     DeparturesOf(curves[a][p], curves[b][p], pattern), scatter)));
+      for (std::size_t b = a + 1; b < rivals.size(); ++b) {
+        const double distance =
+            std::sqrt(SeparationOf(DeparturesOf(curves[a][p], curves[b][p], pattern), scatter));
+        pairs[p].push_back({.a = rivals[a].name,
+                            .b = rivals[b].name,
+                            .distance = distance,
+                            .power = PowerAt(distance)});
       }
     }
-    if (!std::isfinite(closest)) continue;
-    plans[p].experiment.distance = closest;
-    plans[p].experiment.expected_power = PowerAt(closest);
+    Weigh(pairs[p], plans[p].experiment);
     if (!none || curves.back()[p].empty()) {
       finished.push_back(p);
       continue;
@@ -238,12 +264,28 @@ absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
   if (finished.empty()) {
     return NextPlan{.why_none = "no planned test came to an end with all of the models"};
   }
-  std::stable_sort(finished.begin(), finished.end(), [&plans](std::size_t a, std::size_t b) {
+  std::stable_sort(finished.begin(), finished.end(), [&](std::size_t a, std::size_t b) {
+    const double share_a = ShareToldApart(pairs[a]);
+    const double share_b = ShareToldApart(pairs[b]);
+    if (share_a != share_b) return share_a > share_b;
     return plans[a].experiment.distance > plans[b].experiment.distance;
   });
   for (const std::size_t p : finished) next.considered.push_back(plans[p].experiment);
-  const TestPlan& best = plans[finished.front()];
-  next.best = best.experiment;
+  next.best = plans[finished.front()].experiment;
+  const std::vector<RivalPair>& told = pairs[finished.front()];
+  for (const Rival& rival : rivals) {
+    if (std::any_of(told.begin(), told.end(), [&rival](const RivalPair& pair) {
+          return pair.power >= kToldApart && (pair.a == rival.name || pair.b == rival.name);
+        })) {
+      next.separates.push_back(rival.name);
+    }
+  }
+  if (next.separates.empty()) {
+    return NextPlan{.why_none = fmt::format(
+                        "of the {} tests that were tried none tells any two of these models apart, "
+                        "from one specimen each (the best with a power of {})",
+                        finished.size(), report::Percent(next.best.expected_power, 2))};
+  }
   YamlNode snippet = entries[finished.front()];
   campaign::YamlAt(campaign::YamlAt(snippet, "data"), "file") =
       campaign::YamlScalar("measurement_to_be_made.csv");

@@ -32,6 +32,22 @@ struct Rival {
 double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter,
                     const std::vector<double>& shift = {});
 
+/// Two rivals in a planned test.
+struct RivalPair {
+  std::string a, b;
+  double distance = 0;  ///< sd of a measurement, >= 0
+  double power = 0;     ///< chance to see it at the 1 % level
+};
+
+/// With less a pair is not told apart: ten times what is seen of two that are the same.
+inline constexpr double kToldApart = 0.1;
+
+/// Fills expected_power, distance and together of a plan.
+void Weigh(const std::vector<RivalPair>& pairs, PlannedExperiment& planned);
+
+/// Share of the pairs that is expected to be told apart.
+double ShareToldApart(const std::vector<RivalPair>& pairs);
+
 /// "None of these": the campaign's own model with a smooth misfit as large as the one that is there.
 struct NoneOfThese {
   Rival base{};
@@ -41,7 +57,7 @@ struct NoneOfThese {
 
 struct NextExperiment {
   PlannedExperiment best;
-  std::vector<std::string> separates;  ///< the rivals
+  std::vector<std::string> separates;  ///< rivals that the best tells from another
   std::string snippet;  ///< an entry of `experiments`, indented, with a comment; the file of the
                         ///< measurement is to be made
   std::vector<PlannedExperiment> considered;  ///< best first
@@ -58,9 +74,10 @@ struct NextPlan {
 /// seed of sample `like`. Errors of a measurement: the noise that the campaign states for the
 /// observables at values of their size, and `scatter` (of a single run, in units of that noise) for
 /// the measurement and both runs: see SeparationOf(). None for fewer than two rivals, without a
-/// known size of the errors, where no plan is a campaign that this build accepts, or where no plan
-/// is finished by all rivals. Errors: those of the runs. The best is that with the largest distance
-/// between the rivals; their distance from none of them is told beside it.
+/// known size of the errors, where no plan is a campaign that this build accepts, is finished by all
+/// rivals, or tells any two of them apart. Errors: those of the runs. The best is that which tells
+/// the most pairs apart, and of equals the closest of them best; their distance from none of them is
+/// told beside it.
 absl::StatusOr<NextPlan> PlanNextExperiment(Laboratory& laboratory,
                                             const std::vector<Rival>& rivals,
                                             const std::optional<NoneOfThese>& none, int like,

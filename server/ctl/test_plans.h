@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/campaign/campaign.h"
@@ -19,9 +20,10 @@ struct PlannedExperiment {
   bool unloading = false;    ///< once, half-way of the loading
   std::string control;       ///< what drives it,
   std::vector<double> path;  ///< and its values at the readings, SI
-  /// Chance to tell the two closest of the rivals apart at the 1 % level.
+  /// Chance to tell two rivals apart at the 1 % level: the lowest of the pairs that are told apart.
   double expected_power = 0;
   double distance = 0;  ///< between these two, in sd of a measurement
+  std::vector<std::pair<std::string, std::string>> together{};  ///< pairs that are not told apart
   /// The same of the rivals against none of them (NoneOfThese); where that was asked for.
   std::optional<double> distance_from_none{}, power_against_none{};
 };

@@ -110,10 +110,15 @@ std::string NextExperimentHtml(const StoredDiagnosis& d) {
   for (const std::string& name : d.next_separates) {
     names += (names.empty() ? "" : " and ") + NameForPeople(name);
   }
+  std::string together;
+  for (const auto& [a, b] : d.next_together) {
+    together += (together.empty() ? ", but not " : " nor ") + NameForPeople(a) + " from " +
+                NameForPeople(b);
+  }
   return fmt::format(
-      "<h3>Next experiment</h3>\n<p>It separates {} with a power of {}. For the campaign "
+      "<h3>Next experiment</h3>\n<p>It separates {} with a power of {}{}. For the campaign "
       "file:</p>\n<pre>{}</pre>\n",
-      Escape(names), Percent(d.next_power, 3), Escape(d.next_experiment));
+      Escape(names), Percent(d.next_power, 3), Escape(together), Escape(d.next_experiment));
 }
 
 }  // namespace

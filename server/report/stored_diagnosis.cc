@@ -123,6 +123,13 @@ absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& text) {
     Read(*next, "snippet", d.next_experiment);
     Read(*next, "separates", d.next_separates);
     Read(*next, "expected_power", d.next_power);
+    if (const auto pairs = next->find("not_separated"); pairs != next->end()) {
+      for (const Json& pair : *pairs) {
+        if (pair.is_array() && pair.size() == 2 && pair[0].is_string() && pair[1].is_string()) {
+          d.next_together.emplace_back(pair[0], pair[1]);
+        }
+      }
+    }
   }
   return d;
 }

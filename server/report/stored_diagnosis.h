@@ -48,6 +48,7 @@ struct StoredDiagnosis {
   std::string next_experiment{};  ///< the lines for the campaign file; empty: none was planned
   std::vector<std::string> next_separates{};
   double next_power = 0;
+  std::vector<std::pair<std::string, std::string>> next_together{};  ///< that it does not separate
 };
 
 /// INVALID_ARGUMENT when the text is no such document; fields of other versions are left out.

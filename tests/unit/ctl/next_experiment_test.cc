@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "inference/sampling/philox.h"
 
@@ -51,6 +54,30 @@ TEST(NextExperiment, WhatIsFarApartIsInUnitsOfTheErrors) {
   bump[4] = -200;
   // 80 000 over 1 + 1.5 s^2, less the mean of chance.
   EXPECT_NEAR(SeparationOf({bump}, kScatter), 80000 / 38.5, 20);
+}
+
+const std::vector<RivalPair> kOneIsApart = {
+    {"a", "b", 0, 0.01}, {"a", "c", 6, 0.99}, {"b", "c", 5, 0.98}};
+
+TEST(NextExperiment, PairsThatStayTogetherAreSaid) {
+  PlannedExperiment planned;
+  Weigh(kOneIsApart, planned);
+  EXPECT_EQ(planned.distance, 5);
+  EXPECT_EQ(planned.expected_power, 0.98);
+  ASSERT_EQ(planned.together.size(), 1U);
+  EXPECT_EQ(planned.together.front(), (std::pair<std::string, std::string>("a", "b")));
+}
+
+TEST(NextExperiment, WhereNoneIsToldApartTheBestOfThemCounts) {
+  PlannedExperiment planned;
+  Weigh({{"a", "b", 0, 0.01}, {"a", "c", 0.5, 0.03}}, planned);
+  EXPECT_EQ(planned.distance, 0.5);
+  EXPECT_EQ(planned.together.size(), 2U);
+}
+
+TEST(NextExperiment, ATestThatTellsOneFromTheOthersIsWorthMoreThanOneThatTellsNothing) {
+  EXPECT_GT(ShareToldApart(kOneIsApart),
+            ShareToldApart({{"a", "b", 1, 0.09}, {"a", "c", 1, 0.09}, {"b", "c", 1, 0.09}}));
 }
 
 }  // namespace

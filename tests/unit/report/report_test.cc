@@ -166,7 +166,8 @@ constexpr const char* kDiagnosis = R"json({"campaign": "c1", "verdict": "missing
   "units": {"contact_plasticity.stiffness": "Pa"}, "only_adequacy": false,
   "not_excitable": [{"effect": "wall_friction", "reason": "none of the fitted tests can show it"}],
   "next_experiment": {"snippet": "  - name: next\n", "separates": ["contact_plasticity"],
-                      "expected_power": 0.93}, "warnings": ["closer than the stated errors"]})json";
+                      "expected_power": 0.93,
+                      "not_separated": [["adhesion_dmt", "adhesion_jkr"]]}, "warnings": ["closer than the stated errors"]})json";
 
 TEST(Report, ShowsTheDiagnosisThatWasKept) {
   const CampaignView view = testing::ExampleView("sand");
@@ -184,7 +185,7 @@ TEST(Report, ShowsTheDiagnosisThatWasKept) {
         "<td>0.56</td><td>1.02</td>", ">cohesion: range = 2, stiffness = 3.2 kPa<",
         "twisting resistance (12°)", "&lt;b&gt;membrane", "chi-squared 431", "SHA-256 5f1e",
         "wall friction: none of the fitted tests can show it", "closer than the stated errors",
-        "  - name: next"}) {
+        "  - name: next", ", but not adhesion dmt from adhesion jkr."}) {
     EXPECT_THAT(html, HasSubstr(said));
   }
   EXPECT_THAT(html, Not(HasSubstr("nan")));
