@@ -41,6 +41,7 @@ RefitOrder OrderOfRefits(const Diagnosis& diagnosis, const std::vector<dem::User
     order.alike[a.effect].insert(a.confusable_with.begin(), a.confusable_with.end());
     for (const CandidateEffect& b : diagnosis.candidates) {
       if (dem::Exclude(*dem::FindEffect(user, a.effect), *dem::FindEffect(user, b.effect))) {
+        order.other_laws[a.effect].insert(b.effect);
         order.alike[a.effect].insert(b.effect);
       }
     }
@@ -101,12 +102,24 @@ std::optional<std::string> NextRefit(const RefitOrder& order,
       open = &refit;
     }
   }
+  const auto is_begun = [&begun](const RefitOrder::Later& later) {
+    return std::any_of(begun.begin(), begun.end(),
+                       [&later](const auto& r) { return r.effect == later.effect; });
+  };
+  const auto has_law_that_explains = [&](const RefitOrder::Later& later) {
+    const auto laws = order.other_laws.find(later.effect);
+    return laws != order.other_laws.end() &&
+           std::any_of(begun.begin(), begun.end(), [&laws](const auto& r) {
+             return r.explains && laws->second.count(r.effect) > 0;
+           });
+  };
   if (may_begin) {
+    for (const RefitOrder::Later& later : order.later) {
+      if (!is_begun(later) && has_law_that_explains(later)) return later.effect;
+    }
     const bool enough = CountExplaining(order, begun) >= kEnough;
     for (const RefitOrder::Later& later : order.later) {
-      const bool is_begun = std::any_of(begun.begin(), begun.end(),
-                                        [&](const auto& r) { return r.effect == later.effect; });
-      if (is_begun || (enough && !later.hinted)) continue;
+      if (is_begun(later) || (enough && !later.hinted)) continue;
       if (open == nullptr || PriceOf(base_chi2, base_chi2, Promised(order, later.effect),
                                      kLeastBatches) < price(*open)) {
         return later.effect;
