@@ -41,7 +41,6 @@ RefitOrder OrderOfRefits(const Diagnosis& diagnosis, const std::vector<dem::User
     order.alike[a.effect].insert(a.confusable_with.begin(), a.confusable_with.end());
     for (const CandidateEffect& b : diagnosis.candidates) {
       if (dem::Exclude(*dem::FindEffect(user, a.effect), *dem::FindEffect(user, b.effect))) {
-        order.other_laws[a.effect].insert(b.effect);
         order.alike[a.effect].insert(b.effect);
       }
     }
@@ -106,16 +105,16 @@ std::optional<std::string> NextRefit(const RefitOrder& order,
     return std::any_of(begun.begin(), begun.end(),
                        [&later](const auto& r) { return r.effect == later.effect; });
   };
-  const auto has_law_that_explains = [&](const RefitOrder::Later& later) {
-    const auto laws = order.other_laws.find(later.effect);
-    return laws != order.other_laws.end() &&
-           std::any_of(begun.begin(), begun.end(), [&laws](const auto& r) {
-             return r.explains && laws->second.count(r.effect) > 0;
+  const auto is_like_one_that_explains = [&](const RefitOrder::Later& later) {
+    const auto alike = order.alike.find(later.effect);
+    return alike != order.alike.end() &&
+           std::any_of(begun.begin(), begun.end(), [&alike](const auto& r) {
+             return r.explains && alike->second.count(r.effect) > 0;
            });
   };
   if (may_begin) {
     for (const RefitOrder::Later& later : order.later) {
-      if (!is_begun(later) && has_law_that_explains(later)) return later.effect;
+      if (!is_begun(later) && is_like_one_that_explains(later)) return later.effect;
     }
     const bool enough = CountExplaining(order, begun) >= kEnough;
     for (const RefitOrder::Later& later : order.later) {

@@ -22,9 +22,9 @@ struct RefitOrder {
   };
   std::vector<std::string> first{};  ///< side by side
   std::vector<Later> later{};        ///< one after the other
-  /// By effect, both ways: other laws of the same thing; these, and effects that the screen cannot
-  /// tell from it.
-  std::map<std::string, std::set<std::string>> other_laws{}, alike{};
+  /// By effect, both ways: other laws of the same thing, and effects that the screen cannot tell
+  /// from it.
+  std::map<std::string, std::set<std::string>> alike{};
   /// rms error that the screen expects with an effect over that without, >= 0 (above 1: as 1): how
   /// close a refit may come yet. None: 1.
   std::map<std::string, double> promised{};
@@ -48,10 +48,11 @@ struct RefitStanding {
 
 /// The effect that promises most: a batch more of a refit that does not explain the readings and has
 /// not stalled, or the next of `later` that is not begun, if `may_begin`. Once three explain the
-/// readings that are not alike, it has to be hinted at to be begun. Another law of what explains the
-/// readings is begun before anything else: it may do so better, and nothing else tells. Where there is none, a refit that
-/// explains them goes on, the closest last: it is its rivals that are not known yet. None: all have
-/// stalled. base_chi2: of the model without any of the effects, may be infinite.
+/// readings that are not alike, it has to be hinted at to be begun. One that is like an effect that
+/// explains the readings is begun before anything else: it may do so better, and is named with it in
+/// any case. Where there is none, a refit that explains them goes on, the closest last: it is its
+/// rivals that are not known yet. None: all have stalled. base_chi2: of the model without any of the
+/// effects, may be infinite.
 std::optional<std::string> NextRefit(const RefitOrder& order,
                                      const std::vector<RefitStanding>& begun, double base_chi2,
                                      bool may_begin);

@@ -129,8 +129,8 @@ TEST_F(NextRefitTest, ThreeThatAreNotAlikeAreEnough) {
   EXPECT_EQ(Next({At("a", 50), At("c", 50), At("d", 50), At("f", 390)}), "f");
 }
 
-TEST_F(NextRefitTest, AnotherLawOfWhatExplainsIsBegunFirst) {
-  order_.other_laws = {{"a", {"f"}}, {"f", {"a"}}};
+TEST_F(NextRefitTest, WhatIsLikeAnEffectThatExplainsIsBegunFirst) {
+  order_.alike = {{"a", {"f"}}, {"f", {"a"}}};
   EXPECT_EQ(Next({At("a", 50), At("b", 100), At("c", 390), At("d", 390)}), "f");
   EXPECT_EQ(Next({At("a", 380), At("b", 390), At("c", 390), At("d", 390)}), "e");
 }
