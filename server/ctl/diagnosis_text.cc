@@ -136,7 +136,7 @@ std::string AgainstNone(const PlannedExperiment& planned) {
 std::string NotTold(const PlannedExperiment& planned) {
   std::string text;
   for (const auto& [a, b] : planned.together) {
-    text += (text.empty() ? ", but not " : " nor ") + a + " from " + b;
+    text += fmt::format("{}{} from {}", text.empty() ? ", but not " : " nor ", a, b);
   }
   return text;
 }

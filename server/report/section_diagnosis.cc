@@ -112,8 +112,8 @@ std::string NextExperimentHtml(const StoredDiagnosis& d) {
   }
   std::string together;
   for (const auto& [a, b] : d.next_together) {
-    together += (together.empty() ? ", but not " : " nor ") + NameForPeople(a) + " from " +
-                NameForPeople(b);
+    together += fmt::format("{}{} from {}", together.empty() ? ", but not " : " nor ",
+                            NameForPeople(a), NameForPeople(b));
   }
   return fmt::format(
       "<h3>Next experiment</h3>\n<p>It separates {} with a power of {}{}. For the campaign "
