@@ -4,11 +4,13 @@
 #include <Eigen/Dense>
 #include <vector>
 
+#include "inference/diagnosis/histories.h"
+
 namespace calib::inference {
 
 /// A model as a cloud of what it can do. Histories are (prediction - reading) / noise sd.
 struct FittedModel {
-  Eigen::MatrixXd histories;   ///< G x T, mean history at G points of its parameter space
+  Histories histories;         ///< G of T, mean history at G points of its parameter space
   Eigen::MatrixXd covariance;  ///< T x T, of a measurement about the true mean history: noise,
                                ///< scatter, error of the emulator, numerical nuisance
   int parameters = 0;

@@ -41,7 +41,7 @@ std::vector<std::vector<Direction>> DirectionsOf(const std::vector<Signature>& c
       Direction direction{
           .whitened = model.factor.matrixL().solve(difference), .square = 0, .along = {}};
       direction.square = direction.whitened.squaredNorm();
-      direction.along = model.points.transpose() * direction.whitened;
+      direction.along = Along(model, direction.whitened);
       own.push_back(std::move(direction));
     }
   }
@@ -146,7 +146,7 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   Adequacy adequacy;
   adequacy.chi2 = whitened->squares.minCoeff(&adequacy.best);
   if (model.draws.rows() == 0) {
-    adequacy.degrees = static_cast<double>(model.histories.cols() - model.parameters);
+    adequacy.degrees = static_cast<double>(model.histories.readings() - model.parameters);
     adequacy.p_chi2 = adequacy.degrees > 0
                           ? boost::math::gamma_q(0.5 * adequacy.degrees, 0.5 * adequacy.chi2)
                           : 1;
@@ -154,7 +154,7 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
     return adequacy;
   }
   for (const Eigen::MatrixXd& shapes : model.shapes) {
-    if (shapes.rows() != model.histories.cols() || shapes.cols() >= shapes.rows()) {
+    if (shapes.rows() != model.histories.readings() || shapes.cols() >= shapes.rows()) {
       return absl::InvalidArgumentError("diagnosis: shapes do not fit the histories");
     }
   }
@@ -163,10 +163,11 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   // Of each draw: chi-squared, and that of the residual's part in the span of each set of shapes.
   Eigen::MatrixXd squares(model.draws.rows(), static_cast<Index>(1 + model.shapes.size()));
   for (const DrawnGroup& group : *groups) {
-    const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.points.col(adequacy.best);
+    const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.Point(adequacy.best);
     const Nearest nearest = NearestTo(group.model, offsets);
     squares(group.number, 0) = nearest.squares;
-    const Eigen::MatrixXd residuals = group.model.points(Eigen::all, nearest.points) + offsets;
+    const Eigen::MatrixXd residuals =
+        group.model.axes * group.model.points(Eigen::all, nearest.points) + offsets;
     for (std::size_t k = 0; k < model.shapes.size(); ++k) {
       squares(group.number, static_cast<Index>(k + 1)) =
           (SpanOf(model.shapes[k], group.model).transpose() * residuals).colwise().squaredNorm();
@@ -185,7 +186,7 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   }
   adequacy.degrees = tails.front().mean();
   adequacy.p_chi2 = tails.front()(adequacy.chi2);
-  const Eigen::VectorXd residual = whitened->points.col(adequacy.best);
+  const Eigen::VectorXd residual = whitened->Point(adequacy.best);
   for (std::size_t k = 0; k < model.shapes.size(); ++k) {
     const double square = (SpanOf(model.shapes[k], *whitened).transpose() * residual).squaredNorm();
     adequacy.p_shapes = std::min(adequacy.p_shapes.value_or(1), tails[k + 1](square));
@@ -208,7 +209,7 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   if (!adequacy.ok()) return adequacy.status();
   const auto groups = DrawsOf(model);
   if (!groups.ok()) return groups.status();
-  const Index t = model.histories.cols();
+  const Index t = model.histories.readings();
   for (const Signature& candidate : candidates) {
     for (const Eigen::VectorXd& difference : candidate.differences) {
       if (difference.size() != t || !difference.allFinite()) {
@@ -218,11 +219,11 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   }
   const std::vector<std::vector<Direction>> directions = DirectionsOf(candidates, *whitened);
   // Measurements of the fitted model itself.
-  const Eigen::VectorXd fitted = whitened->points.col(adequacy->best);
+  const Eigen::VectorXd fitted = whitened->Point(adequacy->best);
   std::vector<std::vector<double>> simulated(candidates.size());
   const auto simulate = [&](const Whitened& own, const std::vector<std::vector<Direction>>& along,
                             const Eigen::VectorXd& drawn) {
-    const Eigen::VectorXd offset = drawn - own.points.col(adequacy->best);
+    const Eigen::VectorXd offset = drawn - own.Point(adequacy->best);
     const Eigen::VectorXd distances = DistancesFrom(own, offset);
     const double base = distances.minCoeff();
     for (std::size_t c = 0; c < candidates.size(); ++c) {
@@ -263,7 +264,7 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
       score.difference = fit.difference;
       score.explained = std::clamp(score.gain / excess, 0.0, 1.0);
       const Eigen::VectorXd left =
-          model.histories.row(fit.point).transpose() +
+          model.histories[fit.point] +
           fit.amplitude * candidates[c].differences[static_cast<std::size_t>(fit.difference)];
       score.rms = std::sqrt(left.squaredNorm() / static_cast<double>(t));
     }
@@ -275,9 +276,8 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
     for (const Direction& direction : directions[c]) {
       // The point that imitates the effect best, seen from the fitted one.
       Index imitation = 0;
-      (whitened->squares - 2 * (whitened->points.transpose() * (fitted + direction.whitened)))
-          .minCoeff(&imitation);
-      rests.emplace_back(fitted + direction.whitened - whitened->points.col(imitation));
+      (whitened->squares - 2 * Along(*whitened, fitted + direction.whitened)).minCoeff(&imitation);
+      rests.emplace_back(fitted + direction.whitened - whitened->Point(imitation));
     }
     const auto longest = std::max_element(
         rests.begin(), rests.end(),
@@ -329,8 +329,8 @@ absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedM
   const auto whitened = Whiten(base);
   if (!whitened.ok()) return whitened.status();
   if (base.draws.rows() == 0 || extended.parameters <= base.parameters ||
-      extended.histories.cols() != base.histories.cols() || extended.histories.rows() < 1 ||
-      !extended.histories.allFinite()) {
+      extended.histories.readings() != base.histories.readings() ||
+      extended.histories.points() < 1 || !extended.histories.AllFinite()) {
     return absl::InvalidArgumentError(
         "diagnosis: a gain needs draws of the base model and an extension of it");
   }
@@ -338,21 +338,15 @@ absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedM
   if (!groups.ok()) return groups.status();
   Index best = 0;
   const double chi2 = whitened->squares.minCoeff(&best);
-  const auto in_coordinates_of = [&extended](const Whitened& own) {
-    Whitened larger{.factor = {},
-                    .points = own.factor.matrixL().solve(extended.histories.transpose()),
-                    .squares = {}};
-    larger.squares = larger.points.colwise().squaredNorm();
-    return larger;
-  };
   std::vector<double> gains;
   for (const DrawnGroup& group : *groups) {
-    const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.points.col(best);
-    const Eigen::VectorXd own = NearestTo(group.model, offsets).squares -
-                                NearestTo(in_coordinates_of(group.model), offsets).squares;
+    const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.Point(best);
+    const Eigen::VectorXd own =
+        NearestTo(group.model, offsets).squares -
+        NearestTo(WhitenBy(group.model.factor, extended.histories), offsets).squares;
     for (const double gain : own) gains.push_back(std::max(0.0, gain));
   }
-  const Whitened larger = in_coordinates_of(*whitened);
+  const Whitened larger = WhitenBy(whitened->factor, extended.histories);
   return ChanceOfFall(std::max(0.0, chi2 - larger.squares.minCoeff()),
                       {.simulated = std::move(gains),
                        .freedom = std::max(1, extended.parameters - base.parameters),
@@ -368,7 +362,7 @@ absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, in
     Index best = 0;
     whitened->squares.minCoeff(&best);
     const Eigen::MatrixXd lower = whitened->factor.matrixL();
-    terms.emplace_back(0.5 * whitened->points.col(best).array().square() +
+    terms.emplace_back(0.5 * whitened->Point(best).array().square() +
                        lower.diagonal().array().log());
   }
   if (terms[0].size() != terms[1].size() || block < 1) {
@@ -394,7 +388,7 @@ absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, in
 }
 
 absl::StatusOr<double> LeftOutError(const FittedModel& model, const std::vector<int>& group) {
-  const Index t = model.histories.cols();
+  const Index t = model.histories.readings();
   const std::set<int> groups(group.begin(), group.end());
   if (static_cast<Index>(group.size()) != t || groups.size() < 2) {
     return absl::InvalidArgumentError(
@@ -402,7 +396,7 @@ absl::StatusOr<double> LeftOutError(const FittedModel& model, const std::vector<
   }
   // The model at some of the readings.
   const auto at = [&model](const std::vector<Index>& readings) {
-    return FittedModel{.histories = model.histories(Eigen::all, readings),
+    return FittedModel{.histories = model.histories.At(readings),
                        .covariance = model.covariance(readings, readings),
                        .parameters = model.parameters};
   };

@@ -10,21 +10,19 @@ using Eigen::Index;
 
 constexpr Index kFewestDraws = 50;
 
-absl::StatusOr<Whitened> WhitenBy(const Eigen::MatrixXd& covariance,
-                                  const Eigen::MatrixXd& histories) {
-  Whitened whitened{.factor = Eigen::LLT<Eigen::MatrixXd>(covariance), .points = {}, .squares = {}};
-  if (whitened.factor.info() != Eigen::Success) {
+absl::StatusOr<Whitened> WhitenByCovariance(const Eigen::MatrixXd& covariance,
+                                            const Histories& histories) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+  if (factor.info() != Eigen::Success) {
     return absl::InvalidArgumentError("diagnosis: the covariance is not positive definite");
   }
-  whitened.points = whitened.factor.matrixL().solve(histories.transpose());
-  whitened.squares = whitened.points.colwise().squaredNorm();
-  return whitened;
+  return WhitenBy(factor, histories);
 }
 
 bool GroupsFit(const FittedModel& model) {
   const auto groups = static_cast<int>(model.without.size());
   if (groups == 0) return true;
-  const Index t = model.histories.cols();
+  const Index t = model.histories.readings();
   return static_cast<Index>(model.group.size()) == model.draws.rows() &&
          std::all_of(model.group.begin(), model.group.end(),
                      [groups](int g) { return g >= 0 && g < groups; }) &&
@@ -34,20 +32,38 @@ bool GroupsFit(const FittedModel& model) {
 
 }  // namespace
 
+Whitened WhitenBy(const Eigen::LLT<Eigen::MatrixXd>& factor, const Histories& histories) {
+  Whitened whitened{.factor = factor, .axes = {}, .points = {}, .squares = {}};
+  const Eigen::MatrixXd shapes = factor.matrixL().solve(histories.shapes());
+  const Index t = shapes.rows();
+  const Index q = shapes.cols();
+  if (q < t) {
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(shapes);
+    whitened.axes = qr.householderQ() * Eigen::MatrixXd::Identity(t, q);
+    whitened.points =
+        qr.matrixQR().topRows(q).triangularView<Eigen::Upper>() * histories.coefficients();
+  } else {
+    whitened.axes.setIdentity(t, t);
+    whitened.points = shapes * histories.coefficients();
+  }
+  whitened.squares = whitened.points.colwise().squaredNorm();
+  return whitened;
+}
+
 absl::StatusOr<Whitened> Whiten(const FittedModel& model) {
-  const Index t = model.histories.cols();
-  if (model.histories.rows() < 1 || t < 1 || model.covariance.rows() != t ||
-      model.covariance.cols() != t || !model.histories.allFinite()) {
+  const Index t = model.histories.readings();
+  if (model.histories.points() < 1 || t < 1 || model.covariance.rows() != t ||
+      model.covariance.cols() != t || !model.histories.AllFinite()) {
     return absl::InvalidArgumentError("diagnosis: histories and covariance do not fit together");
   }
-  return WhitenBy(model.covariance, model.histories);
+  return WhitenByCovariance(model.covariance, model.histories);
 }
 
 absl::StatusOr<std::vector<DrawnGroup>> DrawsOf(const FittedModel& model) {
   std::vector<DrawnGroup> groups;
   const Index count = model.draws.rows();
   if (count == 0) return groups;
-  if (count < kFewestDraws || model.draws.cols() != model.histories.cols() ||
+  if (count < kFewestDraws || model.draws.cols() != model.histories.readings() ||
       !model.draws.allFinite() || !GroupsFit(model)) {
     return absl::InvalidArgumentError(
         "diagnosis: draws of a measurement are too few or do not fit the histories");
@@ -59,8 +75,8 @@ absl::StatusOr<std::vector<DrawnGroup>> DrawsOf(const FittedModel& model) {
   }
   for (std::size_t g = 0; g < numbers.size(); ++g) {
     if (numbers[g].empty()) continue;
-    auto whitened =
-        WhitenBy(model.without.empty() ? model.covariance : model.without[g], model.histories);
+    auto whitened = WhitenByCovariance(model.without.empty() ? model.covariance : model.without[g],
+                                       model.histories);
     if (!whitened.ok()) return whitened.status();
     const Eigen::MatrixXd own = model.draws(numbers[g], Eigen::all).transpose();
     Eigen::MatrixXd draws = whitened->factor.matrixL().solve(own);
@@ -71,9 +87,12 @@ absl::StatusOr<std::vector<DrawnGroup>> DrawsOf(const FittedModel& model) {
   return groups;
 }
 
+Eigen::MatrixXd Along(const Whitened& whitened, const Eigen::MatrixXd& directions) {
+  return whitened.points.transpose() * (whitened.axes.transpose() * directions);
+}
+
 Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& offset) {
-  return (whitened.squares + 2 * (whitened.points.transpose() * offset)).array() +
-         offset.squaredNorm();
+  return (whitened.squares + 2 * Along(whitened, offset)).array() + offset.squaredNorm();
 }
 
 Nearest NearestTo(const Whitened& whitened, const Eigen::MatrixXd& offsets) {
@@ -82,7 +101,7 @@ Nearest NearestTo(const Whitened& whitened, const Eigen::MatrixXd& offsets) {
                   .points = std::vector<Index>(static_cast<std::size_t>(offsets.cols()))};
   for (Index s = 0; s < offsets.cols(); s += kAtOnce) {
     const auto some = offsets.middleCols(s, std::min(kAtOnce, offsets.cols() - s));
-    const Eigen::MatrixXd along = whitened.points.transpose() * some;
+    const Eigen::MatrixXd along = Along(whitened, some);
     for (Index k = 0; k < some.cols(); ++k) {
       nearest.squares[s + k] = (whitened.squares + 2 * along.col(k))
                                    .minCoeff(&nearest.points[static_cast<std::size_t>(s + k)]) +

@@ -9,11 +9,15 @@
 
 namespace calib::inference {
 
-/// The model in coordinates in which a measurement scatters as a standard normal.
+/// The model in coordinates in which a measurement scatters as a standard normal: its points lie in
+/// the span of q <= T axes.
 struct Whitened {
   Eigen::LLT<Eigen::MatrixXd> factor;  ///< of the covariance
-  Eigen::MatrixXd points;              ///< T x G
+  Eigen::MatrixXd axes;                ///< T x q, orthonormal
+  Eigen::MatrixXd points;              ///< q x G, along the axes
   Eigen::VectorXd squares;             ///< G, of the points' lengths
+
+  Eigen::VectorXd Point(Eigen::Index g) const { return axes * points.col(g); }  ///< T
 };
 
 /// Draws and the coordinates they are judged in.
@@ -23,12 +27,18 @@ struct DrawnGroup {
   Eigen::MatrixXd draws;             ///< T x number of them, whitened
 };
 
+/// factor: of a T x T covariance.
+Whitened WhitenBy(const Eigen::LLT<Eigen::MatrixXd>& factor, const Histories& histories);
+
 /// Errors: INVALID_ARGUMENT for shapes that do not fit, a covariance that is not positive definite.
 absl::StatusOr<Whitened> Whiten(const FittedModel& model);
 
 /// All draws of the model, in the order of their groups; none where the model has none. Errors as
 /// above, and for fewer than 50 draws.
 absl::StatusOr<std::vector<DrawnGroup>> DrawsOf(const FittedModel& model);
+
+/// Inner products of every point and each column of directions (T x S, whitened): G x S.
+Eigen::MatrixXd Along(const Whitened& whitened, const Eigen::MatrixXd& directions);
 
 /// |point + offset|^2 of every point, G; offset: T, whitened.
 Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& offset);

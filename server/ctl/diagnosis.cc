@@ -111,8 +111,7 @@ class Inquiry {
           "The model is closer to the readings than the stated errors and the scatter explain: "
           "they seem too large, and an effect can hide in them.");
     }
-    diagnosis_.rms = response_.model.histories.row(adequacy->best).norm() /
-                     std::sqrt(static_cast<double>(response_.model.histories.cols()));
+    diagnosis_.rms = response_.model.histories.Rms(adequacy->best);
     // A misfit beyond all that the emulator does not know is one however little that is.
     if (!response_.trustworthy && adequacy->p_value >= options_.level) {
       return absl::FailedPreconditionError(absl::StrCat(
@@ -156,7 +155,7 @@ class Inquiry {
   absl::Status ScreenReadings() {
     const campaign::Campaign& campaign = base_.view().campaign;
     const std::vector<ReadingEffect> effects =
-        EffectsOnReadings(campaign, response_.model.histories, diagnosis_.not_excitable);
+        EffectsOnReadings(campaign, response_.model.histories.Values(), diagnosis_.not_excitable);
     std::vector<inference::Signature> signatures;
     for (const ReadingEffect& effect : effects) {
       if (LeftOutAsAskedFor(effect.effect)) continue;
@@ -204,8 +203,7 @@ class Inquiry {
     if (before != nullptr && before->adequacy.chi2 <= adequacy->chi2) return;
     fit.adequacy = *adequacy;
     fit.over_base = *advantage;
-    fit.rms = fit.model.histories.row(adequacy->best).norm() /
-              std::sqrt(static_cast<double>(fit.model.histories.cols()));
+    fit.rms = fit.model.histories.Rms(adequacy->best);
     fit.left_out_error = LeftOut(fit.model);
     fit.best = PointOf(base_.view(), response_.points, adequacy->best);
     fit.best[effect.parameter] = strengths[adequacy->best] * effect.unit;
@@ -393,12 +391,11 @@ class Inquiry {
     const std::vector<inference::Reading> plain =
         campaign::MakeDataSet(base_.view().campaign).readings;
     std::map<std::string, std::pair<double, int>> squares;  // and how many
+    const Eigen::VectorXd fitted = response_.model.histories[diagnosis_.adequacy.best];
     for (std::size_t k = 0; k < readings.size(); ++k) {
       const campaign::Experiment& experiment =
           base_.view().campaign.experiments[static_cast<std::size_t>(readings[k].experiment)];
-      const double missed =
-          response_.model.histories(diagnosis_.adequacy.best, static_cast<Eigen::Index>(k)) *
-          readings[k].sd / plain[k].sd;
+      const double missed = fitted[static_cast<Eigen::Index>(k)] * readings[k].sd / plain[k].sd;
       auto& [sum, count] =
           squares[experiment.observables[static_cast<std::size_t>(readings[k].observable)].name];
       sum += missed * missed;

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/ctl/extension.h"
+#include "server/ctl/left_out_packings.h"
 
 namespace calib::ctl {
 
@@ -16,6 +17,7 @@ FittedCampaign::FittedCampaign(Laboratory& laboratory, const report::CampaignVie
       view_(view),
       readings_(report::ReadingsWithScatter(view)),
       runs_(report::RunsOf(view, readings_.of_mean)),
+      closed_forms_without_(ClosedFormsWithout(view.campaign, readings_)),
       state_(ReferenceOf(view)) {}
 
 int FittedCampaign::fitted_experiments() const {

@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,10 @@ class FittedCampaign {
   /// All histories are in the sd of readings().of_mean.
   const report::ScatteredReadings& readings() const { return readings_; }
   const report::RunTable& runs() const { return runs_; }
+  /// See ClosedFormsWithout.
+  const std::vector<std::optional<Eigen::MatrixXd>>& closed_forms_without() const {
+    return closed_forms_without_;
+  }
   const dem::ReferenceState& state() const { return state_; }
   const std::string& id() const { return view_.status.campaign(); }
   int fitted_experiments() const;
@@ -48,6 +53,7 @@ class FittedCampaign {
   const report::CampaignView& view_;
   report::ScatteredReadings readings_;
   report::RunTable runs_;
+  std::vector<std::optional<Eigen::MatrixXd>> closed_forms_without_;
   dem::ReferenceState state_;
 };
 

@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include "inference/sampling/philox.h"
 #include "inference/scatter/packing_scatter.h"
-#include "inference/scatter/scatter.h"
-#include "server/campaign/scatter_fit.h"
 
 namespace calib::ctl {
 namespace {
@@ -54,33 +50,6 @@ Eigen::VectorXd ScatterOfMissed(const FittedCampaign& base, const inference::Dat
                                : share);
   }
   return scatter;
-}
-
-// The closed form of the scatter, a chain along the path for each observable, from the replicates
-// on all packings but one; none where fewer than two remain.
-std::optional<Eigen::MatrixXd> ClosedFormWithout(int left_out, const FittedCampaign& base,
-                                                 const inference::DataSet& plain) {
-  const report::ScatteredReadings& readings = base.readings();
-  const int packings = PackingsApart(base.view().campaign);
-  std::vector<Index> replicates;
-  for (std::size_t r = 0; r < readings.departure_stream.size(); ++r) {
-    if (readings.departure_stream[r] % packings == left_out) continue;
-    replicates.push_back(static_cast<Index>(r));
-  }
-  if (replicates.size() < 2) return std::nullopt;
-  const Eigen::MatrixXd departures = readings.departures(replicates, Eigen::all);
-  Eigen::MatrixXd closed_form = Eigen::MatrixXd::Zero(departures.cols(), departures.cols());
-  for (const auto& group : inference::GroupsOf(plain)) {
-    const std::vector<int>& own = group.second;
-    closed_form(own, own) = inference::ScatterCovariance(
-        campaign::FitGroupScatter(base.view().campaign, plain, group,
-                                  inference::MomentsOfReplicates(departures(Eigen::all, own))));
-  }
-  Eigen::VectorXd inverse(closed_form.rows());
-  for (Index k = 0; k < inverse.size(); ++k) {
-    inverse[k] = 1 / readings.of_mean.readings[static_cast<std::size_t>(k)].sd;
-  }
-  return Eigen::MatrixXd(inverse.asDiagonal() * closed_form * inverse.asDiagonal());
 }
 
 // Noise, nuisance and scatter of measurements; `missed` holds what the emulator misses of single
@@ -128,15 +97,6 @@ void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
 }
 
 }  // namespace
-
-int PackingsApart(const campaign::Campaign& campaign) {
-  int packings = 0;
-  for (const campaign::Experiment& experiment : campaign.experiments) {
-    if (experiment.role != campaign::Role::kCalibrate || experiment.specimens.size() < 2) continue;
-    packings = std::gcd(packings, static_cast<int>(experiment.specimens.size()));
-  }
-  return std::max(1, packings);
-}
 
 MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
                                        const inference::StateEmulator& emulator,
@@ -188,8 +148,10 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
       inference::PackingScatter scatter = inference::ScatterBetweenPackings(
           of_runs * ScatterOfMissed(base, plain).asDiagonal(), packing,
           [&](std::optional<int> left_out) {
-            const auto own = left_out ? ClosedFormWithout(*left_out, base, plain) : std::nullopt;
-            return own.value_or(closed_form);
+            const auto& forms = base.closed_forms_without();
+            const bool known = left_out && static_cast<std::size_t>(*left_out) < forms.size();
+            return known ? forms[static_cast<std::size_t>(*left_out)].value_or(closed_form)
+                         : closed_form;
           },
           errors.of_mean.covariance - closed_form);
       errors.of_mean.covariance = std::move(scatter.covariance);

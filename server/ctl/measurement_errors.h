@@ -29,11 +29,6 @@ struct MeasurementErrors {
 /// is left to judge it by.
 inline constexpr int kFewestPackings = 4;
 
-/// How many groups of runs share no packing in any fitted experiment with another group: run i is
-/// of group StreamOf(i) mod that. Experiments of 4 and 6 packings have 2, not 4; 1 where packings
-/// were not varied.
-int PackingsApart(const campaign::Campaign& campaign);
-
 /// not_known: sd of the mean history's scores at the point judged by. nuisance: directions (T each)
 /// that a measurement may differ by for numerical reasons, of unit variance. Scatter is what
 /// several packings were measured to differ by, a chain along the path for each observable, and,

@@ -304,17 +304,19 @@ std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
 inference::FittedModel Join(const inference::FittedModel& model, const ReadingEffect& effect,
                             double lowest, double highest, Eigen::VectorXd& strengths) {
   const Eigen::LLT<Eigen::MatrixXd> factor(model.covariance);
-  const Eigen::MatrixXd whitened = factor.matrixL().solve(model.histories.transpose());
+  Eigen::MatrixXd histories = model.histories.Values();
+  const Eigen::MatrixXd whitened = factor.matrixL().solve(histories.transpose());
   const Eigen::MatrixXd change = factor.matrixL().solve(effect.change.transpose());
   inference::FittedModel joined = model;
   ++joined.parameters;
-  strengths.resize(model.histories.rows());
+  strengths.resize(histories.rows());
   for (Index g = 0; g < strengths.size(); ++g) {
     const double square = change.col(g).squaredNorm();
     strengths[g] =
         square > 0 ? std::clamp(-whitened.col(g).dot(change.col(g)) / square, lowest, highest) : 0;
-    joined.histories.row(g) += strengths[g] * effect.change.row(g);
+    histories.row(g) += strengths[g] * effect.change.row(g);
   }
+  joined.histories = std::move(histories);
   return joined;
 }
 

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
+#include "server/ctl/left_out_packings.h"
 #include "server/ctl/stage_shapes.h"
 
 namespace calib::ctl {
@@ -111,9 +112,13 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedMod
   response.trustworthy = std::sqrt(std::max(0.0, response.emulator_error * response.emulator_error -
                                                      scatter * scatter)) <= kMostUncovered;
   response.model.parameters = static_cast<int>(d);
+  // A history is the mean and as much of each component as its scores say.
+  const Index q = components.basis.cols();
+  Eigen::MatrixXd shapes(t, 1 + q);
+  shapes << components.mean.transpose(), components.basis;
   Eigen::MatrixXd points(0, d);
-  Eigen::MatrixXd histories(0, t);
-  Eigen::MatrixXd unknown(0, emulator.scatter_sd().size());
+  Eigen::MatrixXd coefficients(1 + q, 0);
+  Eigen::MatrixXd unknown(0, q);
   const auto add = [&](const Eigen::MatrixXd& values) {
     const inference::ScorePrediction prediction = emulator.Predict(Standard(priors, values));
     std::vector<Index> known;
@@ -126,14 +131,13 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedMod
     const Index before = points.rows();
     const auto more = static_cast<Index>(known.size());
     points.conservativeResize(before + more, d);
-    histories.conservativeResize(before + more, t);
+    coefficients.conservativeResize(1 + q, before + more);
     unknown.conservativeResize(before + more, unknown.cols());
     for (Index i = 0; i < more; ++i) {
       const Index from = known[static_cast<std::size_t>(i)];
       points.row(before + i) = values.row(from);
       unknown.row(before + i) = prediction.sd.row(from);
-      histories.row(before + i) =
-          components.mean + prediction.mean.row(from) * components.basis.transpose();
+      coefficients.col(before + i) << 1, prediction.mean.row(from).transpose();
     }
   };
   const auto spread =
@@ -153,16 +157,17 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedMod
     return ErrorsOfMeasurements(base, emulator, unknown.row(point), packing, nuisance);
   };
   Index best = 0;
-  histories.rowwise().squaredNorm().minCoeff(&best);
+  (shapes * coefficients).colwise().squaredNorm().minCoeff(&best);
   const Eigen::LLT<Eigen::MatrixXd> factor(errors_at(best).of_mean.covariance);
+  const Eigen::MatrixXd whitened = factor.matrixL().solve(shapes);
   Eigen::VectorXd misfit;
   // Ever closer about the best point so far, so that the smallest misfit is met.
   double width = 0.2;
   for (int round = 0;; ++round, width *= 0.4) {
     const Index before = misfit.size();
-    const Eigen::MatrixXd more = histories.bottomRows(histories.rows() - before).transpose();
-    misfit.conservativeResize(histories.rows());
-    misfit.tail(more.cols()) = factor.matrixL().solve(more).colwise().squaredNorm();
+    const Index more = coefficients.cols() - before;
+    misfit.conservativeResize(coefficients.cols());
+    misfit.tail(more) = (whitened * coefficients.rightCols(more)).colwise().squaredNorm();
     misfit.minCoeff(&best);
     if (round == kRounds) break;
     inference::Proposal proposal;
@@ -184,7 +189,7 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedMod
   response.model.group = std::move(errors.of_mean.group);
   response.model.without = std::move(errors.of_mean.without);
   response.of_run = std::move(errors.of_run);
-  response.model.histories = std::move(histories);
+  response.model.histories = {std::move(shapes), std::move(coefficients)};
   response.points = std::move(points);
   response.parts = PartsOf(base.view().campaign, data);
   response.nuisance = nuisance;

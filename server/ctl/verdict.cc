@@ -183,7 +183,7 @@ std::string Verdict::WhyUnexplained() const {
   const std::pair<const std::string, WarmFit>* fitting = nullptr;
   for (const CandidateEffect& candidate : diagnosis_.candidates) {
     const auto fit = fits_.find(candidate.effect);
-    if (fit == fits_.end() || fit->second.model.histories.rows() == 0) continue;
+    if (fit == fits_.end() || fit->second.model.histories.points() == 0) continue;
     const inference::Adequacy& adequacy = fit->second.adequacy;
     if (closest == nullptr || adequacy.chi2 < closest->second.adequacy.chi2) closest = &*fit;
     if (fitting == nullptr && adequacy.p_value >= level_) fitting = &*fit;

@@ -83,7 +83,7 @@ std::vector<RefitStanding> WarmFits::Standings() const {
   std::vector<RefitStanding> standings;
   for (const std::string& effect : begun_) {
     const WarmFit& fit = fits_.at(effect);
-    const bool has_runs = fit.model.histories.rows() > 0;
+    const bool has_runs = fit.model.histories.points() > 0;
     standings.push_back(
         {.effect = effect,
          .chi2 = has_runs ? fit.adequacy.chi2 : std::numeric_limits<double>::infinity(),
@@ -245,8 +245,10 @@ void WarmFits::Judge(const std::string& effect) {
     fit.gain_p_value = p_value.ok() ? *p_value : 1;
   }
   fit.best = PointOf(fit.view, points, adequacy->best);
-  fit.rms = std::sqrt(fit.model.histories.rowwise().squaredNorm().minCoeff() /
-                      static_cast<double>(fit.model.histories.cols()));
+  fit.rms = std::numeric_limits<double>::infinity();
+  for (Index point = 0; point < fit.model.histories.points(); ++point) {
+    fit.rms = std::min(fit.rms, fit.model.histories.Rms(point));
+  }
   if (const auto error = inference::LeftOutError(by_base, response_.parts); error.ok()) {
     fit.left_out_error = *error;
   }

@@ -169,10 +169,10 @@ TEST(Join, FindsTheStrength) {
   Eigen::VectorXd strengths;
   const auto joined = Join(model, *effect, -10, 10, strengths);
   EXPECT_NEAR(strengths[0] * effect->unit, gain, 1e-12);
-  EXPECT_NEAR(joined.histories.norm(), 0, 1e-12);
+  EXPECT_NEAR(joined.histories.Values().norm(), 0, 1e-12);
   EXPECT_EQ(joined.parameters, 2);
-  Join({.histories = -histories, .covariance = model.covariance, .parameters = 1}, *effect, 0, 10,
-       strengths);
+  Join({.histories = Eigen::MatrixXd(-histories), .covariance = model.covariance, .parameters = 1},
+       *effect, 0, 10, strengths);
   EXPECT_EQ(strengths[0], 0);
 }
 

@@ -17,8 +17,8 @@ constexpr double kClose = 40;  // of one that is right
 // A model that can do one thing, with residuals of one size.
 inference::FittedModel Model(double chi2) {
   inference::FittedModel model;
-  model.histories =
-      Eigen::MatrixXd::Constant(1, kReadings, std::sqrt(chi2 / static_cast<double>(kReadings)));
+  const double size = std::sqrt(chi2 / static_cast<double>(kReadings));
+  model.histories = Eigen::MatrixXd(Eigen::MatrixXd::Constant(1, kReadings, size));
   model.covariance.setIdentity(kReadings, kReadings);
   model.parameters = 2;
   return model;

@@ -36,10 +36,9 @@ Eigen::VectorXd Noise(int seed) {
 
 FittedModel Line(const Eigen::VectorXd& measured) {
   FittedModel model;
-  model.histories.resize(2001, kReadings);
-  for (int g = 0; g < 2001; ++g) {
-    model.histories.row(g) = (g - 1000) * 0.05 * Curve(0) - measured;
-  }
+  Eigen::MatrixXd histories(2001, kReadings);
+  for (int g = 0; g < 2001; ++g) histories.row(g) = (g - 1000) * 0.05 * Curve(0) - measured;
+  model.histories = histories;
   model.covariance.setIdentity(kReadings, kReadings);
   model.parameters = 1;
   return model;
@@ -318,7 +317,8 @@ TEST(Diagnosis, ChanceInDifferencesOfRunsIsNotTakenForAnEffect) {
 TEST(Diagnosis, BetterModelHasTheAdvantage) {
   const Eigen::VectorXd measured = 12 * Curve(0) + 30 * Curve(2) + Noise(5);
   FittedModel extended = Line(measured);
-  extended.histories.rowwise() += 30 * Curve(2).transpose();
+  extended.histories =
+      Eigen::MatrixXd(extended.histories.Values().rowwise() + 30 * Curve(2).transpose());
   const auto advantage = Compare(extended, Line(measured));
   EXPECT_GT(advantage->nats, 2 * advantage->sd);
   EXPECT_EQ(Compare(extended, extended)->nats, 0);
@@ -329,17 +329,18 @@ TEST(Diagnosis, BetterModelHasTheAdvantage) {
 // The line with a sine of any amplitude.
 FittedModel LineAndSine(const Eigen::VectorXd& measured) {
   FittedModel model = Line(measured);
-  const Eigen::MatrixXd line = model.histories;
+  const Eigen::MatrixXd line = model.histories.Values();
   constexpr int kSlopes = 61;  // from 5 to 20
   constexpr int kAmplitudes = 41;
   constexpr int kMiddle = kAmplitudes / 2;
-  model.histories.resize(static_cast<Eigen::Index>(kSlopes) * kAmplitudes, kReadings);
+  Eigen::MatrixXd histories(kSlopes * kAmplitudes, kReadings);
   for (int g = 0; g < kSlopes; ++g) {
     for (int a = 0; a < kAmplitudes; ++a) {
-      model.histories.row(g * kAmplitudes + a) =
+      histories.row(g * kAmplitudes + a) =
           line.row(1100 + 5 * g) + 0.2 * (a - kMiddle) * Curve(2).transpose();
     }
   }
+  model.histories = histories;
   model.parameters = 2;
   return model;
 }
@@ -388,16 +389,16 @@ TEST(Diagnosis, SmallPValuesOfTheScreenAreAsRareAsTheySay) {
 
 TEST(Diagnosis, AFewReadingsSayLittleOfTheirOwnChance) {
   FittedModel one = Line(12 * Curve(0));
-  one.histories = Eigen::MatrixXd::Constant(1, 6, 1.0);
+  one.histories = Eigen::MatrixXd(Eigen::MatrixXd::Constant(1, 6, 1.0));
   one.covariance = Eigen::MatrixXd::Identity(6, 6);
   FittedModel other = one;
-  other.histories << 3, 1, 2, 1, 1.5, 1;
+  other.histories = Eigen::MatrixXd{{3, 1, 2, 1, 1.5, 1}};
   const auto advantage = Compare(one, other);
   ASSERT_TRUE(advantage.ok());
   // Terms 4, 0, 1.5, 0, 0.625, 0: their sum and sqrt(n) times their standard deviation.
   EXPECT_DOUBLE_EQ(advantage->nats, 6.125);
   EXPECT_NEAR(advantage->sd, 3.8556, 1e-4);
-  one.histories = other.histories = Eigen::MatrixXd::Constant(1, 1, 1.0);
+  one.histories = other.histories = Eigen::MatrixXd(Eigen::MatrixXd::Constant(1, 1, 1.0));
   one.covariance = other.covariance = Eigen::MatrixXd::Identity(1, 1);
   EXPECT_TRUE(std::isinf(Compare(one, other)->sd));
 }
@@ -409,12 +410,58 @@ TEST(Diagnosis, LeftOutReadingsAreMissedByAWrongModel) {
   EXPECT_GT(LeftOutError(Line(30 * Curve(1) + Noise(3)), halves).value(), 3);
 
   FittedModel bumps = Line(12 * Curve(0));
-  bumps.histories.resize(2, kReadings);
-  bumps.histories.setConstant(10);
-  bumps.histories.row(0).head(kReadings / 2).setZero();
-  bumps.histories.row(1).tail(kReadings / 2).setZero();
+  Eigen::MatrixXd histories = Eigen::MatrixXd::Constant(2, kReadings, 10);
+  histories.row(0).head(kReadings / 2).setZero();
+  histories.row(1).tail(kReadings / 2).setZero();
+  bumps.histories = histories;
   EXPECT_NEAR(LeftOutError(bumps, halves).value(), 10, 1e-9);
   EXPECT_FALSE(LeftOutError(bumps, std::vector<int>(kReadings, 0)).ok());
+}
+
+// Two shapes instead of forty numbers per point: the same answers.
+TEST(Diagnosis, HistoriesOfFewShapesAreJudgedLikeTheirValues) {
+  const Eigen::VectorXd measured = 12 * Curve(0) + 3 * Curve(2) + Noise(2);
+  const FittedModel as_they_are = LineWithScatter(measured, 3, true);
+  FittedModel of_shapes = as_they_are;
+  Eigen::MatrixXd shapes(kReadings, 2);
+  shapes << -measured, Curve(0);
+  Eigen::MatrixXd coefficients = Eigen::MatrixXd::Ones(2, 2001);
+  coefficients.row(1).setLinSpaced(-50, 50);
+  of_shapes.histories = {shapes, coefficients};
+  ASSERT_LT((of_shapes.histories.Values() - as_they_are.histories.Values()).norm(), 1e-9);
+  EXPECT_NEAR(of_shapes.histories.Rms(1234), as_they_are.histories.Rms(1234), 1e-9);
+
+  const auto adequacy = TestAdequacy(of_shapes);
+  const auto expected = TestAdequacy(as_they_are);
+  EXPECT_EQ(adequacy->best, expected->best);
+  EXPECT_NEAR(adequacy->chi2, expected->chi2, 1e-8);
+  EXPECT_NEAR(adequacy->degrees, expected->degrees, 1e-8);
+  EXPECT_NEAR(adequacy->p_value, expected->p_value, 1e-9);
+  const auto scores = Screen(of_shapes, kCandidates);
+  const auto values = Screen(as_they_are, kCandidates);
+  for (std::size_t c = 0; c < kCandidates.size(); ++c) {
+    EXPECT_EQ((*scores)[c].name, (*values)[c].name);
+    EXPECT_NEAR((*scores)[c].gain, (*values)[c].gain, 1e-8);
+    EXPECT_NEAR((*scores)[c].p_value, (*values)[c].p_value, 1e-8);
+    EXPECT_NEAR((*scores)[c].detectable, (*values)[c].detectable, 1e-8);
+  }
+  FittedModel extended = of_shapes;  // with a sine, a point in four
+  shapes.conservativeResize(Eigen::NoChange, 3);
+  shapes.col(2) = 5 * Curve(2);
+  coefficients.conservativeResize(3, Eigen::NoChange);
+  for (Eigen::Index g = 0; g < 2001; ++g) coefficients(2, g) = g % 4 == 0 ? 0.5 : 0;
+  extended.histories = {shapes, coefficients};
+  extended.parameters = 2;
+  FittedModel extended_values = extended;
+  extended_values.histories = extended.histories.Values();
+  EXPECT_NEAR(SignificanceOfGain(of_shapes, extended).value(),
+              SignificanceOfGain(as_they_are, extended_values).value(), 1e-9);
+  EXPECT_NEAR(Compare(extended, of_shapes)->nats, Compare(extended_values, as_they_are)->nats,
+              1e-8);
+  std::vector<int> ends(kReadings, 0);  // one reading is fewer than there are shapes
+  ends.back() = 1;
+  EXPECT_NEAR(LeftOutError(extended, ends).value(), LeftOutError(extended_values, ends).value(),
+              1e-8);
 }
 
 TEST(Diagnosis, ShapesThatDoNotFitAreRefused) {

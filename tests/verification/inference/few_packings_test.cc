@@ -177,14 +177,15 @@ FittedModel ModelOf(const Packings& all, const std::vector<Index>& order, int co
       },
       Eigen::MatrixXd::Identity(t, t) + 1e4 * all.responses.transpose() * all.responses);
   PhiloxStream stream = NumberedStream(12, seed);
-  FittedModel model{.histories = mean - all.runs.row(order[own.size()]),
+  Eigen::MatrixXd histories = mean - all.runs.row(order[own.size()]);
+  for (double& reading : histories.reshaped()) reading += stream.Normal();
+  FittedModel model{.histories = std::move(histories),
                     .covariance = std::move(scatter.covariance),
                     .parameters = static_cast<int>(all.responses.rows()),
                     .draws = Eigen::MatrixXd(kDraws, t),
                     .group = {},
                     .without = std::move(scatter.without),
                     .packings = count};
-  for (double& reading : model.histories.reshaped()) reading += stream.Normal();
   for (Index s = 0; s < kDraws; ++s) {
     const Index run = s % count;
     const double sign = stream.Normal() < 0 ? -1 : 1;
@@ -360,7 +361,8 @@ TEST(FewPackings, AnEffectIsSeenSoonerByItsSignatureThanByTheMisfit) {
       for (int m = 0; m < measurements; ++m) {
         Shuffle(order, 9, m);
         FittedModel model = ModelOf(all, order, 8, m);
-        model.histories -= strength * all.effects.row(effect);
+        model.histories =
+            Eigen::MatrixXd(model.histories.Values() - strength * all.effects.row(effect));
         Judge(model, all, judged);
       }
       const double misfit = Below(judged.adequacy, 0.01);

@@ -1,4 +1,4 @@
-#include "server/ctl/measurement_errors.h"
+#include "server/ctl/left_out_packings.h"
 
 #include <gtest/gtest.h>
 
