@@ -8,7 +8,7 @@ namespace calib::inference {
 
 using Eigen::Index;
 
-Histories::Histories(Eigen::MatrixXd values) {
+void Histories::SetValues(const Eigen::MatrixXd& values) {
   const Index points = values.rows();
   const Index readings = values.cols();
   if (points < readings) {

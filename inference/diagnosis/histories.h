@@ -11,8 +11,11 @@ namespace calib::inference {
 class Histories {
  public:
   Histories() = default;
-  /// G x T, as they are. Not explicit: a matrix of histories is one.
-  Histories(Eigen::MatrixXd values);  // NOLINT(google-explicit-constructor)
+  /// values: G x T, as they are. Not explicit: a matrix of histories is one.
+  template <typename Values>
+  Histories(const Eigen::MatrixBase<Values>& values) {  // NOLINT(google-explicit-constructor)
+    SetValues(values);
+  }
   /// shapes: T x q; coefficients: q x G.
   Histories(Eigen::MatrixXd shapes, Eigen::MatrixXd coefficients);
 
@@ -32,6 +35,8 @@ class Histories {
   bool AllFinite() const;
 
  private:
+  void SetValues(const Eigen::MatrixXd& values);
+
   Eigen::MatrixXd shapes_;
   Eigen::MatrixXd coefficients_;
 };

@@ -171,8 +171,8 @@ TEST(Join, FindsTheStrength) {
   EXPECT_NEAR(strengths[0] * effect->unit, gain, 1e-12);
   EXPECT_NEAR(joined.histories.Values().norm(), 0, 1e-12);
   EXPECT_EQ(joined.parameters, 2);
-  Join({.histories = Eigen::MatrixXd(-histories), .covariance = model.covariance, .parameters = 1},
-       *effect, 0, 10, strengths);
+  Join({.histories = -histories, .covariance = model.covariance, .parameters = 1}, *effect, 0, 10,
+       strengths);
   EXPECT_EQ(strengths[0], 0);
 }
 

@@ -18,7 +18,7 @@ constexpr double kClose = 40;  // of one that is right
 inference::FittedModel Model(double chi2) {
   inference::FittedModel model;
   const double size = std::sqrt(chi2 / static_cast<double>(kReadings));
-  model.histories = Eigen::MatrixXd(Eigen::MatrixXd::Constant(1, kReadings, size));
+  model.histories = Eigen::MatrixXd::Constant(1, kReadings, size);
   model.covariance.setIdentity(kReadings, kReadings);
   model.parameters = 2;
   return model;

@@ -317,8 +317,7 @@ TEST(Diagnosis, ChanceInDifferencesOfRunsIsNotTakenForAnEffect) {
 TEST(Diagnosis, BetterModelHasTheAdvantage) {
   const Eigen::VectorXd measured = 12 * Curve(0) + 30 * Curve(2) + Noise(5);
   FittedModel extended = Line(measured);
-  extended.histories =
-      Eigen::MatrixXd(extended.histories.Values().rowwise() + 30 * Curve(2).transpose());
+  extended.histories = extended.histories.Values().rowwise() + 30 * Curve(2).transpose();
   const auto advantage = Compare(extended, Line(measured));
   EXPECT_GT(advantage->nats, 2 * advantage->sd);
   EXPECT_EQ(Compare(extended, extended)->nats, 0);
@@ -389,7 +388,7 @@ TEST(Diagnosis, SmallPValuesOfTheScreenAreAsRareAsTheySay) {
 
 TEST(Diagnosis, AFewReadingsSayLittleOfTheirOwnChance) {
   FittedModel one = Line(12 * Curve(0));
-  one.histories = Eigen::MatrixXd(Eigen::MatrixXd::Constant(1, 6, 1.0));
+  one.histories = Eigen::MatrixXd::Constant(1, 6, 1.0);
   one.covariance = Eigen::MatrixXd::Identity(6, 6);
   FittedModel other = one;
   other.histories = Eigen::MatrixXd{{3, 1, 2, 1, 1.5, 1}};
@@ -398,7 +397,7 @@ TEST(Diagnosis, AFewReadingsSayLittleOfTheirOwnChance) {
   // Terms 4, 0, 1.5, 0, 0.625, 0: their sum and sqrt(n) times their standard deviation.
   EXPECT_DOUBLE_EQ(advantage->nats, 6.125);
   EXPECT_NEAR(advantage->sd, 3.8556, 1e-4);
-  one.histories = other.histories = Eigen::MatrixXd(Eigen::MatrixXd::Constant(1, 1, 1.0));
+  one.histories = other.histories = Eigen::MatrixXd::Constant(1, 1, 1.0);
   one.covariance = other.covariance = Eigen::MatrixXd::Identity(1, 1);
   EXPECT_TRUE(std::isinf(Compare(one, other)->sd));
 }

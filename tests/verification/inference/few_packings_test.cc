@@ -361,8 +361,7 @@ TEST(FewPackings, AnEffectIsSeenSoonerByItsSignatureThanByTheMisfit) {
       for (int m = 0; m < measurements; ++m) {
         Shuffle(order, 9, m);
         FittedModel model = ModelOf(all, order, 8, m);
-        model.histories =
-            Eigen::MatrixXd(model.histories.Values() - strength * all.effects.row(effect));
+        model.histories = model.histories.Values() - strength * all.effects.row(effect);
         Judge(model, all, judged);
       }
       const double misfit = Below(judged.adequacy, 0.01);
