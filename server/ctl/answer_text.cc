@@ -6,10 +6,10 @@
 #include <cmath>
 
 #include "dem/catalog/catalog.h"
-#include "server/ctl/progress.h"
-#include "server/ctl/text_table.h"
+#include "server/client/progress.h"
 #include "server/report/people_units.h"
 #include "server/report/residual_words.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 namespace {
@@ -57,7 +57,8 @@ std::string Explained(const report::Quantity& q) {
 
 std::string PosteriorText(const v1::Posterior& posterior,
                           const std::vector<std::string>& warnings) {
-  TextTable table({"<parameter", "mean", "± sd", "cov", "5 %", "50 %", "95 %", "<unit", "<"});
+  report::TextTable table(
+      {"<parameter", "mean", "± sd", "cov", "5 %", "50 %", "95 %", "<unit", "<"});
   for (const auto& p : posterior.parameters()) {
     const report::DisplayUnit unit = report::UnitForPeople(p.name(), p.unit(), std::abs(p.mean()));
     const auto shown = [&unit](double value, int digits) {
@@ -86,7 +87,7 @@ std::string PosteriorText(const v1::Posterior& posterior,
   }
   text += ".\n";
   if (posterior.has_measured_loss()) {
-    text += Wrapped(
+    text += report::Wrapped(
         fmt::format("Stopping early may have lost {} of the posterior mass. Audit: {} stopped and "
                     "run to the end all the same might have held {}, and held {}.",
                     Number(posterior.stated_loss(), 2), posterior.audited(),
@@ -94,12 +95,13 @@ std::string PosteriorText(const v1::Posterior& posterior,
         "", "  ");
   }
   for (const auto& scale : posterior.noise_scale()) {
-    text += Wrapped(fmt::format("Errors of {} are {} times as large as stated (5-95 %: {} to {}).",
-                                fmt::join(scale.observables(), ", "), Number(scale.q50(), 2),
-                                Number(scale.q05(), 2), Number(scale.q95(), 2)),
-                    "", "  ");
+    text += report::Wrapped(
+        fmt::format("Errors of {} are {} times as large as stated (5-95 %: {} to {}).",
+                    fmt::join(scale.observables(), ", "), Number(scale.q50(), 2),
+                    Number(scale.q05(), 2), Number(scale.q95(), 2)),
+        "", "  ");
   }
-  for (const std::string& warning : warnings) text += Wrapped(warning, "! ", "  ");
+  for (const std::string& warning : warnings) text += report::Wrapped(warning, "! ", "  ");
   return text;
 }
 
@@ -132,10 +134,11 @@ std::string ComparisonText(const report::Comparison& comparison) {
     text += fmt::format("Error of the held-out data, never fitted: {} sd.\n",
                         Number(*comparison.heldout_rms_error, 3));
   }
-  if (!comparison.note.empty()) text += Wrapped(comparison.note, "", "");
-  for (const std::string& warning : comparison.warnings) text += Wrapped(warning, "! ", "  ");
-  TextTable observables({"<experiment", "<observable", "readings", "error", "scatter/noise",
-                         "residual", "z", "p", "<"});
+  if (!comparison.note.empty()) text += report::Wrapped(comparison.note, "", "");
+  for (const std::string& warning : comparison.warnings)
+    text += report::Wrapped(warning, "! ", "  ");
+  report::TextTable observables({"<experiment", "<observable", "readings", "error", "scatter/noise",
+                                 "residual", "z", "p", "<"});
   for (const report::ObservableMisfit& m : comparison.by_observable) {
     observables.AddRow(
         {m.experiment + (m.heldout ? " (held out)" : ""), m.observable, std::to_string(m.readings),
@@ -144,8 +147,8 @@ std::string ComparisonText(const report::Comparison& comparison) {
          m.z ? Number(*m.z, 2) : "–", m.p_value ? Number(*m.p_value, 2) : "–",
          m.z ? Verdict(m.rms_error, m.p_value) : ""});
   }
-  TextTable segments({"<experiment", "<observable", "<stage", "model − measured", "z", "error", "p",
-                      "chi2", "<shape"});
+  report::TextTable segments({"<experiment", "<observable", "<stage", "model − measured", "z",
+                              "error", "p", "chi2", "<shape"});
   for (const report::SegmentMisfit& m : comparison.by_segment) {
     segments.AddRow({m.experiment + (m.heldout ? " (held out)" : ""), m.observable, m.segment,
                      report::NumberWithUnit(m.bias, m.observable, UnitOf(m.observable), 3),
@@ -156,10 +159,10 @@ std::string ComparisonText(const report::Comparison& comparison) {
   }
   text += "\n" + observables.ToString() + "\n" + segments.ToString();
   for (const std::string& line : report::WhereItFails(comparison)) {
-    text += Wrapped(line, "\n! ", "  ");
+    text += report::Wrapped(line, "\n! ", "  ");
   }
   if (comparison.parameter_drift.empty()) return text;
-  TextTable drift({"<parameter", "<experiment", "<stage", "fitted alone", "± sd", "z"});
+  report::TextTable drift({"<parameter", "<experiment", "<stage", "fitted alone", "± sd", "z"});
   for (const report::ParameterDrift& d : comparison.parameter_drift) {
     for (const report::PartialFit& fit : d.fits) {
       const report::DisplayUnit unit =
@@ -174,8 +177,8 @@ std::string ComparisonText(const report::Comparison& comparison) {
 }
 
 std::string ModelsText(const report::ModelComparison& comparison) {
-  TextTable table({"<campaign", "<name", "log evidence", "± se", "ln Bayes factor", "± se",
-                   "probability", "5 %", "95 %"});
+  report::TextTable table({"<campaign", "<name", "log evidence", "± se", "ln Bayes factor", "± se",
+                           "probability", "5 %", "95 %"});
   for (const report::ComparedModel& m : comparison.models) {
     const inference::ModelProbability& p = m.probability;
     table.AddRow({m.campaign, m.name, Number(m.log_evidence, 6), Number(m.log_evidence_se, 2),
@@ -184,7 +187,8 @@ std::string ModelsText(const report::ModelComparison& comparison) {
   }
   std::string text = table.ToString();
   text += "\nBayes factors are to the first; all models are equally probable before the data.\n";
-  for (const std::string& warning : comparison.warnings) text += Wrapped(warning, "! ", "  ");
+  for (const std::string& warning : comparison.warnings)
+    text += report::Wrapped(warning, "! ", "  ");
   return text;
 }
 
@@ -209,7 +213,8 @@ std::string SensitivityText(const report::Sensitivity& sensitivity) {
     if (q.prior.out_of_reach) {
       text += "The runs cover too little of the prior to say what moves it there.\n";
     }
-    TextTable table({"<parameter", "first order", "total", "rank corr., prior", "posterior"});
+    report::TextTable table(
+        {"<parameter", "first order", "total", "rank corr., prior", "posterior"});
     for (int j = 0; j < static_cast<int>(sensitivity.parameters.size()); ++j) {
       table.AddRow({sensitivity.parameters[static_cast<std::size_t>(j)],
                     with_error(q.prior.indices.first, q.prior.indices.first_error, j),
@@ -220,19 +225,20 @@ std::string SensitivityText(const report::Sensitivity& sensitivity) {
     text += table.ToString() + "\n";
   }
   if (!sensitivity.independent) {
-    text += Wrapped(
+    text += report::Wrapped(
         "Sobol indices need parameters that are independent before the data: the "
         "priors here are correlated or constrained.",
         "! ", "  ");
   }
-  for (const std::string& what : sensitivity.left_out) text += Wrapped(what, "! ", "  ");
-  for (const std::string& warning : sensitivity.warnings) text += Wrapped(warning, "! ", "  ");
+  for (const std::string& what : sensitivity.left_out) text += report::Wrapped(what, "! ", "  ");
+  for (const std::string& warning : sensitivity.warnings)
+    text += report::Wrapped(warning, "! ", "  ");
   return text;
 }
 
 std::string StatusText(const v1::CampaignStatus& s) {
   return fmt::format("{}  {}\n{}\n{} model evaluations so far, {} core hours, method {}.\n",
-                     s.campaign(), s.name(), ProgressText(s), s.model_evaluations(),
+                     s.campaign(), s.name(), client::ProgressText(s), s.model_evaluations(),
                      Number(s.core_hours(), 3), s.method());
 }
 

@@ -6,14 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "server/client/server_choice.h"
+
 namespace calib::ctl {
 
 struct Arguments {
   // Of every verb.
-  std::string server = "127.0.0.1:7443";  ///< HOST:PORT
-  bool server_given = false;              ///< by --server, not by default or $CALIB_SERVER
-  std::string state;                      ///< folder of an embedded server; empty: use `server`
-  std::optional<int> workers;             ///< local workers beside the embedded server
+  client::ServerChoice server;
   bool json = false;
 
   // Of some.

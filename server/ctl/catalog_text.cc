@@ -2,8 +2,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "server/ctl/text_table.h"
 #include "server/report/people_units.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 namespace {
@@ -60,12 +60,14 @@ std::string ScaleText(const dem::ReferenceScale& scale) {
 
 std::string EffectText(const dem::EffectInfo& effect) {
   std::string text = absl::StrCat(effect.name, " (", effect.kind, ")\n");
-  text += Wrapped(effect.description, "  ", "  ") + Wrapped(effect.reference, "  ", "  ");
+  text += report::Wrapped(effect.description, "  ", "  ") +
+          report::Wrapped(effect.reference, "  ", "  ");
   if (!effect.contacts.empty()) {
-    text += Wrapped(absl::StrJoin(effect.contacts, ", "), "  contacts: ", kIndent);
+    text += report::Wrapped(absl::StrJoin(effect.contacts, ", "), "  contacts: ", kIndent);
   }
-  text += Wrapped(effect.excited_by.empty() ? "all tests" : absl::StrJoin(effect.excited_by, ", "),
-                  "  excited by: ", kIndent);
+  text += report::Wrapped(
+      effect.excited_by.empty() ? "all tests" : absl::StrJoin(effect.excited_by, ", "),
+      "  excited by: ", kIndent);
   if (effect.needs_motion) {
     text +=
         "  only where grains move while they are read: with a loading_rate, in collisions, in "
@@ -76,14 +78,14 @@ std::string EffectText(const dem::EffectInfo& effect) {
   if (effect.across_pressures)
     text += "  only where the pressure differs, between experiments or within one\n";
   if (!effect.excludes.empty()) {
-    text += Wrapped(absl::StrJoin(effect.excludes, ", "), "  not together with: ", kIndent);
+    text += report::Wrapped(absl::StrJoin(effect.excludes, ", "), "  not together with: ", kIndent);
   }
   std::vector<std::string> of_pairs;
   for (const dem::ParameterInfo& p : effect.parameters) {
     if (p.of_pairs) of_pairs.push_back(absl::StrCat(effect.name, ".", p.name));
   }
   if (!of_pairs.empty()) {
-    text += Wrapped(absl::StrJoin(of_pairs, ", "), "  of model.pairs too: ", kIndent);
+    text += report::Wrapped(absl::StrJoin(of_pairs, ", "), "  of model.pairs too: ", kIndent);
   }
   return text + ParameterTable(effect.parameters);
 }
@@ -91,21 +93,23 @@ std::string EffectText(const dem::EffectInfo& effect) {
 std::string TestText(const dem::TestInfo& test) {
   std::string text = absl::StrCat(test.name, " (control: ", test.control,
                                   test.may_reverse ? "" : ", one way only", ")\n");
-  text += Wrapped(test.description, "  ", "  ");
-  if (!test.reference.empty()) text += Wrapped(test.reference, "  ", "  ");
+  text += report::Wrapped(test.description, "  ", "  ");
+  if (!test.reference.empty()) text += report::Wrapped(test.reference, "  ", "  ");
   text += "  observables:\n";
   for (const std::string& name : test.observables) {
     const dem::ObservableInfo& info = *dem::FindObservable(name);
-    text += Wrapped(absl::StrCat(name, " [", info.unit, "] ", info.description), kIndent, "      ");
+    text += report::Wrapped(absl::StrCat(name, " [", info.unit, "] ", info.description), kIndent,
+                            "      ");
   }
   for (const dem::MeshInfo& mesh : test.meshes) {
-    text += Wrapped(absl::StrCat("mesh ", mesh.name, ": ", mesh.description), "  ", kIndent);
+    text +=
+        report::Wrapped(absl::StrCat("mesh ", mesh.name, ": ", mesh.description), "  ", kIndent);
   }
   return text + ParameterTable(test.settings);
 }
 
 std::string ParameterTable(const std::vector<dem::ParameterInfo>& parameters) {
-  TextTable table({"<  parameter", "<unit", "admissible", "<default prior", "<default"});
+  report::TextTable table({"<  parameter", "<unit", "admissible", "<default prior", "<default"});
   for (const dem::ParameterInfo& p : parameters) {
     const auto shown = [&p](double value) {
       return report::NumberWithUnit(value, p.name, p.unit_by_contact.empty() ? p.unit : "1", 3);
@@ -121,7 +125,7 @@ std::string ParameterTable(const std::vector<dem::ParameterInfo>& parameters) {
   for (const dem::ParameterInfo& p : parameters) {
     const std::string scaled = ScaledPrior(p);
     if (p.description.empty() && scaled.empty()) continue;
-    text += Wrapped(absl::StrCat(p.name, ": ", p.description, scaled), kIndent, "      ");
+    text += report::Wrapped(absl::StrCat(p.name, ": ", p.description, scaled), kIndent, "      ");
   }
   return text;
 }

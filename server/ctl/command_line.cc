@@ -106,19 +106,20 @@ class Builder {
 
 // $CALIB_SERVER is a default, not a wish: it does not stand in the way of --state.
 void AddCommonOptions(CLI::App& app, Arguments& a) {
-  if (const char* server = std::getenv("CALIB_SERVER"); server != nullptr) a.server = server;
+  if (const char* server = std::getenv("CALIB_SERVER"); server != nullptr)
+    a.server.address = server;
   auto* server = app.add_option_function<std::string>(
       "--server",
       [&a](const std::string& address) {
-        a.server = address;
-        a.server_given = true;
+        a.server.address = address;
+        a.server.given = true;
       },
       "HOST:PORT of calibd [$CALIB_SERVER or 127.0.0.1:7443]");
   server->check([](const std::string& address) { return rpc::ProblemOfAddress(address); });
-  app.add_option("--state", a.state,
+  app.add_option("--state", a.server.state,
                  "work on this state folder with an embedded server instead of --server")
       ->excludes(server);
-  app.add_option("--workers", a.workers,
+  app.add_option("--workers", a.server.workers,
                  "local workers beside the embedded server (run: all cores unless given)")
       ->check(CLI::Range(0, 1024));
   app.add_flag("--json", a.json, "one JSON document on standard output");

@@ -2,14 +2,14 @@
 
 #include <iostream>
 
+#include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/session.h"
 #include "server/report/json_documents.h"
 
 namespace calib::ctl {
 
 int Control(const Arguments& arguments, ControlCall call) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
   const auto status = ((*session)->client().*call)(arguments.campaign);
   if (!status.ok()) return Fail(status.status());

@@ -9,9 +9,9 @@
 #include "dem/catalog/catalog.h"
 #include "proto/rpc/address.h"
 #include "server/campaign/sha256.h"
-#include "server/ctl/text_table.h"
 #include "server/ctl/trial_runs.h"
 #include "server/report/people_units.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 namespace {
@@ -300,9 +300,9 @@ std::string DoctorText(const std::vector<Check>& checks) {
         absl::StrCat(ToString(check.health), std::string(9 - ToString(check.health).size(), ' '),
                      report::NameForPeople(check.name), " (", check.subject, "): ");
     const std::string indent(9, ' ');
-    absl::StrAppend(&text, Wrapped(check.found, head, indent));
+    absl::StrAppend(&text, report::Wrapped(check.found, head, indent));
     if (!check.advice.empty()) {
-      absl::StrAppend(&text, Wrapped(check.advice, indent + "-> ", indent + "   "));
+      absl::StrAppend(&text, report::Wrapped(check.advice, indent + "-> ", indent + "   "));
     }
   }
   return text;

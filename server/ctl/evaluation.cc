@@ -51,7 +51,7 @@ absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const T
     arguments.insert(arguments.end(), {"--checkpoint", task.checkpoint});
   }
   if (!task.vtk.empty()) arguments.insert(arguments.end(), {"--vtk", task.vtk});
-  auto process = ChildProcess::Start(program, arguments, folder + "/log");
+  auto process = client::ChildProcess::Start(program, arguments, folder + "/log");
   if (!process.ok()) return process.status();
   return Evaluation(*std::move(process), folder);
 }

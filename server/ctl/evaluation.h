@@ -6,7 +6,7 @@
 
 #include "absl/status/statusor.h"
 #include "calib/v1/worker.pb.h"
-#include "server/ctl/child_process.h"
+#include "server/client/child_process.h"
 
 namespace calib::ctl {
 
@@ -35,9 +35,9 @@ class Evaluation {
   absl::Status Result();
 
  private:
-  Evaluation(ChildProcess process, std::string folder)
+  Evaluation(client::ChildProcess process, std::string folder)
       : process_(std::move(process)), folder_(std::move(folder)) {}
-  ChildProcess process_;
+  client::ChildProcess process_;
   std::string folder_;
 };
 

@@ -7,8 +7,8 @@
 #include <set>
 #include <utility>
 
-#include "server/ctl/findings.h"
-#include "server/ctl/load_view.h"
+#include "server/client/findings.h"
+#include "server/client/load_view.h"
 #include "server/report/predictions.h"
 
 namespace calib::ctl {
@@ -30,12 +30,12 @@ report::ErrorStep StepOf(const report::CampaignView& view, bool held_out) {
 }
 
 // Documents that another version wrote and this one cannot read are passed over.
-absl::Status AddDiagnoses(Client& client, const std::string& campaign,
+absl::Status AddDiagnoses(client::Client& client, const std::string& campaign,
                           std::vector<report::StoredDiagnosis>& diagnoses) {
   const auto findings = client.Findings(campaign);
   if (!findings.ok()) return findings.status();
   for (const v1::Finding& finding : *findings) {
-    if (finding.kind() != kDiagnosis) continue;
+    if (finding.kind() != client::kDiagnosis) continue;
     const auto document = client.GetBlob(finding.digest());
     if (!document.ok()) return document.status();
     auto diagnosis = report::ReadDiagnosis(*document);
@@ -48,12 +48,13 @@ absl::Status AddDiagnoses(Client& client, const std::string& campaign,
 }
 
 // The campaigns after it in the last improvement that it took part in.
-absl::StatusOr<std::vector<std::string>> ImprovedFrom(Client& client, const std::string& campaign) {
+absl::StatusOr<std::vector<std::string>> ImprovedFrom(client::Client& client,
+                                                      const std::string& campaign) {
   const auto findings = client.Findings(campaign);
   if (!findings.ok()) return findings.status();
   std::vector<std::string> after;
   for (const v1::Finding& finding : *findings) {
-    if (finding.kind() != kImprovement) continue;
+    if (finding.kind() != client::kImprovement) continue;
     const auto document = client.GetBlob(finding.digest());
     if (!document.ok()) return document.status();
     const auto steps = report::ReadImprovedCampaigns(*document);
@@ -66,7 +67,7 @@ absl::StatusOr<std::vector<std::string>> ImprovedFrom(Client& client, const std:
 
 }  // namespace
 
-absl::StatusOr<report::Story> LoadStory(Client& client, const report::CampaignView& view) {
+absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::CampaignView& view) {
   report::Story story;
   story.known = true;
   if (auto drift = report::ParameterDrifts(view); drift.ok()) story.drift = *std::move(drift);
@@ -127,7 +128,7 @@ absl::StatusOr<report::Story> LoadStory(Client& client, const report::CampaignVi
       story.steps.push_back(StepOf(view, end));
       continue;
     }
-    const auto ancestor = LoadView(client, id);
+    const auto ancestor = client::LoadView(client, id);
     if (!ancestor.ok()) return ancestor.status();
     story.steps.push_back(StepOf(*ancestor, end));
   }

@@ -2,7 +2,7 @@
 // The family of a campaign as the server knows it.
 
 #include "absl/status/statusor.h"
-#include "server/ctl/client.h"
+#include "server/client/client.h"
 #include "server/report/campaign_view.h"
 #include "server/report/story.h"
 
@@ -10,6 +10,6 @@ namespace calib::ctl {
 
 /// Ancestors of the campaign by extension, all that was tried on any of them, and the error of the
 /// models on the way. Drift of the parameters where it can be told.
-absl::StatusOr<report::Story> LoadStory(Client& client, const report::CampaignView& view);
+absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::CampaignView& view);
 
 }  // namespace calib::ctl

@@ -19,10 +19,10 @@ std::string Quoted(const std::string& word) {
 
 std::string CommandOf(const Arguments& arguments, const std::string& words) {
   std::string command = absl::StrCat("calibctl ", words);
-  if (!arguments.state.empty()) {
-    absl::StrAppend(&command, " --state ", Quoted(arguments.state));
-  } else if (arguments.server_given) {
-    absl::StrAppend(&command, " --server ", Quoted(arguments.server));
+  if (!arguments.server.state.empty()) {
+    absl::StrAppend(&command, " --state ", Quoted(arguments.server.state));
+  } else if (arguments.server.given) {
+    absl::StrAppend(&command, " --server ", Quoted(arguments.server.address));
   }
   return command;
 }

@@ -102,7 +102,7 @@ void TakeSpecimen(const YamlNode& from, YamlNode& experiment) {
   }
 }
 
-absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path,
+absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::string& path,
                                          const report::CampaignView& parent) {
   const auto text = ReadText(path);
   if (!text.ok()) return text.status();

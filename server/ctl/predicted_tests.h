@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "server/campaign/yaml_tree.h"
-#include "server/ctl/client.h"
+#include "server/client/client.h"
 #include "server/report/campaign_view.h"
 
 namespace calib::ctl {
@@ -32,7 +32,7 @@ void TakeSpecimen(const campaign::YamlNode& from, campaign::YamlNode& experiment
 /// readings, evenly spaced. Without `packing` a test takes the specimen of the parent's first experiment
 /// (TakeSpecimen).
 /// Errors: INVALID_ARGUMENT, a line per problem.
-absl::StatusOr<PredictedTests> ReadTests(Client& client, const std::string& path,
+absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::string& path,
                                          const report::CampaignView& parent);
 
 }  // namespace calib::ctl

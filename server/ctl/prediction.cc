@@ -262,8 +262,9 @@ void AddNotes(const report::CampaignView& view, const Misfit& misfit, Prediction
 
 }  // namespace
 
-absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::CampaignView& parent,
-                                   const PredictedTests& tests, const PredictionOptions& options) {
+absl::StatusOr<Prediction> Predict(client::Laboratory& laboratory,
+                                   const report::CampaignView& parent, const PredictedTests& tests,
+                                   const PredictionOptions& options) {
   const std::string& id = parent.status.campaign();
   if (parent.campaign.precomputed) {
     return absl::FailedPreconditionError(absl::StrCat(

@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 #include "inference/discrepancy/discrepancy.h"
 #include "inference/prediction/prediction.h"
-#include "server/ctl/laboratory.h"
+#include "server/client/laboratory.h"
 #include "server/ctl/predicted_tests.h"
 
 namespace calib::ctl {
@@ -48,8 +48,9 @@ struct Prediction {
 /// Errors: INVALID_ARGUMENT for levels that name no observable; FAILED_PRECONDITION without a
 /// posterior, with runs made elsewhere or when fewer than half of the runs of a test finish; those
 /// of the runs.
-absl::StatusOr<Prediction> Predict(Laboratory& laboratory, const report::CampaignView& parent,
-                                   const PredictedTests& tests, const PredictionOptions& options);
+absl::StatusOr<Prediction> Predict(client::Laboratory& laboratory,
+                                   const report::CampaignView& parent, const PredictedTests& tests,
+                                   const PredictionOptions& options);
 
 std::string PredictionJson(const Prediction& prediction);
 std::string PredictionText(const Prediction& prediction);

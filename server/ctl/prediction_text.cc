@@ -7,8 +7,8 @@
 
 #include "dem/catalog/catalog.h"
 #include "server/ctl/prediction.h"
-#include "server/ctl/text_table.h"
 #include "server/report/people_units.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 namespace {
@@ -76,7 +76,7 @@ std::string PredictionText(const Prediction& prediction) {
   std::string text = fmt::format("Prediction {} from the posterior of {}: {} runs.\n",
                                  prediction.campaign, prediction.parent, prediction.runs);
   for (const PredictedObservable& o : prediction.observables) {
-    TextTable table(
+    report::TextTable table(
         {o.control_name, "mean", "5 %", "95 %", "± parameters", "± model", "± noise", "measured"});
     const std::string unit = UnitOf(o.observable);
     const auto shown = [&](double value) {
@@ -103,7 +103,7 @@ std::string PredictionText(const Prediction& prediction) {
     text +=
         "\nThe band and the probability at a reading are those of a measurement with its noise.\n";
   }
-  for (const std::string& note : prediction.notes) text += Wrapped(note, "! ", "  ");
+  for (const std::string& note : prediction.notes) text += report::Wrapped(note, "! ", "  ");
   return text;
 }
 

@@ -58,7 +58,7 @@ absl::Status CancelledBefore(const std::string& campaign) {
                                          campaign, "` or another --seed starts it anew"));
 }
 
-absl::StatusOr<std::string> SubmitSource(Client& client, const SourceFiles& source,
+absl::StatusOr<std::string> SubmitSource(client::Client& client, const SourceFiles& source,
                                          std::optional<std::uint64_t> seed,
                                          const std::string& file) {
   v1::SubmitRequest request;

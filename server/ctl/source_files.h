@@ -9,8 +9,8 @@
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
 #include "server/campaign/campaign_file.h"
+#include "server/client/client.h"
 #include "server/ctl/arguments.h"
-#include "server/ctl/client.h"
 
 namespace calib::ctl {
 
@@ -28,7 +28,7 @@ std::optional<SourceFiles> ReadSourceFiles(const Arguments& arguments);
 /// Puts the files and submits. The request id is the identity digest: submitting the same again
 /// gives the same campaign. Returns the campaign id. INVALID_ARGUMENT when the server refuses (its
 /// problems are printed).
-absl::StatusOr<std::string> SubmitSource(Client& client, const SourceFiles& source,
+absl::StatusOr<std::string> SubmitSource(client::Client& client, const SourceFiles& source,
                                          std::optional<std::uint64_t> seed,
                                          const std::string& file);
 

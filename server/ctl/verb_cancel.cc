@@ -3,6 +3,6 @@
 
 namespace calib::ctl {
 
-int Cancel(const Arguments& arguments) { return Control(arguments, &Client::Cancel); }
+int Cancel(const Arguments& arguments) { return Control(arguments, &client::Client::Cancel); }
 
 }  // namespace calib::ctl

@@ -4,11 +4,11 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "server/client/load_view.h"
+#include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/load_view.h"
 #include "server/ctl/next_step.h"
-#include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 #include "server/report/discrepancies.h"
 #include "server/report/json_documents.h"
@@ -33,9 +33,9 @@ std::string Next(const Arguments& arguments, const report::Comparison& compariso
 }  // namespace
 
 int Compare(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  const auto view = LoadView((*session)->client(), arguments.campaign);
+  const auto view = client::LoadView((*session)->client(), arguments.campaign);
   if (!view.ok()) return Fail(view.status());
   if (view->iterations.empty()) {
     return Fail(absl::FailedPreconditionError("no iteration of " + arguments.campaign +

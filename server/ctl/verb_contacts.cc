@@ -2,9 +2,9 @@
 
 #include "server/ctl/catalog_text.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 
@@ -15,7 +15,8 @@ int Contacts(const Arguments& arguments) {
   }
   for (const dem::ContactInfo& contact : dem::Contacts()) {
     std::cout << contact.name << "\n"
-              << Wrapped(contact.description, "  ", "  ") << Wrapped(contact.reference, "  ", "  ")
+              << report::Wrapped(contact.description, "  ", "  ")
+              << report::Wrapped(contact.reference, "  ", "  ")
               << ParameterTable(contact.parameters) << "\n";
   }
   return kDone;

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/lineage.h"
-#include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 
 namespace calib::ctl {
@@ -44,9 +44,9 @@ absl::Status CheckChildren(const Arguments& arguments,
 }  // namespace
 
 int Delete(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  Client& client = (*session)->client();
+  client::Client& client = (*session)->client();
   const auto campaigns = client.List();
   if (!campaigns.ok()) return Fail(campaigns.status());
   const std::vector<v1::CampaignStatus> children = Descendants(*campaigns, arguments.campaign);

@@ -1,19 +1,19 @@
 #include <iostream>
 
 #include "absl/strings/str_cat.h"
-#include "server/ctl/diagnosis.h"
-#include "server/ctl/diagnosis_support.h"
+#include "server/client/findings.h"
+#include "server/client/interrupt.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/findings.h"
-#include "server/ctl/interrupt.h"
 #include "server/ctl/next_step.h"
 #include "server/ctl/verbs.h"
+#include "server/diagnosis/diagnosis.h"
+#include "server/diagnosis/diagnosis_support.h"
 
 namespace calib::ctl {
 namespace {
 
 std::string Next(const Arguments& arguments, const report::CampaignView& view,
-                 const Diagnosis& diagnosis) {
+                 const diagnosis::Diagnosis& diagnosis) {
   const std::string& id = arguments.campaign;
   if (diagnosis.verdict == "adequate" || view.campaign.precomputed) {
     return NextStep(CommandOf(arguments, absl::StrCat("report ", id, " -o ", id, ".html")),
@@ -32,20 +32,22 @@ std::string Next(const Arguments& arguments, const report::CampaignView& view,
 }  // namespace
 
 int Diagnose(const Arguments& arguments) {
-  CatchInterrupts();
-  const auto session = Session::Open(arguments);
+  client::CatchInterrupts();
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  Laboratory laboratory(**session, arguments);
+  client::Laboratory laboratory(**session, arguments.server);
   const auto view = laboratory.Finished(arguments.campaign);
   if (!view.ok()) return Fail(view.status());
-  if (auto status = CheckLeftOut(arguments.effects, view->campaign); !status.ok()) {
+  if (auto status = diagnosis::CheckLeftOut(arguments.effects, view->campaign); !status.ok()) {
     return Fail(status);
   }
-  const auto diagnosis = Diagnose(laboratory, *view, {.without = arguments.effects});
+  const auto diagnosis = diagnosis::Diagnose(laboratory, *view, {.without = arguments.effects});
   if (!diagnosis.ok()) return Fail(diagnosis.status());
-  KeepFinding((*session)->client(), arguments.campaign, kDiagnosis, DiagnosisJson(*diagnosis));
-  std::cout << (arguments.json ? DiagnosisJson(*diagnosis)
-                               : DiagnosisText(*diagnosis) + Next(arguments, *view, *diagnosis));
+  client::KeepFinding((*session)->client(), arguments.campaign, client::kDiagnosis,
+                      diagnosis::DiagnosisJson(*diagnosis));
+  std::cout << (arguments.json
+                    ? diagnosis::DiagnosisJson(*diagnosis)
+                    : diagnosis::DiagnosisText(*diagnosis) + Next(arguments, *view, *diagnosis));
   return kDone;
 }
 

@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "server/ctl/child_process.h"
+#include "server/client/child_process.h"
+#include "server/client/session.h"
 #include "server/ctl/doctor.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/session.h"
 #include "server/ctl/temporary_folder.h"
 #include "server/ctl/trial_runs.h"
 #include "server/ctl/verbs.h"
@@ -48,7 +48,7 @@ Worker AskWorker(const std::string& program) {
   const auto folder = TemporaryFolder::Make();
   if (!folder.ok()) return worker;
   const std::string log = folder->path() + "/version";
-  auto process = ChildProcess::Start(program, {"--version"}, log);
+  auto process = client::ChildProcess::Start(program, {"--version"}, log);
   if (!process.ok() || process->Wait() != 0) return worker;
   std::ifstream file(log);
   for (std::string line; std::getline(file, line);) {
@@ -63,7 +63,7 @@ Worker AskWorker(const std::string& program) {
 }
 
 void ExamineNode(std::vector<Check>& checks) {
-  const auto program = FindWorkerProgram();
+  const auto program = client::FindWorkerProgram();
   Worker worker;
   if (program.ok()) {
     worker = AskWorker(*program);
@@ -89,7 +89,7 @@ double UnixSeconds() {
   return std::chrono::duration<double>(now).count();
 }
 
-absl::Status ExamineServer(Session& session, bool is_own, std::vector<Check>& checks) {
+absl::Status ExamineServer(client::Session& session, bool is_own, std::vector<Check>& checks) {
   // The first call opens the connection; the second one tells the time.
   const auto workers = session.client().ListWorkers();
   if (!workers.ok()) return workers.status();
@@ -121,27 +121,29 @@ absl::Status ExamineServer(Session& session, bool is_own, std::vector<Check>& ch
 int Doctor(const Arguments& arguments) {
   std::vector<Check> checks;
   ExamineNode(checks);
-  const bool named =
-      !arguments.state.empty() || arguments.server_given || arguments.server != Arguments().server;
+  const bool named = !arguments.server.state.empty() || arguments.server.given ||
+                     arguments.server.address != Arguments().server.address;
   std::error_code error;
   const bool is_new =
-      !arguments.state.empty() &&
-      !std::filesystem::exists(std::filesystem::path(arguments.state) / "calib.db", error);
+      !arguments.server.state.empty() &&
+      !std::filesystem::exists(std::filesystem::path(arguments.server.state) / "calib.db", error);
   absl::Status reached;
   if (is_new) {
-    checks.push_back(JudgeFolder(service::ExamineFolder(arguments.state), FolderUse::kState));
+    checks.push_back(
+        JudgeFolder(service::ExamineFolder(arguments.server.state), FolderUse::kState));
     checks.back().found += " It holds no campaigns yet.";
   } else {
-    auto session = Session::Open(arguments);
-    reached =
-        session.ok()
-            ? ExamineServer(**session, !arguments.state.empty() && !(*session)->is_guest(), checks)
-            : session.status();
+    auto session = client::Session::Open(arguments.server);
+    reached = session.ok() ? ExamineServer(
+                                 **session,
+                                 !arguments.server.state.empty() && !(*session)->is_guest(), checks)
+                           : session.status();
   }
   if (!reached.ok()) {
     checks.push_back(
         {.name = "server",
-         .subject = arguments.state.empty() ? arguments.server : arguments.state,
+         .subject =
+             arguments.server.state.empty() ? arguments.server.address : arguments.server.state,
          .health = named ? Health::kProblem : Health::kUnknown,
          .found = absl::StrCat(reached.message(), "."),
          .advice = named ? "Look whether calibd runs there and what its log says." : ""});

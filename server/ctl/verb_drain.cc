@@ -1,14 +1,14 @@
 #include <iostream>
 
+#include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 
 namespace calib::ctl {
 
 int Drain(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
   const auto worker = (*session)->client().DrainWorker(arguments.worker);
   if (!worker.ok()) return Fail(worker.status());

@@ -3,9 +3,9 @@
 #include "server/ctl/catalog_text.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/source_files.h"
-#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 
@@ -23,7 +23,7 @@ int Effects(const Arguments& arguments) {
   for (const dem::EffectInfo* effect : dem::AllEffects(declared)) {
     std::cout << EffectText(*effect) << "\n";
   }
-  std::cout << Wrapped(
+  std::cout << report::Wrapped(
       "Scales: p is the pressure at which a test starts [Pa], d the mean diameter "
       "of the grains [m], E young_modulus [Pa], all as of the campaign.",
       "", "");

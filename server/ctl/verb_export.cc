@@ -5,9 +5,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "server/campaign/yaml_text.h"
+#include "server/client/load_view.h"
+#include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/load_view.h"
-#include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 #include "server/ctl/write_file.h"
 #include "server/report/csv_export.h"
@@ -50,9 +50,9 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
 }  // namespace
 
 int Export(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  const auto view = LoadView((*session)->client(), arguments.campaign);
+  const auto view = client::LoadView((*session)->client(), arguments.campaign);
   if (!view.ok()) return Fail(view.status());
   const std::filesystem::path folder(arguments.output);
   std::error_code error;

@@ -2,13 +2,13 @@
 #include <iostream>
 
 #include "absl/strings/str_cat.h"
+#include "server/client/interrupt.h"
+#include "server/client/laboratory.h"
 #include "server/ctl/answer_text.h"
-#include "server/ctl/effect_screen.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/extension.h"
-#include "server/ctl/interrupt.h"
-#include "server/ctl/laboratory.h"
 #include "server/ctl/verbs.h"
+#include "server/diagnosis/effect_screen.h"
+#include "server/diagnosis/extension.h"
 #include "server/report/json_documents.h"
 #include "server/report/people_units.h"
 #include "server/report/warnings.h"
@@ -38,24 +38,25 @@ std::string NewPriors(const report::CampaignView& parent, const report::Campaign
 }  // namespace
 
 int Extend(const Arguments& arguments) {
-  CatchInterrupts();
-  const auto session = Session::Open(arguments);
+  client::CatchInterrupts();
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  Laboratory laboratory(**session, arguments);
+  client::Laboratory laboratory(**session, arguments.server);
   const auto parent = laboratory.Finished(arguments.campaign);
   if (!parent.ok()) return Fail(parent.status());
   for (const std::string& name : arguments.effects) {
     const dem::EffectInfo* effect = dem::FindEffect(parent->campaign.model.user_effects, name);
-    const std::string why = effect == nullptr ? "" : WhyNotShown(parent->campaign, *effect);
+    const std::string why =
+        effect == nullptr ? "" : diagnosis::WhyNotShown(parent->campaign, *effect);
     if (!why.empty()) {
       return Fail(absl::InvalidArgumentError(absl::StrCat(
           name, " cannot be calibrated with the tests of ", arguments.campaign, ": ", why)));
     }
   }
-  const auto text = ExtensionText(*parent, {.effects = arguments.effects,
-                                            .purpose = "extension",
-                                            .samples = std::nullopt,
-                                            .iterations = std::nullopt});
+  const auto text = diagnosis::ExtensionText(*parent, {.effects = arguments.effects,
+                                                       .purpose = "extension",
+                                                       .samples = std::nullopt,
+                                                       .iterations = std::nullopt});
   if (!text.ok()) return Fail(text.status());
   const auto view = laboratory.Run(*parent, *text, "extension of " + arguments.campaign);
   if (!view.ok()) return Fail(view.status());

@@ -5,30 +5,31 @@
 #include <utility>
 
 #include "absl/strings/str_join.h"
-#include "server/ctl/diagnosis_support.h"
+#include "server/client/interrupt.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/improvement.h"
-#include "server/ctl/interrupt.h"
 #include "server/ctl/next_step.h"
-#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
+#include "server/diagnosis/diagnosis_support.h"
+#include "server/diagnosis/improvement.h"
 #include "server/report/people_units.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 namespace {
 
-std::string ToText(const Improvement& improvement) {
-  const std::vector<ImproveStep>& steps = improvement.steps();
-  TextTable table({"<campaign", "<effects", "error", "held out", "log evidence", "<verdict"});
-  for (const ImproveStep& step : steps) {
+std::string ToText(const diagnosis::Improvement& improvement) {
+  const std::vector<diagnosis::ImproveStep>& steps = improvement.steps();
+  report::TextTable table(
+      {"<campaign", "<effects", "error", "held out", "log evidence", "<verdict"});
+  for (const diagnosis::ImproveStep& step : steps) {
     table.AddRow({step.campaign, step.effects.empty() ? "none" : absl::StrJoin(step.effects, " + "),
                   report::Number(step.rms_error, 3),
                   step.heldout_rms_error ? report::Number(*step.heldout_rms_error, 3) : "–",
                   report::Number(step.log_evidence, 5), step.verdict});
   }
   std::string text = table.ToString() + "\n";
-  for (const ImproveStep& step : steps) {
-    text += Wrapped(fmt::format("{}: {}", step.campaign, step.reason), "", "  ");
+  for (const diagnosis::ImproveStep& step : steps) {
+    text += report::Wrapped(fmt::format("{}: {}", step.campaign, step.reason), "", "  ");
   }
   if (steps.size() > 1) {
     text += fmt::format("Error {} before, {} after", report::Number(steps.front().rms_error, 3),
@@ -43,7 +44,7 @@ std::string ToText(const Improvement& improvement) {
   return text + fmt::format("{} model evaluations.\n", improvement.evaluations());
 }
 
-std::string Next(const Arguments& arguments, const ImproveStep& last) {
+std::string Next(const Arguments& arguments, const diagnosis::ImproveStep& last) {
   if (last.verdict == "adequate") {
     return NextStep(CommandOf(arguments, fmt::format("report {0} -o {0}.html", last.campaign)),
                     "parameters, curves and what was tried on the way, in one file");
@@ -55,19 +56,19 @@ std::string Next(const Arguments& arguments, const ImproveStep& last) {
 }  // namespace
 
 int Improve(const Arguments& arguments) {
-  CatchInterrupts();
-  const auto session = Session::Open(arguments);
+  client::CatchInterrupts();
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  Laboratory laboratory(**session, arguments);
+  client::Laboratory laboratory(**session, arguments.server);
   auto view = laboratory.Finished(arguments.campaign);
   if (!view.ok()) return Fail(view.status());
-  if (auto status = CheckLeftOut(arguments.effects, view->campaign); !status.ok()) {
+  if (auto status = diagnosis::CheckLeftOut(arguments.effects, view->campaign); !status.ok()) {
     return Fail(status);
   }
-  Improvement improvement(laboratory, (*session)->client(),
-                          {.effects = arguments.max_effects,
-                           .evaluations = arguments.max_evaluations,
-                           .without = arguments.effects});
+  diagnosis::Improvement improvement(laboratory, (*session)->client(),
+                                     {.effects = arguments.max_effects,
+                                      .evaluations = arguments.max_evaluations,
+                                      .without = arguments.effects});
   if (auto status = improvement.From(*std::move(view)); !status.ok()) return Fail(status);
   std::cout << (arguments.json ? improvement.Json()
                                : ToText(improvement) + Next(arguments, improvement.steps().back()));

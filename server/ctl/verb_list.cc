@@ -4,13 +4,13 @@
 #include <map>
 #include <string>
 
+#include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/lineage.h"
-#include "server/ctl/session.h"
-#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 #include "server/report/people_units.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 namespace {
@@ -32,7 +32,7 @@ std::string Name(const Branch& branch, const std::map<std::string, std::string>&
 }  // namespace
 
 int List(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
   const auto campaigns = (*session)->client().List();
   if (!campaigns.ok()) return Fail(campaigns.status());
@@ -40,7 +40,7 @@ int List(const Arguments& arguments) {
     std::cout << report::StatusListJson(*campaigns);
     return kDone;
   }
-  TextTable table(
+  report::TextTable table(
       {"<id", "<name", "<state", "iteration", "samples", "evaluations", "core hours", "misfit"});
   std::map<std::string, std::string> names;
   for (const v1::CampaignStatus& s : *campaigns) names[s.campaign()] = s.name();

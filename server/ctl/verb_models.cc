@@ -1,9 +1,9 @@
 #include <iostream>
 
+#include "server/client/load_view.h"
+#include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/load_view.h"
-#include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 #include "server/report/model_comparison.h"
@@ -11,10 +11,10 @@
 namespace calib::ctl {
 namespace {
 
-absl::StatusOr<report::RivalModel> LoadRival(Client& client, const std::string& id) {
+absl::StatusOr<report::RivalModel> LoadRival(client::Client& client, const std::string& id) {
   const auto source = client.GetSource(id);
   if (!source.ok()) return source.status();
-  auto read = LoadCampaign(client, *source);
+  auto read = client::LoadCampaign(client, *source);
   if (!read.ok()) return read.status();
   auto posterior = client.GetPosterior(id, std::nullopt);
   if (!posterior.ok()) return posterior.status();
@@ -24,7 +24,7 @@ absl::StatusOr<report::RivalModel> LoadRival(Client& client, const std::string& 
 }  // namespace
 
 int Models(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
   std::vector<report::RivalModel> rivals;
   for (const std::string& id : arguments.campaigns) {

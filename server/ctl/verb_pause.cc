@@ -3,6 +3,6 @@
 
 namespace calib::ctl {
 
-int Pause(const Arguments& arguments) { return Control(arguments, &Client::Pause); }
+int Pause(const Arguments& arguments) { return Control(arguments, &client::Client::Pause); }
 
 }  // namespace calib::ctl

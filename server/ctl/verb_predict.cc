@@ -1,18 +1,18 @@
 #include <iostream>
 
 #include "absl/strings/str_cat.h"
+#include "server/client/interrupt.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/interrupt.h"
 #include "server/ctl/prediction.h"
 #include "server/ctl/verbs.h"
 
 namespace calib::ctl {
 
 int Predict(const Arguments& arguments) {
-  CatchInterrupts();
-  const auto session = Session::Open(arguments);
+  client::CatchInterrupts();
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  Laboratory laboratory(**session, arguments);
+  client::Laboratory laboratory(**session, arguments.server);
   const auto view = laboratory.Finished(arguments.campaign);
   if (!view.ok()) return Fail(view.status());
   if (view->campaign.precomputed) {  // before its tests are held against a model

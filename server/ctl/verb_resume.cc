@@ -3,6 +3,6 @@
 
 namespace calib::ctl {
 
-int Resume(const Arguments& arguments) { return Control(arguments, &Client::Resume); }
+int Resume(const Arguments& arguments) { return Control(arguments, &client::Client::Resume); }
 
 }  // namespace calib::ctl

@@ -4,13 +4,13 @@
 #include <thread>
 
 #include "absl/strings/str_cat.h"
+#include "server/client/interrupt.h"
+#include "server/client/load_view.h"
+#include "server/client/no_worker_notice.h"
+#include "server/client/progress.h"
+#include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/interrupt.h"
-#include "server/ctl/load_view.h"
-#include "server/ctl/no_worker_notice.h"
-#include "server/ctl/progress.h"
-#include "server/ctl/session.h"
 #include "server/ctl/source_files.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
@@ -28,7 +28,7 @@ bool IsOver(const v1::CampaignStatus& status) {
 }
 
 // A campaign that an earlier run left paused goes on.
-absl::Status TakeUp(Client& client, const std::string& campaign) {
+absl::Status TakeUp(client::Client& client, const std::string& campaign) {
   const auto status = client.Show(campaign);
   if (!status.ok()) return status.status();
   if (status->state() != "paused") return absl::OkStatus();
@@ -38,9 +38,9 @@ absl::Status TakeUp(Client& client, const std::string& campaign) {
 
 // Shows progress until the campaign is over, pauses by itself (too many failures) or the user
 // interrupts.
-absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& campaign) {
-  ProgressLine line;
-  NoWorkerNotice notice(session);
+absl::StatusOr<v1::CampaignStatus> Follow(client::Session& session, const std::string& campaign) {
+  client::ProgressLine line;
+  client::NoWorkerNotice notice(session);
   for (;;) {
     auto status = session.client().Show(campaign);
     if (!status.ok()) {
@@ -48,18 +48,18 @@ absl::StatusOr<v1::CampaignStatus> Follow(Session& session, const std::string& c
       return why.ok() ? status.status() : why;
     }
     constexpr int kMilestones = 5;
-    line.Show(ProgressText(*status),
+    line.Show(client::ProgressText(*status),
               kMilestones * 2 * status->iteration() +
                   kMilestones * status->samples_done() / std::max(1, status->samples()));
-    if (IsOver(*status) || status->state() == "paused" || Interrupted()) return status;
+    if (IsOver(*status) || status->state() == "paused" || client::Interrupted()) return status;
     notice.Look(*status);
     if (auto alive = session.Check(); !alive.ok()) return alive;
     std::this_thread::sleep_for(kPollCampaign);
   }
 }
 
-int PrintAnswer(Session& session, const std::string& campaign, bool json) {
-  auto view = LoadView(session.client(), campaign);
+int PrintAnswer(client::Session& session, const std::string& campaign, bool json) {
+  auto view = client::LoadView(session.client(), campaign);
   if (!view.ok()) return Fail(view.status());
   if (view->status.method() == "table") {
     std::cout << (json ? report::TablePosteriorJson(view->status) : TableText(view->status));
@@ -79,17 +79,17 @@ int PrintAnswer(Session& session, const std::string& campaign, bool json) {
 }  // namespace
 
 int Run(const Arguments& given) {
-  if (given.server_given) {
+  if (given.server.given) {
     return Fail(absl::InvalidArgumentError(
         "run brings its own server; with --server use submit and watch"));
   }
   Arguments arguments = given;
-  if (arguments.state.empty()) arguments.state = kDefaultState;
-  arguments.workers.reset();  // started below, once there is something to do
+  if (arguments.server.state.empty()) arguments.server.state = kDefaultState;
+  arguments.server.workers.reset();  // started below, once there is something to do
   const auto source = ReadSourceFiles(arguments);
   if (!source) return kBadInput;
-  CatchInterrupts();
-  const auto session = Session::Open(arguments, /*may_create=*/true);
+  client::CatchInterrupts();
+  const auto session = client::Session::Open(arguments.server, /*may_create=*/true);
   if (!session.ok()) return Fail(session.status());
   const auto campaign = SubmitSource((*session)->client(), *source, arguments.seed, arguments.file);
   if (!campaign.ok()) return Fail(campaign.status());
@@ -99,21 +99,21 @@ int Run(const Arguments& given) {
   const bool cancelled_before = status->state() == "cancelled";
   if (!IsOver(*status)) {
     if (!source->outcome.campaign.precomputed) {
-      if (auto started = (*session)->UseWorkers(given.workers); !started.ok()) {
+      if (auto started = (*session)->UseWorkers(given.server.workers); !started.ok()) {
         return Fail(started);
       }
     }
-    std::cerr << "campaign " << *campaign << " in " << arguments.state << " with "
+    std::cerr << "campaign " << *campaign << " in " << arguments.server.state << " with "
               << (*session)->workers() << " worker(s)\n";
     status = Follow(**session, *campaign);
     if (!status.ok()) return Fail(status.status());
   }
   if (status->state() == "finished") return PrintAnswer(**session, *campaign, arguments.json);
   if (cancelled_before) return Fail(CancelledBefore(*campaign));
-  if (Interrupted()) {
+  if (client::Interrupted()) {
     return Fail(absl::CancelledError(absl::StrCat("stopped; nothing is lost. `calibctl run ",
-                                                  arguments.file, " --state ", arguments.state,
-                                                  "` goes on from here")));
+                                                  arguments.file, " --state ",
+                                                  arguments.server.state, "` goes on from here")));
   }
   return Fail(
       absl::AbortedError(absl::StrCat("campaign ", *campaign, " is ", status->state(),

@@ -1,24 +1,24 @@
 #include <iostream>
 
+#include "server/client/load_view.h"
+#include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/load_view.h"
-#include "server/ctl/session.h"
-#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 #include "server/report/people_units.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 
 int Samples(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  Client& client = (*session)->client();
+  client::Client& client = (*session)->client();
   const auto samples = client.GetSamples(arguments.campaign);
   if (!samples.ok()) return Fail(samples.status());
   const auto source = client.GetSource(arguments.campaign);
   if (!source.ok()) return Fail(source.status());
-  const auto campaign = LoadCampaign(client, *source);
+  const auto campaign = client::LoadCampaign(client, *source);
   if (!campaign.ok()) return Fail(campaign.status());
   std::vector<std::string> names;
   std::vector<std::string> columns = {"sample", "iteration", "<status", "weight", "log likelihood"};
@@ -30,7 +30,7 @@ int Samples(const Arguments& arguments) {
     std::cout << report::SamplesJson(arguments.campaign, names, *samples);
     return kDone;
   }
-  TextTable table(columns);
+  report::TextTable table(columns);
   for (const v1::Sample& s : *samples) {
     std::vector<std::string> row = {std::to_string(s.index()), std::to_string(s.iteration()),
                                     s.status(), report::Number(s.weight(), 3),

@@ -1,9 +1,9 @@
 #include <iostream>
 
+#include "server/client/load_view.h"
+#include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/load_view.h"
-#include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 #include "server/report/sensitivity.h"
@@ -11,9 +11,9 @@
 namespace calib::ctl {
 
 int Sensitivity(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  const auto view = LoadView((*session)->client(), arguments.campaign);
+  const auto view = client::LoadView((*session)->client(), arguments.campaign);
   if (!view.ok()) return Fail(view.status());
   const auto sensitivity = report::AnalyseCampaign(*view);
   if (!sensitivity.ok()) return Fail(sensitivity.status());

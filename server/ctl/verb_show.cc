@@ -4,10 +4,10 @@
 #include <ctime>
 #include <iostream>
 
+#include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/lineage.h"
-#include "server/ctl/session.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 
@@ -65,9 +65,9 @@ std::string Concluded(const std::vector<v1::Finding>& findings) {
 }  // namespace
 
 int Show(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  Client& client = (*session)->client();
+  client::Client& client = (*session)->client();
   const auto status = client.Show(arguments.campaign);
   if (!status.ok()) return Fail(status.status());
   const auto campaigns = client.List();

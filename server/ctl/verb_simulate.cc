@@ -10,11 +10,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
+#include "server/client/interrupt.h"
+#include "server/client/progress.h"
 #include "server/ctl/assignments.h"
 #include "server/ctl/evaluation.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/interrupt.h"
-#include "server/ctl/progress.h"
 #include "server/ctl/source_files.h"
 #include "server/ctl/state_table.h"
 #include "server/ctl/temporary_folder.h"
@@ -74,7 +74,7 @@ class Simulation {
   // of another run, ends it.
   absl::Status RunAll(const std::string& program, const std::string& folder) {
     const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
-    ProgressLine line;
+    client::ProgressLine line;
     for (;;) {
       std::size_t running = 0;
       for (Evaluation& evaluation : evaluations_) {
@@ -86,7 +86,7 @@ class Simulation {
       }
       const bool all_started = evaluations_.size() == campaign_.experiments.size();
       if (all_started && running == 0) return absl::OkStatus();
-      if (Interrupted()) return absl::CancelledError("stopped");
+      if (client::Interrupted()) return absl::CancelledError("stopped");
       if (!all_started && running < cores) {
         if (auto started = StartNext(program, folder); !started.ok()) return started;
         continue;
@@ -150,7 +150,7 @@ class Simulation {
     return absl::OkStatus();
   }
 
-  void ShowProgress(ProgressLine& line) const {
+  void ShowProgress(client::ProgressLine& line) const {
     std::string text;
     int done = 0;
     int of = 0;
@@ -193,12 +193,12 @@ int Simulate(const Arguments& arguments) {
     if (!opened.ok()) return Fail(opened.status());
     output.emplace(*std::move(opened));
   }
-  const auto program = FindWorkerProgram();
+  const auto program = client::FindWorkerProgram();
   if (!program.ok()) return Fail(program.status());
   const auto folder = TemporaryFolder::Make();
   if (!folder.ok()) return Fail(folder.status());
   if (!arguments.vtk.empty()) SayWhatHasNoPictures(campaign);
-  CatchInterrupts();
+  client::CatchInterrupts();
   Simulation simulation(*source, campaign, *std::move(values), arguments);
   if (auto ran = simulation.RunAll(*program, folder->path()); !ran.ok()) return Fail(ran);
   const std::string table = simulation.Table();

@@ -1,13 +1,13 @@
 #include <iostream>
 
 #include "dem/catalog/catalog.h"
+#include "server/client/load_view.h"
+#include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/load_view.h"
-#include "server/ctl/session.h"
-#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 #include "server/report/people_units.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 void Print(const std::string& experiment, const report::StateHistory& history) {
   std::vector<std::string> columns = {"step"};
   columns.insert(columns.end(), history.observables.begin(), history.observables.end());
-  TextTable table(columns);
+  report::TextTable table(columns);
   for (const v1::State& state : history.states) {
     std::vector<std::string> row = {std::to_string(state.load_step())};
     for (int k = 0; k < state.values_size(); ++k) {
@@ -32,9 +32,10 @@ void Print(const std::string& experiment, const report::StateHistory& history) {
 }  // namespace
 
 int States(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
-  const auto states = LoadStates((*session)->client(), arguments.campaign, arguments.sample);
+  const auto states =
+      client::LoadStates((*session)->client(), arguments.campaign, arguments.sample);
   if (!states.ok()) return Fail(states.status());
   std::map<std::string, report::StateHistory> by_experiment;
   for (const auto& [key, history] : *states) by_experiment[key.first] = history;

@@ -1,7 +1,7 @@
 #include <iostream>
 
+#include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/session.h"
 #include "server/ctl/source_files.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
@@ -11,7 +11,7 @@ namespace calib::ctl {
 int Submit(const Arguments& arguments) {
   const auto source = ReadSourceFiles(arguments);
   if (!source) return kBadInput;
-  const auto session = Session::Open(arguments, /*may_create=*/true);
+  const auto session = client::Session::Open(arguments.server, /*may_create=*/true);
   if (!session.ok()) return Fail(session.status());
   const auto campaign = SubmitSource((*session)->client(), *source, arguments.seed, arguments.file);
   if (!campaign.ok()) return Fail(campaign.status());

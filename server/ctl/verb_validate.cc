@@ -5,9 +5,9 @@
 #include "server/campaign/specimen_notes.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/source_files.h"
-#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 
@@ -32,8 +32,8 @@ int Validate(const Arguments& arguments) {
             << campaign.experiments.size() << " experiment(s), " << readings
             << " measured numbers, " << campaign.samples << " samples in each of at most "
             << campaign.max_iterations << " iteration(s).\n";
-  for (const std::string& note : notes) std::cout << Wrapped(note, "  ", "  ");
-  for (const std::string& warning : warnings) std::cout << Wrapped(warning, "! ", "  ");
+  for (const std::string& note : notes) std::cout << report::Wrapped(note, "  ", "  ");
+  for (const std::string& warning : warnings) std::cout << report::Wrapped(warning, "! ", "  ");
   return kDone;
 }
 

@@ -1,11 +1,11 @@
 #include <iostream>
 
+#include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/session.h"
-#include "server/ctl/text_table.h"
 #include "server/ctl/verbs.h"
 #include "server/report/json_documents.h"
 #include "server/report/people_units.h"
+#include "server/report/text_table.h"
 
 namespace calib::ctl {
 namespace {
@@ -20,7 +20,7 @@ std::string State(const v1::WorkerInfo& w) {
 }  // namespace
 
 int Workers(const Arguments& arguments) {
-  const auto session = Session::Open(arguments);
+  const auto session = client::Session::Open(arguments.server);
   if (!session.ok()) return Fail(session.status());
   const auto workers = (*session)->client().ListWorkers();
   if (!workers.ok()) return Fail(workers.status());
@@ -31,7 +31,7 @@ int Workers(const Arguments& arguments) {
   if (workers->empty()) {
     std::cout << "No worker is connected; start one with `calib-worker --server HOST:PORT`.\n";
   }
-  TextTable table({"<worker", "busy", "slots", "million contacts/s", "<state", "<running"});
+  report::TextTable table({"<worker", "busy", "slots", "million contacts/s", "<state", "<running"});
   for (const v1::WorkerInfo& w : *workers) {
     std::string running;
     for (const std::string& what : w.running()) running += (running.empty() ? "" : " ") + what;

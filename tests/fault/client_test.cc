@@ -1,5 +1,5 @@
 // A server started again while calibctl asks: the question is asked again.
-#include "server/ctl/client.h"
+#include "server/client/client.h"
 
 #include <gtest/gtest.h>
 
@@ -23,12 +23,12 @@ auto AcrossARestart(Deployment& deployment, const Ask& ask) {
   return answer.get();
 }
 
-TEST(CtlClient, AsksAgainWhenTheServerIsBack) {
+TEST(Client, AsksAgainWhenTheServerIsBack) {
   Deployment deployment({.name = "asked-again"});
   ASSERT_TRUE(deployment.StartServer()) << deployment.Logs();
-  auto connected = ctl::Client::Connect(deployment.address());
+  auto connected = client::Client::Connect(deployment.address());
   ASSERT_TRUE(connected.ok()) << connected.status();
-  ctl::Client& client = **connected;
+  client::Client& client = **connected;
   ASSERT_TRUE(client.List().ok());
   const auto listed = AcrossARestart(deployment, [&client] { return client.List(); });
   EXPECT_TRUE(listed.ok()) << listed.status();
@@ -42,9 +42,9 @@ TEST(CtlClient, AsksAgainWhenTheServerIsBack) {
   EXPECT_EQ(paused->state(), "paused");
 }
 
-TEST(CtlClient, DoesNotWaitForAServerThatWasNeverThere) {
+TEST(Client, DoesNotWaitForAServerThatWasNeverThere) {
   const auto begun = std::chrono::steady_clock::now();
-  const auto client = ctl::Client::Connect("127.0.0.1:9");
+  const auto client = client::Client::Connect("127.0.0.1:9");
   EXPECT_EQ(client.status().code(), absl::StatusCode::kUnavailable);
   EXPECT_NE(client.status().message().find("no server answers at 127.0.0.1:9"), std::string::npos)
       << client.status();

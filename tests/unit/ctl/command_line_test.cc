@@ -18,7 +18,7 @@ TEST(CommandLine, CommonOptionsStandOnEitherSideOfTheVerb) {
         std::vector<const char*>{"posterior", "c1", "--json", "--state", "s"}}) {
     const Parsed parsed = Parse(words);
     ASSERT_TRUE(parsed.command.has_value());
-    EXPECT_EQ(parsed.command->arguments.state, "s");
+    EXPECT_EQ(parsed.command->arguments.server.state, "s");
     EXPECT_EQ(parsed.command->arguments.campaign, "c1");
     EXPECT_TRUE(parsed.command->arguments.json);
   }

@@ -1,0 +1,304 @@
+#include "server/client/client.h"
+
+#include <grpcpp/channel.h>
+#include <grpcpp/client_context.h>
+
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "calib/v1/campaign.grpc.pb.h"
+#include "proto/rpc/address.h"
+#include "proto/rpc/chunking.h"
+#include "proto/rpc/client_options.h"
+#include "proto/rpc/digest.h"
+#include "proto/rpc/random_id.h"
+#include "proto/rpc/status.h"
+#include "server/client/interrupt.h"
+
+namespace calib::client {
+namespace {
+
+constexpr std::chrono::milliseconds kConnect{1800};
+constexpr std::chrono::minutes kLongestStream{10};
+
+/// A server that is slow to answer (a disk that stalls, a machine that sleeps) or is started again
+/// is asked again, so that hours of a diagnosis do not end with one late answer. Every call may be
+/// made twice: those that change something carry a request_id or a digest.
+constexpr int kLateAnswers = 10;
+constexpr int kLostConnections = 2;
+constexpr std::chrono::minutes kReturn{1};       // of a server that was lost
+constexpr std::chrono::milliseconds kLull{100};  // until a channel knows that it is broken
+
+using Stub = v1::Campaigns::Stub;
+
+struct Connection {
+  std::string address;
+  std::shared_ptr<grpc::Channel> channel;
+  std::unique_ptr<Stub> stub;
+  Client::FindServer find_server;
+
+  void Open(const std::string& where) {
+    address = where;
+    channel = rpc::OpenChannel(address);
+    stub = v1::Campaigns::NewStub(channel);
+  }
+
+  /// After the server was lost: true once it, or who took its place, can be asked.
+  bool Return() {
+    const auto end = std::chrono::system_clock::now() + kReturn;
+    do {
+      std::this_thread::sleep_for(kLull);
+      if (Interrupted()) return false;
+      if (find_server) {
+        const std::string found = find_server();
+        if (found.empty()) return false;
+        if (found != address) Open(found);
+      }
+      if (channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) return true;
+    } while (std::chrono::system_clock::now() < end);
+    return false;
+  }
+};
+
+absl::Status NoAnswer(const grpc::Status& last) {
+  const bool is_late = last.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
+  const std::string why =
+      is_late ? "the server has not answered for minutes" : "the connection to the server was lost";
+  return {is_late ? absl::StatusCode::kDeadlineExceeded : absl::StatusCode::kUnavailable,
+          absl::StrCat(why, " (", last.error_message(),
+                       "); what was submitted goes on there, and the same command again goes on "
+                       "from what is done")};
+}
+
+// Calls ask(stub, context), which returns a grpc::Status, again when its deadline passes or the
+// connection is lost.
+template <typename Ask>
+absl::Status Insist(Connection& connection, std::optional<std::chrono::milliseconds> deadline,
+                    const Ask& ask) {
+  int late = 0;
+  int lost = 0;
+  while (true) {
+    grpc::ClientContext context;
+    if (deadline) rpc::SetDeadline(context, *deadline);
+    const grpc::Status status = ask(*connection.stub, context);
+    switch (status.error_code()) {
+      case grpc::StatusCode::OK:
+        return absl::OkStatus();
+      case grpc::StatusCode::DEADLINE_EXCEEDED:
+        if (++late >= kLateAnswers || Interrupted()) return NoAnswer(status);
+        break;
+      case grpc::StatusCode::CANCELLED:  // by a server that ends
+      case grpc::StatusCode::UNAVAILABLE:
+        if (++lost > kLostConnections || !connection.Return()) return NoAnswer(status);
+        break;
+      default:
+        return rpc::FromGrpc(status);
+    }
+  }
+}
+
+template <typename Reply, typename Request>
+absl::StatusOr<Reply> Call(Connection& connection,
+                           grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                        Reply*),
+                           const Request& request) {
+  Reply reply;
+  auto answered =
+      Insist(connection, rpc::kUnaryDeadline, [&](Stub& stub, grpc::ClientContext& context) {
+        reply.Clear();
+        return (stub.*method)(&context, request, &reply);
+      });
+  if (!answered.ok()) return answered;
+  return reply;
+}
+
+// All messages of one stream.
+template <typename Message, typename Request>
+absl::StatusOr<std::vector<Message>> Collect(
+    Connection& connection,
+    std::unique_ptr<grpc::ClientReader<Message>> (Stub::*method)(grpc::ClientContext*,
+                                                                 const Request&),
+    const Request& request) {
+  std::vector<Message> messages;
+  auto answered = Insist(connection, kLongestStream, [&](Stub& stub, grpc::ClientContext& context) {
+    messages.clear();
+    const auto reader = (stub.*method)(&context, request);
+    Message message;
+    while (reader->Read(&message)) messages.push_back(message);
+    return reader->Finish();
+  });
+  if (!answered.ok()) return answered;
+  return messages;
+}
+
+v1::CampaignRequest Of(const std::string& campaign) {
+  v1::CampaignRequest request;
+  request.set_campaign(campaign);
+  return request;
+}
+
+v1::ControlRequest ControlOf(const std::string& campaign) {
+  v1::ControlRequest request;
+  request.set_campaign(campaign);
+  request.set_request_id(rpc::RandomId());
+  return request;
+}
+
+}  // namespace
+
+struct Client::Impl {
+  Connection connection;
+};
+
+Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Client::~Client() = default;
+
+absl::StatusOr<std::unique_ptr<Client>> Client::Connect(const std::string& address) {
+  if (const std::string problem = rpc::ProblemOfAddress(address); !problem.empty()) {
+    return absl::InvalidArgumentError(problem);  // of $CALIB_SERVER: options are checked before
+  }
+  auto impl = std::make_unique<Impl>();
+  impl->connection.Open(address);
+  if (!impl->connection.channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) {
+    return absl::UnavailableError(
+        absl::StrCat("no server answers at ", address,
+                     "; start one with `calibd --state DIR`, name another with --server HOST:PORT, "
+                     "or work on a folder with --state DIR"));
+  }
+  return std::unique_ptr<Client>(new Client(std::move(impl)));
+}
+
+void Client::OnLoss(FindServer find_server) {
+  impl_->connection.find_server = std::move(find_server);
+}
+
+absl::Status Client::PutBlob(const std::string& content) {
+  return Insist(impl_->connection, rpc::kBlobDeadline,
+                [&content](Stub& stub, grpc::ClientContext& context) {
+                  v1::BlobReceipt receipt;
+                  const auto writer = stub.PutBlob(&context, &receipt);
+                  for (const v1::BlobChunk& chunk : rpc::ToChunks(content)) {
+                    if (!writer->Write(chunk)) break;  // Finish() says why
+                  }
+                  writer->WritesDone();
+                  return writer->Finish();
+                });
+}
+
+absl::StatusOr<std::string> Client::GetBlob(const std::string& digest) {
+  v1::BlobByDigest request;
+  request.set_digest(digest);
+  const auto chunks = Collect(impl_->connection, &Stub::GetBlob, request);
+  if (!chunks.ok()) return chunks.status();
+  rpc::BlobAssembler assembler;
+  for (const v1::BlobChunk& chunk : *chunks) {
+    if (auto added = assembler.Add(chunk); !added.ok()) return added;
+  }
+  return assembler.Finish();
+}
+
+absl::StatusOr<v1::SubmitReply> Client::Submit(const v1::SubmitRequest& request) {
+  return Call<v1::SubmitReply>(impl_->connection, &Stub::Submit, request);
+}
+
+absl::StatusOr<std::vector<v1::CampaignStatus>> Client::List() {
+  const auto reply = Call<v1::ListReply>(impl_->connection, &Stub::List, v1::ListRequest());
+  if (!reply.ok()) return reply.status();
+  return std::vector<v1::CampaignStatus>(reply->campaigns().begin(), reply->campaigns().end());
+}
+
+absl::StatusOr<v1::CampaignStatus> Client::Show(const std::string& campaign) {
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::Show, Of(campaign));
+}
+
+absl::Status Client::Watch(const std::string& campaign,
+                           const std::function<void(const v1::CampaignStatus&)>& seen) {
+  return Insist(impl_->connection, std::nullopt, [&](Stub& stub, grpc::ClientContext& context) {
+    const auto reader = stub.Watch(&context, Of(campaign));
+    v1::CampaignStatus status;
+    while (reader->Read(&status)) seen(status);
+    return reader->Finish();
+  });
+}
+
+absl::StatusOr<v1::Posterior> Client::GetPosterior(const std::string& campaign,
+                                                   std::optional<int> iteration) {
+  v1::PosteriorRequest request;
+  request.set_campaign(campaign);
+  if (iteration) request.set_iteration(*iteration);
+  return Call<v1::Posterior>(impl_->connection, &Stub::GetPosterior, request);
+}
+
+absl::StatusOr<std::vector<v1::Sample>> Client::GetSamples(const std::string& campaign) {
+  return Collect(impl_->connection, &Stub::GetSamples, Of(campaign));
+}
+
+absl::StatusOr<std::vector<v1::SampleStates>> Client::GetStates(const std::string& campaign,
+                                                                std::optional<int> sample) {
+  v1::StatesRequest request;
+  request.set_campaign(campaign);
+  if (sample) request.set_sample(*sample);
+  return Collect(impl_->connection, &Stub::GetStates, request);
+}
+
+absl::StatusOr<v1::CampaignSource> Client::GetSource(const std::string& campaign) {
+  return Call<v1::CampaignSource>(impl_->connection, &Stub::GetSource, Of(campaign));
+}
+
+absl::StatusOr<std::vector<v1::LogEntry>> Client::GetLog(const std::string& campaign) {
+  return Collect(impl_->connection, &Stub::GetLog, Of(campaign));
+}
+
+absl::Status Client::AddFinding(const std::string& campaign, const std::string& kind,
+                                const std::string& document) {
+  if (auto put = PutBlob(document); !put.ok()) return put;
+  v1::AddFindingRequest request;
+  request.set_campaign(campaign);
+  request.set_kind(kind);
+  request.set_digest(rpc::Sha256Hex(document));
+  return Call<v1::Finding>(impl_->connection, &Stub::AddFinding, request).status();
+}
+
+absl::StatusOr<std::vector<v1::Finding>> Client::Findings(const std::string& campaign) {
+  const auto list = Call<v1::FindingList>(impl_->connection, &Stub::ListFindings, Of(campaign));
+  if (!list.ok()) return list.status();
+  return std::vector<v1::Finding>(list->findings().begin(), list->findings().end());
+}
+
+absl::StatusOr<v1::CampaignStatus> Client::Pause(const std::string& campaign) {
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::Pause, ControlOf(campaign));
+}
+
+absl::StatusOr<v1::CampaignStatus> Client::Resume(const std::string& campaign) {
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::Resume, ControlOf(campaign));
+}
+
+absl::StatusOr<v1::CampaignStatus> Client::Cancel(const std::string& campaign) {
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::Cancel, ControlOf(campaign));
+}
+
+absl::Status Client::Delete(const std::string& campaign) {
+  return Call<v1::DeleteReply>(impl_->connection, &Stub::Delete, ControlOf(campaign)).status();
+}
+
+absl::StatusOr<std::vector<v1::WorkerInfo>> Client::ListWorkers() {
+  const auto reply =
+      Call<v1::WorkerList>(impl_->connection, &Stub::ListWorkers, v1::ListWorkersRequest());
+  if (!reply.ok()) return reply.status();
+  return std::vector<v1::WorkerInfo>(reply->workers().begin(), reply->workers().end());
+}
+
+absl::StatusOr<v1::WorkerInfo> Client::DrainWorker(const std::string& worker) {
+  v1::DrainRequest request;
+  request.set_worker(worker);
+  request.set_request_id(rpc::RandomId());
+  return Call<v1::WorkerInfo>(impl_->connection, &Stub::DrainWorker, request);
+}
+
+absl::StatusOr<v1::ServerReport> Client::Examine() {
+  return Call<v1::ServerReport>(impl_->connection, &Stub::Examine, v1::ExamineRequest());
+}
+
+}  // namespace calib::client

@@ -1,0 +1,64 @@
+#pragma once
+// The service as seen by calibctl: one blocking call per question. No gRPC header is needed to use
+// it.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "calib/v1/campaign.pb.h"
+
+namespace calib::client {
+
+/// Errors of all calls: UNAVAILABLE when the server is not there, DEADLINE_EXCEEDED when it is but
+/// has not answered for minutes, otherwise the codes of the service definition. Not thread-safe.
+class Client {
+ public:
+  /// UNAVAILABLE when nothing answers at the address within about two seconds.
+  static absl::StatusOr<std::unique_ptr<Client>> Connect(const std::string& address);
+  /// How to find the server again when the connection is lost: its address, or "" when that is
+  /// hopeless. Without it the same address is tried.
+  using FindServer = std::function<std::string()>;
+  void OnLoss(FindServer find_server);
+  ~Client();
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  absl::Status PutBlob(const std::string& content);
+  absl::StatusOr<std::string> GetBlob(const std::string& digest);
+  absl::StatusOr<v1::SubmitReply> Submit(const v1::SubmitRequest& request);
+  absl::StatusOr<std::vector<v1::CampaignStatus>> List();
+  absl::StatusOr<v1::CampaignStatus> Show(const std::string& campaign);
+  /// Calls `seen` with every status until the campaign ends.
+  absl::Status Watch(const std::string& campaign,
+                     const std::function<void(const v1::CampaignStatus&)>& seen);
+  absl::StatusOr<v1::Posterior> GetPosterior(const std::string& campaign,
+                                             std::optional<int> iteration);
+  absl::StatusOr<std::vector<v1::Sample>> GetSamples(const std::string& campaign);
+  absl::StatusOr<std::vector<v1::SampleStates>> GetStates(const std::string& campaign,
+                                                          std::optional<int> sample);
+  absl::StatusOr<v1::CampaignSource> GetSource(const std::string& campaign);
+  absl::StatusOr<std::vector<v1::LogEntry>> GetLog(const std::string& campaign);
+  /// Puts the document and keeps it as a conclusion about the campaign. kind: diagnosis |
+  /// improvement.
+  absl::Status AddFinding(const std::string& campaign, const std::string& kind,
+                          const std::string& document);
+  absl::StatusOr<std::vector<v1::Finding>> Findings(const std::string& campaign);
+  absl::StatusOr<v1::CampaignStatus> Pause(const std::string& campaign);
+  absl::StatusOr<v1::CampaignStatus> Resume(const std::string& campaign);
+  absl::StatusOr<v1::CampaignStatus> Cancel(const std::string& campaign);
+  absl::Status Delete(const std::string& campaign);
+  absl::StatusOr<std::vector<v1::WorkerInfo>> ListWorkers();
+  absl::StatusOr<v1::WorkerInfo> DrainWorker(const std::string& worker);
+  absl::StatusOr<v1::ServerReport> Examine();
+
+ private:
+  struct Impl;
+  explicit Client(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace calib::client

@@ -1,0 +1,51 @@
+#pragma once
+// Where a verb has further campaigns run: it hands over their text and waits. A campaign is
+// recognised by its text, so that a verb that is issued again finds what it has run already.
+
+#include <map>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "server/client/server_choice.h"
+#include "server/client/session.h"
+#include "server/report/campaign_view.h"
+
+namespace calib::client {
+
+class Laboratory {
+ public:
+  /// The session must outlive it. Starts local workers when there is something to run and the state
+  /// folder is this process's own.
+  Laboratory(Session& session, const ServerChoice& choice) : session_(session), choice_(choice) {}
+
+  /// A finished calibration. FAILED_PRECONDITION with a sentence when it is not finished, or a
+  /// trial that diagnose made for another one.
+  absl::StatusOr<report::CampaignView> Finished(const std::string& campaign);
+
+  /// Submits the text with the parent's files and does not wait, so that several campaigns keep all
+  /// workers busy; returns the campaign's id. Submitted again it is the same campaign.
+  absl::StatusOr<std::string> Submit(const report::CampaignView& parent, const std::string& yaml,
+                                     const std::string& what,
+                                     const std::map<std::string, std::string>& further = {});
+
+  /// Submits the text with the parent's files and waits for the end, progress on standard error.
+  /// further: files by the path that the text names them by, in addition to the parent's.
+  /// ABORTED when the campaign failed, FAILED_PRECONDITION when somebody paused or cancelled it,
+  /// CANCELLED on Ctrl-C (nothing is lost).
+  absl::StatusOr<report::CampaignView> Run(const report::CampaignView& parent,
+                                           const std::string& yaml, const std::string& what,
+                                           const std::map<std::string, std::string>& further = {});
+
+  /// Whether the text is a campaign without a problem; files as for Run().
+  bool Accepts(const report::CampaignView& parent, const std::string& yaml,
+               const std::map<std::string, std::string>& further);
+
+ private:
+  absl::Status Wait(const std::string& campaign, const std::string& what);
+
+  Session& session_;
+  const ServerChoice& choice_;
+  bool workers_started_ = false;
+};
+
+}  // namespace calib::client

@@ -1,0 +1,47 @@
+#include "server/client/no_worker_notice.h"
+
+#include <algorithm>
+#include <iostream>
+#include <string>
+
+#include "server/campaign/yaml_text.h"
+
+namespace calib::client {
+namespace {
+
+// Runs that were made elsewhere are there.
+bool NeedsWorkers(Client& client, const std::string& campaign) {
+  const auto source = client.GetSource(campaign);
+  if (!source.ok()) return false;
+  const auto parsed = campaign::ParseYaml(source->campaign_file());
+  const auto* model = parsed.root ? campaign::YamlFind(*parsed.root, "model") : nullptr;
+  return model == nullptr || campaign::YamlFind(*model, "precomputed") == nullptr;
+}
+
+}  // namespace
+
+void NoWorkerNotice::Look(const v1::CampaignStatus& status) {
+  const auto now = std::chrono::steady_clock::now();
+  const bool lives = status.state() == "queued" || status.state() == "running";
+  const bool computes = status.phase() == "calibrating" && status.samples_done() > 0 &&
+                        status.samples_done() >= status.samples();
+  if (!lives || computes || status.samples_running() > 0) {
+    idle_since_ = now;
+    said_ = false;
+    return;
+  }
+  if (said_ || now - idle_since_ < patience_) return;
+  idle_since_ = now;
+  if (!NeedsWorkers(session_.client(), status.campaign())) return;
+  const auto workers = session_.client().ListWorkers();
+  if (!workers.ok() || std::any_of(workers->begin(), workers->end(),
+                                   [](const v1::WorkerInfo& w) { return w.connected(); })) {
+    return;
+  }
+  said_ = true;
+  std::cerr << "\nno worker is connected to " << session_.address() << ", so nothing runs: start `"
+            << "calib-worker --server " << session_.address()
+            << "`, or stop this and give --state DIR --workers N (nothing is lost)\n";
+}
+
+}  // namespace calib::client

@@ -1,0 +1,30 @@
+#pragma once
+// A wait that cannot end, because no worker is there, says so.
+
+#include <chrono>
+
+#include "calib/v1/campaign.pb.h"
+#include "server/client/session.h"
+
+namespace calib::client {
+
+class NoWorkerNotice {
+ public:
+  /// session must outlive it. patience: how long nothing may run before the workers are counted.
+  explicit NoWorkerNotice(Session& session, std::chrono::milliseconds patience = kPatience)
+      : session_(session), patience_(patience) {}
+
+  /// Call with every status that is waited on. Once nothing has run for as long as patience and no
+  /// worker is connected, a line on standard error says what to do; again only after one has come.
+  void Look(const v1::CampaignStatus& status);
+
+  static constexpr std::chrono::seconds kPatience{5};
+
+ private:
+  Session& session_;
+  std::chrono::milliseconds patience_;
+  std::chrono::steady_clock::time_point idle_since_ = std::chrono::steady_clock::now();
+  bool said_ = false;
+};
+
+}  // namespace calib::client

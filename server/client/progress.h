@@ -1,0 +1,37 @@
+#pragma once
+// Progress on standard error: a line that is drawn over on a terminal, now and then a plain line
+// otherwise.
+
+#include <chrono>
+#include <string>
+
+#include "calib/v1/campaign.pb.h"
+
+namespace calib::client {
+
+/// "iteration 2/4  [########------------]  40/100 samples  2 running  ESS 23  best misfit 1.3  3
+/// min 20 s left"
+std::string ProgressText(const v1::CampaignStatus& status);
+
+class ProgressLine {
+ public:
+  /// quiet: says nothing at all.
+  explicit ProgressLine(bool quiet = false);
+  /// Leaves the last text standing on a terminal.
+  ~ProgressLine();
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  /// Off a terminal a text is printed only when `milestone` differs from the last one printed and a
+  /// second has passed.
+  void Show(const std::string& text, int milestone);
+
+ private:
+  bool quiet_;
+  bool terminal_;
+  bool drawn_ = false;
+  int last_milestone_ = -1;
+  std::chrono::steady_clock::time_point last_{};
+};
+
+}  // namespace calib::client

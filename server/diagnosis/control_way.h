@@ -1,0 +1,18 @@
+#pragma once
+// The values that a control goes through in a planned test.
+
+#include <cstddef>
+#include <vector>
+
+namespace calib::diagnosis {
+
+/// From start (which is no reading) to last in 40 equal steps.
+std::vector<double> Monotonic(double start, double last);
+
+/// The same with an unloading by a tenth of the way, and the reloading, half-way.
+std::vector<double> WithUnloading(double start, double last);
+
+/// count values from low to high: of equal ratios where both are above 0, else of equal steps.
+std::vector<double> Spread(double low, double high, std::size_t count);
+
+}  // namespace calib::diagnosis

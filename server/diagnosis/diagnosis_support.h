@@ -1,0 +1,31 @@
+#pragma once
+// What a diagnosis stands on: whether a campaign can be judged at all, and what makes any verdict
+// doubtful.
+
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "inference/diagnosis/fitted_model.h"
+#include "server/campaign/campaign.h"
+#include "server/diagnosis/fitted_campaign.h"
+
+namespace calib::diagnosis {
+
+/// FAILED_PRECONDITION with a sentence where nothing can be said: no complete iteration, no stated
+/// errors, no more readings than parameters, no finished sample.
+absl::Status CheckDiagnosable(const FittedCampaign& base);
+
+/// INVALID_ARGUMENT for a name that is no effect of the catalogue or of the campaign.
+absl::Status CheckLeftOut(const std::vector<std::string>& effects,
+                          const campaign::Campaign& campaign);
+
+/// Sentences: few readings, one packing only.
+std::vector<std::string> DoubtsOf(const FittedCampaign& base);
+
+/// A sentence on what a scatter known from few packings does to the verdict; empty where it is
+/// known from enough, or where packings were not varied. measured: packings that the best estimate
+/// was run on.
+std::string FewPackings(const inference::FittedModel& model, int measured);
+
+}  // namespace calib::diagnosis

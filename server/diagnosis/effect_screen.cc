@@ -1,0 +1,370 @@
+#include "server/diagnosis/effect_screen.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "absl/strings/str_cat.h"
+#include "server/campaign/excitation.h"
+#include "server/diagnosis/extension.h"
+#include "server/diagnosis/reading_effects.h"
+
+namespace calib::diagnosis {
+namespace {
+
+using Eigen::Index;
+
+constexpr double kNothing = 1e-8;      // of the square of a reading's sd, per reading
+constexpr std::size_t kMostRuns = 4;   // model evaluations of one effect, or
+constexpr double kScreenShare = 0.25;  // of the campaign's over all effects
+constexpr std::size_t kMostRows = 2;   // runs of the campaign from which an effect is tried
+constexpr double kMostDamping = 0.9;
+// A second strength is to change three times what two runs differ by chance: of what a measurement
+// scatters, in square.
+constexpr double kWanted = 18;
+constexpr double kMostRatio = 16;  // of the second strength to the first
+constexpr double kGrades = 4;      // of an octave: the last bits of a history change no run
+constexpr const char* kLoadCell = "load_cell_error";
+
+// A share of what a step on the ray changes, as a share of the step; and the other way about.
+double StepFor(const dem::StrengthRay& ray, double share) {
+  return std::copysign(std::pow(std::abs(share), 1 / ray.order), share);
+}
+double ShareAt(const dem::StrengthRay& ray, double step) {
+  return std::copysign(std::pow(std::abs(step), ray.order), step);
+}
+
+// The last step within the default prior, or the catalogue's second.
+double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
+                const std::string& contact, const dem::ReferenceState& state) {
+  const auto parameter = std::find_if(effect.parameters.begin(), effect.parameters.end(),
+                                      [&ray](const auto& p) { return p.name == ray.parameter; });
+  const double end = dem::PriorOf(*parameter, contact, state).max;
+  const double reach = end - dem::NullValueOf(*parameter, contact).value_or(0);
+  return std::max(ray.steps[1], reach / dem::ScaleOf(*parameter, contact, state));
+}
+
+}  // namespace
+
+double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
+                  const std::string& contact, const dem::ReferenceState& state) {
+  if (!(square > 0)) return ray.steps[1];
+  const double grade =
+      std::round(kGrades * std::log2(StepFor(ray, std::sqrt(kWanted / square)))) / kGrades;
+  const double wanted = std::max(ray.steps[1], std::exp2(grade) * ray.steps[0]);
+  const double step = std::min({wanted, std::max(ray.steps[1], kMostRatio * ray.steps[0]),
+                                LastStep(effect, ray, contact, state)});
+  return dem::RayAdmits(effect, ray, step, contact, state) ? step : ray.steps[1];
+}
+
+std::vector<std::size_t> SharesOfRuns(const std::vector<const dem::EffectInfo*>& effects,
+                                      const std::vector<bool>& calculated, std::size_t samples,
+                                      int experiments, std::size_t numerical) {
+  const double most = std::max(kScreenShare * static_cast<double>(samples),
+                               static_cast<double>(kMostRuns * effects.size()) / experiments);
+  auto left = static_cast<std::int64_t>(most) - static_cast<std::int64_t>(numerical);
+  std::vector<std::size_t> runs(effects.size(), 0);
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    if (calculated[e]) continue;
+    runs[e] = 1;
+    --left;
+  }
+  // Another ray is another signature; what instruments do is nearly in proportion to its strength.
+  const auto grade = [](const dem::EffectInfo& effect) {
+    if (effect.rays.size() > 1) return 0;
+    return effect.kind == "measurement" ? 2 : 1;
+  };
+  for (int wanted = 0; wanted <= 2; ++wanted) {
+    for (std::size_t e = 0; e < effects.size() && left > 0; ++e) {
+      if (runs[e] == 0 || grade(*effects[e]) != wanted) continue;
+      runs[e] = 2;
+      --left;
+    }
+  }
+  return runs;
+}
+
+std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& effect,
+                                                      std::size_t rows) {
+  std::vector<Step> steps;
+  for (const dem::StrengthRay& ray : effect.rays) {
+    if (effect.rays.size() == 1 && rows > 1) steps.push_back({&ray, ray.steps[0]});
+    steps.push_back({&ray, ray.steps[1]});
+  }
+  if (steps.size() > rows) steps.resize(rows);
+  return steps;
+}
+
+std::vector<campaign::Derivation> EffectScreen::NumericalChanges() const {
+  const campaign::Campaign& campaign = base_.view().campaign;
+  const Index best = base_.BestRuns(1).front();
+  const campaign::Derivation::Row row = base_.RowLike(best);
+  std::vector<campaign::Derivation> changes;
+  for (const char* what : {"twice the rate", "half the step", "other damping"}) {
+    changes.push_back(base_.Derived("nuisance", what));
+    changes.back().rows = {row};
+  }
+  bool staged = false;
+  for (const campaign::Experiment& e : campaign.experiments) {
+    if (e.role != campaign::Role::kCalibrate || !campaign::ReadAtRest(e)) continue;
+    staged = true;
+    dem::Scenario scenario;
+    scenario.model = campaign.model;
+    scenario.settings = e.settings;
+    scenario.initial_stress = e.initial_stress;
+    scenario.staging = e.staging;
+    const dem::Staging used = dem::ResolveStaging(scenario, base_.state().diameter);
+    const double damping = *used.damping_loading;
+    changes[0].staging[e.name].rate = 2 * *used.rate;
+    changes[1].staging[e.name].step = *used.step / 2;
+    dem::Staging& damped = changes[2].staging[e.name];
+    damped.damping_loading = damping > kMostDamping / 2 ? damping / 2 : 2 * damping;
+    damped.damping_settling = used.damping_settling;
+  }
+  if (!staged) changes.clear();
+  return changes;
+}
+
+absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
+  const std::vector<campaign::Derivation> changes = NumericalChanges();
+  const auto what = [](const campaign::Derivation& change) {
+    return "influence of numerical choices, " + change.name;
+  };
+  for (const campaign::Derivation& change : changes) {
+    if (auto status = base_.Announce(change, what(change)); !status.ok()) return status;
+  }
+  const Index best = base_.BestRuns(1).front();
+  std::vector<Eigen::VectorXd> directions;
+  for (const campaign::Derivation& change : changes) {
+    const auto view = base_.Run(change, what(change));
+    if (!view.ok()) return view.status();
+    evaluations_ += base_.fitted_experiments();
+    const report::RunTable runs = report::RunsOf(*view, base_.readings().of_mean);
+    if (runs.sample.empty()) continue;
+    directions.emplace_back((runs.histories.row(0) - base_.runs().histories.row(best)).transpose());
+  }
+  return directions;
+}
+
+std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect) {
+  std::set<double> pressures;
+  bool varied = false;  // the pressure, within a test
+  bool shown = false;
+  bool moving = false;
+  for (const campaign::Experiment& e : campaign.experiments) {
+    const dem::TestInfo* const test = dem::FindTest(e.test);
+    if (effect.kind == "particle" && test != nullptr && test->poured &&
+        !campaign::CanShow(e, effect)) {
+      return absl::StrCat("test ", e.test, " pours its grains, which it leaves whole");
+    }
+    if (e.role != campaign::Role::kCalibrate) continue;
+    const auto pressure = e.settings.find("confining_pressure");
+    if (pressure != e.settings.end()) pressures.insert(pressure->second);
+    varied = varied || (test != nullptr && !test->one_pressure);
+    moving = moving || !campaign::ReadAtRest(e);
+    shown = shown || campaign::CanShow(e, effect);
+  }
+  if (effect.needs_motion && !moving) {
+    return "all readings are taken at rest: "
+           "it shows in tests with a loading_rate, in collisions and in flows";
+  }
+  if (!shown) return "none of the fitted tests can show it";
+  if (effect.across_pressures && pressures.size() < 2 && !varied) {
+    return "it shows only between tests at different pressures, or in one whose pressure changes";
+  }
+  return "";
+}
+
+// Empty: the tests can show it.
+std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
+  std::string why = WhyNotShown(base_.view().campaign, effect);
+  if (!why.empty()) return why;
+  return effect.rays.empty() ? "the catalogue gives no strength to try" : "";
+}
+
+std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
+    const std::vector<std::string>& without,
+    std::vector<std::pair<std::string, std::string>>* reasons) const {
+  std::vector<const dem::EffectInfo*> effects;
+  for (const dem::EffectInfo* info : dem::AllEffects(base_.view().campaign.model.user_effects)) {
+    const dem::EffectInfo& effect = *info;
+    const auto& has = base_.view().campaign.model.effects;
+    if (std::find(has.begin(), has.end(), effect.name) != has.end()) continue;
+    if (const std::string why = WhyNotJoin(base_.view().campaign, effect.name); !why.empty()) {
+      if (reasons != nullptr) reasons->emplace_back(effect.name, why);
+      continue;
+    }
+    const bool left_out = std::find(without.begin(), without.end(), effect.name) != without.end();
+    const std::string why = left_out ? "left out as asked for" : WhyNotExcitable(effect);
+    if (why.empty()) {
+      effects.push_back(&effect);
+    } else if (reasons != nullptr) {
+      reasons->emplace_back(effect.name, why);
+    }
+  }
+  return effects;
+}
+
+std::vector<std::size_t> EffectScreen::RunsOfEach(
+    const std::vector<const dem::EffectInfo*>& effects) const {
+  std::vector<bool> calculated;
+  calculated.reserve(effects.size());
+  for (const dem::EffectInfo* effect : effects) calculated.push_back(IsCalculated(*effect));
+  return SharesOfRuns(effects, calculated, base_.runs().sample.size(),
+                      std::max(1, base_.fitted_experiments()), NumericalChanges().size());
+}
+
+std::int64_t EffectScreen::Planned(const std::vector<std::string>& without) const {
+  const std::vector<const dem::EffectInfo*> effects = Excitable(without, nullptr);
+  std::size_t runs = NumericalChanges().size();
+  const std::vector<std::size_t> of_each = RunsOfEach(effects);
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    runs += StepsOf(*effects[e], of_each[e]).size();
+  }
+  return static_cast<std::int64_t>(runs) * base_.fitted_experiments();
+}
+
+absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignatures(
+    const std::vector<std::string>& without, const SquareOfDifference& square_of) {
+  std::vector<inference::Signature> signatures;
+  const std::vector<const dem::EffectInfo*> effects = Excitable(without, &not_excitable_);
+  if (effects.empty()) return signatures;
+  const std::vector<Index> runs = base_.BestRuns(kMostRows);
+  const std::vector<std::size_t> of_each = RunsOfEach(effects);
+  for (const dem::EffectInfo* effect : effects) {
+    signatures.push_back(
+        {.name = effect->name, .differences = {}, .two_sided = effect->two_sided, .strengths = {}});
+  }
+  std::vector<std::vector<Step>> steps(effects.size());  // that are run
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    if (IsCalculated(*effects[e])) {
+      Calculate(*effects[e], runs, signatures[e]);
+    } else {
+      steps[e] = StepsOf(*effects[e], of_each[e]);
+    }
+  }
+  for (std::size_t k = 0; k < kMostRows; ++k) {
+    const Index like = runs[std::min(k, runs.size() - 1)];
+    std::vector<Pair> pairs;
+    // All at once, so that no worker waits for the last run of an effect.
+    for (std::size_t e = 0; e < effects.size(); ++e) {
+      if (k >= steps[e].size()) continue;
+      const bool chosen = effects[e]->rays.size() == 1 && !signatures[e].differences.empty() &&
+                          dem::FindEffect(effects[e]->name) != nullptr;
+      if (k > 0 && chosen) {
+        steps[e][k].step =
+            SecondStep(*effects[e], *steps[e][k].ray, square_of(signatures[e].differences.front()),
+                       base_.view().campaign.model.contact, base_.state());
+      }
+      pairs.push_back(PairOf(*effects[e], steps[e][k], k, like));
+      if (auto status = base_.Announce(pairs.back().with, pairs.back().what); !status.ok()) {
+        return status;
+      }
+    }
+    auto pair = pairs.begin();
+    for (std::size_t e = 0; e < effects.size(); ++e) {
+      if (k >= steps[e].size()) continue;
+      if (auto status = Measure(*effects[e], *pair++, signatures[e]); !status.ok()) return status;
+    }
+  }
+  const auto changes_nothing = [&square_of](const inference::Signature& signature) {
+    return std::all_of(signature.differences.begin(), signature.differences.end(),
+                       [&square_of](const auto& d) { return square_of(d) < kNothing; });
+  };
+  for (const inference::Signature& signature : signatures) {
+    if (signature.differences.empty()) {
+      const std::string& why = diverged_[signature.name];
+      not_excitable_.emplace_back(signature.name, why.empty()
+                                                      ? "runs with it diverge"
+                                                      : "runs with it diverge (" + why + ")");
+    } else if (changes_nothing(signature)) {
+      not_excitable_.emplace_back(signature.name, "it changes nothing in these tests");
+    }
+  }
+  std::erase_if(signatures, changes_nothing);  // of no differences too
+  return signatures;
+}
+
+// A campaign for each step: rays set different parameters. Those of the ray are given by the rows;
+// what it holds goes along.
+EffectScreen::Pair EffectScreen::PairOf(const dem::EffectInfo& effect, Step step, std::size_t k,
+                                        Index without) const {
+  Pair pair{.step = step,
+            .without = without,
+            .with = base_.Derived("screen", absl::StrCat(effect.name, ", step ", k + 1)),
+            .what = absl::StrCat("screen of ", effect.name, ", step ", k + 1)};
+  pair.with.effects = {effect.name};
+  pair.with.fixed = dem::ParametersOnRay(effect, *step.ray, step.step,
+                                         base_.view().campaign.model.contact, base_.state());
+  pair.with.rows = {base_.RowLike(without)};
+  return pair;
+}
+
+// Exact, the specimen does not feel what a load cell reads: no run would tell more.
+bool EffectScreen::IsCalculated(const dem::EffectInfo& effect) const {
+  return effect.name == kLoadCell &&
+         MisreadLoads(base_.view().campaign, base_.readings().of_mean,
+                      base_.runs().histories.topRows(1), Eigen::VectorXd::Zero(1),
+                      Eigen::VectorXd::Zero(1))
+             .has_value();
+}
+
+// Every ray at the catalogue's second strength, as StepsOf() has them run.
+void EffectScreen::Calculate(const dem::EffectInfo& effect, const std::vector<Index>& runs,
+                             inference::Signature& signature) {
+  for (std::size_t k = 0; k < effect.rays.size(); ++k) {
+    const Index like = runs[std::min(k, runs.size() - 1)];
+    const Pair pair = PairOf(effect, {&effect.rays[k], effect.rays[k].steps[1]}, k, like);
+    const auto strength = [&pair](const char* parameter) {
+      const auto found = pair.with.fixed.find(absl::StrCat(kLoadCell, ".", parameter));
+      return Eigen::VectorXd::Constant(1, found == pair.with.fixed.end() ? 0.0 : found->second);
+    };
+    const Eigen::MatrixXd with =
+        *MisreadLoads(base_.view().campaign, base_.readings().of_mean,
+                      base_.runs().histories.row(like), strength("gain"), strength("offset"));
+    const std::vector<int>& streams = base_.runs().stream;
+    Keep(effect, pair, with.row(0), streams[static_cast<std::size_t>(like)], signature);
+  }
+}
+
+absl::Status EffectScreen::Measure(const dem::EffectInfo& effect, const Pair& pair,
+                                   inference::Signature& signature) {
+  const auto view = base_.Run(pair.with, pair.what);
+  if (!view.ok()) return view.status();
+  evaluations_ += base_.fitted_experiments();
+  const report::RunTable with = report::RunsOf(*view, base_.readings().of_mean);
+  if (with.sample.empty()) {
+    for (const v1::Sample& sample : view->samples) diverged_[effect.name] = sample.reason();
+    return absl::OkStatus();
+  }
+  Keep(effect, pair, with.histories.row(0), with.stream.front(), signature);
+  return absl::OkStatus();
+}
+
+void EffectScreen::Keep(const dem::EffectInfo& effect, const Pair& pair,
+                        const Eigen::RowVectorXd& history, int stream,
+                        inference::Signature& signature) {
+  signature.differences.emplace_back(
+      (history - base_.runs().histories.row(pair.without)).transpose());
+  if (effect.rays.size() == 1)
+    signature.strengths.push_back(ShareAt(*pair.step.ray, pair.step.step));
+  tried_[effect.name].push_back(pair.step);
+  EffectRun run{.values = pair.with.rows.front().values, .history = history, .stream = stream};
+  run.values.insert(pair.with.fixed.begin(), pair.with.fixed.end());
+  runs_with_[effect.name].push_back(std::move(run));
+}
+
+std::vector<EffectScreen::EffectRun> EffectScreen::RunsWith(const std::string& effect) const {
+  const auto found = runs_with_.find(effect);
+  return found == runs_with_.end() ? std::vector<EffectRun>{} : found->second;
+}
+
+std::map<std::string, double> EffectScreen::StrengthOf(const std::string& name, std::size_t which,
+                                                       double multiple) const {
+  const Step& step = tried_.at(name)[which];
+  const dem::EffectInfo* effect = dem::FindEffect(base_.view().campaign.model.user_effects, name);
+  return dem::ParametersOnRay(*effect, *step.ray, step.step * StepFor(*step.ray, multiple),
+                              base_.view().campaign.model.contact, base_.state());
+}
+
+}  // namespace calib::diagnosis

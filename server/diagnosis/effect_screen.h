@@ -1,0 +1,118 @@
+#pragma once
+// What each effect would change: pairs of runs with and without it, from the best runs of a fitted
+// campaign, on the same packing with the same seed.
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "dem/catalog/catalog.h"
+#include "inference/diagnosis/screen.h"
+#include "server/diagnosis/fitted_campaign.h"
+
+namespace calib::diagnosis {
+
+/// Why the calibrated experiments cannot show an effect, in a clause; empty: they can.
+std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect);
+
+/// Squared length of a difference of histories over that of a measurement from a model that is
+/// right.
+using SquareOfDifference = std::function<double(const Eigen::VectorXd&)>;
+
+/// How strong to try an effect of the catalogue whose first strength changes the histories by
+/// `square` (see above): so that it stands out from the chance in a difference of two runs, which
+/// is the same however strong the effect is; from the catalogue's second strength to 16 times the
+/// first, within the default prior. In units of the ray.
+double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
+                  const std::string& contact, const dem::ReferenceState& state);
+
+/// Runs that each effect is given, 1 or 2, 0 where it is calculated, in a campaign of so many samples
+/// and fitted experiments: with `numerical` runs at most the larger of a quarter of the campaign's
+/// evaluations and four for each effect, but one run of each in any case. A second one goes first
+/// to effects with another ray of strength, last to what instruments do.
+std::vector<std::size_t> SharesOfRuns(const std::vector<const dem::EffectInfo*>& effects,
+                                      const std::vector<bool>& calculated, std::size_t samples,
+                                      int experiments, std::size_t numerical);
+
+class EffectScreen {
+ public:
+  explicit EffectScreen(const FittedCampaign& base) : base_(base) {}
+
+  /// What twice the rate, half the step and twice the damping of staging change: no physics. Those
+  /// of experiments with a loading_rate and of flows are left as they are; none where there are no
+  /// others.
+  absl::StatusOr<std::vector<Eigen::VectorXd>> MeasureNuisance();
+
+  /// Model evaluations that MeasureNuisance() and MeasureSignatures() take together.
+  std::int64_t Planned(const std::vector<std::string>& without) const;
+
+  /// One signature of each effect that the fitted tests can show, of as many runs as SharesOfRuns()
+  /// says. `without` take no part. The first strength is the catalogue's; the second is that of
+  /// SecondStep(), or as a user's effect says.
+  absl::StatusOr<std::vector<inference::Signature>> MeasureSignatures(
+      const std::vector<std::string>& without, const SquareOfDifference& square_of);
+
+  /// Parameters in SI at a multiple of the `which`th difference of a signature; what the ray of
+  /// strength holds constant is part of it.
+  std::map<std::string, double> StrengthOf(const std::string& effect, std::size_t which,
+                                           double multiple) const;
+
+  /// Effects that could not be judged, and why.
+  const std::vector<std::pair<std::string, std::string>>& not_excitable() const {
+    return not_excitable_;
+  }
+  std::int64_t evaluations() const { return evaluations_; }
+
+  /// A run with an effect: everything that its parameters are set to, SI, and its history.
+  struct EffectRun {
+    std::map<std::string, double> values;
+    Eigen::VectorXd history;
+    int stream = 0;  ///< that of the run without the effect
+  };
+  std::vector<EffectRun> RunsWith(const std::string& effect) const;
+
+ private:
+  // One step away from the model without the effect.
+  struct Step {
+    const dem::StrengthRay* ray = nullptr;
+    double step = 0;
+  };
+  // A run without the effect and the campaign that repeats it with the effect.
+  struct Pair {
+    Step step;
+    Eigen::Index without = 0;
+    campaign::Derivation with;
+    std::string what;
+  };
+  Pair PairOf(const dem::EffectInfo& effect, Step step, std::size_t k, Eigen::Index without) const;
+  static std::vector<Step> StepsOf(const dem::EffectInfo& effect, std::size_t rows);
+  std::string WhyNotExcitable(const dem::EffectInfo& effect) const;
+  /// reasons: of those that are not, added where it is not nullptr.
+  std::vector<const dem::EffectInfo*> Excitable(
+      const std::vector<std::string>& without,
+      std::vector<std::pair<std::string, std::string>>* reasons) const;
+  /// Of the run that comes closest; each with what it changes.
+  std::vector<campaign::Derivation> NumericalChanges() const;
+  std::vector<std::size_t> RunsOfEach(const std::vector<const dem::EffectInfo*>& effects) const;
+  bool IsCalculated(const dem::EffectInfo& effect) const;
+  void Calculate(const dem::EffectInfo& effect, const std::vector<Eigen::Index>& runs,
+                 inference::Signature& signature);
+  absl::Status Measure(const dem::EffectInfo& effect, const Pair& pair,
+                       inference::Signature& signature);
+  void Keep(const dem::EffectInfo& effect, const Pair& pair, const Eigen::RowVectorXd& history,
+            int stream, inference::Signature& signature);
+
+  const FittedCampaign& base_;
+  std::map<std::string, std::vector<Step>> tried_;
+  std::map<std::string, std::vector<EffectRun>> runs_with_;
+  std::map<std::string, std::string> diverged_;  // by effect: why its last run did
+  std::vector<std::pair<std::string, std::string>> not_excitable_;
+  std::int64_t evaluations_ = 0;
+};
+
+}  // namespace calib::diagnosis

@@ -1,0 +1,258 @@
+#include "server/diagnosis/extension.h"
+
+#include <algorithm>
+#include <cmath>
+#include <variant>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "dem/simulation/model_parameters.h"
+#include "server/campaign/derive.h"
+#include "server/campaign/suggestion.h"
+
+namespace calib::diagnosis {
+namespace {
+
+constexpr double kTempered = 10;  // times the parent's standard deviation
+constexpr double kPriorShare = 0.5;
+constexpr double kNear = 0.2;  // times a value that is known to be good
+
+double SettingOr(const campaign::Experiment& experiment, const std::string& name, double other) {
+  const auto found = experiment.settings.find(name);
+  return found != experiment.settings.end() ? found->second : other;
+}
+
+double DiameterOf(const campaign::Experiment& experiment) {
+  for (const campaign::Specimen& specimen : experiment.specimens) {
+    if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
+      return 2 * recipe->mean_radius;
+    }
+    const auto* file = std::get_if<campaign::PackingFile>(&specimen);
+    if (file == nullptr || file->packing.radius.empty()) continue;
+    double sum = 0;
+    for (const double r : file->packing.radius) sum += r;
+    return 2 * sum / static_cast<double>(file->packing.radius.size());
+  }
+  return 2 * SettingOr(experiment, "radius", 0.5e-3);  // of a collision
+}
+
+double GrainsOf(const campaign::Experiment& experiment) {
+  if (experiment.specimens.empty()) return 1;
+  if (const auto* recipe = std::get_if<dem::PackingRecipe>(&experiment.specimens.front())) {
+    return recipe->particles;
+  }
+  const auto* file = std::get_if<campaign::PackingFile>(&experiment.specimens.front());
+  return file != nullptr ? static_cast<double>(file->packing.radius.size()) : 1;
+}
+
+// Geometric mean of the speeds of a collision [m/s].
+double SpeedOf(const campaign::Experiment& experiment) {
+  const double given = SettingOr(experiment, "impact_speed", 0);
+  if (given > 0) return given;
+  double sum = 0;
+  int count = 0;
+  for (const dem::ControlPoint& point : experiment.path) {
+    if (experiment.control_name != "impact_speed" || !(point.target > 0)) continue;
+    sum += std::log(point.target);
+    ++count;
+  }
+  return count > 0 ? std::exp(sum / count) : 0;
+}
+
+// Contact forces over d^2: the pressure of a specimen, the weight of a filling rho g d N^(1/3), the
+// peak (rho v^2)^(3/5) E^(2/5) of a Hertzian impact (Johnson, Contact Mechanics, sec. 11.4). 0: the
+// experiment has none.
+double PressureOf(const campaign::Experiment& experiment, double density, double modulus) {
+  for (const char* name : {"confining_pressure", "start_pressure", "pressure"}) {
+    if (const double pressure = SettingOr(experiment, name, 0); pressure > 0) return pressure;
+  }
+  const dem::TestInfo* const test = dem::FindTest(experiment.test);
+  if (test == nullptr) return 0;
+  if (!test->needs_packing) {
+    const double speed = SpeedOf(experiment);
+    return std::pow(density * speed * speed, 0.6) * std::pow(modulus, 0.4);
+  }
+  if (!test->poured) return 0;
+  return density * SettingOr(experiment, "gravity", 9.80665) * DiameterOf(experiment) *
+         std::cbrt(GrainsOf(experiment));
+}
+
+// Moduli that an extension may move to: a model that lacks an effect bends its modulus to hide it.
+struct Moduli {
+  double low = 0, high = 0;
+};
+
+Moduli ModuliOf(const report::CampaignView& view, double modulus) {
+  constexpr double kFurthest = 10;  // times the parent's
+  Moduli moduli{.low = modulus, .high = modulus};
+  for (const campaign::CalibratedParameter& parameter : view.campaign.parameters) {
+    if (parameter.name != "young_modulus") continue;
+    const inference::Prior& prior = parameter.prior;
+    moduli.low = std::min(modulus, std::max(prior.min, modulus / kFurthest));
+    moduli.high = std::max(modulus, std::min(prior.max, modulus * kFurthest));
+  }
+  return moduli;
+}
+
+// Wide enough whatever the modulus turns out to be once the effect is there.
+dem::DefaultPrior PriorOver(const Moduli& moduli, const dem::ParameterInfo& parameter,
+                            const std::string& contact, dem::ReferenceState state) {
+  state.modulus = moduli.low;
+  const dem::DefaultPrior soft = dem::PriorOf(parameter, contact, state);
+  state.modulus = moduli.high;
+  dem::DefaultPrior prior = dem::PriorOf(parameter, contact, state);
+  prior.min = std::min(prior.min, soft.min);
+  prior.max = std::max(prior.max, soft.max);
+  return prior;
+}
+
+// What is calibrated of an effect: everything without a default or with a null, alternatives once.
+std::map<std::string, dem::DefaultPrior> ParametersOf(const dem::EffectInfo& effect,
+                                                      const std::string& contact,
+                                                      const dem::ReferenceState& state,
+                                                      const Moduli& moduli) {
+  std::map<std::string, dem::DefaultPrior> chosen;
+  std::vector<std::string> covered;
+  const auto on_ray = [&effect](const std::string& name) {
+    return std::any_of(effect.rays.begin(), effect.rays.end(),
+                       [&name](const dem::StrengthRay& ray) { return ray.parameter == name; });
+  };
+  for (const bool strengths : {true, false}) {
+    for (const dem::ParameterInfo& parameter : effect.parameters) {
+      if (on_ray(parameter.name) != strengths) continue;
+      if (!strengths && parameter.default_value) continue;
+      const std::string& other = parameter.alternative_to;
+      const bool said = std::any_of(covered.begin(), covered.end(), [&](const std::string& name) {
+        const auto same =
+            std::find_if(effect.parameters.begin(), effect.parameters.end(),
+                         [&name](const dem::ParameterInfo& p) { return p.name == name; });
+        return name == other || same->alternative_to == parameter.name;
+      });
+      if (said) continue;
+      covered.push_back(parameter.name);
+      chosen[absl::StrCat(effect.name, ".", parameter.name)] =
+          PriorOver(moduli, parameter, contact, state);
+    }
+  }
+  return chosen;
+}
+
+}  // namespace
+
+dem::ReferenceState ReferenceOf(const report::CampaignView& view) {
+  dem::ReferenceState state{.pressure = 1e5, .diameter = 1e-3, .modulus = 1e9};
+  const dem::Model& model = view.campaign.model;
+  const auto fixed = model.parameters.find("young_modulus");
+  if (fixed != model.parameters.end()) state.modulus = fixed->second;
+  for (const auto& parameter : view.posterior.parameters()) {
+    if (parameter.name() == "young_modulus") state.modulus = parameter.mean();
+  }
+  double sum = 0;
+  int count = 0;
+  for (const campaign::Experiment& experiment : view.campaign.experiments) {
+    if (experiment.role != campaign::Role::kCalibrate) continue;
+    state.diameter = DiameterOf(experiment);
+    const double pressure = PressureOf(experiment, model.density, state.modulus);
+    if (!(pressure > 0)) continue;
+    sum += std::log(pressure);
+    ++count;
+  }
+  if (count > 0) state.pressure = std::exp(sum / count);
+  return state;
+}
+
+std::map<std::string, dem::DefaultPrior> PriorsOfExtension(const report::CampaignView& parent,
+                                                           const dem::EffectInfo& effect) {
+  const dem::ReferenceState state = ReferenceOf(parent);
+  return ParametersOf(effect, parent.campaign.model.contact, state,
+                      ModuliOf(parent, state.modulus));
+}
+
+std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& name) {
+  const auto& declared = campaign.model.user_effects;
+  const dem::EffectInfo* effect = dem::FindEffect(declared, name);
+  if (effect == nullptr) {
+    std::vector<std::string> names;
+    for (const dem::EffectInfo* info : dem::AllEffects(declared)) names.push_back(info->name);
+    return absl::StrCat("there is no effect ", name, "; this build has ",
+                        absl::StrJoin(names, ", "));
+  }
+  if (campaign.precomputed) {
+    return absl::StrCat(
+        "runs that were made elsewhere cannot be joined by ", name,
+        "; `calibctl diagnose` says what instruments or a denser start would change of them, and "
+        "runs that your code makes with ",
+        name, " are a campaign of their own (compare it: `calibctl models`)");
+  }
+  const auto& has = campaign.model.effects;
+  if (std::find(has.begin(), has.end(), name) != has.end()) {
+    return absl::StrCat(name, " is part of the model already");
+  }
+  for (const std::string& other : has) {
+    const dem::EffectInfo* joined = dem::FindEffect(declared, other);
+    if (joined != nullptr && dem::Exclude(*effect, *joined)) {
+      return absl::StrCat(name, " is another law of what ", other,
+                          " stands for already: one of them, not both");
+    }
+  }
+  if (!effect->contacts.empty() && std::find(effect->contacts.begin(), effect->contacts.end(),
+                                             campaign.model.contact) == effect->contacts.end()) {
+    return absl::StrCat(name, " cannot join the contact ", campaign.model.contact,
+                        "; it works with ", absl::StrJoin(effect->contacts, ", "));
+  }
+  dem::Model joined = campaign.model;
+  joined.effects.push_back(name);
+  if (const auto problems = dem::MaterialProblems(joined); !problems.empty()) {
+    return problems.front();  // the model itself has none
+  }
+  return "";
+}
+
+absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
+                                          const ExtensionPlan& plan) {
+  if (parent.posterior.posterior_from().empty()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("no iteration of campaign ", parent.status.campaign(),
+                     " is complete, so there is nothing to start from"));
+  }
+  const dem::ReferenceState state = ReferenceOf(parent);
+  const Moduli moduli = ModuliOf(parent, state.modulus);
+  campaign::Derivation derivation{
+      .name = absl::StrCat(parent.campaign.name, " + ", absl::StrJoin(plan.effects, " + ")),
+      .lineage = {.parent = parent.status.campaign(), .purpose = plan.purpose},
+      .effects = plan.effects,
+      .parameters = {},
+      .fixed = {},
+      .held_out = plan.held_out,
+      .samples = plan.samples,
+      .max_iterations = plan.iterations,
+      .first_proposal = campaign::FirstProposal{.prior_share = kPriorShare, .places = {}},
+      .replicates = plan.replicates,
+      .model_evaluations = plan.model_evaluations,
+      .rows = {}};
+  campaign::Campaign grown = parent.campaign;
+  for (const std::string& name : plan.effects) {
+    if (const std::string why = WhyNotJoin(grown, name); !why.empty()) {
+      return absl::InvalidArgumentError(why);
+    }
+    grown.model.effects.push_back(name);
+    derivation.parameters.merge(
+        ParametersOf(*dem::FindEffect(parent.campaign.model.user_effects, name),
+                     parent.campaign.model.contact, state, moduli));
+  }
+  for (int j = 0; j < parent.posterior.parameters_size(); ++j) {
+    const v1::Posterior::Parameter& parameter = parent.posterior.parameters(j);
+    const inference::Prior& prior = parent.campaign.parameters[static_cast<std::size_t>(j)].prior;
+    if (!(parameter.sd() > 0) || !prior.InSupport(parameter.mean())) continue;
+    derivation.first_proposal->places[parameter.name()] = {.center = parameter.mean(),
+                                                           .sd = kTempered * parameter.sd()};
+  }
+  for (const auto& [name, value] : plan.near) {
+    if (value != 0) {
+      derivation.first_proposal->places[name] = {.center = value, .sd = kNear * std::abs(value)};
+    }
+  }
+  return campaign::Derive(parent.source.campaign_file(), derivation);
+}
+
+}  // namespace calib::diagnosis

@@ -1,0 +1,175 @@
+#include "server/diagnosis/measurement_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "inference/sampling/philox.h"
+#include "inference/scatter/packing_scatter.h"
+
+namespace calib::diagnosis {
+namespace {
+
+using Eigen::Index;
+
+constexpr Index kDraws = 400;  // of measurements
+constexpr int kRunsAbout = 5;  // runs of a campaign or a warm fit about its best point
+
+// Correlated errors of the readings, one as variance.
+Eigen::MatrixXd NoiseCorrelation(const inference::DataSet& data) {
+  const Eigen::MatrixXd covariance = inference::ErrorCovariance(data);
+  const Eigen::VectorXd inverse = covariance.diagonal().cwiseSqrt().cwiseInverse();
+  return inverse.asDiagonal() * covariance * inverse.asDiagonal();
+}
+
+// Of the noise of each reading in the sd of histories.
+Eigen::VectorXd NoiseSd(const FittedCampaign& base, const inference::DataSet& plain) {
+  Eigen::VectorXd unit(static_cast<Index>(plain.readings.size()));
+  for (Index k = 0; k < unit.size(); ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    unit[k] = plain.readings[at].sd / base.readings().of_mean.readings[at].sd;
+  }
+  return unit;
+}
+
+// What scatters of a measurement about the mean of the runs, of what the emulator misses of a run.
+Eigen::VectorXd ScatterOfMissed(const FittedCampaign& base, const inference::DataSet& plain) {
+  Eigen::VectorXd scatter(static_cast<Index>(plain.readings.size()));
+  for (Index k = 0; k < scatter.size(); ++k) {
+    const campaign::Experiment& experiment =
+        base.view().campaign.experiments[static_cast<std::size_t>(
+            plain.readings[static_cast<std::size_t>(k)].experiment)];
+    const auto packings = static_cast<double>(experiment.specimens.size());
+    const double share = campaign::ScatterShare(experiment);
+    // A run departs less from the mean over R packings than from that over all, a new one more.
+    scatter[k] = std::sqrt(base.readings().measured && packings > 1
+                               ? (share + 1 / packings) / (1 - 1 / packings)
+                               : share);
+  }
+  return scatter;
+}
+
+// Noise, nuisance and scatter of measurements; `missed` holds what the emulator misses of single
+// runs, n x T; group, of each of them, may be empty.
+void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
+                      const std::vector<int>& group, const std::vector<Eigen::VectorXd>& nuisance,
+                      MeasurementErrors& errors) {
+  const campaign::Campaign& campaign = base.view().campaign;
+  const inference::DataSet plain = campaign::MakeDataSet(campaign);
+  const auto t = static_cast<Index>(plain.readings.size());
+  const Eigen::VectorXd scatter = ScatterOfMissed(base, plain);
+  const Eigen::MatrixXd noise =
+      NoiseSd(base, plain).asDiagonal() *
+      Eigen::MatrixXd(Eigen::LLT<Eigen::MatrixXd>(NoiseCorrelation(plain)).matrixL());
+  const Eigen::LLT<Eigen::MatrixXd> factor(errors.of_run.covariance);
+  errors.of_mean.draws.resize(kDraws, t);
+  errors.of_run.draws.resize(kDraws, t);
+  Eigen::VectorXd normal(t);
+  for (Index s = 0; s < kDraws; ++s) {
+    inference::PhiloxStream stream({.seed = campaign.filter.seed,
+                                    .purpose = inference::StreamPurpose::kDiagnosisDraws,
+                                    .iteration = 0,
+                                    .sample = static_cast<std::uint64_t>(s)});
+    for (Index k = 0; k < t; ++k) normal[k] = stream.Normal();
+    Eigen::VectorXd draw = noise * normal;
+    for (const Eigen::VectorXd& direction : nuisance) draw += stream.Normal() * direction;
+    const Index own = s % missed.rows();
+    const double sign = stream.Normal() < 0 ? -1 : 1;
+    draw += sign * scatter.cwiseProduct(missed.row(own).transpose());
+    errors.of_mean.draws.row(s) = draw;
+    if (!group.empty()) errors.of_mean.group.push_back(group[static_cast<std::size_t>(own)]);
+    // The fits take the closest of the runs about the right point.
+    double closest = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < kRunsAbout; ++k) {
+      const auto other =
+          std::min(static_cast<Index>(stream.Uniform() * static_cast<double>(missed.rows())),
+                   missed.rows() - 1);
+      const Eigen::VectorXd difference = draw - missed.row(other).transpose();
+      const double distance = factor.matrixL().solve(difference).squaredNorm();
+      if (distance >= closest) continue;
+      closest = distance;
+      errors.of_run.draws.row(s) = difference;
+    }
+  }
+}
+
+}  // namespace
+
+MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
+                                       const inference::StateEmulator& emulator,
+                                       const Eigen::VectorXd& not_known,
+                                       const std::vector<int>& packing,
+                                       const std::vector<Eigen::VectorXd>& nuisance) {
+  const report::ScatteredReadings& readings = base.readings();
+  const inference::DataSet& data = readings.of_mean;
+  const auto t = static_cast<Index>(data.readings.size());
+  const inference::PrincipalComponents& components = emulator.components();
+  // Of a history, from standard deviations of its scores.
+  const auto covariance_of = [&](const Eigen::VectorXd& sd) -> Eigen::MatrixXd {
+    const Eigen::MatrixXd factor = components.basis * sd.asDiagonal();
+    Eigen::MatrixXd covariance = factor * emulator.correlation() * factor.transpose();
+    covariance.diagonal() += components.remainder;
+    return covariance;
+  };
+  Eigen::MatrixXd numerical = Eigen::MatrixXd::Zero(t, t);
+  for (const Eigen::VectorXd& direction : nuisance) {
+    numerical += direction * direction.transpose();
+  }
+  const Eigen::VectorXd& sd = emulator.scatter_sd();
+  const Eigen::MatrixXd missed =
+      covariance_of((not_known.array().square() + sd.array().square()).sqrt());
+  // As large as near the best point: far out the emulator knows less, which is no scatter.
+  const Eigen::MatrixXd of_runs =
+      emulator.cross_validation().standardised * missed.diagonal().cwiseSqrt().asDiagonal();
+  const inference::DataSet plain = campaign::MakeDataSet(base.view().campaign);
+  std::vector<int> group;
+  MeasurementErrors errors;
+  if (readings.measured) {
+    Eigen::VectorXd unit(t);  // sd of one run's difference over that of the mean history's
+    double square = 0;
+    for (Index k = 0; k < t; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      unit[k] = readings.of_run.readings[at].sd / data.readings[at].sd;
+      const double of_mean = data.readings[at].sd / plain.readings[at].sd;
+      square += (unit[k] * unit[k] - 1) * of_mean * of_mean;
+    }
+    errors.scatter = std::sqrt(square / static_cast<double>(t));
+    errors.of_mean.covariance = NoiseCorrelation(data) + numerical + covariance_of(not_known);
+    const Eigen::VectorXd noise = NoiseSd(base, plain);
+    const Eigen::MatrixXd closed_form =
+        NoiseCorrelation(data) - noise.asDiagonal() * NoiseCorrelation(plain) * noise.asDiagonal();
+    errors.packings = static_cast<int>(readings.departures.rows());
+    const std::set<int> apart(packing.begin(), packing.end());
+    if (static_cast<Index>(packing.size()) == of_runs.rows() &&
+        static_cast<int>(apart.size()) >= kFewestPackings) {
+      inference::PackingScatter scatter = inference::ScatterBetweenPackings(
+          of_runs * ScatterOfMissed(base, plain).asDiagonal(), packing,
+          [&](std::optional<int> left_out) {
+            const auto& forms = base.closed_forms_without();
+            const bool known = left_out && static_cast<std::size_t>(*left_out) < forms.size();
+            return known ? forms[static_cast<std::size_t>(*left_out)].value_or(closed_form)
+                         : closed_form;
+          },
+          errors.of_mean.covariance - closed_form);
+      errors.of_mean.covariance = std::move(scatter.covariance);
+      errors.of_mean.without = std::move(scatter.without);
+      errors.packings = static_cast<int>(apart.size());
+      group = std::move(scatter.group);
+    }
+    errors.of_run.covariance =
+        unit.asDiagonal() * NoiseCorrelation(readings.of_run) * unit.asDiagonal();
+    errors.of_run.covariance += numerical;
+  } else {
+    const Eigen::MatrixXd noise = NoiseCorrelation(data) + numerical;
+    errors.scatter = emulator.cross_validation().scatter_rms;
+    errors.of_mean.covariance = noise + missed;
+    errors.of_run.covariance = noise + 2 * covariance_of(sd);
+  }
+  DrawMeasurements(base, of_runs, group, nuisance, errors);
+  return errors;
+}
+
+}  // namespace calib::diagnosis

@@ -1,0 +1,86 @@
+#pragma once
+// Which test to do next: among the tests of this build and a grid of their settings, the one in
+// which the models still in the race differ most.
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/client/laboratory.h"
+#include "server/diagnosis/test_plans.h"
+#include "server/report/campaign_view.h"
+
+namespace calib::diagnosis {
+
+/// A model in the race at its best point. The view must outlive it.
+struct Rival {
+  std::string name{};  ///< of the effect; "base": the campaign's own model
+  const report::CampaignView* view = nullptr;
+  std::map<std::string, double> values{};  ///< calibrated parameters, SI
+  std::vector<std::string> effects{};      ///< that join the model of the view, and
+  std::map<std::string, double> fixed{};   ///< their parameters, SI
+};
+
+/// What two runs differ by beyond what two runs of one model do, as a squared distance in units of
+/// what a measurement and both runs scatter by; 0 where it is no more. departures: per curve, the
+/// difference of the runs over the noise. scatter s of a single run in units of the noise: half of
+/// its variance shifts a curve as a whole, half is from reading to reading. shift: per curve, sd of
+/// what else may shift it as a whole, in units of the noise; empty: nothing does.
+double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter,
+                    const std::vector<double>& shift = {});
+
+/// Two rivals in a planned test.
+struct RivalPair {
+  std::string a, b;
+  double distance = 0;  ///< sd of a measurement, >= 0
+  double power = 0;     ///< chance to see it at the 1 % level
+};
+
+/// With less a pair is not told apart: ten times what is seen of two that are the same.
+inline constexpr double kToldApart = 0.1;
+
+/// Fills expected_power, distance and together of a plan.
+void Weigh(const std::vector<RivalPair>& pairs, PlannedExperiment& planned);
+
+/// Share of the pairs that is expected to be told apart.
+double ShareToldApart(const std::vector<RivalPair>& pairs);
+
+/// "None of these": the campaign's own model with a smooth misfit as large as the one that is there.
+struct NoneOfThese {
+  Rival base{};
+  /// By observable: rms of what it misses of the fitted readings beyond their noise, in units of it.
+  std::map<std::string, double> missed{};
+};
+
+struct NextExperiment {
+  PlannedExperiment best;
+  std::vector<std::string> separates;  ///< rivals that the best tells from another
+  std::string snippet;  ///< an entry of `experiments`, indented, with a comment; the file of the
+                        ///< measurement is to be made
+  std::vector<PlannedExperiment> considered;  ///< best first
+  std::int64_t evaluations = 0;
+  double core_seconds = 0;  ///< of one evaluation, mean over what was tried
+};
+
+struct NextPlan {
+  std::optional<NextExperiment> next{};
+  std::string why_none{};  ///< a clause; empty where there is one
+};
+
+/// Runs every rival, and the model of `none`, once in every planned test, from the specimen and
+/// seed of sample `like`. Errors of a measurement: the noise that the campaign states for the
+/// observables at values of their size, and `scatter` (of a single run, in units of that noise) for
+/// the measurement and both runs: see SeparationOf(). None for fewer than two rivals, without a
+/// known size of the errors, where no plan is a campaign that this build accepts, is finished by all
+/// rivals, or tells any two of them apart. Errors: those of the runs. The best is that which tells
+/// the most pairs apart, and of equals the closest of them best; their distance from none of them is
+/// told beside it.
+absl::StatusOr<NextPlan> PlanNextExperiment(client::Laboratory& laboratory,
+                                            const std::vector<Rival>& rivals,
+                                            const std::optional<NoneOfThese>& none, int like,
+                                            double scatter);
+
+}  // namespace calib::diagnosis

@@ -1,0 +1,201 @@
+#include "server/diagnosis/test_plans.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+#include <variant>
+
+#include "dem/catalog/catalog.h"
+#include "server/campaign/yaml_text.h"
+#include "server/diagnosis/control_way.h"
+#include "server/diagnosis/setting_plans.h"
+
+namespace calib::diagnosis {
+
+using campaign::YamlNode;
+
+namespace {
+
+constexpr double kBeyond = 4;  // times the lowest and the highest pressure, and the rate, so far
+constexpr double kOedometricStrain = 0.03;
+constexpr double kDensity = 0.02;  // in porosity
+
+// Over which the errors of a covariance fall to 1/e, along neighbouring readings; 0: independent.
+double CorrelationLength(const std::vector<double>& control,
+                         const campaign::MeasuredObservable& observable) {
+  const Eigen::MatrixXd& c = observable.covariance;
+  if (c.rows() == 0) return observable.correlation_length;
+  double decay = 0;
+  double way = 0;
+  for (Eigen::Index i = 1; i < c.rows(); ++i) {
+    const double correlation = c(i, i - 1) / std::sqrt(c(i, i) * c(i - 1, i - 1));
+    if (!(correlation > 0)) return 0;
+    decay -= std::log(std::min(1.0, correlation));
+    way +=
+        std::abs(control[static_cast<std::size_t>(i)] - control[static_cast<std::size_t>(i - 1)]);
+  }
+  return decay > 0 ? way / decay : 0;
+}
+
+// Looser and denser specimens than the pattern's, where they are generated.
+std::vector<double> OtherPorosities(const campaign::Experiment& pattern) {
+  const auto* recipe = pattern.specimens.empty()
+                           ? nullptr
+                           : std::get_if<dem::PackingRecipe>(&pattern.specimens.front());
+  if (recipe == nullptr) return {};
+  const auto rounded = [](double porosity) { return std::round(porosity * 1e6) / 1e6; };
+  return {rounded(recipe->porosity + kDensity), rounded(recipe->porosity - kDensity)};
+}
+
+bool IsStrainedUnderPressure(const campaign::Experiment& pattern) {
+  const auto pressure = pattern.settings.find("confining_pressure");
+  return pressure != pattern.settings.end() && pressure->second > 0 &&
+         pattern.control_name == "axial_strain" && !pattern.control.empty();
+}
+
+// One pressure and an axial strain define it, and it has what was read of the pattern.
+bool CanFollow(const dem::TestInfo& test, const campaign::Experiment& pattern) {
+  const auto has = [&test](const auto& observable) {
+    return std::find(test.observables.begin(), test.observables.end(), observable.name) !=
+           test.observables.end();
+  };
+  return test.settings.size() == 1 && test.settings[0].name == "confining_pressure" &&
+         test.control == "axial_strain" &&
+         std::all_of(pattern.observables.begin(), pattern.observables.end(), has);
+}
+
+std::vector<PlannedExperiment> PressurePlans(const campaign::Campaign& campaign) {
+  const campaign::Experiment& pattern = PatternOf(campaign);
+  std::set<double> pressures;
+  for (const campaign::Experiment& e : campaign.experiments) {
+    const auto found = e.settings.find("confining_pressure");
+    if (found != e.settings.end() && found->second > 0) pressures.insert(found->second);
+  }
+  const double low = *pressures.begin();
+  const double high = *pressures.rbegin();
+  const double middle = std::sqrt(low * high);
+  const double strain =
+      *std::max_element(pattern.control.begin(), pattern.control.end(),
+                        [](double a, double b) { return std::abs(a) < std::abs(b); });
+  std::vector<PlannedExperiment> plans;
+  const auto add = [&plans, strain](const std::string& test, double pressure,
+                                    bool unloading) -> PlannedExperiment& {
+    const double last = test == "oedometric" ? std::min(strain, kOedometricStrain) : strain;
+    return plans.emplace_back(
+        PlannedExperiment{.test = test,
+                          .settings = {{"confining_pressure", pressure}},
+                          .unloading = unloading,
+                          .control = "axial_strain",
+                          .path = unloading ? WithUnloading(0, last) : Monotonic(0, last)});
+  };
+  for (const dem::TestInfo& test : dem::Tests()) {
+    if (!CanFollow(test, pattern)) continue;
+    const bool same = test.name == pattern.test;
+    if (same) {
+      add(test.name, low / kBeyond, false);
+      add(test.name, high * kBeyond, false);
+      for (const double porosity : OtherPorosities(pattern)) {
+        add(test.name, middle, false).settings["porosity"] = porosity;
+      }
+      if (pattern.loading_rate) {
+        for (const double factor : {1 / kBeyond, kBeyond}) {
+          add(test.name, middle, false).settings["loading_rate"] = factor * *pattern.loading_rate;
+        }
+      }
+    }
+    if (test.may_reverse) {
+      add(test.name, middle, true);
+    } else if (!same) {
+      add(test.name, middle, false);
+    }
+  }
+  return plans;
+}
+
+}  // namespace
+
+const campaign::Experiment& PatternOf(const campaign::Campaign& campaign) {
+  return *std::find_if(campaign.experiments.begin(), campaign.experiments.end(),
+                       [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
+}
+
+std::vector<TestPlan> PlansFor(const campaign::Campaign& campaign) {
+  const campaign::Experiment& pattern = PatternOf(campaign);
+  std::vector<TestPlan> plans;
+  for (PlannedExperiment& planned :
+       IsStrainedUnderPressure(pattern) ? PressurePlans(campaign) : SettingPlans(pattern)) {
+    const std::string name = fmt::format("next_{}", plans.size() + 1);
+    plans.push_back({.experiment = std::move(planned), .name = name, .file = name + ".csv"});
+  }
+  return plans;
+}
+
+std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern) {
+  std::string text = planned.control;
+  for (const auto& observable : pattern.observables) text += "," + observable.name;
+  text += "\n";
+  for (const double value : planned.path) {
+    text += fmt::format("{:.9g}", value);
+    // Runs of a table are not compared with readings: at one a relative noise is known.
+    for (std::size_t k = 0; k < pattern.observables.size(); ++k) text += ",1";
+    text += "\n";
+  }
+  return text;
+}
+
+YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
+                  const YamlNode& original) {
+  YamlNode entry = original;
+  campaign::YamlAt(entry, "name") = campaign::YamlScalar(plan.name);
+  campaign::YamlAt(entry, "test") = campaign::YamlScalar(plan.experiment.test);
+  campaign::YamlErase(entry, plan.experiment.control);  // what drives a test is no setting
+  for (const auto& [name, value] : plan.experiment.settings) {
+    if (name == "porosity") {
+      YamlNode& recipe = campaign::YamlAt(campaign::YamlAt(entry, "packing"), "generate");
+      campaign::YamlErase(recipe, "void_ratio");
+      campaign::YamlAt(recipe, name) = campaign::YamlNumber(value);
+    } else {
+      campaign::YamlAt(entry, name) = campaign::YamlNumber(value);
+    }
+  }
+  const auto pressure = plan.experiment.settings.find("confining_pressure");
+  if (pattern.initial_stress && pressure != plan.experiment.settings.end()) {
+    const double ratio = pressure->second / pattern.settings.at("confining_pressure");
+    campaign::YamlAt(entry, "initial_stress") = campaign::YamlMap(
+        {{"axial", campaign::YamlNumber(ratio * pattern.initial_stress->axial)},
+         {"lateral", campaign::YamlNumber(ratio * pattern.initial_stress->lateral)}});
+  }
+  YamlNode& data = campaign::YamlAt(entry, "data");
+  data = campaign::YamlMap({{"file", campaign::YamlScalar(plan.file)}});
+  const dem::TestInfo* const test = dem::FindTest(plan.experiment.test);
+  if (test != nullptr && test->needs_packing && !test->poured) {  // one that reads strains
+    campaign::YamlAt(data, "strain") = campaign::YamlScalar("logarithmic");
+  }
+  campaign::YamlAt(entry, "control") = campaign::YamlScalar(plan.experiment.control);
+  campaign::YamlErase(entry, "role");
+  campaign::YamlErase(entry, "segments");
+  YamlNode& observables = campaign::YamlAt(entry, "observables");
+  for (const campaign::MeasuredObservable& o : pattern.observables) {
+    // Errors given reading by reading belong to the old readings.
+    const YamlNode* noise = campaign::YamlFind(observables, o.name);
+    const YamlNode* inner = noise != nullptr ? campaign::YamlFind(*noise, "noise") : nullptr;
+    if (inner == nullptr || (campaign::YamlFind(*inner, "column") == nullptr &&
+                             campaign::YamlFind(*inner, "covariance") == nullptr)) {
+      continue;
+    }
+    double sum = 0;
+    for (const double sd : o.sd) sum += sd / static_cast<double>(o.sd.size());
+    YamlNode& mean = campaign::YamlAt(campaign::YamlAt(observables, o.name), "noise");
+    campaign::YamlErase(mean, "column");
+    campaign::YamlErase(mean, "covariance");
+    campaign::YamlAt(mean, "absolute") = campaign::YamlNumber(sum);
+    const double length = CorrelationLength(pattern.control, o);
+    if (length > 0) campaign::YamlAt(mean, "correlation_length") = campaign::YamlNumber(length);
+  }
+  return entry;
+}
+
+}  // namespace calib::diagnosis

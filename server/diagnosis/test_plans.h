@@ -1,0 +1,55 @@
+#pragma once
+// Tests that could be done next: those of the catalogue that the campaign's readings can be taken
+// of, over a grid of their settings.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/campaign/campaign.h"
+#include "server/campaign/yaml_tree.h"
+
+namespace calib::diagnosis {
+
+struct PlannedExperiment {
+  std::string test;
+  /// SI; in addition to the test's own `porosity` (of another specimen) and `loading_rate` (1/s).
+  std::map<std::string, double> settings;
+  bool unloading = false;    ///< once, half-way of the loading
+  std::string control;       ///< what drives it,
+  std::vector<double> path;  ///< and its values at the readings, SI
+  /// Chance to tell two rivals apart at the 1 % level: the lowest of the pairs that are told apart.
+  double expected_power = 0;
+  double distance = 0;  ///< between these two, in sd of a measurement
+  std::vector<std::pair<std::string, std::string>> together{};  ///< pairs that are not told apart
+  /// The same of the rivals against none of them (NoneOfThese); where that was asked for.
+  std::optional<double> distance_from_none{}, power_against_none{};
+};
+
+struct TestPlan {
+  PlannedExperiment experiment;
+  std::string name;  ///< of the experiment in the derived campaign
+  std::string file;  ///< of its data
+};
+
+/// The first fitted experiment, which plans follow in everything that they do not change.
+const campaign::Experiment& PatternOf(const campaign::Campaign& campaign);
+
+/// Where the pattern is driven by the axial strain under a pressure: its test at a quarter of the
+/// lowest and four times the highest pressure, and every test that one pressure and an axial strain
+/// define at their geometric mean: monotonic, with an unloading where it may reverse, where
+/// packings are generated with a specimen looser and denser by 0.02 in porosity, and where it has a
+/// loading_rate at a quarter and four times it. An initial stress grows with the pressure.
+/// Otherwise the plans of setting_plans.h. May be empty.
+std::vector<TestPlan> PlansFor(const campaign::Campaign& campaign);
+
+/// Text of the plan's file: the way of the control. Only that is read of it.
+std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern);
+
+/// The pattern's entry in the campaign file with another test, settings and measurement.
+campaign::YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
+                            const campaign::YamlNode& original);
+
+}  // namespace calib::diagnosis

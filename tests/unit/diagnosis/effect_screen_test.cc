@@ -1,0 +1,138 @@
+#include "server/diagnosis/effect_screen.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace calib::diagnosis {
+namespace {
+
+constexpr dem::ReferenceState kState{.pressure = 1e5, .diameter = 1e-3, .modulus = 1e9};
+
+double Second(const std::string& effect, double square) {
+  const dem::EffectInfo& info = *dem::FindEffect(effect);
+  return SecondStep(info, info.rays.front(), square, "hertz_mindlin", kState) /
+         info.rays.front().steps[0];
+}
+
+TEST(SecondStep, GrowsWithTheRootOfWhatIsMissing) {
+  EXPECT_NEAR(Second("contact_plasticity", 18. / 32), std::sqrt(32), 1e-12) << "18 are wanted";
+  EXPECT_NEAR(Second("contact_plasticity", 18. / 64), 8, 1e-12);
+  EXPECT_EQ(Second("contact_plasticity", 0.3), Second("contact_plasticity", 0.3001)) << "in grades";
+}
+
+// Crushing goes with weakness^3: eight times as much of it wants twice the weakness.
+TEST(SecondStep, KnowsHowWhatIsSeenGrowsWithTheStrength) {
+  EXPECT_NEAR(Second("particle_crushing", 18. / 64), 2, 1e-12);
+}
+
+// The catalogue's second strength is four times its first here.
+TEST(SecondStep, IsNoWeakerThanTheCatalogues) {
+  EXPECT_NEAR(Second("contact_plasticity", 3.9), 4, 1e-12);
+  EXPECT_NEAR(Second("contact_plasticity", 1000), 4, 1e-12);
+  EXPECT_NEAR(Second("contact_plasticity", 0), 4, 1e-12) << "nothing to go by";
+}
+
+TEST(SecondStep, GoesNoFurtherThanItsPrior) {
+  const dem::EffectInfo& density = *dem::FindEffect("initial_density");
+  EXPECT_NEAR(Second("initial_density", 1e-3) * density.rays.front().steps[0] * 0.01,
+              density.parameters.front().default_prior.max, 1e-12);
+  const double membrane = Second("membrane_stiffness", 1e-3);
+  EXPECT_NEAR(membrane, 16, 1e-9) << "a wide prior: no more than so many times";
+}
+
+// Every effect of the catalogue, whatever its first difference.
+TEST(SecondStep, IsAdmissible) {
+  for (const dem::EffectInfo& effect : dem::Effects()) {
+    for (const dem::StrengthRay& ray : effect.rays) {
+      const std::string contact = effect.contacts.empty() ? "hertz_mindlin" : effect.contacts[0];
+      for (const double square : {0.0, 0.01, 1.0, 100.0}) {
+        const double step = SecondStep(effect, ray, square, contact, kState);
+        EXPECT_TRUE(dem::RayAdmits(effect, ray, step, contact, kState)) << effect.name;
+        EXPECT_NE(step, ray.steps[0]) << effect.name;
+      }
+    }
+  }
+}
+
+// The engine refuses shapes and crushing wherever a test pours spheres: no run of a screen may ask
+// for them.
+TEST(SharesOfRuns, KeepTheCapAndGoWhereTheyTellMost) {
+  std::vector<const dem::EffectInfo*> effects;
+  std::vector<bool> calculated;
+  for (const dem::EffectInfo& effect : dem::Effects()) {
+    effects.push_back(&effect);
+    calculated.push_back(effect.name == "load_cell_error");
+  }
+  constexpr std::size_t kNumerical = 3;
+  for (const int experiments : {1, 2, 3}) {
+    for (const std::size_t samples : {24U, 96U, 400U}) {
+      const auto runs = SharesOfRuns(effects, calculated, samples, experiments, kNumerical);
+      std::size_t sum = kNumerical;
+      bool instruments = true;  // all of them twice
+      bool rays = true;
+      for (std::size_t e = 0; e < effects.size(); ++e) {
+        sum += runs[e];
+        EXPECT_GE(runs[e], calculated[e] ? 0U : 1U) << effects[e]->name;
+        if (calculated[e]) {
+          EXPECT_EQ(runs[e], 0U);
+        } else if (effects[e]->rays.size() > 1) {
+          rays = rays && runs[e] == 2;
+        } else if (effects[e]->kind == "measurement") {
+          instruments = instruments && runs[e] == 2;
+        }
+      }
+      EXPECT_LE(sum * static_cast<std::size_t>(experiments),
+                std::max(4 * effects.size(), samples * static_cast<std::size_t>(experiments) / 4))
+          << experiments << " experiments, " << samples << " samples";
+      EXPECT_TRUE(rays || !instruments);
+      if (samples == 400) {
+        EXPECT_TRUE(rays && instruments);
+      }
+    }
+  }
+}
+
+TEST(WhyNotShown, GrainsOfAPouredTestMayKeepTheirShape) {
+  campaign::Campaign campaign;
+  campaign.experiments.resize(1);
+  campaign.experiments[0].test = "silo_discharge";
+  const auto why = [&campaign](const char* effect) {
+    return WhyNotShown(campaign, *dem::FindEffect(effect));
+  };
+  EXPECT_NE(why("initial_density"), "");
+  EXPECT_NE(why("initial_fabric"), "");
+  EXPECT_EQ(why("wall_friction"), "");
+  campaign.experiments.resize(2);
+  campaign.experiments[1].test = "triaxial_drained";
+  EXPECT_EQ(why("initial_density"), "") << "of the triaxial specimen";
+  EXPECT_EQ(why("nonspherical_shape"), "");
+  EXPECT_EQ(why("particle_crushing"),
+            "test silo_discharge pours its grains, which it leaves whole");
+  campaign.experiments[0].test = "collision";
+  EXPECT_EQ(why("particle_crushing"), "");
+}
+
+TEST(WhyNotShown, WhatDependsOnPressureShowsWhereThatDiffers) {
+  campaign::Campaign campaign;
+  campaign.experiments.resize(2);
+  for (campaign::Experiment& experiment : campaign.experiments) {
+    experiment.test = "triaxial_drained";
+    experiment.settings["confining_pressure"] = 2e5;
+  }
+  const auto why = [&campaign] {
+    return WhyNotShown(campaign, *dem::FindEffect("pressure_dependent_friction"));
+  };
+  EXPECT_EQ(why(),
+            "it shows only between tests at different pressures, or in one whose pressure changes");
+  campaign.experiments[1].settings["confining_pressure"] = 4e5;
+  EXPECT_EQ(why(), "");
+  campaign.experiments.resize(1);
+  for (const char* test : {"oedometric", "isotropic", "triaxial_undrained", "collision"}) {
+    campaign.experiments[0].test = test;
+    EXPECT_EQ(why(), "") << test;
+  }
+}
+
+}  // namespace
+}  // namespace calib::diagnosis
