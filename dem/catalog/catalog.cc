@@ -316,6 +316,6 @@ std::string CatalogText() {
   return text;
 }
 
-std::string EngineVersion() { return "13"; }
+std::string EngineVersion() { return "14"; }
 
 }  // namespace calib::dem

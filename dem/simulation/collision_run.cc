@@ -52,7 +52,9 @@ struct Flight {
   double vix = 0, viy = 0, wi = 0;  ///< of the body
   double vjx = 0, vjy = 0, wj = 0;  ///< of the partner
   double peak = 0, begun = 0, ended = 0;
-  double too_deep = 0;  ///< overlap that ended it [m]
+  double overlap = 0;               ///< of the last step in which they touched [m]
+  std::array<double, 6> changes{};  ///< what that step changed of vix, viy, vjx, vjy, wi, wj
+  double too_deep = 0;              ///< overlap that ended it [m]
   bool touched = false, done = false;
 };
 
@@ -132,6 +134,7 @@ class CollisionRun {
     dt_ = std::min(half_period / kStepsPerHalfPeriod, 1 / (kStepsPerRelaxation * rates.damped));
     const auto longest =
         static_cast<std::int64_t>(std::min(kMostSteps, kLongestInHalfPeriods * half_period / dt_));
+    Touch();
     block_.dt = dt_;
     followed_ = static_cast<double>(longest) * dt_ / half_period;
     for (std::int64_t step = 0; step < longest; ++step) {
@@ -239,6 +242,54 @@ class CollisionRun {
     }
   }
 
+  /// Bodies begin where they just touch. What pulls, or resists the speed itself, acts from there
+  /// on: velocities of the leapfrog, which are those of half a step later, feel half a step of it.
+  /// Without that attraction gave an energy of its force times half a step's way.
+  void Touch() {
+    constexpr double kJust = 1e-12;  // of the radius
+    block_.dt = 0;                   // memories stay empty
+    LoadBlock();
+    for (int k = 0; k < kBlock; ++k) {
+      block_.dx[k] -= kJust * body_.radius;
+    }
+    model_.Evaluate(block_);
+    for (int k = 0; k < kBlock; ++k) {
+      flights_[static_cast<std::size_t>(k)].changes = ChangesOf(k);
+      Change(flights_[static_cast<std::size_t>(k)], 0.5);
+    }
+    for (auto& column : block_.own_history) {
+      std::fill(std::begin(column), std::end(column), 0.0);
+    }
+  }
+
+  /// Bodies part between two steps, where their overlap vanishes: the last loads act up to there
+  /// from the middle of the last step on. Of what holds across a gap the place is not known; half a
+  /// step is then right on average. Returns when.
+  double Part(Flight& f, double overlap, double time) const {
+    const double share = f.overlap > 0 ? f.overlap / (f.overlap - overlap) : 0.5;
+    Change(f, share - 0.5);
+    return time - (1.0 - share) * dt_;
+  }
+
+  /// What a step of the loads of block_ changes.
+  [[nodiscard]] std::array<double, 6> ChangesOf(int k) const {
+    return {-dt_ * body_.inverse_mass * block_.force_x[k],
+            -dt_ * body_.inverse_mass * block_.force_y[k],
+            dt_ * partner_.inverse_mass * block_.force_x[k],
+            dt_ * partner_.inverse_mass * block_.force_y[k],
+            dt_ * body_.inverse_inertia * TorqueOnBody(k),
+            dt_ * partner_.inverse_inertia * block_.torque_jz[k]};
+  }
+
+  static void Change(Flight& f, double share) {
+    f.vix += share * f.changes[0];
+    f.viy += share * f.changes[1];
+    f.vjx += share * f.changes[2];
+    f.vjy += share * f.changes[3];
+    f.wi += share * f.changes[4];
+    f.wj += share * f.changes[5];
+  }
+
   /// Velocities by the contact's loads; false: all bodies have separated. A touching contact that
   /// has come apart is over, as in Assembly.
   bool Kick(double time) {
@@ -257,7 +308,7 @@ class CollisionRun {
       }
       if (!(overlap > 0) && !(f.touched && block_.holds[k] > 0)) {
         if (f.touched) {
-          f.ended = time;
+          f.ended = Part(f, overlap, time);
           f.done = true;
           continue;
         }
@@ -269,12 +320,9 @@ class CollisionRun {
         f.begun = time - dt_;
       }
       any = true;
-      f.vix -= dt_ * body_.inverse_mass * block_.force_x[k];
-      f.viy -= dt_ * body_.inverse_mass * block_.force_y[k];
-      f.vjx += dt_ * partner_.inverse_mass * block_.force_x[k];
-      f.vjy += dt_ * partner_.inverse_mass * block_.force_y[k];
-      f.wi += dt_ * body_.inverse_inertia * TorqueOnBody(k);
-      f.wj += dt_ * partner_.inverse_inertia * block_.torque_jz[k];
+      f.overlap = overlap;
+      f.changes = ChangesOf(k);
+      Change(f, 1.0);
     }
     return any;
   }

@@ -23,6 +23,7 @@ constexpr double kMostDamping = 0.9;
 // scatters, in square.
 constexpr double kWanted = 18;
 constexpr double kMostRatio = 16;  // of the second strength to the first
+constexpr double kWeaker = 0.1;    // of a first strength with which no run comes to its end
 constexpr double kGrades = 4;      // of an octave: the last bits of a history change no run
 constexpr const char* kLoadCell = "load_cell_error";
 
@@ -249,9 +250,10 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
     // All at once, so that no worker waits for the last run of an effect.
     for (std::size_t e = 0; e < effects.size(); ++e) {
       if (k >= steps[e].size()) continue;
-      const bool chosen = effects[e]->rays.size() == 1 && !signatures[e].differences.empty() &&
-                          dem::FindEffect(effects[e]->name) != nullptr;
-      if (k > 0 && chosen) {
+      const bool again = k > 0 && effects[e]->rays.size() == 1;
+      if (again && signatures[e].differences.empty()) {
+        steps[e][k].step = kWeaker * steps[e][0].step;
+      } else if (again && dem::FindEffect(effects[e]->name) != nullptr) {
         steps[e][k].step =
             SecondStep(*effects[e], *steps[e][k].ray, square_of(signatures[e].differences.front()),
                        base_.view().campaign.model.contact, base_.state());

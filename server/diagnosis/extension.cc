@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <variant>
 
 #include "absl/strings/str_cat.h"
@@ -45,36 +46,45 @@ double GrainsOf(const campaign::Experiment& experiment) {
   return file != nullptr ? static_cast<double>(file->packing.radius.size()) : 1;
 }
 
-// Geometric mean of the speeds of a collision [m/s].
-double SpeedOf(const campaign::Experiment& experiment) {
-  const double given = SettingOr(experiment, "impact_speed", 0);
-  if (given > 0) return given;
-  double sum = 0;
-  int count = 0;
+// Of the gentlest collision of an experiment, along the normal [m/s]; infinite: it has none.
+double NormalSpeedOf(const campaign::Experiment& experiment) {
+  double speed = SettingOr(experiment, "impact_speed", 0);
+  double angle = SettingOr(experiment, "impact_angle", 0);
+  double slowest = std::numeric_limits<double>::infinity();
   for (const dem::ControlPoint& point : experiment.path) {
-    if (experiment.control_name != "impact_speed" || !(point.target > 0)) continue;
-    sum += std::log(point.target);
-    ++count;
+    if (experiment.control_name == "impact_speed") speed = point.target;
+    if (experiment.control_name == "impact_angle") angle = point.target;
+    if (speed > 0) slowest = std::min(slowest, speed * std::cos(angle));
   }
-  return count > 0 ? std::exp(sum / count) : 0;
+  return slowest;
 }
 
-// Contact forces over d^2: the pressure of a specimen, the weight of a filling rho g d N^(1/3), the
-// peak (rho v^2)^(3/5) E^(2/5) of a Hertzian impact (Johnson, Contact Mechanics, sec. 11.4). 0: the
-// experiment has none.
-double PressureOf(const campaign::Experiment& experiment, double density, double modulus) {
+// Contact forces over d^2: the pressure of a specimen, the weight of a filling rho g d N^(1/3). 0:
+// the experiment has none.
+double PressureOf(const campaign::Experiment& experiment, double density) {
   for (const char* name : {"confining_pressure", "start_pressure", "pressure"}) {
     if (const double pressure = SettingOr(experiment, name, 0); pressure > 0) return pressure;
   }
   const dem::TestInfo* const test = dem::FindTest(experiment.test);
-  if (test == nullptr) return 0;
-  if (!test->needs_packing) {
-    const double speed = SpeedOf(experiment);
-    return std::pow(density * speed * speed, 0.6) * std::pow(modulus, 0.4);
-  }
-  if (!test->poured) return 0;
+  if (test == nullptr || !test->poured) return 0;
   return density * SettingOr(experiment, "gravity", 9.80665) * DiameterOf(experiment) *
          std::cbrt(GrainsOf(experiment));
+}
+
+// The same of the gentlest collision, where what attracts shows most and what sticks does so
+// first: the peak (rho v^2)^(3/5) E^(2/5) of a Hertzian impact (Johnson, Contact Mechanics, sec.
+// 11.4). 0: there is none.
+double ImpactPressure(const campaign::Campaign& campaign, double modulus) {
+  double slowest = std::numeric_limits<double>::infinity();
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    const dem::TestInfo* const test = dem::FindTest(experiment.test);
+    if (experiment.role != campaign::Role::kCalibrate || test == nullptr || test->needs_packing) {
+      continue;
+    }
+    slowest = std::min(slowest, NormalSpeedOf(experiment));
+  }
+  if (!(slowest > 0) || !std::isfinite(slowest)) return 0;
+  return std::pow(campaign.model.density * slowest * slowest, 0.6) * std::pow(modulus, 0.4);
 }
 
 // Moduli that an extension may move to: a model that lacks an effect bends its modulus to hide it.
@@ -149,14 +159,17 @@ dem::ReferenceState ReferenceOf(const report::CampaignView& view) {
   }
   double sum = 0;
   int count = 0;
+  const auto take = [&sum, &count](double pressure) {
+    if (!(pressure > 0)) return;
+    sum += std::log(pressure);
+    ++count;
+  };
   for (const campaign::Experiment& experiment : view.campaign.experiments) {
     if (experiment.role != campaign::Role::kCalibrate) continue;
     state.diameter = DiameterOf(experiment);
-    const double pressure = PressureOf(experiment, model.density, state.modulus);
-    if (!(pressure > 0)) continue;
-    sum += std::log(pressure);
-    ++count;
+    take(PressureOf(experiment, model.density));
   }
+  take(ImpactPressure(view.campaign, state.modulus));
   if (count > 0) state.pressure = std::exp(sum / count);
   return state;
 }

@@ -57,8 +57,16 @@ TEST(Extension, TestsWithoutAPressureHaveThatOfTheirWeightOrImpact) {
   impact.control_name = "impact_speed";
   impact.path = {{.target = 0.5, .load_step = 0}, {.target = 2, .load_step = 1}};
   view.campaign.experiments = {impact};
-  EXPECT_NEAR(ReferenceOf(view).pressure, std::pow(2500, 0.6) * std::pow(1e7, 0.4), 1e-6);
+  const auto of_impact = [](double speed) {
+    return std::pow(2500 * speed * speed, 0.6) * std::pow(1e7, 0.4);
+  };
+  EXPECT_NEAR(ReferenceOf(view).pressure, of_impact(0.5), 1e-6) << "the gentlest";
   EXPECT_DOUBLE_EQ(ReferenceOf(view).diameter, 2e-2);
+  impact.settings = {{"radius", 1e-2}, {"impact_speed", 0.4}};
+  impact.control_name = "impact_angle";
+  impact.path = {{.target = 0, .load_step = 0}, {.target = 1, .load_step = 1}};
+  view.campaign.experiments.push_back(impact);
+  EXPECT_NEAR(ReferenceOf(view).pressure, of_impact(0.4 * std::cos(1)), 1e-6);
 
   campaign::Experiment triaxial;
   triaxial.test = "triaxial_drained";

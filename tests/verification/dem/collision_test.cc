@@ -53,9 +53,28 @@ TEST(Collision, ElasticImpactOnAWallFollowsHertz) {
     EXPECT_NEAR(Value(state, "peak_overlap"), peak, 1e-6 * peak);
     // T = 4/5 B(2/5, 1/2) u/v
     const double duration = 0.8 * std::beta(0.4, 0.5) * peak / v;
-    EXPECT_NEAR(Value(state, "contact_duration"), duration, 4e-4 * duration);
-    EXPECT_NEAR(Value(state, "normal_restitution"), 1, 1e-6);
-    EXPECT_NEAR(Value(state, "energy_restitution"), 1, 2e-6);
+    EXPECT_NEAR(Value(state, "contact_duration"), duration, 4e-7 * duration);
+    EXPECT_NEAR(Value(state, "normal_restitution"), 1, 1e-9);
+    EXPECT_NEAR(Value(state, "energy_restitution"), 1, 2e-9);
+  }
+}
+
+// What pulls from the first touch to the last gives back what it gave; a step of its force too many
+// or too few shows in the energy (before engine 14: 4e-4 of it lost here).
+TEST(Collision, AttractionKeepsTheEnergy) {
+  Scenario s = Steel("hertz_mindlin", {{"friction_coefficient", 0}});
+  s.model.parameters["young_modulus"] = 1.133e8;
+  s.model.parameters["adhesion_dmt.work_of_adhesion"] = 105;
+  s.model.effects = {"adhesion_dmt"};
+  s.path = {{.target = 0.1, .load_step = 0}, {.target = 1, .load_step = 1}};
+  for (const double partner : {std::numeric_limits<double>::infinity(), 0.01}) {
+    if (std::isfinite(partner)) s.settings["partner_radius"] = partner;
+    const test::Run run = test::RunAll(s);
+    ASSERT_EQ(run.states.size(), 2U) << run.summary.reason;
+    for (const State& state : run.states) {
+      EXPECT_NEAR(Value(state, "normal_restitution"), 1, 1e-7) << partner;
+      EXPECT_NEAR(Value(state, "energy_restitution"), 1, 2e-7) << partner;
+    }
   }
 }
 
