@@ -62,6 +62,20 @@ std::string WhyNext(const Diagnosis& diagnosis, const std::string& effect) {
                       absl::StrJoin(others, ", "), " as well.");
 }
 
+std::vector<std::string> OthersToTry(const Diagnosis& diagnosis, const std::string& added,
+                                     double rms_error) {
+  constexpr std::size_t kMost = 2;
+  constexpr double kNear = 2;  // a refit has few runs: calibrations come closer
+  std::vector<std::string> others;
+  for (const CandidateEffect& candidate : diagnosis.candidates) {
+    if (candidate.effect == added || candidate.campaign.empty()) continue;
+    if (candidate.predicted_rms_error > kNear * rms_error) continue;
+    others.push_back(candidate.effect);
+    if (others.size() == kMost) break;
+  }
+  return others;
+}
+
 std::string WhyNoStep(const CalibratedModel& without, const CalibratedModel& with) {
   if (!(with.rms_error < without.rms_error)) {
     return absl::StrCat(with.has_posterior ? "" : "it has no posterior and ",

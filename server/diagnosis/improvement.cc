@@ -12,6 +12,7 @@
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/improve_step.h"
 #include "server/report/comparison.h"
+#include "server/report/people_units.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -40,9 +41,18 @@ std::optional<std::int64_t> Improvement::Left() const {
 absl::Status Improvement::From(report::CampaignView view) {
   first_ = view;
   std::vector<std::string> added;
+  if (auto status = Climb(std::move(view), added); !status.ok()) return status;
+  if (auto status = Exchange(added); !status.ok()) return status;
+  if (auto status = Instead(added); !status.ok()) return status;
+  if (auto status = Prune(added); !status.ok()) return status;
+  return Open();
+}
+
+// Adds effects to a model until it is adequate, nothing helps, or no more are allowed: the last one.
+absl::Status Improvement::Climb(report::CampaignView view, std::vector<std::string>& added) {
   for (;;) {
     const bool last = static_cast<int>(added.size()) >= limits_.effects || Spent();
-    const auto diagnosis = Judge(view, last);
+    auto diagnosis = Judge(view, last);
     if (!diagnosis.ok()) return diagnosis.status();
     ImproveStep& step = steps_.back();
     if (diagnosis->verdict == kAdequate) {
@@ -62,12 +72,11 @@ absl::Status Improvement::From(report::CampaignView view) {
     if (!extended.ok()) return extended.status();
     if (!*extended) break;
     added.push_back(step.next_effect);
+    fork_ = Fork{.view = std::move(view), .diagnosis = *std::move(diagnosis)};
     view = **std::move(extended);
   }
   last_ = std::move(view);
-  if (auto status = Exchange(added); !status.ok()) return status;
-  if (auto status = Prune(added); !status.ok()) return status;
-  return Open();
+  return absl::OkStatus();
 }
 
 // The model with the first of the effects to try that makes it better; none: there is none. Sets
@@ -167,6 +176,37 @@ absl::Status Improvement::Exchange(std::vector<std::string>& added) {
     if (*replaced) return absl::OkStatus();
     AddSentence(absl::StrCat("Nothing else in the place of ", added[k], " makes it adequate."),
                 steps_.back().reason);
+  }
+  return absl::OkStatus();
+}
+
+// The last effect may be the wrong one of several that were near: where the model at the end is not
+// adequate, others are calibrated in its place, and one that comes closer goes on from there.
+absl::Status Improvement::Instead(std::vector<std::string>& added) {
+  if (steps_.back().verdict == kAdequate || added.empty() || !fork_) return absl::OkStatus();
+  const Fork fork = *fork_;
+  const std::string out = added.back();
+  for (const std::string& in : OthersToTry(fork.diagnosis, out, steps_.back().rms_error)) {
+    if (Spent() || !WhyNotJoin(fork.view.campaign, in).empty()) continue;
+    auto with = Extended(fork.view, {in}, ClosestRunWith(in, fork.diagnosis));
+    if (absl::IsResourceExhausted(with.status())) return absl::OkStatus();
+    if (!with.ok()) return with.status();
+    ImproveStep& step = steps_.back();
+    const double error = ErrorOf(*with);
+    if (!WhyNoStep(Calibrated(*last_, step.rms_error), Calibrated(*with, error)).empty()) {
+      AddSentence(absl::StrCat("Nor does ", in, " in the place of ", out, " (",
+                               with->status.campaign(), "): error ", report::Number(error, 3), "."),
+                  step.reason);
+      continue;
+    }
+    steps_.push_back(
+        StepOf(fork.view, fork.diagnosis.verdict,
+               absl::StrCat("Tried in the place of ", out, ": ", in, " comes closer.")));
+    steps_.back().next_effect = in;
+    added.resize(fork.view.campaign.model.effects.size() - first_->campaign.model.effects.size());
+    added.push_back(in);
+    if (auto status = Climb(*std::move(with), added); !status.ok()) return status;
+    if (steps_.back().verdict == kAdequate) return absl::OkStatus();
   }
   return absl::OkStatus();
 }

@@ -55,11 +55,18 @@ class Improvement {
   std::string Json() const;
 
  private:
+  /// The model from which the last effect was added, and why.
+  struct Fork {
+    report::CampaignView view;
+    Diagnosis diagnosis;
+  };
+
   bool Spent() const { return limits_.evaluations && evaluations_ >= *limits_.evaluations; }
   std::optional<std::int64_t> Left() const;
   absl::StatusOr<Diagnosis> Ask(const report::CampaignView& view, bool only_adequacy,
                                 std::string& reason);
   absl::StatusOr<Diagnosis> Judge(const report::CampaignView& view, bool only_adequacy);
+  absl::Status Climb(report::CampaignView view, std::vector<std::string>& added);
   absl::StatusOr<std::optional<report::CampaignView>> Forward(const report::CampaignView& view,
                                                               const Diagnosis& diagnosis);
   absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
@@ -70,6 +77,7 @@ class Improvement {
   absl::Status Exchange(std::vector<std::string>& added);
   absl::StatusOr<bool> Replace(std::size_t doubted, std::vector<std::string>& added,
                                const report::CampaignView& full);
+  absl::Status Instead(std::vector<std::string>& added);
   absl::Status Prune(const std::vector<std::string>& added);
   bool Fits(const report::CampaignView& view);
   absl::Status Open();
@@ -82,6 +90,7 @@ class Improvement {
   /// Of the last model that was screened: the others are judged by the same.
   std::vector<Eigen::VectorXd> nuisance_;
   std::optional<report::CampaignView> first_, last_;
+  std::optional<Fork> fork_;
   std::string digest_;
 };
 

@@ -50,6 +50,21 @@ TEST(ImproveStep, AGroupIsTriedByEvidenceWhereThatOfAllIsKnown) {
   EXPECT_THAT(WhyNext(partly, "b"), HasSubstr("do not tell apart: a, c as well."));
 }
 
+TEST(ImproveStep, OthersAreTriedWhoseRefitsCameNear) {
+  Diagnosis diagnosis;
+  for (const auto& [effect, error] :
+       {std::pair("wrong", 3.0), std::pair("near", 5.9), std::pair("far", 6.1),
+        std::pair("nearer", 4.0), std::pair("third", 2.0)}) {
+    diagnosis.candidates.push_back(Candidate(effect, std::nullopt));
+    diagnosis.candidates.back().campaign = "c9";
+    diagnosis.candidates.back().predicted_rms_error = error;
+  }
+  EXPECT_THAT(OthersToTry(diagnosis, "wrong", 3), ElementsAre("near", "nearer"));
+  EXPECT_THAT(OthersToTry(diagnosis, "near", 1), ElementsAre("third"));
+  diagnosis.candidates.back().campaign = "";
+  EXPECT_THAT(OthersToTry(diagnosis, "near", 1), IsEmpty()) << "not refitted";
+}
+
 TEST(ImproveStep, WhatHelpsMostIsTriedWhereNothingExplains) {
   Diagnosis diagnosis;
   diagnosis.verdict = "unexplained";
