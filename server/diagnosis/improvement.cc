@@ -67,7 +67,9 @@ absl::Status Improvement::Climb(report::CampaignView view, std::vector<std::stri
                   step.reason);
       break;
     }
-    if (step.reason.empty() && EffectsToTry(*diagnosis).empty()) step.reason = diagnosis->reason;
+    if (step.reason.empty() && EffectsToTry(*diagnosis).empty() && !diagnosis->reason.empty()) {
+      step.reason = absl::StrCat(diagnosis->reason, ".");
+    }
     auto extended = Forward(view, *diagnosis);
     if (!extended.ok()) return extended.status();
     if (!*extended) break;

@@ -96,12 +96,14 @@ def measure(calibctl, folder, effect, seed):
     return path
 
 
-def verdict(calibctl, effect, seed):
+def verdict(calibctl, effect, seed, improve):
+    """The diagnosis of a measurement; with improve the model that it ends with beside it."""
     with tempfile.TemporaryDirectory(prefix="calib-collisions-") as folder:
         path = measure(calibctl, folder, effect, seed)
         common = ["--state", os.path.join(folder, "state"), "--workers", "1", "--json"]
         name = json.loads(call(calibctl, "run", path, *common))["campaign"]
-        return json.loads(call(calibctl, "diagnose", name, *common))
+        found = json.loads(call(calibctl, "diagnose", name, *common))
+        return found, json.loads(call(calibctl, "improve", name, *common)) if improve else None
 
 
 def kind(found, effect):
@@ -118,17 +120,27 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--calibctl", required=True)
     parser.add_argument("--seeds", type=int, default=5, help="measurements of each effect")
+    parser.add_argument("--only", help="hidden effects, separated by commas; nothing: no effect")
+    parser.add_argument("--improve", action="store_true", help="also which model improve ends with (minutes each)")
     arguments = parser.parse_args()
+    chosen = [e for e in HIDDEN if not arguments.only or (e or "nothing") in arguments.only.split(",")]
     kinds = ("alone", "group", "adequate", "unexplained", "wrong")
     print(f"{arguments.seeds} measurements each.\n")
-    print("| hidden | misfit of the model without [sd] | named alone | in the group | adequate | unexplained | something else named |")
-    print("|---|---|---|---|---|---|---|", flush=True)
-    for effect in HIDDEN:
-        found = [verdict(arguments.calibctl, effect, seed) for seed in range(1, arguments.seeds + 1)]
-        counts = [kind(one, effect) for one in found]
-        misfits = [one["adequacy"]["rms"] for one in found]
-        print(f"| {effect or 'nothing'} | {min(misfits):.1f} .. {max(misfits):.1f} | " + " | ".join(str(counts.count(k)) for k in kinds) + " |",
-              flush=True)
+    improved = " improve: found | adequate | error held out |" if arguments.improve else ""
+    print("| hidden | misfit of the model without [sd] | named alone | in the group | adequate | unexplained | something else named |" + improved)
+    print("|---" * (7 + improved.count("|")) + "|", flush=True)
+    for effect in chosen:
+        answers = [verdict(arguments.calibctl, effect, seed, arguments.improve) for seed in range(1, arguments.seeds + 1)]
+        counts = [kind(found, effect) for found, _ in answers]
+        misfits = [found["adequacy"]["rms"] for found, _ in answers]
+        row = [effect or "nothing", f"{min(misfits):.1f} .. {max(misfits):.1f}", *[str(counts.count(k)) for k in kinds]]
+        if arguments.improve:
+            last = [improvement["steps"][-1] for _, improvement in answers]
+            row += [str(sum(step["effects"] == ([effect] if effect else []) for step in last)),
+                    str(sum(step["verdict"] == "adequate" for step in last)),
+                    ", ".join(f"{improvement['steps'][0]['heldout_rms_error']:.3g} -> {improvement['steps'][-1]['heldout_rms_error']:.3g}"
+                              for _, improvement in answers)]
+        print("| " + " | ".join(row) + " |", flush=True)
 
 
 if __name__ == "__main__":
