@@ -19,7 +19,7 @@ server/report     server/report/,server/campaign/,inference/,dem/catalog/,dem/fo
 server/service    server/service/,server/scheduler/,server/store/,server/campaign/,inference/,dem/,proto/rpc/,calib/v1/  grpcpp|spdlog|chrono|nlohmann
 server/client     server/client/,server/service/,server/report/,server/campaign/,inference/,proto/rpc/,calib/v1/          grpcpp|chrono
 server/diagnosis  server/diagnosis/,server/client/,server/report/,server/campaign/,inference/,dem/catalog/,dem/formula/,dem/simulation/,calib/v1/   nlohmann
-server/ctl        server/,proto/rpc/,calib/v1/,dem/catalog/,dem/formula/,dem/simulation/,inference/  grpcpp|CLI|nlohmann|chrono|spdlog
+server/ctl        server/,proto/rpc/,calib/v1/,dem/catalog/,dem/formula/,dem/simulation/,inference/  CLI|nlohmann|chrono
 server            server/service/,server/store/,server/scheduler/,proto/rpc/address.h                     spdlog|CLI|chrono
 '
 watched='grpcpp|SQLiteCpp|sqlite3|yaml-cpp|spdlog|CLI|nlohmann|chrono'
