@@ -246,11 +246,11 @@ class CollisionRun {
   /// on: velocities of the leapfrog, which are those of half a step later, feel half a step of it.
   /// Without that attraction gave an energy of its force times half a step's way.
   void Touch() {
-    constexpr double kJust = 1e-12;  // of the radius
+    constexpr double kJust = 1e-12;  // of the distance, which rounds to 1e-16 of it
     block_.dt = 0;                   // memories stay empty
     LoadBlock();
     for (int k = 0; k < kBlock; ++k) {
-      block_.dx[k] -= kJust * body_.radius;
+      block_.dx[k] *= 1.0 - kJust;
     }
     model_.Evaluate(block_);
     for (int k = 0; k < kBlock; ++k) {

@@ -14,7 +14,7 @@ namespace calib::client {
 
 class Laboratory {
  public:
-  /// The session must outlive it. Starts local workers when there is something to run and the state
+  /// Session and choice must outlive it. Starts local workers when there is something to run and the state
   /// folder is this process's own.
   Laboratory(Session& session, const ServerChoice& choice) : session_(session), choice_(choice) {}
 

@@ -67,7 +67,7 @@ TEST(Collision, AttractionKeepsTheEnergy) {
   s.model.parameters["adhesion_dmt.work_of_adhesion"] = 105;
   s.model.effects = {"adhesion_dmt"};
   s.path = {{.target = 0.1, .load_step = 0}, {.target = 1, .load_step = 1}};
-  for (const double partner : {std::numeric_limits<double>::infinity(), 0.01}) {
+  for (const double partner : {std::numeric_limits<double>::infinity(), 0.01, 9e3 * kRadius}) {
     if (std::isfinite(partner)) s.settings["partner_radius"] = partner;
     const test::Run run = test::RunAll(s);
     ASSERT_EQ(run.states.size(), 2U) << run.summary.reason;
