@@ -196,8 +196,8 @@ absl::Status Improvement::Instead(std::vector<std::string>& added) {
     ImproveStep& step = steps_.back();
     const double error = ErrorOf(*with);
     if (!WhyNoStep(Calibrated(*last_, step.rms_error), Calibrated(*with, error)).empty()) {
-      AddSentence(absl::StrCat("Nor does ", in, " in the place of ", out, " (",
-                               with->status.campaign(), "): error ", report::Number(error, 3), "."),
+      AddSentence(absl::StrCat("With ", in, " in the place of ", out, " (", with->status.campaign(),
+                               ") it does no better: error ", report::Number(error, 3), " sd."),
                   step.reason);
       continue;
     }
