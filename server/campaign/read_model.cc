@@ -276,6 +276,11 @@ void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& ca
   if (map.Has("precomputed")) {
     map.Ignore({"precomputed", "contact", "effects", "user_effects", "density", "materials",
                 "pairs", "fixed"});  // read with the experiments
+    if (map.Has("user_effects")) {
+      map.Problem("user_effects",
+                  "acts on runs of this program's DEM; runs made elsewhere (precomputed) cannot be "
+                  "made with it: leave it out");
+    }
     campaign.precomputed.emplace();
     map.Finish();
     return;

@@ -96,6 +96,19 @@ std::optional<dem::StrengthRay> ReadRay(MapReader& map, const dem::ParameterInfo
   return dem::StrengthRay{.parameter = info.name, .steps = {values[0] - null, values[1] - null}};
 }
 
+// What a strength is tried with: the median of the prior of every parameter that is no strength and
+// has no default.
+std::map<std::string, double> MediansOfOthers(const std::vector<dem::ParameterInfo>& parameters) {
+  std::map<std::string, double> medians;
+  for (const dem::ParameterInfo& p : parameters) {
+    if (p.null_value || p.default_value) continue;
+    const dem::DefaultPrior& prior = p.default_prior;
+    medians[p.name] = prior.kind == "log_uniform" ? std::sqrt(prior.min * prior.max)
+                                                  : (prior.min + prior.max) / 2;
+  }
+  return medians;
+}
+
 void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::UserEffect& effect) {
   const std::size_t before = map.problems().size();
   dem::ParameterInfo info;
@@ -267,6 +280,7 @@ dem::UserEffect ReadOne(MapReader& map, const std::string& name, bool is_new) {
   for (dem::ParameterInfo& p : effect.info.parameters) {  // several strengths: each may stay away
     if (strengths > 1 && p.null_value && !p.default_value) p.default_value = p.null_value;
   }
+  for (dem::StrengthRay& ray : effect.info.rays) ray.held = MediansOfOthers(effect.info.parameters);
   if (!UnitsAreSound(map, effect)) return effect;
   const auto problems = dem::UserEffectProblems(effect);
   for (const std::string& problem : problems) map.Problem("formula", problem);

@@ -146,6 +146,16 @@ TEST(Precomputed, RefusesWhatOnlyASimulationNeeds) {
             "c.yaml:19: experiments[1].packing: has no meaning with precomputed runs; remove it\n");
 }
 
+TEST(Precomputed, AFormulaThatActsOnNothingIsRefused) {
+  std::string yaml = BeadsYaml();
+  yaml.insert(
+      yaml.find("  precomputed:"),
+      "  user_effects: {soft: {adds: porosity, formula: \"a * axial_strain\", parameters: {a: "
+      "{null: 0}}}}\n");
+  EXPECT_THAT(ProblemsOf(yaml, Tables()),
+              HasSubstr("user_effects: acts on runs of this program's"));
+}
+
 TEST(Precomputed, ZeroReadingsHaveNoSizeToScaleErrorsWith) {
   auto files = Tables();
   files["exp.dat"].replace(files["exp.dat"].find("1.0"), 3, "0.0");

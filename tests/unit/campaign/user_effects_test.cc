@@ -59,6 +59,19 @@ TEST(UserEffects, AreReadWithUnitsNullsAndSteps) {
   EXPECT_THAT(read.campaign.model.effects, ElementsAre("rolling_resistance"));
 }
 
+// The screen tries a strength before anything is known of the rest.
+TEST(UserEffects, WhatHasNoDefaultIsHeldAtTheMedianOfItsPrior) {
+  const std::string yaml =
+      Changed("default: 1 mm", "prior: {prior: log_uniform, min: 0.1 mm, max: 10 mm}");
+  EXPECT_EQ(ProblemsOf(yaml), "");
+  const ReadOutcome read = ReadCampaign(yaml, "c.yaml", ReaderOf(GoodFiles()));
+  const dem::EffectInfo& effect = read.campaign.model.user_effects.at(0).info;
+  ASSERT_EQ(effect.rays.size(), 1U);
+  ASSERT_EQ(effect.rays[0].held.size(), 1U);
+  EXPECT_EQ(effect.rays[0].held.begin()->first, effect.parameters[1].name);
+  EXPECT_NEAR(effect.rays[0].held.begin()->second, 1e-3, 1e-12);
+}
+
 TEST(UserEffects, JoinTheModelLikeAnyOther) {
   std::string yaml = With(kDamping);
   yaml.replace(yaml.find("[rolling_resistance]"), 20, "[rolling_resistance, my_damping]");
