@@ -41,6 +41,13 @@ std::string ToText(const diagnosis::Improvement& improvement) {
     }
     text += ".\n";
   }
+  if (const std::size_t before = improvement.opened_before().size(); before > 0) {
+    text += report::Wrapped(
+        fmt::format("The held-out data were opened before, for {} of this campaign: who asks again "
+                    "has seen them, and they judge no longer as if they were new.",
+                    before == 1 ? "another verdict" : fmt::format("{} other verdicts", before)),
+        "! ", "  ");
+  }
   return text + fmt::format("{} model evaluations.\n", improvement.evaluations());
 }
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -256,23 +256,34 @@ absl::StatusOr<bool> Improvement::Replace(std::size_t doubted, std::vector<std::
 }
 
 // An effect that was added early may be needless beside the later ones: the model is kept without
-// the first that it is adequate without.
-absl::Status Improvement::Prune(const std::vector<std::string>& added) {
-  if (steps_.back().verdict != kAdequate) return absl::OkStatus();
+// the first that it is adequate without, and what is left is asked again.
+absl::Status Improvement::Prune(std::vector<std::string> added) {
+  while (steps_.back().verdict == kAdequate) {
+    const auto needless = TakeOutNeedless(added);
+    if (absl::IsResourceExhausted(needless.status())) return absl::OkStatus();
+    if (!needless.ok()) return needless.status();
+    if (needless->empty()) return absl::OkStatus();
+    added.erase(std::find(added.begin(), added.end(), *needless));
+  }
+  return absl::OkStatus();
+}
+
+// The effect that was taken out; empty: every one but the last is needed, or --max-evaluations is
+// used up.
+absl::StatusOr<std::string> Improvement::TakeOutNeedless(const std::vector<std::string>& added) {
   const report::CampaignView full = *last_;
   for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
     std::vector<std::string> others = added;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
     auto without = Extended(*first_, others, ClosestRunWithout(added[k], full), 1);
-    if (absl::IsResourceExhausted(without.status())) return absl::OkStatus();
     if (!without.ok()) return without.status();
     if (without->posterior.posterior_from() == "none" || !Fits(*without)) continue;
     last_ = *std::move(without);
     if (auto judged = Judge(*last_, true); !judged.ok()) return judged.status();
     steps_.back().reason = absl::StrCat("As adequate without ", added[k], ", which is taken out.");
-    return absl::OkStatus();
+    return added[k];
   }
-  return absl::OkStatus();
+  return "";
 }
 
 absl::StatusOr<report::CampaignView> Improvement::Extended(const report::CampaignView& view,
@@ -299,11 +310,39 @@ absl::Status Improvement::Open() {
   };
   steps_.front().heldout_rms_error = held_out(*first_);
   steps_.back().heldout_rms_error = held_out(*last_);
+  if (steps_.front().heldout_rms_error) {
+    auto before = OpenedBefore();
+    if (!before.ok()) return before.status();
+    opened_before_ = *std::move(before);
+  }
   const std::string opened = Json();
   client::KeepFinding(client_, steps_.front().campaign, client::kImprovement, opened);
   if (steps_.size() > 1)
     client::KeepFinding(client_, steps_.back().campaign, client::kImprovement, opened);
   return absl::OkStatus();
+}
+
+// Of what is kept with the first campaign: verdicts that were there before this one was first.
+absl::StatusOr<std::vector<std::string>> Improvement::OpenedBefore() {
+  const auto findings = client_.Findings(steps_.front().campaign);
+  if (!findings.ok()) return findings.status();
+  std::map<std::string, std::int64_t> opened;  // verdict's digest -> when first
+  for (const v1::Finding& finding : *findings) {
+    if (finding.kind() != client::kImprovement) continue;
+    const auto document = client_.GetBlob(finding.digest());
+    if (!document.ok()) return document.status();
+    const auto json = nlohmann::json::parse(*document, nullptr, false);
+    if (!json.is_object()) continue;
+    const auto [at, is_new] =
+        opened.emplace(json.value("verdict_digest", ""), finding.created_unix_ms());
+    if (!is_new) at->second = std::min(at->second, finding.created_unix_ms());
+  }
+  const auto own = opened.find(digest_);
+  std::vector<std::string> digests;
+  for (const auto& [digest, when] : opened) {
+    if (digest != digest_ && (own == opened.end() || when < own->second)) digests.push_back(digest);
+  }
+  return digests;
 }
 
 std::string Improvement::Json() const {
@@ -321,13 +360,13 @@ std::string Improvement::Json() const {
          {"next_effect", step.next_effect.empty() ? json(nullptr) : json(step.next_effect)},
          {"reason", step.reason}});
   }
-  return json({{"steps", list},
-               {"verdict", steps_.back().verdict},
-               {"final_campaign", steps_.back().campaign},
-               {"verdict_digest", digest_},
-               {"model_evaluations", evaluations_}})
-             .dump(2, ' ', false, json::error_handler_t::replace) +
-         "\n";
+  json document = {{"steps", list},
+                   {"verdict", steps_.back().verdict},
+                   {"final_campaign", steps_.back().campaign},
+                   {"verdict_digest", digest_},
+                   {"model_evaluations", evaluations_}};
+  if (!opened_before_.empty()) document["opened_before"] = opened_before_;
+  return document.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace calib::diagnosis

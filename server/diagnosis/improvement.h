@@ -50,6 +50,9 @@ class Improvement {
   const std::vector<ImproveStep>& steps() const { return steps_; }
   /// Of the verdict, stored before held-out data were looked at.
   const std::string& digest() const { return digest_; }
+  /// Digests of other verdicts on the first campaign for which its held-out data were opened before:
+  /// they have been seen by whoever asks again.
+  const std::vector<std::string>& opened_before() const { return opened_before_; }
   std::int64_t evaluations() const { return evaluations_; }
   /// One JSON document.
   std::string Json() const;
@@ -78,9 +81,11 @@ class Improvement {
   absl::StatusOr<bool> Replace(std::size_t doubted, std::vector<std::string>& added,
                                const report::CampaignView& full);
   absl::Status Instead(std::vector<std::string>& added);
-  absl::Status Prune(const std::vector<std::string>& added);
+  absl::Status Prune(std::vector<std::string> added);
+  absl::StatusOr<std::string> TakeOutNeedless(const std::vector<std::string>& added);
   bool Fits(const report::CampaignView& view);
   absl::Status Open();
+  absl::StatusOr<std::vector<std::string>> OpenedBefore();
 
   client::Laboratory& laboratory_;
   client::Client& client_;
@@ -92,6 +97,7 @@ class Improvement {
   std::optional<report::CampaignView> first_, last_;
   std::optional<Fork> fork_;
   std::string digest_;
+  std::vector<std::string> opened_before_;
 };
 
 }  // namespace calib::diagnosis

@@ -209,6 +209,13 @@ TEST_F(HiddenFormula, IsNamedAddedAndHeldOutDataAreOpenedAfterTheVerdict) {
   }
   const std::string digest = verdict["verdict_digest"];
   verdict["verdict_digest"] = "";
+  // The budget's verdict was another, and its answer showed them.
+  EXPECT_EQ(verdict["opened_before"], Json({poor.json()["verdict_digest"]})) << improved.out;
+  verdict.erase("opened_before");
+  EXPECT_NE(Call("improve c1 --state s --workers 2")
+                .out.find("! The held-out data were opened before, for another verdict"),
+            std::string::npos)
+      << Read("out");
   EXPECT_EQ(campaign::Sha256Hex(verdict.dump(2) + "\n"), digest);
 }
 
