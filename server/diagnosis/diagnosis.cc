@@ -27,6 +27,23 @@ namespace {
 constexpr double kTooGood = 0.999;
 constexpr double kMostUnits = 10;  // of an effect that is calculated on readings
 
+// A model with draws at some of the readings, ascending, to be screened.
+inference::FittedModel At(const inference::FittedModel& model,
+                          const std::vector<Eigen::Index>& readings) {
+  if (std::ssize(readings) == model.histories.readings()) return model;
+  inference::FittedModel part{.histories = model.histories.At(readings),
+                              .covariance = model.covariance(readings, readings),
+                              .parameters = model.parameters,
+                              .draws = model.draws(Eigen::all, readings),
+                              .group = model.group,
+                              .without = {},
+                              .packings = model.packings};
+  for (const Eigen::MatrixXd& own : model.without) {
+    part.without.emplace_back(own(readings, readings));
+  }
+  return part;
+}
+
 class Inquiry {
  public:
   Inquiry(client::Laboratory& laboratory, const report::CampaignView& view,
@@ -41,15 +58,19 @@ class Inquiry {
     diagnosis_.campaign = base_.id();
     diagnosis_.only_adequacy = options_.only_adequacy;
     diagnosis_.warnings = campaign::NoiseWarnings(base_.view().campaign);
+    diagnosis_.in_doubt = !diagnosis_.warnings.empty();
     for (const report::PriorConflict& conflict : report::PriorConflicts(base_.view())) {
       diagnosis_.warnings.push_back(report::InWords(conflict));
     }
     if (auto possible = CheckDiagnosable(base_); !possible.ok()) return possible;
     const bool elsewhere = base_.view().campaign.precomputed.has_value();
+    diagnosis_.in_doubt = diagnosis_.in_doubt || HasFewReadings(base_);
     for (std::string& doubt : DoubtsOf(base_)) diagnosis_.warnings.push_back(std::move(doubt));
     if (!options_.only_adequacy && !elsewhere) {
       if (auto affordable = CheckBudget(); !affordable.ok()) return affordable;
-      auto nuisance = screen_.MeasureNuisance();
+      const std::string left_out = screen_.WhatIsLeftOut(options_.without);
+      if (!left_out.empty()) diagnosis_.warnings.push_back(left_out);
+      auto nuisance = screen_.MeasureNuisance(options_.without);
       if (!nuisance.ok()) return nuisance.status();
       nuisance_ = *std::move(nuisance);
     } else if (options_.only_adequacy) {
@@ -108,6 +129,7 @@ class Inquiry {
     const std::string few = FewPackings(response_.model, diagnosis_.packings);
     if (!few.empty()) diagnosis_.warnings.push_back(few);
     if (adequacy->p_chi2 > kTooGood) {
+      diagnosis_.in_doubt = true;
       diagnosis_.warnings.emplace_back(
           "The model is closer to the readings than the stated errors and the scatter explain: "
           "they seem too large, and an effect can hide in them.");
@@ -129,20 +151,27 @@ class Inquiry {
   }
 
   absl::Status ScreenEffects() {
-    const Eigen::LLT<Eigen::MatrixXd> factor(response_.model.covariance);
+    const inference::FittedModel model = At(response_.model, screen_.Readings(options_.without));
+    const auto adequacy = inference::TestAdequacy(model);
+    if (!adequacy.ok()) return adequacy.status();
+    const Eigen::LLT<Eigen::MatrixXd> factor(model.covariance);
     const auto signatures = screen_.MeasureSignatures(
-        options_.without, [this, &factor](const Eigen::VectorXd& difference) {
-          return factor.matrixL().solve(difference).squaredNorm() / diagnosis_.adequacy.degrees;
+        options_.without, [&adequacy, &factor](const Eigen::VectorXd& difference) {
+          return factor.matrixL().solve(difference).squaredNorm() / adequacy->degrees;
         });
     if (!signatures.ok()) return signatures.status();
     diagnosis_.not_excitable = screen_.not_excitable();
     diagnosis_.screen_evaluations = screen_.evaluations();
     if (signatures->empty()) return absl::OkStatus();
-    const auto scores =
-        inference::Screen(response_.model, *signatures,
-                          {.level = options_.level, .seed = base_.view().campaign.filter.seed});
+    auto scores = inference::Screen(
+        model, *signatures, {.level = options_.level, .seed = base_.view().campaign.filter.seed});
     if (!scores.ok()) return scores.status();
-    for (const inference::Score& score : *scores) AddCandidate(score);
+    // The share of the error that an effect leaves in what was screened, of the error in all.
+    const double screened = model.histories.Rms(adequacy->best);
+    for (inference::Score& score : *scores) {
+      if (screened > 0) score.rms *= diagnosis_.rms / screened;
+      AddCandidate(score);
+    }
     return absl::OkStatus();
   }
 

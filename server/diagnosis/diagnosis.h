@@ -68,6 +68,9 @@ struct Diagnosis {
   /// What a numerical choice (the rate) changes of each fitted reading, in sd of the noise; none
   /// where there is no such choice. Not part of the JSON document.
   std::vector<Eigen::VectorXd> nuisance{};
+  /// The errors are stated too small or too large by what the readings show, or readings are few:
+  /// what is said rests on them.
+  bool in_doubt = false;
   std::vector<std::string> warnings{};  ///< about noise, readings and packings, a sentence each
   std::map<std::string, std::string> units{};  ///< SI, of the strengths of effects
 };

@@ -53,13 +53,18 @@ absl::Status CheckLeftOut(const std::vector<std::string>& effects,
   return absl::OkStatus();
 }
 
+bool HasFewReadings(const FittedCampaign& base) {
+  constexpr std::size_t kPerParameter = 5;
+  return base.readings().of_mean.readings.size() <
+         kPerParameter * (base.view().campaign.parameters.size() + 1);
+}
+
 std::vector<std::string> DoubtsOf(const FittedCampaign& base) {
   std::vector<std::string> doubts;
-  constexpr std::size_t kPerParameter = 5;
   const report::CampaignView& view = base.view();
-  const std::size_t readings = base.readings().of_mean.readings.size();
-  const std::size_t parameters = view.campaign.parameters.size();
-  if (readings < kPerParameter * (parameters + 1)) {
+  if (HasFewReadings(base)) {
+    const std::size_t readings = base.readings().of_mean.readings.size();
+    const std::size_t parameters = view.campaign.parameters.size();
     doubts.push_back(absl::StrCat("Only ", readings, " readings are fitted with ", parameters,
                                   parameters == 1 ? " parameter" : " parameters",
                                   ": little can be seen with so few, neither a missing effect nor "

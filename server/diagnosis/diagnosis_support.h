@@ -20,6 +20,9 @@ absl::Status CheckDiagnosable(const FittedCampaign& base);
 absl::Status CheckLeftOut(const std::vector<std::string>& effects,
                           const campaign::Campaign& campaign);
 
+/// Fewer than five for each calibrated parameter and one more.
+bool HasFewReadings(const FittedCampaign& base);
+
 /// Sentences: few readings, one packing only.
 std::vector<std::string> DoubtsOf(const FittedCampaign& base);
 

@@ -186,7 +186,7 @@ std::string ByReason(const std::string& begin,
   return text;
 }
 
-std::string Sentence(const Diagnosis& d) {
+std::string VerdictInWords(const Diagnosis& d) {
   if (d.verdict == "adequate" && d.packings > 1 && d.packings < kFewestPackings) {
     return fmt::format(
         "Adequate, as far as {} packings tell, which is next to nothing: what is left may be "
@@ -223,6 +223,11 @@ std::string Sentence(const Diagnosis& d) {
       "Unexplained: the model misses the data, and {}{}",
       d.reason.empty() ? "no effect was tried" : d.reason,
       d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
+}
+
+std::string Sentence(const Diagnosis& d) {
+  return VerdictInWords(d) +
+         (d.in_doubt ? " This is in doubt, for what the warnings say of the readings." : "");
 }
 
 // Of the effects that are named together, where the screen has measured both.
@@ -273,6 +278,7 @@ std::string DiagnosisJson(const Diagnosis& d) {
   json["only_adequacy"] = d.only_adequacy;
   json["units"] = d.units;
   json["sentence"] = Sentence(d);
+  json["in_doubt"] = d.in_doubt;
   json["warnings"] = d.warnings;
   if (d.verdict == "adequate") {
     json["detectable"] = d.detectable;

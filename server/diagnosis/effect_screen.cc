@@ -1,11 +1,16 @@
 #include "server/diagnosis/effect_screen.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "inference/data/data_set.h"
 #include "server/campaign/excitation.h"
+#include "server/campaign/yaml_text.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/reading_effects.h"
 
@@ -58,31 +63,65 @@ double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, do
   return dem::RayAdmits(effect, ray, step, contact, state) ? step : ray.steps[1];
 }
 
-std::vector<std::size_t> SharesOfRuns(const std::vector<const dem::EffectInfo*>& effects,
-                                      const std::vector<bool>& calculated, std::size_t samples,
-                                      int experiments, std::size_t numerical) {
-  const double most = std::max(kScreenShare * static_cast<double>(samples),
-                               static_cast<double>(kMostRuns * effects.size()) / experiments);
-  auto left = static_cast<std::int64_t>(most) - static_cast<std::int64_t>(numerical);
-  std::vector<std::size_t> runs(effects.size(), 0);
-  for (std::size_t e = 0; e < effects.size(); ++e) {
-    if (calculated[e]) continue;
-    runs[e] = 1;
-    --left;
+ScreenShares SharesOfScreen(const std::vector<const dem::EffectInfo*>& effects,
+                            const std::vector<bool>& calculated, std::size_t samples,
+                            int experiments, std::size_t numerical) {
+  const auto run = std::count(calculated.begin(), calculated.end(), false);
+  auto left =
+      static_cast<std::int64_t>(std::max(kScreenShare * static_cast<double>(samples) * experiments,
+                                         static_cast<double>(kMostRuns * effects.size())));
+  ScreenShares shares{
+      .numerical = std::min(numerical, static_cast<std::size_t>((left - run) / experiments)),
+      .experiments = experiments,
+      .runs = {}};
+  left -= static_cast<std::int64_t>(shares.numerical) * experiments;
+  if (run > 0) {
+    shares.experiments = static_cast<int>(std::min<std::int64_t>(experiments, left / run));
   }
+  left -= run * shares.experiments;
+  for (const bool known : calculated) shares.runs.push_back(known ? 0 : 1);
   // Another ray is another signature; what instruments do is nearly in proportion to its strength.
   const auto grade = [](const dem::EffectInfo& effect) {
     if (effect.rays.size() > 1) return 0;
     return effect.kind == "measurement" ? 2 : 1;
   };
   for (int wanted = 0; wanted <= 2; ++wanted) {
-    for (std::size_t e = 0; e < effects.size() && left > 0; ++e) {
-      if (runs[e] == 0 || grade(*effects[e]) != wanted) continue;
-      runs[e] = 2;
-      --left;
+    for (std::size_t e = 0; e < effects.size() && left >= shares.experiments; ++e) {
+      if (shares.runs[e] == 0 || grade(*effects[e]) != wanted) continue;
+      shares.runs[e] = 2;
+      left -= shares.experiments;
     }
   }
-  return runs;
+  return shares;
+}
+
+campaign::Campaign ScreenedPart(const campaign::Campaign& campaign,
+                                const std::vector<const dem::EffectInfo*>& effects,
+                                int experiments) {
+  campaign::Campaign part = campaign;
+  for (campaign::Experiment& e : part.experiments) e.role = campaign::Role::kValidate;
+  const auto shown = [&part, &effects] {
+    return std::count_if(effects.begin(), effects.end(), [&part](const dem::EffectInfo* effect) {
+      return WhyNotShown(part, *effect).empty();
+    });
+  };
+  for (int taken = 0; taken < experiments; ++taken) {
+    campaign::Experiment* next = nullptr;
+    std::ptrdiff_t most = -1;
+    for (std::size_t e = 0; e < part.experiments.size(); ++e) {
+      campaign::Experiment& own = part.experiments[e];
+      const bool fitted = campaign.experiments[e].role == campaign::Role::kCalibrate;
+      if (!fitted || own.role == campaign::Role::kCalibrate) continue;
+      own.role = campaign::Role::kCalibrate;
+      if (const std::ptrdiff_t now = shown(); now > most) {
+        most = now;
+        next = &own;
+      }
+      own.role = campaign::Role::kValidate;
+    }
+    if (next != nullptr) next->role = campaign::Role::kCalibrate;
+  }
+  return part;
 }
 
 std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& effect,
@@ -126,8 +165,10 @@ std::vector<campaign::Derivation> EffectScreen::NumericalChanges() const {
   return changes;
 }
 
-absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance() {
-  const std::vector<campaign::Derivation> changes = NumericalChanges();
+absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance(
+    const std::vector<std::string>& without) {
+  std::vector<campaign::Derivation> changes = NumericalChanges();
+  changes.resize(PlanOf(without, nullptr).shares.numerical);
   const auto what = [](const campaign::Derivation& change) {
     return "influence of numerical choices, " + change.name;
   };
@@ -183,9 +224,8 @@ std::string EffectScreen::WhyNotExcitable(const dem::EffectInfo& effect) const {
   return effect.rays.empty() ? "the catalogue gives no strength to try" : "";
 }
 
-std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
-    const std::vector<std::string>& without,
-    std::vector<std::pair<std::string, std::string>>* reasons) const {
+std::vector<const dem::EffectInfo*> EffectScreen::Excitable(const std::vector<std::string>& without,
+                                                            Reasons* reasons) const {
   std::vector<const dem::EffectInfo*> effects;
   for (const dem::EffectInfo* info : dem::AllEffects(base_.view().campaign.model.user_effects)) {
     const dem::EffectInfo& effect = *info;
@@ -206,32 +246,101 @@ std::vector<const dem::EffectInfo*> EffectScreen::Excitable(
   return effects;
 }
 
-std::vector<std::size_t> EffectScreen::RunsOfEach(
-    const std::vector<const dem::EffectInfo*>& effects) const {
+EffectScreen::Plan EffectScreen::PlanOf(const std::vector<std::string>& without,
+                                        Reasons* reasons) const {
+  const std::vector<const dem::EffectInfo*> effects = Excitable(without, reasons);
   std::vector<bool> calculated;
   calculated.reserve(effects.size());
   for (const dem::EffectInfo* effect : effects) calculated.push_back(IsCalculated(*effect));
-  return SharesOfRuns(effects, calculated, base_.runs().sample.size(),
-                      std::max(1, base_.fitted_experiments()), NumericalChanges().size());
+  Plan plan{
+      .effects = {},
+      .shares = SharesOfScreen(effects, calculated, base_.runs().sample.size(),
+                               std::max(1, base_.fitted_experiments()), NumericalChanges().size()),
+      .part = {}};
+  plan.part = ScreenedPart(base_.view().campaign, effects, plan.shares.experiments);
+  const std::vector<std::size_t> of_each = std::exchange(plan.shares.runs, {});
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    if (WhyNotShown(plan.part, *effects[e]).empty()) {
+      plan.effects.push_back(effects[e]);
+      plan.shares.runs.push_back(of_each[e]);
+    } else if (reasons != nullptr) {
+      reasons->emplace_back(effects[e]->name,
+                            "the experiments that the screen runs do not show it");
+    }
+  }
+  return plan;
 }
 
 std::int64_t EffectScreen::Planned(const std::vector<std::string>& without) const {
-  const std::vector<const dem::EffectInfo*> effects = Excitable(without, nullptr);
-  std::size_t runs = NumericalChanges().size();
-  const std::vector<std::size_t> of_each = RunsOfEach(effects);
-  for (std::size_t e = 0; e < effects.size(); ++e) {
-    runs += StepsOf(*effects[e], of_each[e]).size();
+  const Plan plan = PlanOf(without, nullptr);
+  std::size_t runs = 0;
+  for (std::size_t e = 0; e < plan.effects.size(); ++e) {
+    runs += StepsOf(*plan.effects[e], plan.shares.runs[e]).size();
   }
-  return static_cast<std::int64_t>(runs) * base_.fitted_experiments();
+  return static_cast<std::int64_t>(plan.shares.numerical) * base_.fitted_experiments() +
+         static_cast<std::int64_t>(runs) * plan.shares.experiments;
+}
+
+std::vector<Index> EffectScreen::ReadingsOf(const campaign::Campaign& part) const {
+  const std::vector<inference::Reading>& all = base_.readings().of_mean.readings;
+  std::vector<Index> readings;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const auto experiment = static_cast<std::size_t>(all[k].experiment);
+    if (part.experiments[experiment].role == campaign::Role::kCalibrate) {
+      readings.push_back(static_cast<Index>(k));
+    }
+  }
+  return readings;
+}
+
+std::vector<Index> EffectScreen::Readings(const std::vector<std::string>& without) const {
+  return ReadingsOf(PlanOf(without, nullptr).part);
+}
+
+// Of the campaign's text, whose experiments stand in the same order.
+std::vector<campaign::YamlNode> EffectScreen::EntriesOf(const campaign::Campaign& part) const {
+  std::vector<campaign::YamlNode> entries;
+  const campaign::YamlParse text = campaign::ParseYaml(base_.view().source.campaign_file());
+  const campaign::YamlNode* list =
+      text.root ? campaign::YamlFind(*text.root, "experiments") : nullptr;
+  assert(list != nullptr && list->items.size() == part.experiments.size());
+  for (std::size_t e = 0; e < part.experiments.size(); ++e) {
+    if (part.experiments[e].role == campaign::Role::kCalibrate) entries.push_back(list->items[e]);
+  }
+  return entries;
+}
+
+std::string EffectScreen::WhatIsLeftOut(const std::vector<std::string>& without) const {
+  const Plan plan = PlanOf(without, nullptr);
+  std::vector<std::string> left_out;
+  if (plan.shares.experiments < base_.fitted_experiments()) {
+    std::vector<std::string> names;
+    for (const campaign::Experiment& e : plan.part.experiments) {
+      if (e.role == campaign::Role::kCalibrate) names.push_back(e.name);
+    }
+    left_out.push_back(absl::StrCat("runs effects in ", names.size(), " of ",
+                                    base_.fitted_experiments(), " fitted experiments (",
+                                    absl::StrJoin(names, ", "), "), the refits in all"));
+  }
+  const std::size_t numerical = NumericalChanges().size();
+  if (plan.shares.numerical < numerical) {
+    left_out.push_back(
+        absl::StrCat("varies ", plan.shares.numerical, " of ", numerical, " numerical choices"));
+  }
+  if (left_out.empty()) return "";
+  return absl::StrCat("To cost no more than it may, the screen ", absl::StrJoin(left_out, " and "),
+                      ": more samples allow more.");
 }
 
 absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignatures(
     const std::vector<std::string>& without, const SquareOfDifference& square_of) {
   std::vector<inference::Signature> signatures;
-  const std::vector<const dem::EffectInfo*> effects = Excitable(without, &not_excitable_);
+  const Plan plan = PlanOf(without, &not_excitable_);
+  const std::vector<const dem::EffectInfo*>& effects = plan.effects;
   if (effects.empty()) return signatures;
+  readings_ = ReadingsOf(plan.part);
+  if (plan.shares.experiments < base_.fitted_experiments()) entries_ = EntriesOf(plan.part);
   const std::vector<Index> runs = base_.BestRuns(kMostRows);
-  const std::vector<std::size_t> of_each = RunsOfEach(effects);
   for (const dem::EffectInfo* effect : effects) {
     signatures.push_back(
         {.name = effect->name, .differences = {}, .two_sided = effect->two_sided, .strengths = {}});
@@ -241,7 +350,7 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
     if (IsCalculated(*effects[e])) {
       Calculate(*effects[e], runs, signatures[e]);
     } else {
-      steps[e] = StepsOf(*effects[e], of_each[e]);
+      steps[e] = StepsOf(*effects[e], plan.shares.runs[e]);
     }
   }
   for (std::size_t k = 0; k < kMostRows; ++k) {
@@ -295,6 +404,7 @@ EffectScreen::Pair EffectScreen::PairOf(const dem::EffectInfo& effect, Step step
             .without = without,
             .with = base_.Derived("screen", absl::StrCat(effect.name, ", step ", k + 1)),
             .what = absl::StrCat("screen of ", effect.name, ", step ", k + 1)};
+  pair.with.experiments = entries_;
   pair.with.effects = {effect.name};
   pair.with.fixed = dem::ParametersOnRay(effect, *step.ray, step.step,
                                          base_.view().campaign.model.contact, base_.state());
@@ -325,7 +435,7 @@ void EffectScreen::Calculate(const dem::EffectInfo& effect, const std::vector<In
         *MisreadLoads(base_.view().campaign, base_.readings().of_mean,
                       base_.runs().histories.row(like), strength("gain"), strength("offset"));
     const std::vector<int>& streams = base_.runs().stream;
-    Keep(effect, pair, with.row(0), streams[static_cast<std::size_t>(like)], signature);
+    Keep(effect, pair, with(0, readings_), streams[static_cast<std::size_t>(like)], signature);
   }
 }
 
@@ -333,8 +443,9 @@ absl::Status EffectScreen::Measure(const dem::EffectInfo& effect, const Pair& pa
                                    inference::Signature& signature) {
   const auto view = base_.Run(pair.with, pair.what);
   if (!view.ok()) return view.status();
-  evaluations_ += base_.fitted_experiments();
-  const report::RunTable with = report::RunsOf(*view, base_.readings().of_mean);
+  evaluations_ += entries_.empty() ? base_.fitted_experiments() : std::ssize(entries_);
+  const report::RunTable with = report::RunsOf(
+      *view, inference::Restricted(base_.readings().of_mean, {readings_.begin(), readings_.end()}));
   if (with.sample.empty()) {
     for (const v1::Sample& sample : view->samples) diverged_[effect.name] = sample.reason();
     return absl::OkStatus();
@@ -347,10 +458,11 @@ void EffectScreen::Keep(const dem::EffectInfo& effect, const Pair& pair,
                         const Eigen::RowVectorXd& history, int stream,
                         inference::Signature& signature) {
   signature.differences.emplace_back(
-      (history - base_.runs().histories.row(pair.without)).transpose());
+      (history - base_.runs().histories(pair.without, readings_)).transpose());
   if (effect.rays.size() == 1)
     signature.strengths.push_back(ShareAt(*pair.step.ray, pair.step.step));
   tried_[effect.name].push_back(pair.step);
+  if (!entries_.empty()) return;
   EffectRun run{.values = pair.with.rows.front().values, .history = history, .stream = stream};
   run.values.insert(pair.with.fixed.begin(), pair.with.fixed.end());
   runs_with_[effect.name].push_back(std::move(run));

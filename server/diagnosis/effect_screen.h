@@ -13,6 +13,8 @@
 #include "absl/status/statusor.h"
 #include "dem/catalog/catalog.h"
 #include "inference/diagnosis/screen.h"
+#include "server/campaign/campaign.h"
+#include "server/campaign/yaml_tree.h"
 #include "server/diagnosis/fitted_campaign.h"
 
 namespace calib::diagnosis {
@@ -31,13 +33,27 @@ using SquareOfDifference = std::function<double(const Eigen::VectorXd&)>;
 double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
                   const std::string& contact, const dem::ReferenceState& state);
 
-/// Runs that each effect is given, 1 or 2, 0 where it is calculated, in a campaign of so many samples
-/// and fitted experiments: with `numerical` runs at most the larger of a quarter of the campaign's
-/// evaluations and four for each effect, but one run of each in any case. A second one goes first
-/// to effects with another ray of strength, last to what instruments do.
-std::vector<std::size_t> SharesOfRuns(const std::vector<const dem::EffectInfo*>& effects,
-                                      const std::vector<bool>& calculated, std::size_t samples,
-                                      int experiments, std::size_t numerical);
+/// What a screen runs.
+struct ScreenShares {
+  std::size_t numerical = 0;  ///< numerical choices that are varied, in all fitted experiments
+  int experiments = 0;        ///< that effects are run in
+  std::vector<std::size_t> runs{};  ///< of each effect, 1 or 2, 0 where it is calculated
+};
+
+/// In a campaign of so many samples and fitted experiments, with a number of numerical choices to
+/// vary, at most the larger of a quarter of the campaign's evaluations and four for each effect. One
+/// run of each effect in as many experiments as that allows, at least one; a second goes first to
+/// effects with another ray of strength, last to what instruments do. Numerical choices are given up
+/// last.
+ScreenShares SharesOfScreen(const std::vector<const dem::EffectInfo*>& effects,
+                            const std::vector<bool>& calculated, std::size_t samples,
+                            int experiments, std::size_t numerical);
+
+/// The campaign with so many of its fitted experiments, all others held out: those that show most
+/// effects together (WhyNotShown), of equals the first. What they miss is not asked.
+campaign::Campaign ScreenedPart(const campaign::Campaign& campaign,
+                                const std::vector<const dem::EffectInfo*>& effects,
+                                int experiments);
 
 class EffectScreen {
  public:
@@ -45,15 +61,23 @@ class EffectScreen {
 
   /// What twice the rate, half the step and twice the damping of staging change: no physics. Those
   /// of experiments with a loading_rate and of flows are left as they are; none where there are no
-  /// others.
-  absl::StatusOr<std::vector<Eigen::VectorXd>> MeasureNuisance();
+  /// others. Of all, or as many as SharesOfScreen() says.
+  absl::StatusOr<std::vector<Eigen::VectorXd>> MeasureNuisance(
+      const std::vector<std::string>& without);
 
   /// Model evaluations that MeasureNuisance() and MeasureSignatures() take together.
   std::int64_t Planned(const std::vector<std::string>& without) const;
 
-  /// One signature of each effect that the fitted tests can show, of as many runs as SharesOfRuns()
-  /// says. `without` take no part. The first strength is the catalogue's; the second is that of
-  /// SecondStep(), or as a user's effect says.
+  /// The readings that signatures are about, ascending: all, or where SharesOfScreen() says so those
+  /// of ScreenedPart().
+  std::vector<Eigen::Index> Readings(const std::vector<std::string>& without) const;
+
+  /// What is left out to keep within the cap, in a sentence; empty: nothing.
+  std::string WhatIsLeftOut(const std::vector<std::string>& without) const;
+
+  /// One signature of each effect that the fitted tests can show, of as many runs as
+  /// SharesOfScreen() says and over Readings(). `without` take no part. The first strength is the
+  /// catalogue's; the second is that of SecondStep(), or as a user's effect says.
   absl::StatusOr<std::vector<inference::Signature>> MeasureSignatures(
       const std::vector<std::string>& without, const SquareOfDifference& square_of);
 
@@ -68,7 +92,8 @@ class EffectScreen {
   }
   std::int64_t evaluations() const { return evaluations_; }
 
-  /// A run with an effect: everything that its parameters are set to, SI, and its history.
+  /// A run with an effect in all fitted experiments: everything that its parameters are set to, SI,
+  /// and its history.
   struct EffectRun {
     std::map<std::string, double> values;
     Eigen::VectorXd history;
@@ -93,12 +118,20 @@ class EffectScreen {
   static std::vector<Step> StepsOf(const dem::EffectInfo& effect, std::size_t rows);
   std::string WhyNotExcitable(const dem::EffectInfo& effect) const;
   /// reasons: of those that are not, added where it is not nullptr.
-  std::vector<const dem::EffectInfo*> Excitable(
-      const std::vector<std::string>& without,
-      std::vector<std::pair<std::string, std::string>>* reasons) const;
+  using Reasons = std::vector<std::pair<std::string, std::string>>;
+  std::vector<const dem::EffectInfo*> Excitable(const std::vector<std::string>& without,
+                                                Reasons* reasons) const;
   /// Of the run that comes closest; each with what it changes.
   std::vector<campaign::Derivation> NumericalChanges() const;
-  std::vector<std::size_t> RunsOfEach(const std::vector<const dem::EffectInfo*>& effects) const;
+  // What is run, and on what.
+  struct Plan {
+    std::vector<const dem::EffectInfo*> effects;
+    ScreenShares shares;
+    campaign::Campaign part;  ///< as ScreenedPart()
+  };
+  Plan PlanOf(const std::vector<std::string>& without, Reasons* reasons) const;
+  std::vector<Eigen::Index> ReadingsOf(const campaign::Campaign& part) const;
+  std::vector<campaign::YamlNode> EntriesOf(const campaign::Campaign& part) const;
   bool IsCalculated(const dem::EffectInfo& effect) const;
   void Calculate(const dem::EffectInfo& effect, const std::vector<Eigen::Index>& runs,
                  inference::Signature& signature);
@@ -108,6 +141,8 @@ class EffectScreen {
             int stream, inference::Signature& signature);
 
   const FittedCampaign& base_;
+  std::vector<Eigen::Index> readings_;       // as Readings()
+  std::vector<campaign::YamlNode> entries_;  // experiments of the runs; none: all that are fitted
   std::map<std::string, std::vector<Step>> tried_;
   std::map<std::string, std::vector<EffectRun>> runs_with_;
   std::map<std::string, std::string> diverged_;  // by effect: why its last run did

@@ -11,7 +11,7 @@
 namespace calib::diagnosis {
 namespace {
 
-constexpr double kClearlyCloser = 0.64;  // of the base model's chi-squared
+constexpr double kClearlyCloser = 0.64;  // of another model's chi-squared
 constexpr double kClearlyLess = 0.25;    // of the misfit explained
 constexpr double kFarOff = 4;            // times the chi-squared of the best: twice its rms
 constexpr std::size_t kMostNames = 3;
@@ -81,20 +81,21 @@ bool Verdict::IsFarOff(const CandidateEffect& other, const CandidateEffect& firs
              kFarOff * std::max(best.chi2_after[batches - 1], best.adequacy.degrees);
 }
 
-// Beaten, at its end or with the evidence against it. One that was never judged, or never found,
-// has no end: the screen knows more of it. A fit that was made without runs has no evidence and
-// needs none: all its points are known.
+// Beaten clearly, at its end or with the evidence against it. One that was never judged, or never
+// found, has no end: the screen knows more of it. A fit that was made without runs has no evidence
+// and needs none: all its points are known. Of one that does not explain the readings a fall of
+// chi-squared says it too: on two sides of a level two fits can be next to each other.
 bool Verdict::Excluded(const CandidateEffect& other, const CandidateEffect& first) const {
   const WarmFit& best = *Find(first.effect);
   const WarmFit& fit = *Find(other.effect);
   const bool outweighed = EvidenceFavours(best.evidence, fit.evidence);
-  if (!Explains(other)) {
-    const bool ended = fit.stalled && fit.Judged() && fit.Found();
-    return ended || outweighed || IsFarOff(other, first);
-  }
-  return ClearlyBetter(best, fit, base_.covariance) &&
-         (outweighed || fit.runs.histories.rows() == 0);
+  const bool beaten = ClearlyBetter(best, fit, base_.covariance);
+  if (Explains(other)) return beaten && (outweighed || fit.runs.histories.rows() == 0);
+  const bool fell_behind = best.adequacy.chi2 < kClearlyCloser * fit.adequacy.chi2;
+  return (Ended(fit) && (beaten || fell_behind)) || outweighed || IsFarOff(other, first);
 }
+
+bool Verdict::Ended(const WarmFit& fit) { return fit.stalled && fit.Judged() && fit.Found(); }
 
 // To the screen, clearly.
 bool Verdict::PromisesLess(const CandidateEffect& other, const CandidateEffect& first) {
@@ -140,7 +141,7 @@ void Verdict::Conclude(bool base_fits) {
       continue;
     }
     if (fit == &best || Excluded(other, first)) continue;
-    if (Explains(other)) {
+    if (Explains(other) || Ended(*fit)) {
       as_good.emplace_back(fit->adequacy.chi2, other.effect);
     } else {
       unknown.push_back(&other);

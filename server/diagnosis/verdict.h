@@ -32,6 +32,7 @@ class Verdict {
   bool Settles(const WarmFit& fit) const;
   bool Excluded(const CandidateEffect& other, const CandidateEffect& first) const;
   bool IsFarOff(const CandidateEffect& other, const CandidateEffect& first) const;
+  static bool Ended(const WarmFit& fit);
   static bool PromisesLess(const CandidateEffect& other, const CandidateEffect& first);
   double Chi2OfDouble(const std::string& other, const CandidateEffect& first) const;
   bool WorseLeftOut(const WarmFit& fit) const;

@@ -32,6 +32,17 @@ TEST(DiagnosisText, ThreePackingsMakeNoModelAdequate) {
   EXPECT_THAT(DiagnosisText(diagnosis), Not(HasSubstr("packings tell")));
 }
 
+TEST(DiagnosisText, WhatRestsOnWrongErrorsIsSaidWithDoubt) {
+  diagnosis::Diagnosis diagnosis;
+  diagnosis.verdict = "missing_effect";
+  diagnosis.effect = "rolling_resistance";
+  diagnosis.candidates = {{.effect = "rolling_resistance"}};
+  EXPECT_THAT(DiagnosisText(diagnosis), Not(HasSubstr("for what the warnings say")));
+  diagnosis.in_doubt = true;
+  EXPECT_THAT(DiagnosisText(diagnosis), HasSubstr("for what the warnings say of the readings"));
+  EXPECT_THAT(DiagnosisJson(diagnosis), HasSubstr("\"in_doubt\": true"));
+}
+
 TEST(DiagnosisText, ARefitThatIsFurtherOffThanItsOwnBaseModelHasFoundNothing) {
   diagnosis::Diagnosis diagnosis;
   diagnosis.verdict = "unexplained";

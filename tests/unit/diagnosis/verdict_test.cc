@@ -114,6 +114,22 @@ TEST_F(VerdictTest, TwoThatDoAsWellAreNamedTogether) {
   EXPECT_EQ(Group(), Names{"twisting"});
 }
 
+// On two sides of the level, and nearer to each other than chance: half of the readings are closer
+// to the one, half to the other.
+TEST_F(VerdictTest, ARefitJustBeyondTheLevelIsNotClearlyWorse) {
+  Refit("rolling", 60);
+  WarmFit& twisting = Refit("twisting", 64);
+  Eigen::VectorXd residuals = Eigen::VectorXd::Constant(kReadings, std::sqrt(1.0 / kReadings));
+  for (int k = 0; k < kReadings; ++k) residuals(k) *= std::sqrt(64.0) * (k % 2 == 0 ? 0.4 : 1.357);
+  twisting.model.histories = residuals.transpose();
+  twisting.adequacy = *inference::TestAdequacy(twisting.model);
+  ASSERT_LT(twisting.adequacy.p_value, kLevel);
+  ASSERT_GT(fits_["rolling"].adequacy.p_value, kLevel);
+  EXPECT_EQ(Concluded(), "ambiguous");
+  EXPECT_EQ(Group(), Names{"twisting"});
+  EXPECT_EQ(diagnosis_.unfinished, Names{}) << "it has come to its end";
+}
+
 TEST_F(VerdictTest, NoMoreThanThreeAreNamed) {
   for (const char* name : {"a", "b", "c", "d"}) Refit(name, kClose);
   EXPECT_EQ(Concluded(), "ambiguous");
