@@ -43,6 +43,14 @@ Eigen::MatrixXd Candidates(const ResponseSurfaceOptions& options,
   return candidates;
 }
 
+// The given points, then those of the hypercube.
+Eigen::MatrixXd Joined(const Eigen::MatrixXd& first, const Eigen::MatrixXd& hypercube) {
+  Eigen::MatrixXd design(first.rows() + hypercube.rows(), hypercube.cols());
+  if (first.rows() > 0) design.topRows(first.rows()) = first;
+  design.bottomRows(hypercube.rows()) = hypercube;
+  return design;
+}
+
 // Uniform draws in the place of design points that are not admissible.
 absl::Status ReplaceInadmissible(const ResponseSurfaceOptions& options, Eigen::MatrixXd& design) {
   constexpr int kTries = 1'000'000;
@@ -127,6 +135,19 @@ absl::Status ResponseSurfaceOptions::Validate() const {
     return wrong("initial_points", initial_points,
                  absl::StrCat(2 * dimensions + 1, " or more, or 0"));
   }
+  if (first_points.rows() > 0) {
+    const Index most = InitialPoints(*this) - 2;
+    if (first_points.rows() > most) {
+      return wrong("the number of first points", static_cast<double>(first_points.rows()),
+                   absl::StrCat("0 to ", most));
+    }
+    if (first_points.cols() != dimensions) {
+      return wrong("the length of a first point", static_cast<double>(first_points.cols()),
+                   absl::StrCat(dimensions));
+    }
+    if (!(first_points.minCoeff() >= 0 && first_points.maxCoeff() <= 1))
+      return absl::InvalidArgumentError("surrogate_msrs: a first point lies outside the cube.");
+  }
   if (max_evaluations < 2 * dimensions + 1) {
     return wrong("max_evaluations", max_evaluations, absl::StrCat(2 * dimensions + 1, " or more"));
   }
@@ -149,7 +170,8 @@ absl::Status ResponseSurfaceOptions::Validate() const {
 
 absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceOptions& options) {
   if (auto valid = options.Validate(); !valid.ok()) return valid;
-  LatinHypercubeOptions design{.points = InitialPoints(options),
+  const auto first = static_cast<int>(options.first_points.rows());
+  LatinHypercubeOptions design{.points = InitialPoints(options) - first,
                                .dimensions = options.dimensions,
                                .symmetric = true,
                                .candidates = 1000,
@@ -161,7 +183,7 @@ absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceO
   for (int i = 0; i < kTries; ++i) {
     auto points = LatinHypercube(design);
     if (!points.ok()) return points.status();
-    state.design = *std::move(points);
+    state.design = Joined(options.first_points, *points);
     if (auto replaced = ReplaceInadmissible(options, state.design); !replaced.ok()) return replaced;
     if (SpansLinearFunctions(state.design)) return state;
     ++design.seed;

@@ -18,10 +18,13 @@ namespace calib::inference {
 
 /// Defaults of [Samuelsson 2023, Table 4.2].
 struct ResponseSurfaceOptions {
-  int dimensions = 0;           ///< d >= 1; the unit cube is searched
-  int max_evaluations = 40;     ///< N_max, all dispatched runs together
-  int workers = 1;              ///< P >= 1
-  int initial_points = 0;       ///< of the symmetric Latin hypercube, >= 2 d + 1; 0: 2 d + 1 + P
+  int dimensions = 0;        ///< d >= 1; the unit cube is searched
+  int max_evaluations = 40;  ///< N_max, all dispatched runs together
+  int workers = 1;           ///< P >= 1
+  int initial_points = 0;    ///< of the design, >= 2 d + 1; 0: 2 d + 1 + P
+  /// The first points of the design, m x d in the unit cube; they leave at least two of the
+  /// symmetric Latin hypercube, which has as many fewer. 0 x 0: it is the design.
+  Eigen::MatrixXd first_points = {};
   int candidates = 0;           ///< t per proposal; 0: 100 d
   double max_step = 0.2;        ///< sigma_max, the first step size, (0, 1]
   double min_step = 0.2 / 64;   ///< sigma_min, (0, max_step]
@@ -70,8 +73,8 @@ struct ResponseSurfaceState {
   int best = -1;                        ///< index of the smallest value, -1: none yet
 };
 
-/// Symmetric Latin hypercube, the maximin one of 1000 that spans the linear tail; points that are
-/// not admissible are replaced by uniform draws that are.
+/// The first points and a symmetric Latin hypercube, the maximin one of 1000, that span the linear
+/// tail together; points that are not admissible are replaced by uniform draws that are.
 /// Errors: INVALID_ARGUMENT from Validate; FAILED_PRECONDITION when next to nothing is admissible.
 absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceOptions& options);
 

@@ -16,7 +16,7 @@ using Eigen::Index;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Stage 0 holds the prior draws; step 0 of a later stage is its resampling.
+// Stage 0 holds the draws from the prior; step 0 of a later stage is its resampling.
 PhiloxStream Stream(const TmcmcOptions& options, std::size_t stage, int step, Index row) {
   return PhiloxStream(
       {.seed = options.seed,
@@ -25,14 +25,28 @@ PhiloxStream Stream(const TmcmcOptions& options, std::size_t stage, int step, In
        .sample = static_cast<std::uint64_t>(row)});
 }
 
+bool BeginsAtPrior(const TmcmcOptions& options) {
+  return options.first.components.empty() || options.first.defensive_share == 1;
+}
+
+// ln (prior / q) of each row; -inf outside the support, unless q is the prior.
+Eigen::VectorXd ImportanceOf(const JointPrior& priors, const TmcmcOptions& options,
+                             const Eigen::MatrixXd& rows) {
+  if (BeginsAtPrior(options)) return Eigen::VectorXd::Zero(rows.rows());
+  const Iteration drawn{
+      .proposal = options.first, .parameters = rows, .predictions = {}, .log_proposal = {}};
+  return LogImportance(priors, {&drawn, 1});
+}
+
 // Draws the proposals of the next Metropolis step and the likelihood each must exceed:
-//   accept if ln u < exponent (L' - L) + (P' - P).
+//   accept if ln u < exponent (L' - L) + (P' - P) - (1 - exponent) (R' - R),  R = ln (prior / q).
 void Propose(const JointPrior& priors, const TmcmcOptions& options, TmcmcState& state) {
   const Index n = state.samples.rows();
   const Index d = state.samples.cols();
   state.proposals.resize(n, d);
   state.accept_above.resize(n);
   Eigen::VectorXd normal(d);
+  Eigen::VectorXd log_u(n);
   for (Index i = 0; i < n; ++i) {
     PhiloxStream stream = Stream(options, state.stages.size(), state.step + 1, i);
     for (double& z : normal) z = stream.Normal();
@@ -41,22 +55,31 @@ void Propose(const JointPrior& priors, const TmcmcOptions& options, TmcmcState& 
       const Prior& prior = priors[static_cast<std::size_t>(j)];
       state.proposals(i, j) = prior.FromStandard(prior.ToStandard(state.samples(i, j)) + jump[j]);
     }
+    log_u[i] = std::log(stream.Uniform());
+  }
+  const Eigen::VectorXd log_importance = ImportanceOf(priors, options, state.proposals);
+  for (Index i = 0; i < n; ++i) {
     const double log_prior = priors.LogStandardDensity(state.proposals.row(i));
-    const double log_u = std::log(stream.Uniform());
-    state.accept_above[i] =
-        log_prior == -kInfinity
-            ? kInfinity
-            : state.log_likelihood[i] + (log_u - (log_prior - state.log_prior[i])) / state.exponent;
+    if (log_prior == -kInfinity) {
+      state.accept_above[i] = kInfinity;
+      continue;
+    }
+    const double log_ratio = log_prior - state.log_prior[i] -
+                             (1 - state.exponent) * (log_importance[i] - state.log_importance[i]);
+    state.accept_above[i] = state.log_likelihood[i] + (log_u[i] - log_ratio) / state.exponent;
   }
 }
 
-void Accept(const JointPrior& priors, const Eigen::VectorXd& log_likelihood, TmcmcState& state) {
+void Accept(const JointPrior& priors, const TmcmcOptions& options,
+            const Eigen::VectorXd& log_likelihood, TmcmcState& state) {
+  const Eigen::VectorXd log_importance = ImportanceOf(priors, options, state.proposals);
   int accepted = 0;
   for (Index i = 0; i < state.samples.rows(); ++i) {
     if (!(log_likelihood[i] > state.accept_above[i])) continue;
     state.samples.row(i) = state.proposals.row(i);
     state.log_likelihood[i] = log_likelihood[i];
     state.log_prior[i] = priors.LogStandardDensity(state.samples.row(i));
+    state.log_importance[i] = log_importance[i];
     state.origin[static_cast<std::size_t>(i)] = state.evaluated + i;
     ++accepted;
   }
@@ -90,7 +113,8 @@ absl::Status BeginStage(const JointPrior& priors, const TmcmcOptions& options, T
         " stages allowed: allow more, or widen the stated errors of the readings."));
   }
   const Index n = state.samples.rows();
-  const TemperingStep next = NextExponent(state.log_likelihood, state.exponent, options.target_cv);
+  const TemperingStep next =
+      NextExponent(state.log_likelihood + state.log_importance, state.exponent, options.target_cv);
   Eigen::MatrixXd standard(n, state.samples.cols());
   for (Index j = 0; j < standard.cols(); ++j) {
     for (Index i = 0; i < n; ++i) {
@@ -113,6 +137,7 @@ absl::Status BeginStage(const JointPrior& priors, const TmcmcOptions& options, T
     const Index parent = std::min<Index>(found, n - 1);
     state.samples.row(i) = before.samples.row(parent);
     state.log_prior[i] = before.log_prior[parent];
+    state.log_importance[i] = before.log_importance[parent];
     state.log_likelihood[i] = before.log_likelihood[parent];
     state.ancestor[i] = before.ancestor[parent];
     state.origin[i] = before.origin[parent];
@@ -135,6 +160,10 @@ absl::Status TmcmcOptions::Validate() const {
   if (!(acceptance > 0 && acceptance < 1))
     return wrong("acceptance", acceptance, "between 0 and 1");
   if (max_stages < 1) return wrong("max_stages", max_stages, "1 or more");
+  if (!(first.defensive_share >= 0 && first.defensive_share <= 1))
+    return wrong("the prior's share of the first proposal", first.defensive_share, "0 to 1");
+  if (!first.frozen.empty())
+    return absl::InvalidArgumentError("tmcmc: the first proposal must not hold any parameter.");
   return absl::OkStatus();
 }
 
@@ -162,10 +191,16 @@ absl::StatusOr<TmcmcState> StartTmcmc(const JointPrior& priors, const TmcmcOptio
   if (priors.empty()) return absl::InvalidArgumentError("tmcmc: there is no parameter to sample.");
   if (auto valid = priors.Validate(); !valid.ok()) return valid;
   TmcmcState state;
-  state.proposals.resize(options.samples, static_cast<Index>(priors.size()));
-  for (Index i = 0; i < state.proposals.rows(); ++i) {
-    PhiloxStream stream = Stream(options, 0, 0, i);
-    state.proposals.row(i) = priors.Draw(stream);
+  if (BeginsAtPrior(options)) {
+    state.proposals.resize(options.samples, static_cast<Index>(priors.size()));
+    for (Index i = 0; i < state.proposals.rows(); ++i) {
+      PhiloxStream stream = Stream(options, 0, 0, i);
+      state.proposals.row(i) = priors.Draw(stream);
+    }
+  } else {
+    auto drawn = DrawSamples(options.first, priors, {.seed = options.seed}, 0, options.samples);
+    if (!drawn.ok()) return drawn.status();
+    state.proposals = *std::move(drawn);
   }
   state.accept_above = Eigen::VectorXd::Constant(options.samples, -kInfinity);
   state.scale = FirstScale(priors.size());
@@ -190,13 +225,14 @@ absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
     if ((finite.array() > -kInfinity).count() < 2) {
       return absl::FailedPreconditionError(
           absl::StrCat("tmcmc: fewer than two of ", n,
-                       " draws from the prior have a likelihood, all others did not come to their "
-                       "ends; `calibctl samples` says why each ended: narrow the priors to where "
-                       "the model runs."));
+                       BeginsAtPrior(options) ? " draws from the prior" : " first draws",
+                       " have a likelihood, all others did not come to their ends; `calibctl "
+                       "samples` says why each ended: narrow the priors to where the model runs."));
     }
     next.samples = next.proposals;
     next.log_likelihood = finite;
     next.log_prior.resize(n);
+    next.log_importance = ImportanceOf(priors, options, next.samples);
     next.ancestor.resize(static_cast<std::size_t>(n));
     next.origin.resize(static_cast<std::size_t>(n));
     for (Index i = 0; i < n; ++i) {
@@ -206,7 +242,7 @@ absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
     }
   } else {
     const int before = next.accepted;
-    Accept(priors, finite, next);
+    Accept(priors, options, finite, next);
     next.scale = NextScale(next.scale, priors.size(),
                            (next.accepted - before) / static_cast<double>(n), options.acceptance);
   }

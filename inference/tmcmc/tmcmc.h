@@ -1,8 +1,10 @@
 #pragma once
 // Transitional Markov chain Monte Carlo [Ching & Chen 2007; Hadjidoukas 2014, sec. 3.1]: a
 // population is carried from the prior to the posterior through prior x likelihood^exponent,
-// exponent from 0 to 1, and leaves the evidence behind. Where we depart from the papers (steps per
-// stage, spread of the weights, standard error): README.md of this folder.
+// exponent from 0 to 1, and leaves the evidence behind. From another density q it goes through
+//   q^(1 - exponent) (prior x likelihood)^exponent,
+// to the same posterior and evidence. Where we depart from the papers (steps per stage, spread of
+// the weights, standard error): README.md of this folder.
 
 #include <Eigen/Dense>
 #include <cstdint>
@@ -13,6 +15,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "inference/filter/iterative_filter.h"
 #include "inference/prior/joint_prior.h"
 
 namespace calib::inference {
@@ -26,6 +29,8 @@ struct TmcmcOptions {
       0.3;  ///< share of accepted steps that the proposal's scale is steered to, (0, 1)
   int max_stages = 200;  ///< >= 1
   std::uint64_t seed = 0;
+  /// q: the prior where it has no mixture or is the prior by all of its share. Holds no parameter.
+  Proposal first = {};
   absl::Status Validate() const;
 };
 
@@ -46,8 +51,9 @@ struct TmcmcStage {
 struct TmcmcState {
   Eigen::MatrixXd samples;         ///< N x d, at `exponent`; empty before the first advance
   Eigen::VectorXd log_prior;       ///< N, in standardised coordinates
+  Eigen::VectorXd log_importance;  ///< N: ln (prior / q), 0 where it began at the prior
   Eigen::VectorXd log_likelihood;  ///< N; -inf: diverged
-  std::vector<int> ancestor;       ///< N: index of the prior draw each sample descends from
+  std::vector<int> ancestor;       ///< N: index of the first draw each sample descends from
   /// N: the evaluation that each sample is, all proposals of all batches counted in order from 0.
   std::vector<std::int64_t> origin;
   std::int64_t evaluated = 0;  ///< proposals taken so far
@@ -69,23 +75,23 @@ struct TmcmcState {
 
   bool finished() const { return exponent == 1 && proposals.rows() == 0; }
   /// Standard error of log_evidence: the variance of the product of mean weights is estimated from
-  /// how many of the samples share an ancestor among the prior draws [Lee & Whiteley 2018, Eq. 8],
+  /// how many of the samples share an ancestor among the first draws [Lee & Whiteley 2018, Eq. 8],
   ///   V = 1 - (N / (N - 1))^(n + 1) (1 - sum_e (n_e / N)^2),  n stages, n_e descendants of draw e,
   /// which needs no independence within a stage, and not less than sum cv^2 / N, its value for
   /// perfect mixing.
   double LogEvidenceStandardError() const;
 };
 
-/// N draws from the prior as first proposals. Every random number is a function of (seed, stage,
-/// step, row): neither the order in which likelihoods arrive nor the number of workers matters.
-/// Errors: INVALID_ARGUMENT (options, a prior, no parameter).
+/// N draws from the prior, or from q, as first proposals. Every random number is a function of
+/// (seed, stage, step, row): neither the order in which likelihoods arrive nor the number of workers
+/// matters. Errors: INVALID_ARGUMENT (options, a prior, no parameter); those of DrawSamples.
 absl::StatusOr<TmcmcState> StartTmcmc(const JointPrior& priors, const TmcmcOptions& options);
 
 /// Takes ln p(data | proposals), N entries in the order of state.proposals (NaN counts as -inf: a
 /// diverged run), and prepares the next batch; one call per Metropolis step. Finished when
 /// state.finished(): the samples are equally weighted draws from the posterior. Errors:
 /// INVALID_ARGUMENT for a wrong number of entries or +inf; FAILED_PRECONDITION when fewer than two
-/// prior draws have a likelihood, or after max_stages. The state is unchanged then.
+/// first draws have a likelihood, or after max_stages. The state is unchanged then.
 absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
                           const Eigen::VectorXd& log_likelihood, TmcmcState& state);
 

@@ -1,5 +1,6 @@
-// surrogate_msrs: a symmetric Latin hypercube, then points chosen one by one on a response surface
-// of the misfit while those before are under way, `in_flight` of them at most.
+// surrogate_msrs: a symmetric Latin hypercube, behind points of the first proposal where there is
+// one, then points chosen one by one on a response surface of the misfit while those before are
+// under way, `in_flight` of them at most.
 //
 // Reproducibly, point k is chosen by the results of all points up to k - in_flight, those between
 // pending even if their results are there: the same points for any number of workers and any order
@@ -14,6 +15,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/prior/standard_normal.h"
 #include "inference/surrogate/expected_improvement.h"
 #include "inference/surrogate/response_surface.h"
 #include "server/scheduler/method.h"
@@ -46,6 +48,20 @@ Eigen::VectorXd FromUnit(const inference::JointPrior& priors, const Eigen::Vecto
   return x;
 }
 
+/// The point of the unit cube that FromUnit() takes to x, which lies in the support of the priors.
+Eigen::VectorXd ToUnit(const inference::JointPrior& priors, const Eigen::VectorXd& x) {
+  constexpr double kFarthest = 8.2;  // Phi^-1(1 - 1e-16); a bound itself has an infinite score
+  Eigen::VectorXd z(x.size());
+  for (Eigen::Index j = 0; j < x.size(); ++j) {
+    z(j) = priors[static_cast<std::size_t>(j)].NormalScore(x(j));
+  }
+  if (!priors.is_independent()) {
+    z = z.cwiseMax(-kFarthest).cwiseMin(kFarthest).eval();
+    priors.correlation().llt().matrixL().solveInPlace(z);
+  }
+  return z.unaryExpr([](double score) { return std::exp(inference::LogNormalCdf(score)); });
+}
+
 class SurrogateMethod final : public Method {
  public:
   explicit SurrogateMethod(const Definition& definition)
@@ -64,7 +80,13 @@ class SurrogateMethod final : public Method {
   }
 
   absl::StatusOr<Batch> First() const override {
-    auto state = inference::StartResponseSurface(options_);
+    auto first = FirstPoints();
+    if (!first.ok()) {
+      return first.status();
+    }
+    inference::ResponseSurfaceOptions options = options_;
+    options.first_points = *std::move(first);
+    auto state = inference::StartResponseSurface(options);
     if (!state.ok()) {
       return state.status();
     }
@@ -180,6 +202,44 @@ class SurrogateMethod final : public Method {
   int MostEvaluations() const {
     const auto most = static_cast<std::int64_t>(campaign_.samples) * campaign_.max_iterations;
     return static_cast<int>(std::min<std::int64_t>(most, std::numeric_limits<int>::max()));
+  }
+
+  /// The share of the design that the first proposal does not leave to the prior: its centre, which
+  /// is a run that is known to come close where there is one, and draws. None where it names no
+  /// parameter; two points at least stay of the hypercube, which is none with fewer.
+  absl::StatusOr<Eigen::MatrixXd> FirstPoints() const {
+    constexpr int kFewest = 2;
+    inference::Proposal proposal = campaign::FirstProposalOf(campaign_);
+    const auto spread = static_cast<int>(std::lround(proposal.defensive_share * campaign_.samples));
+    const int points = campaign_.samples - std::max(kFewest, spread);
+    if (!campaign_.first_proposal || campaign_.first_proposal->places.empty() || points < 1) {
+      return Eigen::MatrixXd{};
+    }
+    proposal.defensive_share = 0;
+    auto drawn = inference::DrawSamples(proposal, definition_.priors, campaign_.filter, 0, points);
+    if (!drawn.ok()) {
+      return drawn;
+    }
+    if (const Eigen::VectorXd center = Center(); definition_.priors.InSupport(center)) {
+      drawn->row(0) = center;
+    }
+    Eigen::MatrixXd unit(drawn->rows(), drawn->cols());
+    for (Eigen::Index i = 0; i < unit.rows(); ++i) {
+      unit.row(i) = ToUnit(definition_.priors, drawn->row(i));
+    }
+    return unit;
+  }
+
+  /// Of the first proposal; of parameters that it does not name, their prior's.
+  Eigen::VectorXd Center() const {
+    Eigen::VectorXd center(options_.dimensions);
+    for (std::size_t j = 0; j < campaign_.parameters.size(); ++j) {
+      const auto& places = campaign_.first_proposal->places;
+      const auto place = places.find(campaign_.parameters[j].name);
+      center(static_cast<Eigen::Index>(j)) =
+          place != places.end() ? place->second.center : definition_.priors[j].FromStandard(0);
+    }
+    return center;
   }
 
   /// unit: all points of the iteration; those from row `there` on are new.

@@ -39,6 +39,7 @@ class TmcmcMethod final : public Method {
     options_.samples = definition.campaign.samples;
     options_.seed = definition.campaign.seed;
     options_.max_stages = std::numeric_limits<int>::max();  // the cap is looked at here
+    options_.first = campaign::FirstProposalOf(definition.campaign);
   }
 
   absl::StatusOr<Batch> First() const override {
@@ -46,7 +47,9 @@ class TmcmcMethod final : public Method {
     if (!state.ok()) {
       return state.status();
     }
-    return NextBatch(*state);
+    Batch batch = NextBatch(*state);
+    batch.proposal = ProposalToJson(options_.first);
+    return batch;
   }
 
   absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const override {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "inference/sampling/halton.h"
+#include "inference/sampling/latin_hypercube.h"
 #include "inference/surrogate/cubic_rbf.h"
 #include "inference/surrogate/merit.h"
 #include "inference/surrogate/response_surface.h"
@@ -85,6 +86,24 @@ TEST(ResponseSurface, FirstDispatchesTheDesignThenWaits) {
   for (int i = 0; i < 5; ++i)
     ASSERT_TRUE(Report(options, i, Bowl(state->design.row(i)), *state).ok());
   EXPECT_TRUE(NextPoint(options, *state, surrogate).has_value());  // the other P still run
+}
+
+TEST(ResponseSurface, TheDesignIsAHypercubeBehindThePointsThatAreGiven) {
+  const auto hypercube = [](int points) {
+    return LatinHypercube(
+        {.points = points, .dimensions = 2, .symmetric = true, .candidates = 1000, .seed = 3});
+  };
+  const auto plain = StartResponseSurface({.dimensions = 2, .initial_points = 10, .seed = 3});
+  ASSERT_TRUE(plain.ok());
+  EXPECT_EQ(plain->design, *hypercube(10));
+  Eigen::MatrixXd given(4, 2);
+  given << 0.7, 0.2, 0.71, 0.2, 0.7, 0.21, 1, 0;
+  const auto joined = StartResponseSurface(
+      {.dimensions = 2, .initial_points = 10, .first_points = given, .seed = 3});
+  ASSERT_TRUE(joined.ok());
+  ASSERT_EQ(joined->design.rows(), 10);
+  EXPECT_EQ(joined->design.topRows(4), given);
+  EXPECT_EQ(joined->design.bottomRows(6), *hypercube(6));
 }
 
 TEST(ResponseSurface, StepDoublesAfterSuccessesAndHalvesAfterFailures) {
@@ -176,6 +195,13 @@ TEST(ResponseSurface, SaysWhatIsWrong) {
   EXPECT_FALSE(StartResponseSurface({.dimensions = 3, .max_evaluations = 5}).ok());
   EXPECT_FALSE(StartResponseSurface({.dimensions = 2, .weights = {}}).ok());
   EXPECT_FALSE(StartResponseSurface({.dimensions = 2, .min_step = 0.5}).ok());
+  const auto behind = [](const Eigen::MatrixXd& given) {
+    return StartResponseSurface({.dimensions = 2, .initial_points = 6, .first_points = given});
+  };
+  EXPECT_TRUE(behind(Halton(4, 2)).ok());
+  EXPECT_FALSE(behind(Halton(5, 2)).ok()) << "one point is no hypercube";
+  EXPECT_FALSE(behind(Halton(4, 3)).ok());
+  EXPECT_FALSE(behind(2 * Halton(4, 2)).ok());
   const ResponseSurfaceOptions options{.dimensions = 2};
   auto state = StartResponseSurface(options);
   ASSERT_TRUE(state.ok());

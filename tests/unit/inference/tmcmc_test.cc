@@ -4,6 +4,9 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <optional>
+#include <tuple>
 #include <vector>
 
 #include "inference/tmcmc/tempering_step.h"
@@ -28,6 +31,17 @@ Eigen::VectorXd PeakOfRows(const Eigen::MatrixXd& rows) {
   Eigen::VectorXd result(rows.rows());
   for (Eigen::Index i = 0; i < rows.rows(); ++i) result[i] = Peak(rows(i, 0), rows(i, 1));
   return result;
+}
+
+// One normal in standardised coordinates, cut off at the square, and a share of the prior.
+Proposal About(const JointPrior& priors, double x, double y, double sd, double prior_share) {
+  Proposal proposal;
+  proposal.components.push_back({.weight = 1,
+                                 .mean = priors.ToStandard(Eigen::Vector2d(x, y)),
+                                 .covariance = sd * sd * Eigen::Matrix2d::Identity()});
+  proposal.defensive_share = prior_share;
+  proposal.log_acceptance = LogMassInSupport(proposal.components, priors);
+  return proposal;
 }
 
 TEST(TemperingStep, ReachesTheVariationWanted) {
@@ -126,6 +140,70 @@ TEST(Tmcmc, ThresholdsOfAcceptanceAreExact) {
   EXPECT_EQ(state->log_evidence, whole->log_evidence);
 }
 
+// The peak of PeakOfRows lies within the square up to 1e-4 of its mass. q: on the peak, far from it
+// and cut off by two sides of the square, far from it without a share of the prior.
+TEST(Tmcmc, FromAnotherDensityToTheSamePosteriorAndEvidence) {
+  const JointPrior priors = UnitSquare();
+  const double evidence = std::log(2 * std::numbers::pi * 0.05 * 0.1);
+  const auto from_prior = RunTmcmc(priors, {.samples = 1000, .seed = 1}, PeakOfRows);
+  ASSERT_TRUE(from_prior.ok());
+  for (const Proposal& q : {About(priors, 0.3, 0.6, 0.3, 0.5), About(priors, 0.95, 0.05, 0.3, 0.5),
+                            About(priors, 0.95, 0.05, 0.3, 0.01), About(priors, 0.8, 0.2, 1, 0)}) {
+    for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+      const auto state = RunTmcmc(priors, {.samples = 1000, .seed = seed, .first = q}, PeakOfRows);
+      ASSERT_TRUE(state.ok()) << state.status();
+      // Four standard errors of as many independent draws as every tenth is; log_acceptance is
+      // known to 1e-3.
+      const double few = 4 / std::sqrt(100.0);
+      EXPECT_NEAR(state->log_evidence, evidence, 4 * state->LogEvidenceStandardError() + 2e-3);
+      EXPECT_LT(state->LogEvidenceStandardError(), 0.2);
+      for (const auto& [j, mean, sd] : {std::tuple{0, 0.3, 0.05}, std::tuple{1, 0.6, 0.1}}) {
+        const Eigen::ArrayXd x = state->samples.col(j);
+        EXPECT_NEAR(x.mean(), mean, few * sd);
+        EXPECT_NEAR(std::sqrt((x - x.mean()).square().mean()), sd, few * sd / std::sqrt(2.0));
+      }
+    }
+  }
+  const auto on_the_peak = RunTmcmc(
+      priors, {.samples = 1000, .seed = 1, .first = About(priors, 0.3, 0.6, 0.3, 0.5)}, PeakOfRows);
+  ASSERT_TRUE(on_the_peak.ok());
+  EXPECT_LT(on_the_peak->stages.size(), from_prior->stages.size()) << "a shorter way";
+}
+
+TEST(Tmcmc, FromThePriorAsAFirstProposalTheBitsAreThoseOfThePrior) {
+  const JointPrior priors = UnitSquare();
+  const auto plain = RunTmcmc(priors, {.samples = 200, .seed = 5}, PeakOfRows);
+  const auto all_prior = RunTmcmc(
+      priors, {.samples = 200, .seed = 5, .first = About(priors, 0.9, 0.1, 0.1, 1)}, PeakOfRows);
+  ASSERT_TRUE(plain.ok() && all_prior.ok());
+  EXPECT_EQ(all_prior->samples, plain->samples);
+  EXPECT_EQ(all_prior->log_likelihood, plain->log_likelihood);
+  EXPECT_EQ(all_prior->origin, plain->origin);
+  EXPECT_EQ(all_prior->log_evidence, plain->log_evidence);
+  EXPECT_TRUE((plain->log_importance.array() == 0).all());
+}
+
+TEST(Tmcmc, FromAnotherDensityItGoesOnFromACopyAndStopsExactly) {
+  const JointPrior priors = UnitSquare();
+  const TmcmcOptions options{
+      .samples = 100, .steps = 3, .seed = 1, .first = About(priors, 0.5, 0.5, 0.3, 0.5)};
+  const auto whole = RunTmcmc(priors, options, PeakOfRows);
+  ASSERT_TRUE(whole.ok());
+  auto state = StartTmcmc(priors, options);
+  ASSERT_TRUE(state.ok());
+  while (!state->finished()) {
+    TmcmcState resumed = *state;
+    Eigen::VectorXd log_likelihood = PeakOfRows(resumed.proposals);
+    for (Eigen::Index i = 0; i < log_likelihood.size(); ++i) {
+      if (!(log_likelihood[i] > resumed.accept_above[i])) log_likelihood[i] = -kInfinity;
+    }
+    ASSERT_TRUE(AdvanceTmcmc(priors, options, log_likelihood, resumed).ok());
+    *state = resumed;
+  }
+  EXPECT_EQ(state->samples, whole->samples);
+  EXPECT_EQ(state->log_evidence, whole->log_evidence);
+}
+
 TEST(Tmcmc, NeverEvaluatesOutsideThePrior) {
   const auto priors = UnitSquare();
   const auto at_the_corner = [](const Eigen::MatrixXd& rows) {
@@ -159,6 +237,17 @@ TEST(Tmcmc, SaysWhatIsWrong) {
   EXPECT_EQ(StartTmcmc(priors, {.target_cv = 0}).status().code(),
             absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(StartTmcmc({}, {}).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(StartTmcmc(priors, {.first = About(priors, 0.5, 0.5, 1, 1.5)}).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  Proposal holding;
+  holding.frozen = {0.5, std::nullopt};
+  EXPECT_EQ(StartTmcmc(priors, {.first = holding}).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  Proposal outside = About(priors, 0.5, 0.5, 0.1, 0.5);
+  outside.components[0].mean[0] = 9;
+  outside.log_acceptance = LogMassInSupport(outside.components, priors);
+  EXPECT_EQ(StartTmcmc(priors, {.first = outside}).status().code(),
+            absl::StatusCode::kFailedPrecondition);
   const auto diverged = [](const Eigen::MatrixXd& rows) {
     return Eigen::VectorXd(Eigen::VectorXd::Constant(rows.rows(), kNaN));
   };

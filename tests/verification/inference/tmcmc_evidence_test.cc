@@ -60,6 +60,53 @@ TEST(TmcmcEvidence, LinearGaussianInTwoFiveAndTenDimensions) {
   }
 }
 
+// The same from densities that are not the prior: narrow and two of its sd from its mean, and ten
+// times as wide as the posterior about a point three of its sd from its mean.
+TEST(TmcmcEvidence, LinearGaussianFromAFirstProposal) {
+  for (const int d : {2, 5}) {
+    const LinearModel model(3 * d, d, 0.5, 21);
+    const JointPrior priors(model.priors);
+    const auto likelihood = GaussianLikelihood::Create(model.Data(), NoiseMode::kGiven);
+    ASSERT_TRUE(likelihood.ok());
+    const Eigen::VectorXd exact = model.PosteriorMean();
+    const Eigen::VectorXd sd = model.PosteriorCovariance().diagonal().array().sqrt();
+    for (const bool far : {true, false}) {
+      MixtureComponent component{.weight = 1,
+                                 .mean = Eigen::VectorXd::Constant(d, -2),
+                                 .covariance = 0.04 * Eigen::MatrixXd::Identity(d, d)};
+      for (int j = 0; j < d && !far; ++j) {
+        const double wide = sd[j] / model.priors[static_cast<std::size_t>(j)].sd;
+        component.mean[j] = priors[static_cast<std::size_t>(j)].ToStandard(exact[j]) + 3 * wide;
+        component.covariance(j, j) = 100 * wide * wide;
+      }
+      Proposal first;
+      first.components = {component};
+      first.defensive_share = far ? 0.1 : 0.5;
+      double squares = 0;
+      for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+        const auto state =
+            RunTmcmc(priors, {.samples = 1000, .steps = 15, .seed = seed, .first = first},
+                     [&](const Eigen::MatrixXd& rows) {
+                       return likelihood->LogLikelihood(model.Predict(rows));
+                     });
+        ASSERT_TRUE(state.ok()) << state.status();
+        const double error = state->log_evidence - model.LogEvidence();
+        EXPECT_NEAR(error, 0, kSigmas * state->LogEvidenceStandardError())
+            << "d = " << d << ", seed " << seed << (far ? ", far" : ", near");
+        squares += std::pow(error / state->LogEvidenceStandardError(), 2);
+        for (int j = 0; j < d; ++j) {
+          const Eigen::ArrayXd x = state->samples.col(j);
+          const double few = kSigmas * sd[j] / std::sqrt(Families(*state));
+          EXPECT_NEAR(x.mean(), exact[j], few) << "d = " << d;
+          EXPECT_NEAR(std::sqrt((x - x.mean()).square().mean()), sd[j], few / std::sqrt(2.0));
+        }
+      }
+      // Chi-square of three, probability 0.001.
+      EXPECT_LE(squares, 16.3) << "d = " << d << (far ? ", far" : ", near");
+    }
+  }
+}
+
 // Two modes far apart in a wide box, one narrow: both are kept with their masses.
 TEST(TmcmcEvidence, KeepsBothModes) {
   const std::vector<Prior> box(2, Prior{.kind = PriorKind::kUniform, .min = -10, .max = 10});
