@@ -123,9 +123,33 @@ TEST_F(Improve, AFitThatIsTooGoodIsSaid) {
   EXPECT_TRUE(said("stated too large")) << "by the curve alone: " << diagnosis["warnings"];
 }
 
+// Formulas alone take part: nothing of the build.
+class Formulas : public CalibctlFixture {
+ protected:
+  // data.csv: 20 readings of the model `truth` with the hidden values `set`.
+  void Measure(const std::string& truth, const std::string& set) const {
+    std::vector<double> strains;
+    for (int k = 1; k <= 20; ++k) strains.push_back(0.002 * k);
+    Write("data.csv", UnmeasuredReadings(strains));
+    Write("truth.yaml", truth);
+    const std::string simulate =
+        "simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.5 " + set;
+    const Json states = Call(simulate + " --json").json()["states"];
+    Write("data.csv", MeasuredReadings(states, "tx"));
+  }
+
+  std::string WithoutTheBuild() const {
+    std::string without;
+    for (const Json& effect : Call("effects --json").json()) {
+      without += " --without " + effect["name"].get<std::string>();
+    }
+    return without;
+  }
+};
+
 // Two things hidden in the volume of 64 grains, `first` and `second`, and a third that is much like
 // both together, so that it is taken before either.
-class MistakenAtFirst : public CalibctlFixture {
+class MistakenAtFirst : public Formulas {
  protected:
   static std::string Campaign(const std::string& effects, const std::string& parameters) {
     std::string formulas;
@@ -149,29 +173,14 @@ inference: {method: iterative_bayesian_filter, samples: 16, max_iterations: 3}
 seed: 3
 )";
   }
-
-  void Measure() const {
-    std::vector<double> strains;
-    for (int k = 1; k <= 20; ++k) strains.push_back(0.002 * k);
-    Write("data.csv", UnmeasuredReadings(strains));
-    Write("truth.yaml", Campaign("first, second", "  first.a: default\n  second.a: default\n"));
-    const Json states =
-        Call(
-            "simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.5 --set "
-            "first.a=0.0015 --set second.a=0.0015 --json")
-            .json()["states"];
-    Write("data.csv", MeasuredReadings(states, "tx"));
-  }
 };
 
 TEST_F(MistakenAtFirst, AnEffectGivesWayToTheOneItWasTakenFor) {
-  Measure();
+  Measure(Campaign("first, second", "  first.a: default\n  second.a: default\n"),
+          "--set first.a=0.0015 --set second.a=0.0015");
   Write("base.yaml", Campaign("", ""));
   ASSERT_EQ(Call("run base.yaml --state s --workers 2 --json").code, 0) << Read("err");
-  std::string without;
-  for (const Json& effect : Call("effects --json").json()) {
-    without += " --without " + effect["name"].get<std::string>();
-  }
+  const std::string without = WithoutTheBuild();
   const Answer wrong = Call("improve c1 --state s --workers 2 --without frction");
   EXPECT_EQ(wrong.code, 2) << wrong.err;
   EXPECT_NE(wrong.err.find("there is no effect frction to leave out"), std::string::npos)
@@ -208,7 +217,7 @@ TEST_F(MistakenAtFirst, AnEffectGivesWayToTheOneItWasTakenFor) {
 
 // A wave in the volume of 64 grains whose number a refit of few runs does not find, so that another
 // wave nearby is added first.
-class MistakenAtLast : public CalibctlFixture {
+class MistakenAtLast : public Formulas {
  protected:
   static std::string Campaign(const std::string& effects, const std::string& parameters) {
     return "name: a wave\nmodel:\n  contact: hertz_mindlin\n  effects: [" + effects +
@@ -240,23 +249,12 @@ seed: 3
 };
 
 TEST_F(MistakenAtLast, AnotherEffectIsCalibratedInThePlaceOfOneThatDoesNotExplain) {
-  std::vector<double> strains;
-  for (int k = 1; k <= 20; ++k) strains.push_back(0.002 * k);
-  Write("data.csv", UnmeasuredReadings(strains));
-  Write("truth.yaml", Campaign("wave", "  wave.a: default\n  wave.k: default\n"));
-  const Json states =
-      Call(
-          "simulate truth.yaml --set young_modulus=4e8 --set friction_coefficient=0.5 --set "
-          "wave.a=0.0015 --set wave.k=1.6 --json")
-          .json()["states"];
-  Write("data.csv", MeasuredReadings(states, "tx"));
+  Measure(Campaign("wave", "  wave.a: default\n  wave.k: default\n"),
+          "--set wave.a=0.0015 --set wave.k=1.6");
   Write("base.yaml", Campaign("", ""));
   ASSERT_EQ(Call("run base.yaml --state s --workers 2 --json").code, 0) << Read("err");
-  std::string without;
-  for (const Json& effect : Call("effects --json").json()) {
-    without += " --without " + effect["name"].get<std::string>();
-  }
-  const Answer improved = Call("improve c1 --state s --workers 2 --max-effects 1 --json" + without);
+  const Answer improved =
+      Call("improve c1 --state s --workers 2 --max-effects 1 --json" + WithoutTheBuild());
   ASSERT_EQ(improved.code, 0) << improved.err;
   const Json steps = improved.json()["steps"];
   ASSERT_EQ(steps.size(), 4U) << improved.out;
