@@ -33,6 +33,7 @@ absl::StatusOr<std::map<std::pair<std::string, int>, report::StateHistory>> Load
   std::map<std::pair<std::string, int>, report::StateHistory> states;
   for (const v1::SampleStates& message : *messages) {
     report::StateHistory& history = states[{message.experiment(), message.sample()}];
+    history.core_seconds = message.core_seconds();
     history.observables.assign(message.observables().begin(), message.observables().end());
     history.states.insert(history.states.end(), message.states().begin(), message.states().end());
   }

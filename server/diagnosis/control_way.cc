@@ -7,7 +7,7 @@ namespace calib::diagnosis {
 namespace {
 
 constexpr int kReadings = 40;
-constexpr double kUnloading = 0.1;  // of the way, once, half-way
+constexpr double kUnloading = 0.1;  // of the way, once
 
 void Branch(std::vector<double>& way, double from, double to, int count) {
   for (int i = 1; i <= count; ++i) way.push_back(from + (to - from) * i / count);
@@ -21,13 +21,15 @@ std::vector<double> Monotonic(double start, double last) {
   return way;
 }
 
-std::vector<double> WithUnloading(double start, double last) {
-  const auto at = [start, last](double share) { return start + share * (last - start); };
+std::vector<double> WithUnloading(double start, double last, double share) {
+  const auto at = [start, last](double of_way) { return start + of_way * (last - start); };
+  constexpr int kEach = kReadings / 8;  // of the unloading and of the reloading
+  const int before = static_cast<int>(std::lround(kReadings * share));
   std::vector<double> way;
-  Branch(way, start, at(0.5), kReadings / 2);
-  Branch(way, at(0.5), at(0.5 - kUnloading), kReadings / 8);
-  Branch(way, at(0.5 - kUnloading), at(0.5), kReadings / 8);
-  Branch(way, at(0.5), last, kReadings / 4);
+  Branch(way, start, at(share), before);
+  Branch(way, at(share), at(share - kUnloading), kEach);
+  Branch(way, at(share - kUnloading), at(share), kEach);
+  Branch(way, at(share), last, kReadings - before - 2 * kEach);
   return way;
 }
 

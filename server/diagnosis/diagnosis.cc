@@ -446,6 +446,7 @@ class Inquiry {
                                    response_.scatter);
     if (!next.ok()) return next.status();
     diagnosis_.next_experiment = std::move(next->next);
+    if (!next->warning.empty()) diagnosis_.warnings.push_back(next->warning + ".");
     if (!diagnosis_.next_experiment) {
       diagnosis_.warnings.push_back(
           absl::StrCat("No next experiment is planned: ", next->why_none, "."));

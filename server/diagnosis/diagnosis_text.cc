@@ -72,13 +72,17 @@ Json CandidateJson(const CandidateEffect& c) {
 Json PlannedJson(const PlannedExperiment& planned) {
   return {{"test", planned.test},
           {"settings", planned.settings},
-          {"unloading", planned.unloading},
+          {"unloading", planned.unloading_at.has_value()},
+          {"unloading_at", OrNull(planned.unloading_at)},
           {"control", planned.control},
           {"control_from", planned.path.front()},
           {"control_to", planned.path.back()},
           {"expected_power", planned.expected_power},
           {"distance_sd", planned.distance},
           {"not_separated", planned.together},
+          {"cost",
+           {{"core_seconds_per_evaluation",
+             planned.core_seconds > 0 ? Json(planned.core_seconds) : Json(nullptr)}}},
           {"none_of_these",
            {{"distance_sd", OrNull(planned.distance_from_none)},
             {"expected_power", OrNull(planned.power_against_none)}}}};
@@ -88,7 +92,6 @@ Json NextJson(const std::optional<NextExperiment>& next) {
   if (!next) return nullptr;
   Json json = PlannedJson(next->best);
   json["separates"] = next->separates;
-  json["cost"] = {{"core_seconds_per_evaluation", next->core_seconds}};
   json["snippet"] = next->snippet;
   json["evaluations_for_planning"] = next->evaluations;
   json["considered"] = Json::array();
@@ -121,7 +124,9 @@ std::string InWords(const PlannedExperiment& planned) {
                         in_words(planned.control, planned.path.front()),
                         in_words(planned.control, planned.path.back()));
   }
-  return text + (planned.unloading ? ", one unloading and reloading half-way" : "");
+  if (!planned.unloading_at) return text;
+  return text + fmt::format(", one unloading and reloading at {}",
+                            in_words(planned.control, *planned.unloading_at));
 }
 
 // And from a misfit that none of them makes.
@@ -141,17 +146,24 @@ std::string NotTold(const PlannedExperiment& planned) {
   return text;
 }
 
+std::string CostOf(const PlannedExperiment& planned) {
+  if (!(planned.core_seconds > 0)) return "";
+  return fmt::format("; an evaluation costs about {} core seconds",
+                     Number(planned.core_seconds, 2));
+}
+
 std::string NextText(const NextExperiment& next) {
   std::string names;
   for (const std::string& name : next.separates) names += (names.empty() ? "" : " and ") + name;
   std::string text =
       "\n" +
       report::Wrapped(
-          fmt::format("Next experiment: {}. It separates {} with a power of {} ({} sd apart){}{}; "
-                      "an evaluation costs about {} core seconds. For the campaign file:",
-                      InWords(next.best), names, report::Percent(next.best.expected_power, 3),
-                      Number(next.best.distance, 3), NotTold(next.best), AgainstNone(next.best),
-                      Number(next.core_seconds, 2)),
+          fmt::format(
+              "Next experiment: {}. It separates {} with a power of {} ({} sd apart){}{}{}. "
+              "For the campaign file:",
+              InWords(next.best), names, report::Percent(next.best.expected_power, 3),
+              Number(next.best.distance, 3), NotTold(next.best), AgainstNone(next.best),
+              CostOf(next.best)),
           "", "") +
       "\n" + next.snippet;
   if (next.considered.size() > 1) text += "\nAlso tried:\n";

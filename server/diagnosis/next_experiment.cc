@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "server/campaign/derive.h"
 #include "server/campaign/yaml_text.h"
+#include "server/diagnosis/plan_grid.h"
 #include "server/diagnosis/test_plans.h"
 #include "server/report/people_units.h"
 
@@ -89,33 +90,6 @@ absl::StatusOr<std::string> RivalsText(const Rival& rival, const std::string& pa
                            .rows = {{.like = like, .values = rival.values}}});
 }
 
-// Those that this build accepts: some settings go together with others.
-absl::StatusOr<std::vector<std::pair<TestPlan, YamlNode>>> AcceptedPlans(
-    client::Laboratory& laboratory, const Rival& rival, int like) {
-  const report::CampaignView& view = *rival.view;
-  const campaign::Experiment& pattern = PatternOf(view.campaign);
-  std::vector<std::pair<TestPlan, YamlNode>> accepted;
-  const auto parsed = campaign::ParseYaml(view.source.campaign_file());
-  const YamlNode* list = parsed.root ? campaign::YamlFind(*parsed.root, "experiments") : nullptr;
-  if (list == nullptr) return accepted;
-  const auto original =
-      std::find_if(list->items.begin(), list->items.end(), [&pattern](const YamlNode& item) {
-        const YamlNode* name = campaign::YamlFind(item, "name");
-        return name != nullptr && name->scalar == pattern.name;
-      });
-  if (original == list->items.end()) return accepted;
-  for (TestPlan& plan : PlansFor(view.campaign)) {
-    YamlNode entry = EntryFor(plan, pattern, *original);
-    const auto text = RivalsText(rival, view.status.campaign(), like, {entry});
-    if (!text.ok()) return text.status();
-    const std::map<std::string, std::string> file = {{plan.file, DataOf(plan.experiment, pattern)}};
-    if (laboratory.Accepts(view, *text, file)) {
-      accepted.emplace_back(std::move(plan), std::move(entry));
-    }
-  }
-  return accepted;
-}
-
 // Chance that a difference of so many sd is seen at the 1 % level.
 double PowerAt(double distance) {
   const boost::math::normal normal;
@@ -131,12 +105,214 @@ std::vector<double> ShiftsOf(const NoneOfThese& none, const campaign::Experiment
   return shifts;
 }
 
+// Entry of the pattern in the campaign file; empty: it is not there.
+std::optional<YamlNode> EntryOf(const report::CampaignView& view,
+                                const campaign::Experiment& pattern) {
+  const auto parsed = campaign::ParseYaml(view.source.campaign_file());
+  const YamlNode* list = parsed.root ? campaign::YamlFind(*parsed.root, "experiments") : nullptr;
+  if (list == nullptr) return std::nullopt;
+  for (const YamlNode& item : list->items) {
+    const YamlNode* name = campaign::YamlFind(item, "name");
+    if (name != nullptr && name->scalar == pattern.name) return item;
+  }
+  return std::nullopt;
+}
+
 std::string NothingToPlan(const campaign::Experiment& pattern) {
   return absl::StrCat("tests are planned by other values of what the campaign file sets and of ",
                       "what drives them, and ", pattern.test,
                       " here has nothing of that to change; other tests and observables that were "
                       "not read (`calibctl tests`) are for you to choose");
 }
+
+// A plan that came to an end with all rivals.
+struct Tried {
+  TestPlan plan;
+  YamlNode entry;
+  std::vector<RivalPair> pairs;
+};
+
+// The models, and what has been tried with them.
+class Planning {
+ public:
+  Planning(client::Laboratory& laboratory, const std::vector<Rival>& rivals,
+           const std::optional<NoneOfThese>& none, int like, double scatter)
+      : laboratory_(laboratory),
+        rivals_(rivals),
+        none_(none),
+        like_(like),
+        scatter_(scatter),
+        base_(*rivals.front().view),
+        pattern_(PatternOf(base_.campaign)) {}
+
+  absl::StatusOr<NextPlan> Plan() {
+    if (base_.campaign.filter.noise != inference::NoiseMode::kGiven) {
+      return NextPlan{.why_none =
+                          "the size of the errors is inferred, so that no distance in units "
+                          "of them is known beforehand; state the noise"};
+    }
+    if (auto status = Try(PlansFor(base_.campaign)); !status.ok()) return status;
+    if (offered_ == 0) return NextPlan{.why_none = NothingToPlan(pattern_)};
+    if (tried_.empty()) {
+      return NextPlan{.why_none = "no planned test came to an end with all of the models"};
+    }
+    NextPlan plan;
+    if (ShareToldApart(tried_.front().pairs) < kEnough) {
+      std::vector<PlannedExperiment> best_first;
+      for (const Tried& one : tried_) best_first.push_back(one.plan.experiment);
+      // What is known by now is not lost with it.
+      if (auto status = Try(GridOf(AsDone(base_.campaign), best_first)); !status.ok()) {
+        plan.warning = absl::StrCat("Changes of several settings at once could not be tried: ",
+                                    status.message());
+      }
+    }
+    NextExperiment next = Best();
+    if (next.separates.empty()) {
+      plan.why_none = fmt::format(
+          "of the {} tests that were tried none tells any two of these models apart, "
+          "from one specimen each (the best with a power of {})",
+          tried_.size(), report::Percent(next.best.expected_power, 2));
+      return plan;
+    }
+    plan.next = std::move(next);
+    return plan;
+  }
+
+ private:
+  // With more of the pairs told apart one change is enough.
+  static constexpr double kEnough = 0.99;
+
+  // Those of the plans that this build accepts (some settings go together with others), run with
+  // every model. Leaves what was tried best first.
+  absl::Status Try(std::vector<PlannedExperiment> wanted) {
+    std::vector<Tried> plans;
+    std::map<std::string, std::string> files;
+    const std::optional<YamlNode> original = EntryOf(base_, pattern_);
+    if (!original) return absl::OkStatus();
+    for (TestPlan& plan : Named(std::move(wanted), numbered_ + 1)) {
+      ++numbered_;
+      YamlNode entry = EntryFor(plan, pattern_, *original);
+      const auto text = RivalsText(rivals_.front(), base_.status.campaign(), like_, {entry});
+      if (!text.ok()) return text.status();
+      const std::string data = DataOf(plan.experiment, pattern_);
+      if (!laboratory_.Accepts(base_, *text, {{plan.file, data}})) continue;
+      files[plan.file] = data;
+      plans.push_back({.plan = std::move(plan), .entry = std::move(entry), .pairs = {}});
+    }
+    if (plans.empty()) return absl::OkStatus();
+    offered_ += plans.size();
+    const auto curves = Run(plans, files);
+    if (!curves.ok()) return curves.status();
+    for (std::size_t p = 0; p < plans.size(); ++p) {
+      if (!IsFinished(*curves, p)) continue;
+      Compare(*curves, p, plans[p]);
+      tried_.push_back(std::move(plans[p]));
+    }
+    std::stable_sort(tried_.begin(), tried_.end(), [](const Tried& a, const Tried& b) {
+      const double share_a = ShareToldApart(a.pairs);
+      const double share_b = ShareToldApart(b.pairs);
+      if (share_a != share_b) return share_a > share_b;
+      return a.plan.experiment.distance > b.plan.experiment.distance;
+    });
+    return absl::OkStatus();
+  }
+
+  using Curves = std::vector<std::vector<std::vector<Eigen::VectorXd>>>;
+
+  // [model][plan][observable]; what the plans cost is noted in them.
+  absl::StatusOr<Curves> Run(std::vector<Tried>& plans,
+                             const std::map<std::string, std::string>& files) {
+    std::vector<YamlNode> entries;
+    entries.reserve(plans.size());
+    for (const Tried& one : plans) entries.push_back(one.entry);
+    std::vector<Rival> models = rivals_;
+    if (none_) models.push_back(none_->base);
+    std::vector<int> ran(plans.size(), 0);  // for this: of others the time is not known
+    Curves curves;
+    for (const Rival& rival : models) {
+      const auto text = RivalsText(rival, base_.status.campaign(), like_, entries);
+      if (!text.ok()) return text.status();
+      const auto view = laboratory_.Run(*rival.view, *text,
+                                        "planning the next experiment with " + rival.name, files);
+      if (!view.ok()) return view.status();
+      evaluations_ += view->status.model_evaluations();
+      auto& own = curves.emplace_back();
+      for (std::size_t p = 0; p < plans.size(); ++p) {
+        PlannedExperiment& planned = plans[p].plan.experiment;
+        own.push_back(
+            CurvesOf(*view, plans[p].plan.name, pattern_, static_cast<Index>(planned.path.size())));
+        const auto found = view->states.find({plans[p].plan.name, 0});
+        if (found == view->states.end() || !(found->second.core_seconds > 0)) continue;
+        ++ran[p];
+        planned.core_seconds += (found->second.core_seconds - planned.core_seconds) / ran[p];
+      }
+    }
+    return curves;
+  }
+
+  bool IsFinished(const Curves& curves, std::size_t p) const {
+    return std::none_of(curves.begin(),
+                        curves.begin() + static_cast<std::ptrdiff_t>(rivals_.size()),
+                        [p](const auto& own) { return own[p].empty(); });
+  }
+
+  void Compare(const Curves& curves, std::size_t p, Tried& tried) const {
+    for (std::size_t a = 0; a < rivals_.size(); ++a) {
+      for (std::size_t b = a + 1; b < rivals_.size(); ++b) {
+        const double distance =
+            std::sqrt(SeparationOf(DeparturesOf(curves[a][p], curves[b][p], pattern_), scatter_));
+        tried.pairs.push_back({.a = rivals_[a].name,
+                               .b = rivals_[b].name,
+                               .distance = distance,
+                               .power = PowerAt(distance)});
+      }
+    }
+    PlannedExperiment& planned = tried.plan.experiment;
+    Weigh(tried.pairs, planned);
+    if (!none_ || curves.back()[p].empty()) return;
+    double from_none = std::numeric_limits<double>::infinity();
+    for (std::size_t a = 0; a < rivals_.size(); ++a) {
+      const auto departures = DeparturesOf(curves[a][p], curves.back()[p], pattern_);
+      from_none = std::min(
+          from_none, std::sqrt(SeparationOf(departures, scatter_, ShiftsOf(*none_, pattern_))));
+    }
+    planned.distance_from_none = from_none;
+    planned.power_against_none = PowerAt(from_none);
+  }
+
+  NextExperiment Best() const {
+    NextExperiment next;
+    next.evaluations = evaluations_;
+    for (const Tried& one : tried_) next.considered.push_back(one.plan.experiment);
+    const Tried& best = tried_.front();
+    next.best = best.plan.experiment;
+    for (const Rival& rival : rivals_) {
+      if (std::any_of(best.pairs.begin(), best.pairs.end(), [&rival](const RivalPair& pair) {
+            return pair.power >= kToldApart && (pair.a == rival.name || pair.b == rival.name);
+          })) {
+        next.separates.push_back(rival.name);
+      }
+    }
+    YamlNode snippet = best.entry;
+    campaign::YamlAt(campaign::YamlAt(snippet, "data"), "file") =
+        campaign::YamlScalar("measurement_to_be_made.csv");
+    const std::string section = campaign::ToYaml(
+        campaign::YamlMap({{"experiments", campaign::YamlList({std::move(snippet)})}}));
+    next.snippet = absl::StrCat(kSnippetHead, section.substr(section.find('\n') + 1));
+    return next;
+  }
+
+  client::Laboratory& laboratory_;
+  const std::vector<Rival>& rivals_;
+  const std::optional<NoneOfThese>& none_;
+  int like_;
+  double scatter_;
+  const report::CampaignView& base_;
+  const campaign::Experiment& pattern_;
+  std::size_t numbered_ = 0, offered_ = 0;
+  std::int64_t evaluations_ = 0;
+  std::vector<Tried> tried_;  // best first
+};
 
 }  // namespace
 
@@ -187,111 +363,7 @@ absl::StatusOr<NextPlan> PlanNextExperiment(client::Laboratory& laboratory,
                                             const std::optional<NoneOfThese>& none, int like,
                                             double scatter) {
   if (rivals.size() < 2) return NextPlan{.why_none = "there are no two models to tell apart"};
-  const report::CampaignView& base = *rivals.front().view;
-  if (base.campaign.filter.noise != inference::NoiseMode::kGiven) {
-    return NextPlan{.why_none =
-                        "the size of the errors is inferred, so that no distance in units "
-                        "of them is known beforehand; state the noise"};
-  }
-  const campaign::Experiment& pattern = PatternOf(base.campaign);
-  auto offered = AcceptedPlans(laboratory, rivals.front(), like);
-  if (!offered.ok()) return offered.status();
-  if (offered->empty()) return NextPlan{.why_none = NothingToPlan(pattern)};
-  std::vector<TestPlan> plans;
-  std::vector<YamlNode> entries;
-  std::map<std::string, std::string> files;
-  for (auto& [plan, entry] : *offered) {
-    files[plan.file] = DataOf(plan.experiment, pattern);
-    plans.push_back(std::move(plan));
-    entries.push_back(std::move(entry));
-  }
-  NextExperiment next;
-  std::vector<std::vector<std::vector<Eigen::VectorXd>>> curves;  // [model][plan][observable]
-  double core_hours = 0;
-  std::vector<Rival> models = rivals;
-  if (none) models.push_back(none->base);
-  for (const Rival& rival : models) {
-    const auto text = RivalsText(rival, base.status.campaign(), like, entries);
-    if (!text.ok()) return text.status();
-    const auto view = laboratory.Run(*rival.view, *text,
-                                     "planning the next experiment with " + rival.name, files);
-    if (!view.ok()) return view.status();
-    next.evaluations += view->status.model_evaluations();
-    core_hours += view->status.core_hours();
-    auto& own = curves.emplace_back();
-    for (const TestPlan& plan : plans) {
-      const auto readings = static_cast<Index>(plan.experiment.path.size());
-      own.push_back(CurvesOf(*view, plan.name, pattern, readings));
-    }
-  }
-  constexpr double kSecondsPerHour = 3600;
-  next.core_seconds = next.evaluations > 0
-                          ? core_hours * kSecondsPerHour / static_cast<double>(next.evaluations)
-                          : 0;
-  std::vector<std::size_t> finished;
-  std::vector<std::vector<RivalPair>> pairs(plans.size());
-  for (std::size_t p = 0; p < plans.size(); ++p) {
-    const bool all_end =
-        std::none_of(curves.begin(), curves.begin() + static_cast<std::ptrdiff_t>(rivals.size()),
-                     [p](const auto& own) { return own[p].empty(); });
-    if (!all_end) continue;
-    for (std::size_t a = 0; a < rivals.size(); ++a) {
-      for (std::size_t b = a + 1; b < rivals.size(); ++b) {
-        const double distance =
-            std::sqrt(SeparationOf(DeparturesOf(curves[a][p], curves[b][p], pattern), scatter));
-        pairs[p].push_back({.a = rivals[a].name,
-                            .b = rivals[b].name,
-                            .distance = distance,
-                            .power = PowerAt(distance)});
-      }
-    }
-    Weigh(pairs[p], plans[p].experiment);
-    if (!none || curves.back()[p].empty()) {
-      finished.push_back(p);
-      continue;
-    }
-    double from_none = std::numeric_limits<double>::infinity();
-    for (std::size_t a = 0; a < rivals.size(); ++a) {
-      const auto departures = DeparturesOf(curves[a][p], curves.back()[p], pattern);
-      from_none = std::min(from_none,
-                           std::sqrt(SeparationOf(departures, scatter, ShiftsOf(*none, pattern))));
-    }
-    plans[p].experiment.distance_from_none = from_none;
-    plans[p].experiment.power_against_none = PowerAt(from_none);
-    finished.push_back(p);
-  }
-  if (finished.empty()) {
-    return NextPlan{.why_none = "no planned test came to an end with all of the models"};
-  }
-  std::stable_sort(finished.begin(), finished.end(), [&](std::size_t a, std::size_t b) {
-    const double share_a = ShareToldApart(pairs[a]);
-    const double share_b = ShareToldApart(pairs[b]);
-    if (share_a != share_b) return share_a > share_b;
-    return plans[a].experiment.distance > plans[b].experiment.distance;
-  });
-  for (const std::size_t p : finished) next.considered.push_back(plans[p].experiment);
-  next.best = plans[finished.front()].experiment;
-  const std::vector<RivalPair>& told = pairs[finished.front()];
-  for (const Rival& rival : rivals) {
-    if (std::any_of(told.begin(), told.end(), [&rival](const RivalPair& pair) {
-          return pair.power >= kToldApart && (pair.a == rival.name || pair.b == rival.name);
-        })) {
-      next.separates.push_back(rival.name);
-    }
-  }
-  if (next.separates.empty()) {
-    return NextPlan{.why_none = fmt::format(
-                        "of the {} tests that were tried none tells any two of these models apart, "
-                        "from one specimen each (the best with a power of {})",
-                        finished.size(), report::Percent(next.best.expected_power, 2))};
-  }
-  YamlNode snippet = entries[finished.front()];
-  campaign::YamlAt(campaign::YamlAt(snippet, "data"), "file") =
-      campaign::YamlScalar("measurement_to_be_made.csv");
-  const std::string section = campaign::ToYaml(
-      campaign::YamlMap({{"experiments", campaign::YamlList({std::move(snippet)})}}));
-  next.snippet = absl::StrCat(kSnippetHead, section.substr(section.find('\n') + 1));
-  return NextPlan{.next = std::move(next)};
+  return Planning(laboratory, rivals, none, like, scatter).Plan();
 }
 
 }  // namespace calib::diagnosis

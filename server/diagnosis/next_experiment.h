@@ -62,16 +62,17 @@ struct NextExperiment {
                         ///< measurement is to be made
   std::vector<PlannedExperiment> considered;  ///< best first
   std::int64_t evaluations = 0;
-  double core_seconds = 0;  ///< of one evaluation, mean over what was tried
 };
 
 struct NextPlan {
   std::optional<NextExperiment> next{};
   std::string why_none{};  ///< a clause; empty where there is one
+  std::string warning{};   ///< a sentence without its full stop; may be empty
 };
 
 /// Runs every rival, and the model of `none`, once in every planned test, from the specimen and
-/// seed of sample `like`. Errors of a measurement: the noise that the campaign states for the
+/// seed of sample `like`: first with one thing changed at a time; where that does not tell 99 % of
+/// the pairs apart, with the best changes together (GridOf()). Errors of a measurement: the noise that the campaign states for the
 /// observables at values of their size, and `scatter` (of a single run, in units of that noise) for
 /// the measurement and both runs: see SeparationOf(). None for fewer than two rivals, without a
 /// known size of the errors, where no plan is a campaign that this build accepts, is finished by all

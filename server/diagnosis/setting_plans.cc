@@ -61,14 +61,6 @@ class Plans {
   }
 
  private:
-  PlannedExperiment AsMeasured() const {
-    PlannedExperiment planned;
-    planned.test = test_.name;
-    planned.control = pattern_.control_name;
-    planned.path = pattern_.control;
-    return planned;
-  }
-
   bool IsStressDriven() const {
     const dem::ObservableInfo* info = dem::FindObservable(pattern_.control_name);
     return info != nullptr && info->unit == "Pa";
@@ -83,7 +75,7 @@ class Plans {
       }
       for (const double other : {value / factor_, value * factor_}) {
         if (!IsAllowed(*setting, other)) continue;
-        plans_.push_back(AsMeasured());
+        plans_.push_back(AsMeasured(pattern_));
         plans_.back().settings[name] = other;
       }
     }
@@ -126,7 +118,7 @@ class Plans {
     const auto range =
         Within(pattern_.control_name, {.down = down, .up = up, .lowest = *low, .most = *high});
     if (!range) return;
-    plans_.push_back(AsMeasured());
+    plans_.push_back(AsMeasured(pattern_));
     plans_.back().path = Points(*range);
   }
 
@@ -145,7 +137,7 @@ class Plans {
     std::vector<double> values = pattern_.control;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
-    PlannedExperiment& planned = plans_.emplace_back(AsMeasured());
+    PlannedExperiment& planned = plans_.emplace_back(AsMeasured(pattern_));
     planned.control = control;
     planned.settings[pattern_.control_name] = *middle;
     planned.path = Points(*range);
@@ -155,20 +147,21 @@ class Plans {
     if (pattern_.control.empty()) return;
     const double last = *std::max_element(pattern_.control.begin(), pattern_.control.end());
     if (IsStressDriven()) {
-      plans_.push_back(AsMeasured());
+      plans_.push_back(AsMeasured(pattern_));
       plans_.back().path = Monotonic(pattern_.control_start, kFactor * last);
     }
     if (test_.may_reverse && std::is_sorted(pattern_.control.begin(), pattern_.control.end())) {
-      plans_.push_back(AsMeasured());
-      plans_.back().path = WithUnloading(pattern_.control_start, last);
-      plans_.back().unloading = true;
+      plans_.push_back(AsMeasured(pattern_));
+      plans_.back().path = WithUnloading(pattern_.control_start, last, kHalfWay);
+      plans_.back().unloading_at =
+          pattern_.control_start + kHalfWay * (last - pattern_.control_start);
     }
   }
 
   void OtherRates() {
     if (!pattern_.loading_rate) return;
     for (const double rate : {*pattern_.loading_rate / kFactor, *pattern_.loading_rate * kFactor}) {
-      plans_.push_back(AsMeasured());
+      plans_.push_back(AsMeasured(pattern_));
       plans_.back().settings["loading_rate"] = rate;
     }
   }
@@ -180,6 +173,14 @@ class Plans {
 };
 
 }  // namespace
+
+PlannedExperiment AsMeasured(const campaign::Experiment& pattern) {
+  PlannedExperiment planned;
+  planned.test = pattern.test;
+  planned.control = pattern.control_name;
+  planned.path = pattern.control;
+  return planned;
+}
 
 std::vector<PlannedExperiment> SettingPlans(const campaign::Experiment& pattern) {
   const dem::TestInfo* const test = dem::FindTest(pattern.test);

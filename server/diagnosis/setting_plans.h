@@ -8,6 +8,9 @@
 
 namespace calib::diagnosis {
 
+/// The pattern's test with nothing changed.
+PlannedExperiment AsMeasured(const campaign::Experiment& pattern);
+
 /// The pattern's test with one thing changed at a time, by a factor of 4 (1.5 of flows under
 /// gravity, in whose geometry little else runs) either way: every length, speed, angle or pressure
 /// that the campaign file sets; the range of its control; another control (collisions: the speed in

@@ -22,6 +22,7 @@ namespace {
 constexpr double kBeyond = 4;  // times the lowest and the highest pressure, and the rate, so far
 constexpr double kOedometricStrain = 0.03;
 constexpr double kDensity = 0.02;  // in porosity
+constexpr double kEarly = 0.2;     // of the way, an unloading before most of the deformation
 
 // Over which the errors of a covariance fall to 1/e, along neighbouring readings; 0: independent.
 double CorrelationLength(const std::vector<double>& control,
@@ -67,8 +68,11 @@ bool CanFollow(const dem::TestInfo& test, const campaign::Experiment& pattern) {
          std::all_of(pattern.observables.begin(), pattern.observables.end(), has);
 }
 
-std::vector<PlannedExperiment> PressurePlans(const campaign::Campaign& campaign) {
-  const campaign::Experiment& pattern = PatternOf(campaign);
+struct Pressures {
+  double low = 0, middle = 0, high = 0;
+};
+
+Pressures PressuresOf(const campaign::Campaign& campaign) {
   std::set<double> pressures;
   for (const campaign::Experiment& e : campaign.experiments) {
     const auto found = e.settings.find("confining_pressure");
@@ -76,40 +80,57 @@ std::vector<PlannedExperiment> PressurePlans(const campaign::Campaign& campaign)
   }
   const double low = *pressures.begin();
   const double high = *pressures.rbegin();
-  const double middle = std::sqrt(low * high);
-  const double strain =
-      *std::max_element(pattern.control.begin(), pattern.control.end(),
-                        [](double a, double b) { return std::abs(a) < std::abs(b); });
+  return {.low = low, .middle = std::sqrt(low * high), .high = high};
+}
+
+// Signed, and the largest in size.
+double LastStrain(const campaign::Experiment& pattern) {
+  return *std::max_element(pattern.control.begin(), pattern.control.end(),
+                           [](double a, double b) { return std::abs(a) < std::abs(b); });
+}
+
+PlannedExperiment UnderPressure(const std::string& test, double pressure, double last_strain) {
+  const double last = test == "oedometric" ? std::min(last_strain, kOedometricStrain) : last_strain;
+  return {.test = test,
+          .settings = {{"confining_pressure", pressure}},
+          .control = "axial_strain",
+          .path = Monotonic(0, last)};
+}
+
+void AddUnloading(double share, PlannedExperiment& planned) {
+  const double last = planned.path.back();
+  planned.unloading_at = share * last;
+  planned.path = WithUnloading(0, last, share);
+}
+
+std::vector<PlannedExperiment> PressurePlans(const campaign::Campaign& campaign) {
+  const campaign::Experiment& pattern = PatternOf(campaign);
+  const Pressures pressures = PressuresOf(campaign);
   std::vector<PlannedExperiment> plans;
-  const auto add = [&plans, strain](const std::string& test, double pressure,
-                                    bool unloading) -> PlannedExperiment& {
-    const double last = test == "oedometric" ? std::min(strain, kOedometricStrain) : strain;
-    return plans.emplace_back(
-        PlannedExperiment{.test = test,
-                          .settings = {{"confining_pressure", pressure}},
-                          .unloading = unloading,
-                          .control = "axial_strain",
-                          .path = unloading ? WithUnloading(0, last) : Monotonic(0, last)});
+  const auto add = [&](const std::string& test, double pressure) -> PlannedExperiment& {
+    return plans.emplace_back(UnderPressure(test, pressure, LastStrain(pattern)));
   };
   for (const dem::TestInfo& test : dem::Tests()) {
     if (!CanFollow(test, pattern)) continue;
     const bool same = test.name == pattern.test;
     if (same) {
-      add(test.name, low / kBeyond, false);
-      add(test.name, high * kBeyond, false);
+      add(test.name, pressures.low / kBeyond);
+      add(test.name, pressures.high * kBeyond);
       for (const double porosity : OtherPorosities(pattern)) {
-        add(test.name, middle, false).settings["porosity"] = porosity;
+        add(test.name, pressures.middle).settings["porosity"] = porosity;
       }
       if (pattern.loading_rate) {
         for (const double factor : {1 / kBeyond, kBeyond}) {
-          add(test.name, middle, false).settings["loading_rate"] = factor * *pattern.loading_rate;
+          add(test.name, pressures.middle).settings["loading_rate"] =
+              factor * *pattern.loading_rate;
         }
       }
+      if (test.may_reverse) AddUnloading(kEarly, add(test.name, pressures.middle));
     }
     if (test.may_reverse) {
-      add(test.name, middle, true);
+      AddUnloading(kHalfWay, add(test.name, pressures.middle));
     } else if (!same) {
-      add(test.name, middle, false);
+      add(test.name, pressures.middle);
     }
   }
   return plans;
@@ -122,15 +143,25 @@ const campaign::Experiment& PatternOf(const campaign::Campaign& campaign) {
                        [](const auto& e) { return e.role == campaign::Role::kCalibrate; });
 }
 
-std::vector<TestPlan> PlansFor(const campaign::Campaign& campaign) {
+PlannedExperiment AsDone(const campaign::Campaign& campaign) {
   const campaign::Experiment& pattern = PatternOf(campaign);
-  std::vector<TestPlan> plans;
-  for (PlannedExperiment& planned :
-       IsStrainedUnderPressure(pattern) ? PressurePlans(campaign) : SettingPlans(pattern)) {
-    const std::string name = fmt::format("next_{}", plans.size() + 1);
-    plans.push_back({.experiment = std::move(planned), .name = name, .file = name + ".csv"});
+  return IsStrainedUnderPressure(pattern)
+             ? UnderPressure(pattern.test, PressuresOf(campaign).middle, LastStrain(pattern))
+             : AsMeasured(pattern);
+}
+
+std::vector<PlannedExperiment> PlansFor(const campaign::Campaign& campaign) {
+  const campaign::Experiment& pattern = PatternOf(campaign);
+  return IsStrainedUnderPressure(pattern) ? PressurePlans(campaign) : SettingPlans(pattern);
+}
+
+std::vector<TestPlan> Named(std::vector<PlannedExperiment> plans, std::size_t first) {
+  std::vector<TestPlan> named;
+  for (PlannedExperiment& planned : plans) {
+    const std::string name = fmt::format("next_{}", first + named.size());
+    named.push_back({.experiment = std::move(planned), .name = name, .file = name + ".csv"});
   }
-  return plans;
+  return named;
 }
 
 std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern) {

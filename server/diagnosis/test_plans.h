@@ -17,12 +17,13 @@ struct PlannedExperiment {
   std::string test;
   /// SI; in addition to the test's own `porosity` (of another specimen) and `loading_rate` (1/s).
   std::map<std::string, double> settings;
-  bool unloading = false;    ///< once, half-way of the loading
-  std::string control;       ///< what drives it,
-  std::vector<double> path;  ///< and its values at the readings, SI
+  std::optional<double> unloading_at{};  ///< value of the control at which it turns back, once
+  std::string control;                   ///< what drives it,
+  std::vector<double> path;              ///< and its values at the readings, SI
   /// Chance to tell two rivals apart at the 1 % level: the lowest of the pairs that are told apart.
   double expected_power = 0;
-  double distance = 0;  ///< between these two, in sd of a measurement
+  double distance = 0;      ///< between these two, in sd of a measurement
+  double core_seconds = 0;  ///< of one run, mean over the models; 0: none was run for this
   std::vector<std::pair<std::string, std::string>> together{};  ///< pairs that are not told apart
   /// The same of the rivals against none of them (NoneOfThese); where that was asked for.
   std::optional<double> distance_from_none{}, power_against_none{};
@@ -37,13 +38,21 @@ struct TestPlan {
 /// The first fitted experiment, which plans follow in everything that they do not change.
 const campaign::Experiment& PatternOf(const campaign::Campaign& campaign);
 
+/// The pattern's test with nothing changed, as far as a plan may change it: each of PlansFor() is
+/// this with one thing changed. Under a pressure it is monotonic at the plans' middle pressure.
+PlannedExperiment AsDone(const campaign::Campaign& campaign);
+
 /// Where the pattern is driven by the axial strain under a pressure: its test at a quarter of the
 /// lowest and four times the highest pressure, and every test that one pressure and an axial strain
-/// define at their geometric mean: monotonic, with an unloading where it may reverse, where
-/// packings are generated with a specimen looser and denser by 0.02 in porosity, and where it has a
-/// loading_rate at a quarter and four times it. An initial stress grows with the pressure.
-/// Otherwise the plans of setting_plans.h. May be empty.
-std::vector<TestPlan> PlansFor(const campaign::Campaign& campaign);
+/// define at their geometric mean: monotonic, with an unloading where it may reverse (of the
+/// pattern's test half-way or after a fifth of the way), where packings are generated with a
+/// specimen looser and denser by 0.02 in porosity, and where it has a loading_rate at a quarter and
+/// four times it. An initial stress grows with the pressure. Otherwise the plans of
+/// setting_plans.h. May be empty.
+std::vector<PlannedExperiment> PlansFor(const campaign::Campaign& campaign);
+
+/// With a name and a file of data each; numbers from `first` on.
+std::vector<TestPlan> Named(std::vector<PlannedExperiment> plans, std::size_t first);
 
 /// Text of the plan's file: the way of the control. Only that is read of it.
 std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern);

@@ -290,7 +290,8 @@ absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, st
   }
   const auto definition = scheduler::LoadDefinition(reader, record->submitted);
   const auto states = reader.States(campaign, sample);
-  for (const absl::Status& status : {definition.status(), states.status()}) {
+  const auto seconds = reader.CoreSeconds(campaign);
+  for (const absl::Status& status : {definition.status(), states.status(), seconds.status()}) {
     if (!status.ok()) {
       return status;
     }
@@ -315,6 +316,8 @@ absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, st
       v1::SampleStates& message = messages.emplace_back();
       message.set_sample(state.key.sample);
       message.set_experiment(experiment.name);
+      const auto spent = seconds->find(state.key);
+      message.set_core_seconds(spent == seconds->end() ? 0 : spent->second);
       if (read.precomputed.has_value()) {
         for (const campaign::MeasuredObservable& observable : experiment.observables) {
           message.add_observables(observable.name);

@@ -319,6 +319,21 @@ absl::StatusOr<std::map<int, int>> Reader::AttemptsBySample(std::int64_t campaig
   });
 }
 
+absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(std::int64_t campaign) {
+  return Guard([&] {
+    std::map<EvaluationKey, double> seconds;
+    SQLite::Statement& row = connection_->Bind(
+        "SELECT sample, experiment, coalesce(sum(core_seconds), 0.0) FROM attempt "
+        "WHERE campaign = ? GROUP BY sample, experiment",
+        campaign);
+    while (row.executeStep()) {
+      seconds[{campaign, row.getColumn(0).getInt(), row.getColumn(1).getInt()}] =
+          row.getColumn(2).getDouble();
+    }
+    return seconds;
+  });
+}
+
 absl::StatusOr<Effort> Reader::EffortOf(std::int64_t campaign) {
   return Guard([&] {
     Effort effort;

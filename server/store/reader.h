@@ -56,6 +56,8 @@ class Reader {
   absl::StatusOr<std::int64_t> LastAttempt();
   /// Attempts made so far, by sample.
   absl::StatusOr<std::map<int, int>> AttemptsBySample(std::int64_t campaign);
+  /// Of all attempts that ended, by evaluation; those that were never attempted are not in it.
+  absl::StatusOr<std::map<EvaluationKey, double>> CoreSeconds(std::int64_t campaign);
   absl::StatusOr<Effort> EffortOf(std::int64_t campaign);
   absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);
   /// In the order in which they were last put.

@@ -103,7 +103,7 @@ TEST(SettingPlans, AStressGoesOnAndIsTakenOffOnce) {
   const std::vector<PlannedExperiment> plans = SettingPlans(isotropic);
   ASSERT_EQ(plans.size(), 2U);
   EXPECT_EQ(plans[0].path, Monotonic(1e5, 2e6));
-  EXPECT_TRUE(plans[1].unloading);
+  EXPECT_TRUE(plans[1].unloading_at);
   EXPECT_DOUBLE_EQ(plans[1].path.back(), 5e5);
   EXPECT_GT(plans[1].path.front(), 1e5);
 }

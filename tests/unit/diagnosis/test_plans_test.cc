@@ -36,7 +36,7 @@ int Count(const std::vector<TestPlan>& plans, const auto& condition) {
 }
 
 TEST(TestPlans, GridOfPressureDensityAndUnloading) {
-  const std::vector<TestPlan> plans = PlansFor(Measured());
+  const std::vector<TestPlan> plans = Named(PlansFor(Measured()), 1);
   const auto at = [](double pressure) {
     return [pressure](const TestPlan& plan) {
       return plan.experiment.test == "triaxial_drained" &&
@@ -45,7 +45,7 @@ TEST(TestPlans, GridOfPressureDensityAndUnloading) {
   };
   EXPECT_EQ(Count(plans, at(1e5 / 4)), 1);
   EXPECT_EQ(Count(plans, at(4 * 4e5)), 1);
-  EXPECT_EQ(Count(plans, at(2e5)), 3);  // looser, denser, with an unloading
+  EXPECT_EQ(Count(plans, at(2e5)), 4);  // looser, denser, with an early and a late unloading
   for (const double porosity : {0.38, 0.42}) {
     EXPECT_EQ(Count(plans,
                     [porosity](const TestPlan& plan) {
@@ -60,7 +60,7 @@ TEST(TestPlans, GridOfPressureDensityAndUnloading) {
   for (const TestPlan& plan : plans) {
     const std::vector<double>& strains = plan.experiment.path;
     EXPECT_GE(strains.size(), 40U);
-    EXPECT_EQ(std::is_sorted(strains.begin(), strains.end()), !plan.experiment.unloading);
+    EXPECT_EQ(std::is_sorted(strains.begin(), strains.end()), !plan.experiment.unloading_at);
     EXPECT_NEAR(strains.back(), plan.experiment.test == "oedometric" ? 0.03 : 0.1, 1e-9);
   }
 }
@@ -68,7 +68,7 @@ TEST(TestPlans, GridOfPressureDensityAndUnloading) {
 TEST(TestPlans, SpecimensFromAFileKeepTheirDensity) {
   campaign::Campaign campaign = Measured();
   for (auto& experiment : campaign.experiments) experiment.specimens = {campaign::PackingFile{}};
-  const std::vector<TestPlan> plans = PlansFor(campaign);
+  const std::vector<TestPlan> plans = Named(PlansFor(campaign), 1);
   EXPECT_FALSE(plans.empty());
   EXPECT_EQ(
       Count(plans, [](const TestPlan& p) { return p.experiment.settings.contains("porosity"); }),
@@ -78,7 +78,7 @@ TEST(TestPlans, SpecimensFromAFileKeepTheirDensity) {
 TEST(TestPlans, ARateIsVariedAndKeptByTheOthers) {
   campaign::Campaign campaign = Measured();
   for (auto& experiment : campaign.experiments) experiment.loading_rate = 2;
-  const std::vector<TestPlan> plans = PlansFor(campaign);
+  const std::vector<TestPlan> plans = Named(PlansFor(campaign), 1);
   const auto original = campaign::ParseYaml("name: dense\nloading_rate: 2 1/s\n");
   for (const double rate : {0.5, 8.0}) {
     const auto at = std::find_if(plans.begin(), plans.end(), [rate](const TestPlan& plan) {
@@ -100,7 +100,7 @@ TEST(TestPlans, AnInitialStressGrowsWithThePressure) {
   for (auto& experiment : campaign.experiments) {
     experiment.initial_stress = dem::InitialStress{.axial = 2e5, .lateral = 1e5};
   }
-  const std::vector<TestPlan> plans = PlansFor(campaign);
+  const std::vector<TestPlan> plans = Named(PlansFor(campaign), 1);
   const auto low = std::find_if(plans.begin(), plans.end(), [](const TestPlan& plan) {
     return std::abs(plan.experiment.settings.at("confining_pressure") - 1e5 / 4) < 1e-6;
   });
@@ -115,7 +115,7 @@ TEST(TestPlans, AnInitialStressGrowsWithThePressure) {
 TEST(TestPlans, AnExtensionStaysOne) {
   campaign::Campaign campaign = Measured();
   for (auto& experiment : campaign.experiments) experiment.control = {0, -0.05, -0.1};
-  EXPECT_DOUBLE_EQ(PlansFor(campaign).front().experiment.path.back(), -0.1);
+  EXPECT_DOUBLE_EQ(PlansFor(campaign).front().path.back(), -0.1);
 }
 
 TEST(TestPlans, FileHoldsTheControlAndNamesWhatWasRead) {
@@ -138,7 +138,7 @@ observables:
 )");
   ASSERT_TRUE(original.root);
   const campaign::Campaign campaign = Measured();
-  const std::vector<TestPlan> plans = PlansFor(campaign);
+  const std::vector<TestPlan> plans = Named(PlansFor(campaign), 1);
   const auto denser = std::find_if(plans.begin(), plans.end(), [](const TestPlan& plan) {
     return plan.experiment.settings.contains("porosity");
   });
@@ -173,7 +173,7 @@ TEST(TestPlans, ACovarianceOfOldReadingsBecomesItsMeanAndLength) {
       campaign::ParseYaml("name: a\nobservables:\n  q_over_p: {noise: {covariance: c.txt}}\n");
   ASSERT_TRUE(original.root);
   const std::string text =
-      campaign::ToYaml(EntryFor(PlansFor(campaign).front(), pattern, *original.root));
+      campaign::ToYaml(EntryFor(Named(PlansFor(campaign), 1).front(), pattern, *original.root));
   EXPECT_EQ(text.find("c.txt"), std::string::npos) << text;
   EXPECT_NE(text.find("correlation_length: 0.02"), std::string::npos) << text;
 }
