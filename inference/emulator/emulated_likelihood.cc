@@ -96,6 +96,41 @@ EmulatedLikelihood EmulatedLikelihood::First(Index readings) const {
   return first;
 }
 
+EmulatedLikelihood EmulatedLikelihood::Of(const std::vector<Index>& readings) const {
+  EmulatedLikelihood part = *this;
+  for (Form& form : part.forms_) {
+    std::vector<Index> kept;  // places in the group
+    for (std::size_t i = 0; i < form.readings.size(); ++i) {
+      if (std::binary_search(readings.begin(), readings.end(), form.readings[i])) {
+        kept.push_back(static_cast<Index>(i));
+      }
+    }
+    if (kept.empty()) {
+      form.readings.clear();
+      continue;
+    }
+    const auto whitening = form.whitening.triangularView<Eigen::Lower>();
+    const Eigen::MatrixXd root = whitening.solve(  // of the covariance, and the rest unwhitened
+        Eigen::MatrixXd::Identity(form.whitening.rows(), form.whitening.cols()));
+    const Eigen::MatrixXd covariance = root(kept, Eigen::all) * root(kept, Eigen::all).transpose();
+    const Eigen::MatrixXd basis = root(kept, Eigen::all) * form.whitened_basis;
+    const Eigen::VectorXd residual = root(kept, Eigen::all) * form.residual;
+    const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+    const auto size = static_cast<Index>(kept.size());
+    form.log_pivots = factor.matrixLLT().diagonal().array().log();
+    form.whitening = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
+    form.whitened_basis = form.whitening * basis;
+    form.residual = form.whitening * residual;
+    form.log_sd = form.log_sd(kept).eval();
+    std::vector<Index> own;
+    for (const Index i : kept) own.push_back(form.readings[static_cast<std::size_t>(i)]);
+    form.readings = std::move(own);
+    form.Sum();
+  }
+  std::erase_if(part.forms_, [](const Form& form) { return form.readings.empty(); });
+  return part;
+}
+
 Eigen::VectorXd EmulatedLikelihood::Whiten(const Form& form, const Eigen::VectorXd& z) const {
   Eigen::VectorXd residual(static_cast<Index>(form.readings.size()));
   for (Index i = 0; i < residual.size(); ++i) {

@@ -35,6 +35,9 @@ class EmulatedLikelihood {
   /// their places.
   EmulatedLikelihood First(Eigen::Index readings) const;
 
+  /// The likelihood of these readings alone, ascending indices; noise groups keep their places.
+  EmulatedLikelihood Of(const std::vector<Eigen::Index>& readings) const;
+
   /// Noise groups (NoiseGroupsOf), one variance factor each.
   int groups() const { return groups_; }
 

@@ -146,6 +146,22 @@ double PredictiveP(const EmulatedLikelihood& likelihood, const ScorePrediction& 
   return sum / static_cast<double>(misfit.size());
 }
 
+// Of as many draws as a probability of a few per cent is known well from, evenly thinned.
+std::vector<double> StageP(const EmulatedLikelihood& likelihood, const ScorePrediction& prediction,
+                           const std::vector<JudgedReadings>& stages) {
+  constexpr Index kDraws = 500;
+  const Index stride = std::max<Index>(1, prediction.mean.rows() / kDraws);
+  const auto thinned = Eigen::seq(0, prediction.mean.rows() - 1, stride);
+  const ScorePrediction some{.mean = prediction.mean(thinned, Eigen::all),
+                             .sd = prediction.sd(thinned, Eigen::all)};
+  std::vector<double> p;
+  for (const JudgedReadings& stage : stages) {
+    const std::vector<Index> readings(stage.readings.begin(), stage.readings.end());
+    p.push_back(PredictiveP(likelihood.Of(readings), some, readings.size(), stage.known));
+  }
+  return p;
+}
+
 // The errors in units of the noise sd of each reading, with kInferred sqrt(variance) times that
 // stated; T variances.
 void StateErrors(const TrainedEmulator& trained, const Eigen::VectorXd& variance,
@@ -326,6 +342,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   const double unknown = target.Unknown(prediction.sd, factors).sum();
   if (options.noise == NoiseMode::kGiven) {
     result.predictive_p = PredictiveP(*likelihood, prediction, data.readings.size(), options.known);
+    result.stage_p = StageP(*likelihood, prediction, options.stages);
   }
   if (options.replicates && options.noise == NoiseMode::kGiven) {
     Widen(priors, data, options, trained->emulator, prediction, target.free(), result);

@@ -23,6 +23,12 @@
 
 namespace calib::inference {
 
+/// Some of the readings, whose misfit is judged by itself.
+struct JudgedReadings {
+  std::vector<int> readings;  ///< ascending indices
+  KnownFrom known = {};       ///< of their errors about a run
+};
+
 struct EmulatorOptions {
   /// kGiven or kInferred. kEssTarget is a tempering chosen from the weights of the runs themselves,
   /// there is nothing in it to emulate: INVALID_ARGUMENT.
@@ -42,6 +48,7 @@ struct EmulatorOptions {
   std::optional<Replicates> replicates = {};
   /// Of the errors of a reading about a run, for predictive_p.
   KnownFrom known = {};
+  std::vector<JudgedReadings> stages = {};  ///< for stage_p
   /// Draws carried along the readings for EmulatedResult::path, 0: no path; and for reversed_path.
   int path_draws = 0;  ///< 0 or [100, 1e5]
   bool reversed_path = false;
@@ -84,6 +91,7 @@ struct EmulatedResult {
   /// the emulator's error and the shared scatter in the covariance [Gelman et al. 1996]; see
   /// Posterior::predictive_p.
   std::optional<double> predictive_p;
+  std::vector<double> stage_p;  ///< kGiven: the same of each of options.stages alone
   /// As Posterior::split_half, of SplitHalfOfEmulator (split_half.h); empty: not asked for.
   Eigen::VectorXd split_half;
 

@@ -65,8 +65,24 @@ Expected ExpectedOf(const Group& group, const CampaignView& view, bool validatio
   return expected;
 }
 
-void AddSegments(const Group& group, const Expected& expected, bool heldout, bool judged,
-                 std::vector<SegmentMisfit>& out) {
+// What the record says of these readings at draws of the posterior.
+std::optional<double> PredictiveP(const CampaignView& view, const Group& group, Eigen::Index first,
+                                  Eigen::Index count) {
+  const auto step = [&group](Eigen::Index i) {
+    return static_cast<int>(group.readings[static_cast<std::size_t>(i)]);
+  };
+  for (const v1::Posterior::StageP& stage : view.posterior.stage_p()) {
+    if (stage.experiment() == group.experiment->name &&
+        stage.observable() == group.observable->name && stage.first() == step(first) &&
+        stage.last() == step(first + count - 1)) {
+      return stage.p();
+    }
+  }
+  return std::nullopt;
+}
+
+void AddSegments(const CampaignView& view, const Group& group, const Expected& expected,
+                 bool heldout, bool judged, std::vector<SegmentMisfit>& out) {
   const auto size = static_cast<Eigen::Index>(group.readings.size());
   const auto segment = [&group](Eigen::Index i) -> const std::string& {
     return group.experiment->segment[group.readings[static_cast<std::size_t>(i)]];
@@ -99,9 +115,10 @@ void AddSegments(const Group& group, const Expected& expected, bool heldout, boo
       const auto n = static_cast<double>(count);
       misfit.z = inference::NormalDeviateOfMean(misfit.bias * n / std::sqrt(own.sum()),
                                                 scatter.sum() / own.sum(), group.packings);
-      misfit.p_value =
+      misfit.predictive_p = PredictiveP(view, group, first, count);
+      misfit.p_value = misfit.predictive_p.value_or(
           inference::UpperTail(ChiSquared(expected.covariance, group.residual, first, count), n,
-                               inference::WhatIsKnown(own, scatter, group.packings));
+                               inference::WhatIsKnown(own, scatter, group.packings)));
       // Divided by their sum in the end.
       misfit.chi2_share = ChiSquared(group.covariance, group.residual, first, count);
       misfit.pattern = PatternOf(CurveOf(group, first, count));
@@ -203,12 +220,13 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
             inference::WhatIsKnown(expected.covariance, expected.scatter, group.packings);
         misfit.pattern = PatternOf(CurveOf(group, 0, group.residual.size()));
         misfit.z = inference::NormalDeviate(chi2, n, known);
-        misfit.p_value = inference::UpperTail(chi2, n, known);
+        misfit.predictive_p = PredictiveP(view, group, 0, group.residual.size());
+        misfit.p_value = misfit.predictive_p.value_or(inference::UpperTail(chi2, n, known));
         sums.chi2 += chi2;
         sums.known += known;
       }
       comparison.by_observable.push_back(std::move(misfit));
-      AddSegments(group, expected, validation, judged, comparison.by_segment);
+      AddSegments(view, group, expected, validation, judged, comparison.by_segment);
     }
   }
   comparison.rms_error = std::sqrt(fitted.squared / fitted.readings);

@@ -25,10 +25,12 @@ struct ObservableMisfit {
   std::optional<double>
       z;  ///< chi-squared of the group as a standard normal deviate (inference::NormalDeviate)
   /// Probability of a chi-squared at least as large if the model is right, scatter known from the
-  /// packings that were run (inference::UpperTail). At the posterior mean:
-  /// too large by as many degrees of freedom as the parameters take of these readings. Of held-out
-  /// readings the errors of the prediction are among those of the residuals.
+  /// packings that were run (inference::UpperTail): predictive_p, else at the posterior mean. That
+  /// is too large by as many degrees of freedom as the parameters take of these readings. Of
+  /// held-out readings the errors of the prediction are among those of the residuals.
   std::optional<double> p_value{};
+  std::optional<double>
+      predictive_p{};  ///< over draws of the posterior, fitted readings: the record's
   /// Independent readings that would fix the mean of the residual as well: n^2 / sum of the
   /// correlations of the errors.
   double effective_readings = 0;
@@ -43,7 +45,8 @@ struct SegmentMisfit {
   std::optional<double>
       z;  ///< bias over its standard deviation, correlation of the errors included, as a standard
           ///< normal deviate (inference::NormalDeviateOfMean)
-  std::optional<double> p_value{};  ///< as ObservableMisfit::p_value, of this stage alone
+  std::optional<double> p_value{};       ///< as ObservableMisfit::p_value, of this stage alone
+  std::optional<double> predictive_p{};  ///< as ObservableMisfit::predictive_p
   int readings = 0;
   double effective_readings = 0;  ///< as ObservableMisfit::effective_readings
   double rms_error = 0;           ///< rms of residual / standard deviation

@@ -9,6 +9,7 @@
 #include "inference/emulator/search_widening.h"
 #include "inference/emulator/split_half.h"
 #include "inference/filter/widened_posterior.h"
+#include "server/scheduler/stage_misfit.h"
 
 namespace calib::scheduler {
 namespace {
@@ -72,12 +73,14 @@ void AskEmulator(const Definition& definition, std::span<const inference::Iterat
   inference::EmulatorOptions options = EmulatorOptionsOf(definition);
   options.replicates = definition.replicates;
   options.known = definition.known;
+  for (Stage& stage : StagesOf(definition)) options.stages.push_back(std::move(stage.judged));
   options.path_draws = kPathDraws;
   options.reversed_path = definition.campaign.filter.reversed_path;
   const inference::DataSet& data = EmulatedData(definition);
   auto emulated = inference::EmulatedPosterior(definition.priors, data, options, iterations);
   if (emulated.ok()) {
     if (emulated->adequate) {
+      answer.stage_p = emulated->stage_p;
       answer.scatter = ScatterOfEmulator(definition, *emulated);
       const inference::SplitHalf split =
           inference::SplitHalfOfEmulator(definition.priors, data, options, iterations, *emulated);
@@ -140,6 +143,18 @@ std::string ConditionedOn(const Definition& definition,
                                      "this, and leave its uncertainty out.");
 }
 
+Eigen::MatrixXd AllPredictions(std::span<const inference::Iteration> iterations) {
+  Eigen::Index runs = 0;
+  for (const inference::Iteration& one : iterations) runs += one.predictions.rows();
+  Eigen::MatrixXd all(runs, iterations.front().predictions.cols());
+  runs = 0;
+  for (const inference::Iteration& one : iterations) {
+    all.middleRows(runs, one.predictions.rows()) = one.predictions;
+    runs += one.predictions.rows();
+  }
+  return all;
+}
+
 }  // namespace
 
 absl::StatusOr<Answer> FindAnswer(const Definition& definition,
@@ -157,8 +172,11 @@ absl::StatusOr<Answer> FindAnswer(const Definition& definition,
   }
   if (!answer.FromWeights()) {
     AskEmulator(definition, iterations, answer);
-  } else if (definition.replicates &&
-             definition.campaign.filter.noise == inference::NoiseMode::kGiven) {
+    return answer;
+  }
+  answer.stage_p = StageP(definition, StagesOf(definition), AllPredictions(iterations),
+                          answer.weighted.log_weights);
+  if (definition.replicates && definition.campaign.filter.noise == inference::NoiseMode::kGiven) {
     const double widened =
         inference::WidenByRefits(definition.priors, definition.data, *definition.replicates,
                                  iterations, definition.campaign.filter.seed, answer.weighted);

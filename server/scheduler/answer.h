@@ -22,6 +22,7 @@ struct Answer {
   /// Where the weights do not suffice and the states could be emulated, adequately or not.
   std::optional<inference::EmulatedResult> emulated;
   std::vector<ObservableScatter> scatter;  ///< what runs on other packings differ by, where known
+  std::vector<double> stage_p;             ///< of StagesOf(), one each; empty: not known
   std::vector<std::string> warnings;       ///< whole sentences
 
   bool FromWeights() const { return weighted.degeneracy.empty(); }

@@ -49,6 +49,7 @@ struct Definition {
   std::optional<inference::Replicates> replicates{};
   /// Of the errors of `data`, where packings are part of them.
   inference::KnownFrom known{};
+  Eigen::MatrixXd of_packings{};  ///< these packings' part of the covariance of `data`; or empty
   inference::JointPrior priors;
   ReadingIndex readings;
   /// Of surrogate_msrs, kept from one plan to the next: nothing that the store does not give again

@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "inference/filter/parameter_summary.h"
+#include "server/scheduler/stage_misfit.h"
 
 namespace calib::scheduler {
 namespace {
@@ -157,6 +158,23 @@ void AddEmulator(const Definition& definition, const inference::EmulatedResult& 
   }
 }
 
+void AddStages(const Definition& definition, const Answer& answer, v1::Posterior& message) {
+  if (answer.stage_p.empty() || !answer.HasIntervals()) return;
+  std::size_t at = 0;
+  for (const Stage& stage : StagesOf(definition)) {
+    const double p = answer.stage_p[at++];
+    if (!std::isfinite(p)) continue;
+    const campaign::Experiment& experiment =
+        definition.campaign.experiments[static_cast<std::size_t>(stage.experiment)];
+    v1::Posterior::StageP& out = *message.add_stage_p();
+    out.set_experiment(experiment.name);
+    out.set_observable(experiment.observables[static_cast<std::size_t>(stage.observable)].name);
+    out.set_first(stage.first);
+    out.set_last(stage.last);
+    out.set_p(p);
+  }
+}
+
 void AddScatter(const Definition& definition, const Answer& answer, v1::Posterior& message) {
   for (const ObservableScatter& scatter : answer.scatter) {
     const campaign::Experiment& experiment =
@@ -233,6 +251,7 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
   if (answer.HasIntervals() && predictive_p.has_value()) {
     message.set_predictive_p(*predictive_p);
   }
+  AddStages(definition, answer, message);
   message.mutable_warnings()->Add(answer.warnings.begin(), answer.warnings.end());
   AddTails(definition, answer, message);
   message.set_noise(ToString(definition.campaign.filter.noise));

@@ -176,8 +176,8 @@ Definition DefinitionWith(const Definition& definition, const MeasuredScatter& s
     with.data = inference::WithScatter(definition.data, groups, 1);
     if (VariesPackings(definition.campaign)) {
       const Eigen::MatrixXd covariance = inference::ErrorCovariance(with.data);
-      with.known = inference::WhatIsKnown(
-          covariance, covariance - inference::ErrorCovariance(definition.data), fewest);
+      with.of_packings = covariance - inference::ErrorCovariance(definition.data);
+      with.known = inference::WhatIsKnown(covariance, with.of_packings, fewest);
     }
     with.mean_data = inference::WithScatter(definition.data, of_mean, 0);
     if (scatter.departures.rows() > 0) {

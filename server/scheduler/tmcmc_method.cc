@@ -23,6 +23,7 @@
 #include "server/scheduler/method.h"
 #include "server/scheduler/plan_memory.h"
 #include "server/scheduler/posterior_record.h"
+#include "server/scheduler/stage_misfit.h"
 
 namespace calib::scheduler {
 namespace {
@@ -199,6 +200,8 @@ class TmcmcMethod final : public Method {
     posterior.degeneracy = Degeneracy(state, posterior.ess);
     if (posterior.degeneracy.empty()) {
       answer.draws = state.samples;
+      answer.stage_p =
+          StageP(definition_, StagesOf(definition_), PredictionsOf(state, history), equal);
       AddChecks(state, history, posterior);
     } else {
       answer.warnings.push_back(posterior.degeneracy);

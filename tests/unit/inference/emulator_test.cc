@@ -189,11 +189,13 @@ TEST(EmulatedLikelihood, AgreesWithTheDenseGaussian) {
 
   const PrincipalComponents& components = emulator->components();
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(t, t);
+  Eigen::MatrixXd as_stated = covariance;  // factors one
   for (int a = 0; a < t; ++a) {
     for (int b = 0; b < t; ++b) {
       if (a % 2 != b % 2) continue;
       const double noise = a == b ? 1 : a % 2 == 1 ? std::exp(-0.1 * std::abs(a - b) / 0.3) : 0;
-      covariance(a, b) = factors(0, a % 2) * (noise + (a == b ? components.remainder[a] : 0));
+      as_stated(a, b) = noise + (a == b ? components.remainder[a] : 0);
+      covariance(a, b) = factors(0, a % 2) * as_stated(a, b);
     }
   }
   const Eigen::VectorXd spread = (prediction.sd.row(0).transpose().array().square() +
@@ -203,6 +205,8 @@ TEST(EmulatedLikelihood, AgreesWithTheDenseGaussian) {
       spread.asDiagonal() * emulator->correlation() * spread.asDiagonal();
   covariance += components.basis * scores * components.basis.transpose();
   covariance *= 0.2 * 0.2;
+  as_stated += components.basis * scores * components.basis.transpose();
+  as_stated *= 0.2 * 0.2;
   const Eigen::VectorXd residual =
       -0.2 * (components.mean.transpose() + components.basis * prediction.mean.row(0).transpose());
   const Eigen::LLT<Eigen::MatrixXd> dense(covariance);
@@ -211,6 +215,15 @@ TEST(EmulatedLikelihood, AgreesWithTheDenseGaussian) {
                           dense.matrixLLT().diagonal().array().log().sum();
   EXPECT_NEAR(likelihood->LogLikelihood(prediction, factors)[0], expected,
               1e-8 * std::abs(expected));
+
+  // Of some readings alone: their own block of the covariance. The last are all of one group.
+  for (const std::vector<Index>& some : {std::vector<Index>{2, 3, 5, 6, 11},
+                                         std::vector<Index>{0, 1}, std::vector<Index>{1, 5, 9}}) {
+    const Eigen::LLT<Eigen::MatrixXd> block(as_stated(some, some));
+    const Eigen::VectorXd own = residual(some);
+    const double misfit = own.dot(block.solve(own));
+    EXPECT_NEAR(likelihood->Of(some).Misfit(prediction)[0], misfit, 1e-8 * misfit) << some.size();
+  }
 }
 
 TEST(EmulatedPosterior, SaysWhatIsWrong) {

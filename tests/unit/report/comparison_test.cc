@@ -54,6 +54,23 @@ TEST(Comparison, IndependentErrors) {
   EXPECT_FALSE(c.heldout_rms_error.has_value());
 }
 
+TEST(Comparison, WhatTheRecordSaysOfAStageOverDrawsGoesBeforeThePosteriorMean) {
+  CampaignView view = FourReadings(0);
+  v1::Posterior::StageP& stage = *view.posterior.add_stage_p();
+  stage.set_experiment("a");
+  stage.set_observable("q_over_p");
+  stage.set_first(2);
+  stage.set_last(3);
+  stage.set_p(0.03);
+  const Comparison c = Compare(view, PredictReadings(view));
+  ASSERT_EQ(c.by_segment.size(), 2U);
+  EXPECT_EQ(c.by_segment[1].predictive_p, 0.03);
+  EXPECT_EQ(c.by_segment[1].p_value, 0.03);
+  EXPECT_FALSE(c.by_segment[0].predictive_p);
+  EXPECT_NEAR(*c.by_segment[0].p_value, std::exp(-1), 1e-6);  // chi-squared of 2 at 2
+  EXPECT_FALSE(c.by_observable[0].predictive_p);
+}
+
 TEST(Comparison, CorrelatedErrorsMakeAlternatingResidualsUnlikely) {
   const CampaignView view = FourReadings(0.05);
   EXPECT_GT(*Compare(view, PredictReadings(view)).reduced_chi2, 4.0);

@@ -54,6 +54,8 @@ TEST(Answer, WideNoiseLeavesWeightsThatSuffice) {
   EXPECT_FALSE(posterior.has_emulator());
   EXPECT_EQ(posterior.draws_size(), 0);
   EXPECT_GT(posterior.ess(), 50);
+  ASSERT_GT(posterior.stage_p_size(), 0);
+  EXPECT_NEAR(posterior.stage_p(0).p(), posterior.predictive_p(), 1e-9) << "nothing else is fitted";
   EXPECT_EQ(HeldOutDraws(service, 200), 0);
 }
 
@@ -69,6 +71,10 @@ TEST(Answer, FewEffectiveSamplesAreEmulatedAndHeldOutTestsRunOnDraws) {
   EXPECT_EQ(posterior.bands(0).observable(), "stress_ratio");
   ASSERT_EQ(posterior.bands(0).mean_size(), 12);
   EXPECT_LT(posterior.bands(0).q05(11), posterior.bands(0).q95(11));
+  ASSERT_GT(posterior.stage_p_size(), 0);
+  EXPECT_EQ(posterior.stage_p(0).last(), 11);
+  // Every observable as a whole: here all there is, of a quarter of the draws.
+  EXPECT_NEAR(posterior.stage_p(0).p(), posterior.predictive_p(), 0.03);
   for (const auto& parameter : posterior.parameters()) {
     EXPECT_LT(parameter.q05(), parameter.mean());
     EXPECT_LT(parameter.mean(), parameter.q95());

@@ -74,6 +74,13 @@ TEST_F(FinishedTmcmcCampaign, JudgesItsFitAndItself) {
   ASSERT_TRUE(posterior.has_predictive_p());
   EXPECT_GT(posterior.predictive_p(), 0);
   EXPECT_LT(posterior.predictive_p(), 1);
+  ASSERT_GT(posterior.stage_p_size(), 0);
+  const auto& whole = posterior.stage_p(0);
+  EXPECT_EQ(whole.experiment(), "tx");
+  EXPECT_EQ(whole.observable(), "stress_ratio");
+  EXPECT_EQ(whole.first(), 0);
+  EXPECT_EQ(whole.last(), 11);
+  EXPECT_NEAR(whole.p(), posterior.predictive_p(), 1e-9) << "nothing else is fitted";
   EXPECT_EQ(posterior.noise_scale_size(), 0) << "the noise is given";
   for (const auto& parameter : posterior.parameters()) {
     // Means of halves of 40 chains or so: 2 / sqrt(80) in the mean, of families somewhat more.

@@ -188,34 +188,49 @@ TEST(EmulatedPosterior, SameSeedSameBitsAndDivergedRunsAreLeftOut) {
   EXPECT_EQ(first->predictive_q95, second->predictive_q95);
 }
 
-// The model is linear, so that the misfit of each draw is known exactly. A sawtooth of two sd is
-// nothing that a model with three smooth parameters could follow.
+// The model is linear, so that the misfit of each draw is known exactly. A sawtooth of 2.5 sd is
+// nothing that a model with three smooth parameters could follow; in one half of the readings it
+// leaves the other half as good as it was.
 TEST(EmulatedPosterior, PredictiveProbabilityIsTheExactOneAndTellsAWrongModel) {
   const LinearModel model(30, 3, 0.2, 77);
   const Iteration runs = PriorRuns(model, 60);
-  for (const double sawtooth : {0.0, 2.0}) {
+  EmulatorOptions options{.seed = 1};
+  options.stages.resize(2);
+  for (int t = 0; t < 30; ++t) options.stages[t < 15 ? 0 : 1].readings.push_back(t);
+  for (const double sawtooth : {0.0, 2.5}) {
     DataSet data = model.Data();
-    for (std::size_t t = 0; t < data.readings.size(); ++t)
+    for (std::size_t t = 15; t < data.readings.size(); ++t)
       data.readings[t].value += (t % 2 == 0 ? 1 : -1) * sawtooth * data.readings[t].sd;
-    const auto result = EmulatedPosterior(model.priors, data, {.seed = 1}, {&runs, 1});
+    const auto result = EmulatedPosterior(model.priors, data, options, {&runs, 1});
     ASSERT_TRUE(result.ok()) << result.status();
     ASSERT_TRUE(result->predictive_p.has_value());
+    ASSERT_EQ(result->stage_p.size(), 2U);
     const Eigen::MatrixXd histories = model.Predict(result->draws);
     double exact = 0;
+    double exact_of_stage[] = {0, 0};
     for (Eigen::Index i = 0; i < histories.rows(); ++i) {
-      double misfit = 0;
+      double misfit[] = {0, 0};
       for (std::size_t t = 0; t < data.readings.size(); ++t) {
         const Reading& reading = data.readings[t];
-        misfit +=
+        misfit[t < 15 ? 0 : 1] +=
             std::pow((histories(i, static_cast<Eigen::Index>(t)) - reading.value) / reading.sd, 2);
       }
-      exact += boost::math::gamma_q(15, misfit / 2) / static_cast<double>(histories.rows());
+      const double share = 1 / static_cast<double>(histories.rows());
+      exact += share * boost::math::gamma_q(15, (misfit[0] + misfit[1]) / 2);
+      for (const int s : {0, 1}) {
+        exact_of_stage[s] += share * boost::math::gamma_q(7.5, misfit[s] / 2);
+      }
     }
     EXPECT_NEAR(*result->predictive_p, exact, 0.02);
+    EXPECT_NEAR(result->stage_p[0], exact_of_stage[0], 0.03);  // a quarter of the draws
+    EXPECT_NEAR(result->stage_p[1], exact_of_stage[1], 0.03);
+    EXPECT_GT(result->stage_p[0], 0.05);
     if (sawtooth > 0) {
       EXPECT_LT(*result->predictive_p, 1e-3);
+      EXPECT_LT(result->stage_p[1], 1e-3);
     } else {
       EXPECT_GT(*result->predictive_p, 0.05);
+      EXPECT_GT(result->stage_p[1], 0.05);
     }
   }
 }
