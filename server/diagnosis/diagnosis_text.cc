@@ -8,6 +8,7 @@
 #include "dem/catalog/catalog.h"
 #include "server/diagnosis/diagnosis.h"
 #include "server/diagnosis/measurement_errors.h"
+#include "server/diagnosis/plan_words.h"
 #include "server/report/people_units.h"
 #include "server/report/stored_diagnosis.h"
 #include "server/report/text_table.h"
@@ -91,6 +92,7 @@ Json PlannedJson(const PlannedExperiment& planned) {
 Json NextJson(const std::optional<NextExperiment>& next) {
   if (!next) return nullptr;
   Json json = PlannedJson(next->best);
+  json["in_words"] = InWords(next->best);
   json["separates"] = next->separates;
   json["snippet"] = next->snippet;
   json["evaluations_for_planning"] = next->evaluations;
@@ -99,34 +101,6 @@ Json NextJson(const std::optional<NextExperiment>& next) {
     json["considered"].push_back(PlannedJson(planned));
   }
   return json;
-}
-
-std::string UnitOf(const std::string& quantity, const dem::TestInfo& test) {
-  if (quantity == "loading_rate") return "1/s";
-  for (const dem::ParameterInfo& setting : test.settings) {
-    if (setting.name == quantity) return setting.unit;
-  }
-  const dem::ObservableInfo* const observable = dem::FindObservable(quantity);
-  return observable != nullptr ? observable->unit : "1";
-}
-
-std::string InWords(const PlannedExperiment& planned) {
-  const dem::TestInfo& test = *dem::FindTest(planned.test);
-  const auto in_words = [&test](const std::string& name, double value) {
-    return report::NumberWithUnit(value, name, UnitOf(name, test), 3);
-  };
-  std::string text = planned.test;
-  for (const auto& [name, value] : planned.settings) {
-    text += fmt::format(", {} {}", report::NameForPeople(name), in_words(name, value));
-  }
-  if (planned.control != "axial_strain") {
-    text += fmt::format(", driven by {} from {} to {}", report::NameForPeople(planned.control),
-                        in_words(planned.control, planned.path.front()),
-                        in_words(planned.control, planned.path.back()));
-  }
-  if (!planned.unloading_at) return text;
-  return text + fmt::format(", one unloading and reloading at {}",
-                            in_words(planned.control, *planned.unloading_at));
 }
 
 // And from a misfit that none of them makes.

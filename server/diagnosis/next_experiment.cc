@@ -13,6 +13,7 @@
 #include "server/campaign/derive.h"
 #include "server/campaign/yaml_text.h"
 #include "server/diagnosis/plan_grid.h"
+#include "server/diagnosis/plan_words.h"
 #include "server/diagnosis/test_plans.h"
 #include "server/report/people_units.h"
 
@@ -298,7 +299,8 @@ class Planning {
         campaign::YamlScalar("measurement_to_be_made.csv");
     const std::string section = campaign::ToYaml(
         campaign::YamlMap({{"experiments", campaign::YamlList({std::move(snippet)})}}));
-    next.snippet = absl::StrCat(kSnippetHead, section.substr(section.find('\n') + 1));
+    next.snippet = absl::StrCat(kSnippetHead, "  # ", WayInWords(next.best), ".\n",
+                                section.substr(section.find('\n') + 1));
     return next;
   }
 

@@ -68,6 +68,12 @@ bool CanFollow(const dem::TestInfo& test, const campaign::Experiment& pattern) {
          std::all_of(pattern.observables.begin(), pattern.observables.end(), has);
 }
 
+// To three digits: nobody sets more.
+double Rounded(double pressure) {
+  const double digit = std::pow(10, std::floor(std::log10(pressure)) - 2);
+  return digit * std::round(pressure / digit);
+}
+
 struct Pressures {
   double low = 0, middle = 0, high = 0;
 };
@@ -80,7 +86,7 @@ Pressures PressuresOf(const campaign::Campaign& campaign) {
   }
   const double low = *pressures.begin();
   const double high = *pressures.rbegin();
-  return {.low = low, .middle = std::sqrt(low * high), .high = high};
+  return {.low = low, .middle = Rounded(std::sqrt(low * high)), .high = high};
 }
 
 // Signed, and the largest in size.

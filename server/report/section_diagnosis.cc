@@ -116,9 +116,10 @@ std::string NextExperimentHtml(const StoredDiagnosis& d) {
                             NameForPeople(a), NameForPeople(b));
   }
   return fmt::format(
-      "<h3>Next experiment</h3>\n<p>It separates {} with a power of {}{}. For the campaign "
+      "<h3>Next experiment</h3>\n<p>{}It separates {} with a power of {}{}. For the campaign "
       "file:</p>\n<pre>{}</pre>\n",
-      Escape(names), Percent(d.next_power, 3), Escape(together), Escape(d.next_experiment));
+      d.next_in_words.empty() ? "" : Escape(d.next_in_words) + ". ", Escape(names),
+      Percent(d.next_power, 3), Escape(together), Escape(d.next_experiment));
 }
 
 }  // namespace

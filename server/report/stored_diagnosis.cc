@@ -121,6 +121,7 @@ absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& text) {
   }
   if (const auto next = json.find("next_experiment"); next != json.end() && next->is_object()) {
     Read(*next, "snippet", d.next_experiment);
+    Read(*next, "in_words", d.next_in_words);
     Read(*next, "separates", d.next_separates);
     Read(*next, "expected_power", d.next_power);
     if (const auto pairs = next->find("not_separated"); pairs != next->end()) {

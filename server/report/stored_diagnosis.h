@@ -46,6 +46,7 @@ struct StoredDiagnosis {
   std::vector<std::pair<std::string, std::string>> undetectable{};  ///< effect, why
   std::vector<std::string> warnings{};
   std::string next_experiment{};  ///< the lines for the campaign file; empty: none was planned
+  std::string next_in_words{};    ///< the test and what is set; empty in older records
   std::vector<std::string> next_separates{};
   double next_power = 0;
   std::vector<std::pair<std::string, std::string>> next_together{};  ///< that it does not separate
