@@ -74,6 +74,12 @@ struct ScreenOptions {
 /// Errors: INVALID_ARGUMENT for shapes that do not fit, a covariance that is not positive definite.
 absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model);
 
+/// Points beside the closest that the readings do not exclude: their chi-squared is above its by no
+/// more than the 0.95 quantile of the chi-squared law with model.parameters degrees of freedom
+/// [Wilks 1938]. At most `count`, evenly spaced in the order of chi-squared; may be empty. Errors as
+/// above.
+absl::StatusOr<std::vector<Eigen::Index>> PointsNotExcluded(const FittedModel& model, int count);
+
 /// What of the base model's chi2 an effect may explain: its excess over what a right model has, at
 /// least the chance scatter of that (so that nothing explains a misfit that is none).
 double ExplainableMisfit(const Adequacy& base);

@@ -360,7 +360,8 @@ class Inquiry {
   std::optional<Rival> RivalOf(const CandidateEffect& candidate) const {
     const WarmFit* fit = fits_.Find(candidate.effect);
     if (fit != nullptr && !fit->best.empty() && !candidate.campaign.empty()) {
-      return Rival{.name = candidate.effect, .view = &fit->view, .values = fit->best};
+      return Rival{
+          .name = candidate.effect, .view = &fit->view, .values = fit->best, .near = fit->near};
     }
     const dem::Model& model = base_.view().campaign.model;
     const dem::EffectInfo& effect = *dem::FindEffect(model.user_effects, candidate.effect);
@@ -410,7 +411,10 @@ class Inquiry {
       if (auto rival = RivalOf(candidate)) rivals.push_back(*std::move(rival));
       if (rivals.size() == 2) return rivals;
     }
-    if (rivals.size() == 1) rivals.push_back(BaseRival());
+    if (rivals.size() == 1) {
+      rivals.push_back(BaseRival());
+      rivals.back().near = PointsNear(base_.view(), response_.points, response_.model);
+    }
     return rivals;
   }
 

@@ -80,6 +80,7 @@ Json PlannedJson(const PlannedExperiment& planned) {
           {"control_to", planned.path.back()},
           {"expected_power", planned.expected_power},
           {"distance_sd", planned.distance},
+          {"points", planned.points},
           {"not_separated", planned.together},
           {"cost",
            {{"core_seconds_per_evaluation",

@@ -38,8 +38,9 @@ double ErrorAt(const campaign::MeasuredObservable& observable, double value) {
 
 // Curves of one run, [observable][reading]; empty: it did not finish.
 std::vector<Eigen::VectorXd> CurvesOf(const report::CampaignView& view, const std::string& name,
-                                      const campaign::Experiment& pattern, Index readings) {
-  const auto found = view.states.find({name, 0});
+                                      int sample, const campaign::Experiment& pattern,
+                                      Index readings) {
+  const auto found = view.states.find({name, sample});
   if (found == view.states.end() || static_cast<Index>(found->second.states.size()) < readings) {
     return {};
   }
@@ -79,16 +80,20 @@ constexpr const char* kSnippetHead =
     "`data`,\n"
     "  # columns named as our observables, SI units unless `units:` says otherwise.\n";
 
-// The rival run in these experiments.
-absl::StatusOr<std::string> RivalsText(const Rival& rival, const std::string& parent, int like,
+// The rival run in these experiments, at each of the points.
+absl::StatusOr<std::string> RivalsText(const Rival& rival,
+                                       const std::vector<std::map<std::string, double>>& points,
+                                       const std::string& parent, int like,
                                        const std::vector<YamlNode>& entries) {
+  std::vector<campaign::Derivation::Row> rows;
+  for (const auto& values : points) rows.push_back({.like = like, .values = values});
   return campaign::Derive(rival.view->source.campaign_file(),
                           {.name = fmt::format("{}: next experiment", rival.view->campaign.name),
                            .lineage = {.parent = parent, .purpose = "next_experiment"},
                            .effects = rival.effects,
                            .fixed = rival.fixed,
                            .experiments = entries,
-                           .rows = {{.like = like, .values = rival.values}}});
+                           .rows = std::move(rows)});
 }
 
 // Chance that a difference of so many sd is seen at the 1 % level.
@@ -131,6 +136,10 @@ struct Tried {
   TestPlan plan;
   YamlNode entry;
   std::vector<RivalPair> pairs;
+  std::string data;  // its file
+  /// [rival][point][observable]; the best point first.
+  std::vector<std::vector<std::vector<Eigen::VectorXd>>> curves;
+  bool confirmed = false;  // at further points
 };
 
 // The models, and what has been tried with them.
@@ -158,14 +167,10 @@ class Planning {
       return NextPlan{.why_none = "no planned test came to an end with all of the models"};
     }
     NextPlan plan;
-    if (ShareToldApart(tried_.front().pairs) < kEnough) {
-      std::vector<PlannedExperiment> best_first;
-      for (const Tried& one : tried_) best_first.push_back(one.plan.experiment);
-      // What is known by now is not lost with it.
-      if (auto status = Try(GridOf(AsDone(base_.campaign), best_first)); !status.ok()) {
-        plan.warning = absl::StrCat("Changes of several settings at once could not be tried: ",
-                                    status.message());
-      }
+    if (auto status = Refine(); !status.ok()) {  // what is known by now is not lost with it
+      if (absl::IsCancelled(status)) return status;
+      plan.warning =
+          absl::StrCat("A better next experiment could not be looked for: ", status.message());
     }
     NextExperiment next = Best();
     if (next.separates.empty()) {
@@ -182,6 +187,22 @@ class Planning {
  private:
   // With more of the pairs told apart one change is enough.
   static constexpr double kEnough = 0.99;
+  static constexpr std::size_t kConfirmed = 3;
+
+  static bool TellsSome(const Tried& tried) {
+    return tried.plan.experiment.expected_power >= kToldApart;
+  }
+
+  absl::Status Refine() {
+    if (auto status = Confirm(); !status.ok()) return status;
+    if (ShareToldApart(tried_.front().pairs) >= kEnough) return absl::OkStatus();
+    std::vector<PlannedExperiment> best_first;
+    for (const Tried& one : tried_) {
+      if (TellsSome(one)) best_first.push_back(one.plan.experiment);
+    }
+    if (auto status = Try(GridOf(AsDone(base_.campaign), best_first)); !status.ok()) return status;
+    return Confirm();
+  }
 
   // Those of the plans that this build accepts (some settings go together with others), run with
   // every model. Leaves what was tried best first.
@@ -193,12 +214,18 @@ class Planning {
     for (TestPlan& plan : Named(std::move(wanted), numbered_ + 1)) {
       ++numbered_;
       YamlNode entry = EntryFor(plan, pattern_, *original);
-      const auto text = RivalsText(rivals_.front(), base_.status.campaign(), like_, {entry});
+      const auto text = RivalsText(rivals_.front(), {rivals_.front().values},
+                                   base_.status.campaign(), like_, {entry});
       if (!text.ok()) return text.status();
       const std::string data = DataOf(plan.experiment, pattern_);
       if (!laboratory_.Accepts(base_, *text, {{plan.file, data}})) continue;
       files[plan.file] = data;
-      plans.push_back({.plan = std::move(plan), .entry = std::move(entry), .pairs = {}});
+      plans.push_back({.plan = std::move(plan),
+                       .entry = std::move(entry),
+                       .pairs = {},
+                       .data = data,
+                       .curves = {},
+                       .confirmed = false});
     }
     if (plans.empty()) return absl::OkStatus();
     offered_ += plans.size();
@@ -206,15 +233,59 @@ class Planning {
     if (!curves.ok()) return curves.status();
     for (std::size_t p = 0; p < plans.size(); ++p) {
       if (!IsFinished(*curves, p)) continue;
-      Compare(*curves, p, plans[p]);
+      for (std::size_t r = 0; r < rivals_.size(); ++r) plans[p].curves.push_back({(*curves)[r][p]});
+      ComparePairs(plans[p]);
+      CompareWithNone(*curves, p, plans[p].plan.experiment);
       tried_.push_back(std::move(plans[p]));
     }
+    BestFirst();
+    return absl::OkStatus();
+  }
+
+  // What has been seen at one point each alone may stand out by chance and comes behind the rest.
+  void BestFirst() {
     std::stable_sort(tried_.begin(), tried_.end(), [](const Tried& a, const Tried& b) {
+      if (a.confirmed != b.confirmed) return a.confirmed;
       const double share_a = ShareToldApart(a.pairs);
       const double share_b = ShareToldApart(b.pairs);
       if (share_a != share_b) return share_a > share_b;
       return a.plan.experiment.distance > b.plan.experiment.distance;
     });
+  }
+
+  // The best of those that have not been, at the rivals' other points.
+  absl::Status Confirm() {
+    std::vector<Tried*> wanted;
+    std::vector<YamlNode> entries;
+    std::map<std::string, std::string> files;
+    for (Tried& one : tried_) {
+      if (one.confirmed || wanted.size() == kConfirmed || !TellsSome(one)) continue;
+      wanted.push_back(&one);
+      entries.push_back(one.entry);
+      files[one.plan.file] = one.data;
+    }
+    for (std::size_t r = 0; r < rivals_.size() && !wanted.empty(); ++r) {
+      const Rival& rival = rivals_[r];
+      if (rival.near.empty()) continue;
+      const auto text = RivalsText(rival, rival.near, base_.status.campaign(), like_, entries);
+      if (!text.ok()) return text.status();
+      const auto view = laboratory_.Run(
+          *rival.view, *text, "the best next experiments at other points of " + rival.name, files);
+      if (!view.ok()) return view.status();
+      evaluations_ += view->status.model_evaluations();
+      for (Tried* one : wanted) {
+        const auto readings = static_cast<Index>(one->plan.experiment.path.size());
+        for (int i = 0; i < static_cast<int>(rival.near.size()); ++i) {
+          auto curves = CurvesOf(*view, one->plan.name, i, pattern_, readings);
+          if (!curves.empty()) one->curves[r].push_back(std::move(curves));
+        }
+      }
+    }
+    for (Tried* one : wanted) {
+      one->confirmed = true;
+      ComparePairs(*one);
+    }
+    BestFirst();
     return absl::OkStatus();
   }
 
@@ -231,7 +302,7 @@ class Planning {
     std::vector<int> ran(plans.size(), 0);  // for this: of others the time is not known
     Curves curves;
     for (const Rival& rival : models) {
-      const auto text = RivalsText(rival, base_.status.campaign(), like_, entries);
+      const auto text = RivalsText(rival, {rival.values}, base_.status.campaign(), like_, entries);
       if (!text.ok()) return text.status();
       const auto view = laboratory_.Run(*rival.view, *text,
                                         "planning the next experiment with " + rival.name, files);
@@ -240,8 +311,8 @@ class Planning {
       auto& own = curves.emplace_back();
       for (std::size_t p = 0; p < plans.size(); ++p) {
         PlannedExperiment& planned = plans[p].plan.experiment;
-        own.push_back(
-            CurvesOf(*view, plans[p].plan.name, pattern_, static_cast<Index>(planned.path.size())));
+        own.push_back(CurvesOf(*view, plans[p].plan.name, 0, pattern_,
+                               static_cast<Index>(planned.path.size())));
         const auto found = view->states.find({plans[p].plan.name, 0});
         if (found == view->states.end() || !(found->second.core_seconds > 0)) continue;
         ++ran[p];
@@ -257,19 +328,30 @@ class Planning {
                         [p](const auto& own) { return own[p].empty(); });
   }
 
-  void Compare(const Curves& curves, std::size_t p, Tried& tried) const {
+  void ComparePairs(Tried& tried) const {
+    tried.pairs.clear();
+    std::size_t fewest = tried.curves.front().size();
     for (std::size_t a = 0; a < rivals_.size(); ++a) {
+      fewest = std::min(fewest, tried.curves[a].size());
       for (std::size_t b = a + 1; b < rivals_.size(); ++b) {
-        const double distance =
-            std::sqrt(SeparationOf(DeparturesOf(curves[a][p], curves[b][p], pattern_), scatter_));
-        tried.pairs.push_back({.a = rivals_[a].name,
-                               .b = rivals_[b].name,
-                               .distance = distance,
-                               .power = PowerAt(distance)});
+        RivalPair pair{.a = rivals_[a].name, .b = rivals_[b].name};
+        const auto points = static_cast<double>(tried.curves[a].size() * tried.curves[b].size());
+        for (const auto& of_a : tried.curves[a]) {
+          for (const auto& of_b : tried.curves[b]) {
+            const double distance =
+                std::sqrt(SeparationOf(DeparturesOf(of_a, of_b, pattern_), scatter_));
+            pair.distance += distance / points;
+            pair.power += PowerAt(distance) / points;
+          }
+        }
+        tried.pairs.push_back(std::move(pair));
       }
     }
-    PlannedExperiment& planned = tried.plan.experiment;
-    Weigh(tried.pairs, planned);
+    tried.plan.experiment.points = static_cast<int>(fewest);
+    Weigh(tried.pairs, tried.plan.experiment);
+  }
+
+  void CompareWithNone(const Curves& curves, std::size_t p, PlannedExperiment& planned) const {
     if (!none_ || curves.back()[p].empty()) return;
     double from_none = std::numeric_limits<double>::infinity();
     for (std::size_t a = 0; a < rivals_.size(); ++a) {

@@ -19,9 +19,10 @@ namespace calib::diagnosis {
 struct Rival {
   std::string name{};  ///< of the effect; "base": the campaign's own model
   const report::CampaignView* view = nullptr;
-  std::map<std::string, double> values{};  ///< calibrated parameters, SI
-  std::vector<std::string> effects{};      ///< that join the model of the view, and
-  std::map<std::string, double> fixed{};   ///< their parameters, SI
+  std::map<std::string, double> values{};             ///< calibrated parameters, SI
+  std::vector<std::map<std::string, double>> near{};  ///< others that the readings do not exclude
+  std::vector<std::string> effects{};                 ///< that join the model of the view, and
+  std::map<std::string, double> fixed{};              ///< their parameters, SI
 };
 
 /// What two runs differ by beyond what two runs of one model do, as a squared distance in units of
@@ -32,7 +33,7 @@ struct Rival {
 double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter,
                     const std::vector<double>& shift = {});
 
-/// Two rivals in a planned test.
+/// Two rivals in a planned test; means over their points.
 struct RivalPair {
   std::string a, b;
   double distance = 0;  ///< sd of a measurement, >= 0
@@ -71,9 +72,11 @@ struct NextPlan {
 };
 
 /// Runs every rival, and the model of `none`, once in every planned test, from the specimen and
-/// seed of sample `like`: first with one thing changed at a time; where that does not tell 99 % of
-/// the pairs apart, with the best changes together (GridOf()). Errors of a measurement: the noise that the campaign states for the
-/// observables at values of their size, and `scatter` (of a single run, in units of that noise) for
+/// seed of sample `like`, first with one thing changed at a time. The three best are run at the
+/// rivals' other points too, and of these the best is chosen by what is expected over them; where
+/// that does not tell 99 % of the pairs apart, the same with the best changes together (GridOf()).
+/// Errors of a measurement: the noise that the campaign states for the observables at values of
+/// their size, and `scatter` (of a single run, in units of that noise) for
 /// the measurement and both runs: see SeparationOf(). None for fewer than two rivals, without a
 /// known size of the errors, where no plan is a campaign that this build accepts, is finished by all
 /// rivals, or tells any two of them apart. Errors: those of the runs. The best is that which tells

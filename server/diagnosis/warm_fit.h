@@ -24,8 +24,10 @@ struct WarmFit {
   int idle = 0;                          ///< batches since one came clearly closer
   bool stalled = false;                  ///< several batches have come no closer
   std::map<std::string, double> best{};  ///< parameters of the point with the smallest chi2, SI
-  double rms = 0;                        ///< smallest of a point, residual over noise sd
-  inference::FittedModel model{};        ///< runs, or mean histories, as points
+  /// Others that the readings do not exclude (PointsNear).
+  std::vector<std::map<std::string, double>> near{};
+  double rms = 0;                  ///< smallest of a point, residual over noise sd
+  inference::FittedModel model{};  ///< runs, or mean histories, as points
   /// As of a model that fits nowhere until it has been judged.
   inference::Adequacy adequacy{.chi2 = std::numeric_limits<double>::infinity(), .p_value = 0};
   inference::Advantage over_base{};

@@ -28,6 +28,17 @@ int BatchOf(const FittedCampaign& base) {
 
 }  // namespace
 
+std::vector<std::map<std::string, double>> PointsNear(const report::CampaignView& view,
+                                                      const Eigen::MatrixXd& points,
+                                                      const inference::FittedModel& model) {
+  constexpr int kCount = 3;
+  std::vector<std::map<std::string, double>> near;
+  const auto rows = inference::PointsNotExcluded(model, kCount);
+  if (!rows.ok()) return near;
+  for (const Index row : *rows) near.push_back(PointOf(view, points, row));
+  return near;
+}
+
 std::map<std::string, double> PointOf(const report::CampaignView& view,
                                       const Eigen::MatrixXd& points, Index row) {
   std::map<std::string, double> values;
@@ -245,6 +256,7 @@ void WarmFits::Judge(const std::string& effect) {
     fit.gain_p_value = p_value.ok() ? *p_value : 1;
   }
   fit.best = PointOf(fit.view, points, adequacy->best);
+  fit.near = PointsNear(fit.view, points, fit.model);
   fit.rms = std::numeric_limits<double>::infinity();
   for (Index point = 0; point < fit.model.histories.points(); ++point) {
     fit.rms = std::min(fit.rms, fit.model.histories.Rms(point));

@@ -78,6 +78,12 @@ class WarmFits {
   std::map<std::string, WarmFit> fits_;
 };
 
+/// Up to three points beside the closest that the readings do not exclude
+/// (inference::PointsNotExcluded). points: where the model's histories are.
+std::vector<std::map<std::string, double>> PointsNear(const report::CampaignView& view,
+                                                      const Eigen::MatrixXd& points,
+                                                      const inference::FittedModel& model);
+
 /// Calibrated parameters of a campaign at a row of `points`, by name.
 std::map<std::string, double> PointOf(const report::CampaignView& view,
                                       const Eigen::MatrixXd& points, Eigen::Index row);

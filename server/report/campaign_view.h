@@ -15,7 +15,7 @@ namespace calib::report {
 struct StateHistory {
   std::vector<std::string> observables;  ///< what the values of each state are, in order
   std::vector<v1::State> states;
-  double core_seconds = 0;  ///< of all attempts; 0: it was run for another campaign
+  double core_seconds = 0;  ///< of all attempts; 0: not known
 };
 
 struct CampaignView {

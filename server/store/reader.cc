@@ -323,8 +323,16 @@ absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(std::int64_t
   return Guard([&] {
     std::map<EvaluationKey, double> seconds;
     SQLite::Statement& row = connection_->Bind(
-        "SELECT sample, experiment, coalesce(sum(core_seconds), 0.0) FROM attempt "
-        "WHERE campaign = ? GROUP BY sample, experiment",
+        "SELECT wanted.sample, wanted.experiment, sum(attempt.core_seconds) AS spent "
+        "FROM evaluation AS wanted JOIN evaluation AS ran "
+        "ON ran.digest = wanted.digest AND NOT ran.reused AND (wanted.reused OR "
+        "(ran.campaign, ran.sample, ran.experiment) = "
+        "(wanted.campaign, wanted.sample, wanted.experiment)) "
+        "JOIN attempt ON (attempt.campaign, attempt.sample, attempt.experiment) = "
+        "(ran.campaign, ran.sample, ran.experiment) "
+        "WHERE wanted.campaign = ? "
+        "GROUP BY wanted.sample, wanted.experiment, ran.campaign, ran.sample, ran.experiment "
+        "HAVING spent > 0",
         campaign);
     while (row.executeStep()) {
       seconds[{campaign, row.getColumn(0).getInt(), row.getColumn(1).getInt()}] =

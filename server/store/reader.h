@@ -56,7 +56,8 @@ class Reader {
   absl::StatusOr<std::int64_t> LastAttempt();
   /// Attempts made so far, by sample.
   absl::StatusOr<std::map<int, int>> AttemptsBySample(std::int64_t campaign);
-  /// Of all attempts that ended, by evaluation; those that were never attempted are not in it.
+  /// Of all attempts that ended, by evaluation; of one that was reused those of the equal one that
+  /// ran, where that is still there. Those that nothing is known of are not in it.
   absl::StatusOr<std::map<EvaluationKey, double>> CoreSeconds(std::int64_t campaign);
   absl::StatusOr<Effort> EffortOf(std::int64_t campaign);
   absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);

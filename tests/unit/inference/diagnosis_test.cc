@@ -62,6 +62,24 @@ TEST(Diagnosis, NothingMissingIsAdequateAtTheStatedRate) {
   EXPECT_LE(flagged, 12);
 }
 
+TEST(Diagnosis, PointsThatTheReadingsDoNotExcludeLieAroundTheClosest) {
+  const FittedModel model = Line(12 * Curve(0) + Noise(3));
+  const auto closest = TestAdequacy(model)->best;
+  const double steps = std::sqrt(3.841) / (0.05 * Curve(0).norm());  // of the 95 % interval
+  const auto near = *PointsNotExcluded(model, 3);
+  ASSERT_EQ(near.size(), 3U);
+  double before = 0;
+  for (const Eigen::Index point : near) {
+    const auto off = static_cast<double>(std::abs(point - closest));
+    EXPECT_LE(off, steps + 1);
+    EXPECT_GT(off, before);
+    before = off;
+  }
+  EXPECT_GT(before, 0.6 * steps);
+  EXPECT_EQ(PointsNotExcluded(model, 1)->size(), 1U);
+  EXPECT_LT(PointsNotExcluded(model, 2001)->size(), 2 * steps + 1);
+}
+
 // A misfit that lasts is a small part of all that scatters, and the whole of what lasts.
 TEST(Diagnosis, AMisfitInAKnownShapeIsSeenBeforeItIsLargeAmongAllReadings) {
   constexpr int kDraws = 100;

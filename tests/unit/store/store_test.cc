@@ -175,6 +175,25 @@ TEST_F(StoreTest, EqualEvaluationIsReusedWithItsStates) {
   EXPECT_EQ(Read().EffortOf(1)->model_evaluations, 1) << "counted once";
 }
 
+TEST_F(StoreTest, WhatAnEvaluationCostIsThatOfItsAttemptsOrOfTheRunThatItReuses) {
+  const EvaluationKey copy{.campaign = 1, .sample = 1, .experiment = 0};
+  Write([&](Transaction& t) {
+    PutEvaluation(t);
+    for (const int id : {5, 6}) {
+      t.InsertAttempt({.id = id, .key = kKey, .worker = "w"});
+      t.EndAttempt({.id = id, .outcome = id == 5 ? "lost" : "completed", .core_seconds = 1.5});
+    }
+    t.SetEvaluation(kKey, EvaluationStatus::kFinished, "", 0);
+    t.InsertSample(1, {.sample = 1, .iteration = 0, .parameters = {1e9, 0.1}});
+    t.InsertEvaluation({.key = copy, .digest = "d"});
+  });
+  EXPECT_EQ(Read().CoreSeconds(1)->at(kKey), 3);
+  EXPECT_FALSE(Read().CoreSeconds(1)->contains(copy)) << "it has neither run nor been reused";
+  Write([&](Transaction& t) { t.ReuseEvaluation(kKey, copy); });
+  EXPECT_EQ(Read().CoreSeconds(1)->at(copy), 3);
+  EXPECT_EQ(Read().CoreSeconds(1)->at(kKey), 3);
+}
+
 TEST_F(StoreTest, FailedCommitIsReportedToEveryoneAndNothingMoreIsTaken) {
   bool full = false;
   Open({.before_commit = [&] {
