@@ -123,6 +123,7 @@ EmulatedLikelihood EmulatedLikelihood::Of(const std::vector<Index>& readings) co
     form.residual = form.whitening * residual;
     form.log_sd = form.log_sd(kept).eval();
     std::vector<Index> own;
+    own.reserve(kept.size());
     for (const Index i : kept) own.push_back(form.readings[static_cast<std::size_t>(i)]);
     form.readings = std::move(own);
     form.Sum();

@@ -86,6 +86,7 @@ absl::StatusOr<std::string> RivalsText(const Rival& rival,
                                        const std::string& parent, int like,
                                        const std::vector<YamlNode>& entries) {
   std::vector<campaign::Derivation::Row> rows;
+  rows.reserve(points.size());
   for (const auto& values : points) rows.push_back({.like = like, .values = values});
   return campaign::Derive(rival.view->source.campaign_file(),
                           {.name = fmt::format("{}: next experiment", rival.view->campaign.name),
