@@ -144,10 +144,12 @@ std::string NextText(const NextExperiment& next) {
   if (next.considered.size() > 1) text += "\nAlso tried:\n";
   for (std::size_t k = 1; k < next.considered.size(); ++k) {
     const PlannedExperiment& planned = next.considered[k];
-    text += "  " + InWords(planned) + ": " +
-            (planned.expected_power < kToldApart
-                 ? "tells none of them apart\n"
-                 : fmt::format("{} sd apart{}\n", Number(planned.distance, 3), NotTold(planned)));
+    text +=
+        "  " + InWords(planned) + ": " +
+        (planned.expected_power < kToldApart
+             ? "tells none of them apart\n"
+             : fmt::format("power {}, {} sd apart{}\n", report::Percent(planned.expected_power, 2),
+                           Number(planned.distance, 3), NotTold(planned)));
   }
   return text;
 }

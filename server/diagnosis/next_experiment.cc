@@ -382,7 +382,7 @@ class Planning {
         campaign::YamlScalar("measurement_to_be_made.csv");
     const std::string section = campaign::ToYaml(
         campaign::YamlMap({{"experiments", campaign::YamlList({std::move(snippet)})}}));
-    next.snippet = absl::StrCat(kSnippetHead, "  # ", WayInWords(next.best), ".\n",
+    next.snippet = absl::StrCat(kSnippetHead, "  # Control: ", WayInWords(next.best), ".\n",
                                 section.substr(section.find('\n') + 1));
     return next;
   }
