@@ -295,7 +295,11 @@ TEST_F(Misfit, ATestThatCannotBePreparedIsLeftOutOfTheNextOnes) {
   EXPECT_GE(considered.size(), 3U) << considered;
   for (const Json& planned : considered) {
     EXPECT_LT(planned["settings"].value("porosity", 0.0), 0.43) << considered;
+    EXPECT_GT(planned["cost"]["core_seconds_per_evaluation"].get<double>(), 0) << planned;
+    EXPECT_GE(planned["points"], 1) << planned;
   }
+  const std::string snippet = json["next_experiment"]["snippet"];
+  EXPECT_NE(snippet.find("# Control: axial strain to "), std::string::npos) << snippet;
 }
 
 TEST_F(Misfit, ItsVerdictIsKeptWhenNoNextExperimentCanBePlanned) {
