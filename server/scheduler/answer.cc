@@ -143,16 +143,26 @@ std::string ConditionedOn(const Definition& definition,
                                      "this, and leave its uncertainty out.");
 }
 
-Eigen::MatrixXd AllPredictions(std::span<const inference::Iteration> iterations) {
-  Eigen::Index runs = 0;
-  for (const inference::Iteration& one : iterations) runs += one.predictions.rows();
-  Eigen::MatrixXd all(runs, iterations.front().predictions.cols());
-  runs = 0;
-  for (const inference::Iteration& one : iterations) {
-    all.middleRows(runs, one.predictions.rows()) = one.predictions;
-    runs += one.predictions.rows();
+// How well the runs that the weights rest on fit each stage: of a large table only these are copied.
+std::vector<double> StagePOfWeights(const Definition& definition,
+                                    std::span<const inference::Iteration> iterations,
+                                    const Eigen::VectorXd& log_weights) {
+  constexpr double kNoWeight = 1e-12;  // as in inference::PredictiveP
+  const std::vector<Stage> stages = StagesOf(definition);
+  if (stages.empty()) return {};
+  const Eigen::Index runs = (log_weights.array() >= std::log(kNoWeight)).count();
+  Eigen::MatrixXd predictions(runs, iterations.front().predictions.cols());
+  Eigen::VectorXd weights(runs);
+  Eigen::Index run = 0;
+  Eigen::Index kept = 0;
+  for (const inference::Iteration& iteration : iterations) {
+    for (Eigen::Index i = 0; i < iteration.predictions.rows(); ++i, ++run) {
+      if (!(log_weights[run] >= std::log(kNoWeight))) continue;
+      predictions.row(kept) = iteration.predictions.row(i);
+      weights[kept++] = log_weights[run];
+    }
   }
-  return all;
+  return StageP(definition, stages, predictions, weights);
 }
 
 }  // namespace
@@ -174,8 +184,7 @@ absl::StatusOr<Answer> FindAnswer(const Definition& definition,
     AskEmulator(definition, iterations, answer);
     return answer;
   }
-  answer.stage_p = StageP(definition, StagesOf(definition), AllPredictions(iterations),
-                          answer.weighted.log_weights);
+  answer.stage_p = StagePOfWeights(definition, iterations, answer.weighted.log_weights);
   if (definition.replicates && definition.campaign.filter.noise == inference::NoiseMode::kGiven) {
     const double widened =
         inference::WidenByRefits(definition.priors, definition.data, *definition.replicates,

@@ -14,8 +14,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kNoWeight = 1e-12;  // of a run, as in PredictiveP
-
 Stage MakeStage(const Definition& definition, std::pair<int, int> group,
                 std::vector<int> readings) {
   Stage stage{.experiment = group.first, .observable = group.second};
@@ -62,21 +60,16 @@ std::vector<Stage> StagesOf(const Definition& definition) {
 
 std::vector<double> StageP(const Definition& definition, const std::vector<Stage>& stages,
                            const Eigen::MatrixXd& predictions, const Eigen::VectorXd& log_weights) {
-  std::vector<Index> runs;  // that count
-  for (Index i = 0; i < log_weights.size(); ++i) {
-    if (std::exp(log_weights[i]) >= kNoWeight) runs.push_back(i);
-  }
-  const Eigen::VectorXd weights = log_weights(runs);
   std::vector<double> p;
   for (const Stage& stage : stages) {
     const inference::DataSet data = inference::Restricted(definition.data, stage.judged.readings);
     const auto likelihood =
         inference::GaussianLikelihood::Create(data, inference::NoiseMode::kGiven);
-    p.push_back(likelihood.ok()
-                    ? inference::PredictiveP(
-                          data, likelihood->LogLikelihood(predictions(runs, stage.judged.readings)),
-                          weights, stage.judged.known)
-                    : std::numeric_limits<double>::quiet_NaN());
+    p.push_back(likelihood.ok() ? inference::PredictiveP(data,
+                                                         likelihood->LogLikelihood(predictions(
+                                                             Eigen::all, stage.judged.readings)),
+                                                         log_weights, stage.judged.known)
+                                : std::numeric_limits<double>::quiet_NaN());
   }
   return p;
 }
