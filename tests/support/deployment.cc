@@ -66,7 +66,8 @@ absl::StatusOr<std::string> Fingerprint(Client& client, const std::string& campa
     sample.clear_attempts();
     bytes += sample.SerializeAsString();
   }
-  for (const v1::SampleStates& of_sample : *states) {
+  for (v1::SampleStates& of_sample : *states) {
+    of_sample.clear_core_seconds();
     bytes += of_sample.SerializeAsString();
   }
   return bytes;
