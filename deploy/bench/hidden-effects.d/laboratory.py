@@ -38,11 +38,18 @@ class Laboratory:
     def sealed(self, case, ending):
         return os.path.join(self.folder, 'sealed', case.name + ending)
 
-    def finished(self, case):
-        return os.path.exists(self.path(case, 'verdict.json'))
+    def finished(self, case, improve=False):
+        """improve: with the answer of improve, where the case asks for one."""
+        if not os.path.exists(self.path(case, 'verdict.json')):
+            return False
+        if not improve or case.verb != 'improve':
+            return True
+        with open(self.path(case, 'verdict.json')) as document:
+            return 'improve' in json.load(document)
 
     def run(self, case, improve=True):
-        if self.finished(case):
+        """What has been run is found again in the case's state: a verdict without improve gets one."""
+        if self.finished(case, improve):
             return
         os.makedirs(self.path(case), exist_ok=True)
         if not os.path.exists(self.path(case, 'campaign.yaml')):
