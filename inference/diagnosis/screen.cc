@@ -141,25 +141,6 @@ double IndependentJudgements(const Eigen::MatrixXd& squares, const std::vector<D
 
 }  // namespace
 
-absl::StatusOr<std::vector<Index>> PointsNotExcluded(const FittedModel& model, int count) {
-  const auto whitened = Whiten(model);
-  if (!whitened.ok()) return whitened.status();
-  const Eigen::VectorXd& squares = whitened->squares;
-  std::vector<Index> near(static_cast<std::size_t>(squares.size()));
-  std::iota(near.begin(), near.end(), Index{0});
-  const boost::math::chi_squared law(std::max(1, model.parameters));
-  const double most = squares.minCoeff() + boost::math::quantile(law, 0.95);
-  std::erase_if(near, [&](Index i) { return squares[i] > most; });
-  std::stable_sort(near.begin(), near.end(),
-                   [&](Index a, Index b) { return squares[a] < squares[b]; });
-  near.erase(near.begin());  // the closest
-  const auto wanted = std::min(static_cast<std::size_t>(count), near.size());
-  std::vector<Index> some;
-  for (std::size_t k = 0; k < wanted; ++k)
-    some.push_back(near[(2 * k + 1) * near.size() / (2 * wanted)]);
-  return some;
-}
-
 absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   const auto whitened = Whiten(model);
   if (!whitened.ok()) return whitened.status();
@@ -214,6 +195,25 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   adequacy.p_value = std::min(1.0, IndependentJudgements(squares, tails) *
                                        std::min(adequacy.p_chi2, adequacy.p_shapes.value_or(1)));
   return adequacy;
+}
+
+absl::StatusOr<std::vector<Index>> PointsNotExcluded(const FittedModel& model, int count) {
+  const auto whitened = Whiten(model);
+  if (!whitened.ok()) return whitened.status();
+  const Eigen::VectorXd& squares = whitened->squares;
+  std::vector<Index> near(static_cast<std::size_t>(squares.size()));
+  std::iota(near.begin(), near.end(), Index{0});
+  const boost::math::chi_squared law(std::max(1, model.parameters));
+  const double most = squares.minCoeff() + boost::math::quantile(law, 0.95);
+  std::erase_if(near, [&](Index i) { return squares[i] > most; });
+  std::stable_sort(near.begin(), near.end(),
+                   [&](Index a, Index b) { return squares[a] < squares[b]; });
+  near.erase(near.begin());  // the closest
+  const auto wanted = std::min(static_cast<std::size_t>(count), near.size());
+  std::vector<Index> some;
+  for (std::size_t k = 0; k < wanted; ++k)
+    some.push_back(near[(2 * k + 1) * near.size() / (2 * wanted)]);
+  return some;
 }
 
 double ExplainableMisfit(const Adequacy& base) {

@@ -112,10 +112,10 @@ EmulatedLikelihood EmulatedLikelihood::Of(const std::vector<Index>& readings) co
     const auto whitening = form.whitening.triangularView<Eigen::Lower>();
     const Eigen::MatrixXd root = whitening.solve(  // of the covariance, and the rest unwhitened
         Eigen::MatrixXd::Identity(form.whitening.rows(), form.whitening.cols()));
-    const Eigen::MatrixXd covariance = root(kept, Eigen::all) * root(kept, Eigen::all).transpose();
-    const Eigen::MatrixXd basis = root(kept, Eigen::all) * form.whitened_basis;
-    const Eigen::VectorXd residual = root(kept, Eigen::all) * form.residual;
-    const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+    const Eigen::MatrixXd rows = root(kept, Eigen::all);
+    const Eigen::MatrixXd basis = rows * form.whitened_basis;
+    const Eigen::VectorXd residual = rows * form.residual;
+    const Eigen::LLT<Eigen::MatrixXd> factor(rows * rows.transpose());
     const auto size = static_cast<Index>(kept.size());
     form.log_pivots = factor.matrixLLT().diagonal().array().log();
     form.whitening = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));

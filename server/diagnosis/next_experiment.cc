@@ -132,7 +132,7 @@ std::string NothingToPlan(const campaign::Experiment& pattern) {
                       "not read (`calibctl tests`) are for you to choose");
 }
 
-// A plan that came to an end with all rivals.
+// A plan, and what the rivals do in it.
 struct Tried {
   TestPlan plan;
   YamlNode entry;
@@ -300,7 +300,7 @@ class Planning {
     for (const Tried& one : plans) entries.push_back(one.entry);
     std::vector<Rival> models = rivals_;
     if (none_) models.push_back(none_->base);
-    std::vector<int> ran(plans.size(), 0);  // for this: of others the time is not known
+    std::vector<int> ran(plans.size(), 0);  // whose time is known
     Curves curves;
     for (const Rival& rival : models) {
       const auto text = RivalsText(rival, {rival.values}, base_.status.campaign(), like_, entries);

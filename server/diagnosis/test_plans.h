@@ -24,7 +24,7 @@ struct PlannedExperiment {
   double expected_power = 0;
   double distance = 0;      ///< between these two, in sd of a measurement
   int points = 1;           ///< of each rival that it was run at: of that with the fewest
-  double core_seconds = 0;  ///< of one run, mean over the models; 0: none was run for this
+  double core_seconds = 0;  ///< of one run, mean over the models; 0: not known
   std::vector<std::pair<std::string, std::string>> together{};  ///< pairs that are not told apart
   /// The same of the rivals against none of them (NoneOfThese); where that was asked for.
   std::optional<double> distance_from_none{}, power_against_none{};

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "server/diagnosis/plan_words.h"
-
 namespace calib::diagnosis {
 namespace {
 
@@ -65,10 +63,10 @@ TEST(PlanGrid, OneThingHasOneValue) {
 
 TEST(PlanGrid, WhatDrivesATestIsNoSettingOfIt) {
   PlannedExperiment driven = kAsDone;
-  driven.control = "impact_velocity";
+  driven.control = "impact_speed";
   driven.settings["impact_angle"] = 0.3;
   PlannedExperiment faster = kAsDone;
-  faster.settings["impact_velocity"] = 4;
+  faster.settings["impact_speed"] = 4;
   EXPECT_FALSE(Together(kAsDone, driven, faster));
 }
 
@@ -87,18 +85,6 @@ TEST(PlanGrid, TheThreeBestChangesInEveryCombination) {
       3);
   EXPECT_TRUE(
       std::none_of(grid.begin(), grid.end(), [](const auto& p) { return p.unloading_at == 0.02; }));
-}
-
-TEST(PlanWords, SayWhatIsSetAndHowTheControlGoes) {
-  const auto both = Together(kAsDone, Under(8e5), Unloaded(0.05));
-  ASSERT_TRUE(both);
-  EXPECT_EQ(InWords(*both),
-            "triaxial_drained, confining pressure 800 kPa, one unloading and reloading at 5 %");
-  EXPECT_EQ(WayInWords(*both), "axial strain to 5 %, back to 2.5 %, then to 10 %");
-  EXPECT_EQ(WayInWords(kAsDone), "axial strain to 10 %");
-  const PlannedExperiment collision{
-      .test = "collision", .settings = {}, .control = "impact_angle", .path = {0.1, 0.2, 0.3}};
-  EXPECT_EQ(WayInWords(collision), "impact angle at 3 values from 5.73 deg to 17.2 deg");
 }
 
 TEST(PlanGrid, NothingGoesTogetherWithOneChange) {
