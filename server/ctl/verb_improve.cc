@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <iostream>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -19,15 +20,21 @@ namespace {
 
 std::string ToText(const diagnosis::Improvement& improvement) {
   const std::vector<diagnosis::ImproveStep>& steps = improvement.steps();
+  const auto number = [](const std::optional<double>& error) {
+    return error ? report::Number(*error, 3) : "–";
+  };
   report::TextTable table(
-      {"<campaign", "<effects", "error", "held out", "log evidence", "<verdict"});
+      {"<campaign", "<effects", "error", "left out", "held out", "log evidence", "<verdict"});
   for (const diagnosis::ImproveStep& step : steps) {
     table.AddRow({step.campaign, step.effects.empty() ? "none" : absl::StrJoin(step.effects, " + "),
-                  report::Number(step.rms_error, 3),
-                  step.heldout_rms_error ? report::Number(*step.heldout_rms_error, 3) : "–",
-                  report::Number(step.log_evidence, 5), step.verdict});
+                  report::Number(step.rms_error, 3), number(step.left_out_error),
+                  number(step.heldout_rms_error), report::Number(step.log_evidence, 5),
+                  step.verdict});
   }
   std::string text = table.ToString() + "\n";
+  text +=
+      "Errors in sd: of the fitted data; of each part of them, fitted to the others; of held-out "
+      "data.\n\n";
   for (const diagnosis::ImproveStep& step : steps) {
     text += report::Wrapped(fmt::format("{}: {}", step.campaign, step.reason), "", "  ");
   }

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "server/diagnosis/left_out_error.h"
 #include "server/report/people_units.h"
 
 namespace calib::diagnosis {
@@ -82,6 +83,11 @@ std::string WhyNoStep(const CalibratedModel& without, const CalibratedModel& wit
                         "it comes no closer, ", report::Number(with.rms_error, 3), " sd, ",
                         report::Number(without.rms_error, 3), " without it",
                         with.has_posterior ? "" : "; run more samples");
+  }
+  if (WorseLeftOut(without.left_out_error, with.left_out_error)) {
+    return absl::StrCat("it comes closer, but not to parts that are left out of the fit, ",
+                        report::Number(*with.left_out_error, 3), " sd, ",
+                        report::Number(*without.left_out_error, 3), " without it");
   }
   if (!without.has_posterior || !with.has_posterior) return "";
   const double gain = with.log_evidence - without.log_evidence;

@@ -2,6 +2,7 @@
 // What improve decides from one model to the next, without running anything: which effects are
 // tried, in which order, and whether a calibration with one of them is a step forward.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,11 +29,13 @@ struct CalibratedModel {
   double rms_error = 0;  ///< as in report::Comparison
   bool has_posterior = false;
   double log_evidence = 0, log_evidence_se = 0;  ///< with a posterior; NaN: not known
+  /// Of the parts that it is not fitted to, in sd of a measurement (see LeftOutErrors).
+  std::optional<double> left_out_error{};
 };
 
-/// Empty: the model with the effect comes closer to the fitted data than the one without it, and
-/// its evidence, where both are known, is not lower by more than two standard errors. Otherwise
-/// what speaks against it, to follow "is no step: ".
+/// Empty: the model with the effect comes closer to the fitted data than the one without it, its
+/// evidence is not lower by more than two standard errors and it predicts parts left out no worse,
+/// where these are known of both. Otherwise what speaks against it, to follow "is no step: ".
 std::string WhyNoStep(const CalibratedModel& without, const CalibratedModel& with);
 
 }  // namespace calib::diagnosis

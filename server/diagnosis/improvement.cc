@@ -11,6 +11,7 @@
 #include "server/client/findings.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/improve_step.h"
+#include "server/diagnosis/left_out_error.h"
 #include "server/report/comparison.h"
 #include "server/report/people_units.h"
 
@@ -86,7 +87,6 @@ absl::Status Improvement::Climb(report::CampaignView view, std::vector<std::stri
 absl::StatusOr<std::optional<report::CampaignView>> Improvement::Forward(
     const report::CampaignView& view, const Diagnosis& diagnosis) {
   ImproveStep& step = steps_.back();
-  const CalibratedModel without = Calibrated(view, step.rms_error);
   std::string against;
   for (const std::string& effect : EffectsToTry(diagnosis)) {
     if (const std::string why = WhyNotJoin(view.campaign, effect); !why.empty()) {
@@ -101,7 +101,7 @@ absl::StatusOr<std::optional<report::CampaignView>> Improvement::Forward(
       break;
     }
     if (!extended.ok()) return extended.status();
-    const std::string why = WhyNoStep(without, Calibrated(*extended, ErrorOf(*extended)));
+    const std::string why = WhyNot(view, step.rms_error, *extended, ErrorOf(*extended));
     if (why.empty()) {
       step.next_effect = effect;
       AddSentence(WhyNext(diagnosis, effect), step.reason);
@@ -114,6 +114,18 @@ absl::StatusOr<std::optional<report::CampaignView>> Improvement::Forward(
   }
   AddSentence(against, step.reason);
   return std::optional<report::CampaignView>();
+}
+
+// WhyNoStep of two models whose errors on the fitted data are known.
+std::string Improvement::WhyNot(const report::CampaignView& without, double without_error,
+                                const report::CampaignView& with, double with_error) {
+  CalibratedModel before = Calibrated(without, without_error);
+  CalibratedModel after = Calibrated(with, with_error);
+  if (const auto left_out = LeftOutErrorsOf(laboratory_, without, with, nuisance_)) {
+    before.left_out_error = left_out->without;
+    after.left_out_error = left_out->with;
+  }
+  return WhyNoStep(before, after);
 }
 
 // A diagnosis that cannot be paid for is no more than the adequacy of the model; the reason says so.
@@ -159,6 +171,7 @@ ImproveStep Improvement::StepOf(const report::CampaignView& view, const std::str
           .effects = view.campaign.model.effects,
           .rms_error = ErrorOf(view),
           .heldout_rms_error = std::nullopt,
+          .left_out_error = LeftOutErrorOf(laboratory_, view, nuisance_),
           .log_evidence = view.posterior.log_evidence(),
           .verdict = verdict,
           .next_effect = "",
@@ -195,7 +208,7 @@ absl::Status Improvement::Instead(std::vector<std::string>& added) {
     if (!with.ok()) return with.status();
     ImproveStep& step = steps_.back();
     const double error = ErrorOf(*with);
-    if (!WhyNoStep(Calibrated(*last_, step.rms_error), Calibrated(*with, error)).empty()) {
+    if (!WhyNot(*last_, step.rms_error, *with, error).empty()) {
       AddSentence(absl::StrCat("With ", in, " in the place of ", out, " (", with->status.campaign(),
                                ") it does no better: error ", report::Number(error, 3), " sd."),
                   step.reason);
@@ -355,6 +368,7 @@ std::string Improvement::Json() const {
          {"rms_error", step.rms_error},
          {"heldout_rms_error",
           step.heldout_rms_error ? json(*step.heldout_rms_error) : json(nullptr)},
+         {"left_out_error", step.left_out_error ? json(*step.left_out_error) : json(nullptr)},
          {"log_evidence", step.log_evidence},
          {"verdict", step.verdict},
          {"next_effect", step.next_effect.empty() ? json(nullptr) : json(step.next_effect)},

@@ -22,6 +22,7 @@ struct ImproveStep {
   std::vector<std::string> effects{};
   double rms_error = 0;  ///< of the fitted data, as in report::Comparison
   std::optional<double> heldout_rms_error{};
+  std::optional<double> left_out_error{};  ///< within the fitted data, see LeftOutErrorOf
   double log_evidence = 0;
   std::string verdict{};
   std::string next_effect{};  ///< joins the model in the next step; empty: the last one
@@ -75,8 +76,10 @@ class Improvement {
   absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
                                                 const std::vector<std::string>& effects,
                                                 const ClosestRun& closest, int times = 3);
-  static ImproveStep StepOf(const report::CampaignView& view, const std::string& verdict,
-                            std::string reason);
+  ImproveStep StepOf(const report::CampaignView& view, const std::string& verdict,
+                     std::string reason);
+  std::string WhyNot(const report::CampaignView& without, double without_error,
+                     const report::CampaignView& with, double with_error);
   absl::Status Exchange(std::vector<std::string>& added);
   absl::StatusOr<bool> Replace(std::size_t doubted, std::vector<std::string>& added,
                                const report::CampaignView& full);

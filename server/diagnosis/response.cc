@@ -68,19 +68,34 @@ std::vector<int> PackingsOf(const campaign::Campaign& campaign, const RunTable& 
   return packing;
 }
 
-}  // namespace
-
-absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
-                                   const std::vector<Eigen::VectorXd>& nuisance) {
-  const v1::Posterior& posterior = base.view().posterior;
-  const auto d = static_cast<Index>(base.view().campaign.parameters.size());
+// Of the posterior: n x d, SI.
+Eigen::MatrixXd DrawsOf(const report::CampaignView& view) {
+  const v1::Posterior& posterior = view.posterior;
+  const auto d = static_cast<Index>(view.campaign.parameters.size());
   const Index n = posterior.draws_size() / std::max<Index>(1, d);
   Eigen::MatrixXd draws(n, d);
   for (Index i = 0; i < n; ++i) {
     for (Index j = 0; j < d; ++j) draws(i, j) = posterior.draws(static_cast<int>(i * d + j));
   }
+  return draws;
+}
+
+}  // namespace
+
+absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const report::CampaignView& view,
+                                   const std::vector<Eigen::VectorXd>& nuisance) {
+  return RespondTo(base,
+                   {.campaign = view.campaign,
+                    .runs = report::RunsOf(view, base.readings().of_mean),
+                    .draws = DrawsOf(view)},
+                   nuisance);
+}
+
+absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
+                                   const std::vector<Eigen::VectorXd>& nuisance) {
   auto response = RespondTo(
-      base, {.campaign = base.view().campaign, .runs = base.runs(), .draws = draws}, nuisance);
+      base, {.campaign = base.view().campaign, .runs = base.runs(), .draws = DrawsOf(base.view())},
+      nuisance);
   if (response.ok()) {
     response->model.shapes = StageShapes(base.view().campaign, base.readings().of_mean);
   }

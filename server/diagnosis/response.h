@@ -41,6 +41,10 @@ struct EmulatedModel {
 absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedModel& model,
                                    const std::vector<Eigen::VectorXd>& nuisance);
 
+/// Another calibration on the same readings, such as an extension, by the errors of `base`.
+absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const report::CampaignView& view,
+                                   const std::vector<Eigen::VectorXd>& nuisance);
+
 /// The model of the fitted campaign itself.
 absl::StatusOr<Response> RespondTo(const FittedCampaign& base,
                                    const std::vector<Eigen::VectorXd>& nuisance);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/strings/str_format.h"
+#include "server/diagnosis/left_out_error.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -47,13 +48,7 @@ const WarmFit* Verdict::Find(const std::string& effect) const {
 bool Verdict::Explains(const CandidateEffect& candidate) const {
   const WarmFit* fit = Find(candidate.effect);
   return fit != nullptr && (fit->Explains(level_, fits_.size()) || Settles(*fit)) &&
-         !WorseLeftOut(*fit);
-}
-
-// Up to one sd is as expected of a right model: which of two such errors is larger is chance.
-bool Verdict::WorseLeftOut(const WarmFit& fit) const {
-  return fit.left_out_error && diagnosis_.left_out_error &&
-         *fit.left_out_error > std::max(1.0, *diagnosis_.left_out_error);
+         !WorseLeftOut(diagnosis_.left_out_error, fit->left_out_error);
 }
 
 // The model without it is wrong beyond doubt, and with it adequate and rid of nearly all the
@@ -214,7 +209,7 @@ std::string Verdict::WhyUnexplained() const {
 
 // Of an adequate fit that does not explain.
 std::string Verdict::WhyNotBetter(const WarmFit& fit) const {
-  if (WorseLeftOut(fit)) {
+  if (WorseLeftOut(diagnosis_.left_out_error, fit.left_out_error)) {
     return absl::StrFormat("it misses data it was not fitted to by %.3g sd, %.3g without",
                            *fit.left_out_error, *diagnosis_.left_out_error);
   }

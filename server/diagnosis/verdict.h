@@ -35,7 +35,6 @@ class Verdict {
   static bool Ended(const WarmFit& fit);
   static bool PromisesLess(const CandidateEffect& other, const CandidateEffect& first);
   double Chi2OfDouble(const std::string& other, const CandidateEffect& first) const;
-  bool WorseLeftOut(const WarmFit& fit) const;
   std::string Closest() const;
   std::string WhyUnexplained() const;
   std::string WhyNotBetter(const WarmFit& fit) const;

@@ -98,5 +98,18 @@ TEST(ImproveStep, EvidenceAgainstItOutweighsAFitThatIsALittleCloser) {
   EXPECT_EQ(WhyNoStep(without, with), "");
 }
 
+TEST(ImproveStep, AnEffectThatMissesWhatIsLeftOutIsNoStep) {
+  CalibratedModel without{.rms_error = 2, .has_posterior = true, .left_out_error = 2.5};
+  CalibratedModel with{.rms_error = 1, .has_posterior = true, .left_out_error = 3};
+  EXPECT_THAT(WhyNoStep(without, with), HasSubstr("left out of the fit, 3 sd, 2.5 without it"));
+  with.left_out_error = 2.4;
+  EXPECT_EQ(WhyNoStep(without, with), "");
+  with.left_out_error = std::nullopt;
+  EXPECT_EQ(WhyNoStep(without, with), "") << "not known, so nothing to hold against it";
+  without.left_out_error = 0.7;
+  with.left_out_error = 0.9;
+  EXPECT_EQ(WhyNoStep(without, with), "") << "both as of a right model";
+}
+
 }  // namespace
 }  // namespace calib::diagnosis
