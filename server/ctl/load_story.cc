@@ -47,22 +47,28 @@ absl::Status AddDiagnoses(client::Client& client, const std::string& campaign,
   return absl::OkStatus();
 }
 
-// The campaigns after it in the last improvement that it took part in.
-absl::StatusOr<std::vector<std::string>> ImprovedFrom(client::Client& client,
-                                                      const std::string& campaign) {
-  const auto findings = client.Findings(campaign);
+std::vector<report::ImprovedModel>::const_iterator StepAt(
+    const report::StoredImprovement& improvement, const std::string& campaign) {
+  return std::find_if(improvement.steps.begin(), improvement.steps.end(),
+                      [&campaign](const auto& step) { return step.campaign == campaign; });
+}
+
+// The last one kept with `keeper` in which the campaign took part.
+absl::StatusOr<std::optional<report::StoredImprovement>> ImprovementOf(client::Client& client,
+                                                                       const std::string& campaign,
+                                                                       const std::string& keeper) {
+  const auto findings = client.Findings(keeper);
   if (!findings.ok()) return findings.status();
-  std::vector<std::string> after;
+  std::optional<report::StoredImprovement> last;
   for (const v1::Finding& finding : *findings) {
     if (finding.kind() != client::kImprovement) continue;
     const auto document = client.GetBlob(finding.digest());
     if (!document.ok()) return document.status();
-    const auto steps = report::ReadImprovedCampaigns(*document);
-    if (!steps.ok()) continue;
-    const auto at = std::find(steps->begin(), steps->end(), campaign);
-    after.assign(at == steps->end() ? at : at + 1, steps->end());
+    auto improvement = report::ReadImprovement(*document);
+    if (!improvement.ok()) continue;
+    if (StepAt(*improvement, campaign) != improvement->steps.end()) last = *std::move(improvement);
   }
-  return after;
+  return last;
 }
 
 }  // namespace
@@ -91,12 +97,21 @@ absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::Ca
     if (std::find(line.begin(), line.end(), at) != line.end()) break;
     line.insert(line.begin(), at);
   }
-  // Where improve went on from it.
-  const auto improved = ImprovedFrom(client, view.status.campaign());
-  if (!improved.ok()) return improved.status();
-  for (const std::string& id : *improved) {
-    const bool there = known.contains(id) && known.at(id).finished;
-    if (there && std::find(line.begin(), line.end(), id) == line.end()) line.push_back(id);
+  // Where improve went on from it. An improvement is kept with its first and its last campaign.
+  for (const std::string& keeper : {view.status.campaign(), line.front()}) {
+    if (story.improvement) break;
+    auto improvement = ImprovementOf(client, view.status.campaign(), keeper);
+    if (!improvement.ok()) return improvement.status();
+    story.improvement = *std::move(improvement);
+  }
+  if (story.improvement) {
+    const auto& steps = story.improvement->steps;
+    for (auto at = StepAt(*story.improvement, view.status.campaign()); at != steps.end(); ++at) {
+      const bool there = known.contains(at->campaign) && known.at(at->campaign).finished;
+      if (there && std::find(line.begin(), line.end(), at->campaign) == line.end()) {
+        line.push_back(at->campaign);
+      }
+    }
   }
   for (const std::string& id : line) {
     if (auto status = AddDiagnoses(client, id, story.diagnoses); !status.ok()) return status;

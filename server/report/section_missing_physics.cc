@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <optional>
 
 #include "server/report/html.h"
 #include "server/report/plot/plot.h"
@@ -82,22 +84,66 @@ std::string Tree(const ReportData& data) {
   return html;
 }
 
+const ImprovedModel* StepOf(const Story& story, const std::string& campaign) {
+  if (!story.improvement) return nullptr;
+  const auto& steps = story.improvement->steps;
+  const auto found = std::find_if(steps.begin(), steps.end(), [&campaign](const auto& step) {
+    return step.campaign == campaign;
+  });
+  return found == steps.end() ? nullptr : &*found;
+}
+
 // The models on the way with what the diagnosis of each said.
 std::string StepTable(const Story& story) {
-  std::string html =
+  const auto number = [](const std::optional<double>& error) {
+    return error ? Number(*error, 3) : std::string("–");
+  };
+  // By improve alone.
+  const bool left_out = story.improvement.has_value();
+  std::string html = fmt::format(
       "<div class=\"scroll\"><table><tr><th>campaign</th><th class=\"l\">effects added</th>"
-      "<th>error, sd</th><th>held out</th><th class=\"l\">verdict</th></tr>\n";
+      "<th>error, sd</th>{}<th>held out</th><th class=\"l\">verdict</th></tr>\n",
+      left_out ? "<th>left out</th>" : "");
   for (const ErrorStep& step : story.steps) {
     const StoredDiagnosis* d = LatestOf(story.diagnoses, step.campaign);
+    const ImprovedModel* improved = StepOf(story, step.campaign);
     std::string verdict = d == nullptr ? "–" : NameForPeople(d->verdict);
     if (d != nullptr && !d->effect.empty()) verdict += ": " + NameForPeople(d->effect);
     html += fmt::format(
-        "<tr><td>{}</td><td class=\"l\">{}</td><td>{}</td><td>{}</td><td "
+        "<tr><td>{}</td><td class=\"l\">{}</td><td>{}</td>{}<td>{}</td><td "
         "class=\"l\">{}</td></tr>\n",
         Escape(step.campaign), Escape(InWords(step.effects)), Number(step.rms_error, 3),
-        step.heldout_rms_error ? Number(*step.heldout_rms_error, 3) : "–", Escape(verdict));
+        left_out ? "<td>" + number(improved == nullptr ? std::nullopt : improved->left_out_error) +
+                       "</td>"
+                 : "",
+        number(step.heldout_rms_error), Escape(verdict));
   }
-  return html + "</table></div>\n";
+  html += "</table></div>\n";
+  if (!left_out) return html;
+  return html +
+         "<p class=\"sub\">Left out: each experiment of the fitted data, or each stage of a single "
+         "one, predicted by a fit to the others.</p>\n";
+}
+
+// Why each effect was added and what spoke against others, as improve said it.
+std::string Reasons(const Story& story) {
+  if (!story.improvement) return "";
+  std::string items;
+  for (const ImprovedModel& step : story.improvement->steps) {
+    if (!step.reason.empty())
+      items += "<li>" + Escape(step.campaign + ": " + step.reason) + "</li>\n";
+  }
+  if (items.empty()) return "";
+  std::string html = "<h3>Why each step</h3>\n<ul>\n" + items + "</ul>\n";
+  if (story.improvement->verdict_digest.empty()) return html;
+  html += fmt::format(
+      "<p class=\"sub\">The verdict was kept, SHA-256 {}, before the held-out data were opened.",
+      Escape(story.improvement->verdict_digest));
+  if (const std::size_t before = story.improvement->opened_before.size(); before > 0) {
+    html += fmt::format(" They had been opened before, for {}: who asks again has seen them.",
+                        before == 1 ? "another verdict" : fmt::format("{} other verdicts", before));
+  }
+  return html + "</p>\n";
 }
 
 // Stage by stage, of the first model and the last.
@@ -209,7 +255,7 @@ std::string ErrorChart(const Story& story) {
       html += ErrorPlot(NameForPeople(name), OfObservable(steps, name), steps.size());
     }
   }
-  html += "</div>\n" + StepTable(story) +
+  html += "</div>\n" + StepTable(story) + Reasons(story) +
           "<h3>By observable</h3>\n<div class=\"scroll\"><table><tr><th>model</th><th "
           "class=\"l\">experiment</th><th "
           "class=\"l\">observable</th><th>error, sd</th></tr>\n";

@@ -4,62 +4,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "server/report/lenient_json.h"
 #include "server/report/people_units.h"
 
 namespace calib::report {
 namespace {
 
 using Json = nlohmann::json;
-
-// What is missing, null or of another type stays as it was.
-void Read(const Json& json, const char* key, double& value) {
-  const auto found = json.find(key);
-  if (found != json.end() && found->is_number()) value = found->get<double>();
-}
-void Read(const Json& json, const char* key, std::optional<double>& value) {
-  const auto found = json.find(key);
-  if (found != json.end() && found->is_number()) value = found->get<double>();
-}
-void Read(const Json& json, const char* key, std::string& value) {
-  const auto found = json.find(key);
-  if (found != json.end() && found->is_string()) value = found->get<std::string>();
-}
-void Read(const Json& json, const char* key, bool& value) {
-  const auto found = json.find(key);
-  if (found != json.end() && found->is_boolean()) value = found->get<bool>();
-}
-void Read(const Json& json, const char* key, std::vector<std::string>& value) {
-  const auto found = json.find(key);
-  if (found == json.end() || !found->is_array()) return;
-  for (const Json& item : *found) {
-    if (item.is_string()) value.push_back(item.get<std::string>());
-  }
-}
-void Read(const Json& json, const char* key, std::map<std::string, double>& value) {
-  const auto found = json.find(key);
-  if (found == json.end() || !found->is_object()) return;
-  for (const auto& [name, item] : found->items()) {
-    if (item.is_number()) value[name] = item.get<double>();
-  }
-}
-void Read(const Json& json, const char* key, std::map<std::string, std::string>& value) {
-  const auto found = json.find(key);
-  if (found == json.end() || !found->is_object()) return;
-  for (const auto& [name, item] : found->items()) {
-    if (item.is_string()) value[name] = item.get<std::string>();
-  }
-}
-void Read(const Json& json, const char* key,
-          std::vector<std::pair<std::string, std::string>>& value) {
-  const auto found = json.find(key);
-  if (found == json.end() || !found->is_array()) return;
-  for (const Json& item : *found) {
-    if (!item.is_object()) continue;
-    auto& [effect, reason] = value.emplace_back();
-    Read(item, "effect", effect);
-    Read(item, "reason", reason);
-  }
-}
 
 TriedEffect ReadTried(const Json& json) {
   TriedEffect tried;
@@ -147,21 +98,6 @@ const StoredDiagnosis* LatestOf(const std::vector<StoredDiagnosis>& diagnoses,
     if (latest == nullptr || latest->only_adequacy || !d.only_adequacy) latest = &d;
   }
   return latest;
-}
-
-absl::StatusOr<std::vector<std::string>> ReadImprovedCampaigns(const std::string& text) {
-  const Json json = Json::parse(text, nullptr, false);
-  const auto steps = json.is_object() ? json.find("steps") : json.end();
-  if (!json.is_object() || steps == json.end() || !steps->is_array()) {
-    return absl::InvalidArgumentError("the document kept as an improvement is none");
-  }
-  std::vector<std::string> campaigns;
-  for (const Json& step : *steps) {
-    std::string campaign;
-    if (step.is_object()) Read(step, "campaign", campaign);
-    if (!campaign.empty()) campaigns.push_back(std::move(campaign));
-  }
-  return campaigns;
 }
 
 std::string PValuesInWords(double p_value, std::optional<double> p_chi2,

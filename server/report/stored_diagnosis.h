@@ -60,10 +60,6 @@ absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& json);
 const StoredDiagnosis* LatestOf(const std::vector<StoredDiagnosis>& diagnoses,
                                 const std::string& campaign);
 
-/// Campaigns of an improvement in order, base first, of the JSON document of `calibctl improve`.
-/// Errors as above.
-absl::StatusOr<std::vector<std::string>> ReadImprovedCampaigns(const std::string& json);
-
 /// "p = 0.42", or with what it is made of: "p = 0.03; of means and trends of the stages 0.002;
 /// together 0.006".
 std::string PValuesInWords(double p_value, std::optional<double> p_chi2,

@@ -7,6 +7,7 @@
 
 #include "server/report/comparison.h"
 #include "server/report/stored_diagnosis.h"
+#include "server/report/stored_improvement.h"
 
 namespace calib::report {
 
@@ -36,6 +37,8 @@ struct Story {
   std::vector<ParameterDrift> drift;
   /// Of the campaigns on the way, in the order in which they were kept.
   std::vector<StoredDiagnosis> diagnoses{};
+  /// The last improvement that the campaign took part in.
+  std::optional<StoredImprovement> improvement{};
   bool known = false;  ///< the server was asked
 };
 

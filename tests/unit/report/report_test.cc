@@ -150,6 +150,23 @@ TEST(Report, TellsTheStoryOfAnAddedEffect) {
   EXPECT_THAT(html, HasSubstr("c2: &lt;b&gt;membrane (tried)"));
   EXPECT_THAT(html, HasSubstr("<td>4.25</td>"));
   EXPECT_THAT(html, Not(HasSubstr("nan")));
+  EXPECT_THAT(html, Not(HasSubstr("Why each step"))) << "extended by hand";
+  EXPECT_THAT(html, Not(HasSubstr("left out")));
+  story.improvement = StoredImprovement{
+      .steps = {{.campaign = "c0",
+                 .verdict = "ambiguous",
+                 .reason = "rolling_resistance is added, <i>twisting</i> is no step.",
+                 .left_out_error = 2.75},
+                {.campaign = "c1", .verdict = "adequate", .reason = "", .left_out_error = 0.9}},
+      .verdict_digest = "5f1e",
+      .opened_before = {"ab"}};
+  const std::string improved = RenderReport(view, story);
+  for (const char* said :
+       {"<td>4.25</td><td>2.75</td><td>5</td>", "<td>1</td><td>0.9</td><td>–</td>",
+        "<li>c0: rolling_resistance is added, &lt;i&gt;twisting&lt;/i&gt; is no step.</li>",
+        "SHA-256 5f1e, before the held-out data", "opened before, for another verdict"}) {
+    EXPECT_THAT(improved, HasSubstr(said));
+  }
 }
 
 // The JSON of `calibctl diagnose`, shortened.
@@ -214,12 +231,21 @@ TEST(StoredDiagnosis, TheLatestThatTriedEffectsIsShown) {
 TEST(StoredDiagnosis, AnotherDocumentIsRefused) {
   for (const char* text : {"", "{", "[]", "{}", R"({"campaign": 3, "verdict": "adequate"})"}) {
     EXPECT_FALSE(ReadDiagnosis(text).ok()) << text;
-    EXPECT_FALSE(ReadImprovedCampaigns(text).ok()) << text;
+    EXPECT_FALSE(ReadImprovement(text).ok()) << text;
   }
-  const auto campaigns = ReadImprovedCampaigns(
-      R"({"steps": [{"campaign": "c1"}, {"campaign": null}, 4, {"campaign": "c9"}]})");
-  ASSERT_TRUE(campaigns.ok());
-  EXPECT_EQ(*campaigns, (std::vector<std::string>{"c1", "c9"}));
+  const auto improvement = ReadImprovement(R"json({
+    "steps": [{"campaign": "c1", "verdict": "ambiguous", "left_out_error": null}, {"campaign": null},
+              4, {"campaign": "c9", "left_out_error": 0.8, "reason": "It is needed."}],
+    "verdict_digest": "5f1e", "opened_before": ["ab", "cd"]})json");
+  ASSERT_TRUE(improvement.ok());
+  ASSERT_EQ(improvement->steps.size(), 2U);
+  EXPECT_EQ(improvement->steps[0].verdict, "ambiguous");
+  EXPECT_FALSE(improvement->steps[0].left_out_error.has_value());
+  EXPECT_EQ(improvement->steps[1].campaign, "c9");
+  EXPECT_EQ(improvement->steps[1].left_out_error, 0.8);
+  EXPECT_EQ(improvement->steps[1].reason, "It is needed.");
+  EXPECT_EQ(improvement->verdict_digest, "5f1e");
+  EXPECT_EQ(improvement->opened_before, (std::vector<std::string>{"ab", "cd"}));
 }
 
 TEST(Report, ACampaignWithoutAnIterationSaysSo) {

@@ -1,0 +1,26 @@
+#pragma once
+// Fields of JSON documents that another version may have written: what is missing, null or of
+// another type stays as it was.
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace calib::report {
+
+void Read(const nlohmann::json& document, const char* key, double& value);
+void Read(const nlohmann::json& document, const char* key, std::optional<double>& value);
+void Read(const nlohmann::json& document, const char* key, std::string& value);
+void Read(const nlohmann::json& document, const char* key, bool& value);
+void Read(const nlohmann::json& document, const char* key, std::vector<std::string>& value);
+void Read(const nlohmann::json& document, const char* key, std::map<std::string, double>& value);
+void Read(const nlohmann::json& document, const char* key,
+          std::map<std::string, std::string>& value);
+/// Of objects with "effect" and "reason".
+void Read(const nlohmann::json& document, const char* key,
+          std::vector<std::pair<std::string, std::string>>& value);
+
+}  // namespace calib::report
