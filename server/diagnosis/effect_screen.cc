@@ -2,127 +2,28 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <iterator>
-#include <set>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "inference/data/data_set.h"
-#include "server/campaign/excitation.h"
 #include "server/campaign/yaml_text.h"
 #include "server/diagnosis/extension.h"
+#include "server/diagnosis/numerical_choices.h"
 #include "server/diagnosis/reading_effects.h"
+#include "server/diagnosis/screen_strengths.h"
 
 namespace calib::diagnosis {
 namespace {
 
 using Eigen::Index;
 
-constexpr double kNothing = 1e-8;      // of the square of a reading's sd, per reading
-constexpr std::size_t kMostRuns = 4;   // model evaluations of one effect, or
-constexpr double kScreenShare = 0.25;  // of the campaign's over all effects
-constexpr std::size_t kMostRows = 2;   // runs of the campaign from which an effect is tried
-constexpr double kMostDamping = 0.9;
-// A second strength is to change three times what two runs differ by chance: of what a measurement
-// scatters, in square.
-constexpr double kWanted = 18;
-constexpr double kMostRatio = 16;  // of the second strength to the first
-constexpr double kWeaker = 0.1;    // of a first strength with which no run comes to its end
-constexpr double kGrades = 4;      // of an octave: the last bits of a history change no run
+constexpr double kNothing = 1e-8;     // of the square of a reading's sd, per reading
+constexpr std::size_t kMostRows = 2;  // runs of the campaign from which an effect is tried
+constexpr double kWeaker = 0.1;       // of a first strength with which no run comes to its end
 constexpr const char* kLoadCell = "load_cell_error";
 
-// A share of what a step on the ray changes, as a share of the step; and the other way about.
-double StepFor(const dem::StrengthRay& ray, double share) {
-  return std::copysign(std::pow(std::abs(share), 1 / ray.order), share);
-}
-double ShareAt(const dem::StrengthRay& ray, double step) {
-  return std::copysign(std::pow(std::abs(step), ray.order), step);
-}
-
-// The last step within the default prior, or the catalogue's second.
-double LastStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray,
-                const std::string& contact, const dem::ReferenceState& state) {
-  const auto parameter = std::find_if(effect.parameters.begin(), effect.parameters.end(),
-                                      [&ray](const auto& p) { return p.name == ray.parameter; });
-  const double end = dem::PriorOf(*parameter, contact, state).max;
-  const double reach = end - dem::NullValueOf(*parameter, contact).value_or(0);
-  return std::max(ray.steps[1], reach / dem::ScaleOf(*parameter, contact, state));
-}
-
 }  // namespace
-
-double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
-                  const std::string& contact, const dem::ReferenceState& state) {
-  if (!(square > 0)) return ray.steps[1];
-  const double grade =
-      std::round(kGrades * std::log2(StepFor(ray, std::sqrt(kWanted / square)))) / kGrades;
-  const double wanted = std::max(ray.steps[1], std::exp2(grade) * ray.steps[0]);
-  const double step = std::min({wanted, std::max(ray.steps[1], kMostRatio * ray.steps[0]),
-                                LastStep(effect, ray, contact, state)});
-  return dem::RayAdmits(effect, ray, step, contact, state) ? step : ray.steps[1];
-}
-
-ScreenShares SharesOfScreen(const std::vector<const dem::EffectInfo*>& effects,
-                            const std::vector<bool>& calculated, std::size_t samples,
-                            int experiments, std::size_t numerical) {
-  const auto run = std::count(calculated.begin(), calculated.end(), false);
-  auto left =
-      static_cast<std::int64_t>(std::max(kScreenShare * static_cast<double>(samples) * experiments,
-                                         static_cast<double>(kMostRuns * effects.size())));
-  ScreenShares shares{
-      .numerical = std::min(numerical, static_cast<std::size_t>((left - run) / experiments)),
-      .experiments = experiments,
-      .runs = {}};
-  left -= static_cast<std::int64_t>(shares.numerical) * experiments;
-  if (run > 0) {
-    shares.experiments = static_cast<int>(std::min<std::int64_t>(experiments, left / run));
-  }
-  left -= run * shares.experiments;
-  for (const bool known : calculated) shares.runs.push_back(known ? 0 : 1);
-  // Another ray is another signature; what instruments do is nearly in proportion to its strength.
-  const auto grade = [](const dem::EffectInfo& effect) {
-    if (effect.rays.size() > 1) return 0;
-    return effect.kind == "measurement" ? 2 : 1;
-  };
-  for (int wanted = 0; wanted <= 2; ++wanted) {
-    for (std::size_t e = 0; e < effects.size() && left >= shares.experiments; ++e) {
-      if (shares.runs[e] == 0 || grade(*effects[e]) != wanted) continue;
-      shares.runs[e] = 2;
-      left -= shares.experiments;
-    }
-  }
-  return shares;
-}
-
-campaign::Campaign ScreenedPart(const campaign::Campaign& campaign,
-                                const std::vector<const dem::EffectInfo*>& effects,
-                                int experiments) {
-  campaign::Campaign part = campaign;
-  for (campaign::Experiment& e : part.experiments) e.role = campaign::Role::kValidate;
-  const auto shown = [&part, &effects] {
-    return std::count_if(effects.begin(), effects.end(), [&part](const dem::EffectInfo* effect) {
-      return WhyNotShown(part, *effect).empty();
-    });
-  };
-  for (int taken = 0; taken < experiments; ++taken) {
-    campaign::Experiment* next = nullptr;
-    std::ptrdiff_t most = -1;
-    for (std::size_t e = 0; e < part.experiments.size(); ++e) {
-      campaign::Experiment& own = part.experiments[e];
-      const bool fitted = campaign.experiments[e].role == campaign::Role::kCalibrate;
-      if (!fitted || own.role == campaign::Role::kCalibrate) continue;
-      own.role = campaign::Role::kCalibrate;
-      if (const std::ptrdiff_t now = shown(); now > most) {
-        most = now;
-        next = &own;
-      }
-      own.role = campaign::Role::kValidate;
-    }
-    if (next != nullptr) next->role = campaign::Role::kCalibrate;
-  }
-  return part;
-}
 
 std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& effect,
                                                       std::size_t rows) {
@@ -135,39 +36,9 @@ std::vector<EffectScreen::Step> EffectScreen::StepsOf(const dem::EffectInfo& eff
   return steps;
 }
 
-std::vector<campaign::Derivation> EffectScreen::NumericalChanges() const {
-  const campaign::Campaign& campaign = base_.view().campaign;
-  const Index best = base_.BestRuns(1).front();
-  const campaign::Derivation::Row row = base_.RowLike(best);
-  std::vector<campaign::Derivation> changes;
-  for (const char* what : {"twice the rate", "half the step", "other damping"}) {
-    changes.push_back(base_.Derived("nuisance", what));
-    changes.back().rows = {row};
-  }
-  bool staged = false;
-  for (const campaign::Experiment& e : campaign.experiments) {
-    if (e.role != campaign::Role::kCalibrate || !campaign::ReadAtRest(e)) continue;
-    staged = true;
-    dem::Scenario scenario;
-    scenario.model = campaign.model;
-    scenario.settings = e.settings;
-    scenario.initial_stress = e.initial_stress;
-    scenario.staging = e.staging;
-    const dem::Staging used = dem::ResolveStaging(scenario, base_.state().diameter);
-    const double damping = *used.damping_loading;
-    changes[0].staging[e.name].rate = 2 * *used.rate;
-    changes[1].staging[e.name].step = *used.step / 2;
-    dem::Staging& damped = changes[2].staging[e.name];
-    damped.damping_loading = damping > kMostDamping / 2 ? damping / 2 : 2 * damping;
-    damped.damping_settling = used.damping_settling;
-  }
-  if (!staged) changes.clear();
-  return changes;
-}
-
 absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance(
     const std::vector<std::string>& without) {
-  std::vector<campaign::Derivation> changes = NumericalChanges();
+  std::vector<campaign::Derivation> changes = NumericalChanges(base_);
   changes.resize(PlanOf(without, nullptr).shares.numerical);
   const auto what = [](const campaign::Derivation& change) {
     return "influence of numerical choices, " + change.name;
@@ -186,35 +57,6 @@ absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance(
     directions.emplace_back((runs.histories.row(0) - base_.runs().histories.row(best)).transpose());
   }
   return directions;
-}
-
-std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect) {
-  std::set<double> pressures;
-  bool varied = false;  // the pressure, within a test
-  bool shown = false;
-  bool moving = false;
-  for (const campaign::Experiment& e : campaign.experiments) {
-    const dem::TestInfo* const test = dem::FindTest(e.test);
-    if (effect.kind == "particle" && test != nullptr && test->poured &&
-        !campaign::CanShow(e, effect)) {
-      return absl::StrCat("test ", e.test, " pours its grains, which it leaves whole");
-    }
-    if (e.role != campaign::Role::kCalibrate) continue;
-    const auto pressure = e.settings.find("confining_pressure");
-    if (pressure != e.settings.end()) pressures.insert(pressure->second);
-    varied = varied || (test != nullptr && !test->one_pressure);
-    moving = moving || !campaign::ReadAtRest(e);
-    shown = shown || campaign::CanShow(e, effect);
-  }
-  if (effect.needs_motion && !moving) {
-    return "all readings are taken at rest: "
-           "it shows in tests with a loading_rate, in collisions and in flows";
-  }
-  if (!shown) return "none of the fitted tests can show it";
-  if (effect.across_pressures && pressures.size() < 2 && !varied) {
-    return "it shows only between tests at different pressures, or in one whose pressure changes";
-  }
-  return "";
 }
 
 // Empty: the tests can show it.
@@ -252,11 +94,11 @@ EffectScreen::Plan EffectScreen::PlanOf(const std::vector<std::string>& without,
   std::vector<bool> calculated;
   calculated.reserve(effects.size());
   for (const dem::EffectInfo* effect : effects) calculated.push_back(IsCalculated(*effect));
-  Plan plan{
-      .effects = {},
-      .shares = SharesOfScreen(effects, calculated, base_.runs().sample.size(),
-                               std::max(1, base_.fitted_experiments()), NumericalChanges().size()),
-      .part = {}};
+  Plan plan{.effects = {},
+            .shares = SharesOfScreen(effects, calculated, base_.runs().sample.size(),
+                                     std::max(1, base_.fitted_experiments()),
+                                     NumericalChanges(base_).size()),
+            .part = {}};
   plan.part = ScreenedPart(base_.view().campaign, effects, plan.shares.experiments);
   const std::vector<std::size_t> of_each = std::exchange(plan.shares.runs, {});
   for (std::size_t e = 0; e < effects.size(); ++e) {
@@ -322,7 +164,7 @@ std::string EffectScreen::WhatIsLeftOut(const std::vector<std::string>& without)
                                     base_.fitted_experiments(), " fitted experiments (",
                                     absl::StrJoin(names, ", "), "), the refits in all"));
   }
-  const std::size_t numerical = NumericalChanges().size();
+  const std::size_t numerical = NumericalChanges(base_).size();
   if (plan.shares.numerical < numerical) {
     left_out.push_back(
         absl::StrCat("varies ", plan.shares.numerical, " of ", numerical, " numerical choices"));

@@ -16,44 +16,13 @@
 #include "server/campaign/campaign.h"
 #include "server/campaign/yaml_tree.h"
 #include "server/diagnosis/fitted_campaign.h"
+#include "server/diagnosis/screen_shares.h"
 
 namespace calib::diagnosis {
-
-/// Why the calibrated experiments cannot show an effect, in a clause; empty: they can.
-std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect);
 
 /// Squared length of a difference of histories over that of a measurement from a model that is
 /// right.
 using SquareOfDifference = std::function<double(const Eigen::VectorXd&)>;
-
-/// How strong to try an effect of the catalogue whose first strength changes the histories by
-/// `square` (see above): so that it stands out from the chance in a difference of two runs, which
-/// is the same however strong the effect is; from the catalogue's second strength to 16 times the
-/// first, within the default prior. In units of the ray.
-double SecondStep(const dem::EffectInfo& effect, const dem::StrengthRay& ray, double square,
-                  const std::string& contact, const dem::ReferenceState& state);
-
-/// What a screen runs.
-struct ScreenShares {
-  std::size_t numerical = 0;  ///< numerical choices that are varied, in all fitted experiments
-  int experiments = 0;        ///< that effects are run in
-  std::vector<std::size_t> runs{};  ///< of each effect, 1 or 2, 0 where it is calculated
-};
-
-/// In a campaign of so many samples and fitted experiments, with a number of numerical choices to
-/// vary, at most the larger of a quarter of the campaign's evaluations and four for each effect. One
-/// run of each effect in as many experiments as that allows, at least one; a second goes first to
-/// effects with another ray of strength, last to what instruments do. Numerical choices are given up
-/// last.
-ScreenShares SharesOfScreen(const std::vector<const dem::EffectInfo*>& effects,
-                            const std::vector<bool>& calculated, std::size_t samples,
-                            int experiments, std::size_t numerical);
-
-/// The campaign with so many of its fitted experiments, all others held out: those that show most
-/// effects together (WhyNotShown), of equals the first. What they miss is not asked.
-campaign::Campaign ScreenedPart(const campaign::Campaign& campaign,
-                                const std::vector<const dem::EffectInfo*>& effects,
-                                int experiments);
 
 class EffectScreen {
  public:
@@ -121,8 +90,6 @@ class EffectScreen {
   using Reasons = std::vector<std::pair<std::string, std::string>>;
   std::vector<const dem::EffectInfo*> Excitable(const std::vector<std::string>& without,
                                                 Reasons* reasons) const;
-  /// Of the run that comes closest; each with what it changes.
-  std::vector<campaign::Derivation> NumericalChanges() const;
   // What is run, and on what.
   struct Plan {
     std::vector<const dem::EffectInfo*> effects;
