@@ -73,7 +73,7 @@ RefitOrder OrderOfRefits(const Diagnosis& diagnosis, const std::vector<dem::User
 
 // Without the effect it is the base model: a fit that is further off has merely not been found. One
 // that is not as close as the screen expects has further to go.
-double PriceOf(double chi2, double base, double promised, int batches) {
+double PriceOf(double chi2, double base, double promised, double batches) {
   const double share = std::min(1.0, promised);
   return std::sqrt(std::min(chi2, base * share * share)) * std::pow(kPatience, batches);
 }

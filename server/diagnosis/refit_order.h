@@ -41,7 +41,7 @@ RefitOrder OrderOfRefits(const Diagnosis& diagnosis, const std::vector<dem::User
 struct RefitStanding {
   std::string effect{};
   double chi2 = 0;        ///< of the closest point so far, >= 0, may be infinite
-  int batches = 0;        ///< that have been run, >= kLeastBatches
+  double batches = 0;     ///< that have been run, by their runs that came to an end: > 0
   bool stalled = false;   ///< several have brought nothing
   bool explains = false;  ///< the readings (WarmFit::Explains)
 };
@@ -58,9 +58,9 @@ std::optional<std::string> NextRefit(const RefitOrder& order,
                                      bool may_begin);
 
 /// What orders the refits, the lowest first: the rms that is left to explain where the fit stands or
-/// where the screen expects it to end, whichever is less, dearer with every batch that has been made.
+/// where the screen expects it to end, whichever is less, dearer with every batch that has been made. Runs that diverge tell nothing of how close it comes.
 /// chi2, base: of the fit so far and of the model without the effect, >= 0, may be infinite;
 /// promised: rms the screen expects over the base model's, >= 0 (above 1: as 1).
-double PriceOf(double chi2, double base, double promised, int batches);
+double PriceOf(double chi2, double base, double promised, double batches);
 
 }  // namespace calib::diagnosis

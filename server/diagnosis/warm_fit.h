@@ -19,6 +19,7 @@ namespace calib::diagnosis {
 struct WarmFit {
   report::CampaignView view{};  ///< its first batch, a campaign of the extended model
   report::RunTable runs{};      ///< of all batches
+  Eigen::MatrixXd diverged{};   ///< where a run came to no end, m x d, SI
   int iterations = 0;
   std::vector<double> chi2_after{};      ///< the smallest chi2, batch after batch
   int idle = 0;                          ///< batches since one came clearly closer

@@ -98,7 +98,7 @@ std::vector<RefitStanding> WarmFits::Standings() const {
     standings.push_back(
         {.effect = effect,
          .chi2 = has_runs ? fit.adequacy.chi2 : std::numeric_limits<double>::infinity(),
-         .batches = fit.iterations,
+         .batches = static_cast<double>(fit.runs.histories.rows()) / samples_,
          .stalled = fit.stalled || fit.runs.histories.rows() == 0,
          .explains = fit.Explains(level_, begun_.size())});
   }
@@ -151,7 +151,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     if (!view.ok()) return view.status();
     evaluations_ += view->status.model_evaluations();
     fit.view = *std::move(view);
-    Append(report::RunsOf(fit.view, base_.readings().of_mean), fit.runs);
+    Add(fit.view, fit);
   } else {
     const auto points = PointsFor(effect);
     if (!points.ok()) return points.status();
@@ -165,7 +165,7 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     const auto view = base_.Run(*text, what);
     if (!view.ok()) return view.status();
     evaluations_ += view->status.model_evaluations();
-    Append(report::RunsOf(*view, base_.readings().of_mean), fit.runs);
+    Add(*view, fit);
   }
   ++fit.iterations;
   if (fit.runs.histories.rows() == 0) {
@@ -179,6 +179,14 @@ absl::Status WarmFits::Continue(const std::string& effect) {
   fit.idle = fit.iterations == 1 || closer ? 0 : fit.idle + 1;
   fit.stalled = fit.idle >= kMostIdle;
   return absl::OkStatus();
+}
+
+void WarmFits::Add(const report::CampaignView& batch, WarmFit& fit) const {
+  Append(report::RunsOf(batch, base_.readings().of_mean), fit.runs);
+  const Eigen::MatrixXd diverged = DivergedPoints(batch);
+  const Index before = fit.diverged.rows();
+  fit.diverged.conservativeResize(before + diverged.rows(), diverged.cols());
+  fit.diverged.bottomRows(diverged.rows()) = diverged;
 }
 
 // Its own, those of the screen, and the base model's: at its null an effect changes nothing, and
@@ -196,7 +204,8 @@ report::RunTable WarmFits::RunsFor(const std::string& effect) const {
 
 absl::StatusOr<Eigen::MatrixXd> WarmFits::PointsFor(const std::string& effect) const {
   const WarmFit& fit = fits_.at(effect);
-  return NextPoints(fit.view.campaign, base_.readings(), RunsFor(effect), fit.iterations, samples_);
+  return NextPoints(fit.view.campaign, base_.readings(), RunsFor(effect), fit.diverged,
+                    fit.iterations, samples_);
 }
 
 void WarmFits::WeighEvidence() {

@@ -62,6 +62,7 @@ class WarmFits {
   absl::Status Continue(const std::string& effect);
   std::vector<RefitStanding> Standings() const;
   absl::StatusOr<Eigen::MatrixXd> PointsFor(const std::string& effect) const;
+  void Add(const report::CampaignView& batch, WarmFit& fit) const;
   report::RunTable RunsFor(const std::string& effect) const;
   void Judge(const std::string& effect);
   inference::FittedModel ByRuns(const report::RunTable& runs) const;

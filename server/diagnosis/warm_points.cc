@@ -1,10 +1,14 @@
 #include "server/diagnosis/warm_points.h"
 
 #include <algorithm>
+#include <limits>
+#include <numeric>
 #include <utility>
+#include <vector>
 
 #include "dem/catalog/catalog.h"
 #include "dem/simulation/model_parameters.h"
+#include "inference/emulator/emulated_target.h"
 #include "inference/emulator/search_widening.h"
 #include "server/diagnosis/reading_effects.h"
 
@@ -159,6 +163,35 @@ absl::StatusOr<inference::EmulatedResult> EmulateBy(
 
 double ScatterShare(const report::ScatteredReadings& readings) { return readings.measured ? 0 : 1; }
 
+double NearestSquare(const Eigen::MatrixXd& points, const Eigen::RowVectorXd& to) {
+  return points.rows() == 0 ? std::numeric_limits<double>::infinity()
+                            : (points.rowwise() - to).rowwise().squaredNorm().minCoeff();
+}
+
+// Those that are nearer to a point that ended than to one that diverged, in the order drawn; where
+// they are too few, others are left among them.
+absl::StatusOr<Eigen::MatrixXd> DrawWhereRunsEnd(const inference::Proposal& proposal,
+                                                 const inference::JointPrior& priors,
+                                                 const inference::FilterOptions& filter,
+                                                 const Eigen::MatrixXd& ended,
+                                                 const Eigen::MatrixXd& diverged, int batch,
+                                                 int count) {
+  constexpr int kTimes = 8;
+  if (diverged.rows() == 0) return inference::DrawSamples(proposal, priors, filter, batch, count);
+  auto drawn = inference::DrawSamples(proposal, priors, filter, batch, kTimes * count);
+  if (!drawn.ok()) return drawn;
+  const Eigen::MatrixXd good = inference::ToStandard(priors, ended);
+  const Eigen::MatrixXd bad = inference::ToStandard(priors, diverged);
+  const Eigen::MatrixXd standard = inference::ToStandard(priors, *drawn);
+  std::vector<Index> order(static_cast<std::size_t>(drawn->rows()));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::stable_partition(order.begin(), order.end(), [&](Index row) {
+    return NearestSquare(good, standard.row(row)) <= NearestSquare(bad, standard.row(row));
+  });
+  order.resize(static_cast<std::size_t>(count));
+  return Eigen::MatrixXd((*drawn)(order, Eigen::all));
+}
+
 }  // namespace
 
 absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& campaign,
@@ -170,20 +203,34 @@ absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& camp
 
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
                                            const report::ScatteredReadings& readings,
-                                           const report::RunTable& runs, int batch, int count) {
+                                           const report::RunTable& runs,
+                                           const Eigen::MatrixXd& diverged, int batch, int count) {
   const inference::JointPrior priors = campaign::Priors(campaign);
   const std::vector<inference::Iteration> iterations = {IterationOf(runs, readings.of_mean)};
   const inference::DataSet wider = inference::WithLargerErrors(
       readings.of_mean, inference::SearchWidening(readings.of_mean, iterations));
   const auto emulated = EmulateBy(campaign, wider, ScatterShare(readings), iterations);
   if (!emulated.ok() || emulated->draws.rows() == 0) {
-    return inference::DrawSamples({}, priors, campaign.filter, batch, count);
+    return DrawWhereRunsEnd({}, priors, campaign.filter, runs.parameters, diverged, batch, count);
   }
   const auto about = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
                                                    static_cast<std::size_t>(batch), {},
                                                    inference::ClosestDraws(*emulated));
   if (!about.ok()) return about.status();
-  return inference::DrawSamples(*about, priors, campaign.filter, batch, count);
+  return DrawWhereRunsEnd(*about, priors, campaign.filter, runs.parameters, diverged, batch, count);
+}
+
+Eigen::MatrixXd DivergedPoints(const report::CampaignView& view) {
+  const auto d = static_cast<Index>(view.campaign.parameters.size());
+  Eigen::MatrixXd points(0, d);
+  for (const v1::Sample& sample : view.samples) {
+    if (sample.status() != "diverged" || sample.parameters_size() != d) continue;
+    points.conservativeResize(points.rows() + 1, d);
+    for (Index j = 0; j < d; ++j) {
+      points(points.rows() - 1, j) = sample.parameters(static_cast<int>(j));
+    }
+  }
+  return points;
 }
 
 }  // namespace calib::diagnosis

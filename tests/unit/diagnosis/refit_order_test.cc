@@ -87,7 +87,7 @@ TEST_F(OrderOfRefitsTest, OnlyHintsAreFollowedWhereNothingIsMissingForCertain) {
 
 class NextRefitTest : public OrderOfRefitsTest {
  protected:
-  static RefitStanding At(const std::string& effect, double chi2, int batches = 2) {
+  static RefitStanding At(const std::string& effect, double chi2, double batches = 2) {
     return {.effect = effect,
             .chi2 = chi2,
             .batches = batches,
@@ -116,6 +116,12 @@ TEST_F(NextRefitTest, AFitThatComesCloseGoesOnBeforeAnotherIsBegun) {
 TEST_F(NextRefitTest, AnotherIsBegunBeforeThoseThatComeNoCloserGoOn) {
   EXPECT_EQ(Next({At("a", 380), At("b", 390), At("c", 390), At("d", 390)}), "e");
   EXPECT_EQ(Next({At("a", 380), At("b", 390), At("c", 390), At("d", 390)}, false), "a");
+}
+
+TEST_F(NextRefitTest, RunsThatDivergedMakeAFitNoDearer) {
+  const RefitStanding b = Stalled("b", 390);
+  EXPECT_EQ(Next({At("a", 150, 3), b, b, b}), "e");
+  EXPECT_EQ(Next({At("a", 150, 13.0 / 6), b, b, b}), "a") << "3 batches of 6, 5 runs diverged";
 }
 
 TEST_F(NextRefitTest, AFitThatExplainsLeavesItsRunsToTheOthers) {

@@ -35,19 +35,48 @@ report::ScatteredReadings Readings() {
 }
 
 TEST(WarmPoints, LieAboutThePosteriorThatAnEmulatorOfTheRunsGives) {
-  const auto points = NextPoints(Square(), Readings(), Runs(30), 1, 40);
+  const auto points = NextPoints(Square(), Readings(), Runs(30), {}, 1, 40);
   ASSERT_TRUE(points.ok()) << points.status();
   // The posterior's sd is 0.1; a few of forty are the defensive share of the prior.
   const Eigen::VectorXd distance =
       (points->rowwise() - Eigen::RowVector2d(0.3, 0.7)).rowwise().norm();
   EXPECT_GE((distance.array() < 0.4).count(), 32);
-  EXPECT_EQ(*points, *NextPoints(Square(), Readings(), Runs(30), 1, 40)) << "same bits";
+  EXPECT_EQ(*points, *NextPoints(Square(), Readings(), Runs(30), {}, 1, 40)) << "same bits";
+}
+
+TEST(WarmPoints, StayAwayFromWhereRunsDiverged) {
+  const Eigen::MatrixXd diverged = Eigen::RowVector2d(0.35, 0.75);
+  const auto nearer_to_it = [&diverged](const Eigen::RowVectorXd& point) {
+    const double nearest_run =
+        (Runs(30).parameters.rowwise() - point).rowwise().squaredNorm().minCoeff();
+    return (point - diverged.row(0)).squaredNorm() < nearest_run;
+  };
+  const auto count = [&](const Eigen::MatrixXd& points) {
+    int there = 0;
+    for (Index i = 0; i < points.rows(); ++i) there += nearer_to_it(points.row(i)) ? 1 : 0;
+    return there;
+  };
+  const auto before = NextPoints(Square(), Readings(), Runs(30), {}, 1, 12);
+  const auto points = NextPoints(Square(), Readings(), Runs(30), diverged, 1, 12);
+  ASSERT_TRUE(before.ok() && points.ok()) << points.status();
+  EXPECT_GE(count(*before), 3);
+  EXPECT_LE(count(*points),
+            1);  // seen in standardised coordinates the border is a little elsewhere
+  EXPECT_EQ(points->rows(), 12);
+  EXPECT_EQ(*points, *NextPoints(Square(), Readings(), Runs(30), diverged, 1, 12)) << "same bits";
+}
+
+TEST(WarmPoints, AreWhereRunsDivergedWhereNothingElseIs) {
+  const Eigen::MatrixXd diverged = Runs(5).parameters;
+  const auto points = NextPoints(Square(), Readings(), Runs(0), diverged, 1, 6);
+  ASSERT_TRUE(points.ok()) << points.status();
+  EXPECT_EQ(*points, *NextPoints(Square(), Readings(), Runs(0), {}, 1, 6));
 }
 
 TEST(WarmPoints, ComeFromThePriorWhereThereIsTooLittleToGoBy) {
-  const auto points = NextPoints(Square(), Readings(), Runs(4), 1, 6);
+  const auto points = NextPoints(Square(), Readings(), Runs(4), {}, 1, 6);
   ASSERT_TRUE(points.ok()) << points.status();
-  EXPECT_EQ(*points, *NextPoints(Square(), Readings(), Runs(5), 1, 6));
+  EXPECT_EQ(*points, *NextPoints(Square(), Readings(), Runs(5), {}, 1, 6));
 }
 
 TEST(WarmPoints, AScreensRunCountsWhereItGivesEveryParameter) {
