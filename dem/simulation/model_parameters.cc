@@ -225,4 +225,22 @@ std::vector<std::string> MaterialProblems(const Model& model) {
   return problems;
 }
 
+std::vector<std::string> ShapeProblems(const Model& model, bool clumps) {
+  std::vector<std::string> problems;
+  const char* const kShaped = "nonspherical_shape";
+  const char* const kCrushing = "particle_crushing";
+  for (const char* name : {kShaped, kCrushing}) {
+    if (clumps && Has(model.effects, name)) {
+      problems.push_back(absl::StrCat("effect ", name,
+                                      " needs a packing of single spheres (clump -1), this one has "
+                                      "clumps"));
+    }
+  }
+  if (Has(model.effects, kShaped) && Has(model.effects, kCrushing)) {
+    problems.push_back(absl::StrCat("effects ", kShaped, " and ", kCrushing,
+                                    " cannot act together: only spheres crush"));
+  }
+  return problems;
+}
+
 }  // namespace calib::dem

@@ -1,5 +1,6 @@
 #pragma once
-// What may have a value in a model: contact law, effects, materials and pairs of them.
+// What may have a value in a model: contact law, effects, materials and pairs of them; what of it
+// cannot be together.
 
 #include <string>
 #include <vector>
@@ -19,5 +20,9 @@ std::vector<std::string> MaterialParameters(const Model& model);
 
 /// Everything wrong with the names and values of the model's materials, one sentence each.
 std::vector<std::string> MaterialProblems(const Model& model);
+
+/// Everything wrong with the model's effects that know single spheres only, one sentence each.
+/// clumps: whether the packing has any.
+std::vector<std::string> ShapeProblems(const Model& model, bool clumps);
 
 }  // namespace calib::dem

@@ -239,16 +239,8 @@ void CheckShapes(const Scenario& scenario, bool poured, Problems& problems) {
     problems.push_back(absl::StrCat("effect particle_crushing is not there in test ", scenario.test,
                                     ", which leaves the grains that it pours whole"));
   }
-  for (const char* name : {"nonspherical_shape", "particle_crushing"}) {
-    if (clumps && chosen(name)) {
-      problems.push_back(absl::StrCat("effect ", name,
-                                      " needs a packing of single spheres (clump -1), this one has "
-                                      "clumps"));
-    }
-  }
-  if (chosen("nonspherical_shape") && chosen("particle_crushing")) {
-    problems.emplace_back(
-        "effects nonspherical_shape and particle_crushing cannot act together: only spheres crush");
+  for (std::string& problem : ShapeProblems(scenario.model, clumps)) {
+    problems.push_back(std::move(problem));
   }
 }
 

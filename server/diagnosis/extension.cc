@@ -23,6 +23,16 @@ double SettingOr(const campaign::Experiment& experiment, const std::string& name
   return found != experiment.settings.end() ? found->second : other;
 }
 
+bool HasClumps(const campaign::Experiment& experiment) {
+  return std::any_of(experiment.specimens.begin(), experiment.specimens.end(),
+                     [](const campaign::Specimen& specimen) {
+                       const auto* file = std::get_if<campaign::PackingFile>(&specimen);
+                       return file != nullptr &&
+                              std::any_of(file->packing.clump.begin(), file->packing.clump.end(),
+                                          [](int clump) { return clump >= 0; });
+                     });
+}
+
 double DiameterOf(const campaign::Experiment& experiment) {
   for (const campaign::Specimen& specimen : experiment.specimens) {
     if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
@@ -218,7 +228,10 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
   if (const auto problems = dem::MaterialProblems(joined); !problems.empty()) {
     return problems.front();  // the model itself has none
   }
-  return "";
+  const bool clumps =
+      std::any_of(campaign.experiments.begin(), campaign.experiments.end(), HasClumps);
+  const auto problems = dem::ShapeProblems(joined, clumps);
+  return problems.empty() ? "" : problems.front();
 }
 
 absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,

@@ -35,6 +35,25 @@ TEST(Extension, AModelHasOneLawOfAThing) {
   EXPECT_EQ(WhyNotJoin(campaign, "capillary_bridges"), "");
 }
 
+// A screen of such an effect was begun before, was refused, and cost the whole diagnosis.
+TEST(Extension, OnlySpheresCrush) {
+  campaign::Campaign campaign;
+  campaign.model.contact = "hertz_mindlin";
+  campaign.model.effects = {"particle_crushing"};
+  EXPECT_THAT(WhyNotJoin(campaign, "nonspherical_shape"), HasSubstr("only spheres crush"));
+  campaign.model.effects = {"nonspherical_shape"};
+  EXPECT_THAT(WhyNotJoin(campaign, "particle_crushing"), HasSubstr("only spheres crush"));
+  EXPECT_EQ(WhyNotJoin(campaign, "rolling_resistance"), "");
+  campaign.model.effects = {};
+  EXPECT_EQ(WhyNotJoin(campaign, "particle_crushing"), "");
+  campaign::PackingFile file;
+  file.packing.clump = {-1, 0, 0};
+  campaign.experiments.resize(1);
+  campaign.experiments.front().specimens = {file};
+  EXPECT_THAT(WhyNotJoin(campaign, "particle_crushing"), HasSubstr("this one has clumps"));
+  EXPECT_EQ(WhyNotJoin(campaign, "rolling_resistance"), "");
+}
+
 // Strengths are in units of the forces that the test's own contacts carry.
 TEST(Extension, TestsWithoutAPressureHaveThatOfTheirWeightOrImpact) {
   report::CampaignView view;
