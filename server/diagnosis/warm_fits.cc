@@ -204,10 +204,8 @@ report::RunTable WarmFits::RunsFor(const std::string& effect) const {
 
 absl::StatusOr<Eigen::MatrixXd> WarmFits::PointsFor(const std::string& effect) const {
   const WarmFit& fit = fits_.at(effect);
-  // Of few, the nearest is a poor guess: the right point may lie beside some that diverged.
-  const bool mostly = fit.diverged.rows() > fit.runs.histories.rows();
-  return NextPoints(fit.view.campaign, base_.readings(), RunsFor(effect),
-                    mostly ? fit.diverged : Eigen::MatrixXd(), fit.iterations, samples_);
+  return NextPoints(fit.view.campaign, base_.readings(), RunsFor(effect), fit.diverged,
+                    fit.iterations, samples_);
 }
 
 void WarmFits::WeighEvidence() {

@@ -168,8 +168,8 @@ double NearestSquare(const Eigen::MatrixXd& points, const Eigen::RowVectorXd& to
                             : (points.rowwise() - to).rowwise().squaredNorm().minCoeff();
 }
 
-// Those that are nearer to a point that ended than to one that diverged, in the order drawn; where
-// they are too few, others are left among them.
+// Those that are not twice as near to a point that diverged as to any that ended, in the order
+// drawn; where they are too few, others are left among them.
 absl::StatusOr<Eigen::MatrixXd> DrawWhereRunsEnd(const inference::Proposal& proposal,
                                                  const inference::JointPrior& priors,
                                                  const inference::FilterOptions& filter,
@@ -177,6 +177,8 @@ absl::StatusOr<Eigen::MatrixXd> DrawWhereRunsEnd(const inference::Proposal& prop
                                                  const Eigen::MatrixXd& diverged, int batch,
                                                  int count) {
   constexpr int kTimes = 8;
+  // The right point may lie beside some that diverged (adhesion beside spheres that stick).
+  constexpr double kNear = 2 * 2;
   if (diverged.rows() == 0) return inference::DrawSamples(proposal, priors, filter, batch, count);
   auto drawn = inference::DrawSamples(proposal, priors, filter, batch, kTimes * count);
   if (!drawn.ok()) return drawn;
@@ -186,7 +188,7 @@ absl::StatusOr<Eigen::MatrixXd> DrawWhereRunsEnd(const inference::Proposal& prop
   std::vector<Index> order(static_cast<std::size_t>(drawn->rows()));
   std::iota(order.begin(), order.end(), Index{0});
   std::stable_partition(order.begin(), order.end(), [&](Index row) {
-    return NearestSquare(good, standard.row(row)) <= NearestSquare(bad, standard.row(row));
+    return NearestSquare(good, standard.row(row)) <= kNear * NearestSquare(bad, standard.row(row));
   });
   order.resize(static_cast<std::size_t>(count));
   return Eigen::MatrixXd((*drawn)(order, Eigen::all));

@@ -46,7 +46,7 @@ absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& camp
 /// prior: half of them about the draws of its posterior that it expects closest, half about all of
 /// them, by errors wider while the model is far from the readings (inference/emulator:
 /// search_widening.h); else from the prior. diverged: points, SI, of runs that came to no end, m x d:
-/// where one of them is nearer than any run, in standardised coordinates, a point is drawn again, as
+/// twice as near to one of them as to any run, in standardised coordinates, a point is drawn again, as
 /// long as others come in eight times as many draws. batch: number of batches so far, decides the
 /// random numbers. Errors: those of inference::FitProposalToDraws and DrawSamples.
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,

@@ -45,15 +45,17 @@ TEST(WarmPoints, LieAboutThePosteriorThatAnEmulatorOfTheRunsGives) {
 }
 
 TEST(WarmPoints, StayAwayFromWhereRunsDiverged) {
-  const Eigen::MatrixXd diverged = Eigen::RowVector2d(0.35, 0.75);
-  const auto nearer_to_it = [&diverged](const Eigen::RowVectorXd& point) {
-    const double nearest_run =
-        (Runs(30).parameters.rowwise() - point).rowwise().squaredNorm().minCoeff();
-    return (point - diverged.row(0)).squaredNorm() < nearest_run;
+  Eigen::MatrixXd diverged(5, 2);  // where the posterior is
+  diverged << 0.3, 0.7, 0.2, 0.7, 0.4, 0.7, 0.3, 0.6, 0.3, 0.8;
+  const auto among_them = [&diverged](const Eigen::RowVectorXd& point) {
+    const auto nearest = [&point](const Eigen::MatrixXd& to) {
+      return (to.rowwise() - point).rowwise().norm().minCoeff();
+    };
+    return 2 * nearest(diverged) < nearest(Runs(30).parameters);
   };
   const auto count = [&](const Eigen::MatrixXd& points) {
     int there = 0;
-    for (Index i = 0; i < points.rows(); ++i) there += nearer_to_it(points.row(i)) ? 1 : 0;
+    for (Index i = 0; i < points.rows(); ++i) there += among_them(points.row(i)) ? 1 : 0;
     return there;
   };
   const auto before = NextPoints(Square(), Readings(), Runs(30), {}, 1, 12);
