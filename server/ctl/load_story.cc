@@ -47,10 +47,15 @@ absl::Status AddDiagnoses(client::Client& client, const std::string& campaign,
   return absl::OkStatus();
 }
 
-std::vector<report::ImprovedModel>::const_iterator StepAt(
-    const report::StoredImprovement& improvement, const std::string& campaign) {
-  return std::find_if(improvement.steps.begin(), improvement.steps.end(),
-                      [&campaign](const auto& step) { return step.campaign == campaign; });
+// The campaign behind its ancestors, base first; empty: it is not known.
+std::vector<std::string> LineTo(const std::map<std::string, Known>& known,
+                                const std::string& campaign) {
+  std::vector<std::string> line;
+  for (std::string at = campaign; known.contains(at); at = known.at(at).relative.parent) {
+    if (std::find(line.begin(), line.end(), at) != line.end()) break;
+    line.insert(line.begin(), at);
+  }
+  return line;
 }
 
 // The last one kept with `keeper` in which the campaign took part.
@@ -66,7 +71,11 @@ absl::StatusOr<std::optional<report::StoredImprovement>> ImprovementOf(client::C
     if (!document.ok()) return document.status();
     auto improvement = report::ReadImprovement(*document);
     if (!improvement.ok()) continue;
-    if (StepAt(*improvement, campaign) != improvement->steps.end()) last = *std::move(improvement);
+    const auto& steps = improvement->steps;
+    const bool took_part = std::any_of(steps.begin(), steps.end(), [&campaign](const auto& step) {
+      return step.campaign == campaign;
+    });
+    if (took_part) last = *std::move(improvement);
   }
   return last;
 }
@@ -90,28 +99,28 @@ absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::Ca
                      .log_evidence = std::nan("")},
         .finished = status.state() == "finished"};
   }
-  // The line of ancestors, base first.
-  std::vector<std::string> line;
-  for (std::string at = view.status.campaign(); known.contains(at);
-       at = known.at(at).relative.parent) {
-    if (std::find(line.begin(), line.end(), at) != line.end()) break;
-    line.insert(line.begin(), at);
-  }
-  // Where improve went on from it. An improvement is kept with its first and its last campaign.
-  for (const std::string& keeper : {view.status.campaign(), line.front()}) {
+  const std::string& shown = view.status.campaign();
+  std::vector<std::string> line = LineTo(known, shown);
+  if (line.empty()) return story;  // deleted since
+  // An improvement is kept with its first and its last campaign.
+  for (const std::string& keeper : {shown, line.front()}) {
     if (story.improvement) break;
-    auto improvement = ImprovementOf(client, view.status.campaign(), keeper);
+    auto improvement = ImprovementOf(client, shown, keeper);
     if (!improvement.ok()) return improvement.status();
     story.improvement = *std::move(improvement);
   }
+  // All models on its way, those that it left again too.
   if (story.improvement) {
     const auto& steps = story.improvement->steps;
-    for (auto at = StepAt(*story.improvement, view.status.campaign()); at != steps.end(); ++at) {
-      const bool there = known.contains(at->campaign) && known.at(at->campaign).finished;
-      if (there && std::find(line.begin(), line.end(), at->campaign) == line.end()) {
-        line.push_back(at->campaign);
+    std::vector<std::string> way = LineTo(known, steps.front().campaign);
+    for (const report::ImprovedModel& step : steps) {
+      const auto found = known.find(step.campaign);
+      const bool there = found != known.end() && found->second.finished;
+      if (there && std::find(way.begin(), way.end(), step.campaign) == way.end()) {
+        way.push_back(step.campaign);
       }
     }
+    line = std::move(way);
   }
   for (const std::string& id : line) {
     if (auto status = AddDiagnoses(client, id, story.diagnoses); !status.ok()) return status;

@@ -170,7 +170,7 @@ std::string StageTable(const std::vector<ErrorStep>& steps) {
          rows + "</table></div>\n";
 }
 
-// Error against the number of effects added, of the fitted data and, where they were opened, of the
+// Error against step, of the fitted data and, where they were opened, of the
 // held-out ones.
 struct ErrorCurve {
   std::vector<double> x, fitted, held_x, held;
@@ -221,7 +221,7 @@ std::string ErrorPlot(const std::string& name, const ErrorCurve& curve, std::siz
   all.insert(all.end(), curve.fitted.begin(), curve.fitted.end());
   all.insert(all.end(), curve.held.begin(), curve.held.end());
   const int last = static_cast<int>(steps) - 1;
-  Plot plot({.width = 330, .height = 190}, Axis("effects added", 0, last, last),
+  Plot plot({.width = 330, .height = 190}, Axis("step", 0, last, last),
             Axis::Covering("error, sd", all, 5));
   plot.AddHorizontal(1);
   plot.AddLine(curve.x, curve.fitted, "mean");
@@ -229,7 +229,7 @@ std::string ErrorPlot(const std::string& name, const ErrorCurve& curve, std::siz
   plot.AddLine(curve.held_x, curve.held, "mean held");
   plot.AddPoints(curve.held_x, curve.held, 3.5, "residual held");
   return "<figure>\n" +
-         plot.Svg("Error of " + name + " against the number of effects added",
+         plot.Svg("Error of " + name + " against step",
                   "rms of residual over standard deviation of the fitted data and of the held-out "
                   "data") +
          "<figcaption>" + Escape(name) + "</figcaption>\n</figure>\n";

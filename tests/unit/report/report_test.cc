@@ -149,6 +149,7 @@ TEST(Report, TellsTheStoryOfAnAddedEffect) {
   EXPECT_THAT(html, HasSubstr("<strong>c1: rolling resistance</strong>, log evidence 12"));
   EXPECT_THAT(html, HasSubstr("c2: &lt;b&gt;membrane (tried)"));
   EXPECT_THAT(html, HasSubstr("<td>4.25</td>"));
+  EXPECT_THAT(html, HasSubstr("Error of all observables against step"));
   EXPECT_THAT(html, Not(HasSubstr("nan")));
   EXPECT_THAT(html, Not(HasSubstr("Why each step"))) << "extended by hand";
   EXPECT_THAT(html, Not(HasSubstr("left out")));
