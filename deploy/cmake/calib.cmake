@@ -32,7 +32,7 @@ if(CALIB_PRECOMPILE)
     $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overread> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>
     $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>)
 endif()
-target_include_directories(calib_flags INTERFACE ${CMAKE_SOURCE_DIR})
+target_include_directories(calib_flags INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_SOURCE_DIR}/deploy/cmake)  # calib/return_if_error.h
 
 function(calib_precompile name)
   if(ARGN AND CALIB_PRECOMPILE)
