@@ -5,7 +5,7 @@
 
 #include "absl/status/statusor.h"
 #include "calib/v1/worker.pb.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
 #include "worker/specimens.h"
 
 namespace calib::worker {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "dem/geometry/stl_file.h"
 #include "worker/scenario_from_spec.h"
 

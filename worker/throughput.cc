@@ -3,8 +3,8 @@
 #include <stop_token>
 #include <thread>
 
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/scenario.h"
+#include "dem/registry/catalog.h"
+#include "dem/model/scenario.h"
 
 namespace calib::worker {
 namespace {

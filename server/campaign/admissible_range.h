@@ -1,7 +1,7 @@
 #pragma once
 // What a parameter of the catalogue may be, for whoever reads a number for it.
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/map_reader.h"
 
 namespace calib::campaign {

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
 #include "inference/data/data_set.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/joint_prior.h"

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "absl/strings/str_cat.h"
-#include "dem/simulation/test_meshes.h"
+#include "dem/model/test_meshes.h"
 #include "server/campaign/excitation.h"
 #include "server/campaign/map_reader.h"
 #include "server/campaign/read_context.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
 
 namespace calib::campaign {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/scenario.h"
+#include "dem/registry/catalog.h"
+#include "dem/model/scenario.h"
 #include "server/campaign/campaign.h"
 #include "server/campaign/yaml_tree.h"
 

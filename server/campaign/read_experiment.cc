@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/read_materials.h"
 #include "server/campaign/read_measurements.h"

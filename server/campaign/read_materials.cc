@@ -5,8 +5,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/contact/materials.h"
-#include "dem/simulation/material_use.h"
-#include "dem/simulation/model_parameters.h"
+#include "dem/registry/material_use.h"
+#include "dem/registry/model_parameters.h"
 #include "server/campaign/admissible_range.h"
 #include "server/campaign/suggestion.h"
 

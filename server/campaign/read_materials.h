@@ -1,7 +1,7 @@
 #pragma once
 // Materials of a campaign file: `model.materials` and `model.pairs`, `materials` of an experiment.
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/campaign.h"
 #include "server/campaign/map_reader.h"
 

@@ -5,7 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/admissible_range.h"
 #include "server/campaign/control_path.h"
 #include "server/campaign/laboratory_table.h"

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "dem/contact/materials.h"
-#include "dem/simulation/model_parameters.h"
+#include "dem/registry/model_parameters.h"
 #include "server/campaign/admissible_range.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/read_materials.h"

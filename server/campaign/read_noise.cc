@@ -6,7 +6,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "inference/data/gaussian_likelihood.h"
 #include "server/campaign/suggestion.h"
 

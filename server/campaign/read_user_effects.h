@@ -1,7 +1,7 @@
 #pragma once
 // The section `model.user_effects` of a campaign file: effects that are formulas.
 
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
 #include "server/campaign/map_reader.h"
 #include "server/campaign/read_context.h"
 

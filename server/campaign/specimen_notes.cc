@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 
 namespace calib::campaign {
 

@@ -6,8 +6,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/model_parameters.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/model_parameters.h"
 #include "server/campaign/admissible_range.h"
 #include "server/campaign/quantity.h"
 #include "server/campaign/suggestion.h"

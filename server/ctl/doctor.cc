@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "proto/rpc/address.h"
 #include "server/campaign/sha256.h"
 #include "server/ctl/trial_runs.h"

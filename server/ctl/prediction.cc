@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/derive.h"
 #include "server/campaign/excitation.h"
 #include "server/campaign/quantity.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/ctl/prediction.h"
 #include "server/report/people_units.h"
 #include "server/report/text_table.h"

@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
-#include "dem/simulation/shape_change.h"
+#include "dem/lab_tests/shared/shape_change.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/verbs.h"
 #include "server/ctl/write_file.h"

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/client/interrupt.h"
 #include "server/client/progress.h"
 #include "server/ctl/assignments.h"

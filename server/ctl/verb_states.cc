@@ -1,6 +1,6 @@
 #include <iostream>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/client/load_view.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"

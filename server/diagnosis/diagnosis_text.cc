@@ -5,7 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/diagnosis/diagnosis.h"
 #include "server/diagnosis/measurement_errors.h"
 #include "server/diagnosis/plan_words.h"

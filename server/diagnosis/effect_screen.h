@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "inference/diagnosis/screen.h"
 #include "server/campaign/campaign.h"
 #include "server/campaign/yaml_tree.h"

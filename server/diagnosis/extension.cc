@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "dem/simulation/model_parameters.h"
+#include "dem/registry/model_parameters.h"
 #include "server/campaign/derive.h"
 #include "server/campaign/suggestion.h"
 

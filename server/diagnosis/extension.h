@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/report/campaign_view.h"
 
 namespace calib::diagnosis {

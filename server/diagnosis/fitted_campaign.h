@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/derive.h"
 #include "server/client/laboratory.h"
 #include "server/report/campaign_view.h"

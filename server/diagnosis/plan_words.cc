@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/report/people_units.h"
 
 namespace calib::diagnosis {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/campaign.h"
 
 namespace calib::diagnosis {

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/model_parameters.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/model_parameters.h"
 #include "inference/emulator/emulated_target.h"
 #include "inference/emulator/search_widening.h"
 #include "server/diagnosis/reading_effects.h"

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/report/json_documents.h"
 
 namespace calib::report {

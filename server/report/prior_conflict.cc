@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/report/people_units.h"
 #include "server/report/run_table.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/report/html.h"
 #include "server/report/plot/plot.h"
 #include "server/report/sections.h"

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/specimen_notes.h"
 #include "server/report/html.h"
 #include "server/report/people_units.h"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "inference/sampling/philox.h"
 #include "server/report/bulk_properties.h"
 #include "server/report/warnings.h"

@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/sha256.h"
 
 namespace calib::scheduler {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "calib/v1/worker.pb.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
 #include "server/campaign/campaign.h"
 
 namespace calib::scheduler {

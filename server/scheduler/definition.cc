@@ -5,7 +5,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/scheduler/plan_memory.h"
 
 namespace calib::scheduler {

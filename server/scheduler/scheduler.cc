@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 
 namespace calib::scheduler {
 

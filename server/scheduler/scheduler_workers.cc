@@ -2,7 +2,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/sha256.h"
 #include "server/scheduler/attempt_spec.h"
 #include "server/scheduler/scheduler.h"

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "proto/rpc/status.h"
 #include "server/campaign/sha256.h"
 #include "server/service/blob_stream.h"

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/origin.h"
 #include "server/scheduler/definition.h"
 #include "server/scheduler/history.h"

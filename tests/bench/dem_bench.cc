@@ -10,7 +10,7 @@
 #include <string>
 
 #include "dem/dynamics/quasi_static.h"
-#include "dem/simulation/shape_change.h"
+#include "dem/lab_tests/shared/shape_change.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "dem/contact/contact_kinematics.h"
-#include "dem/contact/contact_model.h"
+#include "dem/dynamics/contact_model.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -9,7 +9,7 @@
 #include <limits>
 #include <thread>
 
-#include "dem/contact/contact_model.h"
+#include "dem/dynamics/contact_model.h"
 #include "dem/elementary/functions.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/campaign/sha256.h"
 #include "server/scheduler/posterior_record.h"
 

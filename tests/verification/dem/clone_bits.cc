@@ -10,7 +10,7 @@
 #include <map>
 #include <string>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "dem/particles/grading.h"
 #include "tests/support/dem/scenarios.h"
 

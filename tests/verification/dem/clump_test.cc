@@ -5,11 +5,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "dem/dynamics/assembly.h"
 #include "dem/particles/disk_pair.h"
 #include "dem/particles/elongation.h"
-#include "dem/simulation/shape_change.h"
+#include "dem/lab_tests/shared/shape_change.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"
 

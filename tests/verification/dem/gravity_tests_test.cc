@@ -6,7 +6,7 @@
 #include <numbers>
 #include <set>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "dem/geometry/triangle_mesh.h"
 #include "tests/support/dem/scenarios.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/flow.h"
 #include "dem/particles/material_shares.h"

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "dem/particles/packing.h"
-#include "dem/simulation/element_test_run.h"
+#include "dem/lab_tests/shared/element_test_run.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/element_test_run.h"
+#include "dem/registry/catalog.h"
+#include "dem/lab_tests/shared/element_test_run.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "dem/dynamics/assembly.h"
 #include "tests/support/dem/scenarios.h"
 

@@ -10,8 +10,8 @@
 #include <filesystem>
 
 #include "absl/strings/escaping.h"
-#include "dem/simulation/element_test_run.h"
-#include "dem/simulation/vtk_series.h"
+#include "dem/lab_tests/shared/element_test_run.h"
+#include "dem/simulate/vtk_series.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
