@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/standard_normal.h"
 #include "inference/surrogate/expected_improvement.h"
 #include "inference/surrogate/response_surface.h"
 #include "server/scheduler/method.h"

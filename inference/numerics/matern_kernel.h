@@ -1,7 +1,7 @@
 #pragma once
 // Covariance of the emulator and its marginal likelihood; inputs and outputs scaled to order one.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::inference {
 

@@ -1,4 +1,4 @@
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/standard_normal.h"
 
 #include <boost/math/special_functions/erf.hpp>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "inference/emulator/bounded_minimizer.h"
+#include "inference/numerics/bounded_minimizer.h"
 
 #include <cassert>
 #include <cmath>

@@ -1,7 +1,9 @@
-#include "inference/emulator/matern_kernel.h"
+#include "inference/numerics/matern_kernel.h"
 
 #include <cmath>
 #include <limits>
+
+#include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
 namespace {
@@ -70,7 +72,7 @@ double KernelObjective::operator()(const Eigen::VectorXd& x, Eigen::VectorXd& gr
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);  // reads the lower triangle only
   if (factor.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
   const Eigen::VectorXd alpha = factor.solve(outputs_);
-  const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd inverse = Solved(factor, Eigen::MatrixXd::Identity(n, n));
   double value = 0.5 * outputs_.dot(alpha);
   for (Index i = 0; i < n; ++i) value += std::log(factor.matrixLLT()(i, i));
 

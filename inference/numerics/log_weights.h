@@ -1,7 +1,7 @@
 #pragma once
 // Weights in log space. Sums run in index order, so that equal input gives equal bits.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::inference {
 

@@ -2,7 +2,7 @@
 // Moments and quantiles of weighted samples. Weights are given as normalised logs; sums run in
 // index order.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 namespace calib::inference {

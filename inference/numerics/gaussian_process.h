@@ -1,7 +1,7 @@
 #pragma once
 // Gaussian-process regression of one scalar output [Rasmussen & Williams 2006, ch. 2, 4, 5].
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "absl/status/statusor.h"
 

@@ -1,4 +1,4 @@
-#include "inference/emulator/gaussian_process.h"
+#include "inference/numerics/gaussian_process.h"
 
 #include <algorithm>
 #include <cassert>
@@ -6,8 +6,9 @@
 #include <limits>
 #include <vector>
 
-#include "inference/emulator/bounded_minimizer.h"
-#include "inference/emulator/matern_kernel.h"
+#include "inference/numerics/bounded_minimizer.h"
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/matern_kernel.h"
 
 namespace calib::inference {
 namespace {
@@ -105,7 +106,7 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   process.cholesky_ = factor.matrixL();
   process.alpha_ = factor.solve(scaled);
-  const Eigen::VectorXd precision = factor.solve(Eigen::MatrixXd::Identity(n, n)).diagonal();
+  const Eigen::VectorXd precision = Solved(factor, Eigen::MatrixXd::Identity(n, n)).diagonal();
   process.leave_one_out_.error = process.output_sd_ * process.alpha_.cwiseQuotient(precision);
   process.leave_one_out_.variance = output_variance * precision.cwiseInverse();
   return process;

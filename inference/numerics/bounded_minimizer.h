@@ -1,7 +1,7 @@
 #pragma once
 // Smooth minimisation in a box, for the handful of hyper-parameters of an emulator.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <functional>
 
 namespace calib::inference {

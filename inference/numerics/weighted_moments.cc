@@ -1,4 +1,4 @@
-#include "inference/filter/weighted_moments.h"
+#include "inference/numerics/weighted_moments.h"
 
 #include <algorithm>
 #include <cassert>

@@ -1,4 +1,4 @@
-#include "inference/filter/log_weights.h"
+#include "inference/numerics/log_weights.h"
 
 #include <algorithm>
 #include <cmath>
