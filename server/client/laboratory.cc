@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/campaign_file.h"
-#include "server/campaign/identity.h"
-#include "server/campaign/sha256.h"
+#include "server/campaign/file/campaign_file.h"
+#include "server/campaign/model/identity.h"
+#include "server/campaign/model/sha256.h"
 #include "server/client/interrupt.h"
 #include "server/client/load_view.h"
 #include "server/client/no_worker_notice.h"

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/campaign_file.h"
+#include "server/campaign/file/campaign_file.h"
 
 namespace calib::client {
 

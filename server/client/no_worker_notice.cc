@@ -4,7 +4,7 @@
 #include <iostream>
 #include <string>
 
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/text/yaml_text.h"
 
 namespace calib::client {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <iostream>
 
-#include "server/report/people_units.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::client {
 namespace {

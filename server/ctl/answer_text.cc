@@ -7,9 +7,9 @@
 
 #include "dem/catalog/catalog.h"
 #include "server/client/progress.h"
-#include "server/report/people_units.h"
-#include "server/report/residual_words.h"
-#include "server/report/text_table.h"
+#include "server/report/text/people_units.h"
+#include "server/report/text/text_table.h"
+#include "server/report/views/residual_words.h"
 
 namespace calib::ctl {
 namespace {

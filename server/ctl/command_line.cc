@@ -14,8 +14,8 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "proto/rpc/address.h"
-#include "server/campaign/suggestion.h"
-#include "server/campaign/utf8.h"
+#include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/file/text/utf8.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/verbs.h"
 

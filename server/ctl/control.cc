@@ -4,7 +4,7 @@
 
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/report/json_documents.h"
+#include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
 

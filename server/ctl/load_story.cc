@@ -9,7 +9,7 @@
 
 #include "server/client/findings.h"
 #include "server/client/load_view.h"
-#include "server/report/predictions.h"
+#include "server/report/views/predictions.h"
 
 namespace calib::ctl {
 namespace {

@@ -10,11 +10,11 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/catalog/catalog.h"
-#include "server/campaign/campaign_file.h"
-#include "server/campaign/derive.h"
-#include "server/campaign/quantity.h"
-#include "server/campaign/sha256.h"
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/campaign_file.h"
+#include "server/campaign/file/derive.h"
+#include "server/campaign/file/text/quantity.h"
+#include "server/campaign/file/text/yaml_text.h"
+#include "server/campaign/model/sha256.h"
 
 namespace calib::ctl {
 namespace {

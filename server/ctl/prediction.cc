@@ -7,12 +7,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
-#include "server/campaign/derive.h"
-#include "server/campaign/excitation.h"
-#include "server/campaign/quantity.h"
-#include "server/campaign/suggestion.h"
-#include "server/report/discrepancies.h"
-#include "server/report/warnings.h"
+#include "server/campaign/file/derive.h"
+#include "server/campaign/file/text/quantity.h"
+#include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/model/excitation.h"
+#include "server/report/views/discrepancies.h"
+#include "server/report/views/warnings.h"
 
 namespace calib::ctl {
 namespace {

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/identity.h"
-#include "server/campaign/sha256.h"
-#include "server/report/json_documents.h"
+#include "server/campaign/model/identity.h"
+#include "server/campaign/model/sha256.h"
+#include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
 namespace {

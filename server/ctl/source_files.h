@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
-#include "server/campaign/campaign_file.h"
+#include "server/campaign/file/campaign_file.h"
 #include "server/client/client.h"
 #include "server/ctl/arguments.h"
 

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "absl/strings/str_split.h"
-#include "server/campaign/campaign.h"
-#include "server/campaign/sha256.h"
+#include "server/campaign/model/campaign.h"
+#include "server/campaign/model/sha256.h"
 #include "server/ctl/evaluation.h"
 #include "server/ctl/temporary_folder.h"
-#include "server/scheduler/attempt_spec.h"
+#include "server/messages/attempt_spec.h"
 
 namespace calib::ctl {
 namespace {
@@ -34,7 +34,7 @@ v1::AttemptSpec CollisionSpec() {
   s.test = "collision";
   s.settings = {{"radius", c.radius}, {"partner_radius", c.radius}, {"impact_angle", 0}};
   s.path = {{.target = c.speed, .load_step = 0}};
-  return scheduler::ToSpec(s, campaign::NoPacking{}, "collision");
+  return messages::ToSpec(s, campaign::NoPacking{}, "collision");
 }
 
 v1::AttemptSpec CompressionSpec() {
@@ -52,7 +52,7 @@ v1::AttemptSpec CompressionSpec() {
                                   .radius_spread = 0.2,
                                   .pressure = 0.5 * kTrialStress,
                                   .seed = 1};
-  return scheduler::ToSpec(s, recipe, "compression");
+  return messages::ToSpec(s, recipe, "compression");
 }
 
 /// The table of one run.

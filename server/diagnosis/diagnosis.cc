@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/noise_check.h"
+#include "server/campaign/model/noise_check.h"
 #include "server/diagnosis/diagnosis_support.h"
 #include "server/diagnosis/effect_screen.h"
 #include "server/diagnosis/extension.h"
@@ -18,7 +18,7 @@
 #include "server/diagnosis/strengths.h"
 #include "server/diagnosis/verdict.h"
 #include "server/diagnosis/warm_fits.h"
-#include "server/report/prior_conflict.h"
+#include "server/report/views/prior_conflict.h"
 
 namespace calib::diagnosis {
 namespace {

@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "inference/data/data_set.h"
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/numerical_choices.h"
 #include "server/diagnosis/reading_effects.h"

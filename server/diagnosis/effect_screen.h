@@ -13,8 +13,8 @@
 #include "absl/status/statusor.h"
 #include "dem/catalog/catalog.h"
 #include "inference/diagnosis/screen.h"
-#include "server/campaign/campaign.h"
-#include "server/campaign/yaml_tree.h"
+#include "server/campaign/file/text/yaml_tree.h"
+#include "server/campaign/model/campaign.h"
 #include "server/diagnosis/fitted_campaign.h"
 #include "server/diagnosis/screen_shares.h"
 

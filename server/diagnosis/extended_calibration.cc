@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "server/diagnosis/extension.h"
-#include "server/report/comparison.h"
+#include "server/report/views/comparison.h"
 
 namespace calib::diagnosis {
 namespace {

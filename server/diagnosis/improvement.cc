@@ -7,13 +7,13 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/sha256.h"
+#include "server/campaign/model/sha256.h"
 #include "server/client/findings.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/improve_step.h"
 #include "server/diagnosis/left_out_error.h"
-#include "server/report/comparison.h"
-#include "server/report/people_units.h"
+#include "server/report/text/people_units.h"
+#include "server/report/views/comparison.h"
 
 namespace calib::diagnosis {
 namespace {

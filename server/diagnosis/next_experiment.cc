@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/derive.h"
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/derive.h"
+#include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/plan_grid.h"
 #include "server/diagnosis/plan_words.h"
 #include "server/diagnosis/test_plans.h"
-#include "server/report/people_units.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::diagnosis {
 namespace {

@@ -1,6 +1,6 @@
 #include "server/diagnosis/numerical_choices.h"
 
-#include "server/campaign/excitation.h"
+#include "server/campaign/model/excitation.h"
 
 namespace calib::diagnosis {
 namespace {

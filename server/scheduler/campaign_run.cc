@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
-#include "server/scheduler/attempt_spec.h"
+#include "server/messages/attempt_spec.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
 
@@ -168,8 +168,8 @@ std::map<EvaluationKey, std::string> CampaignRun::OfOtherMechanics() const {
     const bool stopped = evaluation.status == EvaluationStatus::kStoppedEarly &&
                          record_.progress.phase != "calibrating";
     if (for_good || stopped || evaluation.digest.empty()) continue;
-    const std::string digest = SpecDigest(
-        SpecOf(definition_->campaign, key.experiment, parameters_.at(key.sample), key.sample));
+    const std::string digest = messages::SpecDigest(messages::SpecOf(
+        definition_->campaign, key.experiment, parameters_.at(key.sample), key.sample));
     if (digest != evaluation.digest) others[key] = digest;
   }
   return others;

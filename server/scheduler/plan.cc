@@ -7,8 +7,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "inference/data/gaussian_likelihood.h"
-#include "server/campaign/read_precomputed.h"
-#include "server/campaign/specimen_notes.h"
+#include "server/campaign/file/read_precomputed.h"
+#include "server/campaign/model/specimen_notes.h"
 #include "server/scheduler/answer.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"

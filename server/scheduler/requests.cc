@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/scheduler/attempt_spec.h"
+#include "server/messages/attempt_spec.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/rungs.h"
 
@@ -47,8 +47,8 @@ absl::Status Requests::Request(const store::SampleRecord& sample,
   for (const int experiment : experiments) {
     store::EvaluationRecord evaluation{
         .key = {id_, sample.sample, experiment},
-        .digest =
-            SpecDigest(SpecOf(definition_.campaign, experiment, sample.parameters, sample.sample))};
+        .digest = messages::SpecDigest(
+            messages::SpecOf(definition_.campaign, experiment, sample.parameters, sample.sample))};
     if (reuse) {
       const auto equal = reader_.FindEqual(evaluation.digest);
       if (!equal.ok()) {

@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "server/campaign/scatter_fit.h"
+#include "server/campaign/model/scatter_fit.h"
 #include "server/scheduler/history.h"
 
 namespace calib::scheduler {

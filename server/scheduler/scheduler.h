@@ -15,10 +15,10 @@
 #include "calib/v1/campaign.pb.h"
 #include "calib/v1/worker.pb.h"
 #include "server/scheduler/campaign_run.h"
-#include "server/scheduler/lease_table.h"
+#include "server/scheduler/leases/lease_table.h"
+#include "server/scheduler/leases/worker_table.h"
 #include "server/scheduler/plan.h"
 #include "server/scheduler/ports.h"
-#include "server/scheduler/worker_table.h"
 
 namespace calib::scheduler {
 

@@ -7,9 +7,9 @@
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
 #include "proto/rpc/status.h"
-#include "server/campaign/sha256.h"
+#include "server/campaign/model/sha256.h"
+#include "server/messages/folder_report.h"
 #include "server/service/blob_stream.h"
-#include "server/service/folder_report.h"
 #include "server/service/queries.h"
 #include "server/service/stream_reactor.h"
 #include "server/service/submission.h"
@@ -401,7 +401,7 @@ grpc::ServerUnaryReactor* CampaignsService::Examine(Context* context,
       reply->set_engine_version(dem::EngineVersion());
       reply->set_catalog_digest(campaign::Sha256Hex(dem::CatalogText()));
       reply->set_listen(site_.listen);
-      *reply->mutable_state_folder() = ExamineFolder(site_.state_folder);
+      *reply->mutable_state_folder() = messages::ExamineFolder(site_.state_folder);
       auto reader = core_.Read();
       const auto check = reader.ok() ? reader->CheckFile(kLookingThroughTheFile)
                                      : absl::StatusOr<store::Reader::FileCheck>(reader.status());

@@ -7,7 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
-#include "server/campaign/origin.h"
+#include "server/campaign/file/origin.h"
 #include "server/scheduler/definition.h"
 #include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"

@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "proto/rpc/digest.h"
-#include "server/campaign/campaign_file.h"
+#include "server/campaign/file/campaign_file.h"
 #include "server/scheduler/definition.h"
 #include "server/service/queries.h"
 

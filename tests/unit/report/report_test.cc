@@ -1,4 +1,4 @@
-#include "server/report/report.h"
+#include "server/report/html/report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <regex>
 
-#include "server/report/comparison.h"
-#include "server/report/html.h"
+#include "server/report/text/html.h"
+#include "server/report/views/comparison.h"
 #include "tests/unit/report/example_view.h"
 
 namespace calib::report {

@@ -1,11 +1,11 @@
-#include "server/report/residual_pattern.h"
+#include "server/report/views/residual_pattern.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "server/report/residual_words.h"
+#include "server/report/views/residual_words.h"
 
 namespace calib::report {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/report/residual_words.h"
+#include "server/report/views/residual_words.h"
 
 #include <gmock/gmock.h>
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "dem/catalog/catalog.h"
-#include "server/campaign/sha256.h"
+#include "server/campaign/model/sha256.h"
 #include "server/scheduler/posterior_record.h"
 
 namespace calib::scheduler {
