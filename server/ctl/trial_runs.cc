@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "absl/strings/str_split.h"
+#include "calib/return_if_error.h"
 #include "server/campaign/model/campaign.h"
 #include "server/campaign/model/sha256.h"
 #include "server/ctl/evaluation.h"
@@ -62,17 +63,16 @@ absl::StatusOr<std::string> Run(const std::string& program, v1::AttemptSpec spec
   std::filesystem::create_directories(folder, error);
   Evaluation::Task task;
   task.spec = std::move(spec);
-  auto run = Evaluation::Start(program, task, folder.string());
-  if (!run.ok()) return run.status();
+  ASSIGN_OR_RETURN(auto run, Evaluation::Start(program, task, folder.string()));
   const auto until = std::chrono::steady_clock::now() + kAtMost;
-  while (!run->Poll()) {
+  while (!run.Poll()) {
     if (std::chrono::steady_clock::now() > until) {
       return absl::DeadlineExceededError("it has not ended within a minute");
     }
     std::this_thread::sleep_for(kPoll);
   }
-  if (auto ended = run->Result(); !ended.ok()) return ended;
-  return run->Table();
+  RETURN_IF_ERROR(run.Result());
+  return run.Table();
 }
 
 /// The value of the last row; NaN without such a column.

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "dem/simulation/test_meshes.h"
 #include "server/campaign/file/map_reader.h"
 #include "server/campaign/file/read_context.h"
@@ -131,9 +132,8 @@ void CheckCorrelationLengths(const MapReader& map, const Campaign& campaign) {
 FileReader DiskReader(const std::string& campaign_file_path) {
   const std::filesystem::path folder = std::filesystem::path(campaign_file_path).parent_path();
   return [folder](const std::string& path) -> absl::StatusOr<std::string> {
-    const auto expanded = ExpandPath(path);
-    if (!expanded.ok()) return expanded.status();
-    return ReadFromDisk(folder / *expanded);  // an absolute path replaces the folder
+    ASSIGN_OR_RETURN(const auto expanded, ExpandPath(path));
+    return ReadFromDisk(folder / expanded);  // an absolute path replaces the folder
   };
 }
 

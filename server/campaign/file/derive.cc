@@ -68,7 +68,7 @@ void ChangeModel(const Derivation& derivation, YamlNode& root) {
 
 bool IsHeldOut(const YamlNode& experiment) {
   const YamlNode* role = YamlFind(experiment, "role");
-  return role != nullptr && role->scalar == "validate";
+  return role != nullptr && ValueOf(kRoleWords, role->scalar) == Role::kValidate;
 }
 
 // out: an entry of `experiments`.
@@ -123,8 +123,8 @@ void RaiseSamples(YamlNode& root) {
   const YamlNode* method = YamlFind(inference, "method");
   const YamlNode* samples = YamlFind(inference, "samples");
   int given = 0;
-  if (method == nullptr || method->scalar != "surrogate_msrs" || samples == nullptr ||
-      !absl::SimpleAtoi(samples->scalar, &given)) {
+  if (method == nullptr || ValueOf(kMethodWords, method->scalar) != Method::kSurrogateMsrs ||
+      samples == nullptr || !absl::SimpleAtoi(samples->scalar, &given)) {
     return;
   }
   const int fewest = 2 * static_cast<int>(YamlAt(root, "parameters").entries.size()) + 1;
@@ -139,7 +139,7 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
     YamlErase(root, "budget");
     return;
   }
-  if (derivation.lineage.purpose == "warm_fit") MakeBatch(root);
+  if (ToDerivedFor(derivation.lineage.purpose) == DerivedFor::kWarmFit) MakeBatch(root);
   YamlNode& inference = YamlAt(root, "inference");
   if (derivation.samples) {
     YamlAt(inference, "samples") = YamlScalar(absl::StrCat(*derivation.samples));

@@ -89,9 +89,11 @@ std::optional<LaboratoryTable> LaboratoryTable::Read(MapReader& experiment,
   LaboratoryTable table;
   table.columns_ = ReadColumns(*data, free_names);
   table.factors_ = ReadUnits(*data, free_names);
-  table.engineering_ =
-      data->Choice("strain", {"engineering", "logarithmic"}).value_or("engineering") ==
-      "engineering";
+  constexpr std::array kStrainWords = {
+      Word{Strain::kEngineering, "engineering"},
+      Word{Strain::kLogarithmic, "logarithmic"},
+  };
+  table.strain_ = data->Choice("strain", kStrainWords).value_or(table.strain_);
   const auto path = data->RequiredText("file", "the table of measured values");
   data->Finish();
   if (!path) return std::nullopt;
@@ -142,7 +144,7 @@ double LaboratoryTable::Factor(const std::string& name) const {
 }
 
 bool LaboratoryTable::IsEngineering(const std::string& name) const {
-  return engineering_ && IsStrain(name);
+  return strain_ == Strain::kEngineering && IsStrain(name);
 }
 
 std::vector<double> LaboratoryTable::ToModel(const std::string& name,

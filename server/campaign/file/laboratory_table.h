@@ -52,7 +52,8 @@ class LaboratoryTable {
   std::shared_ptr<const DataTable> table_;
   std::vector<std::pair<std::string, std::string>> columns_;  // our name, the file's
   std::vector<std::pair<std::string, double>> factors_;       // our name, to SI
-  bool engineering_ = true;
+  enum class Strain { kEngineering, kLogarithmic };
+  Strain strain_ = Strain::kEngineering;
 };
 
 }  // namespace calib::campaign

@@ -161,6 +161,12 @@ std::optional<std::string> MapReader::Choice(const std::string& key,
   return text;
 }
 
+std::optional<bool> MapReader::TrueOrFalse(const std::string& key) {
+  const auto word = Choice(key, {"true", "false"});
+  if (!word) return std::nullopt;
+  return *word == "true";
+}
+
 std::optional<std::vector<std::string>> MapReader::TextList(const std::string& key) {
   const YamlNode* node = Find(key);
   if (node == nullptr) return std::nullopt;

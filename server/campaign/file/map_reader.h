@@ -10,6 +10,7 @@
 #include "server/campaign/file/problem_list.h"
 #include "server/campaign/file/text/yaml_tree.h"
 #include "server/campaign/model/range.h"
+#include "server/campaign/model/word_table.h"
 
 namespace calib::campaign {
 
@@ -48,6 +49,12 @@ class MapReader {
   /// One of a list of words.
   std::optional<std::string> Choice(const std::string& key,
                                     const std::vector<std::string>& allowed);
+  template <typename Enum, std::size_t N>
+  std::optional<Enum> Choice(const std::string& key, const WordTable<Enum, N>& words) {
+    const auto word = Choice(key, AllWords(words));
+    return word ? ValueOf(words, *word) : std::nullopt;
+  }
+  std::optional<bool> TrueOrFalse(const std::string& key);
   /// A list of texts; a single text counts as a list of one.
   std::optional<std::vector<std::string>> TextList(const std::string& key);
   /// A map of texts: {our_name: column}.

@@ -163,9 +163,8 @@ void ReadStaging(MapReader& map, Experiment& experiment) {
   experiment.staging.unbalanced =
       staging->Quantity("unbalanced", "1", {.min = 0, .max = 1, .min_open = true});
   ReadDamping(*staging, experiment.staging);
-  if (const auto adaptive = staging->Choice("adaptive", {"true", "false"})) {
-    experiment.staging.adaptive = *adaptive == "true";
-  }
+  experiment.staging.adaptive =
+      staging->TrueOrFalse("adaptive").value_or(experiment.staging.adaptive);
   staging->Finish();
 }
 
@@ -205,10 +204,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   experiment.name = ReadName(map, context, campaign);
   const dem::TestInfo* test = ReadTest(map, campaign, experiment);
   if (test != nullptr) ReadSettings(map, *test, !campaign.precomputed, experiment);
-  experiment.role =
-      map.Choice("role", {"calibrate", "validate"}).value_or("calibrate") == "validate"
-          ? Role::kValidate
-          : Role::kCalibrate;
+  experiment.role = map.Choice("role", kRoleWords).value_or(Role::kCalibrate);
   if (campaign.precomputed) {
     if (test == nullptr) map.Ignore({"confining_pressure"});
     RefuseKeys(map, "has no meaning with precomputed runs; remove it");

@@ -33,43 +33,36 @@ void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
     noise->Finish();
     return;
   }
-  const auto mode = map.Choice("noise", {"given", "inferred", "ess_target"});
-  if (mode == "inferred") filter.noise = NoiseMode::kInferred;
-  if (mode == "ess_target") filter.noise = NoiseMode::kEssTarget;
+  filter.noise = map.Choice("noise", kNoiseModeWords).value_or(filter.noise);
 }
 
-constexpr std::array kMethods = {Method::kSqmc, Method::kIterativeBayesianFilter, Method::kTmcmc,
-                                 Method::kSurrogateMsrs, Method::kTable};
 constexpr int kMostStages = 100;  // of tmcmc, unless max_iterations says otherwise
 
 void ReadMethod(MapReader& map, Campaign& campaign) {
-  std::vector<std::string> names;
-  names.reserve(kMethods.size());
-  for (const Method method : kMethods) names.emplace_back(ToString(method));
-  const auto chosen = map.Choice("method", names);
-  for (const Method method : kMethods) {
-    if (chosen == ToString(method)) campaign.method = method;
-  }
+  campaign.method = map.Choice("method", kMethodWords).value_or(campaign.method);
   if (campaign.method == Method::kTmcmc) campaign.max_iterations = kMostStages;
   if (IsFilter(campaign.method) || campaign.method == Method::kTable) return;
   if (campaign.precomputed) {
-    map.Problem("method", absl::StrCat(*chosen,
+    map.Problem("method", absl::StrCat(ToString(campaign.method),
                                        " chooses its own samples, and runs that exist "
                                        "already are what they are; use sqmc"));
   } else if (campaign.filter.noise == NoiseMode::kEssTarget) {
-    map.Problem("method", absl::StrCat(*chosen,
+    map.Problem("method", absl::StrCat(ToString(campaign.method),
                                        " needs the errors of the readings; use noise: "
                                        "given or noise: inferred with it"));
   }
 }
 
+using inference::Design;
+constexpr std::array kDesignWords = {
+    Word{Design::kHalton, "halton"},
+    Word{Design::kSobol, "sobol"},
+    Word{Design::kLatinHypercube, "latin_hypercube"},
+    Word{Design::kSymmetricLatinHypercube, "symmetric_latin_hypercube"},
+};
+
 void ReadDesign(MapReader& map, inference::FilterOptions& filter) {
-  using inference::Design;
-  const auto design =
-      map.Choice("design", {"halton", "sobol", "latin_hypercube", "symmetric_latin_hypercube"});
-  if (design == "sobol") filter.design = Design::kSobol;
-  if (design == "latin_hypercube") filter.design = Design::kLatinHypercube;
-  if (design == "symmetric_latin_hypercube") filter.design = Design::kSymmetricLatinHypercube;
+  filter.design = map.Choice("design", kDesignWords).value_or(filter.design);
 }
 
 void ReadTmcmcOptions(MapReader& map, inference::TmcmcOptions& tmcmc) {
@@ -92,7 +85,7 @@ void ReadTermination(MapReader& map, Campaign& campaign) {
 }
 
 void ReadDecisions(MapReader& map, Campaign& campaign) {
-  if (map.Choice("decisions", {"reproducible", "immediate"}) != "immediate") return;
+  if (map.Choice("decisions", kDecisionsWords) != Decisions::kImmediate) return;
   if (campaign.method != Method::kSurrogateMsrs && !IsFilter(campaign.method)) {
     map.Problem("decisions", absl::StrCat(ToString(campaign.method),
                                           " decides nothing while runs are under way; immediate "
@@ -102,6 +95,12 @@ void ReadDecisions(MapReader& map, Campaign& campaign) {
   }
   campaign.decisions = Decisions::kImmediate;
 }
+
+using inference::MixtureOver;
+constexpr std::array kMixtureWords = {
+    Word{MixtureOver::kParameters, "parameters"},
+    Word{MixtureOver::kParametersAndStates, "parameters_and_states"},
+};
 
 void ReadFilterOptions(MapReader& map, Campaign& campaign) {
   inference::FilterOptions& filter = campaign.filter;
@@ -113,13 +112,9 @@ void ReadFilterOptions(MapReader& map, Campaign& campaign) {
       static_cast<int>(map.Integer("max_components", 1, 1000).value_or(filter.max_components));
   filter.concentration =
       map.Quantity("concentration", "1", kPositive).value_or(filter.concentration);
-  if (map.Choice("mixture", {"parameters", "parameters_and_states"}) == "parameters_and_states") {
-    filter.mixture = inference::MixtureOver::kParametersAndStates;
-  }
+  filter.mixture = map.Choice("mixture", kMixtureWords).value_or(filter.mixture);
   ReadDesign(map, filter);
-  if (const auto reversed = map.Choice("reversed_path", {"true", "false"})) {
-    filter.reversed_path = *reversed == "true";
-  }
+  filter.reversed_path = map.TrueOrFalse("reversed_path").value_or(filter.reversed_path);
   if (campaign.filter.noise != NoiseMode::kEssTarget) {
     filter.ess_target = map.Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
   } else if (map.Has("ess_target")) {
@@ -197,11 +192,9 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
       campaign.replicates = static_cast<int>(*replicates);
     }
     ReadFreeze(*map, campaign);
-    if (campaign.method == Method::kSurrogateMsrs &&
-        map->Choice("surrogate", {"cubic_rbf", "gaussian_process"}) == "gaussian_process") {
-      campaign.surrogate = SurrogateModel::kGaussianProcess;
-    }
     if (campaign.method == Method::kSurrogateMsrs) {
+      campaign.surrogate =
+          map->Choice("surrogate", kSurrogateModelWords).value_or(campaign.surrogate);
       ReadTermination(*map, campaign);
       campaign.in_flight = static_cast<int>(
           map->Integer("in_flight", 1, kMostInFlight).value_or(campaign.in_flight));

@@ -1,5 +1,6 @@
 #include "server/campaign/file/read_prior.h"
 
+#include <array>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
@@ -13,18 +14,12 @@ namespace {
 using inference::Prior;
 using inference::PriorKind;
 
-const std::vector<std::string>& Kinds() {
-  static const auto* const kinds =
-      new std::vector<std::string>{"uniform", "log_uniform", "normal", "log_normal"};
-  return *kinds;
-}
-
-PriorKind KindOf(const std::string& name) {
-  if (name == "log_uniform") return PriorKind::kLogUniform;
-  if (name == "normal") return PriorKind::kNormal;
-  if (name == "log_normal") return PriorKind::kLogNormal;
-  return PriorKind::kUniform;
-}
+constexpr std::array kKindWords = {
+    Word{PriorKind::kUniform, "uniform"},
+    Word{PriorKind::kLogUniform, "log_uniform"},
+    Word{PriorKind::kNormal, "normal"},
+    Word{PriorKind::kLogNormal, "log_normal"},
+};
 
 // A number that has to be there; NaN after a problem.
 double Required(MapReader& map, const std::string& key, const std::string& unit, const Range& range,
@@ -89,22 +84,23 @@ bool HoldsMass(const Prior& prior, const std::string& key, MapReader& map) {
 namespace {
 
 std::optional<Prior> ReadFrom(MapReader& map, const std::string& unit) {
-  if (map.Require("prior", "one of " + Listed(Kinds())) == nullptr) {
+  if (map.Require("prior", "one of " + Listed(AllWords(kKindWords))) == nullptr) {
     map.Ignore({"min", "max", "mean", "sd"});
     map.Finish();
     return std::nullopt;
   }
-  const auto kind = map.Choice("prior", Kinds());
+  const auto kind = map.Choice("prior", kKindWords);
   if (!kind) {
     map.Ignore({"min", "max", "mean", "sd"});
     map.Finish();
     return std::nullopt;
   }
   Prior prior;
-  prior.kind = KindOf(*kind);
+  prior.kind = *kind;
   const bool bounded = prior.kind == PriorKind::kUniform || prior.kind == PriorKind::kLogUniform;
+  const std::string word = WordOf(kKindWords, *kind);
   const bool read =
-      bounded ? ReadBounds(map, unit, *kind, prior) : ReadMoments(map, unit, *kind, prior);
+      bounded ? ReadBounds(map, unit, word, prior) : ReadMoments(map, unit, word, prior);
   map.Finish();
   if (!read) return std::nullopt;
   if (const auto valid = prior.Validate(); !valid.ok()) {

@@ -1,6 +1,7 @@
 #include "server/campaign/file/read_user_effects.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -109,6 +110,14 @@ std::map<std::string, double> MediansOfOthers(const std::vector<dem::ParameterIn
   return medians;
 }
 
+// On which side of its null value a strength may be.
+enum class Sign { kPositive, kNegative, kEither };
+constexpr std::array kSignWords = {
+    Word{Sign::kPositive, "positive"},
+    Word{Sign::kNegative, "negative"},
+    Word{Sign::kEither, "either"},
+};
+
 void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::UserEffect& effect) {
   const std::size_t before = map.problems().size();
   dem::ParameterInfo info;
@@ -131,16 +140,16 @@ void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::Us
   bool both = false;
   if (info.null_value) {
     const double null = *info.null_value;
-    std::string sign = "either";
-    if (prior && prior->min >= null) sign = "positive";
-    if (prior && prior->max <= null) sign = "negative";
-    if (const auto given = map.Choice("sign", {"positive", "negative", "either"})) sign = *given;
-    if (sign == "positive") info.min = null;
-    if (sign == "negative") info.max = null;
-    both = sign == "either";
+    Sign sign = Sign::kEither;
+    if (prior && prior->min >= null) sign = Sign::kPositive;
+    if (prior && prior->max <= null) sign = Sign::kNegative;
+    sign = map.Choice("sign", kSignWords).value_or(sign);
+    if (sign == Sign::kPositive) info.min = null;
+    if (sign == Sign::kNegative) info.max = null;
+    both = sign == Sign::kEither;
     if (prior && (prior->min < info.min || prior->max > info.max)) {
-      map.Problem("prior",
-                  absl::StrCat("reaches beyond the null ", null, ", but its sign is ", sign));
+      map.Problem("prior", absl::StrCat("reaches beyond the null ", null, ", but its sign is ",
+                                        WordOf(kSignWords, sign)));
     }
     if (!prior && !map.Has("prior")) {
       map.Problem("prior",

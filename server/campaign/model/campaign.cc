@@ -5,26 +5,6 @@
 
 namespace calib::campaign {
 
-const char* ToString(Method method) {
-  switch (method) {
-    case Method::kSqmc:
-      return "sqmc";
-    case Method::kIterativeBayesianFilter:
-      return "iterative_bayesian_filter";
-    case Method::kTmcmc:
-      return "tmcmc";
-    case Method::kSurrogateMsrs:
-      return "surrogate_msrs";
-    case Method::kTable:
-      break;
-  }
-  return "table";
-}
-
-bool IsFilter(Method method) {
-  return method == Method::kSqmc || method == Method::kIterativeBayesianFilter;
-}
-
 int LaterBatch(const Campaign& campaign) {
   return campaign.method == Method::kSurrogateMsrs ? std::min(kSurrogateBatch, campaign.samples)
                                                    : campaign.samples;

@@ -2,6 +2,7 @@
 // A campaign as the program holds it: read from YAML and its files (campaign_file.h), SI inside,
 // compression positive.
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/joint_prior.h"
 #include "inference/tmcmc/tmcmc.h"
+#include "server/campaign/model/words.h"
 
 namespace calib::campaign {
 
@@ -49,8 +51,6 @@ struct MeasuredObservable {
   /// law (a column, a covariance, nothing).
   std::optional<NoiseLaw> noise = {};
 };
-
-enum class Role { kCalibrate, kValidate };
 
 /// A specimen: the packing file's content (path as written, parsed), or a recipe.
 struct PackingFile {
@@ -116,13 +116,6 @@ struct Precomputed {
   std::optional<Eigen::VectorXd> log_proposal;
 };
 
-/// kTable: the rows of `table` are run, nothing is inferred.
-enum class Method { kSqmc, kIterativeBayesianFilter, kTmcmc, kSurrogateMsrs, kTable };
-/// As users write it: "sqmc", "iterative_bayesian_filter", "tmcmc", "surrogate_msrs", "table".
-const char* ToString(Method method);
-/// True for the two filters, whose posterior is that of weighted samples.
-bool IsFilter(Method method);
-
 /// Parameter values to run, given one by one.
 struct Table {
   Eigen::MatrixXd parameters;  ///< N x d, the campaign's parameters in order
@@ -154,6 +147,12 @@ struct Freeze {
   std::vector<std::string> names;  ///< and these
 };
 
+inline constexpr std::array kNoiseModeWords = {
+    Word{inference::NoiseMode::kGiven, "given"},
+    Word{inference::NoiseMode::kInferred, "inferred"},
+    Word{inference::NoiseMode::kEssTarget, "ess_target"},
+};
+
 /// Observables that share one inferred factor of their noise.
 struct SharedNoise {
   std::vector<std::pair<int, int>> members;  ///< (experiment, observable)
@@ -162,11 +161,19 @@ struct SharedNoise {
 
 /// What surrogate_msrs asks where to look next.
 enum class SurrogateModel { kCubicRbf, kGaussianProcess };
+inline constexpr std::array kSurrogateModelWords = {
+    Word{SurrogateModel::kCubicRbf, "cubic_rbf"},
+    Word{SurrogateModel::kGaussianProcess, "gaussian_process"},
+};
 
 /// When a campaign decides while runs are under way (the next point of surrogate_msrs, which run
 /// to end early). kReproducible: by what follows from results in their order, whatever arrived
 /// first; kImmediate: at once, by what has arrived.
 enum class Decisions { kReproducible, kImmediate };
+inline constexpr std::array kDecisionsWords = {
+    Word{Decisions::kReproducible, "reproducible"},
+    Word{Decisions::kImmediate, "immediate"},
+};
 
 struct EarlyStopping {
   double discard_at_most = 1e-3;

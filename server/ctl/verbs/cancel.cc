@@ -1,8 +1,10 @@
 #include "server/ctl/control.h"
-#include "server/ctl/verbs.h"
 
 namespace calib::ctl {
 
-int Cancel(const Arguments& arguments) { return Control(arguments, &client::Client::Cancel); }
+Verb CancelVerb() {
+  return ControlVerb("cancel", "End a campaign for good, keeping what it has",
+                     &client::Client::Cancel);
+}
 
 }  // namespace calib::ctl

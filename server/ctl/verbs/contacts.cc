@@ -2,14 +2,15 @@
 
 #include "server/ctl/catalog_text.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/text/text_table.h"
 
 namespace calib::ctl {
+namespace {
 
-int Contacts(const Arguments& arguments) {
-  if (arguments.json) {
+absl::StatusOr<int> Contacts(const CommonOptions& common) {
+  if (common.json) {
     std::cout << report::ContactsJson();
     return kDone;
   }
@@ -20,6 +21,15 @@ int Contacts(const Arguments& arguments) {
               << ParameterTable(contact.parameters) << "\n";
   }
   return kDone;
+}
+
+}  // namespace
+
+Verb ContactsVerb() {
+  return {.help = {.name = "contacts",
+                   .description = "Contact laws this build offers",
+                   .example = "contacts"},
+          .run = &Contacts};
 }
 
 }  // namespace calib::ctl

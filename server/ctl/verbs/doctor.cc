@@ -14,12 +14,13 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "server/client/child_process.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/temporary_folder.h"
 #include "server/ctl/trial_runs.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/verb.h"
 #include "server/messages/folder_report.h"
 
 namespace calib::ctl {
@@ -92,66 +93,70 @@ double UnixSeconds() {
 
 absl::Status ExamineServer(client::Session& session, bool is_own, std::vector<Check>& checks) {
   // The first call opens the connection; the second one tells the time.
-  const auto workers = session.client().ListWorkers();
-  if (!workers.ok()) return workers.status();
+  ASSIGN_OR_RETURN(const auto workers, session.client().ListWorkers());
   const double asked = UnixSeconds();
-  const auto server = session.client().Examine();
-  if (!server.ok()) return server.status();
+  ASSIGN_OR_RETURN(const auto server, session.client().Examine());
   checks.push_back(
-      JudgeBuild("server", OwnBuild(), {server->engine_version(), server->catalog_digest()}));
+      JudgeBuild("server", OwnBuild(), {server.engine_version(), server.catalog_digest()}));
   if (!is_own) {
     // The server reads its clock as the call comes in: half of what a short call takes is unknown.
     const double before = UnixSeconds();
     const auto again = session.client().ListWorkers();
     const double trip = UnixSeconds() - before;
     if (!again.ok()) return again.status();
-    const double its = 1e-3 * static_cast<double>(server->unix_ms());
+    const double its = 1e-3 * static_cast<double>(server.unix_ms());
     checks.push_back(JudgeClockOffset(its - asked - 0.5 * trip, 0.5 * trip + 1e-3));
   }
-  checks.push_back(JudgeFolder(server->state_folder(), FolderUse::kState));
-  checks.push_back(JudgeDatabase(*server));
-  checks.push_back(JudgeConnection(session.address(), server->listen()));
+  checks.push_back(JudgeFolder(server.state_folder(), FolderUse::kState));
+  checks.push_back(JudgeDatabase(server));
+  checks.push_back(JudgeConnection(session.address(), server.listen()));
   if (!is_own) {
-    for (Check& check : JudgeWorkers(*workers, *server)) checks.push_back(std::move(check));
+    for (Check& check : JudgeWorkers(workers, server)) checks.push_back(std::move(check));
   }
   return absl::OkStatus();
 }
 
-}  // namespace
-
-int Doctor(const Arguments& arguments) {
+absl::StatusOr<int> Doctor(const CommonOptions& common) {
   std::vector<Check> checks;
   ExamineNode(checks);
-  const bool named = !arguments.server.state.empty() || arguments.server.given ||
-                     arguments.server.address != Arguments().server.address;
+  const bool named = !common.server.state.empty() || common.server.given ||
+                     common.server.address != client::ServerChoice().address;
   std::error_code error;
   const bool is_new =
-      !arguments.server.state.empty() &&
-      !std::filesystem::exists(std::filesystem::path(arguments.server.state) / "calib.db", error);
+      !common.server.state.empty() &&
+      !std::filesystem::exists(std::filesystem::path(common.server.state) / "calib.db", error);
   absl::Status reached;
   if (is_new) {
-    checks.push_back(
-        JudgeFolder(messages::ExamineFolder(arguments.server.state), FolderUse::kState));
+    checks.push_back(JudgeFolder(messages::ExamineFolder(common.server.state), FolderUse::kState));
     checks.back().found += " It holds no campaigns yet.";
   } else {
-    auto session = client::Session::Open(arguments.server);
-    reached = session.ok() ? ExamineServer(
-                                 **session,
-                                 !arguments.server.state.empty() && !(*session)->is_guest(), checks)
-                           : session.status();
+    auto session = client::Session::Open(common.server);
+    reached = session.ok()
+                  ? ExamineServer(**session,
+                                  !common.server.state.empty() && !(*session)->is_guest(), checks)
+                  : session.status();
   }
   if (!reached.ok()) {
     checks.push_back(
         {.name = "server",
-         .subject =
-             arguments.server.state.empty() ? arguments.server.address : arguments.server.state,
+         .subject = common.server.state.empty() ? common.server.address : common.server.state,
          .health = named ? Health::kProblem : Health::kUnknown,
          .found = absl::StrCat(reached.message(), "."),
          .advice = named ? "Look whether calibd runs there and what its log says." : ""});
   }
-  std::cout << (arguments.json ? DoctorJson(checks) : DoctorText(checks));
+  std::cout << (common.json ? DoctorJson(checks) : DoctorText(checks));
   if (named && absl::IsUnavailable(reached)) return kUnreachable;
   return IsHealthy(checks) ? kDone : kFailed;
+}
+
+}  // namespace
+
+Verb DoctorVerb() {
+  return {.help = {.name = "doctor",
+                   .description = "Checks this node, and a server: build, clock, file systems, "
+                                  "time step, certificates",
+                   .example = "doctor --server node1:7443"},
+          .run = &Doctor};
 }
 
 }  // namespace calib::ctl

@@ -1,22 +1,33 @@
 #include <iostream>
+#include <string>
 
 #include "server/ctl/catalog_text.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/option_list.h"
 #include "server/ctl/source_files.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/text/text_table.h"
 
 namespace calib::ctl {
+namespace {
 
-int Effects(const Arguments& arguments) {
+struct EffectsOptions {
+  std::string file;  ///< campaign file; empty: the effects of this build alone
+};
+
+void Declare(OptionList& list, EffectsOptions& options) {
+  list.Text("--campaign", options.file, "file of a campaign, whose user_effects are listed too");
+}
+
+absl::StatusOr<int> Effects(const CommonOptions& common, const EffectsOptions& options) {
   std::vector<dem::UserEffect> declared;
-  if (!arguments.file.empty()) {
-    const auto source = ReadSourceFiles(arguments);
+  if (!options.file.empty()) {
+    const auto source = ReadSourceFiles(options.file, std::nullopt, common.json);
     if (!source) return kBadInput;
     declared = source->outcome.campaign.model.user_effects;
   }
-  if (arguments.json) {
+  if (common.json) {
     std::cout << report::EffectsJson(declared);
     return kDone;
   }
@@ -28,6 +39,15 @@ int Effects(const Arguments& arguments) {
       "of the grains [m], E young_modulus [Pa], all as of the campaign.",
       "", "");
   return kDone;
+}
+
+}  // namespace
+
+Verb EffectsVerb() {
+  return MakeVerb<EffectsOptions>({.name = "effects",
+                                   .description = "Physical effects this build offers",
+                                   .example = "effects"},
+                                  &Declare, &Effects);
 }
 
 }  // namespace calib::ctl

@@ -1,21 +1,30 @@
 #include <filesystem>
 #include <iostream>
+#include <string>
 #include <system_error>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/client/load_view.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/option_list.h"
+#include "server/ctl/verb.h"
 #include "server/ctl/write_file.h"
+#include "server/messages/read_words.h"
 #include "server/report/documents/csv_export.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/html/report.h"
 
 namespace calib::ctl {
 namespace {
+
+struct ExportOptions {
+  std::string campaign;
+  std::string output;  ///< folder
+};
 
 // As it was run: with the seed of the command line, where one was given.
 std::string CampaignFile(const v1::CampaignSource& source) {
@@ -34,7 +43,7 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
   const std::string& id = view.status.campaign();
   return {{"campaign.yaml", CampaignFile(view.source)},
           {"status.json", report::StatusJson(view.status)},
-          {"posterior.json", view.status.method() == "table"
+          {"posterior.json", messages::MethodOf(view.status) == campaign::Method::kTable
                                  ? report::TablePosteriorJson(view.status)
                                  : report::PosteriorJson(view.posterior, view.campaign.parameters)},
           {"posterior.csv", report::PosteriorCsv(view.posterior)},
@@ -47,33 +56,40 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
           {"report.html", report::RenderReport(view)}};
 }
 
-}  // namespace
+void Declare(OptionList& list, ExportOptions& options) {
+  list.Campaign(options.campaign);
+  list.Text("-o,--output", options.output, "folder, created if need be").Required();
+}
 
-int Export(const Arguments& arguments) {
-  const auto session = client::Session::Open(arguments.server);
-  if (!session.ok()) return Fail(session.status());
-  const auto view = client::LoadView((*session)->client(), arguments.campaign);
-  if (!view.ok()) return Fail(view.status());
-  const std::filesystem::path folder(arguments.output);
+absl::StatusOr<int> Export(const CommonOptions& common, const ExportOptions& options) {
+  ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  ASSIGN_OR_RETURN(const auto view, client::LoadView(session->client(), options.campaign));
+  const std::filesystem::path folder(options.output);
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
-    return Fail(
-        absl::PermissionDeniedError(arguments.output + " cannot be made: " + error.message()));
+    return absl::PermissionDeniedError(options.output + " cannot be made: " + error.message());
   }
-  const auto files = Files(*view);
+  const auto files = Files(view);
   for (const auto& [name, content] : files) {
-    if (auto written = WriteFile((folder / name).string(), content); !written.ok()) {
-      return Fail(written);
-    }
+    RETURN_IF_ERROR(WriteFile((folder / name).string(), content));
   }
-  if (arguments.json) {
-    std::cout << "{\"campaign\": \"" << view->status.campaign() << "\", \"files\": " << files.size()
+  if (common.json) {
+    std::cout << "{\"campaign\": \"" << view.status.campaign() << "\", \"files\": " << files.size()
               << "}\n";
   } else {
     for (const auto& [name, content] : files) std::cout << (folder / name).string() << "\n";
   }
   return kDone;
+}
+
+}  // namespace
+
+Verb ExportVerb() {
+  return MakeVerb<ExportOptions>({.name = "export",
+                                  .description = "CSV and JSON of everything",
+                                  .example = "export c1 -o c1 --state calib-state"},
+                                 &Declare, &Export);
 }
 
 }  // namespace calib::ctl

@@ -1,15 +1,19 @@
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <iostream>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_join.h"
+#include "calib/return_if_error.h"
 #include "server/client/interrupt.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/next_step.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/option_list.h"
+#include "server/ctl/verb.h"
 #include "server/diagnosis/diagnosis_support.h"
 #include "server/diagnosis/improvement.h"
 #include "server/report/text/people_units.h"
@@ -17,6 +21,13 @@
 
 namespace calib::ctl {
 namespace {
+
+struct ImproveOptions {
+  std::string campaign;
+  int max_effects = 3;
+  std::optional<std::int64_t> max_evaluations{};
+  std::vector<std::string> without{};  ///< effects that are not to be thought of
+};
 
 std::string ToText(const diagnosis::Improvement& improvement) {
   const std::vector<diagnosis::ImproveStep>& steps = improvement.steps();
@@ -58,35 +69,53 @@ std::string ToText(const diagnosis::Improvement& improvement) {
   return text + fmt::format("{} model evaluations.\n", improvement.evaluations());
 }
 
-std::string Next(const Arguments& arguments, const diagnosis::ImproveStep& last) {
+std::string Next(const CommonOptions& common, const ImproveOptions& options,
+                 const diagnosis::ImproveStep& last) {
   if (last.verdict == "adequate") {
-    return NextStep(CommandOf(arguments, fmt::format("report {0} -o {0}.html", last.campaign)),
+    return NextStep(CommandOf(common.server, fmt::format("report {0} -o {0}.html", last.campaign)),
                     "parameters, curves and what was tried on the way, in one file");
   }
-  return NextStep(CommandOf(arguments, "diagnose " + last.campaign),
+  return NextStep(CommandOf(common.server, "diagnose " + last.campaign),
                   "what was tried on it, and the experiment that would tell more");
+}
+
+void Declare(OptionList& list, ImproveOptions& options) {
+  list.Campaign(options.campaign);
+  list.BoundedNumber("--max-effects", options.max_effects, {1, 10},
+                     "at most so many are added [3]");
+  list.BoundedNumber(
+      "--max-evaluations", options.max_evaluations, {1, 1'000'000'000},
+      "model evaluations of all screens, refits and calibrations, those that diagnose "
+      "has made already included; held-out tests of a calibration count and may exceed it");
+  list.Texts("--without", options.without, "effect that is not to be thought of");
+}
+
+absl::StatusOr<int> Improve(const CommonOptions& common, const ImproveOptions& options) {
+  client::CatchInterrupts();
+  ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  client::Laboratory laboratory(*session, common.server);
+  ASSIGN_OR_RETURN(auto view, laboratory.Finished(options.campaign));
+  RETURN_IF_ERROR(diagnosis::CheckLeftOut(options.without, view.campaign));
+  diagnosis::Improvement improvement(laboratory, session->client(),
+                                     {.effects = options.max_effects,
+                                      .evaluations = options.max_evaluations,
+                                      .without = options.without});
+  RETURN_IF_ERROR(improvement.From(std::move(view)));
+  std::cout << (common.json
+                    ? improvement.Json()
+                    : ToText(improvement) + Next(common, options, improvement.steps().back()));
+  return kDone;
 }
 
 }  // namespace
 
-int Improve(const Arguments& arguments) {
-  client::CatchInterrupts();
-  const auto session = client::Session::Open(arguments.server);
-  if (!session.ok()) return Fail(session.status());
-  client::Laboratory laboratory(**session, arguments.server);
-  auto view = laboratory.Finished(arguments.campaign);
-  if (!view.ok()) return Fail(view.status());
-  if (auto status = diagnosis::CheckLeftOut(arguments.effects, view->campaign); !status.ok()) {
-    return Fail(status);
-  }
-  diagnosis::Improvement improvement(laboratory, (*session)->client(),
-                                     {.effects = arguments.max_effects,
-                                      .evaluations = arguments.max_evaluations,
-                                      .without = arguments.effects});
-  if (auto status = improvement.From(*std::move(view)); !status.ok()) return Fail(status);
-  std::cout << (arguments.json ? improvement.Json()
-                               : ToText(improvement) + Next(arguments, improvement.steps().back()));
-  return kDone;
+Verb ImproveVerb() {
+  return MakeVerb<ImproveOptions>(
+      {.name = "improve",
+       .description = "Compare, diagnose, extend until the misfit is explained or nothing helps",
+       .example = "improve c1 --state calib-state",
+       .speaks_of_errors = true},
+      &Declare, &Improve);
 }
 
 }  // namespace calib::ctl

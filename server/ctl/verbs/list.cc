@@ -4,10 +4,11 @@
 #include <map>
 #include <string>
 
+#include "calib/return_if_error.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/lineage.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
@@ -29,22 +30,18 @@ std::string Name(const Branch& branch, const std::map<std::string, std::string>&
   return s.purpose().empty() ? own : s.purpose() + ": " + own;
 }
 
-}  // namespace
-
-int List(const Arguments& arguments) {
-  const auto session = client::Session::Open(arguments.server);
-  if (!session.ok()) return Fail(session.status());
-  const auto campaigns = (*session)->client().List();
-  if (!campaigns.ok()) return Fail(campaigns.status());
-  if (arguments.json) {
-    std::cout << report::StatusListJson(*campaigns);
+absl::StatusOr<int> List(const CommonOptions& common) {
+  ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  ASSIGN_OR_RETURN(const auto campaigns, session->client().List());
+  if (common.json) {
+    std::cout << report::StatusListJson(campaigns);
     return kDone;
   }
   report::TextTable table(
       {"<id", "<name", "<state", "iteration", "samples", "evaluations", "core hours", "misfit"});
   std::map<std::string, std::string> names;
-  for (const v1::CampaignStatus& s : *campaigns) names[s.campaign()] = s.name();
-  for (const Branch& branch : AsTree(*campaigns)) {
+  for (const v1::CampaignStatus& s : campaigns) names[s.campaign()] = s.name();
+  for (const Branch& branch : AsTree(campaigns)) {
     const v1::CampaignStatus& s = branch.status;
     table.AddRow({std::string(static_cast<std::size_t>(2 * branch.depth), ' ') + s.campaign(),
                   Name(branch, names), s.state(),
@@ -53,10 +50,17 @@ int List(const Arguments& arguments) {
                   std::to_string(s.model_evaluations()), report::Number(s.core_hours(), 3),
                   s.best_misfit() > 0 ? report::Number(s.best_misfit(), 3) : "–"});
   }
-  std::cout << (campaigns->empty()
+  std::cout << (campaigns.empty()
                     ? "There are no campaigns yet; `calibctl submit FILE` makes one.\n"
                     : table.ToString());
   return kDone;
+}
+
+}  // namespace
+
+Verb ListVerb() {
+  return {.help = {.name = "list", .description = "All campaigns", .example = "list"},
+          .run = &List};
 }
 
 }  // namespace calib::ctl

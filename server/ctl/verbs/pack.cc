@@ -1,4 +1,5 @@
 // A packing of spheres turned into one of rigid clumps, as a file that campaigns can name.
+#include <cstdint>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -12,13 +13,22 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
+#include "calib/return_if_error.h"
 #include "dem/simulation/shape_change.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/option_list.h"
+#include "server/ctl/verb.h"
 #include "server/ctl/write_file.h"
 
 namespace calib::ctl {
 namespace {
+
+struct PackOptions {
+  std::string file;    ///< packing of single spheres
+  std::string clumps;  ///< dumbbell:ASPECT or the file of a template
+  std::string output;
+  std::optional<std::uint64_t> seed{};  ///< of the orientations
+};
 
 constexpr const char* kDumbbell = "dumbbell:";
 
@@ -59,27 +69,31 @@ std::optional<dem::ClumpTemplate> ReadShape(const std::string& word) {
   return shape;
 }
 
-}  // namespace
+void Declare(OptionList& list, PackOptions& options) {
+  list.Text("FILE", options.file, "packing of single spheres").Required();
+  list.Text("--clumps", options.clumps,
+            "dumbbell:LENGTH/WIDTH, above 1 and at most 2, or a file with a sphere `x y z r` "
+            "per line, in any unit")
+      .Required();
+  list.Text("-o,--output", options.output, "packing file").Required();
+  list.WholeNumber("--seed", options.seed, "of the orientations [1]");
+}
 
-int Pack(const Arguments& arguments) {
-  const auto shape = ReadShape(arguments.clumps);
+absl::StatusOr<int> Pack(const CommonOptions& common, const PackOptions& options) {
+  const auto shape = ReadShape(options.clumps);
   if (!shape) return kBadInput;
-  const auto text = ReadText(arguments.file);
+  const auto text = ReadText(options.file);
   if (!text) return kBadInput;
   std::vector<dem::PackingProblem> problems;
   const dem::Packing spheres = dem::ParsePacking(*text, problems);
-  if (Print(arguments.file, problems)) return kBadInput;
-  const auto made = dem::MakeClumps(spheres, *shape, arguments.seed.value_or(1), 1, {});
+  if (Print(options.file, problems)) return kBadInput;
+  const auto made = dem::MakeClumps(spheres, *shape, options.seed.value_or(1), 1, {});
   if (!made.ok()) {
-    return Fail(
-        absl::Status(made.status().code(),
-                     absl::StrCat(arguments.file, ": ", std::string(made.status().message()))));
+    return absl::Status(made.status().code(),
+                        absl::StrCat(options.file, ": ", std::string(made.status().message())));
   }
-  if (auto written = WriteFile(arguments.output, dem::FormatPacking(made->packing));
-      !written.ok()) {
-    return Fail(written);
-  }
-  if (arguments.json) {
+  RETURN_IF_ERROR(WriteFile(options.output, dem::FormatPacking(made->packing)));
+  if (common.json) {
     const nlohmann::json answer = {{"clumps", spheres.x.size()},
                                    {"spheres", made->packing.x.size()},
                                    {"porosity", made->porosity},
@@ -91,9 +105,20 @@ int Pack(const Arguments& arguments) {
   std::cout << absl::StrFormat(
       "%d clumps of %d spheres in %s: porosity %.4f (of the spheres %.4f), largest overlap of two "
       "clumps %.2g of a radius\n",
-      spheres.x.size(), shape->spheres.size(), arguments.output, made->porosity,
+      spheres.x.size(), shape->spheres.size(), options.output, made->porosity,
       dem::PorosityOf(spheres), made->largest_overlap);
   return kDone;
+}
+
+}  // namespace
+
+Verb PackVerb() {
+  return MakeVerb<PackOptions>(
+      {.name = "pack",
+       .description =
+           "A packing of spheres as one of rigid clumps: same volumes, porosity and cell",
+       .example = "pack spheres.txt --clumps dumbbell:1.4 -o clumps.txt"},
+      &Declare, &Pack);
 }
 
 }  // namespace calib::ctl

@@ -1,8 +1,9 @@
 #include "server/ctl/control.h"
-#include "server/ctl/verbs.h"
 
 namespace calib::ctl {
 
-int Pause(const Arguments& arguments) { return Control(arguments, &client::Client::Pause); }
+Verb PauseVerb() {
+  return ControlVerb("pause", "Stop handing out work; nothing is lost", &client::Client::Pause);
+}
 
 }  // namespace calib::ctl

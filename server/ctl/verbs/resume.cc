@@ -1,8 +1,9 @@
 #include "server/ctl/control.h"
-#include "server/ctl/verbs.h"
 
 namespace calib::ctl {
 
-int Resume(const Arguments& arguments) { return Control(arguments, &client::Client::Resume); }
+Verb ResumeVerb() {
+  return ControlVerb("resume", "Go on with a paused campaign", &client::Client::Resume);
+}
 
 }  // namespace calib::ctl

@@ -3,16 +3,24 @@
 
 #include <ctime>
 #include <iostream>
+#include <string>
 
+#include "calib/return_if_error.h"
 #include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/lineage.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/option_list.h"
+#include "server/ctl/verb.h"
+#include "server/messages/read_words.h"
 #include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
 namespace {
+
+struct ShowOptions {
+  std::string campaign;
+};
 
 std::string Clock(std::int64_t unix_ms) {
   const std::time_t seconds = unix_ms / 1000;
@@ -39,7 +47,7 @@ std::string Family(const v1::CampaignStatus& status,
   }
   std::vector<v1::CampaignStatus> trials;
   for (const v1::CampaignStatus& child : ChildrenOf(campaigns, status.campaign())) {
-    if (child.purpose() != "extension") {
+    if (messages::PurposeOf(child) != campaign::DerivedFor::kExtension) {
       trials.push_back(child);
       continue;
     }
@@ -62,31 +70,35 @@ std::string Concluded(const std::vector<v1::Finding>& findings) {
   return text;
 }
 
-}  // namespace
+void Declare(OptionList& list, ShowOptions& options) { list.Campaign(options.campaign); }
 
-int Show(const Arguments& arguments) {
-  const auto session = client::Session::Open(arguments.server);
-  if (!session.ok()) return Fail(session.status());
-  client::Client& client = (*session)->client();
-  const auto status = client.Show(arguments.campaign);
-  if (!status.ok()) return Fail(status.status());
-  const auto campaigns = client.List();
-  if (!campaigns.ok()) return Fail(campaigns.status());
-  const auto findings = client.Findings(arguments.campaign);
-  if (!findings.ok()) return Fail(findings.status());
-  if (arguments.json) {
-    std::cout << report::ShownJson(*status, ChildrenOf(*campaigns, arguments.campaign), *findings);
+absl::StatusOr<int> Show(const CommonOptions& common, const ShowOptions& options) {
+  ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  client::Client& client = session->client();
+  ASSIGN_OR_RETURN(const auto status, client.Show(options.campaign));
+  ASSIGN_OR_RETURN(const auto campaigns, client.List());
+  ASSIGN_OR_RETURN(const auto findings, client.Findings(options.campaign));
+  if (common.json) {
+    std::cout << report::ShownJson(status, ChildrenOf(campaigns, options.campaign), findings);
     return kDone;
   }
-  std::cout << StatusText(*status) << Family(*status, *campaigns) << Concluded(*findings);
-  const auto log = client.GetLog(arguments.campaign);
-  if (!log.ok()) return Fail(log.status());
+  std::cout << StatusText(status) << Family(status, campaigns) << Concluded(findings);
+  ASSIGN_OR_RETURN(const auto log, client.GetLog(options.campaign));
   constexpr std::size_t kShown = 10;
-  const std::size_t first = log->size() > kShown ? log->size() - kShown : 0;
-  for (std::size_t i = first; i < log->size(); ++i) {
-    std::cout << Clock((*log)[i].unix_ms()) << "  " << (*log)[i].what() << "\n";
+  const std::size_t first = log.size() > kShown ? log.size() - kShown : 0;
+  for (std::size_t i = first; i < log.size(); ++i) {
+    std::cout << Clock(log[i].unix_ms()) << "  " << log[i].what() << "\n";
   }
   return kDone;
+}
+
+}  // namespace
+
+Verb ShowVerb() {
+  return MakeVerb<ShowOptions>({.name = "show",
+                                .description = "State of a campaign",
+                                .example = "show c1 --state calib-state"},
+                               &Declare, &Show);
 }
 
 }  // namespace calib::ctl

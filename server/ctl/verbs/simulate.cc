@@ -5,26 +5,38 @@
 #include <filesystem>
 #include <iostream>
 #include <optional>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "dem/catalog/catalog.h"
 #include "server/client/interrupt.h"
 #include "server/client/progress.h"
 #include "server/ctl/assignments.h"
 #include "server/ctl/evaluation.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/option_list.h"
 #include "server/ctl/source_files.h"
 #include "server/ctl/state_table.h"
 #include "server/ctl/temporary_folder.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/verb.h"
 #include "server/ctl/write_file.h"
 #include "server/messages/attempt_spec.h"
 #include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
 namespace {
+
+struct SimulateOptions {
+  std::string file;
+  std::vector<std::string> set{};  ///< NAME=VALUE
+  std::string output;              ///< CSV file; empty: standard output
+  std::string vtk;                 ///< folder; empty: no pictures
+  std::string checkpoint;          ///< folder; empty: none
+};
 
 constexpr std::chrono::milliseconds kPollWorkers{100};
 
@@ -67,8 +79,8 @@ void SayWhatHasNoPictures(const campaign::Campaign& campaign) {
 class Simulation {
  public:
   Simulation(const SourceFiles& source, const campaign::Campaign& campaign,
-             std::vector<double> values, const Arguments& arguments)
-      : source_(source), campaign_(campaign), values_(std::move(values)), arguments_(arguments) {}
+             std::vector<double> values, const SimulateOptions& options)
+      : source_(source), campaign_(campaign), values_(std::move(values)), options_(options) {}
 
   // Starts what there is a core for and waits for all; the first failure to start, or checkpoint
   // of another run, ends it.
@@ -88,7 +100,7 @@ class Simulation {
       if (all_started && running == 0) return absl::OkStatus();
       if (client::Interrupted()) return absl::CancelledError("stopped");
       if (!all_started && running < cores) {
-        if (auto started = StartNext(program, folder); !started.ok()) return started;
+        RETURN_IF_ERROR(StartNext(program, folder));
         continue;
       }
       ShowProgress(line);
@@ -131,22 +143,21 @@ class Simulation {
         .spec = messages::SpecOf(campaign_, static_cast<int>(e), values_, 0),
         .packing = PackingText(experiment, source_),
         .meshes = MeshContents(experiment, source_),
-        .vtk = HasPictures(experiment) ? Below(arguments_.vtk, experiment.name) : "",
-        .checkpoint = Below(arguments_.checkpoint, experiment.name + ".checkpoint")};
+        .vtk = HasPictures(experiment) ? Below(options_.vtk, experiment.name) : "",
+        .checkpoint = Below(options_.checkpoint, experiment.name + ".checkpoint")};
     std::error_code error;
     std::filesystem::create_directories(own, error);
     if (!error && !task.vtk.empty()) std::filesystem::create_directories(task.vtk, error);
     if (!error && !task.checkpoint.empty()) {
-      std::filesystem::create_directories(arguments_.checkpoint, error);
+      std::filesystem::create_directories(options_.checkpoint, error);
     }
     if (error) {
       return absl::PermissionDeniedError(absl::StrCat(
           "a folder for ", experiment.name, " cannot be made in ",
-          task.vtk.empty() ? arguments_.checkpoint : arguments_.vtk, ": ", error.message()));
+          task.vtk.empty() ? options_.checkpoint : options_.vtk, ": ", error.message()));
     }
-    auto started = Evaluation::Start(program, task, own.string());
-    if (!started.ok()) return started.status();
-    evaluations_.push_back(*std::move(started));
+    ASSIGN_OR_RETURN(auto started, Evaluation::Start(program, task, own.string()));
+    evaluations_.push_back(std::move(started));
     return absl::OkStatus();
   }
 
@@ -170,47 +181,64 @@ class Simulation {
   const SourceFiles& source_;
   const campaign::Campaign& campaign_;
   std::vector<double> values_;
-  const Arguments& arguments_;
+  const SimulateOptions& options_;
   std::vector<Evaluation> evaluations_;
 };
 
-}  // namespace
+void Declare(OptionList& list, SimulateOptions& options) {
+  list.CampaignFile(options.file);
+  list.Texts("--set", options.set,
+             "NAME=VALUE with an optional unit; once per calibrated parameter");
+  list.Text("-o,--output", options.output, "CSV file, a row per load step [standard output]");
+  list.Text("--vtk", options.vtk,
+            "folder for grains, contacts and walls after each load step, one below it "
+            "per experiment: open grains.pvd in ParaView");
+  list.Text("--checkpoint", options.checkpoint,
+            "folder for a checkpoint per experiment, renewed after each load step: the "
+            "same command again goes on from there, to the same bits");
+}
 
-int Simulate(const Arguments& arguments) {
-  const auto source = ReadSourceFiles(arguments);
+absl::StatusOr<int> Simulate(const CommonOptions& common, const SimulateOptions& options) {
+  const auto source = ReadSourceFiles(options.file, std::nullopt, common.json);
   if (!source) return kBadInput;
   campaign::Campaign campaign = source->outcome.campaign;
   if (campaign.precomputed) {
-    return Fail(absl::InvalidArgumentError(
-        arguments.file +
-        " names runs made elsewhere (model.precomputed): there is no model to run"));
+    return absl::InvalidArgumentError(
+        options.file + " names runs made elsewhere (model.precomputed): there is no model to run");
   }
-  auto values = ApplyAssignments(arguments.set, campaign);
-  if (!values.ok()) return Fail(values.status());
+  ASSIGN_OR_RETURN(auto values, ApplyAssignments(options.set, campaign));
   std::optional<OutputFile> output;
-  if (!arguments.output.empty()) {
-    auto opened = OutputFile::Open(arguments.output);
-    if (!opened.ok()) return Fail(opened.status());
-    output.emplace(*std::move(opened));
+  if (!options.output.empty()) {
+    ASSIGN_OR_RETURN(auto opened, OutputFile::Open(options.output));
+    output.emplace(std::move(opened));
   }
-  const auto program = client::FindWorkerProgram();
-  if (!program.ok()) return Fail(program.status());
-  const auto folder = TemporaryFolder::Make();
-  if (!folder.ok()) return Fail(folder.status());
-  if (!arguments.vtk.empty()) SayWhatHasNoPictures(campaign);
+  ASSIGN_OR_RETURN(const auto program, client::FindWorkerProgram());
+  ASSIGN_OR_RETURN(const auto folder, TemporaryFolder::Make());
+  if (!options.vtk.empty()) SayWhatHasNoPictures(campaign);
   client::CatchInterrupts();
-  Simulation simulation(*source, campaign, *std::move(values), arguments);
-  if (auto ran = simulation.RunAll(*program, folder->path()); !ran.ok()) return Fail(ran);
+  Simulation simulation(*source, campaign, std::move(values), options);
+  RETURN_IF_ERROR(simulation.RunAll(program, folder.path()));
   const std::string table = simulation.Table();
   if (output && simulation.HasStates()) {  // else an earlier table stays
-    if (auto written = output->Put(table); !written.ok()) return Fail(written);
+    RETURN_IF_ERROR(output->Put(table));
   }
-  if (arguments.json) {
+  if (common.json) {
     std::cout << report::StateTableJson(table);
-  } else if (arguments.output.empty()) {
+  } else if (options.output.empty()) {
     std::cout << table;
   }
   return simulation.ReportFailures();
+}
+
+}  // namespace
+
+Verb SimulateVerb() {
+  return MakeVerb<SimulateOptions>(
+      {.name = "simulate",
+       .description = "One model evaluation of each experiment at given parameters",
+       .example = "simulate sand.yaml --set young_modulus='2 GPa' --set friction_angle='30 deg' -o "
+                  "states.csv"},
+      &Declare, &Simulate);
 }
 
 }  // namespace calib::ctl

@@ -1,16 +1,24 @@
 #include <iostream>
+#include <string>
 
+#include "calib/return_if_error.h"
 #include "dem/catalog/catalog.h"
 #include "server/client/load_view.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/option_list.h"
+#include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
 
 namespace calib::ctl {
 namespace {
+
+struct StatesOptions {
+  std::string campaign;
+  int sample = 0;
+};
 
 void Print(const std::string& experiment, const report::StateHistory& history) {
   std::vector<std::string> columns = {"step"};
@@ -29,23 +37,33 @@ void Print(const std::string& experiment, const report::StateHistory& history) {
   std::cout << experiment << "\n" << table.ToString() << "\n";
 }
 
-}  // namespace
+void Declare(OptionList& list, StatesOptions& options) {
+  list.Campaign(options.campaign);
+  list.WholeNumber("SAMPLE", options.sample, "index, as shown by `calibctl samples`").Required();
+}
 
-int States(const Arguments& arguments) {
-  const auto session = client::Session::Open(arguments.server);
-  if (!session.ok()) return Fail(session.status());
-  const auto states =
-      client::LoadStates((*session)->client(), arguments.campaign, arguments.sample);
-  if (!states.ok()) return Fail(states.status());
+absl::StatusOr<int> States(const CommonOptions& common, const StatesOptions& options) {
+  ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  ASSIGN_OR_RETURN(const auto states,
+                   client::LoadStates(session->client(), options.campaign, options.sample));
   std::map<std::string, report::StateHistory> by_experiment;
-  for (const auto& [key, history] : *states) by_experiment[key.first] = history;
-  if (arguments.json) {
-    std::cout << report::StatesJson(arguments.campaign, arguments.sample, by_experiment);
+  for (const auto& [key, history] : states) by_experiment[key.first] = history;
+  if (common.json) {
+    std::cout << report::StatesJson(options.campaign, options.sample, by_experiment);
     return kDone;
   }
-  if (by_experiment.empty()) std::cout << "Sample " << arguments.sample << " has no states yet.\n";
+  if (by_experiment.empty()) std::cout << "Sample " << options.sample << " has no states yet.\n";
   for (const auto& [experiment, history] : by_experiment) Print(experiment, history);
   return kDone;
+}
+
+}  // namespace
+
+Verb StatesVerb() {
+  return MakeVerb<StatesOptions>({.name = "states",
+                                  .description = "The state history of one sample",
+                                  .example = "states c1 0 --state calib-state"},
+                                 &Declare, &States);
 }
 
 }  // namespace calib::ctl

@@ -1,29 +1,54 @@
+#include <cstdint>
 #include <iostream>
+#include <optional>
+#include <string>
 
+#include "calib/return_if_error.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/option_list.h"
 #include "server/ctl/source_files.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/verb.h"
+#include "server/messages/read_words.h"
 #include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
+namespace {
 
-int Submit(const Arguments& arguments) {
-  const auto source = ReadSourceFiles(arguments);
+struct SubmitOptions {
+  std::string file;
+  std::optional<std::uint64_t> seed{};
+};
+
+void Declare(OptionList& list, SubmitOptions& options) {
+  list.CampaignFile(options.file);
+  list.Seed(options.seed);
+}
+
+absl::StatusOr<int> Submit(const CommonOptions& common, const SubmitOptions& options) {
+  const auto source = ReadSourceFiles(options.file, options.seed, common.json);
   if (!source) return kBadInput;
-  const auto session = client::Session::Open(arguments.server, /*may_create=*/true);
-  if (!session.ok()) return Fail(session.status());
-  const auto campaign = SubmitSource((*session)->client(), *source, arguments.seed, arguments.file);
-  if (!campaign.ok()) return Fail(campaign.status());
-  const auto status = (*session)->client().Show(*campaign);
-  if (!status.ok()) return Fail(status.status());
-  if (status->state() == "cancelled") return Fail(CancelledBefore(*campaign));
-  if (arguments.json) {
-    std::cout << report::StatusJson(*status);
+  ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server, /*may_create=*/true));
+  ASSIGN_OR_RETURN(const auto campaign,
+                   SubmitSource(session->client(), *source, options.seed, options.file));
+  ASSIGN_OR_RETURN(const auto status, session->client().Show(campaign));
+  if (messages::StateOf(status) == campaign::CampaignState::kCancelled)
+    return CancelledBefore(campaign);
+  if (common.json) {
+    std::cout << report::StatusJson(status);
   } else {
-    std::cout << *campaign << "\n";
+    std::cout << campaign << "\n";
   }
   return kDone;
+}
+
+}  // namespace
+
+Verb SubmitVerb() {
+  return MakeVerb<SubmitOptions>({.name = "submit",
+                                  .description = "Validate and submit; prints the campaign id",
+                                  .example = "submit sand.yaml --server node1:7443"},
+                                 &Declare, &Submit);
 }
 
 }  // namespace calib::ctl

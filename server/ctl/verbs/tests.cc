@@ -2,13 +2,14 @@
 
 #include "server/ctl/catalog_text.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
+namespace {
 
-int Tests(const Arguments& arguments) {
-  if (arguments.json) {
+absl::StatusOr<int> Tests(const CommonOptions& common) {
+  if (common.json) {
     std::cout << report::TestsJson();
     return kDone;
   }
@@ -16,6 +17,14 @@ int Tests(const Arguments& arguments) {
     std::cout << TestText(test) << "\n";
   }
   return kDone;
+}
+
+}  // namespace
+
+Verb TestsVerb() {
+  return {
+      .help = {.name = "tests", .description = "Lab tests this build offers", .example = "tests"},
+      .run = &Tests};
 }
 
 }  // namespace calib::ctl

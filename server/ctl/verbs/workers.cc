@@ -1,8 +1,9 @@
 #include <iostream>
 
+#include "calib/return_if_error.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/ctl/verbs.h"
+#include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
@@ -17,22 +18,18 @@ std::string State(const v1::WorkerInfo& w) {
   return w.draining() ? "draining" : "ready";
 }
 
-}  // namespace
-
-int Workers(const Arguments& arguments) {
-  const auto session = client::Session::Open(arguments.server);
-  if (!session.ok()) return Fail(session.status());
-  const auto workers = (*session)->client().ListWorkers();
-  if (!workers.ok()) return Fail(workers.status());
-  if (arguments.json) {
-    std::cout << report::WorkersJson(*workers);
+absl::StatusOr<int> Workers(const CommonOptions& common) {
+  ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  ASSIGN_OR_RETURN(const auto workers, session->client().ListWorkers());
+  if (common.json) {
+    std::cout << report::WorkersJson(workers);
     return kDone;
   }
-  if (workers->empty()) {
+  if (workers.empty()) {
     std::cout << "No worker is connected; start one with `calib-worker --server HOST:PORT`.\n";
   }
   report::TextTable table({"<worker", "busy", "slots", "million contacts/s", "<state", "<running"});
-  for (const v1::WorkerInfo& w : *workers) {
+  for (const v1::WorkerInfo& w : workers) {
     std::string running;
     for (const std::string& what : w.running()) running += (running.empty() ? "" : " ") + what;
     table.AddRow({w.name(), std::to_string(w.busy()), std::to_string(w.slots()),
@@ -40,6 +37,15 @@ int Workers(const Arguments& arguments) {
   }
   std::cout << table.ToString();
   return kDone;
+}
+
+}  // namespace
+
+Verb WorkersVerb() {
+  return {.help = {.name = "workers",
+                   .description = "Nodes, slots, speed, running samples",
+                   .example = "workers"},
+          .run = &Workers};
 }
 
 }  // namespace calib::ctl

@@ -85,7 +85,7 @@ Json Path(const google::protobuf::RepeatedPtrField<v1::Posterior::PathPoint>& po
 }
 
 Json Pattern(const ResidualPattern& p) {
-  return {{"name", p.name}, {"size", p.size}, {"z", p.z}, {"explained", p.explained}};
+  return {{"name", ToString(p.shape)}, {"size", p.size}, {"z", p.z}, {"explained", p.explained}};
 }
 
 Json Drift(const ParameterDrift& d) {
@@ -233,7 +233,7 @@ std::string SensitivityJson(const std::string& campaign, const Sensitivity& s) {
   return Dump({{"campaign", campaign},
                {"parameters", s.parameters},
                {"independent", s.independent},
-               {"posterior_from", s.points_from},
+               {"posterior_from", ToString(s.points_from)},
                {"quantities", quantities},
                {"left_out", s.left_out},
                {"warnings", s.warnings}});

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "server/messages/read_words.h"
 #include "server/report/html/sections.h"
 #include "server/report/plot/plot.h"
 #include "server/report/text/html.h"
@@ -160,10 +161,11 @@ std::string EvolutionSection(const ReportData& data) {
         "stages. The band is one standard deviation to either side; the first steps may reach "
         "beyond "
         "the plot, they are cut at its edge.";
-    const bool emulated = view.posterior.posterior_from() == "emulator";
+    const bool emulated =
+        messages::SourceOf(view.posterior) == campaign::PosteriorSource::kEmulator;
     if (emulated) {
       html += " On the emulator, like the posterior that it ends in.";
-    } else if (view.posterior.posterior_from() != "weights") {
+    } else if (messages::SourceOf(view.posterior) != campaign::PosteriorSource::kWeights) {
       html +=
           " By the weighted samples alone, few of which count at the end: look at the effective "
           "sample size beside.";

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dem/catalog/catalog.h"
+#include "server/messages/read_words.h"
 #include "server/report/html/sections.h"
 #include "server/report/plot/plot.h"
 #include "server/report/text/html.h"
@@ -207,8 +208,11 @@ double RmsScatter(const v1::Posterior::Scatter& scatter) {
 }
 
 std::string ScatterOrigin(const v1::Posterior::Scatter& scatter) {
-  if (scatter.from() == "realizations") return fmt::format("{} packings", scatter.runs());
-  if (scatter.from() == "repeats") return fmt::format("{} repeats", scatter.runs());
+  const auto source = messages::SourceOf(scatter);
+  if (source == campaign::ScatterSource::kRealizations) {
+    return fmt::format("{} packings", scatter.runs());
+  }
+  if (source == campaign::ScatterSource::kRepeats) return fmt::format("{} repeats", scatter.runs());
   return fmt::format("emulator, {} runs", scatter.runs());
 }
 
@@ -272,7 +276,7 @@ std::string SegmentTable(const ReportData& data) {
         bad ? "bad" : "", segment.z ? Number(*segment.z, 3) : "–", Number(segment.rms_error, 3),
         segment.p_value ? Number(*segment.p_value, 2) : "–",
         segment.chi2_share ? Percent(*segment.chi2_share, 2) : "–",
-        segment.pattern.name == "none" ? "" : Escape(segment.pattern.name));
+        segment.pattern.shape == ResidualShape::kNone ? "" : ToString(segment.pattern.shape));
   }
   return html + "</table></div>\n";
 }
@@ -286,7 +290,7 @@ std::string FitSection(const ReportData& data) {
       "<span class=\"key\" style=\"color:var(--model)\"></span>{}."
       "<span class=\"key\" style=\"color:var(--held)\"></span>held out. Below each curve: model "
       "minus measurement{}.</p>\n",
-      data.view.posterior.posterior_from() == "none"
+      messages::SourceOf(data.view.posterior) == campaign::PosteriorSource::kNone
           ? "mean of the weighted samples, without a band since there is no posterior"
           : "posterior mean, shaded: 5&#8239;%&#8239;to&#8239;95&#8239;%",
       data.comparison.discrepancies.empty()

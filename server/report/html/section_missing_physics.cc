@@ -63,7 +63,7 @@ void AddBranch(const std::vector<Relative>& family, const std::string& parent,
     html += fmt::format("<li>{}{}{}{}</li>\n", r.campaign == shown ? "<strong>" : "", name,
                         r.campaign == shown ? "</strong>" : "",
                         // Evidence of a first batch of a refit says nothing of the model.
-                        r.purpose == "warm_fit" ? " (tried)"
+                        r.purpose == campaign::DerivedFor::kWarmFit ? " (tried)"
                         : std::isfinite(r.log_evidence)
                             ? fmt::format(", log evidence {}", Number(r.log_evidence, 5))
                             : std::string());

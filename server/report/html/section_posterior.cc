@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "server/messages/read_words.h"
 #include "server/report/html/sections.h"
 #include "server/report/plot/plot.h"
 #include "server/report/text/html.h"
@@ -166,9 +167,9 @@ std::string PosteriorSection(const ReportData& data) {
   const std::vector<ParameterPlot> parameters = MakeParameterPlots(data.view);
   const std::vector<double> weights = Weights(data.view);
   const v1::Posterior& posterior = data.view.posterior;
-  if (posterior.posterior_from() == "none") return "";
+  if (messages::SourceOf(posterior) == campaign::PosteriorSource::kNone) return "";
   const bool drawn = posterior.draws_size() > 0;
-  const bool emulated = posterior.posterior_from() == "emulator";
+  const bool emulated = messages::SourceOf(posterior) == campaign::PosteriorSource::kEmulator;
   std::string html = fmt::format(
       "<h2>Posterior</h2>\n<p class=\"sub\">Columns: {} over the prior's range, or the part of it "
       "where a narrow posterior lies."

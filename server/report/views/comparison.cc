@@ -7,6 +7,7 @@
 
 #include "inference/scatter/chi_squared_law.h"
 #include "server/campaign/model/noise_check.h"
+#include "server/messages/read_words.h"
 #include "server/report/views/residual_group.h"
 #include "server/report/views/setting_trend.h"
 
@@ -56,7 +57,7 @@ Expected ExpectedOf(const Group& group, const CampaignView& view, bool validatio
   Expected expected{.covariance = group.covariance + group.of_prediction,
                     .scatter = Eigen::MatrixXd::Zero(group.residual.size(), group.residual.size())};
   if (group.packings < 2) return expected;
-  const bool mean = view.posterior.posterior_from() != "none";
+  const bool mean = messages::SourceOf(view.posterior) != campaign::PosteriorSource::kNone;
   const double of_model = mean ? 1.0 / group.packings : 1;
   const double share = campaign::ScatterShare(*group.experiment);
   const bool predicted = mean && validation;

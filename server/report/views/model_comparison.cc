@@ -5,7 +5,9 @@
 #include <set>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "server/campaign/model/identity.h"
+#include "server/messages/read_words.h"
 
 namespace calib::report {
 namespace {
@@ -35,8 +37,8 @@ absl::Status CheckEvidence(const RivalModel& rival) {
                      "its evidence says nothing about the model; run it with noise: given or "
                      "noise: inferred"));
   }
-  if (posterior.posterior_from() == "none" || !std::isfinite(posterior.log_evidence()) ||
-      !std::isfinite(posterior.log_evidence_se())) {
+  if (messages::SourceOf(posterior) == campaign::PosteriorSource::kNone ||
+      !std::isfinite(posterior.log_evidence()) || !std::isfinite(posterior.log_evidence_se())) {
     return absl::FailedPreconditionError(
         absl::StrCat("campaign ", posterior.campaign(),
                      " has no evidence, because it has no posterior: see `calibctl posterior ",
@@ -98,8 +100,9 @@ std::vector<std::string> Warnings(const std::vector<RivalModel>& rivals) {
   if (!open.empty()) {
     warnings.push_back(absl::StrCat("Not converged: ", open, "; its evidence is provisional."));
   }
-  const std::string emulated =
-      names([](const RivalModel& r) { return r.posterior.posterior_from() == "emulator"; });
+  const std::string emulated = names([](const RivalModel& r) {
+    return messages::SourceOf(r.posterior) == campaign::PosteriorSource::kEmulator;
+  });
   if (!emulated.empty()) {
     warnings.push_back(
         absl::StrCat("Evidence from an emulator of the runs: ", emulated,
@@ -111,14 +114,14 @@ std::vector<std::string> Warnings(const std::vector<RivalModel>& rivals) {
 }  // namespace
 
 absl::StatusOr<ModelComparison> CompareModels(const std::vector<RivalModel>& rivals) {
-  if (absl::Status status = CheckRivals(rivals); !status.ok()) return status;
+  RETURN_IF_ERROR(CheckRivals(rivals));
   std::vector<inference::EvidenceEstimate> evidence;
   for (const RivalModel& rival : rivals) {
-    if (absl::Status status = CheckEvidence(rival); !status.ok()) return status;
+    RETURN_IF_ERROR(CheckEvidence(rival));
     evidence.push_back({.log_evidence = rival.posterior.log_evidence(),
                         .standard_error = rival.posterior.log_evidence_se()});
   }
-  if (absl::Status status = CheckSameData(rivals); !status.ok()) return status;
+  RETURN_IF_ERROR(CheckSameData(rivals));
   const auto probabilities = inference::ModelProbabilities(evidence);
   ModelComparison comparison{.models = {}, .warnings = Warnings(rivals)};
   for (std::size_t k = 0; k < rivals.size(); ++k) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/messages/read_words.h"
 #include "server/report/views/weighted_statistics.h"
 
 namespace calib::report {
@@ -49,7 +50,7 @@ Counted PosteriorDraws(const CampaignView& view) {
   Counted counted;
   for (const v1::Sample& sample : view.samples) {
     const bool ensemble = sample.iteration() < view.posterior.iterations();
-    if (ensemble || sample.purpose() == "replicate") continue;
+    if (ensemble || messages::PurposeOf(sample) == campaign::SamplePurpose::kReplicate) continue;
     counted.samples.push_back(&sample);
     counted.weights.push_back(1);
   }
@@ -141,8 +142,8 @@ ExperimentPrediction FromBands(const v1::Posterior& posterior,
 }  // namespace
 
 std::vector<ExperimentPrediction> PredictReadings(const CampaignView& view) {
-  const bool emulated = view.posterior.posterior_from() == "emulator";
-  const bool band = view.posterior.posterior_from() != "none";
+  const bool emulated = messages::SourceOf(view.posterior) == campaign::PosteriorSource::kEmulator;
+  const bool band = messages::SourceOf(view.posterior) != campaign::PosteriorSource::kNone;
   const Counted weighted = WeightedSamples(view);
   const Counted draws = emulated ? PosteriorDraws(view) : Counted{};
   std::vector<ExperimentPrediction> predictions;

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "dem/catalog/catalog.h"
+#include "server/messages/read_words.h"
 #include "server/report/text/people_units.h"
 #include "server/report/views/run_table.h"
 
@@ -22,7 +23,9 @@ constexpr int kFewest = 2;       // readings of a stretch
 Eigen::MatrixXd FirstRuns(const CampaignView& view, const inference::DataSet& units) {
   std::set<int> first;
   for (const v1::Sample& sample : view.samples) {
-    if (sample.iteration() == 0 && sample.purpose().empty()) first.insert(sample.index());
+    if (sample.iteration() == 0 &&
+        messages::PurposeOf(sample) == campaign::SamplePurpose::kEnsemble)
+      first.insert(sample.index());
   }
   const RunTable runs = RunsOf(view, units);
   std::vector<Index> rows;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "inference/scatter/scatter.h"
+#include "server/messages/read_words.h"
 #include "server/report/views/comparison.h"
 #include "server/report/views/scatter_record.h"
 
@@ -37,14 +38,16 @@ Eigen::MatrixXd AddScatter(const CampaignView& view, const std::vector<double>& 
                                   travelled.data(), static_cast<Eigen::Index>(travelled.size())));
   std::vector<Eigen::Index> kept;
   for (const std::size_t i : group.readings) kept.push_back(static_cast<Eigen::Index>(i));
-  const double times = scatter.share + (view.posterior.posterior_from() == "none" ? 1 : 0);
+  const double times =
+      scatter.share +
+      (messages::SourceOf(view.posterior) == campaign::PosteriorSource::kNone ? 1 : 0);
   Eigen::MatrixXd of_run = inference::ScatterCovariance(scatter)(kept, kept);
   const Eigen::MatrixXd covariance = times * of_run;
   const Eigen::VectorXd ratio = covariance.diagonal().cwiseQuotient(group.covariance.diagonal());
   group.scatter = std::sqrt(ratio.mean());
   group.scatter_from = record->from();
   group.covariance += covariance;
-  if (record->from() == "realizations") {
+  if (messages::SourceOf(*record) == campaign::ScatterSource::kRealizations) {
     group.of_packings = of_run;
     group.packings = record->runs();
   }

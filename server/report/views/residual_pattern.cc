@@ -1,15 +1,27 @@
 #include "server/report/views/residual_pattern.h"
 
 #include <algorithm>
+#include <array>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <utility>
 #include <vector>
 
+#include "server/campaign/model/word_table.h"
+
 namespace calib::report {
 namespace {
 
 using Eigen::Index;
+
+constexpr std::array kShapeWords = {
+    campaign::Word{ResidualShape::kNone, "none"},
+    campaign::Word{ResidualShape::kOffset, "offset"},
+    campaign::Word{ResidualShape::kSlope, "slope"},
+    campaign::Word{ResidualShape::kAmplitude, "amplitude"},
+    campaign::Word{ResidualShape::kLag, "lag"},
+    campaign::Word{ResidualShape::kIrregular, "irregular"},
+};
 
 constexpr double kFits = 0.01;  // p of chi-squared above which there is nothing to name
 constexpr double kMostOfIt = 0.5;
@@ -27,6 +39,8 @@ Eigen::VectorXd Derivative(const Eigen::VectorXd& y, const Eigen::VectorXd& x) {
 }
 
 }  // namespace
+
+const char* ToString(ResidualShape shape) { return campaign::WordOf(kShapeWords, shape); }
 
 Eigen::VectorXd Whitened(const ResidualCurve& curve, const Eigen::VectorXd& x) {
   Eigen::VectorXd white = x.cwiseQuotient(curve.sd);
@@ -47,15 +61,15 @@ ResidualPattern PatternOf(const ResidualCurve& curve) {
   if (!std::isfinite(chi2) || boost::math::gamma_q(0.5 * degrees, 0.5 * chi2) > kFits) {
     return pattern;
   }
-  const std::vector<std::pair<std::string, Eigen::VectorXd>> shapes = {
-      {"offset", Eigen::VectorXd::Ones(n)},
-      {"slope", curve.control.array() - curve.control.mean()},
-      {"amplitude", curve.model},
-      {"lag", -Derivative(curve.model, curve.control)}};
-  pattern.name = "irregular";
+  const std::vector<std::pair<ResidualShape, Eigen::VectorXd>> shapes = {
+      {ResidualShape::kOffset, Eigen::VectorXd::Ones(n)},
+      {ResidualShape::kSlope, curve.control.array() - curve.control.mean()},
+      {ResidualShape::kAmplitude, curve.model},
+      {ResidualShape::kLag, -Derivative(curve.model, curve.control)}};
+  pattern.shape = ResidualShape::kIrregular;
   double best = 0;
-  for (const auto& [name, shape] : shapes) {
-    const Eigen::VectorXd f = Whitened(curve, shape);
+  for (const auto& [shape, curve_of_shape] : shapes) {
+    const Eigen::VectorXd f = Whitened(curve, curve_of_shape);
     const double square = f.squaredNorm();
     if (!(square > 0) || !std::isfinite(square)) continue;
     const double along = f.dot(r);
@@ -64,7 +78,7 @@ ResidualPattern PatternOf(const ResidualCurve& curve) {
     const double z = along / std::sqrt(square);
     if (explained < kMostOfIt || std::abs(z) < kClear || kAsGood * gain < best) continue;
     best = gain;
-    pattern = {.name = name, .size = along / square, .z = z, .explained = explained};
+    pattern = {.shape = shape, .size = along / square, .z = z, .explained = explained};
   }
   return pattern;
 }

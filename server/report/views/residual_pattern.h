@@ -2,7 +2,6 @@
 // The shape of what a model leaves unexplained along a curve, in one word and one number.
 
 #include <Eigen/Dense>
-#include <string>
 
 namespace calib::report {
 
@@ -18,14 +17,21 @@ struct ResidualCurve {
 /// A bias or a shape is called clear beyond this many of its standard deviations.
 constexpr double kClear = 3;
 
+/// The shapes that have a name, with the unit of their size.
+enum class ResidualShape {
+  kNone,       ///< what is left is noise (p of chi-squared above 0.01)
+  kOffset,     ///< residual = size                                       [observable]
+  kSlope,      ///< residual = size (control - its mean)                  [observable / control]
+  kAmplitude,  ///< residual = size model                                 [-]
+  /// residual = -size d model / d control: the model answers later by `size`  [control]
+  kLag,
+  kIrregular  ///< none of these makes up half of the excess
+};
+/// "none", "offset", "slope", "amplitude", "lag", "irregular"
+const char* ToString(ResidualShape shape);
+
 struct ResidualPattern {
-  /// none       what is left is noise (p of chi-squared above 0.01)
-  /// offset     residual = size                                       [observable]
-  /// slope      residual = size (control - its mean)                  [observable / control]
-  /// amplitude  residual = size model                                 [-]
-  /// lag        residual = -size d model / d control: the model answers later by `size`  [control]
-  /// irregular  none of these makes up half of the excess
-  std::string name = "none";
+  ResidualShape shape = ResidualShape::kNone;
   double size = 0;       ///< of the named shape by weighted least squares; 0 with none, irregular
   double z = 0;          ///< size over its standard deviation
   double explained = 0;  ///< share of chi-squared beyond the number of readings that it takes away

@@ -23,26 +23,27 @@ std::string Shown(double value, const std::string& observable) {
 
 std::string ShapeInWords(const SegmentMisfit& m) {
   const ResidualPattern& p = m.pattern;
-  if (p.name == "offset") return "a constant offset";
-  if (p.name == "slope") {
+  if (p.shape == ResidualShape::kOffset) return "a constant offset";
+  if (p.shape == ResidualShape::kSlope) {
     const bool grows = (p.size > 0) == (m.to > m.from);
     return fmt::format("model minus measurement {} along the stage", grows ? "grows" : "falls");
   }
-  if (p.name == "amplitude" && p.size <= -1) {
+  if (p.shape == ResidualShape::kAmplitude && p.size <= -1) {
     return "the model goes the other way than the measurement throughout";
   }
-  if (p.name == "amplitude") {
+  if (p.shape == ResidualShape::kAmplitude) {
     return fmt::format("the model is {} by the factor {} throughout",
                        p.size > 0 ? "too large" : "too small", Number(1 + p.size, 3));
   }
-  if (p.name == "lag")
+  if (p.shape == ResidualShape::kLag)
     return fmt::format("the model answers too {}", p.size > 0 ? "late" : "early");
-  if (p.name == "irregular") return "no simple shape";
+  if (p.shape == ResidualShape::kIrregular) return "no simple shape";
   return "";
 }
 
 bool StandsOut(const SegmentMisfit& m) {
-  return m.z && (std::abs(*m.z) > kClear || (m.pattern.name != "none" && m.rms_error > kLargeRms));
+  return m.z && (std::abs(*m.z) > kClear ||
+                 (m.pattern.shape != ResidualShape::kNone && m.rms_error > kLargeRms));
 }
 
 std::string StageSentence(const SegmentMisfit& m) {

@@ -8,6 +8,7 @@
 
 #include "inference/scatter/refit_spread.h"
 #include "inference/scatter/scatter.h"
+#include "server/messages/read_words.h"
 #include "server/report/views/scatter_record.h"
 
 namespace calib::report {
@@ -70,7 +71,9 @@ void AddDepartures(const CampaignView& view, const inference::DataSet& data,
   std::vector<Eigen::RowVectorXd> rows;  // of those that came to their ends
   std::vector<int> streams;
   for (const v1::Sample& sample : view.samples) {
-    if (sample.purpose() != "replicate" || replicates == packings) continue;
+    if (messages::PurposeOf(sample) != campaign::SamplePurpose::kReplicate ||
+        replicates == packings)
+      continue;
     ++replicates;
     Eigen::RowVectorXd row = HistoryOf(view, sample.index(), data, places);
     if (!row.allFinite()) continue;
@@ -96,7 +99,7 @@ ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
     const std::string& observable =
         experiment.observables[static_cast<std::size_t>(key.second)].name;
     const v1::Posterior::Scatter* record = FindScatter(view.posterior, experiment.name, observable);
-    if (record == nullptr || record->from() == "emulator" ||
+    if (record == nullptr || messages::SourceOf(*record) == campaign::ScatterSource::kEmulator ||
         record->sd_size() != static_cast<int>(readings.size())) {
       continue;
     }
@@ -109,7 +112,8 @@ ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
     of_run.back().experiment = key.first;
     of_run.back().observable = key.second;
     of_mean.push_back(of_run.back());
-    if (record->from() == "realizations") of_mean.back().share += 1.0 / record->runs();
+    if (messages::SourceOf(*record) == campaign::ScatterSource::kRealizations)
+      of_mean.back().share += 1.0 / record->runs();
   }
   ScatteredReadings readings{.of_mean = inference::WithScatter(data, of_mean, 0),
                              .of_run = inference::WithScatter(data, of_run, 1),

@@ -8,12 +8,14 @@
 #include "absl/strings/str_cat.h"
 #include "dem/catalog/catalog.h"
 #include "inference/sampling/philox.h"
+#include "server/messages/read_words.h"
 #include "server/report/views/bulk_properties.h"
 #include "server/report/views/warnings.h"
 
 namespace calib::report {
 namespace {
 
+using campaign::PosteriorSource;
 using Eigen::Index;
 
 constexpr int kPriorDraws = 1000;
@@ -51,7 +53,8 @@ bool IsComplete(const campaign::Experiment& experiment, const StateHistory& hist
 Eigen::MatrixXd PosteriorPoints(const CampaignView& view) {
   const v1::Posterior& posterior = view.posterior;
   const auto d = static_cast<Index>(view.campaign.parameters.size());
-  if (posterior.posterior_from() == "none" || posterior.posterior_from().empty()) {
+  if (messages::SourceOf(posterior) == PosteriorSource::kNone ||
+      posterior.posterior_from().empty()) {
     return Eigen::MatrixXd(0, d);
   }
   if (posterior.draws_size() > 0 && posterior.draws_size() % d == 0) {
@@ -110,7 +113,9 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
     prior_points.row(i) = priors.Draw(stream);
   }
   const Eigen::MatrixXd posterior_points = PosteriorPoints(view);
-  result.points_from = posterior_points.rows() > 2 ? view.posterior.posterior_from() : "none";
+  if (posterior_points.rows() > 2) {
+    result.points_from = messages::SourceOf(view.posterior).value_or(PosteriorSource::kNone);
+  }
   const inference::SensitivityOptions options{.sobol = {.seed = view.campaign.seed % 1000}};
   const std::vector<Eigen::MatrixXd> sets =
       result.independent ? inference::SobolSets(static_cast<int>(d), options.sobol)
@@ -168,7 +173,7 @@ absl::StatusOr<Sensitivity> AnalyseCampaign(const CampaignView& view) {
       quantity.unit = names[k].unit;
       quantity.runs = static_cast<int>(n);
       quantity.prior = emulated->Over(priors, over_prior, sets);
-      if (result.points_from == "none" || !quantity.prior.Explains()) continue;
+      if (result.points_from == PosteriorSource::kNone || !quantity.prior.Explains()) continue;
       quantity.posterior = emulated->Over(priors, over_posterior, {});
     }
   }

@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "inference/sensitivity/emulated_output.h"
+#include "server/campaign/model/words.h"
 #include "server/report/views/campaign_view.h"
 
 namespace calib::report {
@@ -25,7 +26,8 @@ struct Quantity {
 struct Sensitivity {
   std::vector<std::string> parameters;
   bool independent = true;  ///< false: correlated or constrained priors have no Sobol indices
-  std::string points_from;  ///< of the posterior: weights, tmcmc, emulator or none
+  /// Where the points of the posterior come from; kNone: there are none.
+  campaign::PosteriorSource points_from = campaign::PosteriorSource::kNone;
   std::vector<Quantity> quantities;
   std::vector<std::string> left_out;  ///< "tx02: secant_modulus: ...", a clause each
   std::vector<std::string> warnings;  ///< of the posterior: Warnings()

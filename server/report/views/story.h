@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "server/campaign/model/words.h"
 #include "server/report/views/comparison.h"
 #include "server/report/views/stored_diagnosis.h"
 #include "server/report/views/stored_improvement.h"
@@ -14,8 +15,8 @@ namespace calib::report {
 /// A campaign of the family. Screens and other tables of runs are left out.
 struct Relative {
   std::string campaign, name;
-  std::string parent;   ///< id; empty: the base
-  std::string purpose;  ///< extension | warm_fit; empty: the base
+  std::string parent;                             ///< id; empty: the base
+  std::optional<campaign::DerivedFor> purpose{};  ///< extension or warm fit; empty: the base
   std::vector<std::string> effects;
   double log_evidence = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "server/messages/read_words.h"
 #include "server/report/text/people_units.h"
 
 namespace calib::report {
@@ -10,7 +11,8 @@ std::vector<std::string> PosteriorWarnings(const CampaignView& view) {
   const v1::Posterior& posterior = view.posterior;
   std::vector<std::string> warnings(posterior.warnings().begin(), posterior.warnings().end());
   if (posterior.parameters_size() > 0 && !posterior.converged() &&
-      posterior.posterior_from() != "none" && view.status.state() == "finished") {
+      messages::SourceOf(posterior) != campaign::PosteriorSource::kNone &&
+      messages::StateOf(view.status) == campaign::CampaignState::kFinished) {
     warnings.emplace_back(
         "The iterations ended before the posterior means settled: treat the intervals as "
         "provisional, or go on with more "

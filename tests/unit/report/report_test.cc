@@ -128,7 +128,7 @@ TEST(Report, TellsTheStoryOfAnAddedEffect) {
       r.parent = "c0";
       r.effects = {effect};
     }
-    r.purpose = purpose;
+    r.purpose = campaign::ToDerivedFor(purpose);
     r.log_evidence = log_evidence;
     return r;
   };

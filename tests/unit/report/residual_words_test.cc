@@ -20,7 +20,7 @@ std::vector<std::string> Said(double amplitude) {
                                    .readings = 5,
                                    .rms_error = 6,
                                    .chi2_share = 0.5,
-                                   .pattern = {.name = "amplitude", .size = amplitude}});
+                                   .pattern = {.shape = ResidualShape::kAmplitude, .size = amplitude}});
   return WhereItFails(comparison);
 }
 

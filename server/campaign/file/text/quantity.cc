@@ -12,6 +12,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "server/campaign/file/text/suggestion.h"
 
 namespace calib::campaign {
@@ -172,11 +173,10 @@ absl::StatusOr<Unit> ParseUnit(const std::string& text) {
       continue;
     }
     const std::size_t end = std::min(text.find_first_of("/* ", at), text.size());
-    const auto factor = SplitExponent(text.substr(at, end - at));
-    if (!factor.ok()) return factor.status();
-    const std::optional<Unit> unit = FindFactor(factor->first);
-    if (!unit) return UnknownUnit(factor->first);
-    Multiply(product, *unit, sign * factor->second);
+    ASSIGN_OR_RETURN(const auto factor, SplitExponent(text.substr(at, end - at)));
+    const std::optional<Unit> unit = FindFactor(factor.first);
+    if (!unit) return UnknownUnit(factor.first);
+    Multiply(product, *unit, sign * factor.second);
     sign = 1;
     at = end;
   }

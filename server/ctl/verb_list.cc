@@ -1,0 +1,44 @@
+#include "server/ctl/verb_list.h"
+
+namespace calib::ctl {
+
+// Each is a file in verbs/: that of X defines the function XVerb. The order is that of the help.
+#define CALIB_VERBS(VERB) \
+  VERB(Simulate)          \
+  VERB(Run)               \
+  VERB(Submit)            \
+  VERB(Validate)          \
+  VERB(List)              \
+  VERB(Show)              \
+  VERB(Watch)             \
+  VERB(Posterior)         \
+  VERB(Samples)           \
+  VERB(States)            \
+  VERB(Compare)           \
+  VERB(Sensitivity)       \
+  VERB(Models)            \
+  VERB(Diagnose)          \
+  VERB(Extend)            \
+  VERB(Improve)           \
+  VERB(Predict)           \
+  VERB(Report)            \
+  VERB(Export)            \
+  VERB(Pause)             \
+  VERB(Resume)            \
+  VERB(Cancel)            \
+  VERB(Delete)            \
+  VERB(Workers)           \
+  VERB(Doctor)            \
+  VERB(Drain)             \
+  VERB(Effects)           \
+  VERB(Tests)             \
+  VERB(Contacts)          \
+  VERB(Pack)
+
+#define CALIB_DECLARE_VERB(name) Verb name##Verb();
+CALIB_VERBS(CALIB_DECLARE_VERB)
+
+#define CALIB_CALL_VERB(name) name##Verb(),
+std::vector<Verb> AllVerbs() { return {CALIB_VERBS(CALIB_CALL_VERB)}; }
+
+}  // namespace calib::ctl
