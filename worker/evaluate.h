@@ -6,6 +6,8 @@
 #include "absl/status/statusor.h"
 #include "calib/v1/worker.pb.h"
 #include "dem/model/scenario.h"
+#include "dem/model/state.h"
+#include "dem/simulate/simulate.h"
 #include "worker/specimens.h"
 
 namespace calib::worker {

@@ -11,6 +11,7 @@
 
 #include "calib/v1/worker.pb.h"
 #include "dem/model/scenario.h"
+#include "dem/model/state.h"
 #include "worker/resting_run.h"
 #include "worker/specimens.h"
 

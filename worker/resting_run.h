@@ -7,6 +7,7 @@
 
 #include "calib/v1/worker.pb.h"
 #include "dem/model/scenario.h"
+#include "dem/model/state.h"
 #include "worker/checkpoints.h"
 #include "worker/specimens.h"
 

@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "dem/model/state.h"
 #include "dem/registry/catalog.h"
 #include "proto/rpc/backoff.h"
 #include "proto/rpc/digest.h"

@@ -1,6 +1,5 @@
 // `initial_density`: a specimen of another density than assumed.
 
-#include "dem/lab_tests/shared/element_test.h"
 #include "dem/model/effect.h"
 
 namespace calib::dem {

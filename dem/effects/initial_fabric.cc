@@ -1,6 +1,5 @@
 // `initial_fabric`: an anisotropic fabric left by the way the specimen was made.
 
-#include "dem/lab_tests/shared/element_test.h"
 #include "dem/model/effect.h"
 
 namespace calib::dem {

@@ -1,6 +1,5 @@
 // `nonspherical_shape`: elongated grains in place of spheres.
 
-#include "dem/lab_tests/shared/element_test.h"
 #include "dem/model/effect.h"
 
 namespace calib::dem {

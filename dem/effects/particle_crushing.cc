@@ -1,6 +1,5 @@
 // `particle_crushing`: grains that crush under their contact forces and lose size.
 
-#include "dem/lab_tests/shared/element_test.h"
 #include "dem/model/effect.h"
 
 namespace calib::dem {

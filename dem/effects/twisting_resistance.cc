@@ -6,8 +6,6 @@
 
 #include "dem/contact/simd.h"
 #include "dem/effects/shared/moment_stiffness.h"
-#include "dem/lab_tests/shared/element_test.h"
-#include "dem/lab_tests/shared/gravity_test.h"
 #include "dem/model/effect.h"
 
 namespace calib::dem {

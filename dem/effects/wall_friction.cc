@@ -1,6 +1,5 @@
 // `wall_friction`: grains slide on walls with another friction than on each other.
 
-#include "dem/lab_tests/shared/gravity_test.h"
 #include "dem/model/effect.h"
 
 namespace calib::dem {

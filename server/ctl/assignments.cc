@@ -9,8 +9,9 @@
 #include "dem/registry/catalog.h"
 #include "dem/registry/model_parameters.h"
 #include "server/campaign/admissible_range.h"
-#include "server/campaign/quantity.h"
-#include "server/campaign/suggestion.h"
+#include "server/campaign/file/text/quantity.h"
+#include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/model/range.h"
 
 namespace calib::ctl {
 namespace {

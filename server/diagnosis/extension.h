@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "dem/registry/catalog.h"
-#include "server/report/campaign_view.h"
+#include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
 

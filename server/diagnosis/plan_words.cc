@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "dem/registry/catalog.h"
-#include "server/report/people_units.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::diagnosis {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "dem/registry/catalog.h"
-#include "server/campaign/campaign.h"
+#include "server/campaign/model/campaign.h"
 
 namespace calib::diagnosis {
 

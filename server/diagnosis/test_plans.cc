@@ -9,7 +9,7 @@
 #include <variant>
 
 #include "dem/registry/catalog.h"
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/control_way.h"
 #include "server/diagnosis/setting_plans.h"
 

@@ -11,6 +11,8 @@
 
 #include "dem/dynamics/contact_model.h"
 #include "dem/elementary/functions.h"
+#include "dem/formula/user_effect.h"
+#include "dem/registry/declared_effects.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"
 

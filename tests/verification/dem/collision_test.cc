@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "dem/registry/catalog.h"
+#include "dem/registry/scenario_problems.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "dem/registry/catalog.h"
+#include "dem/simulate/simulate.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "dem/registry/catalog.h"
+#include "dem/registry/scenario_problems.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
