@@ -14,7 +14,7 @@
 #include <iostream>
 #include <thread>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "proto/rpc/address.h"
 #include "proto/rpc/digest.h"
 #include "worker/once.h"

@@ -14,7 +14,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "dem/simulation/whole_file.h"
+#include "dem/simulate/whole_file.h"
 #include "proto/rpc/random_id.h"
 
 namespace calib::worker {

@@ -3,6 +3,8 @@
 #include <chrono>
 
 #include "absl/strings/str_cat.h"
+#include "dem/model/state.h"
+#include "dem/simulate/simulate.h"
 #include "worker/scenario_from_spec.h"
 
 namespace calib::worker {

@@ -5,7 +5,9 @@
 
 #include "absl/status/statusor.h"
 #include "calib/v1/worker.pb.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
+#include "dem/model/state.h"
+#include "dem/simulate/simulate.h"
 #include "worker/specimens.h"
 
 namespace calib::worker {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "dem/model/state.h"
 #include "worker/evaluate.h"
 
 namespace calib::worker {

@@ -10,7 +10,8 @@
 #include <vector>
 
 #include "calib/v1/worker.pb.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
+#include "dem/model/state.h"
 #include "worker/resting_run.h"
 #include "worker/specimens.h"
 

@@ -13,8 +13,10 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/whole_file.h"
+#include "dem/model/state.h"
+#include "dem/registry/catalog.h"
+#include "dem/simulate/simulate.h"
+#include "dem/simulate/whole_file.h"
 #include "proto/rpc/digest.h"
 #include "worker/evaluate.h"
 #include "worker/scenario_from_spec.h"

@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "dem/model/state.h"
+#include "dem/simulate/simulate.h"
 #include "worker/evaluate.h"
 #include "worker/scenario_from_spec.h"
 

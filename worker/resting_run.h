@@ -6,7 +6,8 @@
 #include <string>
 
 #include "calib/v1/worker.pb.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
+#include "dem/model/state.h"
 #include "worker/checkpoints.h"
 #include "worker/specimens.h"
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "dem/formula/user_effect.h"
+
 namespace calib::worker {
 namespace {
 

@@ -2,7 +2,7 @@
 // AttemptSpec -> dem::Scenario; the inverse of server/scheduler/attempt_spec.
 
 #include "calib/v1/worker.pb.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
 
 namespace calib::worker {
 

@@ -4,8 +4,10 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "calib/return_if_error.h"
 #include "dem/geometry/stl_file.h"
+#include "dem/registry/catalog.h"
+#include "dem/simulate/packing_generator.h"
 #include "worker/scenario_from_spec.h"
 
 namespace calib::worker {
@@ -71,15 +73,9 @@ absl::StatusOr<dem::Packing> Specimens::Generate(const v1::AttemptSpec& spec,
                                                  std::stop_token stop) const {
   dem::PackingRecipe recipe = RecipeFromMessage(spec.recipe());
   if (!spec.recipe().sizes_digest().empty()) {
-    const auto text = fetch_(spec.recipe().sizes_digest(), stop);
-    if (!text.ok()) {
-      return text.status();
-    }
-    auto like = ReadPacking(*text);
-    if (!like.ok()) {
-      return like.status();
-    }
-    recipe.radii = std::move(like->radius);
+    ASSIGN_OR_RETURN(const auto text, fetch_(spec.recipe().sizes_digest(), stop));
+    ASSIGN_OR_RETURN(auto like, ReadPacking(text));
+    recipe.radii = std::move(like.radius);
   }
   const dem::TestInfo* test = dem::FindTest(spec.test());
   return test != nullptr && test->poured ? dem::GenerateSizes(recipe)
@@ -101,11 +97,8 @@ Specimens::Result Specimens::Make(const v1::AttemptSpec& spec, std::stop_token s
   }
   Specimen specimen{.packing = *std::move(packing), .meshes = {}};
   for (const v1::Mesh& named : spec.meshes()) {
-    const auto content = fetch_(named.digest(), stop);
-    if (!content.ok()) {
-      return content.status();
-    }
-    auto mesh = ReadMesh(*content, named.scale());
+    ASSIGN_OR_RETURN(const auto content, fetch_(named.digest(), stop));
+    auto mesh = ReadMesh(content, named.scale());
     if (!mesh.ok()) {
       return absl::InvalidArgumentError(
           absl::StrCat("mesh ", named.name(), ": ", mesh.status().message()));

@@ -3,8 +3,10 @@
 #include <stop_token>
 #include <thread>
 
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
+#include "dem/model/state.h"
+#include "dem/registry/catalog.h"
+#include "dem/simulate/simulate.h"
 
 namespace calib::worker {
 namespace {

@@ -11,7 +11,8 @@
 #include <optional>
 #include <utility>
 
-#include "dem/catalog/catalog.h"
+#include "dem/model/state.h"
+#include "dem/registry/catalog.h"
 #include "proto/rpc/backoff.h"
 #include "proto/rpc/digest.h"
 #include "proto/rpc/random_id.h"

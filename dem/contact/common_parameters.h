@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "dem/catalog/catalog.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 

@@ -4,20 +4,11 @@
 #include <memory>
 #include <string>
 
-#include "dem/catalog/parameter_set.h"
 #include "dem/contact/contact_block.h"
+#include "dem/model/effect.h"
+#include "dem/model/parameter_set.h"
 
 namespace calib::dem {
-
-/// Order in which a block passes the kernels of a model.
-enum class ContactStage {
-  kNormal,        ///< sets normal_force, normal_stiffness, tangential_stiffness
-  kNormalExtra,   ///< adds to the normal force (adhesion, viscosity, plasticity)
-  kSlidingLimit,  ///< sets or changes sliding_limit
-  kTangential,    ///< integrates the shear force
-  kShearExtra,    ///< adds to the shear force (viscosity)
-  kMoment,        ///< adds moments
-};
 
 /// Immutable after construction, so one instance serves all threads.
 class ContactKernel {
@@ -57,7 +48,5 @@ struct KernelContext {
       parameters;  ///< of the law, or of the effect (without its prefix), defaults filled in
   const Materials* materials = nullptr;  ///< while the kernel is made; null: there is one material
 };
-
-using MakeKernel = std::unique_ptr<ContactKernel> (*)(const KernelContext& context);
 
 }  // namespace calib::dem

@@ -6,39 +6,23 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/registry.h"
 #include "dem/contact/common_parameters.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 
-std::vector<std::string> MaterialNames(const Model& model) {
-  std::vector<std::string> names = {kOwnMaterial};
-  names.insert(names.end(), model.materials.begin(), model.materials.end());
-  return names;
-}
-
-bool IsMaterialPair(const Model& model, const std::string& name) {
-  const std::vector<std::string> names = MaterialNames(model);
-  const auto has = [&names](const std::string& one) {
-    return std::find(names.begin(), names.end(), one) != names.end();
-  };
-  const std::size_t dash = name.find('-');
-  return dash != std::string::npos && has(name.substr(0, dash)) && has(name.substr(dash + 1)) &&
-         name != absl::StrCat(kOwnMaterial, "-", kOwnMaterial);
-}
-
-Materials::Materials(const Model& model, const ParameterSet& own, double thickness)
+Materials::Materials(const Model& model, const ContactInfo& law, const ParameterSet& own,
+                     double thickness)
     : names_(MaterialNames(model)),
       laws_{own},
       densities_{model.density},
       mass_units_{GrainMassOf(model.density, thickness).unit},
       depth_(GrainMassOf(model.density, thickness).depth),
       parameters_(model.parameters) {
-  const std::vector<ParameterInfo>& infos = FindContact(model.contact)->parameters;
   std::vector<double> friction = {SlidingFriction(model.parameters)};
   for (const std::string& name : model.materials) {
     std::map<std::string, double> values;
-    for (const ParameterInfo& info : infos) {
+    for (const ParameterInfo& info : law.parameters) {
       const auto given = model.parameters.find(absl::StrCat(name, ".", info.name));
       if (given != model.parameters.end()) {
         values[info.name] = given->second;

@@ -8,21 +8,10 @@
 
 #include "dem/contact/contact_kernel.h"
 #include "dem/contact/grain_mass.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/contact_law.h"
+#include "dem/model/model.h"
 
 namespace calib::dem {
-
-/// The model's own material, of everything that nobody says otherwise of.
-inline constexpr const char* kOwnMaterial = "grains";
-
-/// Materials that a model may have besides its own.
-inline constexpr int kMostMaterials = 16;
-
-/// The model's own material first, then its others in their order.
-std::vector<std::string> MaterialNames(const Model& model);
-
-/// Whether a name is "A-B" of two materials of the model, or "A-A" of one that is not its own.
-bool IsMaterialPair(const Model& model, const std::string& name);
 
 /// Stiffness of two bodies one behind the other, from those of contacts among equals: 2ab/(a + b),
 /// exactly `a` where both are the same. For the moduli of Hertz and Mindlin this is
@@ -39,7 +28,8 @@ inline double InSeries(double a, double b) { return a == b ? a : 2.0 * (a / (a +
 class Materials {
  public:
   /// thickness: of disks [m]; 0: spheres. Preconditions: MaterialProblems() finds nothing wrong.
-  Materials(const Model& model, const ParameterSet& own, double thickness);
+  /// law: of the model; own: its parameters of `grains`.
+  Materials(const Model& model, const ContactInfo& law, const ParameterSet& own, double thickness);
 
   [[nodiscard]] int count() const { return static_cast<int>(laws_.size()); }
   [[nodiscard]] int pairs() const { return count() * count(); }

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "dem/catalog/registry.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "dem/contact/contact_model.h"
+#include "dem/dynamics/contact_model.h"
 #include "dem/dynamics/leapfrog.h"
 #include "dem/dynamics/pair_blocks.h"
 #include "dem/dynamics/rigid_clumps.h"

@@ -2,9 +2,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
 #include "dem/dynamics/archive.h"
 #include "dem/dynamics/flow.h"
+#include "dem/model/engine_version.h"
 
 namespace calib::dem {
 namespace {

@@ -7,7 +7,7 @@
 // than bodies that do not know each other, where each contact holds i with (1 + t) k and j with
 // (1 + 1/t) k, and the square of the fastest rate is at most the largest eigenvalue of one body's
 // M^-1 K. t = 1 is the usual bound; t = m_i/m_j, for which a pair has just the rate of its reduced mass,
-// is far sharper where grains differ in size (dem/dynamics/README.md). It holds for the stiffnesses of
+// is far sharper where grains differ in size (dem/DECISIONS.md). It holds for the stiffnesses of
 // the moment, and where sliding does not couple normal and tangential motion.
 
 #include <array>

@@ -8,7 +8,7 @@
 
 #include "absl/status/status.h"
 #include "dem/contact/contact_block.h"
-#include "dem/contact/contact_model.h"
+#include "dem/dynamics/contact_model.h"
 #include "dem/dynamics/grain_load.h"
 #include "dem/geometry/wall.h"
 #include "dem/particles/particle_arrays.h"

@@ -1,6 +1,6 @@
 // `apparatus_compliance`: the loading frame shortens too.
 
-#include "dem/catalog/registry.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
@@ -36,9 +36,9 @@ EffectEntry ApparatusCompliance() {
                    .parameters = {compliance},
                    .reference = "Jardine, Symes & Burland, Geotechnique 34 (1984) 323",
                    .two_sided = false,
-                   .rays = {{.parameter = "compliance", .steps = {0.1, 0.5}}},
-                   .excited_by = {"triaxial_drained", "triaxial_undrained", "oedometric"}},
+                   .rays = {{.parameter = "compliance", .steps = {0.1, 0.5}}}},
           .place = 160,
+          .shows_in = [](const TestInfo& test) { return test.rig_load != RigLoad::kNone; },
           .alter = &Alter};
 }
 

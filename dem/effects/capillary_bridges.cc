@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "dem/catalog/registry.h"
 #include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
 #include "dem/elementary/functions.h"
 #include "dem/elementary/power.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {

@@ -4,9 +4,9 @@
 #include <utility>
 #include <vector>
 
-#include "dem/catalog/registry.h"
 #include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {

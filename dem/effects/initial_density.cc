@@ -1,7 +1,6 @@
 // `initial_density`: a specimen of another density than assumed.
 
-#include "dem/catalog/registry.h"
-#include "dem/lab_tests/element_test.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
@@ -39,9 +38,9 @@ EffectEntry InitialDensity() {
                    .parameters = {densification},
                    .reference = "Cheng et al. 2018, sec. 2.2",
                    .two_sided = true,
-                   .rays = {{.parameter = "densification", .steps = {0.5, 1.5}}},
-                   .excited_by = ElementTestNames()},
+                   .rays = {{.parameter = "densification", .steps = {0.5, 1.5}}}},
           .place = 130,
+          .shows_in = &InPeriodicCell,
           .prepare = &Prepare};
 }
 

@@ -1,7 +1,6 @@
 // `initial_fabric`: an anisotropic fabric left by the way the specimen was made.
 
-#include "dem/catalog/registry.h"
-#include "dem/lab_tests/element_test.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
@@ -36,9 +35,9 @@ EffectEntry InitialFabric() {
                    .reference =
                        "Oda, Soils Found. 12 (1972) 1; Yimsiri & Soga, Geotechnique 60 (2010) 699",
                    .two_sided = true,
-                   .rays = {{.parameter = "stress_anisotropy", .steps = {0.2, 0.5}}},
-                   .excited_by = ElementTestNames()},
+                   .rays = {{.parameter = "stress_anisotropy", .steps = {0.2, 0.5}}}},
           .place = 140,
+          .shows_in = &InPeriodicCell,
           .prepare = &Prepare};
 }
 

@@ -1,6 +1,6 @@
 // `load_cell_error`: gain and zero of the load cell.
 
-#include "dem/catalog/registry.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
@@ -48,9 +48,9 @@ EffectEntry LoadCellError() {
                        "ASTM E74, calibration and verification for force-measuring instruments",
                    .two_sided = true,
                    .rays = {{.parameter = "gain", .steps = {0.05, 0.15}},
-                            {.parameter = "offset", .steps = {0.03, 0.1}}},
-                   .excited_by = {"triaxial_drained", "triaxial_undrained", "oedometric"}},
+                            {.parameter = "offset", .steps = {0.03, 0.1}}}},
           .place = 190,
+          .shows_in = [](const TestInfo& test) { return test.rig_load != RigLoad::kNone; },
           .alter = &Alter};
 }
 

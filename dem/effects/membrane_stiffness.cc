@@ -1,6 +1,6 @@
 // `membrane_stiffness`: a rubber membrane that confines a bulging specimen.
 
-#include "dem/catalog/registry.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
@@ -34,9 +34,9 @@ EffectEntry MembraneStiffness() {
                    .parameters = {stiffness},
                    .reference = "Henkel & Gilbert, Geotechnique 3 (1952) 20",
                    .two_sided = false,
-                   .rays = {{.parameter = "stiffness", .steps = {0.5, 2}}},
-                   .excited_by = {"triaxial_drained", "triaxial_undrained"}},
+                   .rays = {{.parameter = "stiffness", .steps = {0.5, 2}}}},
           .place = 180,
+          .shows_in = [](const TestInfo& test) { return test.rig_load == RigLoad::kDeviatoric; },
           .alter = &Alter};
 }
 

@@ -1,21 +1,12 @@
 // `nonspherical_shape`: elongated grains in place of spheres.
 
-#include "dem/catalog/registry.h"
-#include "dem/lab_tests/element_test.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
 
 void Prepare(const ParameterSet& parameters, Preparation& preparation) {
   preparation.aspect = parameters.Get("aspect");
-}
-
-/// Specimens, and poured grains.
-std::vector<std::string> TestsOfShape() {
-  std::vector<std::string> tests = ElementTestNames();
-  tests.insert(tests.end(), {"angle_of_repose", "calibration_device", "rotating_drum", "shaken_box",
-                             "silo_discharge", "transfer_chute"});
-  return tests;
 }
 
 }  // namespace
@@ -49,8 +40,10 @@ EffectEntry NonsphericalShape() {
                                 "(2004) 193",
                    .two_sided = false,
                    .rays = {{.parameter = "aspect", .steps = {0.1, 0.3}}},
-                   .excited_by = TestsOfShape()},
+                   .makes_clumps = true,
+                   .one_material = ""},
           .place = 10,
+          .shows_in = [](const TestInfo& test) { return test.needs_packing; },
           .prepare = &Prepare};
 }
 

@@ -1,7 +1,6 @@
 // `particle_crushing`: grains that crush under their contact forces and lose size.
 
-#include "dem/catalog/registry.h"
-#include "dem/lab_tests/element_test.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
@@ -70,8 +69,9 @@ EffectEntry ParticleCrushing() {
                              .held = {{"reference_diameter", 1}},
                              // Of few grains that crush: their share goes with weakness^m.
                              .order = *modulus.default_value}},
-                   .excited_by = ElementTestNames()},
+                   .breaks_grains = true},
           .place = 20,
+          .shows_in = &InPeriodicCell,
           .prepare = &Prepare};
 }
 

@@ -4,10 +4,10 @@
 #include <utility>
 #include <vector>
 
-#include "dem/catalog/registry.h"
 #include "dem/contact/contact_kinematics.h"
 #include "dem/contact/simd.h"
 #include "dem/effects/shared/moment_stiffness.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {

@@ -1,6 +1,6 @@
 // `strain_offset`: bedding and seating errors that close under load.
 
-#include "dem/catalog/registry.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
@@ -48,9 +48,9 @@ EffectEntry StrainOffset() {
                "Jardine, Symes & Burland, Geotechnique 34 (1984) 323; Goto et al., Soils Found. 31 "
                "(1991) 169",
            .two_sided = false,
-           .rays = {{.parameter = "offset", .steps = {0.1, 0.4}, .held = {{"stress", 0.3}}}},
-           .excited_by = {"triaxial_drained", "triaxial_undrained", "oedometric"}},
+           .rays = {{.parameter = "offset", .steps = {0.1, 0.4}, .held = {{"stress", 0.3}}}}},
       .place = 170,
+      .shows_in = [](const TestInfo& test) { return test.rig_load != RigLoad::kNone; },
       .alter = &Alter};
 }
 

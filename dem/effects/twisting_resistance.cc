@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <iterator>
 
-#include "dem/catalog/registry.h"
 #include "dem/contact/simd.h"
 #include "dem/effects/shared/moment_stiffness.h"
-#include "dem/lab_tests/element_test.h"
-#include "dem/lab_tests/gravity_test.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
@@ -49,15 +47,6 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
   return std::make_unique<TwistingKernel>(MomentLawsFrom(context));
 }
 
-/// A collision happens in a plane, and a shaken box is one: nothing twists about a normal in it.
-std::vector<std::string> WhereGrainsTwist() {
-  std::vector<std::string> names = ElementTestNames();
-  const std::vector<std::string> poured = GravityTestNames();
-  std::copy_if(poured.begin(), poured.end(), std::back_inserter(names),
-               [](const std::string& name) { return name != "shaken_box"; });
-  return names;
-}
-
 }  // namespace
 
 ///   dM = k_t dtheta,  dtheta = n.(w2 - w1) dt,   |M| <= eta Fn l
@@ -75,9 +64,9 @@ EffectEntry TwistingResistance() {
                .reference = "Cheng et al. 2018, Table 1",
                .two_sided = false,
                .rays = MomentRays(),
-               .excited_by = WhereGrainsTwist(),
                .needs_space = true},
       .place = 120,
+      .shows_in = [](const TestInfo& test) { return !test.planar; },
       .kernels = {{.stage = ContactStage::kMoment, .make = &Make}}};
 }
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "dem/catalog/registry.h"
 #include "dem/contact/materials.h"
 #include "dem/contact/simd.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {

@@ -1,7 +1,6 @@
 // `wall_friction`: grains slide on walls with another friction than on each other.
 
-#include "dem/catalog/registry.h"
-#include "dem/lab_tests/gravity_test.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 namespace {
@@ -9,13 +8,6 @@ namespace {
 void Bound(const ParameterSet& parameters, WallProperties& walls) {
   walls.friction_ratio = parameters.Find("ratio").value_or(1.0);
   walls.friction = parameters.Find("coefficient");
-}
-
-/// `collision` has one where its partner is a wall.
-std::vector<std::string> WhereWallsAre() {
-  std::vector<std::string> names = GravityTestNames();
-  names.emplace_back("collision");
-  return names;
 }
 
 }  // namespace
@@ -50,8 +42,9 @@ EffectEntry WallFriction() {
                    .reference = "Samuelsson 2023, sec. 4.1, Table 4.1",
                    .two_sided = true,
                    .rays = {{.parameter = "ratio", .steps = {0.25, 0.5}}},
-                   .excited_by = WhereWallsAre()},
+                   .one_material = "friction at walls of a material is that of the pair"},
           .place = 150,
+          .shows_in = [](const TestInfo& test) { return test.has_walls; },
           .bound = &Bound};
 }
 

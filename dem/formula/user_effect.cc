@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/formula/formula.h"
+#include "dem/model/readings.h"
 
 namespace calib::dem {
 namespace {
@@ -47,18 +48,11 @@ const std::vector<FormulaQuantity>& Stage() {
   return *all;
 }
 
-constexpr const char* kReadings[] = {
-    "axial_strain",   "volumetric_strain", "lateral_strain",    "axial_stress",
-    "lateral_stress", "mean_stress",       "deviatoric_stress", "stress_ratio",
-    "q_over_p",       "shear_strain",      "shear_stress",      "shear_stress_ratio",
-    "pore_pressure",  "porosity",          "void_ratio",        "coordination_number"};
-
-const std::vector<FormulaQuantity>& Readings() {
+const std::vector<FormulaQuantity>& ReadingsAsQuantities() {
   static const auto* const all = [] {
     auto* list = new std::vector<FormulaQuantity>;
-    for (const char* name : kReadings) {
-      const ObservableInfo* info = FindObservable(name);
-      list->push_back({name, info->unit, info->description});
+    for (const ReadingEntry& reading : Readings()) {
+      list->push_back({reading.info.name, reading.info.unit, reading.info.description});
     }
     return list;
   }();
@@ -141,7 +135,7 @@ constexpr const char* kZeros[] = {"overlap",          "closing_velocity", "slidi
 
 std::span<const FormulaQuantity> ContactQuantities() { return Contact(); }
 std::span<const FormulaQuantity> StageQuantities() { return Stage(); }
-std::span<const FormulaQuantity> ReadingQuantities() { return Readings(); }
+std::span<const FormulaQuantity> ReadingQuantities() { return ReadingsAsQuantities(); }
 
 std::span<const FormulaQuantity> ContactTargets() {
   static const auto* const all = new std::vector<FormulaQuantity>{
@@ -156,7 +150,7 @@ std::span<const FormulaQuantity> ContactTargets() {
 std::span<const FormulaQuantity> ReadingTargets() {
   static const auto* const all = [] {
     auto* list = new std::vector<FormulaQuantity>;
-    for (const FormulaQuantity& q : Readings()) {
+    for (const FormulaQuantity& q : ReadingsAsQuantities()) {
       if (q.name != "axial_strain" && q.name != "shear_strain") list->push_back(q);
     }
     return list;
@@ -169,7 +163,7 @@ std::string KindOfTarget(const std::string& target) {
 }
 
 std::vector<FormulaQuantity> QuantitiesOf(const std::string& kind) {
-  if (kind == "measurement") return Readings();
+  if (kind == "measurement") return ReadingsAsQuantities();
   std::vector<FormulaQuantity> all = Contact();
   all.insert(all.end(), Stage().begin(), Stage().end());
   return all;
@@ -192,12 +186,12 @@ bool NeedsStage(const UserEffect& effect) {
   return effect.info.kind == "contact" && Mentions(effect, Stage());
 }
 
-std::vector<std::string> UserEffectProblems(const UserEffect& effect) {
+std::vector<std::string> UserEffectProblems(const UserEffect& effect, bool name_taken) {
   std::vector<std::string> problems;
   const EffectInfo& info = effect.info;
   if (!IsName(info.name)) {
     problems.push_back(absl::StrCat("'", info.name, "': ", kNameRule));
-  } else if (FindEffect(info.name) != nullptr) {
+  } else if (name_taken) {
     problems.push_back(absl::StrCat("there is an effect ", info.name, " in this build already"));
   }
   const bool contact = info.kind == "contact";
@@ -272,39 +266,6 @@ std::string NullProblem(const UserEffect& effect) {
                         zero, ", ...) or ", zero, " > 0 ? ... : ", none);
   }
   return "";
-}
-
-const EffectInfo* FindEffect(std::span<const UserEffect> declared, const std::string& name) {
-  if (const EffectInfo* info = FindEffect(name)) return info;
-  const auto it = std::find_if(declared.begin(), declared.end(),
-                               [&](const UserEffect& e) { return e.info.name == name; });
-  return it == declared.end() ? nullptr : &it->info;
-}
-
-const ParameterInfo* FindParameter(std::span<const UserEffect> declared, const std::string& contact,
-                                   std::span<const std::string> effects,
-                                   const std::string& dotted_name) {
-  if (const ParameterInfo* info = FindParameter(contact, effects, dotted_name)) return info;
-  const auto dot = dotted_name.find('.');
-  const std::string prefix = dotted_name.substr(0, dot);
-  const auto effect = std::find_if(declared.begin(), declared.end(),
-                                   [&](const UserEffect& e) { return e.info.name == prefix; });
-  if (dot == std::string::npos || effect == declared.end() ||
-      std::find(effects.begin(), effects.end(), prefix) == effects.end()) {
-    return nullptr;
-  }
-  const auto& parameters = effect->info.parameters;
-  const auto it = std::find_if(
-      parameters.begin(), parameters.end(),
-      [name = dotted_name.substr(dot + 1)](const ParameterInfo& p) { return p.name == name; });
-  return it == parameters.end() ? nullptr : &*it;
-}
-
-std::vector<const EffectInfo*> AllEffects(std::span<const UserEffect> declared) {
-  std::vector<const EffectInfo*> all;
-  for (const EffectInfo& info : Effects()) all.push_back(&info);
-  for (const UserEffect& effect : declared) all.push_back(&effect.info);
-  return all;
 }
 
 }  // namespace calib::dem

@@ -6,24 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
+#include "dem/model/user_effect.h"
 
 namespace calib::dem {
-
-/// What a formula does to its target.
-enum class FormulaAction {
-  kAdds,   ///< target + formula, in the target's unit; 0: no effect
-  kScales  ///< target * formula, dimensionless; 1: no effect
-};
-
-/// A user's effect. info.kind says where it acts: "contact" between grains and at walls,
-/// "measurement" on the readings.
-struct UserEffect {
-  EffectInfo info;  ///< one-sided or not, parameters, rays, ... as of those of the build
-  FormulaAction action = FormulaAction::kAdds;
-  std::string target;   ///< of ContactTargets() or ReadingTargets()
-  std::string formula;  ///< over the quantities of its kind and the effect's own parameters
-};
 
 /// Something that a formula may speak of, or change.
 struct FormulaQuantity {
@@ -67,23 +52,12 @@ bool IsViscous(const UserEffect& effect);
 bool NeedsStage(const UserEffect& effect);
 
 /// What is wrong with it, a sentence each; empty: it can run. Names of effects and parameters are
-/// letters, digits and _, begin with a letter and are nobody else's.
-std::vector<std::string> UserEffectProblems(const UserEffect& effect);
+/// letters, digits and _, begin with a letter and are nobody else's; name_taken: the build has an effect of its name.
+std::vector<std::string> UserEffectProblems(const UserEffect& effect, bool name_taken);
 
 /// What the formula is where its parameters are at their null, if not exactly nothing, or that it
 /// is finite nowhere; the rest of a sentence about it, empty: neither. Precondition: it can run and
 /// parameters without a default have a default prior.
 std::string NullProblem(const UserEffect& effect);
-
-/// An effect by name: of the build, or one of the declared; or nullptr.
-const EffectInfo* FindEffect(std::span<const UserEffect> declared, const std::string& name);
-
-/// The same for parameters: FindParameter() of the catalogue, with the declared effects.
-const ParameterInfo* FindParameter(std::span<const UserEffect> declared, const std::string& contact,
-                                   std::span<const std::string> effects,
-                                   const std::string& dotted_name);
-
-/// Those of the build, then the declared.
-std::vector<const EffectInfo*> AllEffects(std::span<const UserEffect> declared);
 
 }  // namespace calib::dem

@@ -1,10 +1,91 @@
-#include "dem/lab_tests/angle_of_repose.h"
+// `angle_of_repose`: a cylinder is filled and lifted; the heap that stays.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 
-#include "dem/lab_tests/gravity_test.h"
+#include "absl/strings/str_cat.h"
+#include "dem/elementary/functions.h"
+#include "dem/lab_tests/shared/gravity_run.h"
+#include "dem/lab_tests/shared/gravity_test.h"
+#include "dem/measure/free_surface.h"
 
 namespace calib::dem {
 
-GravityTestEntry AngleOfRepose() {
+namespace {
+
+constexpr int kSides = 32;
+constexpr double kSolidFraction = 0.58;  ///< of the filling
+
+StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
+  const double d = run.largest_diameter();
+  double solid = 0;
+  for (const double r : run.radii()) {
+    solid += 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  }
+  const double radius =
+      0.5 *
+      run.SettingOr("cylinder_diameter",
+                    std::max(3 * d, CubeRoot(4 * solid / (kSolidFraction * std::numbers::pi))));
+  const double inner = radius * Cosine(std::numbers::pi / kSides);
+  const double speed =
+      run.SettingOr("lift_speed", 0.15 * std::sqrt(run.gravity() * run.mean_diameter()));
+  const Vec3 axis{4 * radius, 4 * radius, 0};
+  Packing grains = run.Fill(
+      {.low = {axis.x - radius, axis.y - radius, 0},
+       .width = 2 * radius,
+       .depth = 2 * radius,
+       .holds = [&](const Vec3& c,
+                    double r) { return Hypotenuse(c.x - axis.x, c.y - axis.y) + r < inner; }},
+      run.seed() + static_cast<std::uint64_t>(std::llround(1e6 * point.target)) * 1'000'003U);
+  if (run.CountOf(grains) < run.radii().size()) {
+    return run.Fail("cylinder_diameter is too small: no grain fits into the cylinder");
+  }
+  const double top = TopOf(grains);
+  grains.length[0] = grains.length[1] = 8 * radius;
+  grains.length[2] = top;
+  TriangleMesh side;
+  AddFrustum({.centre = axis,
+              .height = top + d,
+              .lower_radius = radius,
+              .upper_radius = radius,
+              .sides = kSides},
+             side);
+  Assembly assembly = run.Make(grains, {.walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
+                                                  MakeMeshWall("cylinder", side)}});
+  const double far = 100 * radius + 10 * top;
+  Flow flow = run.Drive(
+      assembly, {.drop_height = top, .low = {-far, -far, -d}, .high = {far, far, top + far}});
+  const double longest = 40 * std::sqrt(top / run.gravity());
+  StageEnd end = flow.Settle(longest, GravityRun::kSettling);
+  if (end == StageEnd::kDone) {
+    double heap = 0;
+    for (std::size_t g = 0; g < assembly.particles().z.size(); ++g) {
+      heap = std::max(heap, assembly.particles().z[g] + assembly.particles().radius[g]);
+    }
+    assembly.mutable_walls()[1].velocity = {0, 0, speed};
+    end = flow.Advance((heap + d) / speed);
+  }
+  if (end == StageEnd::kDone) {
+    assembly.mutable_walls()[1].active = false;
+    assembly.mutable_walls()[1].velocity = {};
+    assembly.SearchAgain();
+    end = flow.Settle(longest, run.Setting("local_damping"));
+  }
+  end = run.Close(end, flow, {}, absl::StrCat("repetition ", point.target));
+  if (end != StageEnd::kDone) {
+    return end;
+  }
+  const Heap heap = ConicalHeap(assembly.particles(), axis, run.mean_diameter());
+  return run.Report(point, {point.target, heap.angle, heap.height}, assembly);
+}
+
+StageEnd Walk(GravityRun& run) {
+  return run.Walk([&](const ControlPoint& point) { return Repeat(run, point); });
+}
+
+}  // namespace
+
+TestEntry AngleOfRepose() {
   return {
       .info = {.name = "angle_of_repose",
                .description =
@@ -29,7 +110,11 @@ GravityTestEntry AngleOfRepose() {
                             "Samuelsson 2023, sec. 1",
                .poured = true,
                .separate_points = true,
-               .control_range = ControlRange{.min = 0, .max = 1e6, .whole = true}}};
+               .control_range = ControlRange{.min = 0, .max = 1e6, .whole = true},
+               .has_walls = true,
+               .bodies = {"walls"}},
+      .place = 60,
+      .procedure = GravityProcedure(&Walk)};
 }
 
 }  // namespace calib::dem

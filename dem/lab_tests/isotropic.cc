@@ -1,4 +1,5 @@
-#include "dem/lab_tests/isotropic.h"
+// `isotropic`: the mean stress driven, all three axes at the same stress.
+#include "dem/lab_tests/shared/element_test.h"
 
 namespace calib::dem {
 namespace {
@@ -10,7 +11,7 @@ CellGoal Plan(const ElementTestContext& /*context*/, double mean_stress) {
 
 }  // namespace
 
-ElementTestEntry Isotropic() {
+TestEntry Isotropic() {
   return {.info = {.name = "isotropic",
                    .description =
                        "Periodic cell, isotropic compression to confining_pressure (the start "
@@ -24,7 +25,8 @@ ElementTestEntry Isotropic() {
                    .control = "mean_stress",
                    .may_reverse = true,
                    .reference = "Cheng et al. 2018, sec. 2.2"},
-          .plan = &Plan};
+          .place = 10,
+          .procedure = CellProcedure(&Plan)};
 }
 
 }  // namespace calib::dem

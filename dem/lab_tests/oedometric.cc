@@ -1,4 +1,5 @@
-#include "dem/lab_tests/oedometric.h"
+// `oedometric`: axial strain driven, no lateral strain.
+#include "dem/lab_tests/shared/element_test.h"
 
 namespace calib::dem {
 namespace {
@@ -10,7 +11,7 @@ CellGoal Plan(const ElementTestContext& /*context*/, double axial_strain) {
 
 }  // namespace
 
-ElementTestEntry Oedometric() {
+TestEntry Oedometric() {
   return {.info = {.name = "oedometric",
                    .description =
                        "Periodic cell, isotropic compression to confining_pressure (the start "
@@ -23,9 +24,10 @@ ElementTestEntry Oedometric() {
                    .observables = ElementObservables(),
                    .control = "axial_strain",
                    .may_reverse = true,
-                   .reference = "Cheng et al. 2019, sec. 4"},
-          .plan = &Plan,
-          .rig_load = RigLoad::kAxial};
+                   .reference = "Cheng et al. 2019, sec. 4",
+                   .rig_load = RigLoad::kAxial},
+          .place = 20,
+          .procedure = CellProcedure(&Plan)};
 }
 
 }  // namespace calib::dem

@@ -1,4 +1,5 @@
-#include "dem/lab_tests/simple_shear.h"
+// `simple_shear`: the top displaced over the bottom at constant normal stress or constant volume.
+#include "dem/lab_tests/shared/element_test.h"
 
 namespace calib::dem {
 namespace {
@@ -25,7 +26,12 @@ ParameterInfo ConstantVolume() {
 
 }  // namespace
 
-ElementTestEntry SimpleShear() {
+/// The periodic cell is sheared along x over its height (Lees-Edwards boundaries along z), without
+/// strain along x and y. The normal (axial) stress keeps the value of the end of consolidation, or,
+/// with constant_volume 1, the height does. Shear strain is the displacement of the top over the
+/// height at the end of consolidation, as a direct simple shear device gives it (ASTM D6528).
+/// [Lees & Edwards 1972]
+TestEntry SimpleShear() {
   return {
       .info = {.name = "simple_shear",
                .description =
@@ -42,7 +48,8 @@ ElementTestEntry SimpleShear() {
                .may_reverse = true,
                .reference = "Lees & Edwards, J. Phys. C 5 (1972) 1921; ASTM D6528",
                .one_pressure = true},
-      .plan = &Plan};
+      .place = 50,
+      .procedure = CellProcedure(&Plan)};
 }
 
 }  // namespace calib::dem

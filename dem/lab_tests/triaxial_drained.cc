@@ -1,4 +1,5 @@
-#include "dem/lab_tests/triaxial_drained.h"
+// `triaxial_drained`: axial strain driven, lateral stress held.
+#include "dem/lab_tests/shared/element_test.h"
 
 namespace calib::dem {
 namespace {
@@ -10,7 +11,7 @@ CellGoal Plan(const ElementTestContext& context, double axial_strain) {
 
 }  // namespace
 
-ElementTestEntry TriaxialDrained() {
+TestEntry TriaxialDrained() {
   return {.info = {.name = "triaxial_drained",
                    .description =
                        "Periodic cell, isotropic compression to confining_pressure, then axial "
@@ -22,9 +23,10 @@ ElementTestEntry TriaxialDrained() {
                    .control = "axial_strain",
                    .may_reverse = true,
                    .reference = "Cheng et al. 2018, sec. 4",
-                   .one_pressure = true},
-          .plan = &Plan,
-          .rig_load = RigLoad::kDeviatoric};
+                   .one_pressure = true,
+                   .rig_load = RigLoad::kDeviatoric},
+          .place = 30,
+          .procedure = CellProcedure(&Plan)};
 }
 
 }  // namespace calib::dem

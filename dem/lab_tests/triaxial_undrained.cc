@@ -1,4 +1,5 @@
-#include "dem/lab_tests/triaxial_undrained.h"
+// `triaxial_undrained`: axial strain driven at constant volume.
+#include "dem/lab_tests/shared/element_test.h"
 
 namespace calib::dem {
 namespace {
@@ -16,7 +17,12 @@ std::vector<std::string> Observed() {
 
 }  // namespace
 
-ElementTestEntry TriaxialUndrained() {
+/// The pores are taken as full of an incompressible liquid: the lateral strain is -eps_a/2 (in
+/// logarithmic measure), so that the volume at every settled stage is that of the end of
+/// consolidation, and grain stresses are the effective stresses. The excess pore pressure is what
+/// keeps the total lateral stress at the cell pressure. [Sitharam et al. 2002; Thornton 2000, sec.
+/// 4]
+TestEntry TriaxialUndrained() {
   return {.info = {.name = "triaxial_undrained",
                    .description =
                        "Periodic cell, isotropic compression to confining_pressure, then axial "
@@ -28,9 +34,10 @@ ElementTestEntry TriaxialUndrained() {
                    .control = "axial_strain",
                    .may_reverse = true,
                    .reference = "Sitharam, Dinesh & Shimizu, Int. J. Numer. Anal. Methods "
-                                "Geomech. 26 (2002) 1167"},
-          .plan = &Plan,
-          .rig_load = RigLoad::kDeviatoric};
+                                "Geomech. 26 (2002) 1167",
+                   .rig_load = RigLoad::kDeviatoric},
+          .place = 40,
+          .procedure = CellProcedure(&Plan)};
 }
 
 }  // namespace calib::dem

@@ -1,43 +1,17 @@
 #include "dem/measure/observables.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <map>
+#include <tuple>
 
 #include "dem/elementary/functions.h"
+#include "dem/measure/found_observables.h"
 
 namespace calib::dem {
 
 double Porosity(const Assembly& assembly) {
   return 1.0 - assembly.solid_volume() / assembly.cell().Volume();
-}
-
-void DeriveReadings(Measurement& m) {
-  m.mean_stress = (m.axial_stress + 2.0 * m.lateral_stress) / 3.0;
-  m.deviatoric_stress = m.axial_stress - m.lateral_stress;
-  m.stress_ratio = m.axial_stress / m.lateral_stress;
-  m.q_over_p = m.deviatoric_stress / m.mean_stress;
-  m.shear_stress_ratio = m.shear_stress / m.axial_stress;
-  m.void_ratio = m.porosity / (1.0 - m.porosity);
-}
-
-Measurement ReadThrough(const Apparatus& apparatus, double x, bool by_axial, Measurement m) {
-  if (!apparatus.Alters()) {
-    return m;
-  }
-  m.lateral_stress -= apparatus.MembraneStress(m.lateral_strain);
-  m.axial_stress += apparatus.load_gain * x + apparatus.load_offset;
-  if (apparatus.AltersStrain()) {
-    const double rig = apparatus.RigStrain(x);
-    m.axial_strain += rig;
-    if (by_axial) {
-      m.volumetric_strain += rig;
-      m.porosity = 1.0 - (1.0 - m.porosity) * Exp(rig);
-    }
-    m.lateral_strain = 0.5 * (m.volumetric_strain - m.axial_strain);
-  }
-  DeriveReadings(m);
-  return m;
 }
 
 Measurement Measure(const Assembly& assembly, const double reference[3]) {
@@ -61,36 +35,32 @@ Measurement Measure(const Assembly& assembly, const double reference[3]) {
   return m;
 }
 
-double Measurement::*MemberNamed(const std::string& name) {
-  static const std::map<std::string, double Measurement::*> members = {
-      {"axial_strain", &Measurement::axial_strain},
-      {"volumetric_strain", &Measurement::volumetric_strain},
-      {"lateral_strain", &Measurement::lateral_strain},
-      {"axial_stress", &Measurement::axial_stress},
-      {"lateral_stress", &Measurement::lateral_stress},
-      {"mean_stress", &Measurement::mean_stress},
-      {"deviatoric_stress", &Measurement::deviatoric_stress},
-      {"stress_ratio", &Measurement::stress_ratio},
-      {"q_over_p", &Measurement::q_over_p},
-      {"shear_strain", &Measurement::shear_strain},
-      {"shear_stress", &Measurement::shear_stress},
-      {"shear_stress_ratio", &Measurement::shear_stress_ratio},
-      {"pore_pressure", &Measurement::pore_pressure},
-      {"porosity", &Measurement::porosity},
-      {"void_ratio", &Measurement::void_ratio},
-      {"coordination_number", &Measurement::coordination_number},
-  };
-  const auto it = members.find(name);
-  return it == members.end() ? nullptr : it->second;
+std::span<const ObservableEntry> FurtherObservables() {
+  static const std::vector<ObservableEntry> entries = [] {
+    std::vector<ObservableEntry> found = FoundObservables();
+    std::sort(found.begin(), found.end(), [](const ObservableEntry& a, const ObservableEntry& b) {
+      return std::tie(a.place, a.info.name) < std::tie(b.place, b.info.name);
+    });
+    return found;
+  }();
+  return entries;
 }
 
-std::vector<double> Select(const Measurement& m, const std::vector<std::string>& names) {
+std::vector<double> Select(const Measurement& m, const Assembly& settled,
+                           const std::vector<std::string>& names) {
   std::vector<double> values;
   values.reserve(names.size());
   for (const std::string& name : names) {
-    double Measurement::*const member = MemberNamed(name);
-    assert(member != nullptr);
-    values.push_back(m.*member);
+    if (double Measurement::*const member = MemberNamed(name); member != nullptr) {
+      values.push_back(m.*member);
+      continue;
+    }
+    const auto further = FurtherObservables();
+    const auto it = std::find_if(further.begin(), further.end(), [&](const ObservableEntry& entry) {
+      return entry.info.name == name;
+    });
+    assert(it != further.end());
+    values.push_back(it->read(settled));
   }
   return values;
 }

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/registry.h"
+#include "dem/model/model.h"
 
 namespace calib::dem {
 namespace {

@@ -6,7 +6,7 @@
 #include "absl/status/status.h"
 #include "dem/formula/formula.h"
 #include "dem/measure/observables.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/model.h"
 
 namespace calib::dem {
 

@@ -2,7 +2,6 @@
 // Initial positions and sizes of the grains of one specimen in its periodic cell.
 
 #include <cstdint>
-#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -55,10 +54,6 @@ struct PackingRecipe {
 /// Radius of the largest grain that the recipe can give [m].
 double LargestRadius(const PackingRecipe& recipe);
 
-/// Grains of the recipe's sizes, thrown loosely into a cell, for tests that pour them themselves;
-/// its porosity and pressure are not used. Errors as GeneratePacking.
-absl::StatusOr<Packing> GenerateSizes(const PackingRecipe& recipe);
-
 /// The recipe of another packing of the grains of `packing`, which has single spheres only: its
 /// radii, its porosity and the shape of its cell. Compressed by other random places, the cell ends
 /// near that shape.
@@ -66,12 +61,5 @@ PackingRecipe RecipeLike(const Packing& packing);
 
 /// 1 - volume of all spheres / volume of the cell.
 double PorosityOf(const Packing& packing);
-
-/// Generates a packing; the same recipe gives the same bits on every thread count. Independent of
-/// the model's parameters, so that all samples of a campaign start from the same specimen. Errors:
-/// OUT_OF_RANGE with the attainable porosity range when the target cannot be reached by lowering
-/// friction; CANCELLED on stop.
-absl::StatusOr<Packing> GeneratePacking(const PackingRecipe& recipe, int threads,
-                                        std::stop_token stop);
 
 }  // namespace calib::dem

@@ -1,7 +1,7 @@
 #pragma once
 // The measurements as the inference sees them: a flat vector of readings with Gaussian errors.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <map>
 #include <string>
 #include <utility>

@@ -1,7 +1,6 @@
 #include "inference/data/gaussian_likelihood.h"
 
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cassert>
 #include <cmath>
 #include <cstring>
@@ -10,7 +9,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "inference/filter/wide_exponential.h"
+#include "inference/numerics/special_functions.h"
+#include "inference/numerics/wide_exponential.h"
 
 namespace calib::inference {
 namespace {
@@ -221,7 +221,7 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
     for (Eigen::Index k = 0; k < factor.log_constant.size(); ++k) {
       // Without the cancellation of the difference.
       const double before = shared.prior.shape + 0.5 * static_cast<double>(k);
-      factor.log_constant[k] = -std::log(boost::math::tgamma_delta_ratio(before, 0.5));
+      factor.log_constant[k] = -std::log(GammaRatio(before, 0.5));
     }
     likelihood.factors_.push_back(std::move(factor));
   }

@@ -1,7 +1,7 @@
 #pragma once
 // Gaussian likelihood of the readings, factorised along the processing order.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "absl/functional/function_ref.h"

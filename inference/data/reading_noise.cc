@@ -1,9 +1,10 @@
 #include "inference/data/reading_noise.h"
 
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
+
+#include "inference/numerics/special_functions.h"
 
 namespace calib::inference {
 namespace {
@@ -73,8 +74,8 @@ absl::StatusOr<OfOrder> Differences(const std::vector<ReadingRun>& runs, int ord
 
 // Factor on an observed scale: the true one is below (upper) or above it but for kSure.
 double LimitFactor(double degrees, bool upper) {
-  const double chi2 = 2 * (upper ? boost::math::gamma_p_inv(0.5 * degrees, kSure)
-                                 : boost::math::gamma_q_inv(0.5 * degrees, kSure));
+  const double chi2 =
+      2 * (upper ? GammaPInverse(0.5 * degrees, kSure) : GammaQInverse(0.5 * degrees, kSure));
   return std::sqrt(degrees / chi2);
 }
 

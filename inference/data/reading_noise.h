@@ -2,7 +2,7 @@
 // How large the errors of a measured curve are, judged by the curve alone: what changes from one
 // reading to the next and back cannot be the material's.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "absl/status/statusor.h"

@@ -1,13 +1,12 @@
 #include "inference/diagnosis/drawn_tail.h"
 
 #include <algorithm>
-#include <boost/math/distributions/fisher_f.hpp>
-#include <boost/math/distributions/students_t.hpp>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <map>
+
+#include "inference/numerics/special_functions.h"
 
 namespace calib::inference {
 namespace {
@@ -30,7 +29,7 @@ double GammaTail(double mean, double variance, double square) {
   if (shape > kNarrow || !(shape * (ratio - 1 - std::log(ratio)) < kNothing)) {
     return ratio > 1 ? 0 : 1;
   }
-  return boost::math::gamma_q(shape, shape * ratio);
+  return GammaQ(shape, shape * ratio);
 }
 
 double Variance(const Eigen::ArrayXd& values) {
@@ -61,13 +60,13 @@ DrawnTail::DrawnTail(const Eigen::VectorXd& drawn, const std::vector<int>& group
   if (!(between > 0) || !(within_ > 0)) return;
   const auto groups = static_cast<double>(rows.size());
   const double width = std::sqrt(between * (1 + 1 / groups));
-  const boost::math::students_t law(groups - 1);
+  const StudentLaw law{.freedom = groups - 1};
   const auto add_side = [&](double sign, int decades) {
     double beyond = 0.5;
     for (int k = 1; k <= kPerDecade * decades; ++k) {
       const bool last = k == kPerDecade * decades;
       const double next = last ? 0 : 0.5 * std::pow(10.0, -static_cast<double>(k) / kPerDecade);
-      const double t = boost::math::quantile(boost::math::complement(law, 0.5 * (beyond + next)));
+      const double t = law.TailQuantile(0.5 * (beyond + next));
       means_.emplace_back(std::exp(logarithm.mean() + sign * width * t), beyond - next);
       beyond = next;
     }
@@ -79,8 +78,9 @@ DrawnTail::DrawnTail(const Eigen::VectorXd& drawn, const std::vector<int>& group
 double DrawnTail::operator()(double square) const {
   if (!varies()) return 1;
   if (freedom_ > 0) {
-    const boost::math::fisher_f law(2 * mean_ * mean_ / variance_, freedom_);
-    return boost::math::cdf(boost::math::complement(law, square / mean_));
+    const FisherLaw law{.numerator = 2 * mean_ * mean_ / variance_,
+                        .denominator = static_cast<double>(freedom_)};
+    return law.Tail(square / mean_);
   }
   if (means_.empty()) return GammaTail(mean_, variance_, square);
   double sum = 0;

@@ -1,7 +1,7 @@
 #pragma once
 // How often a right model is as far off as a measurement is, from draws that share few packings.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <utility>
 #include <vector>
 

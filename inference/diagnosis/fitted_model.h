@@ -1,7 +1,7 @@
 #pragma once
 // A model as the statistics of the diagnosis see it.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "inference/diagnosis/histories.h"

@@ -1,7 +1,7 @@
 #pragma once
 // What a model can do, in as few numbers per point as it takes.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 namespace calib::inference {

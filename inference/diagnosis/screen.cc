@@ -1,9 +1,6 @@
 #include "inference/diagnosis/screen.h"
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -14,12 +11,16 @@
 #include "inference/diagnosis/drawn_tail.h"
 #include "inference/diagnosis/fall_tail.h"
 #include "inference/diagnosis/whitened.h"
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/special_functions.h"
 #include "inference/sampling/philox.h"
 
 namespace calib::inference {
 namespace {
 
 using Eigen::Index;
+
+constexpr double kPower = 0.9;  // chance that an effect of the detectable amplitude is found
 
 // A difference seen from every point.
 struct Direction {
@@ -40,7 +41,7 @@ std::vector<std::vector<Direction>> DirectionsOf(const std::vector<Signature>& c
     std::vector<Direction>& own = directions.emplace_back();
     for (const Eigen::VectorXd& difference : candidate.differences) {
       Direction direction{
-          .whitened = model.factor.matrixL().solve(difference), .square = 0, .along = {}};
+          .whitened = model.factor->matrixL().solve(difference), .square = 0, .along = {}};
       direction.square = direction.whitened.squaredNorm();
       direction.along = Along(model, direction.whitened);
       own.push_back(std::move(direction));
@@ -54,11 +55,11 @@ std::vector<std::vector<Direction>> DirectionsOf(const std::vector<Signature>& c
 double VarianceAlong(const Eigen::VectorXd& direction, const Whitened& model,
                      const std::vector<DrawnGroup>& groups) {
   if (groups.empty() || direction.isZero()) return 1;
-  const Eigen::VectorXd unwhitened = model.factor.matrixL() * direction;
+  const Eigen::VectorXd unwhitened = model.factor->matrixL() * direction;
   double sum = 0;
   double count = 0;
   for (const DrawnGroup& group : groups) {
-    const Eigen::VectorXd own = group.model.factor.matrixL().solve(unwhitened);
+    const Eigen::VectorXd own = group.model.factor->matrixL().solve(unwhitened);
     sum += (own.transpose() * group.draws).squaredNorm() / own.squaredNorm();
     count += static_cast<double>(group.draws.cols());
   }
@@ -118,9 +119,8 @@ double SquareOfEffect(const std::vector<Eigen::VectorXd>& differences,
 
 // Orthonormal, in the model's coordinates.
 Eigen::MatrixXd SpanOf(const Eigen::MatrixXd& shapes, const Whitened& model) {
-  const Eigen::MatrixXd whitened = model.factor.matrixL().solve(shapes);
-  return Eigen::HouseholderQR<Eigen::MatrixXd>(whitened).householderQ() *
-         Eigen::MatrixXd::Identity(shapes.rows(), shapes.cols());
+  const Eigen::MatrixXd whitened = LowerSolved(*model.factor, shapes);
+  return OrthonormalColumns(Eigen::HouseholderQR<Eigen::MatrixXd>(whitened));
 }
 
 // How many independent judgements the columns of `squares` (draws in rows) amount to: by how much
@@ -148,9 +148,8 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   adequacy.chi2 = whitened->squares.minCoeff(&adequacy.best);
   if (model.draws.rows() == 0) {
     adequacy.degrees = static_cast<double>(model.histories.readings() - model.parameters);
-    adequacy.p_chi2 = adequacy.degrees > 0
-                          ? boost::math::gamma_q(0.5 * adequacy.degrees, 0.5 * adequacy.chi2)
-                          : 1;
+    adequacy.p_chi2 =
+        adequacy.degrees > 0 ? GammaQ(0.5 * adequacy.degrees, 0.5 * adequacy.chi2) : 1;
     adequacy.p_value = adequacy.p_chi2;
     return adequacy;
   }
@@ -203,8 +202,8 @@ absl::StatusOr<std::vector<Index>> PointsNotExcluded(const FittedModel& model, i
   const Eigen::VectorXd& squares = whitened->squares;
   std::vector<Index> near(static_cast<std::size_t>(squares.size()));
   std::iota(near.begin(), near.end(), Index{0});
-  const boost::math::chi_squared law(std::max(1, model.parameters));
-  const double most = squares.minCoeff() + boost::math::quantile(law, 0.95);
+  const double most =
+      squares.minCoeff() + 2 * GammaPInverse(0.5 * std::max(1, model.parameters), 0.95);
   std::erase_if(near, [&](Index i) { return squares[i] > most; });
   std::stable_sort(near.begin(), near.end(),
                    [&](Index a, Index b) { return squares[a] < squares[b]; });
@@ -271,8 +270,7 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   // In sd along a direction: either sign of every difference of every candidate is a chance.
   const auto reach = [&](std::size_t differences) {
     const auto chances = static_cast<double>(candidates.size() * differences);
-    return SdAsked(options.level / chances, model) +
-           boost::math::quantile(boost::math::normal(), 0.9);
+    return SdAsked(options.level / chances, model) + NormalTailQuantile(1 - kPower);
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     Score score{.name = candidates[c].name};
@@ -381,7 +379,7 @@ absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, in
     if (!whitened.ok()) return whitened.status();
     Index best = 0;
     whitened->squares.minCoeff(&best);
-    const Eigen::MatrixXd lower = whitened->factor.matrixL();
+    const Eigen::MatrixXd lower = whitened->factor->matrixL();
     terms.emplace_back(0.5 * whitened->Point(best).array().square() +
                        lower.diagonal().array().log());
   }

@@ -2,7 +2,7 @@
 // Is a fitted model adequate, and if not, the signature of which candidate explains the misfit?
 // Matrices in, statistics out. What a signature is and where runs come from: README.md.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <map>
 #include <optional>

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "inference/numerics/decompositions.h"
+
 namespace calib::inference {
 namespace {
 
@@ -12,11 +14,11 @@ constexpr Index kFewestDraws = 50;
 
 absl::StatusOr<Whitened> WhitenByCovariance(const Eigen::MatrixXd& covariance,
                                             const Histories& histories) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
-  if (factor.info() != Eigen::Success) {
+  auto factor = std::make_shared<Eigen::LLT<Eigen::MatrixXd>>(covariance);
+  if (factor->info() != Eigen::Success) {
     return absl::InvalidArgumentError("diagnosis: the covariance is not positive definite");
   }
-  return WhitenBy(factor, histories);
+  return WhitenBy(std::move(factor), histories);
 }
 
 bool GroupsFit(const FittedModel& model) {
@@ -32,14 +34,14 @@ bool GroupsFit(const FittedModel& model) {
 
 }  // namespace
 
-Whitened WhitenBy(const Eigen::LLT<Eigen::MatrixXd>& factor, const Histories& histories) {
-  Whitened whitened{.factor = factor, .axes = {}, .points = {}, .squares = {}};
-  const Eigen::MatrixXd shapes = factor.matrixL().solve(histories.shapes());
+Whitened WhitenBy(CovarianceFactor factor, const Histories& histories) {
+  Whitened whitened{.factor = std::move(factor), .axes = {}, .points = {}, .squares = {}};
+  const Eigen::MatrixXd shapes = LowerSolved(*whitened.factor, histories.shapes());
   const Index t = shapes.rows();
   const Index q = shapes.cols();
   if (q < t) {
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(shapes);
-    whitened.axes = qr.householderQ() * Eigen::MatrixXd::Identity(t, q);
+    whitened.axes = OrthonormalColumns(qr);
     whitened.points =
         qr.matrixQR().topRows(q).triangularView<Eigen::Upper>() * histories.coefficients();
   } else {
@@ -79,7 +81,7 @@ absl::StatusOr<std::vector<DrawnGroup>> DrawsOf(const FittedModel& model) {
                                        model.histories);
     if (!whitened.ok()) return whitened.status();
     const Eigen::MatrixXd own = model.draws(numbers[g], Eigen::all).transpose();
-    Eigen::MatrixXd draws = whitened->factor.matrixL().solve(own);
+    Eigen::MatrixXd draws = LowerSolved(*whitened->factor, own);
     groups.push_back({.model = *std::move(whitened),
                       .number = std::move(numbers[g]),
                       .draws = std::move(draws)});

@@ -1,7 +1,8 @@
 #pragma once
 // Models and draws in coordinates in which distances are Mahalanobis distances.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -9,13 +10,16 @@
 
 namespace calib::inference {
 
+/// Cholesky factor of a T x T covariance, shared by all that is whitened by it; never null, immutable.
+using CovarianceFactor = std::shared_ptr<const Eigen::LLT<Eigen::MatrixXd>>;
+
 /// The model in coordinates in which a measurement scatters as a standard normal: its points lie in
 /// the span of q <= T axes.
 struct Whitened {
-  Eigen::LLT<Eigen::MatrixXd> factor;  ///< of the covariance
-  Eigen::MatrixXd axes;                ///< T x q, orthonormal
-  Eigen::MatrixXd points;              ///< q x G, along the axes
-  Eigen::VectorXd squares;             ///< G, of the points' lengths
+  CovarianceFactor factor;  ///< of the covariance
+  Eigen::MatrixXd axes;     ///< T x q, orthonormal
+  Eigen::MatrixXd points;   ///< q x G, along the axes
+  Eigen::VectorXd squares;  ///< G, of the points' lengths
 
   Eigen::VectorXd Point(Eigen::Index g) const { return axes * points.col(g); }  ///< T
 };
@@ -27,8 +31,7 @@ struct DrawnGroup {
   Eigen::MatrixXd draws;             ///< T x number of them, whitened
 };
 
-/// factor: of a T x T covariance.
-Whitened WhitenBy(const Eigen::LLT<Eigen::MatrixXd>& factor, const Histories& histories);
+Whitened WhitenBy(CovarianceFactor factor, const Histories& histories);
 
 /// Errors: INVALID_ARGUMENT for shapes that do not fit, a covariance that is not positive definite.
 absl::StatusOr<Whitened> Whiten(const FittedModel& model);

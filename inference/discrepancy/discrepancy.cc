@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
 namespace {
@@ -108,7 +109,7 @@ absl::StatusOr<Discrepancy> Discrepancy::Fit(std::vector<DiscrepancyCurve> curve
       return absl::InvalidArgumentError(
           absl::StrCat("the covariance of curve ", c, " is not positive definite."));
     }
-    inverse.block(at, at, m, m) = factor.matrixL().solve(Eigen::MatrixXd::Identity(m, m));
+    inverse.block(at, at, m, m) = LowerSolved(factor, Eigen::MatrixXd::Identity(m, m));
     fit.path_.segment(at, m) = curve.path;
     fit.scale_.segment(at, m).setConstant(curve.scale);
     residual.segment(at, m) = curve.residual;
@@ -130,8 +131,8 @@ absl::StatusOr<Discrepancy> Discrepancy::Fit(std::vector<DiscrepancyCurve> curve
         kernel.row(i) = fit.Kernel(basis, fit.curve_[static_cast<std::size_t>(i)],
                                    fit.path_.segment(i, 1), fit.scale_[i]);
       }
-      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(inverse * kernel *
-                                                                  inverse.transpose());
+      kernel = (inverse * kernel * inverse.transpose()).eval();
+      const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(kernel);
       if (solver.info() != Eigen::Success) {
         return absl::InvalidArgumentError("the covariance of a discrepancy has no eigenvalues.");
       }

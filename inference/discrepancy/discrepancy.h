@@ -2,7 +2,7 @@
 // A Gaussian process over the loading path for what a model leaves unexplained [Kennedy & O'Hagan
 // 2001]; see README.md for the model and its priors.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "absl/status/statusor.h"

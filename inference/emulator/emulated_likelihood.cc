@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
 namespace {
@@ -56,7 +57,7 @@ absl::StatusOr<EmulatedLikelihood> EmulatedLikelihood::Create(const DataSet& dat
                        " lie too close for their correlation length: leave out some."));
     }
     form.log_pivots = factor.matrixLLT().diagonal().array().log();
-    form.whitening = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
+    form.whitening = LowerSolved(factor, Eigen::MatrixXd::Identity(size, size));
     form.whitened_basis = form.whitening * basis;
     form.readings.assign(members.begin(), members.end());
     form.residual = likelihood.Whiten(form, Eigen::VectorXd::Zero(components.mean.size()));
@@ -115,10 +116,11 @@ EmulatedLikelihood EmulatedLikelihood::Of(const std::vector<Index>& readings) co
     const Eigen::MatrixXd rows = root(kept, Eigen::all);
     const Eigen::MatrixXd basis = rows * form.whitened_basis;
     const Eigen::VectorXd residual = rows * form.residual;
-    const Eigen::LLT<Eigen::MatrixXd> factor(rows * rows.transpose());
+    const Eigen::MatrixXd covariance = rows * rows.transpose();
+    const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
     const auto size = static_cast<Index>(kept.size());
     form.log_pivots = factor.matrixLLT().diagonal().array().log();
-    form.whitening = factor.matrixL().solve(Eigen::MatrixXd::Identity(size, size));
+    form.whitening = LowerSolved(factor, Eigen::MatrixXd::Identity(size, size));
     form.whitened_basis = form.whitening * basis;
     form.residual = form.whitening * residual;
     form.log_sd = form.log_sd(kept).eval();

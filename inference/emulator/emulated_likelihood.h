@@ -1,7 +1,7 @@
 #pragma once
 // Likelihood of the readings with the emulator's error in the covariance.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "absl/status/statusor.h"

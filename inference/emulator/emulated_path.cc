@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "inference/filter/ensemble.h"
-#include "inference/filter/log_weights.h"
-#include "inference/filter/weighted_moments.h"
+#include "inference/numerics/log_weights.h"
+#include "inference/numerics/weighted_moments.h"
 #include "inference/sampling/philox.h"
 #include "inference/tmcmc/tempering_step.h"
 

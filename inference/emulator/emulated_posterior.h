@@ -4,7 +4,7 @@
 // [filter/iterative_filter.h, ess and pareto_k]: with honest noise a posterior is tiny against the
 // prior, and a hundred weighted runs hold one effective sample.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <span>

@@ -1,12 +1,12 @@
 #include "inference/emulator/emulated_target.h"
 
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <map>
 #include <utility>
 
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/special_functions.h"
+#include "inference/numerics/standard_normal.h"
 
 namespace calib::inference {
 namespace {
@@ -111,7 +111,7 @@ Eigen::MatrixXd EmulatedTarget::Factors(const Eigen::MatrixXd& points) const {
       const double u =
           IsDefault(prior) ? 0 : std::exp(LogNormalCdf(std::clamp(z, -kFarthest, kFarthest)));
       z = IsDefault(prior) ? 1 / std::max(z * z, 1e-12)
-                           : prior.rate / boost::math::gamma_q_inv(prior.shape, u);
+                           : prior.rate / GammaQInverse(prior.shape, u);
     }
   }
   return factors;

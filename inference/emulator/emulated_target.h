@@ -2,7 +2,7 @@
 // What is sampled on an emulator: the parameters that are not held and, where the noise is inferred,
 // one coordinate per noise group, over the part of the prior where the emulator knows the model.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <optional>
 #include <span>
 #include <vector>

@@ -1,7 +1,7 @@
 #pragma once
 // The few curves that span the runs' histories.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <span>
 
 namespace calib::inference {

@@ -1,6 +1,5 @@
 #include "inference/emulator/search_widening.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>

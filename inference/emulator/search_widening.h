@@ -1,7 +1,7 @@
 #pragma once
 // Where the next runs go while a model is far from its readings.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <span>
 
 #include "inference/data/data_set.h"

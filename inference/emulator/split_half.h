@@ -1,7 +1,7 @@
 #pragma once
 // Split-half agreement of emulated posteriors: what another set of runs would have said.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <span>
 #include <stop_token>
 

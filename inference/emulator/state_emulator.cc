@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "inference/numerics/decompositions.h"
+
 namespace calib::inference {
 
 using Eigen::Index;

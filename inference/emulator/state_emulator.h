@@ -2,13 +2,13 @@
 // Emulator of the state history: principal components of the runs, a Gaussian process for each of
 // their scores.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <span>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "inference/emulator/gaussian_process.h"
 #include "inference/emulator/principal_components.h"
+#include "inference/numerics/gaussian_process.h"
 
 namespace calib::inference {
 

@@ -1,7 +1,7 @@
 #pragma once
 // Which runs the emulator learns from.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "absl/status/status.h"

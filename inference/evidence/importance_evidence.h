@@ -1,7 +1,7 @@
 #pragma once
 // Model evidence from importance weights.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::inference {
 

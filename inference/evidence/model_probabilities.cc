@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "inference/filter/log_weights.h"
+#include "inference/numerics/log_weights.h"
 #include "inference/sampling/philox.h"
 
 namespace calib::inference {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "inference/filter/log_weights.h"
+#include "inference/numerics/log_weights.h"
 
 namespace calib::inference {
 

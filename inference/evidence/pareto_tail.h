@@ -1,7 +1,7 @@
 #pragma once
 // How heavy the tail of the importance weights is.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 namespace calib::inference {

@@ -2,7 +2,7 @@
 // What ComputePosterior and FitProposal have in common: the samples of all iterations with their
 // likelihood.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <optional>
 #include <span>
 #include <vector>

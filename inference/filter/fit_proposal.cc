@@ -13,9 +13,10 @@
 #include "inference/filter/ensemble.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/filter/joint_states.h"
-#include "inference/filter/log_weights.h"
 #include "inference/mixture/dirichlet_mixture.h"
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/log_weights.h"
+#include "inference/numerics/standard_normal.h"
 #include "inference/sampling/sobol.h"
 
 namespace calib::inference {

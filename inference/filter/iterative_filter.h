@@ -3,7 +3,7 @@
 // [Cheng 2018] is its first iteration alone. Where we depart from the paper (weights, proposals,
 // noise): README.md of this folder.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <span>

@@ -4,6 +4,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "inference/numerics/decompositions.h"
+
 namespace calib::inference {
 namespace {
 
@@ -28,8 +30,8 @@ WeightedPoints JoinStates(const WeightedPoints& parameters, const Eigen::MatrixX
   const Eigen::MatrixXd regressors =
       roots.asDiagonal() * Centred(parameters.points.transpose(), shares);
   const Eigen::MatrixXd weighted = roots.asDiagonal() * Centred(states, shares);
-  const Eigen::MatrixXd residuals =
-      weighted - regressors * regressors.colPivHouseholderQr().solve(weighted);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> regression(regressors);
+  const Eigen::MatrixXd residuals = weighted - regressors * Solved(regression, weighted);
 
   // Left singular vectors, times their singular values, from the smaller of the two Gram matrices.
   const bool by_points = n < states.cols();

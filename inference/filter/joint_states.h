@@ -3,7 +3,7 @@
 // parameters alone do not [Cheng 2019, sec. 3.2 and 3.5: the mixture of the augmented states (x,
 // theta)].
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "inference/mixture/variational_steps.h"
 

@@ -8,8 +8,8 @@
 #include "inference/data/gaussian_likelihood.h"
 #include "inference/filter/ensemble.h"
 #include "inference/filter/iterative_filter.h"
-#include "inference/filter/log_weights.h"
 #include "inference/filter/tempering.h"
+#include "inference/numerics/log_weights.h"
 
 namespace calib::inference {
 namespace {

@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "inference/filter/weighted_moments.h"
+#include "inference/numerics/weighted_moments.h"
 
 namespace calib::inference {
 namespace {

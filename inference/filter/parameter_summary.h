@@ -1,7 +1,7 @@
 #pragma once
 // One parameter of a weighted sample in the numbers that reports show.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "inference/filter/iterative_filter.h"
 #include "inference/prior/prior.h"

@@ -11,11 +11,11 @@
 #include "inference/evidence/pareto_tail.h"
 #include "inference/filter/ensemble.h"
 #include "inference/filter/iterative_filter.h"
-#include "inference/filter/log_weights.h"
 #include "inference/filter/parameter_summary.h"
 #include "inference/filter/posterior_checks.h"
 #include "inference/filter/sequential_filter.h"
-#include "inference/filter/weighted_moments.h"
+#include "inference/numerics/log_weights.h"
+#include "inference/numerics/weighted_moments.h"
 #include "inference/sampling/shuffle.h"
 
 namespace calib::inference {

@@ -1,10 +1,10 @@
 #include "inference/filter/posterior_checks.h"
 
 #include <algorithm>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
 
+#include "inference/numerics/special_functions.h"
 #include "inference/sampling/halton.h"
 
 namespace calib::inference {
@@ -26,7 +26,7 @@ Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
       }
       const double u = RadicalInverse(static_cast<std::uint64_t>(m) + 1, 2);
       draws[static_cast<std::size_t>(m)] =
-          std::sqrt(factors.rates(i, g) / boost::math::gamma_q_inv(factors.shapes[g], u));
+          std::sqrt(factors.rates(i, g) / GammaQInverse(factors.shapes[g], u));
     }
     std::sort(draws.begin(), draws.end());
     scale.row(g) << draws[kDraws / 20], draws[kDraws / 2], draws[kDraws - 1 - kDraws / 20];
@@ -37,8 +37,6 @@ Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
 // ln L = const - chi^2 / 2 with stated errors, the constant that of zero residuals.
 double PredictiveP(const DataSet& data, const Eigen::VectorXd& log_likelihood,
                    const Eigen::VectorXd& log_weights, const KnownFrom& known) {
-  // In double alone: in long double it was a sixth of the time of a posterior.
-  using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
   const auto likelihood = GaussianLikelihood::Create(data, NoiseMode::kGiven);
   const bool few = std::isfinite(known.Freedom());
   double p = 0;
@@ -51,7 +49,7 @@ double PredictiveP(const DataSet& data, const Eigen::VectorXd& log_likelihood,
     if (weight < 1e-12) continue;
     const double half = std::max(0.0, perfect - log_likelihood[i]);
     p += weight * (few ? UpperTail(2 * half, static_cast<double>(readings), known)
-                       : boost::math::gamma_q(0.5 * static_cast<double>(readings), half, Policy()));
+                       : GammaQInDouble(0.5 * static_cast<double>(readings), half));
   }
   return p;
 }

@@ -1,7 +1,7 @@
 #pragma once
 // What a posterior of weighted samples says about itself beside its moments.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <span>
 #include <vector>
 

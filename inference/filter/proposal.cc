@@ -8,7 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "inference/filter/iterative_filter.h"
-#include "inference/filter/log_weights.h"
+#include "inference/numerics/log_weights.h"
 #include "inference/sampling/halton.h"
 #include "inference/sampling/latin_hypercube.h"
 #include "inference/sampling/philox.h"

@@ -5,9 +5,9 @@
 #include <cstring>
 #include <limits>
 
-#include "inference/filter/log_weights.h"
 #include "inference/filter/parameter_summary.h"
-#include "inference/filter/wide_exponential.h"
+#include "inference/numerics/log_weights.h"
+#include "inference/numerics/wide_exponential.h"
 
 namespace calib::inference {
 namespace {

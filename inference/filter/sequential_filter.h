@@ -1,7 +1,7 @@
 #pragma once
 // Sequential importance sampling along the readings [Cheng 2019, Eqs. 13-17], in log space.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 namespace calib::inference {

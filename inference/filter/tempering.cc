@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "inference/filter/log_weights.h"
+#include "inference/numerics/log_weights.h"
 
 namespace calib::inference {
 namespace {

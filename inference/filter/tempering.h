@@ -1,7 +1,7 @@
 #pragma once
 // The exponent of the likelihood that gives a wanted effective sample size.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::inference {
 

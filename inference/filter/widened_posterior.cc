@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "inference/filter/parameter_summary.h"
-#include "inference/filter/weighted_moments.h"
+#include "inference/numerics/weighted_moments.h"
 #include "inference/scatter/moved_draws.h"
 
 namespace calib::inference {

@@ -4,7 +4,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/standard_normal.h"
 #include "inference/sampling/halton.h"
 
 namespace calib::inference {

@@ -1,7 +1,7 @@
 #pragma once
 // Mass of a multivariate Gaussian inside a box.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::inference {
 

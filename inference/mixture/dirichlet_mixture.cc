@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "inference/mixture/k_means.h"
 #include "inference/mixture/softmax_moments.h"
+#include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
 namespace {

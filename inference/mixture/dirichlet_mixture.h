@@ -2,7 +2,7 @@
 // Variational Dirichlet-process mixture of Gaussians, fitted to weighted samples [Blei & Jordan
 // 2006; Cheng 2019, sec. 3.5].
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 

@@ -4,8 +4,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "inference/filter/log_weights.h"
 #include "inference/mixture/box_probability.h"
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/log_weights.h"
 
 namespace calib::inference {
 

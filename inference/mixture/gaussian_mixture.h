@@ -1,7 +1,7 @@
 #pragma once
 // A finite mixture of multivariate Gaussians: its density and its draws.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <span>
 #include <vector>
 

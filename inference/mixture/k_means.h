@@ -1,7 +1,7 @@
 #pragma once
 // Clusters from which the mixture's iterations start.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "inference/mixture/variational_steps.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "inference/filter/wide_exponential.h"
+#include "inference/numerics/wide_exponential.h"
 
 namespace calib::inference {
 namespace {

@@ -2,10 +2,10 @@
 // One pass over samples for a mixture of log-linear densities: E step and the sums of the M step
 // together, so that no responsibility is ever stored.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
-#include "inference/filter/wide_exponential.h"
+#include "inference/numerics/wide_exponential.h"
 
 namespace calib::inference {
 

@@ -1,20 +1,17 @@
 #include "inference/mixture/variational_steps.h"
 
 #include <algorithm>
-#include <boost/math/special_functions/digamma.hpp>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/special_functions.h"
+
 namespace calib::inference {
 namespace {
 
-using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
-
-double Digamma(double x) { return boost::math::digamma(x, Policy()); }
-double LogGamma(double x) { return boost::math::lgamma(x, Policy()); }
 double LogBeta(double a, double b) { return LogGamma(a) + LogGamma(b) - LogGamma(a + b); }
 
 // sum_{i<d} f((nu - i) / 2), the multivariate digamma and log gamma without their constants.

@@ -1,7 +1,7 @@
 #pragma once
 // The coordinate ascent behind the Dirichlet-process mixture: E step, M step, lower bounds.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 namespace calib::inference {

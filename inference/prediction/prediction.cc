@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "inference/prior/standard_normal.h"
-#include "inference/scatter/student_ratio.h"
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/special_functions.h"
+#include "inference/numerics/standard_normal.h"
 
 namespace calib::inference {
 namespace {
@@ -119,7 +120,7 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
   } else if (result.separated) {
     const Eigen::MatrixXd centred = parameters.rowwise() - parameters.colwise().mean();
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> regression(centred);
-    const Eigen::MatrixXd fitted = centred * regression.solve(departure);
+    const Eigen::MatrixXd fitted = centred * Solved(regression, departure);
     const auto rank = static_cast<double>(regression.rank());
     const Eigen::ArrayXd scatter =
         (departure - fitted).colwise().squaredNorm().transpose().array() /

@@ -1,7 +1,7 @@
 #pragma once
 // A quantity predicted from runs at draws of the posterior [Hadjidoukas 2014, Eqs. 11-15].
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "absl/status/statusor.h"
 

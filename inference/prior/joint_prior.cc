@@ -7,7 +7,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/standard_normal.h"
 #include "inference/sampling/sobol.h"
 
 namespace calib::inference {

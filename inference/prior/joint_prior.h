@@ -2,7 +2,7 @@
 // Prior of all parameters together: marginals, tied by a Gaussian copula and cut by linear
 // constraints where the user says so.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <span>
 #include <vector>
 

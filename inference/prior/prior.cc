@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "absl/strings/str_cat.h"
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/standard_normal.h"
 
 namespace calib::inference {
 namespace {

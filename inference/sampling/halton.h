@@ -1,7 +1,7 @@
 #pragma once
 // Halton sequence [Halton 1960], unscrambled: the first design of Cheng 2018 and 2019.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 
 namespace calib::inference {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/decompositions.h"
 #include "inference/sampling/philox.h"
 
 namespace calib::inference {

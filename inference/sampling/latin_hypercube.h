@@ -2,7 +2,7 @@
 // Latin hypercube designs [McKay, Beckman & Conover 1979] and their symmetric kind [Ye, Li &
 // Sudjianto 2000].
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 
 #include "absl/status/statusor.h"

@@ -2,7 +2,7 @@
 
 #include <Random123/philox.h>
 
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/standard_normal.h"
 
 namespace calib::inference {
 

@@ -1,7 +1,7 @@
 #pragma once
 // Sobol sequence with Owen's nested uniform scrambling.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 
 namespace calib::inference {

@@ -1,12 +1,11 @@
 #include "inference/scatter/chi_squared_law.h"
 
 #include <algorithm>
-#include <boost/math/distributions/fisher_f.hpp>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
-#include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <limits>
+
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/special_functions.h"
 
 namespace calib::inference {
 namespace {
@@ -36,16 +35,15 @@ KnownFrom WhatIsKnown(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& 
   KnownFrom known{
       .readings = static_cast<double>(covariance.rows()), .scatter = 0, .packings = packings};
   if (packings < 2) return known;
-  const Eigen::MatrixXd share = Eigen::LLT<Eigen::MatrixXd>(covariance).solve(scatter);
+  const Eigen::MatrixXd share = Solved(Eigen::LLT<Eigen::MatrixXd>(covariance), scatter);
   known.scatter = std::clamp(share.cwiseProduct(share.transpose()).sum(), 0.0, known.readings);
   return known;
 }
 
 double UpperTail(double chi2, double degrees, const KnownFrom& known) {
   const double freedom = known.Freedom();
-  if (!std::isfinite(freedom)) return boost::math::gamma_q(0.5 * degrees, 0.5 * chi2);
-  const boost::math::fisher_f law(degrees, freedom);
-  return boost::math::cdf(boost::math::complement(law, chi2 / degrees));
+  if (!std::isfinite(freedom)) return GammaQ(0.5 * degrees, 0.5 * chi2);
+  return FisherLaw{.numerator = degrees, .denominator = freedom}.Tail(chi2 / degrees);
 }
 
 double NormalDeviate(double chi2, double degrees, const KnownFrom& known) {
@@ -59,12 +57,10 @@ double NormalDeviate(double chi2, double degrees, const KnownFrom& known) {
 double NormalDeviateOfMean(double ratio, double share, int packings) {
   const double freedom = Freedom(share * share, packings);
   if (!std::isfinite(freedom) || !std::isfinite(ratio)) return ratio;
-  const boost::math::students_t law(freedom);
-  const double beyond = boost::math::cdf(boost::math::complement(law, std::abs(ratio)));
+  const double beyond = StudentLaw{.freedom = freedom}.Tail(std::abs(ratio));
   // So rare a value that a double does not hold its chance stays as it is.
   if (!(beyond > std::numeric_limits<double>::min())) return ratio;
-  return std::copysign(
-      boost::math::quantile(boost::math::complement(boost::math::normal(), beyond)), ratio);
+  return std::copysign(NormalTailQuantile(beyond), ratio);
 }
 
 }  // namespace calib::inference

@@ -1,7 +1,7 @@
 #pragma once
 // Chi-squared and means of readings whose covariance is in part scatter that few packings show.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::inference {
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "inference/numerics/decompositions.h"
 #include "inference/sampling/philox.h"
 
 namespace calib::inference {

@@ -1,7 +1,7 @@
 #pragma once
 // Draws of a posterior that is too sure, moved by what refits of the replicates add to it.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 

@@ -2,7 +2,7 @@
 // Covariance of the scatter between packings from runs on them, and for each packing the one that
 // knows nothing of it.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <functional>
 #include <optional>
 #include <vector>

@@ -3,7 +3,8 @@
 #include <cassert>
 #include <cmath>
 
-#include "inference/scatter/student_ratio.h"
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/special_functions.h"
 
 namespace calib::inference {
 
@@ -34,8 +35,8 @@ Eigen::MatrixXd SpreadOfRefits(const Eigen::MatrixXd& draws, const Eigen::Matrix
   const Eigen::MatrixXd posterior = z.transpose() * z / n;
   // The estimate moves by gain * difference of a measurement: C J^T K^-1, C J^T from the draws.
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
-  const Eigen::MatrixXd gain = factor.solve(h.transpose() * z / n).transpose();  // d x T
-  const Eigen::MatrixXd shifts = gain * replicates.departures.transpose();       // d x R
+  const Eigen::MatrixXd gain = Solved(factor, h.transpose() * z / n).transpose();  // d x T
+  const Eigen::MatrixXd shifts = gain * replicates.departures.transpose();         // d x R
   const auto freedom = static_cast<double>(count - 1);
   const double ratio = StudentRatio(freedom);
   const Eigen::MatrixXd beyond = ratio * ratio / freedom * (shifts * shifts.transpose()) -
@@ -45,9 +46,8 @@ Eigen::MatrixXd SpreadOfRefits(const Eigen::MatrixXd& draws, const Eigen::Matrix
   if (factor.info() != Eigen::Success || sphere.info() != Eigen::Success) {
     return Eigen::MatrixXd::Zero(draws.cols(), draws.cols());
   }
-  const Eigen::MatrixXd half = sphere.matrixL().solve(beyond);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(
-      sphere.matrixL().solve(half.transpose()));
+  const Eigen::MatrixXd half = LowerSolved(sphere, beyond);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(LowerSolved(sphere, half.transpose()));
   const Eigen::MatrixXd axes = sphere.matrixL() * parts.eigenvectors();
   return axes * parts.eigenvalues().cwiseMax(0).asDiagonal() * axes.transpose();
 }

@@ -4,7 +4,7 @@
 // none between observables) may be far too sure of them; replicates on several packings, each
 // fitted as if it were the measurement, show it without any assumption on that form.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::inference {
 

@@ -2,7 +2,7 @@
 // Scatter of the model: what two runs of one parameter vector differ by, because their packings do.
 // Strongly correlated along the path, so a covariance and not a number.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 

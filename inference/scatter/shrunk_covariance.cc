@@ -4,6 +4,8 @@
 #include <cassert>
 #include <map>
 
+#include "inference/numerics/decompositions.h"
+
 namespace calib::inference {
 
 using Eigen::Index;
@@ -16,13 +18,10 @@ ShrunkCovariance ShrinkCovariance(const Eigen::MatrixXd& departures, const std::
   for (Index i = 0; i < n; ++i) groups[group[static_cast<std::size_t>(i)]].push_back(i);
   if (groups.size() < 2) return {.covariance = target, .target_weight = 1};
   const Eigen::LLT<Eigen::MatrixXd> factor(unit);
-  const auto whiten = [&factor](const Eigen::MatrixXd& matrix) -> Eigen::MatrixXd {
-    return factor.matrixL().solve(matrix);
-  };
-  const Eigen::MatrixXd z = whiten(departures.transpose());  // T x n
+  const Eigen::MatrixXd z = LowerSolved(factor, departures.transpose());  // T x n
   const auto count = static_cast<double>(n);
   const Eigen::MatrixXd seen = z * z.transpose() / count;
-  const Eigen::MatrixXd closed = whiten(whiten(target).transpose());
+  const Eigen::MatrixXd closed = LowerSolved(factor, LowerSolved(factor, target).transpose());
   double chance = 0;
   for (const auto& [number, rows] : groups) {
     const Eigen::MatrixXd own = z(Eigen::all, rows);

@@ -2,7 +2,7 @@
 // Scatter of single runs as a full covariance over all readings: what is seen of it, held together
 // by a closed form where runs are few.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 namespace calib::inference {

@@ -2,12 +2,12 @@
 // What an emulator of runs says of one of their outputs: which parameters move it, and how it goes
 // with them.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <span>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "inference/emulator/gaussian_process.h"
+#include "inference/numerics/gaussian_process.h"
 #include "inference/prior/joint_prior.h"
 #include "inference/sensitivity/sobol_indices.h"
 

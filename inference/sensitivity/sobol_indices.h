@@ -1,7 +1,7 @@
 #pragma once
 // Which parameters move an output, over the whole range of their prior: variance-based indices.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <functional>
 #include <span>

@@ -1,7 +1,7 @@
 #pragma once
 // Spread of numbers, and what of it is rounding.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::inference {
 

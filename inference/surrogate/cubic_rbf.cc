@@ -1,11 +1,13 @@
 #include "inference/surrogate/cubic_rbf.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
 namespace {
@@ -72,7 +74,7 @@ bool CubicRbf::ChooseTailPoints() {
     block.col(m + k) = border;
     block.row(m + k).head(m) = border.head(m).transpose();
   }
-  block_.compute(block);
+  block_ = std::make_shared<Eigen::PartialPivLU<Eigen::MatrixXd>>(block);
   return true;
 }
 
@@ -91,7 +93,7 @@ Eigen::VectorXd CubicRbf::Border(int i) const {
 // One more row of the Cholesky factor of S; false when its pivot vanishes.
 bool CubicRbf::AppendRow(int i) {
   const Eigen::VectorXd border = Border(i);
-  const Eigen::VectorXd solved = block_.solve(border);
+  const Eigen::VectorXd solved = block_->solve(border);
   const std::size_t n = others_.size();
   Eigen::VectorXd row(static_cast<Index>(n) + 1);
   for (std::size_t k = 0; k < n; ++k) {
@@ -120,7 +122,7 @@ void CubicRbf::Solve() {
   Eigen::VectorXd first = Eigen::VectorXd::Zero(2 * m);
   for (Index k = 0; k < m; ++k)
     first[m + k] = values_[static_cast<std::size_t>(tail_points_[static_cast<std::size_t>(k)])];
-  const Eigen::VectorXd particular = block_.solve(first);
+  const Eigen::VectorXd particular = block_->solve(first);
 
   const std::size_t n = others_.size();
   Eigen::VectorXd second(static_cast<Index>(n));

@@ -1,8 +1,8 @@
 #pragma once
 // Cubic radial basis function interpolant with a linear tail [Powell 1992; Regis & Shoemaker 2007].
 
-#include <Eigen/Dense>
-#include <span>
+#include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -54,12 +54,12 @@ class CubicRbf {
   int dimensions_;
   std::vector<Eigen::VectorXd> points_;
   std::vector<double> values_;
-  std::vector<int> tail_points_;                // d + 1 indices, ascending
-  std::vector<int> others_;                     // the rest in the order of the factor's rows
-  Eigen::PartialPivLU<Eigen::MatrixXd> block_;  // A = [0 P^T; P Phi_11]
-  std::vector<Eigen::VectorXd> borders_;        // columns of B
-  std::vector<Eigen::VectorXd> solved_;         // columns of A^-1 B
-  std::vector<Eigen::VectorXd> factor_;         // rows of the Cholesky factor of S
+  std::vector<int> tail_points_;  // d + 1 indices, ascending
+  std::vector<int> others_;       // the rest in the order of the factor's rows
+  std::shared_ptr<const Eigen::PartialPivLU<Eigen::MatrixXd>> block_;  // A = [0 P^T; P Phi_11]
+  std::vector<Eigen::VectorXd> borders_;                               // columns of B
+  std::vector<Eigen::VectorXd> solved_;                                // columns of A^-1 B
+  std::vector<Eigen::VectorXd> factor_;  // rows of the Cholesky factor of S
   Eigen::VectorXd coefficients_;
   Eigen::VectorXd tail_;
 };

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "inference/emulator/gaussian_process.h"
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/gaussian_process.h"
+#include "inference/numerics/standard_normal.h"
 #include "inference/sampling/philox.h"
 #include "inference/sampling/sobol.h"
 

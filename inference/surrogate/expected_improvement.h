@@ -2,7 +2,7 @@
 // The next point of an expensive minimisation by expected improvement on a Gaussian process [Jones,
 // Schonlau & Welch 1998], the alternative to the response surface's merit.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <optional>
 
 #include "absl/status/statusor.h"

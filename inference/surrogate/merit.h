@@ -1,7 +1,7 @@
 #pragma once
 // Which candidate to evaluate next [Regis & Shoemaker 2007; Samuelsson 2023, Alg. 4].
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::inference {
 

@@ -3,7 +3,7 @@
 // version, asynchronous and with early termination [Regis & Shoemaker 2007; Samuelsson 2023, Alg.
 // 3-5].
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <functional>
 #include <optional>

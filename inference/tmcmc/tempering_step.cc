@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "inference/numerics/decompositions.h"
+
 namespace calib::inference {
 namespace {
 

@@ -2,7 +2,7 @@
 // The numerical choices of a tempering stage: how far the exponent goes, and shape and scale of the
 // proposal.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstddef>
 
 namespace calib::inference {

@@ -6,7 +6,7 @@
 // to the same posterior and evidence. Where we depart from the papers (steps per stage, spread of
 // the weights, standard error): README.md of this folder.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <functional>
 #include <span>

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "calib/v1/campaign.grpc.pb.h"
 #include "proto/rpc/address.h"
 #include "proto/rpc/chunking.h"
@@ -190,11 +191,10 @@ absl::Status Client::PutBlob(const std::string& content) {
 absl::StatusOr<std::string> Client::GetBlob(const std::string& digest) {
   v1::BlobByDigest request;
   request.set_digest(digest);
-  const auto chunks = Collect(impl_->connection, &Stub::GetBlob, request);
-  if (!chunks.ok()) return chunks.status();
+  ASSIGN_OR_RETURN(const auto chunks, Collect(impl_->connection, &Stub::GetBlob, request));
   rpc::BlobAssembler assembler;
-  for (const v1::BlobChunk& chunk : *chunks) {
-    if (auto added = assembler.Add(chunk); !added.ok()) return added;
+  for (const v1::BlobChunk& chunk : chunks) {
+    RETURN_IF_ERROR(assembler.Add(chunk));
   }
   return assembler.Finish();
 }
@@ -204,9 +204,9 @@ absl::StatusOr<v1::SubmitReply> Client::Submit(const v1::SubmitRequest& request)
 }
 
 absl::StatusOr<std::vector<v1::CampaignStatus>> Client::List() {
-  const auto reply = Call<v1::ListReply>(impl_->connection, &Stub::List, v1::ListRequest());
-  if (!reply.ok()) return reply.status();
-  return std::vector<v1::CampaignStatus>(reply->campaigns().begin(), reply->campaigns().end());
+  ASSIGN_OR_RETURN(const auto reply,
+                   Call<v1::ListReply>(impl_->connection, &Stub::List, v1::ListRequest()));
+  return std::vector<v1::CampaignStatus>(reply.campaigns().begin(), reply.campaigns().end());
 }
 
 absl::StatusOr<v1::CampaignStatus> Client::Show(const std::string& campaign) {
@@ -253,7 +253,7 @@ absl::StatusOr<std::vector<v1::LogEntry>> Client::GetLog(const std::string& camp
 
 absl::Status Client::AddFinding(const std::string& campaign, const std::string& kind,
                                 const std::string& document) {
-  if (auto put = PutBlob(document); !put.ok()) return put;
+  RETURN_IF_ERROR(PutBlob(document));
   v1::AddFindingRequest request;
   request.set_campaign(campaign);
   request.set_kind(kind);
@@ -262,9 +262,9 @@ absl::Status Client::AddFinding(const std::string& campaign, const std::string& 
 }
 
 absl::StatusOr<std::vector<v1::Finding>> Client::Findings(const std::string& campaign) {
-  const auto list = Call<v1::FindingList>(impl_->connection, &Stub::ListFindings, Of(campaign));
-  if (!list.ok()) return list.status();
-  return std::vector<v1::Finding>(list->findings().begin(), list->findings().end());
+  ASSIGN_OR_RETURN(const auto list,
+                   Call<v1::FindingList>(impl_->connection, &Stub::ListFindings, Of(campaign)));
+  return std::vector<v1::Finding>(list.findings().begin(), list.findings().end());
 }
 
 absl::StatusOr<v1::CampaignStatus> Client::Pause(const std::string& campaign) {
@@ -284,10 +284,9 @@ absl::Status Client::Delete(const std::string& campaign) {
 }
 
 absl::StatusOr<std::vector<v1::WorkerInfo>> Client::ListWorkers() {
-  const auto reply =
-      Call<v1::WorkerList>(impl_->connection, &Stub::ListWorkers, v1::ListWorkersRequest());
-  if (!reply.ok()) return reply.status();
-  return std::vector<v1::WorkerInfo>(reply->workers().begin(), reply->workers().end());
+  ASSIGN_OR_RETURN(const auto reply, Call<v1::WorkerList>(impl_->connection, &Stub::ListWorkers,
+                                                          v1::ListWorkersRequest()));
+  return std::vector<v1::WorkerInfo>(reply.workers().begin(), reply.workers().end());
 }
 
 absl::StatusOr<v1::WorkerInfo> Client::DrainWorker(const std::string& worker) {

@@ -8,37 +8,41 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/campaign_file.h"
-#include "server/campaign/identity.h"
-#include "server/campaign/sha256.h"
+#include "calib/return_if_error.h"
+#include "server/campaign/file/campaign_file.h"
+#include "server/campaign/model/identity.h"
+#include "server/campaign/model/sha256.h"
 #include "server/client/interrupt.h"
 #include "server/client/load_view.h"
 #include "server/client/no_worker_notice.h"
 #include "server/client/progress.h"
+#include "server/messages/read_words.h"
 
 namespace calib::client {
+
+using campaign::CampaignState;
+
 namespace {
 
 constexpr std::chrono::milliseconds kPollServer{100};
 
-bool IsOver(const std::string& state) {
-  return state == "finished" || state == "failed" || state == "cancelled";
-}
-
 // About a campaign that is not finished.
 std::string WhatToDo(const v1::CampaignStatus& status) {
   const std::string& id = status.campaign();
-  if (status.state() == "paused") return absl::StrCat("go on with `calibctl resume ", id, "`");
-  if (status.state() == "failed") {
+  const auto state = messages::StateOf(status);
+  if (state == CampaignState::kPaused) return absl::StrCat("go on with `calibctl resume ", id, "`");
+  if (state == CampaignState::kFailed) {
     return "its reason says what to change in the campaign file before it is submitted again";
   }
-  if (status.state() == "cancelled") return "submit it again (with another seed) and let it end";
+  if (state == CampaignState::kCancelled)
+    return "submit it again (with another seed) and let it end";
   return absl::StrCat("wait for it with `calibctl watch ", id, "`");
 }
 
 // Runs that another verb made for a purpose of its own say nothing by themselves.
 std::string WhyNoCalibration(const v1::CampaignStatus& status) {
-  const bool trial = status.purpose() == "warm_fit" || status.method() == "table";
+  const bool trial = messages::PurposeOf(status) == campaign::DerivedFor::kWarmFit ||
+                     messages::MethodOf(status) == campaign::Method::kTable;
   if (!trial || status.parent().empty()) return "";
   return absl::StrCat(status.campaign(), " is no calibration but a trial (", status.purpose(),
                       ") made of ", status.parent(), "; ask ", status.parent(), " instead");
@@ -47,14 +51,13 @@ std::string WhyNoCalibration(const v1::CampaignStatus& status) {
 }  // namespace
 
 absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& campaign) {
-  const auto status = session_.client().Show(campaign);
-  if (!status.ok()) return status.status();
-  if (status->state() != "finished") {
+  ASSIGN_OR_RETURN(const auto status, session_.client().Show(campaign));
+  if (messages::StateOf(status) != CampaignState::kFinished) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "campaign ", campaign, " is ", status->state(), ", not finished",
-        status->reason().empty() ? "" : ": " + status->reason(), "; ", WhatToDo(*status)));
+        "campaign ", campaign, " is ", status.state(), ", not finished",
+        status.reason().empty() ? "" : ": " + status.reason(), "; ", WhatToDo(status)));
   }
-  if (const std::string why = WhyNoCalibration(*status); !why.empty()) {
+  if (const std::string why = WhyNoCalibration(status); !why.empty()) {
     return absl::FailedPreconditionError(why);
   }
   return LoadView(session_.client(), campaign);
@@ -69,7 +72,8 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
       const absl::Status why = session_.Check();
       return why.ok() ? status.status() : why;
     }
-    if (!line && status->state() == "finished") return absl::OkStatus();
+    const auto state = messages::StateOf(*status);
+    if (!line && state == CampaignState::kFinished) return absl::OkStatus();
     if (!line) {
       std::cerr << what << ": campaign " << campaign << "\n";
       line.emplace();
@@ -78,19 +82,19 @@ absl::Status Laboratory::Wait(const std::string& campaign, const std::string& wh
     line->Show(ProgressText(*status),
                kMilestones * 2 * status->iteration() +
                    kMilestones * status->samples_done() / std::max(1, status->samples()));
-    if (status->state() == "finished") return absl::OkStatus();
+    if (state == CampaignState::kFinished) return absl::OkStatus();
     notice.Look(*status);
-    if (IsOver(status->state()) || status->state() == "paused") {
+    if (messages::IsOver(*status) || state == CampaignState::kPaused) {
       const std::string why =
           absl::StrCat("campaign ", campaign, " (", what, ") is ", status->state(),
                        status->reason().empty() ? "" : ": ", status->reason());
-      return status->state() == "failed" ? absl::AbortedError(why)
-                                         : absl::FailedPreconditionError(why);
+      return state == CampaignState::kFailed ? absl::AbortedError(why)
+                                             : absl::FailedPreconditionError(why);
     }
     if (Interrupted()) {
       return absl::CancelledError("stopped; nothing is lost, the same command goes on from here");
     }
-    if (auto alive = session_.Check(); !alive.ok()) return alive;
+    RETURN_IF_ERROR(session_.Check());
     std::this_thread::sleep_for(kPollServer);
   }
 }
@@ -104,7 +108,7 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
   if (parent.source.has_seed()) request.set_seed(parent.source.seed());
   *request.mutable_files() = parent.source.files();
   for (const auto& [path, content] : further) {
-    if (auto put = session_.client().PutBlob(content); !put.ok()) return put;
+    RETURN_IF_ERROR(session_.client().PutBlob(content));
     (*request.mutable_files())[path] = campaign::Sha256Hex(content);
   }
   campaign::Submission submission{.campaign_file = yaml,
@@ -114,26 +118,25 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
   if (parent.source.has_seed()) submission.seed = parent.source.seed();
   submission.files.insert(request.files().begin(), request.files().end());
   request.set_request_id(campaign::IdentityDigest(submission));
-  const auto reply = session_.client().Submit(request);
-  if (!reply.ok()) return reply.status();
-  if (!reply->problems().empty()) {
-    const v1::Problem& problem = reply->problems(0);
+  ASSIGN_OR_RETURN(const auto reply, session_.client().Submit(request));
+  if (!reply.problems().empty()) {
+    const v1::Problem& problem = reply.problems(0);
     return absl::InvalidArgumentError(absl::StrCat(
         what, " cannot be run: ",
         campaign::ToString({problem.file(), problem.line(), problem.key(), problem.message()})));
   }
-  const std::string& campaign = reply->campaign();
+  const std::string& campaign = reply.campaign();
   auto status = session_.client().Show(campaign);
   if (!status.ok()) return status.status();
-  if (status->state() == "paused") {
+  if (messages::StateOf(*status) == CampaignState::kPaused) {
     std::cerr << "campaign " << campaign << " was paused (" << status->reason()
               << "); it goes on\n";
     status = session_.client().Resume(campaign);
     if (!status.ok()) return status.status();
   }
-  if (!IsOver(status->state())) {
+  if (!messages::IsOver(*status)) {
     if (!workers_started_ && !choice_.workers && !choice_.state.empty()) {
-      if (auto started = session_.UseWorkers(std::nullopt); !started.ok()) return started;
+      RETURN_IF_ERROR(session_.UseWorkers(std::nullopt));
     }
     workers_started_ = true;
   }
@@ -143,10 +146,9 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
 absl::StatusOr<report::CampaignView> Laboratory::Run(
     const report::CampaignView& parent, const std::string& yaml, const std::string& what,
     const std::map<std::string, std::string>& further) {
-  const auto campaign = Submit(parent, yaml, what, further);
-  if (!campaign.ok()) return campaign.status();
-  if (auto ended = Wait(*campaign, what); !ended.ok()) return ended;
-  return LoadView(session_.client(), *campaign);
+  ASSIGN_OR_RETURN(const auto campaign, Submit(parent, yaml, what, further));
+  RETURN_IF_ERROR(Wait(campaign, what));
+  return LoadView(session_.client(), campaign);
 }
 
 bool Laboratory::Accepts(const report::CampaignView& parent, const std::string& yaml,

@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 #include "server/client/server_choice.h"
 #include "server/client/session.h"
-#include "server/report/campaign_view.h"
+#include "server/report/views/campaign_view.h"
 
 namespace calib::client {
 

@@ -3,7 +3,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/campaign_file.h"
+#include "calib/return_if_error.h"
+#include "server/campaign/file/campaign_file.h"
 
 namespace calib::client {
 
@@ -28,10 +29,9 @@ absl::StatusOr<campaign::Campaign> LoadCampaign(Client& client, const v1::Campai
 
 absl::StatusOr<std::map<std::pair<std::string, int>, report::StateHistory>> LoadStates(
     Client& client, const std::string& campaign, std::optional<int> sample) {
-  const auto messages = client.GetStates(campaign, sample);
-  if (!messages.ok()) return messages.status();
+  ASSIGN_OR_RETURN(const auto messages, client.GetStates(campaign, sample));
   std::map<std::pair<std::string, int>, report::StateHistory> states;
-  for (const v1::SampleStates& message : *messages) {
+  for (const v1::SampleStates& message : messages) {
     report::StateHistory& history = states[{message.experiment(), message.sample()}];
     history.core_seconds = message.core_seconds();
     history.observables.assign(message.observables().begin(), message.observables().end());
@@ -42,15 +42,12 @@ absl::StatusOr<std::map<std::pair<std::string, int>, report::StateHistory>> Load
 
 absl::StatusOr<report::CampaignView> LoadView(Client& client, const std::string& campaign) {
   report::CampaignView view;
-  auto status = client.Show(campaign);
-  if (!status.ok()) return status.status();
-  view.status = *std::move(status);
-  auto source = client.GetSource(campaign);
-  if (!source.ok()) return source.status();
-  view.source = *std::move(source);
-  auto read = LoadCampaign(client, view.source);
-  if (!read.ok()) return read.status();
-  view.campaign = *std::move(read);
+  ASSIGN_OR_RETURN(auto status, client.Show(campaign));
+  view.status = std::move(status);
+  ASSIGN_OR_RETURN(auto source, client.GetSource(campaign));
+  view.source = std::move(source);
+  ASSIGN_OR_RETURN(auto read, LoadCampaign(client, view.source));
+  view.campaign = std::move(read);
   auto posterior = client.GetPosterior(campaign, std::nullopt);
   if (posterior.ok()) {
     view.posterior = *std::move(posterior);
@@ -59,16 +56,13 @@ absl::StatusOr<report::CampaignView> LoadView(Client& client, const std::string&
     return posterior.status();
   }
   for (int k = 0; k < view.posterior.iterations(); ++k) {
-    auto earlier = client.GetPosterior(campaign, k);
-    if (!earlier.ok()) return earlier.status();
-    view.iterations.push_back(*std::move(earlier));
+    ASSIGN_OR_RETURN(auto earlier, client.GetPosterior(campaign, k));
+    view.iterations.push_back(std::move(earlier));
   }
-  auto samples = client.GetSamples(campaign);
-  if (!samples.ok()) return samples.status();
-  view.samples = *std::move(samples);
-  auto states = LoadStates(client, campaign, std::nullopt);
-  if (!states.ok()) return states.status();
-  view.states = *std::move(states);
+  ASSIGN_OR_RETURN(auto samples, client.GetSamples(campaign));
+  view.samples = std::move(samples);
+  ASSIGN_OR_RETURN(auto states, LoadStates(client, campaign, std::nullopt));
+  view.states = std::move(states);
   return view;
 }
 

@@ -3,7 +3,7 @@
 
 #include "absl/status/statusor.h"
 #include "server/client/client.h"
-#include "server/report/campaign_view.h"
+#include "server/report/views/campaign_view.h"
 
 namespace calib::client {
 

@@ -4,9 +4,13 @@
 #include <iostream>
 #include <string>
 
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/text/yaml_text.h"
+#include "server/messages/read_words.h"
 
 namespace calib::client {
+
+using campaign::CampaignState;
+
 namespace {
 
 // Runs that were made elsewhere are there.
@@ -22,9 +26,10 @@ bool NeedsWorkers(Client& client, const std::string& campaign) {
 
 void NoWorkerNotice::Look(const v1::CampaignStatus& status) {
   const auto now = std::chrono::steady_clock::now();
-  const bool lives = status.state() == "queued" || status.state() == "running";
-  const bool computes = status.phase() == "calibrating" && status.samples_done() > 0 &&
-                        status.samples_done() >= status.samples();
+  const auto state = messages::StateOf(status);
+  const bool lives = state == CampaignState::kQueued || state == CampaignState::kRunning;
+  const bool computes = messages::PhaseOf(status) == campaign::Phase::kCalibrating &&
+                        status.samples_done() > 0 && status.samples_done() >= status.samples();
   if (!lives || computes || status.samples_running() > 0) {
     idle_since_ = now;
     said_ = false;

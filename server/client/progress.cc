@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <iostream>
 
-#include "server/report/people_units.h"
+#include "server/messages/read_words.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::client {
+
+using campaign::CampaignState;
+
 namespace {
 
 constexpr int kBarWidth = 20;
@@ -22,10 +26,11 @@ std::string Bar(int done, int of) {
 }  // namespace
 
 std::string ProgressText(const v1::CampaignStatus& s) {
-  if (s.state() != "running" && s.state() != "queued") {
+  const auto state = messages::StateOf(s);
+  if (state != CampaignState::kRunning && state != CampaignState::kQueued) {
     return s.state() + (s.reason().empty() ? "" : ": " + s.reason());
   }
-  if (s.phase() == "validating") return "held-out tests";
+  if (messages::PhaseOf(s) == campaign::Phase::kValidating) return "held-out tests";
   std::string text = fmt::format("iteration {}/{}", s.iteration() + 1, s.max_iterations());
   text += fmt::format("  {}  {}/{} samples", Bar(s.samples_done(), s.samples()), s.samples_done(),
                       s.samples());

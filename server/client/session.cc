@@ -12,10 +12,15 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
+#include "server/messages/read_words.h"
 #include "server/service/server.h"
 #include "server/service/state_folder.h"
 
 namespace calib::client {
+
+using campaign::CampaignState;
+
 namespace {
 
 constexpr std::chrono::seconds kShutdown{3};
@@ -54,18 +59,17 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const ServerChoice& choic
           " holds no state of a server; `calibctl run` and `calibctl submit` make one"));
     }
     session->state_ = choice.state;
-    if (auto status = session->ServeOrJoin(); !status.ok()) return status;
+    RETURN_IF_ERROR(session->ServeOrJoin());
   } else {
-    auto client = Client::Connect(session->address_);
-    if (!client.ok()) return client.status();
-    session->client_ = *std::move(client);
+    ASSIGN_OR_RETURN(auto client, Client::Connect(session->address_));
+    session->client_ = std::move(client);
   }
   if (choice.workers.value_or(0) > 0) {
     if (choice.state.empty()) {
       return absl::InvalidArgumentError(
           "--workers goes with --state DIR; workers of a remote server are calib-worker --server");
     }
-    if (auto started = session->UseWorkers(choice.workers); !started.ok()) return started;
+    RETURN_IF_ERROR(session->UseWorkers(choice.workers));
   }
   return session;
 }
@@ -100,9 +104,8 @@ absl::Status Session::ServeOrJoin() {
   constexpr int kTries = 3;
   absl::Status last;
   for (int i = 0; i < kTries && client_ == nullptr; ++i) {
-    auto address = ServeOrFind(kAnyPort);
-    if (!address.ok()) return address.status();
-    address_ = *std::move(address);
+    ASSIGN_OR_RETURN(auto address, ServeOrFind(kAnyPort));
+    address_ = std::move(address);
     auto client = Client::Connect(address_);
     last = client.status();
     if (client.ok()) client_ = *std::move(client);
@@ -165,7 +168,8 @@ bool Session::AllEnded() {
   const auto campaigns = client_->List();
   return campaigns.ok() &&
          std::all_of(campaigns->begin(), campaigns->end(), [](const v1::CampaignStatus& c) {
-           return c.state() == "finished" || c.state() == "cancelled";
+           const auto state = messages::StateOf(c);
+           return state == CampaignState::kFinished || state == CampaignState::kCancelled;
          });
 }
 
@@ -182,24 +186,23 @@ absl::Status Session::UseWorkers(std::optional<int> count) {
 
 absl::Status Session::StartWorkers(int count) {
   if (count == 0) return absl::OkStatus();
-  const auto program = FindWorkerProgram();
-  if (!program.ok()) return program.status();
+  ASSIGN_OR_RETURN(const auto program, FindWorkerProgram());
   for (int i = 1; i <= count; ++i) {
     const std::string log =
         (std::filesystem::path(state_) / absl::StrCat("worker-", i, ".log")).string();
-    auto worker = ChildProcess::Start(
-        *program,
-        {"--server", address_, "--slots", "1", "--name", absl::StrCat("local-", getpid(), "-", i),
-         "--checkpoints", Checkpoints(), "--exit-with-parent", absl::StrCat(getpid())},
-        log);
-    if (!worker.ok()) return worker.status();
-    workers_.push_back(*std::move(worker));
+    ASSIGN_OR_RETURN(auto worker, ChildProcess::Start(
+                                      program,
+                                      {"--server", address_, "--slots", "1", "--name",
+                                       absl::StrCat("local-", getpid(), "-", i), "--checkpoints",
+                                       Checkpoints(), "--exit-with-parent", absl::StrCat(getpid())},
+                                      log));
+    workers_.push_back(std::move(worker));
   }
   return absl::OkStatus();
 }
 
 absl::Status Session::Check() {
-  if (auto failure = failure_->Get(); !failure.ok()) return failure;
+  RETURN_IF_ERROR(failure_->Get());
   if (workers_.empty()) return absl::OkStatus();
   for (ChildProcess& worker : workers_) {
     if (!worker.Poll()) return absl::OkStatus();

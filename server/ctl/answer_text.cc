@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/client/progress.h"
-#include "server/report/people_units.h"
-#include "server/report/residual_words.h"
-#include "server/report/text_table.h"
+#include "server/messages/read_words.h"
+#include "server/report/text/people_units.h"
+#include "server/report/text/text_table.h"
+#include "server/report/views/residual_words.h"
 
 namespace calib::ctl {
 namespace {
@@ -76,9 +77,11 @@ std::string PosteriorText(const v1::Posterior& posterior,
       "evaluations",
       posterior.converged() ? "Converged" : "Not converged", posterior.iterations(),
       posterior.iterations() == 1 ? "" : "s", Number(posterior.ess(), 3),
-      posterior.posterior_from() == "emulator" ? ", posterior sampled on an emulator" : "",
+      messages::SourceOf(posterior) == campaign::PosteriorSource::kEmulator
+          ? ", posterior sampled on an emulator"
+          : "",
       Number(posterior.log_evidence(), 5), Number(posterior.log_evidence_se(), 2),
-      posterior.posterior_from() != "emulator" ? ""
+      messages::SourceOf(posterior) != campaign::PosteriorSource::kEmulator ? ""
       : HalvesGiveOne(posterior) ? " (what halves of the emulator's runs differ by is in it)"
                                  : " (of its sampling; the emulator's own error is not known)",
       posterior.model_evaluations());
@@ -150,12 +153,13 @@ std::string ComparisonText(const report::Comparison& comparison) {
   report::TextTable segments({"<experiment", "<observable", "<stage", "model − measured", "z",
                               "error", "p", "chi2", "<shape"});
   for (const report::SegmentMisfit& m : comparison.by_segment) {
-    segments.AddRow({m.experiment + (m.heldout ? " (held out)" : ""), m.observable, m.segment,
-                     report::NumberWithUnit(m.bias, m.observable, UnitOf(m.observable), 3),
-                     m.z ? Number(*m.z, 3) : "–", Number(m.rms_error, 3),
-                     m.p_value ? Number(*m.p_value, 2) : "–",
-                     m.chi2_share ? report::Percent(*m.chi2_share, 2) : "–",
-                     m.pattern.name == "none" ? "" : m.pattern.name});
+    segments.AddRow(
+        {m.experiment + (m.heldout ? " (held out)" : ""), m.observable, m.segment,
+         report::NumberWithUnit(m.bias, m.observable, UnitOf(m.observable), 3),
+         m.z ? Number(*m.z, 3) : "–", Number(m.rms_error, 3),
+         m.p_value ? Number(*m.p_value, 2) : "–",
+         m.chi2_share ? report::Percent(*m.chi2_share, 2) : "–",
+         m.pattern.shape == report::ResidualShape::kNone ? "" : ToString(m.pattern.shape)});
   }
   text += "\n" + observables.ToString() + "\n" + segments.ToString();
   for (const std::string& line : report::WhereItFails(comparison)) {

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "calib/v1/campaign.pb.h"
-#include "server/report/comparison.h"
-#include "server/report/model_comparison.h"
-#include "server/report/sensitivity.h"
+#include "server/report/views/comparison.h"
+#include "server/report/views/model_comparison.h"
+#include "server/report/views/sensitivity.h"
 
 namespace calib::ctl {
 

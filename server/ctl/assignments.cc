@@ -6,11 +6,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/model_parameters.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/model_parameters.h"
 #include "server/campaign/admissible_range.h"
-#include "server/campaign/quantity.h"
-#include "server/campaign/suggestion.h"
+#include "server/campaign/file/text/quantity.h"
+#include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/model/range.h"
 
 namespace calib::ctl {
 namespace {

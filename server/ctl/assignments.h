@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "server/campaign/campaign.h"
+#include "server/campaign/model/campaign.h"
 
 namespace calib::ctl {
 

@@ -2,8 +2,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "server/report/people_units.h"
-#include "server/report/text_table.h"
+#include "server/report/text/people_units.h"
+#include "server/report/text/text_table.h"
 
 namespace calib::ctl {
 namespace {

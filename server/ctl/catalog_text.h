@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 
 namespace calib::ctl {
 

@@ -1,20 +1,17 @@
 #pragma once
-// The command line of calibctl: verbs, options, help. The only place that knows the argument
-// library.
+// The command line of calibctl: which verb, with which options, or help. With option_list the only
+// place that knows the argument library.
 
-#include <functional>
 #include <optional>
-#include <string>
+#include <vector>
 
-#include "server/ctl/arguments.h"
+#include "server/ctl/verb.h"
 
 namespace calib::ctl {
 
-using Verb = std::function<int(const Arguments&)>;
-
 struct Command {
   Verb verb;
-  Arguments arguments;
+  CommonOptions common;
 };
 
 /// The command, or the exit code when there is nothing more to do (help was shown, or the usage was
@@ -23,6 +20,8 @@ struct Parsed {
   std::optional<Command> command;
   int exit_code = 0;
 };
-Parsed ParseCommandLine(int argc, const char* const* argv);
+/// Reads a command line with one of `verbs`; writes help to standard output and what is wrong to
+/// standard error.
+Parsed ParseCommandLine(const std::vector<Verb>& verbs, int argc, const char* const* argv);
 
 }  // namespace calib::ctl

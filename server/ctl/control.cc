@@ -1,24 +1,33 @@
 #include "server/ctl/control.h"
 
 #include <iostream>
+#include <memory>
 
+#include "calib/return_if_error.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
-#include "server/report/json_documents.h"
+#include "server/ctl/option_list.h"
+#include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
 
-int Control(const Arguments& arguments, ControlCall call) {
-  const auto session = client::Session::Open(arguments.server);
-  if (!session.ok()) return Fail(session.status());
-  const auto status = ((*session)->client().*call)(arguments.campaign);
-  if (!status.ok()) return Fail(status.status());
-  if (arguments.json) {
-    std::cout << report::StatusJson(*status);
-  } else {
-    std::cout << status->campaign() << " is " << status->state() << ".\n";
-  }
-  return kDone;
+Verb ControlVerb(const std::string& name, const std::string& description, ControlCall call) {
+  const auto campaign = std::make_shared<std::string>();
+  const auto run = [campaign, call](const CommonOptions& common) -> absl::StatusOr<int> {
+    ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+    ASSIGN_OR_RETURN(const auto status, (session->client().*call)(*campaign));
+    if (common.json) {
+      std::cout << report::StatusJson(status);
+    } else {
+      std::cout << status.campaign() << " is " << status.state() << ".\n";
+    }
+    return kDone;
+  };
+  return {.help = {.name = name,
+                   .description = description,
+                   .example = name + " c1 --state calib-state"},
+          .declare = [campaign](OptionList& list) { list.Campaign(*campaign); },
+          .run = run};
 }
 
 }  // namespace calib::ctl

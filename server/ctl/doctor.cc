@@ -6,12 +6,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "proto/rpc/address.h"
-#include "server/campaign/sha256.h"
+#include "server/campaign/model/sha256.h"
 #include "server/ctl/trial_runs.h"
-#include "server/report/people_units.h"
-#include "server/report/text_table.h"
+#include "server/report/text/people_units.h"
+#include "server/report/text/text_table.h"
 
 namespace calib::ctl {
 namespace {

@@ -9,6 +9,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "server/ctl/write_file.h"
 
 namespace calib::ctl {
@@ -29,7 +30,7 @@ absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const T
   if (!google::protobuf::util::MessageToJsonString(task.spec, &json).ok()) {
     return absl::InternalError("the evaluation cannot be written as JSON");
   }
-  if (auto written = WriteFile(folder + "/spec.json", json); !written.ok()) return written;
+  RETURN_IF_ERROR(WriteFile(folder + "/spec.json", json));
   std::vector<std::string> arguments = {"--once",
                                         folder + "/spec.json",
                                         "-o",
@@ -37,23 +38,20 @@ absl::StatusOr<Evaluation> Evaluation::Start(const std::string& program, const T
                                         "--exit-with-parent",
                                         std::to_string(getpid())};
   if (!task.packing.empty()) {
-    if (auto written = WriteFile(folder + "/packing.txt", task.packing); !written.ok()) {
-      return written;
-    }
+    RETURN_IF_ERROR(WriteFile(folder + "/packing.txt", task.packing));
     arguments.insert(arguments.end(), {"--packing", folder + "/packing.txt"});
   }
   for (std::size_t m = 0; m < task.meshes.size(); ++m) {
     const std::string path = absl::StrCat(folder, "/mesh", m, ".stl");
-    if (auto written = WriteFile(path, task.meshes[m]); !written.ok()) return written;
+    RETURN_IF_ERROR(WriteFile(path, task.meshes[m]));
     arguments.insert(arguments.end(), {"--mesh", path});
   }
   if (!task.checkpoint.empty()) {
     arguments.insert(arguments.end(), {"--checkpoint", task.checkpoint});
   }
   if (!task.vtk.empty()) arguments.insert(arguments.end(), {"--vtk", task.vtk});
-  auto process = client::ChildProcess::Start(program, arguments, folder + "/log");
-  if (!process.ok()) return process.status();
-  return Evaluation(*std::move(process), folder);
+  ASSIGN_OR_RETURN(auto process, client::ChildProcess::Start(program, arguments, folder + "/log"));
+  return Evaluation(std::move(process), folder);
 }
 
 int Evaluation::StatesSoFar() const {

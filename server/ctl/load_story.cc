@@ -7,9 +7,11 @@
 #include <set>
 #include <utility>
 
+#include "calib/return_if_error.h"
 #include "server/client/findings.h"
 #include "server/client/load_view.h"
-#include "server/report/predictions.h"
+#include "server/messages/read_words.h"
+#include "server/report/views/predictions.h"
 
 namespace calib::ctl {
 namespace {
@@ -32,13 +34,11 @@ report::ErrorStep StepOf(const report::CampaignView& view, bool held_out) {
 // Documents that another version wrote and this one cannot read are passed over.
 absl::Status AddDiagnoses(client::Client& client, const std::string& campaign,
                           std::vector<report::StoredDiagnosis>& diagnoses) {
-  const auto findings = client.Findings(campaign);
-  if (!findings.ok()) return findings.status();
-  for (const v1::Finding& finding : *findings) {
+  ASSIGN_OR_RETURN(const auto findings, client.Findings(campaign));
+  for (const v1::Finding& finding : findings) {
     if (finding.kind() != client::kDiagnosis) continue;
-    const auto document = client.GetBlob(finding.digest());
-    if (!document.ok()) return document.status();
-    auto diagnosis = report::ReadDiagnosis(*document);
+    ASSIGN_OR_RETURN(const auto document, client.GetBlob(finding.digest()));
+    auto diagnosis = report::ReadDiagnosis(document);
     if (!diagnosis.ok()) continue;
     diagnosis->digest = finding.digest();
     diagnosis->created_unix_ms = finding.created_unix_ms();
@@ -62,14 +62,12 @@ std::vector<std::string> LineTo(const std::map<std::string, Known>& known,
 absl::StatusOr<std::optional<report::StoredImprovement>> ImprovementOf(client::Client& client,
                                                                        const std::string& campaign,
                                                                        const std::string& keeper) {
-  const auto findings = client.Findings(keeper);
-  if (!findings.ok()) return findings.status();
+  ASSIGN_OR_RETURN(const auto findings, client.Findings(keeper));
   std::optional<report::StoredImprovement> last;
-  for (const v1::Finding& finding : *findings) {
+  for (const v1::Finding& finding : findings) {
     if (finding.kind() != client::kImprovement) continue;
-    const auto document = client.GetBlob(finding.digest());
-    if (!document.ok()) return document.status();
-    auto improvement = report::ReadImprovement(*document);
+    ASSIGN_OR_RETURN(const auto document, client.GetBlob(finding.digest()));
+    auto improvement = report::ReadImprovement(document);
     if (!improvement.ok()) continue;
     const auto& steps = improvement->steps;
     const bool took_part = std::any_of(steps.begin(), steps.end(), [&campaign](const auto& step) {
@@ -86,18 +84,17 @@ absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::Ca
   report::Story story;
   story.known = true;
   if (auto drift = report::ParameterDrifts(view); drift.ok()) story.drift = *std::move(drift);
-  const auto statuses = client.List();
-  if (!statuses.ok()) return statuses.status();
+  ASSIGN_OR_RETURN(const auto statuses, client.List());
   std::map<std::string, Known> known;
-  for (const v1::CampaignStatus& status : *statuses) {
+  for (const v1::CampaignStatus& status : statuses) {
     known[status.campaign()] = {
         .relative = {.campaign = status.campaign(),
                      .name = status.name(),
                      .parent = status.parent(),
-                     .purpose = status.purpose(),
+                     .purpose = messages::PurposeOf(status),
                      .effects = {status.effects().begin(), status.effects().end()},
                      .log_evidence = std::nan("")},
-        .finished = status.state() == "finished"};
+        .finished = messages::StateOf(status) == campaign::CampaignState::kFinished};
   }
   const std::string& shown = view.status.campaign();
   std::vector<std::string> line = LineTo(known, shown);
@@ -105,9 +102,8 @@ absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::Ca
   // An improvement is kept with its first and its last campaign.
   for (const std::string& keeper : {shown, line.front()}) {
     if (story.improvement) break;
-    auto improvement = ImprovementOf(client, shown, keeper);
-    if (!improvement.ok()) return improvement.status();
-    story.improvement = *std::move(improvement);
+    ASSIGN_OR_RETURN(auto improvement, ImprovementOf(client, shown, keeper));
+    story.improvement = std::move(improvement);
   }
   // All models on its way, those that it left again too.
   if (story.improvement) {
@@ -123,7 +119,7 @@ absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::Ca
     line = std::move(way);
   }
   for (const std::string& id : line) {
-    if (auto status = AddDiagnoses(client, id, story.diagnoses); !status.ok()) return status;
+    RETURN_IF_ERROR(AddDiagnoses(client, id, story.diagnoses));
   }
   const auto add = [&](const std::string& id) -> absl::Status {
     report::Relative relative = known.at(id).relative;
@@ -134,15 +130,16 @@ absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::Ca
     return absl::OkStatus();
   };
   for (const std::string& id : line) {
-    if (auto status = add(id); !status.ok()) return status;
+    RETURN_IF_ERROR(add(id));
     for (const auto& [other, entry] : known) {
       const bool on_line = std::find(line.begin(), line.end(), other) != line.end();
-      const std::string& purpose = entry.relative.purpose;
+      const auto purpose = entry.relative.purpose;
       if (entry.relative.parent != id || on_line || !entry.finished ||
-          (purpose != "warm_fit" && purpose != "extension")) {
+          (purpose != campaign::DerivedFor::kWarmFit &&
+           purpose != campaign::DerivedFor::kExtension)) {
         continue;
       }
-      if (auto status = add(other); !status.ok()) return status;
+      RETURN_IF_ERROR(add(other));
     }
   }
   if (line.size() < 2) return story;
@@ -152,9 +149,8 @@ absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::Ca
       story.steps.push_back(StepOf(view, end));
       continue;
     }
-    const auto ancestor = client::LoadView(client, id);
-    if (!ancestor.ok()) return ancestor.status();
-    story.steps.push_back(StepOf(*ancestor, end));
+    ASSIGN_OR_RETURN(const auto ancestor, client::LoadView(client, id));
+    story.steps.push_back(StepOf(ancestor, end));
   }
   return story;
 }

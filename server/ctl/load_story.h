@@ -3,8 +3,8 @@
 
 #include "absl/status/statusor.h"
 #include "server/client/client.h"
-#include "server/report/campaign_view.h"
-#include "server/report/story.h"
+#include "server/report/views/campaign_view.h"
+#include "server/report/views/story.h"
 
 namespace calib::ctl {
 

@@ -17,12 +17,12 @@ std::string Quoted(const std::string& word) {
 
 }  // namespace
 
-std::string CommandOf(const Arguments& arguments, const std::string& words) {
+std::string CommandOf(const client::ServerChoice& server, const std::string& words) {
   std::string command = absl::StrCat("calibctl ", words);
-  if (!arguments.server.state.empty()) {
-    absl::StrAppend(&command, " --state ", Quoted(arguments.server.state));
-  } else if (arguments.server.given) {
-    absl::StrAppend(&command, " --server ", Quoted(arguments.server.address));
+  if (!server.state.empty()) {
+    absl::StrAppend(&command, " --state ", Quoted(server.state));
+  } else if (server.given) {
+    absl::StrAppend(&command, " --server ", Quoted(server.address));
   }
   return command;
 }

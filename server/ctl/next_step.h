@@ -3,12 +3,12 @@
 
 #include <string>
 
-#include "server/ctl/arguments.h"
+#include "server/client/server_choice.h"
 
 namespace calib::ctl {
 
-/// "calibctl WORDS" with the --state or --server of this call, quoted for a shell where need be.
-std::string CommandOf(const Arguments& arguments, const std::string& words);
+/// "calibctl WORDS" with the --state or --server of `server`, quoted for a shell where need be.
+std::string CommandOf(const client::ServerChoice& server, const std::string& words);
 
 /// A line for the end of an answer: "Next: calibctl diagnose c1 --state s   which effect is
 /// missing".

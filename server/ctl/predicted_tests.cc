@@ -9,12 +9,13 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "dem/catalog/catalog.h"
-#include "server/campaign/campaign_file.h"
-#include "server/campaign/derive.h"
-#include "server/campaign/quantity.h"
-#include "server/campaign/sha256.h"
-#include "server/campaign/yaml_text.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/file/campaign_file.h"
+#include "server/campaign/file/derive.h"
+#include "server/campaign/file/text/quantity.h"
+#include "server/campaign/file/text/yaml_text.h"
+#include "server/campaign/model/sha256.h"
 
 namespace calib::ctl {
 namespace {
@@ -104,9 +105,8 @@ void TakeSpecimen(const YamlNode& from, YamlNode& experiment) {
 
 absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::string& path,
                                          const report::CampaignView& parent) {
-  const auto text = ReadText(path);
-  if (!text.ok()) return text.status();
-  campaign::YamlParse parse = campaign::ParseYaml(*text);
+  ASSIGN_OR_RETURN(const auto text, ReadText(path));
+  campaign::YamlParse parse = campaign::ParseYaml(text);
   if (parse.error) return ProblemIn(path, parse.error->line, parse.error->message);
   if (parse.root->kind != Kind::kMap) {
     return ProblemIn(path, 1, "is no map; one experiment, or a map with experiments, is expected");
@@ -138,9 +138,7 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
           list.items.size() == 1 ? "predicted" : absl::StrCat("predicted_", number));
     }
     campaign::YamlErase(experiment, "role");
-    if (auto spelled = SpellOutControl(path, experiment, tests.files); !spelled.ok()) {
-      return spelled;
-    }
+    RETURN_IF_ERROR(SpellOutControl(path, experiment, tests.files));
     if (first != nullptr && !first->items.empty()) TakeSpecimen(first->items.front(), experiment);
   }
   tests.experiments = list.items;
@@ -148,7 +146,8 @@ absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::stri
   const auto derived =
       campaign::Derive(parent.source.campaign_file(),
                        {.name = "prediction",
-                        .lineage = {.parent = parent.status.campaign(), .purpose = "prediction"},
+                        .lineage = {.parent = parent.status.campaign(),
+                                    .purpose = ToString(campaign::DerivedFor::kPrediction)},
                         .experiments = tests.experiments,
                         .rows = {{.like = 0, .values = [&parent] {
                                     std::map<std::string, double> values;

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "server/campaign/yaml_tree.h"
+#include "server/campaign/file/text/yaml_tree.h"
 #include "server/client/client.h"
-#include "server/report/campaign_view.h"
+#include "server/report/views/campaign_view.h"
 
 namespace calib::ctl {
 

@@ -6,13 +6,15 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
-#include "server/campaign/derive.h"
-#include "server/campaign/excitation.h"
-#include "server/campaign/quantity.h"
-#include "server/campaign/suggestion.h"
-#include "server/report/discrepancies.h"
-#include "server/report/warnings.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/file/derive.h"
+#include "server/campaign/file/text/quantity.h"
+#include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/model/excitation.h"
+#include "server/messages/read_words.h"
+#include "server/report/views/discrepancies.h"
+#include "server/report/views/warnings.h"
 
 namespace calib::ctl {
 namespace {
@@ -140,7 +142,9 @@ RunsOfObservable Collect(const report::CampaignView& view, const campaign::Exper
 // A sentence; empty: none says why.
 std::string WhyOneFailed(const report::CampaignView& view) {
   for (const v1::Sample& sample : view.samples) {
-    if (sample.status() == "finished" || sample.reason().empty()) continue;
+    if (messages::StatusOf(sample) == campaign::EvaluationStatus::kFinished ||
+        sample.reason().empty())
+      continue;
     return absl::StrCat("Sample ", sample.index(), ": ", sample.reason());
   }
   return "";
@@ -270,16 +274,17 @@ absl::StatusOr<Prediction> Predict(client::Laboratory& laboratory,
     return absl::FailedPreconditionError(absl::StrCat(
         "the runs of ", id, " were made elsewhere: there is no model to run another test with"));
   }
-  if (parent.posterior.posterior_from().empty() || parent.posterior.posterior_from() == "none") {
+  if (parent.posterior.posterior_from().empty() ||
+      messages::SourceOf(parent.posterior) == campaign::PosteriorSource::kNone) {
     return absl::FailedPreconditionError(absl::StrCat(
         "campaign ", id, " has no posterior to predict from: see `calibctl posterior ", id, "`"));
   }
-  const auto levels = ReadLevels(options.exceed, tests.observables);
-  if (!levels.ok()) return levels.status();
+  ASSIGN_OR_RETURN(const auto levels, ReadLevels(options.exceed, tests.observables));
   const Draws draws = DrawsOf(parent, options.draws);
-  campaign::Derivation derivation{.name = absl::StrCat(parent.campaign.name, ": prediction"),
-                                  .lineage = {.parent = id, .purpose = "prediction"},
-                                  .experiments = tests.experiments};
+  campaign::Derivation derivation{
+      .name = absl::StrCat(parent.campaign.name, ": prediction"),
+      .lineage = {.parent = id, .purpose = ToString(campaign::DerivedFor::kPrediction)},
+      .experiments = tests.experiments};
   for (Index i = 0; i < draws.parameters.rows(); ++i) {
     campaign::Derivation::Row row{.like = draws.like[static_cast<std::size_t>(i)], .values = {}};
     for (std::size_t j = 0; j < parent.campaign.parameters.size(); ++j) {
@@ -287,23 +292,19 @@ absl::StatusOr<Prediction> Predict(client::Laboratory& laboratory,
     }
     derivation.rows.push_back(std::move(row));
   }
-  const auto text = campaign::Derive(parent.source.campaign_file(), derivation);
-  if (!text.ok()) return text.status();
-  const auto view = laboratory.Run(parent, *text, "prediction", tests.files);
-  if (!view.ok()) return view.status();
+  ASSIGN_OR_RETURN(const auto text, campaign::Derive(parent.source.campaign_file(), derivation));
+  ASSIGN_OR_RETURN(const auto view, laboratory.Run(parent, text, "prediction", tests.files));
 
   Prediction prediction;
   prediction.parent = id;
-  prediction.campaign = view->status.campaign();
+  prediction.campaign = view.status.campaign();
   const Misfit misfit{
       .parent = &parent,
       .discrepancies = report::FitDiscrepancies(parent, report::PredictReadings(parent))};
-  for (const campaign::Experiment& experiment : view->campaign.experiments) {
-    if (auto added = AddExperiment(*view, experiment, *levels, misfit, prediction); !added.ok()) {
-      return added;
-    }
+  for (const campaign::Experiment& experiment : view.campaign.experiments) {
+    RETURN_IF_ERROR(AddExperiment(view, experiment, levels, misfit, prediction));
   }
-  AddNotes(*view, misfit, prediction);
+  AddNotes(view, misfit, prediction);
   return prediction;
 }
 

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/ctl/prediction.h"
-#include "server/report/people_units.h"
-#include "server/report/text_table.h"
+#include "server/report/text/people_units.h"
+#include "server/report/text/text_table.h"
 
 namespace calib::ctl {
 namespace {

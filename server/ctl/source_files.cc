@@ -5,9 +5,10 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/identity.h"
-#include "server/campaign/sha256.h"
-#include "server/report/json_documents.h"
+#include "calib/return_if_error.h"
+#include "server/campaign/model/identity.h"
+#include "server/campaign/model/sha256.h"
+#include "server/report/documents/json_documents.h"
 
 namespace calib::ctl {
 namespace {
@@ -24,29 +25,30 @@ void Print(const std::vector<campaign::Problem>& problems, bool json) {
 
 }  // namespace
 
-std::optional<SourceFiles> ReadSourceFiles(const Arguments& arguments) {
+std::optional<SourceFiles> ReadSourceFiles(const std::string& file,
+                                           std::optional<std::uint64_t> seed, bool json) {
   SourceFiles source;
-  const std::filesystem::path path(arguments.file);
+  const std::filesystem::path path(file);
   source.file_name = path.filename().string();
-  auto yaml = campaign::DiskReader("")(arguments.file);
+  auto yaml = campaign::DiskReader("")(file);
   if (!yaml.ok()) {
-    Print({{.file = arguments.file,
+    Print({{.file = file,
             .line = 0,
             .key = "",
             .message = absl::StrCat("cannot be read: ", yaml.status().message())}},
-          arguments.json);
+          json);
     return std::nullopt;
   }
   source.yaml = *std::move(yaml);
-  const campaign::FileReader disk = campaign::DiskReader(arguments.file);
+  const campaign::FileReader disk = campaign::DiskReader(file);
   const campaign::FileReader remember = [&disk, &source](const std::string& name) {
     auto content = disk(name);
     if (content.ok()) source.contents[name] = *content;
     return content;
   };
-  source.outcome = campaign::ReadCampaign(source.yaml, arguments.file, remember, arguments.seed);
+  source.outcome = campaign::ReadCampaign(source.yaml, file, remember, seed);
   if (!source.outcome.problems.empty()) {
-    Print(source.outcome.problems, arguments.json);
+    Print(source.outcome.problems, json);
     return std::nullopt;
   }
   return source;
@@ -68,15 +70,14 @@ absl::StatusOr<std::string> SubmitSource(client::Client& client, const SourceFil
   campaign::Submission submission{
       .campaign_file = source.yaml, .file_name = source.file_name, .files = {}, .seed = seed};
   for (const auto& [path, content] : source.contents) {
-    if (auto put = client.PutBlob(content); !put.ok()) return put;
+    RETURN_IF_ERROR(client.PutBlob(content));
     submission.files[path] = campaign::Sha256Hex(content);
     (*request.mutable_files())[path] = submission.files[path];
   }
   request.set_request_id(campaign::IdentityDigest(submission));
-  const auto reply = client.Submit(request);
-  if (!reply.ok()) return reply.status();
-  if (reply->problems().empty()) return reply->campaign();
-  for (const v1::Problem& problem : reply->problems()) {
+  ASSIGN_OR_RETURN(const auto reply, client.Submit(request));
+  if (reply.problems().empty()) return reply.campaign();
+  for (const v1::Problem& problem : reply.problems()) {
     std::cerr << campaign::ToString(
                      {problem.file(), problem.line(), problem.key(), problem.message()})
               << "\n";

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "server/campaign/data_file.h"
+#include "server/campaign/file/text/data_file.h"
 
 namespace calib::ctl {
 

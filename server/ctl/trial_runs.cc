@@ -10,11 +10,12 @@
 #include <utility>
 
 #include "absl/strings/str_split.h"
-#include "server/campaign/campaign.h"
-#include "server/campaign/sha256.h"
+#include "calib/return_if_error.h"
+#include "server/campaign/model/campaign.h"
+#include "server/campaign/model/sha256.h"
 #include "server/ctl/evaluation.h"
 #include "server/ctl/temporary_folder.h"
-#include "server/scheduler/attempt_spec.h"
+#include "server/messages/attempt_spec.h"
 
 namespace calib::ctl {
 namespace {
@@ -34,7 +35,7 @@ v1::AttemptSpec CollisionSpec() {
   s.test = "collision";
   s.settings = {{"radius", c.radius}, {"partner_radius", c.radius}, {"impact_angle", 0}};
   s.path = {{.target = c.speed, .load_step = 0}};
-  return scheduler::ToSpec(s, campaign::NoPacking{}, "collision");
+  return messages::ToSpec(s, campaign::NoPacking{}, "collision");
 }
 
 v1::AttemptSpec CompressionSpec() {
@@ -52,7 +53,7 @@ v1::AttemptSpec CompressionSpec() {
                                   .radius_spread = 0.2,
                                   .pressure = 0.5 * kTrialStress,
                                   .seed = 1};
-  return scheduler::ToSpec(s, recipe, "compression");
+  return messages::ToSpec(s, recipe, "compression");
 }
 
 /// The table of one run.
@@ -62,17 +63,16 @@ absl::StatusOr<std::string> Run(const std::string& program, v1::AttemptSpec spec
   std::filesystem::create_directories(folder, error);
   Evaluation::Task task;
   task.spec = std::move(spec);
-  auto run = Evaluation::Start(program, task, folder.string());
-  if (!run.ok()) return run.status();
+  ASSIGN_OR_RETURN(auto run, Evaluation::Start(program, task, folder.string()));
   const auto until = std::chrono::steady_clock::now() + kAtMost;
-  while (!run->Poll()) {
+  while (!run.Poll()) {
     if (std::chrono::steady_clock::now() > until) {
       return absl::DeadlineExceededError("it has not ended within a minute");
     }
     std::this_thread::sleep_for(kPoll);
   }
-  if (auto ended = run->Result(); !ended.ok()) return ended;
-  return run->Table();
+  RETURN_IF_ERROR(run.Result());
+  return run.Table();
 }
 
 /// The value of the last row; NaN without such a column.

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
 #include "server/ctl/doctor.h"
 
 namespace calib::ctl {

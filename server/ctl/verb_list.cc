@@ -1,62 +1,44 @@
-#include <fmt/format.h>
-
-#include <iostream>
-#include <map>
-#include <string>
-
-#include "server/client/session.h"
-#include "server/ctl/exit_codes.h"
-#include "server/ctl/lineage.h"
-#include "server/ctl/verbs.h"
-#include "server/report/json_documents.h"
-#include "server/report/people_units.h"
-#include "server/report/text_table.h"
+#include "server/ctl/verb_list.h"
 
 namespace calib::ctl {
-namespace {
 
-// Below its parent the parent's name goes without saying, its purpose does not. A parent that is
-// not above it has been deleted.
-std::string Name(const Branch& branch, const std::map<std::string, std::string>& names) {
-  const v1::CampaignStatus& s = branch.status;
-  if (s.parent().empty()) return s.name();
-  if (branch.depth == 0) return s.purpose() + " of " + s.parent() + ", gone: " + s.name();
-  std::string own = s.name();
-  const std::string& parent = names.at(s.parent());
-  if (own.starts_with(parent)) own.erase(0, parent.size());
-  const std::size_t begin = own.find_first_not_of(": ");
-  own = begin == std::string::npos ? s.name() : own.substr(begin);
-  return s.purpose().empty() ? own : s.purpose() + ": " + own;
-}
+// Each is a file in verbs/: that of X defines the function XVerb. The order is that of the help.
+#define CALIB_VERBS(VERB) \
+  VERB(Simulate)          \
+  VERB(Run)               \
+  VERB(Submit)            \
+  VERB(Validate)          \
+  VERB(List)              \
+  VERB(Show)              \
+  VERB(Watch)             \
+  VERB(Posterior)         \
+  VERB(Samples)           \
+  VERB(States)            \
+  VERB(Compare)           \
+  VERB(Sensitivity)       \
+  VERB(Models)            \
+  VERB(Diagnose)          \
+  VERB(Extend)            \
+  VERB(Improve)           \
+  VERB(Predict)           \
+  VERB(Report)            \
+  VERB(Export)            \
+  VERB(Pause)             \
+  VERB(Resume)            \
+  VERB(Cancel)            \
+  VERB(Delete)            \
+  VERB(Workers)           \
+  VERB(Doctor)            \
+  VERB(Drain)             \
+  VERB(Effects)           \
+  VERB(Tests)             \
+  VERB(Contacts)          \
+  VERB(Pack)
 
-}  // namespace
+#define CALIB_DECLARE_VERB(name) Verb name##Verb();
+CALIB_VERBS(CALIB_DECLARE_VERB)
 
-int List(const Arguments& arguments) {
-  const auto session = client::Session::Open(arguments.server);
-  if (!session.ok()) return Fail(session.status());
-  const auto campaigns = (*session)->client().List();
-  if (!campaigns.ok()) return Fail(campaigns.status());
-  if (arguments.json) {
-    std::cout << report::StatusListJson(*campaigns);
-    return kDone;
-  }
-  report::TextTable table(
-      {"<id", "<name", "<state", "iteration", "samples", "evaluations", "core hours", "misfit"});
-  std::map<std::string, std::string> names;
-  for (const v1::CampaignStatus& s : *campaigns) names[s.campaign()] = s.name();
-  for (const Branch& branch : AsTree(*campaigns)) {
-    const v1::CampaignStatus& s = branch.status;
-    table.AddRow({std::string(static_cast<std::size_t>(2 * branch.depth), ' ') + s.campaign(),
-                  Name(branch, names), s.state(),
-                  fmt::format("{}/{}", s.iteration() + 1, s.max_iterations()),
-                  fmt::format("{}/{}", s.samples_done(), s.samples()),
-                  std::to_string(s.model_evaluations()), report::Number(s.core_hours(), 3),
-                  s.best_misfit() > 0 ? report::Number(s.best_misfit(), 3) : "–"});
-  }
-  std::cout << (campaigns->empty()
-                    ? "There are no campaigns yet; `calibctl submit FILE` makes one.\n"
-                    : table.ToString());
-  return kDone;
-}
+#define CALIB_CALL_VERB(name) name##Verb(),
+std::vector<Verb> AllVerbs() { return {CALIB_VERBS(CALIB_CALL_VERB)}; }
 
 }  // namespace calib::ctl

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 
 namespace calib::ctl {
 namespace {
@@ -61,7 +62,7 @@ OutputFile::~OutputFile() {
 
 absl::Status OutputFile::Put(const std::string& content) {
   if (part_.empty()) return WriteFile(path_, content);
-  if (auto written = Write(part_, path_, content); !written.ok()) return written;
+  RETURN_IF_ERROR(Write(part_, path_, content));
   std::error_code error;
   std::filesystem::rename(part_, path_, error);
   if (error) return CannotWrite(path_, error.message());

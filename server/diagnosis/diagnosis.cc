@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/noise_check.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/declared_effects.h"
+#include "server/campaign/model/noise_check.h"
 #include "server/diagnosis/diagnosis_support.h"
 #include "server/diagnosis/effect_screen.h"
 #include "server/diagnosis/extension.h"
@@ -18,7 +20,7 @@
 #include "server/diagnosis/strengths.h"
 #include "server/diagnosis/verdict.h"
 #include "server/diagnosis/warm_fits.h"
-#include "server/report/prior_conflict.h"
+#include "server/report/views/prior_conflict.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -62,28 +64,27 @@ class Inquiry {
     for (const report::PriorConflict& conflict : report::PriorConflicts(base_.view())) {
       diagnosis_.warnings.push_back(report::InWords(conflict));
     }
-    if (auto possible = CheckDiagnosable(base_); !possible.ok()) return possible;
+    RETURN_IF_ERROR(CheckDiagnosable(base_));
     const bool elsewhere = base_.view().campaign.precomputed.has_value();
     diagnosis_.in_doubt = diagnosis_.in_doubt || HasFewReadings(base_);
     for (std::string& doubt : DoubtsOf(base_)) diagnosis_.warnings.push_back(std::move(doubt));
     if (!options_.only_adequacy && !elsewhere) {
-      if (auto affordable = CheckBudget(); !affordable.ok()) return affordable;
+      RETURN_IF_ERROR(CheckBudget());
       const std::string left_out = screen_.WhatIsLeftOut(options_.without);
       if (!left_out.empty()) diagnosis_.warnings.push_back(left_out);
-      auto nuisance = screen_.MeasureNuisance(options_.without);
-      if (!nuisance.ok()) return nuisance.status();
-      nuisance_ = *std::move(nuisance);
+      ASSIGN_OR_RETURN(auto nuisance, screen_.MeasureNuisance(options_.without));
+      nuisance_ = std::move(nuisance);
     } else if (options_.only_adequacy) {
       nuisance_ = options_.nuisance;
     }
     diagnosis_.nuisance = nuisance_;
-    if (auto status = JudgeBase(); !status.ok()) return status;
+    RETURN_IF_ERROR(JudgeBase());
     const bool fits = diagnosis_.adequacy.p_value >= options_.level;
     if (options_.only_adequacy) {
       diagnosis_.verdict = fits ? "adequate" : "unexplained";
       return diagnosis_;
     }
-    if (auto status = elsewhere ? ScreenReadings() : ScreenEffects(); !status.ok()) return status;
+    RETURN_IF_ERROR(elsewhere ? ScreenReadings() : ScreenEffects());
     const bool hinted =
         !diagnosis_.candidates.empty() && diagnosis_.candidates.front().p_value < options_.level;
     if (fits && !hinted) {
@@ -92,7 +93,7 @@ class Inquiry {
     }
     const inference::FittedModel base = elsewhere ? response_.model : fits_.Base();
     diagnosis_.left_out_error = LeftOut(base);
-    if (auto status = FitWarm(base); !status.ok()) return status;
+    RETURN_IF_ERROR(FitWarm(base));
     Verdict(diagnosis_, fits_.all(), base, options_.level).Conclude(fits);
     if (options_.next_experiment && !elsewhere && diagnosis_.verdict != "adequate") {
       const absl::Status planned = PlanNext();
@@ -117,26 +118,24 @@ class Inquiry {
   }
 
   absl::Status JudgeBase() {
-    auto response = RespondTo(base_, nuisance_);
-    if (!response.ok()) return response.status();
-    response_ = *std::move(response);
-    const auto adequacy = inference::TestAdequacy(response_.model);
-    if (!adequacy.ok()) return adequacy.status();
-    diagnosis_.adequacy = *adequacy;
+    ASSIGN_OR_RETURN(auto response, RespondTo(base_, nuisance_));
+    response_ = std::move(response);
+    ASSIGN_OR_RETURN(const auto adequacy, inference::TestAdequacy(response_.model));
+    diagnosis_.adequacy = adequacy;
     diagnosis_.emulator_error = response_.emulator_error;
     diagnosis_.scatter = response_.scatter;
     diagnosis_.packings = static_cast<int>(base_.readings().departures.rows());
     const std::string few = FewPackings(response_.model, diagnosis_.packings);
     if (!few.empty()) diagnosis_.warnings.push_back(few);
-    if (adequacy->p_chi2 > kTooGood) {
+    if (adequacy.p_chi2 > kTooGood) {
       diagnosis_.in_doubt = true;
       diagnosis_.warnings.emplace_back(
           "The model is closer to the readings than the stated errors and the scatter explain: "
           "they seem too large, and an effect can hide in them.");
     }
-    diagnosis_.rms = response_.model.histories.Rms(adequacy->best);
+    diagnosis_.rms = response_.model.histories.Rms(adequacy.best);
     // A misfit beyond all that the emulator does not know is one however little that is.
-    if (!response_.trustworthy && adequacy->p_value >= options_.level) {
+    if (!response_.trustworthy && adequacy.p_value >= options_.level) {
       return absl::FailedPreconditionError(absl::StrCat(
           "the emulator misses the runs of ", base_.id(),
           " by more than twice the noise beyond their scatter, too much to judge the model by; run "
@@ -163,12 +162,12 @@ class Inquiry {
     diagnosis_.not_excitable = screen_.not_excitable();
     diagnosis_.screen_evaluations = screen_.evaluations();
     if (signatures->empty()) return absl::OkStatus();
-    auto scores = inference::Screen(
-        model, *signatures, {.level = options_.level, .seed = base_.view().campaign.filter.seed});
-    if (!scores.ok()) return scores.status();
+    ASSIGN_OR_RETURN(auto scores, inference::Screen(model, *signatures,
+                                                    {.level = options_.level,
+                                                     .seed = base_.view().campaign.filter.seed}));
     // The share of the error that an effect leaves in what was screened, of the error in all.
     const double screened = model.histories.Rms(adequacy->best);
-    for (inference::Score& score : *scores) {
+    for (inference::Score& score : scores) {
       if (screened > 0) score.rms *= diagnosis_.rms / screened;
       AddCandidate(score);
     }
@@ -210,11 +209,11 @@ class Inquiry {
                            ? "left out as asked for"
                            : "the runs were made elsewhere, none can be made with it");
     }
-    const auto scores = inference::Screen(
-        response_.model, signatures,
-        {.max_amplitude = kMostUnits, .level = options_.level, .seed = campaign.filter.seed});
-    if (!scores.ok()) return scores.status();
-    for (const inference::Score& score : *scores) AddCandidate(score);
+    ASSIGN_OR_RETURN(const auto scores, inference::Screen(response_.model, signatures,
+                                                          {.max_amplitude = kMostUnits,
+                                                           .level = options_.level,
+                                                           .seed = campaign.filter.seed}));
+    for (const inference::Score& score : scores) AddCandidate(score);
     steps_on_readings_.clear();
     return absl::OkStatus();
   }
@@ -296,7 +295,7 @@ class Inquiry {
       if (most) *most -= screen_.evaluations();
       const RefitOrder order =
           OrderOfRefits(diagnosis_, base_.view().campaign.model.user_effects, options_.level);
-      if (auto status = fits_.Fit(order, most); !status.ok()) return status;
+      RETURN_IF_ERROR(fits_.Fit(order, most));
     }
     diagnosis_.warm_evaluations = fits_.evaluations();
     for (CandidateEffect& candidate : diagnosis_.candidates) Describe(candidate);
@@ -446,14 +445,13 @@ class Inquiry {
     const std::vector<Rival> rivals =
         diagnosis_.verdict == "ambiguous" ? RivalsOfGroup() : BestTwo();
     const auto like = static_cast<std::size_t>(base_.BestRuns(1).front());
-    auto next = PlanNextExperiment(laboratory_, rivals, None(rivals), base_.runs().sample[like],
-                                   response_.scatter);
-    if (!next.ok()) return next.status();
-    diagnosis_.next_experiment = std::move(next->next);
-    if (!next->warning.empty()) diagnosis_.warnings.push_back(next->warning + ".");
+    ASSIGN_OR_RETURN(auto next, PlanNextExperiment(laboratory_, rivals, None(rivals),
+                                                   base_.runs().sample[like], response_.scatter));
+    diagnosis_.next_experiment = std::move(next.next);
+    if (!next.warning.empty()) diagnosis_.warnings.push_back(next.warning + ".");
     if (!diagnosis_.next_experiment) {
       diagnosis_.warnings.push_back(
-          absl::StrCat("No next experiment is planned: ", next->why_none, "."));
+          absl::StrCat("No next experiment is planned: ", next.why_none, "."));
     }
     return absl::OkStatus();
   }

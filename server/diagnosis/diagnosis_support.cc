@@ -4,7 +4,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "dem/formula/user_effect.h"
-#include "server/campaign/excitation.h"
+#include "dem/registry/declared_effects.h"
+#include "server/campaign/model/excitation.h"
 #include "server/diagnosis/measurement_errors.h"
 
 namespace calib::diagnosis {

@@ -7,7 +7,7 @@
 
 #include "absl/status/status.h"
 #include "inference/diagnosis/fitted_model.h"
-#include "server/campaign/campaign.h"
+#include "server/campaign/model/campaign.h"
 #include "server/diagnosis/fitted_campaign.h"
 
 namespace calib::diagnosis {

@@ -5,13 +5,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/diagnosis/diagnosis.h"
 #include "server/diagnosis/measurement_errors.h"
 #include "server/diagnosis/plan_words.h"
-#include "server/report/people_units.h"
-#include "server/report/stored_diagnosis.h"
-#include "server/report/text_table.h"
+#include "server/report/text/people_units.h"
+#include "server/report/text/text_table.h"
+#include "server/report/views/stored_diagnosis.h"
 
 namespace calib::diagnosis {
 namespace {

@@ -6,8 +6,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/declared_effects.h"
+#include "dem/registry/registry.h"
 #include "inference/data/data_set.h"
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/numerical_choices.h"
 #include "server/diagnosis/reading_effects.h"
@@ -44,15 +47,14 @@ absl::StatusOr<std::vector<Eigen::VectorXd>> EffectScreen::MeasureNuisance(
     return "influence of numerical choices, " + change.name;
   };
   for (const campaign::Derivation& change : changes) {
-    if (auto status = base_.Announce(change, what(change)); !status.ok()) return status;
+    RETURN_IF_ERROR(base_.Announce(change, what(change)));
   }
   const Index best = base_.BestRuns(1).front();
   std::vector<Eigen::VectorXd> directions;
   for (const campaign::Derivation& change : changes) {
-    const auto view = base_.Run(change, what(change));
-    if (!view.ok()) return view.status();
+    ASSIGN_OR_RETURN(const auto view, base_.Run(change, what(change)));
     evaluations_ += base_.fitted_experiments();
-    const report::RunTable runs = report::RunsOf(*view, base_.readings().of_mean);
+    const report::RunTable runs = report::RunsOf(view, base_.readings().of_mean);
     if (runs.sample.empty()) continue;
     directions.emplace_back((runs.histories.row(0) - base_.runs().histories.row(best)).transpose());
   }
@@ -210,14 +212,12 @@ absl::StatusOr<std::vector<inference::Signature>> EffectScreen::MeasureSignature
                        base_.view().campaign.model.contact, base_.state());
       }
       pairs.push_back(PairOf(*effects[e], steps[e][k], k, like));
-      if (auto status = base_.Announce(pairs.back().with, pairs.back().what); !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(base_.Announce(pairs.back().with, pairs.back().what));
     }
     auto pair = pairs.begin();
     for (std::size_t e = 0; e < effects.size(); ++e) {
       if (k >= steps[e].size()) continue;
-      if (auto status = Measure(*effects[e], *pair++, signatures[e]); !status.ok()) return status;
+      RETURN_IF_ERROR(Measure(*effects[e], *pair++, signatures[e]));
     }
   }
   const auto changes_nothing = [&square_of](const inference::Signature& signature) {
@@ -283,13 +283,12 @@ void EffectScreen::Calculate(const dem::EffectInfo& effect, const std::vector<In
 
 absl::Status EffectScreen::Measure(const dem::EffectInfo& effect, const Pair& pair,
                                    inference::Signature& signature) {
-  const auto view = base_.Run(pair.with, pair.what);
-  if (!view.ok()) return view.status();
+  ASSIGN_OR_RETURN(const auto view, base_.Run(pair.with, pair.what));
   evaluations_ += entries_.empty() ? base_.fitted_experiments() : std::ssize(entries_);
   const report::RunTable with = report::RunsOf(
-      *view, inference::Restricted(base_.readings().of_mean, {readings_.begin(), readings_.end()}));
+      view, inference::Restricted(base_.readings().of_mean, {readings_.begin(), readings_.end()}));
   if (with.sample.empty()) {
-    for (const v1::Sample& sample : view->samples) diverged_[effect.name] = sample.reason();
+    for (const v1::Sample& sample : view.samples) diverged_[effect.name] = sample.reason();
     return absl::OkStatus();
   }
   Keep(effect, pair, with.histories.row(0), with.stream.front(), signature);

@@ -11,10 +11,11 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/registry.h"
 #include "inference/diagnosis/screen.h"
-#include "server/campaign/campaign.h"
-#include "server/campaign/yaml_tree.h"
+#include "server/campaign/file/text/yaml_tree.h"
+#include "server/campaign/model/campaign.h"
 #include "server/diagnosis/fitted_campaign.h"
 #include "server/diagnosis/screen_shares.h"
 

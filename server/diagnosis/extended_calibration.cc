@@ -6,8 +6,9 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "calib/return_if_error.h"
 #include "server/diagnosis/extension.h"
-#include "server/report/comparison.h"
+#include "server/report/views/comparison.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -109,10 +110,9 @@ absl::StatusOr<report::CampaignView> ExtendedCalibration::Once(
                      .model_evaluations = budget};
   if (times > 1 && by_samples) plan.samples = samples;
   if (times > 1 && !by_samples) plan.iterations = times * campaign.max_iterations;
-  const auto text = ExtensionText(parent, plan);
-  if (!text.ok()) return text.status();
+  ASSIGN_OR_RETURN(const auto text, ExtensionText(parent, plan));
   auto extended =
-      laboratory_.Run(parent, *text, "calibration with " + absl::StrJoin(effects, " + "));
+      laboratory_.Run(parent, text, "calibration with " + absl::StrJoin(effects, " + "));
   if (extended.ok()) evaluations_ += extended->status.model_evaluations();
   return extended;
 }

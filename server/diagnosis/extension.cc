@@ -7,9 +7,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "dem/simulation/model_parameters.h"
-#include "server/campaign/derive.h"
-#include "server/campaign/suggestion.h"
+#include "dem/registry/declared_effects.h"
+#include "dem/registry/model_parameters.h"
+#include "server/campaign/file/derive.h"
+#include "server/campaign/file/text/suggestion.h"
 
 namespace calib::diagnosis {
 namespace {

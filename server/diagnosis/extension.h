@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "dem/catalog/catalog.h"
-#include "server/report/campaign_view.h"
+#include "dem/registry/catalog.h"
+#include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
 

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/left_out_packings.h"
 
@@ -70,9 +71,8 @@ absl::Status FittedCampaign::Announce(const std::string& text, const std::string
 
 absl::StatusOr<report::CampaignView> FittedCampaign::Run(const campaign::Derivation& derivation,
                                                          const std::string& what) const {
-  const auto text = campaign::Derive(view_.source.campaign_file(), derivation);
-  if (!text.ok()) return text.status();
-  return Run(*text, what);
+  ASSIGN_OR_RETURN(const auto text, campaign::Derive(view_.source.campaign_file(), derivation));
+  return Run(text, what);
 }
 
 absl::StatusOr<report::CampaignView> FittedCampaign::Run(const std::string& text,

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "dem/catalog/catalog.h"
-#include "server/campaign/derive.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/file/derive.h"
 #include "server/client/laboratory.h"
-#include "server/report/campaign_view.h"
-#include "server/report/run_table.h"
+#include "server/report/views/campaign_view.h"
+#include "server/report/views/run_table.h"
 
 namespace calib::diagnosis {
 

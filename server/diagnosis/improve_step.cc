@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "server/diagnosis/left_out_error.h"
-#include "server/report/people_units.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::diagnosis {
 namespace {

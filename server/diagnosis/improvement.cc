@@ -7,13 +7,14 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/sha256.h"
+#include "calib/return_if_error.h"
+#include "server/campaign/model/sha256.h"
 #include "server/client/findings.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/improve_step.h"
 #include "server/diagnosis/left_out_error.h"
-#include "server/report/comparison.h"
-#include "server/report/people_units.h"
+#include "server/report/text/people_units.h"
+#include "server/report/views/comparison.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -42,10 +43,10 @@ std::optional<std::int64_t> Improvement::Left() const {
 absl::Status Improvement::From(report::CampaignView view) {
   first_ = view;
   std::vector<std::string> added;
-  if (auto status = Climb(std::move(view), added); !status.ok()) return status;
-  if (auto status = Exchange(added); !status.ok()) return status;
-  if (auto status = Instead(added); !status.ok()) return status;
-  if (auto status = Prune(added); !status.ok()) return status;
+  RETURN_IF_ERROR(Climb(std::move(view), added));
+  RETURN_IF_ERROR(Exchange(added));
+  RETURN_IF_ERROR(Instead(added));
+  RETURN_IF_ERROR(Prune(added));
   return Open();
 }
 
@@ -53,10 +54,9 @@ absl::Status Improvement::From(report::CampaignView view) {
 absl::Status Improvement::Climb(report::CampaignView view, std::vector<std::string>& added) {
   for (;;) {
     const bool last = static_cast<int>(added.size()) >= limits_.effects || Spent();
-    auto diagnosis = Judge(view, last);
-    if (!diagnosis.ok()) return diagnosis.status();
+    ASSIGN_OR_RETURN(auto diagnosis, Judge(view, last));
     ImproveStep& step = steps_.back();
-    if (diagnosis->verdict == kAdequate) {
+    if (diagnosis.verdict == kAdequate) {
       std::string reason = kExplained;
       AddSentence(step.reason, reason);
       step.reason = std::move(reason);
@@ -68,15 +68,14 @@ absl::Status Improvement::Climb(report::CampaignView view, std::vector<std::stri
                   step.reason);
       break;
     }
-    if (step.reason.empty() && EffectsToTry(*diagnosis).empty() && !diagnosis->reason.empty()) {
-      step.reason = absl::StrCat(diagnosis->reason, ".");
+    if (step.reason.empty() && EffectsToTry(diagnosis).empty() && !diagnosis.reason.empty()) {
+      step.reason = absl::StrCat(diagnosis.reason, ".");
     }
-    auto extended = Forward(view, *diagnosis);
-    if (!extended.ok()) return extended.status();
-    if (!*extended) break;
+    ASSIGN_OR_RETURN(auto extended, Forward(view, diagnosis));
+    if (!extended) break;
     added.push_back(step.next_effect);
-    fork_ = Fork{.view = std::move(view), .diagnosis = *std::move(diagnosis)};
-    view = **std::move(extended);
+    fork_ = Fork{.view = std::move(view), .diagnosis = std::move(diagnosis)};
+    view = *std::move(extended);
   }
   last_ = std::move(view);
   return absl::OkStatus();
@@ -220,7 +219,7 @@ absl::Status Improvement::Instead(std::vector<std::string>& added) {
     steps_.back().next_effect = in;
     added.resize(fork.view.campaign.model.effects.size() - first_->campaign.model.effects.size());
     added.push_back(in);
-    if (auto status = Climb(*std::move(with), added); !status.ok()) return status;
+    RETURN_IF_ERROR(Climb(*std::move(with), added));
     if (steps_.back().verdict == kAdequate) return absl::OkStatus();
   }
   return absl::OkStatus();
@@ -233,34 +232,32 @@ absl::StatusOr<bool> Improvement::Replace(std::size_t doubted, std::vector<std::
   const std::string out = added[doubted];
   std::vector<std::string> others = added;
   others.erase(others.begin() + static_cast<std::ptrdiff_t>(doubted));
-  const auto without = Extended(*first_, others, ClosestRunWithout(out, full), 1);
-  if (!without.ok()) return without.status();
+  ASSIGN_OR_RETURN(const auto without, Extended(*first_, others, ClosestRunWithout(out, full), 1));
   std::string reason;
-  const auto missing = Ask(*without, false, reason);
+  const auto missing = Ask(without, false, reason);
   if (absl::IsFailedPrecondition(missing.status())) return false;
   if (!missing.ok()) return missing.status();
   if (missing->verdict == kAdequate) {
-    steps_.push_back(StepOf(*without, missing->verdict,
-                            absl::StrCat(kExplained, " It does without ", out, ".")));
-    last_ = *without;
+    steps_.push_back(
+        StepOf(without, missing->verdict, absl::StrCat(kExplained, " It does without ", out, ".")));
+    last_ = without;
     added = std::move(others);
     return true;
   }
   for (const std::string& in : EffectsToTry(*missing)) {
-    if (in == out || !WhyNotJoin(without->campaign, in).empty()) continue;
-    auto with = Extended(*without, {in}, ClosestRunWith(in, *missing));
-    if (!with.ok()) return with.status();
-    const auto judged = Ask(*with, false, reason);
+    if (in == out || !WhyNotJoin(without.campaign, in).empty()) continue;
+    ASSIGN_OR_RETURN(auto with, Extended(without, {in}, ClosestRunWith(in, *missing)));
+    const auto judged = Ask(with, false, reason);
     if (absl::IsFailedPrecondition(judged.status())) continue;
     if (!judged.ok()) return judged.status();
     if (judged->verdict != kAdequate) continue;
     steps_.push_back(StepOf(
-        *without, missing->verdict,
+        without, missing->verdict,
         absl::StrCat("Asked anew what is missing without ", out, ": ", WhyNext(*missing, in))));
     steps_.back().next_effect = in;
-    steps_.push_back(StepOf(*with, judged->verdict,
+    steps_.push_back(StepOf(with, judged->verdict,
                             absl::StrCat(kExplained, " So ", in, " stands where ", out, " did.")));
-    last_ = *std::move(with);
+    last_ = std::move(with);
     others.push_back(in);
     added = std::move(others);
     return true;
@@ -288,10 +285,9 @@ absl::StatusOr<std::string> Improvement::TakeOutNeedless(const std::vector<std::
   for (std::size_t k = 0; k + 1 < added.size() && !Spent(); ++k) {
     std::vector<std::string> others = added;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    auto without = Extended(*first_, others, ClosestRunWithout(added[k], full), 1);
-    if (!without.ok()) return without.status();
-    if (without->posterior.posterior_from() == "none" || !Fits(*without)) continue;
-    last_ = *std::move(without);
+    ASSIGN_OR_RETURN(auto without, Extended(*first_, others, ClosestRunWithout(added[k], full), 1));
+    if (without.posterior.posterior_from() == "none" || !Fits(without)) continue;
+    last_ = std::move(without);
     if (auto judged = Judge(*last_, true); !judged.ok()) return judged.status();
     steps_.back().reason = absl::StrCat("As adequate without ", added[k], ", which is taken out.");
     return added[k];
@@ -316,7 +312,7 @@ bool Improvement::Fits(const report::CampaignView& view) {
 // The verdict is stored by its digest before held-out data are looked at.
 absl::Status Improvement::Open() {
   const std::string verdict = Json();
-  if (auto stored = client_.PutBlob(verdict); !stored.ok()) return stored;
+  RETURN_IF_ERROR(client_.PutBlob(verdict));
   digest_ = campaign::Sha256Hex(verdict);
   const auto held_out = [](const report::CampaignView& view) {
     return report::Compare(view, report::PredictReadings(view)).heldout_rms_error;
@@ -324,9 +320,8 @@ absl::Status Improvement::Open() {
   steps_.front().heldout_rms_error = held_out(*first_);
   steps_.back().heldout_rms_error = held_out(*last_);
   if (steps_.front().heldout_rms_error) {
-    auto before = OpenedBefore();
-    if (!before.ok()) return before.status();
-    opened_before_ = *std::move(before);
+    ASSIGN_OR_RETURN(auto before, OpenedBefore());
+    opened_before_ = std::move(before);
   }
   const std::string opened = Json();
   client::KeepFinding(client_, steps_.front().campaign, client::kImprovement, opened);
@@ -337,14 +332,12 @@ absl::Status Improvement::Open() {
 
 // Of what is kept with the first campaign: verdicts that were there before this one was first.
 absl::StatusOr<std::vector<std::string>> Improvement::OpenedBefore() {
-  const auto findings = client_.Findings(steps_.front().campaign);
-  if (!findings.ok()) return findings.status();
+  ASSIGN_OR_RETURN(const auto findings, client_.Findings(steps_.front().campaign));
   std::map<std::string, std::int64_t> opened;  // verdict's digest -> when first
-  for (const v1::Finding& finding : *findings) {
+  for (const v1::Finding& finding : findings) {
     if (finding.kind() != client::kImprovement) continue;
-    const auto document = client_.GetBlob(finding.digest());
-    if (!document.ok()) return document.status();
-    const auto json = nlohmann::json::parse(*document, nullptr, false);
+    ASSIGN_OR_RETURN(const auto document, client_.GetBlob(finding.digest()));
+    const auto json = nlohmann::json::parse(document, nullptr, false);
     if (!json.is_object()) continue;
     const auto [at, is_new] =
         opened.emplace(json.value("verdict_digest", ""), finding.created_unix_ms());

@@ -13,7 +13,7 @@
 #include "server/client/laboratory.h"
 #include "server/diagnosis/diagnosis.h"
 #include "server/diagnosis/extended_calibration.h"
-#include "server/report/campaign_view.h"
+#include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "server/client/laboratory.h"
-#include "server/report/campaign_view.h"
+#include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
 

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "inference/scatter/scatter.h"
-#include "server/campaign/scatter_fit.h"
+#include "server/campaign/model/scatter_fit.h"
 
 namespace calib::diagnosis {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/report/run_table.h"
+#include "server/report/views/run_table.h"
 
 namespace calib::diagnosis {
 

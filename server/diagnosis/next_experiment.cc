@@ -10,12 +10,13 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/derive.h"
-#include "server/campaign/yaml_text.h"
+#include "calib/return_if_error.h"
+#include "server/campaign/file/derive.h"
+#include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/plan_grid.h"
 #include "server/diagnosis/plan_words.h"
 #include "server/diagnosis/test_plans.h"
-#include "server/report/people_units.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -162,7 +163,7 @@ class Planning {
                           "the size of the errors is inferred, so that no distance in units "
                           "of them is known beforehand; state the noise"};
     }
-    if (auto status = Try(PlansFor(base_.campaign)); !status.ok()) return status;
+    RETURN_IF_ERROR(Try(PlansFor(base_.campaign)));
     if (offered_ == 0) return NextPlan{.why_none = NothingToPlan(pattern_)};
     if (tried_.empty()) {
       return NextPlan{.why_none = "no planned test came to an end with all of the models"};
@@ -195,13 +196,13 @@ class Planning {
   }
 
   absl::Status Refine() {
-    if (auto status = Confirm(); !status.ok()) return status;
+    RETURN_IF_ERROR(Confirm());
     if (ShareToldApart(tried_.front().pairs) >= kEnough) return absl::OkStatus();
     std::vector<PlannedExperiment> best_first;
     for (const Tried& one : tried_) {
       if (TellsSome(one)) best_first.push_back(one.plan.experiment);
     }
-    if (auto status = Try(GridOf(AsDone(base_.campaign), best_first)); !status.ok()) return status;
+    RETURN_IF_ERROR(Try(GridOf(AsDone(base_.campaign), best_first)));
     return Confirm();
   }
 
@@ -215,11 +216,10 @@ class Planning {
     for (TestPlan& plan : Named(std::move(wanted), numbered_ + 1)) {
       ++numbered_;
       YamlNode entry = EntryFor(plan, pattern_, *original);
-      const auto text = RivalsText(rivals_.front(), {rivals_.front().values},
-                                   base_.status.campaign(), like_, {entry});
-      if (!text.ok()) return text.status();
+      ASSIGN_OR_RETURN(const auto text, RivalsText(rivals_.front(), {rivals_.front().values},
+                                                   base_.status.campaign(), like_, {entry}));
       const std::string data = DataOf(plan.experiment, pattern_);
-      if (!laboratory_.Accepts(base_, *text, {{plan.file, data}})) continue;
+      if (!laboratory_.Accepts(base_, text, {{plan.file, data}})) continue;
       files[plan.file] = data;
       plans.push_back({.plan = std::move(plan),
                        .entry = std::move(entry),
@@ -230,13 +230,12 @@ class Planning {
     }
     if (plans.empty()) return absl::OkStatus();
     offered_ += plans.size();
-    const auto curves = Run(plans, files);
-    if (!curves.ok()) return curves.status();
+    ASSIGN_OR_RETURN(const auto curves, Run(plans, files));
     for (std::size_t p = 0; p < plans.size(); ++p) {
-      if (!IsFinished(*curves, p)) continue;
-      for (std::size_t r = 0; r < rivals_.size(); ++r) plans[p].curves.push_back({(*curves)[r][p]});
+      if (!IsFinished(curves, p)) continue;
+      for (std::size_t r = 0; r < rivals_.size(); ++r) plans[p].curves.push_back({curves[r][p]});
       ComparePairs(plans[p]);
-      CompareWithNone(*curves, p, plans[p].plan.experiment);
+      CompareWithNone(curves, p, plans[p].plan.experiment);
       tried_.push_back(std::move(plans[p]));
     }
     BestFirst();
@@ -268,16 +267,17 @@ class Planning {
     for (std::size_t r = 0; r < rivals_.size() && !wanted.empty(); ++r) {
       const Rival& rival = rivals_[r];
       if (rival.near.empty()) continue;
-      const auto text = RivalsText(rival, rival.near, base_.status.campaign(), like_, entries);
-      if (!text.ok()) return text.status();
-      const auto view = laboratory_.Run(
-          *rival.view, *text, "the best next experiments at other points of " + rival.name, files);
-      if (!view.ok()) return view.status();
-      evaluations_ += view->status.model_evaluations();
+      ASSIGN_OR_RETURN(const auto text,
+                       RivalsText(rival, rival.near, base_.status.campaign(), like_, entries));
+      ASSIGN_OR_RETURN(
+          const auto view,
+          laboratory_.Run(*rival.view, text,
+                          "the best next experiments at other points of " + rival.name, files));
+      evaluations_ += view.status.model_evaluations();
       for (Tried* one : wanted) {
         const auto readings = static_cast<Index>(one->plan.experiment.path.size());
         for (int i = 0; i < static_cast<int>(rival.near.size()); ++i) {
-          auto curves = CurvesOf(*view, one->plan.name, i, pattern_, readings);
+          auto curves = CurvesOf(view, one->plan.name, i, pattern_, readings);
           if (!curves.empty()) one->curves[r].push_back(std::move(curves));
         }
       }
@@ -303,19 +303,19 @@ class Planning {
     std::vector<int> ran(plans.size(), 0);  // whose time is known
     Curves curves;
     for (const Rival& rival : models) {
-      const auto text = RivalsText(rival, {rival.values}, base_.status.campaign(), like_, entries);
-      if (!text.ok()) return text.status();
-      const auto view = laboratory_.Run(*rival.view, *text,
-                                        "planning the next experiment with " + rival.name, files);
-      if (!view.ok()) return view.status();
-      evaluations_ += view->status.model_evaluations();
+      ASSIGN_OR_RETURN(const auto text,
+                       RivalsText(rival, {rival.values}, base_.status.campaign(), like_, entries));
+      ASSIGN_OR_RETURN(const auto view,
+                       laboratory_.Run(*rival.view, text,
+                                       "planning the next experiment with " + rival.name, files));
+      evaluations_ += view.status.model_evaluations();
       auto& own = curves.emplace_back();
       for (std::size_t p = 0; p < plans.size(); ++p) {
         PlannedExperiment& planned = plans[p].plan.experiment;
-        own.push_back(CurvesOf(*view, plans[p].plan.name, 0, pattern_,
+        own.push_back(CurvesOf(view, plans[p].plan.name, 0, pattern_,
                                static_cast<Index>(planned.path.size())));
-        const auto found = view->states.find({plans[p].plan.name, 0});
-        if (found == view->states.end() || !(found->second.core_seconds > 0)) continue;
+        const auto found = view.states.find({plans[p].plan.name, 0});
+        if (found == view.states.end() || !(found->second.core_seconds > 0)) continue;
         ++ran[p];
         planned.core_seconds += (found->second.core_seconds - planned.core_seconds) / ran[p];
       }

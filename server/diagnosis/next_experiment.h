@@ -11,7 +11,7 @@
 #include "absl/status/statusor.h"
 #include "server/client/laboratory.h"
 #include "server/diagnosis/test_plans.h"
-#include "server/report/campaign_view.h"
+#include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
 

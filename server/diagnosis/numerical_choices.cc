@@ -1,6 +1,7 @@
 #include "server/diagnosis/numerical_choices.h"
 
-#include "server/campaign/excitation.h"
+#include "dem/model/staging.h"
+#include "server/campaign/model/excitation.h"
 
 namespace calib::diagnosis {
 namespace {

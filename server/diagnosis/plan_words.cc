@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
-#include "dem/catalog/catalog.h"
-#include "server/report/people_units.h"
+#include "dem/registry/catalog.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::diagnosis {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "inference/diagnosis/screen.h"
-#include "server/campaign/campaign.h"
+#include "server/campaign/model/campaign.h"
 
 namespace calib::diagnosis {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 
 namespace calib::diagnosis {
 namespace {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
 #include "server/diagnosis/left_out_packings.h"
@@ -155,10 +156,9 @@ absl::StatusOr<Response> RespondTo(const FittedCampaign& base, const EmulatedMod
       coefficients.col(before + i) << 1, prediction.mean.row(from).transpose();
     }
   };
-  const auto spread =
-      inference::DrawSamples(inference::Proposal{}, priors, campaign.filter, 0, kSpread);
-  if (!spread.ok()) return spread.status();
-  add(*spread);
+  ASSIGN_OR_RETURN(const auto spread, inference::DrawSamples(inference::Proposal{}, priors,
+                                                             campaign.filter, 0, kSpread));
+  add(spread);
   add(table.parameters);
   if (model.draws.rows() > 0) add(model.draws);
   if (points.rows() == 0) {

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "absl/strings/str_cat.h"
-#include "server/campaign/excitation.h"
+#include "server/campaign/model/excitation.h"
 
 namespace calib::diagnosis {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
-#include "server/campaign/campaign.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/model/campaign.h"
 
 namespace calib::diagnosis {
 

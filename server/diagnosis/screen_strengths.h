@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 
 namespace calib::diagnosis {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <set>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "server/diagnosis/control_way.h"
 
 namespace calib::diagnosis {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "inference/data/data_set.h"
-#include "server/campaign/campaign.h"
+#include "server/campaign/model/campaign.h"
 
 namespace calib::diagnosis {
 

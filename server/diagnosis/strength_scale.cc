@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "dem/registry/declared_effects.h"
 
 namespace calib::diagnosis {
 namespace {

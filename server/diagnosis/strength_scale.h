@@ -5,7 +5,7 @@
 #include <array>
 #include <string>
 
-#include "server/campaign/campaign.h"
+#include "server/campaign/model/campaign.h"
 
 namespace calib::diagnosis {
 

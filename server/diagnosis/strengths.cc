@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "absl/strings/str_cat.h"
-#include "server/report/people_units.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::diagnosis {
 

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 
 namespace calib::diagnosis {
 

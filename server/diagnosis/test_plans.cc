@@ -8,8 +8,8 @@
 #include <utility>
 #include <variant>
 
-#include "dem/catalog/catalog.h"
-#include "server/campaign/yaml_text.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/control_way.h"
 #include "server/diagnosis/setting_plans.h"
 

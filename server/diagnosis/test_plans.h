@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/campaign/campaign.h"
-#include "server/campaign/yaml_tree.h"
+#include "server/campaign/file/text/yaml_tree.h"
+#include "server/campaign/model/campaign.h"
 
 namespace calib::diagnosis {
 

@@ -11,8 +11,8 @@
 
 #include "inference/diagnosis/screen.h"
 #include "server/diagnosis/strength_scale.h"
-#include "server/report/campaign_view.h"
-#include "server/report/run_table.h"
+#include "server/report/views/campaign_view.h"
+#include "server/report/views/run_table.h"
 
 namespace calib::diagnosis {
 

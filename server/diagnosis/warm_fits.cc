@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/warm_points.h"
 
@@ -63,7 +64,7 @@ absl::Status WarmFits::Fit(const RefitOrder& order, std::optional<std::int64_t> 
   const auto fitting = static_cast<std::size_t>(std::max(1, allowed / (kLeastBatches * batch)));
   std::vector<std::string> first = order.first;
   first.resize(std::min(first.size(), fitting));
-  if (auto status = Begin(first); !status.ok()) return status;
+  RETURN_IF_ERROR(Begin(first));
   while (spent_ + batch <= allowed) {
     const bool may_begin = spent_ + kLeastBatches * batch <= allowed;
     const auto next = NextRefit(order, Standings(), base_chi2, may_begin);
@@ -77,13 +78,12 @@ absl::Status WarmFits::Fit(const RefitOrder& order, std::optional<std::int64_t> 
 // Side by side.
 absl::Status WarmFits::Begin(const std::vector<std::string>& effects) {
   for (const std::string& effect : effects) {
-    const auto text = FirstText(effect);
-    if (!text.ok()) return text.status();
-    if (auto status = base_.Announce(*text, effect); !status.ok()) return status;
+    ASSIGN_OR_RETURN(const auto text, FirstText(effect));
+    RETURN_IF_ERROR(base_.Announce(text, effect));
   }
   for (int first = 0; first < kLeastBatches; ++first) {
     for (const std::string& effect : effects) {
-      if (auto status = Continue(effect); !status.ok()) return status;
+      RETURN_IF_ERROR(Continue(effect));
     }
   }
   begun_.insert(begun_.end(), effects.begin(), effects.end());
@@ -138,9 +138,8 @@ absl::Status WarmFits::Continue(const std::string& effect) {
   const double rms = fit.rms;
   const double chi2 = fit.adequacy.chi2;
   if (fit.iterations == 0) {
-    const auto text = FirstText(effect);
-    if (!text.ok()) return text.status();
-    auto view = base_.Run(*text, what);
+    ASSIGN_OR_RETURN(const auto text, FirstText(effect));
+    auto view = base_.Run(text, what);
     if (absl::IsAborted(view.status())) {  // not one run of it came to an end
       fit.stalled = true;
       fit.iterations = 1;
@@ -153,19 +152,17 @@ absl::Status WarmFits::Continue(const std::string& effect) {
     fit.view = *std::move(view);
     Add(fit.view, fit);
   } else {
-    const auto points = PointsFor(effect);
-    if (!points.ok()) return points.status();
+    ASSIGN_OR_RETURN(const auto points, PointsFor(effect));
     campaign::Derivation derivation = base_.Derived("warm_fit_batch", what);
-    for (Index i = 0; i < points->rows(); ++i) {
+    for (Index i = 0; i < points.rows(); ++i) {
       derivation.rows.push_back({.like = fit.iterations * samples_ + static_cast<int>(i),
-                                 .values = PointOf(fit.view, *points, i)});
+                                 .values = PointOf(fit.view, points, i)});
     }
-    const auto text = campaign::Derive(fit.view.source.campaign_file(), derivation);
-    if (!text.ok()) return text.status();
-    const auto view = base_.Run(*text, what);
-    if (!view.ok()) return view.status();
-    evaluations_ += view->status.model_evaluations();
-    Add(*view, fit);
+    ASSIGN_OR_RETURN(const auto text,
+                     campaign::Derive(fit.view.source.campaign_file(), derivation));
+    ASSIGN_OR_RETURN(const auto view, base_.Run(text, what));
+    evaluations_ += view.status.model_evaluations();
+    Add(view, fit);
   }
   ++fit.iterations;
   if (fit.runs.histories.rows() == 0) {

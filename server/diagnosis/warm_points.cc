@@ -6,8 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/model_parameters.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/model_parameters.h"
 #include "inference/emulator/emulated_target.h"
 #include "inference/emulator/search_widening.h"
 #include "server/diagnosis/reading_effects.h"
@@ -215,11 +216,11 @@ absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
   if (!emulated.ok() || emulated->draws.rows() == 0) {
     return DrawWhereRunsEnd({}, priors, campaign.filter, runs.parameters, diverged, batch, count);
   }
-  const auto about = inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
-                                                   static_cast<std::size_t>(batch), {},
-                                                   inference::ClosestDraws(*emulated));
-  if (!about.ok()) return about.status();
-  return DrawWhereRunsEnd(*about, priors, campaign.filter, runs.parameters, diverged, batch, count);
+  ASSIGN_OR_RETURN(const auto about,
+                   inference::FitProposalToDraws(priors, campaign.filter, emulated->draws,
+                                                 static_cast<std::size_t>(batch), {},
+                                                 inference::ClosestDraws(*emulated)));
+  return DrawWhereRunsEnd(about, priors, campaign.filter, runs.parameters, diverged, batch, count);
 }
 
 Eigen::MatrixXd DivergedPoints(const report::CampaignView& view) {

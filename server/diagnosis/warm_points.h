@@ -9,7 +9,7 @@
 #include "absl/status/statusor.h"
 #include "inference/emulator/emulated_posterior.h"
 #include "server/diagnosis/effect_screen.h"
-#include "server/report/run_table.h"
+#include "server/report/views/run_table.h"
 
 namespace calib::diagnosis {
 

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "calib/return_if_error.h"
 #include "inference/emulator/search_widening.h"
 #include "inference/emulator/split_half.h"
 #include "inference/filter/widened_posterior.h"
@@ -169,13 +170,11 @@ std::vector<double> StagePOfWeights(const Definition& definition,
 
 absl::StatusOr<Answer> FindAnswer(const Definition& definition,
                                   std::span<const inference::Iteration> iterations) {
-  auto weighted = inference::ComputePosterior(
-      definition.priors, definition.data, definition.campaign.filter, iterations, definition.known);
-  if (!weighted.ok()) {
-    return weighted.status();
-  }
+  ASSIGN_OR_RETURN(auto weighted, inference::ComputePosterior(definition.priors, definition.data,
+                                                              definition.campaign.filter,
+                                                              iterations, definition.known));
   Answer answer;
-  answer.weighted = *std::move(weighted);
+  answer.weighted = std::move(weighted);
   answer.warnings = answer.weighted.warnings;
   if (std::string held = ConditionedOn(definition, answer.weighted.frozen); !held.empty()) {
     answer.warnings.insert(answer.warnings.begin(), std::move(held));

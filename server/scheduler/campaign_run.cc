@@ -5,7 +5,8 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
-#include "server/scheduler/attempt_spec.h"
+#include "calib/return_if_error.h"
+#include "server/messages/attempt_spec.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
 
@@ -27,25 +28,12 @@ CampaignRun::CampaignRun(std::int64_t id, std::shared_ptr<const Definition> defi
 
 absl::StatusOr<std::unique_ptr<CampaignRun>> CampaignRun::Load(store::Reader& reader,
                                                                std::int64_t id) {
-  const auto record = reader.Campaign(id);
-  if (!record.ok()) {
-    return record.status();
-  }
-  auto definition = LoadDefinition(reader, record->submitted);
-  if (!definition.ok()) {
-    return definition.status();
-  }
-  std::unique_ptr<CampaignRun> run(new CampaignRun(id, *std::move(definition)));
-  const auto state = ToCampaignState(record->progress.state);
-  if (!state.has_value()) {
-    return absl::DataLossError(
-        absl::StrCat("campaign c", id, " is in the unknown state ", record->progress.state));
-  }
-  run->record_ = *record;
-  run->state_ = *state;
-  if (absl::Status status = run->Reload(reader); !status.ok()) {
-    return status;
-  }
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(id));
+  ASSIGN_OR_RETURN(auto definition, LoadDefinition(reader, record.submitted));
+  std::unique_ptr<CampaignRun> run(new CampaignRun(id, std::move(definition)));
+  run->record_ = record;
+  run->state_ = record.progress.state;
+  RETURN_IF_ERROR(run->Reload(reader));
   return run;
 }
 
@@ -59,24 +47,19 @@ absl::Status CampaignRun::Reload(store::Reader& reader) {
 }
 
 absl::Status CampaignRun::Extend(store::Reader& reader) {
-  const auto samples = reader.Samples(id_);
-  const auto evaluations = reader.Evaluations(id_);
-  for (const absl::Status& status : {samples.status(), evaluations.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
+  ASSIGN_OR_RETURN(const auto samples, reader.Samples(id_));
+  ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(id_));
   const bool everything = evaluations_.empty();
   std::vector<store::EvaluationRecord> added;
   std::set<int> of_samples;
   std::set<int> open = OpenSamples();
-  for (const store::EvaluationRecord& evaluation : *evaluations) {
+  for (const store::EvaluationRecord& evaluation : evaluations) {
     if (evaluations_.count(evaluation.key) > 0) {
       continue;
     }
     added.push_back(evaluation);
     of_samples.insert(evaluation.key.sample);
-    if (!store::IsTerminal(evaluation.status)) {
+    if (!campaign::IsTerminal(evaluation.status)) {
       open.insert(evaluation.key.sample);
     }
   }
@@ -86,7 +69,7 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
   std::erase_if(arrived_, [this, &open](const auto& entry) {
     return !IsOfRunningIteration(entry.first) && open.count(entry.first) == 0;
   });
-  for (const store::SampleRecord& sample : *samples) {
+  for (const store::SampleRecord& sample : samples) {
     if (!parameters_.emplace(sample.sample, sample.parameters).second) {
       continue;
     }
@@ -109,23 +92,20 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
     return AddStates(reader.States(id_));
   }
   for (const int sample : of_samples) {
-    if (absl::Status status = AddStates(reader.States(id_, sample)); !status.ok()) {
-      return status;
-    }
+    RETURN_IF_ERROR(AddStates(reader.States(id_, sample)));
   }
   return absl::OkStatus();
 }
 
 absl::Status CampaignRun::Refresh(store::Reader& reader, const std::vector<EvaluationKey>& keys) {
-  const auto evaluations = reader.Evaluations(id_);
-  if (!evaluations.ok()) return evaluations.status();
+  ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(id_));
   std::set<int> samples;
   for (const EvaluationKey& key : keys) samples.insert(key.sample);
   for (const int sample : samples) {
-    if (absl::Status status = AddStates(reader.States(id_, sample)); !status.ok()) return status;
+    RETURN_IF_ERROR(AddStates(reader.States(id_, sample)));
   }
   const std::set<EvaluationKey> wanted(keys.begin(), keys.end());
-  for (const store::EvaluationRecord& evaluation : *evaluations) {
+  for (const store::EvaluationRecord& evaluation : evaluations) {
     if (wanted.count(evaluation.key) > 0) {
       SetStatus(evaluation.key, evaluation.status, evaluation.failures);
     }
@@ -144,12 +124,9 @@ absl::Status CampaignRun::AddStates(const absl::StatusOr<std::vector<store::Stat
 }
 
 absl::Status CampaignRun::Apply(CampaignEvent event, const std::string& reason) {
-  const auto next = Next(state_, event);
-  if (!next.ok()) {
-    return next.status();
-  }
-  state_ = *next;
-  record_.progress.state = ToString(state_);
+  ASSIGN_OR_RETURN(const auto next, Next(state_, event));
+  state_ = next;
+  record_.progress.state = state_;
   record_.progress.reason = reason;
   return absl::OkStatus();
 }
@@ -166,10 +143,10 @@ std::map<EvaluationKey, std::string> CampaignRun::OfOtherMechanics() const {
                           evaluation.status == EvaluationStatus::kDiverged;
     // What rests or was stopped may be asked to go on while its iteration is not concluded.
     const bool stopped = evaluation.status == EvaluationStatus::kStoppedEarly &&
-                         record_.progress.phase != "calibrating";
+                         record_.progress.phase != campaign::Phase::kCalibrating;
     if (for_good || stopped || evaluation.digest.empty()) continue;
-    const std::string digest = SpecDigest(
-        SpecOf(definition_->campaign, key.experiment, parameters_.at(key.sample), key.sample));
+    const std::string digest = messages::SpecDigest(messages::SpecOf(
+        definition_->campaign, key.experiment, parameters_.at(key.sample), key.sample));
     if (digest != evaluation.digest) others[key] = digest;
   }
   return others;
@@ -178,7 +155,7 @@ std::map<EvaluationKey, std::string> CampaignRun::OfOtherMechanics() const {
 bool CampaignRun::HasBegun() const {
   return std::any_of(evaluations_.begin(), evaluations_.end(), [this](const auto& entry) {
     const auto& [key, evaluation] = entry;
-    return store::IsTerminal(evaluation.status) ||
+    return campaign::IsTerminal(evaluation.status) ||
            evaluation.missing.size() < definition_->LoadSteps(key.experiment).size();
   });
 }
@@ -210,14 +187,14 @@ std::vector<EvaluationKey> CampaignRun::With(EvaluationStatus status) const {
 
 bool CampaignRun::AllTerminal() const {
   return std::all_of(by_status_.begin(), by_status_.end(), [](const auto& item) {
-    return item.second.empty() || store::IsTerminal(item.first);
+    return item.second.empty() || campaign::IsTerminal(item.first);
   });
 }
 
 std::vector<EvaluationKey> CampaignRun::Open() const {
   std::vector<EvaluationKey> open;
   for (const auto& [status, keys] : by_status_) {
-    if (!store::IsTerminal(status)) open.insert(open.end(), keys.begin(), keys.end());
+    if (!campaign::IsTerminal(status)) open.insert(open.end(), keys.begin(), keys.end());
   }
   return open;
 }
@@ -232,8 +209,9 @@ std::size_t CampaignRun::Results() const {
 }
 
 bool CampaignRun::WantsPlan() const {
-  return AllTerminal() || (DecidesWhileRunning(*definition_) &&
-                           record_.progress.phase == "calibrating" && planned_ != Results());
+  return AllTerminal() ||
+         (DecidesWhileRunning(*definition_) &&
+          record_.progress.phase == campaign::Phase::kCalibrating && planned_ != Results());
 }
 
 void CampaignRun::Planned(bool again) {
@@ -315,7 +293,7 @@ bool CampaignRun::IsItsTurn(const EvaluationKey& key) const {
   }
   for (auto before = evaluations_.lower_bound({key.campaign, key.sample, 0});
        before != evaluations_.end() && before->first < key; ++before) {
-    if (IsCalibrated(before->first.experiment) && !store::IsTerminal(before->second.status)) {
+    if (IsCalibrated(before->first.experiment) && !campaign::IsTerminal(before->second.status)) {
       return false;
     }
   }

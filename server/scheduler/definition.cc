@@ -5,7 +5,8 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/catalog.h"
 #include "server/scheduler/plan_memory.h"
 
 namespace calib::scheduler {
@@ -112,12 +113,9 @@ std::shared_ptr<const Definition> MakeDefinition(campaign::Campaign campaign) {
 
 absl::StatusOr<std::shared_ptr<const Definition>> LoadDefinition(
     store::Reader& reader, const store::NewCampaign& submitted) {
-  const auto files = reader.Files(submitted.id);
-  if (!files.ok()) {
-    return files.status();
-  }
+  ASSIGN_OR_RETURN(const auto files, reader.Files(submitted.id));
   campaign::ReadOutcome outcome =
-      campaign::ReadCampaign(submitted.yaml, submitted.file_name, StoredFiles(reader, *files),
+      campaign::ReadCampaign(submitted.yaml, submitted.file_name, StoredFiles(reader, files),
                              submitted.seed, campaign::CampaignIs::kStored);
   if (!outcome.problems.empty()) {
     return absl::FailedPreconditionError(

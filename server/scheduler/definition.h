@@ -14,8 +14,8 @@
 #include "inference/scatter/chi_squared_law.h"
 #include "inference/scatter/refit_spread.h"
 #include "inference/surrogate/cubic_rbf.h"
-#include "server/campaign/campaign.h"
-#include "server/campaign/campaign_file.h"
+#include "server/campaign/file/campaign_file.h"
+#include "server/campaign/model/campaign.h"
 #include "server/store/reader.h"
 
 namespace calib::scheduler {

@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "calib/return_if_error.h"
 #include "inference/sampling/philox.h"
 #include "server/scheduler/decisions.h"
 
@@ -61,14 +62,12 @@ absl::StatusOr<Finished> FinishedMass(const Definition& definition, const Histor
   std::vector<double> weights;
   Eigen::Index at = 0;
   for (const inference::Iteration& iteration : history.iterations) {
-    const auto likelihood = inference::LogLikelihood(definition.data, definition.campaign.filter,
-                                                     iteration.predictions);
-    if (!likelihood.ok()) {
-      return likelihood.status();
-    }
-    for (Eigen::Index i = 0; i < likelihood->size(); ++i) {
-      const bool counts = std::isfinite((*likelihood)(i)) && std::isfinite(importance(at));
-      weights.push_back(counts ? importance(at) + *exponent * (*likelihood)(i) : kNoMass);
+    ASSIGN_OR_RETURN(const auto likelihood,
+                     inference::LogLikelihood(definition.data, definition.campaign.filter,
+                                              iteration.predictions));
+    for (Eigen::Index i = 0; i < likelihood.size(); ++i) {
+      const bool counts = std::isfinite(likelihood(i)) && std::isfinite(importance(at));
+      weights.push_back(counts ? importance(at) + *exponent * likelihood(i) : kNoMass);
       ++at;
     }
   }
@@ -111,17 +110,14 @@ absl::StatusOr<std::vector<double>> StopThresholds(const Definition& definition,
   std::vector<inference::Iteration> all = history.iterations;
   all.push_back(next);
   const Eigen::VectorXd importance = inference::LogImportance(definition.priors, all);
-  const auto finished = FinishedMass(definition, history, importance);
-  if (!finished.ok()) {
-    return finished.status();
-  }
-  if (!std::isfinite(finished->log_mass)) {
+  ASSIGN_OR_RETURN(const auto finished, FinishedMass(definition, history, importance));
+  if (!std::isfinite(finished.log_mass)) {
     return thresholds;
   }
   const Eigen::Index first = importance.size() - n;
   for (Eigen::Index i = 0; i < n; ++i) {
     thresholds[static_cast<std::size_t>(i)] =
-        Threshold(definition, *finished, importance(first + i), n);
+        Threshold(definition, finished, importance(first + i), n);
   }
   return thresholds;
 }
@@ -131,11 +127,8 @@ absl::StatusOr<std::vector<std::pair<int, double>>> ThresholdsNow(const Definiti
   std::vector<std::pair<int, double>> changed;
   const Eigen::VectorXd importance =
       inference::LogImportance(definition.priors, history.iterations);
-  const auto finished = FinishedMass(definition, history, importance);
-  if (!finished.ok()) {
-    return finished.status();
-  }
-  const auto done = std::count_if(finished->log_weights.begin(), finished->log_weights.end(),
+  ASSIGN_OR_RETURN(const auto finished, FinishedMass(definition, history, importance));
+  const auto done = std::count_if(finished.log_weights.begin(), finished.log_weights.end(),
                                   [](double weight) { return std::isfinite(weight); });
   if (!definition.campaign.early_stopping->exponent &&
       static_cast<double>(done) < FinishedWanted(definition)) {
@@ -144,9 +137,9 @@ absl::StatusOr<std::vector<std::pair<int, double>>> ThresholdsNow(const Definiti
   const std::vector<char>& ended = history.ended.back();
   const auto n = static_cast<Eigen::Index>(ended.size());
   const Eigen::Index first = importance.size() - n;
-  for (Eigen::Index i = 0; std::isfinite(finished->log_mass) && i < n; ++i) {
+  for (Eigen::Index i = 0; std::isfinite(finished.log_mass) && i < n; ++i) {
     const store::SampleRecord& sample = history.samples[static_cast<std::size_t>(first + i)];
-    const double threshold = Threshold(definition, *finished, importance(first + i), n);
+    const double threshold = Threshold(definition, finished, importance(first + i), n);
     const bool may_stop = !std::isnan(sample.stop_below);
     if (ended[static_cast<std::size_t>(i)] == 0 && may_stop && threshold != sample.stop_below) {
       changed.emplace_back(sample.sample, threshold);
@@ -162,10 +155,7 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
   }
   const Eigen::VectorXd importance =
       inference::LogImportance(definition.priors, history.iterations);
-  const auto finished = FinishedMass(definition, history, importance);
-  if (!finished.ok()) {
-    return finished.status();
-  }
+  ASSIGN_OR_RETURN(const auto finished, FinishedMass(definition, history, importance));
   std::map<int, std::vector<store::EvaluationKey>> keys;
   for (const store::EvaluationKey& key : history.stopped_keys) {
     keys[key.sample].push_back(key);
@@ -177,16 +167,14 @@ absl::StatusOr<Loss> StatedLoss(const Definition& definition, const History& his
   std::vector<Stopped> stopped;
   std::size_t at = 0;
   for (std::size_t k = 0; k < history.iterations.size(); ++k) {
-    const auto bound = inference::LogLikelihoodBound(definition.data, definition.campaign.filter,
-                                                     history.stopped[k]);
-    if (!bound.ok()) {
-      return bound.status();
-    }
-    for (Eigen::Index i = 0; i < bound->size(); ++i, ++at) {
+    ASSIGN_OR_RETURN(const auto bound,
+                     inference::LogLikelihoodBound(definition.data, definition.campaign.filter,
+                                                   history.stopped[k]));
+    for (Eigen::Index i = 0; i < bound.size(); ++i, ++at) {
       const int sample = history.samples[at].sample;
       if (keys.count(sample) > 0) {
         stopped.push_back({.bound = std::exp(importance(static_cast<Eigen::Index>(at)) +
-                                             finished->exponent * (*bound)(i)-finished->log_mass),
+                                             finished.exponent * bound(i) - finished.log_mass),
                            .sample = sample});
       }
     }
@@ -243,14 +231,12 @@ absl::StatusOr<Audit> AuditOf(const Definition& definition, const History& histo
   if (audit.samples == 0) {
     return audit;
   }
-  const auto finished = FinishedMass(
-      definition, history, inference::LogImportance(definition.priors, history.iterations));
-  if (!finished.ok()) {
-    return finished.status();
-  }
-  for (std::size_t i = 0; i < finished->log_weights.size(); ++i) {
+  ASSIGN_OR_RETURN(const auto finished,
+                   FinishedMass(definition, history,
+                                inference::LogImportance(definition.priors, history.iterations)));
+  for (std::size_t i = 0; i < finished.log_weights.size(); ++i) {
     if (!std::isnan(history.samples[i].audited)) {
-      audit.measured += std::exp(finished->log_weights[i] - finished->log_mass);
+      audit.measured += std::exp(finished.log_weights[i] - finished.log_mass);
     }
   }
   return audit;

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "calib/return_if_error.h"
 #include "server/scheduler/early_stopping.h"
 #include "server/scheduler/method.h"
 #include "server/scheduler/posterior_record.h"
@@ -21,32 +22,17 @@ class FilterMethod final : public Method {
   }
 
   absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const override {
-    auto answer = FindAnswer(definition_, history.iterations);
-    if (!answer.ok()) {
-      return answer.status();
-    }
-    const auto converged = IsConverged(*answer, history);
-    if (!converged.ok()) {
-      return converged.status();
-    }
-    Outcome outcome{.answer = *std::move(answer), .converged = *converged, .log = "", .next = {}};
+    ASSIGN_OR_RETURN(auto answer, FindAnswer(definition_, history.iterations));
+    ASSIGN_OR_RETURN(const auto converged, IsConverged(answer, history));
+    Outcome outcome{.answer = std::move(answer), .converged = converged, .log = "", .next = {}};
     const auto iterations = static_cast<int>(history.iterations.size());
     if (outcome.converged || !affordable || iterations >= campaign::MostBatches(campaign_)) {
       return outcome;
     }
-    const auto frozen = Hold(outcome.answer, history);
-    if (!frozen.ok()) {
-      return frozen.status();
-    }
-    const auto proposal = NextProposal(outcome.answer, history, *frozen);
-    if (!proposal.ok()) {
-      return proposal.status();
-    }
-    auto next = Draw(history, *proposal);
-    if (!next.ok()) {
-      return next.status();
-    }
-    outcome.next = *std::move(next);
+    ASSIGN_OR_RETURN(const auto frozen, Hold(outcome.answer, history));
+    ASSIGN_OR_RETURN(const auto proposal, NextProposal(outcome.answer, history, frozen));
+    ASSIGN_OR_RETURN(auto next, Draw(history, proposal));
+    outcome.next = std::move(next);
     return outcome;
   }
 
@@ -82,16 +68,13 @@ class FilterMethod final : public Method {
     if (!history.last_posterior.has_value()) {
       return false;
     }
-    const auto before = PosteriorFromJson(*history.last_posterior);
-    if (!before.ok()) {
-      return before.status();
-    }
-    if (before->posterior_from() == "none") {
+    ASSIGN_OR_RETURN(const auto before, PosteriorFromJson(*history.last_posterior));
+    if (before.posterior_from() == "none") {
       return false;
     }
     inference::Posterior now;
     now.parameters = answer.Parameters();
-    return inference::MeansConverged(MeansOf(*before), now, campaign_.filter);
+    return inference::MeansConverged(MeansOf(before), now, campaign_.filter);
   }
 
   /// What the next iteration holds: what this one held, and what `freeze` says of the next, at the
@@ -106,13 +89,10 @@ class FilterMethod final : public Method {
     const std::vector<inference::ParameterSummary> now = answer.Parameters();
     std::vector<char> still(now.size(), 0);
     if (rule->second.converged && answer.HasIntervals() && history.last_posterior.has_value()) {
-      const auto before = PosteriorFromJson(*history.last_posterior);
-      if (!before.ok()) {
-        return before.status();
-      }
+      ASSIGN_OR_RETURN(const auto before, PosteriorFromJson(*history.last_posterior));
       inference::Posterior posterior;
       posterior.parameters = now;
-      still = inference::ConvergedMeans(MeansOf(*before), posterior, campaign_.filter);
+      still = inference::ConvergedMeans(MeansOf(before), posterior, campaign_.filter);
     }
     frozen.resize(now.size());
     auto free = std::count(frozen.begin(), frozen.end(), std::nullopt);
@@ -135,23 +115,18 @@ class FilterMethod final : public Method {
     if (campaign_.precomputed.has_value()) {
       batch.parameters = campaign_.precomputed->parameters;
     } else {
-      auto drawn =
+      ASSIGN_OR_RETURN(
+          auto drawn,
           inference::DrawSamples(proposal, definition_.priors, campaign_.filter,
-                                 static_cast<int>(history.iterations.size()), campaign_.samples);
-      if (!drawn.ok()) {
-        return drawn.status();
-      }
-      batch.parameters = *std::move(drawn);
+                                 static_cast<int>(history.iterations.size()), campaign_.samples));
+      batch.parameters = std::move(drawn);
     }
-    auto thresholds = StopThresholds(definition_, history,
-                                     {.proposal = proposal,
-                                      .parameters = batch.parameters,
-                                      .predictions = {},
-                                      .log_proposal = {}});
-    if (!thresholds.ok()) {
-      return thresholds.status();
-    }
-    batch.stop_below = *std::move(thresholds);
+    ASSIGN_OR_RETURN(auto thresholds, StopThresholds(definition_, history,
+                                                     {.proposal = proposal,
+                                                      .parameters = batch.parameters,
+                                                      .predictions = {},
+                                                      .log_proposal = {}}));
+    batch.stop_below = std::move(thresholds);
     return batch;
   }
 

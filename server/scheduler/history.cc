@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "calib/return_if_error.h"
 #include "server/scheduler/plan_memory.h"
 #include "server/scheduler/posterior_record.h"
 
@@ -74,7 +75,7 @@ void AddEnds(const std::vector<store::EvaluationRecord>& evaluations, const Plac
     if (placed_alone && found == place.end()) {
       continue;
     }
-    if (store::IsTerminal(evaluation.status)) {
+    if (campaign::IsTerminal(evaluation.status)) {
       const bool spared = evaluation.status == store::EvaluationStatus::kStoppedEarly &&
                           history.begun.count(evaluation.key) == 0;
       ran += evaluation.reused || spared ? 0 : 1;
@@ -98,21 +99,15 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
       keeps && definition.memory->history.has_value() ? *definition.memory->history : History{};
   const std::size_t known = history.iterations.size();
   const int first = history.samples.empty() ? 0 : history.samples.back().sample + 1;
-  auto iterations = reader.Iterations(campaign);
-  auto samples = reader.Samples(campaign, first);
-  auto evaluations = reader.Evaluations(campaign);
-  auto states = reader.StatesFrom(campaign, first);
-  auto effort = reader.EffortOf(campaign);
-  for (const absl::Status& status : {iterations.status(), samples.status(), evaluations.status(),
-                                     states.status(), effort.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
+  ASSIGN_OR_RETURN(auto iterations, reader.Iterations(campaign));
+  ASSIGN_OR_RETURN(auto samples, reader.Samples(campaign, first));
+  ASSIGN_OR_RETURN(auto evaluations, reader.Evaluations(campaign));
+  ASSIGN_OR_RETURN(auto states, reader.StatesFrom(campaign, first));
+  ASSIGN_OR_RETURN(auto effort, reader.EffortOf(campaign));
   history.last_posterior.reset();
   history.previous_posterior.reset();
   history.concluded = 0;
-  for (store::IterationRecord& record : *iterations) {
+  for (store::IterationRecord& record : iterations) {
     if (record.proposal == kHeldOutDraws || record.proposal == kReplicates) {
       break;  // nothing of the ensemble comes after them
     }
@@ -122,11 +117,8 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     if (static_cast<std::size_t>(record.number) >= known) {
       inference::Iteration& iteration = history.iterations.emplace_back();
       if (campaign::IsFilter(definition.campaign.method)) {
-        auto proposal = ProposalFromJson(record.proposal);
-        if (!proposal.ok()) {
-          return proposal.status();
-        }
-        iteration.proposal = *std::move(proposal);
+        ASSIGN_OR_RETURN(auto proposal, ProposalFromJson(record.proposal));
+        iteration.proposal = std::move(proposal);
       }
       history.proposals.push_back(std::move(record.proposal));
       if (definition.campaign.precomputed.has_value()) {
@@ -139,30 +131,30 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
       ++history.concluded;
     }
   }
-  std::erase_if(*samples, [&history](const store::SampleRecord& sample) {
+  std::erase_if(samples, [&history](const store::SampleRecord& sample) {
     return static_cast<std::size_t>(sample.iteration) >= history.iterations.size();
   });
-  history.samples.insert(history.samples.end(), samples->begin(), samples->end());
-  history.effort = *effort;
+  history.samples.insert(history.samples.end(), samples.begin(), samples.end());
+  history.effort = effort;
   AddSamples(definition, known, history);
 
   // Position of a sample within its iteration, by its number.
   Places place;
   std::vector<Eigen::Index> next(history.iterations.size(), 0);
-  for (const store::SampleRecord& sample : *samples) {
+  for (const store::SampleRecord& sample : samples) {
     const auto k = static_cast<std::size_t>(sample.iteration);
     place[sample.sample] = {k, next[k]++};
   }
-  const auto finished = WithStatus(*evaluations, store::EvaluationStatus::kFinished);
-  auto stopped = WithStatus(*evaluations, store::EvaluationStatus::kStoppedEarly);
-  for (const store::StateRecord& state : *states) {
+  const auto finished = WithStatus(evaluations, store::EvaluationStatus::kFinished);
+  auto stopped = WithStatus(evaluations, store::EvaluationStatus::kStoppedEarly);
+  for (const store::StateRecord& state : states) {
     if (stopped.count(state.key) > 0) {
       history.begun.insert(state.key);
     }
   }
-  AddEnds(*evaluations, place, first_iterations.has_value(), history);
+  AddEnds(evaluations, place, first_iterations.has_value(), history);
   std::set<int> without_weight;  // whatever their other experiments would come to
-  for (const auto& key : WithStatus(*evaluations, store::EvaluationStatus::kDiverged)) {
+  for (const auto& key : WithStatus(evaluations, store::EvaluationStatus::kDiverged)) {
     without_weight.insert(key.sample);
   }
   std::erase_if(stopped, [&without_weight](const store::EvaluationKey& key) {
@@ -173,7 +165,7 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
   for (const store::EvaluationKey& key : stopped) {
     stopped_samples.insert(key.sample);
   }
-  for (const store::StateRecord& state : *states) {
+  for (const store::StateRecord& state : states) {
     const auto found = place.find(state.key.sample);
     if (found == place.end()) {
       continue;
@@ -188,7 +180,7 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
     }
   }
   history.stopped_keys = {stopped.begin(), stopped.end()};
-  for (const store::EvaluationRecord& evaluation : *evaluations) {
+  for (const store::EvaluationRecord& evaluation : evaluations) {
     if (stopped.count(evaluation.key) > 0 && evaluation.rest_after.has_value()) {
       history.resting[evaluation.key] = *evaluation.rest_after;
     }

@@ -1,5 +1,7 @@
 #include "server/scheduler/method.h"
 
+#include "calib/return_if_error.h"
+
 namespace calib::scheduler {
 
 std::unique_ptr<Method> MakeMethod(const Definition& definition) {
@@ -21,12 +23,10 @@ absl::StatusOr<std::vector<Eigen::VectorXd>> LogLikelihoodsByBatch(const Definit
                                                                    std::size_t first) {
   std::vector<Eigen::VectorXd> batches;
   for (std::size_t k = first; k < history.iterations.size(); ++k) {
-    auto likelihood = inference::LogLikelihood(definition.data, definition.campaign.filter,
-                                               history.iterations[k].predictions);
-    if (!likelihood.ok()) {
-      return likelihood.status();
-    }
-    batches.push_back(*std::move(likelihood));
+    ASSIGN_OR_RETURN(auto likelihood,
+                     inference::LogLikelihood(definition.data, definition.campaign.filter,
+                                              history.iterations[k].predictions));
+    batches.push_back(std::move(likelihood));
   }
   return batches;
 }

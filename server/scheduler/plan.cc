@@ -6,9 +6,10 @@
 #include <numeric>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/data/gaussian_likelihood.h"
-#include "server/campaign/read_precomputed.h"
-#include "server/campaign/specimen_notes.h"
+#include "server/campaign/file/read_precomputed.h"
+#include "server/campaign/model/specimen_notes.h"
 #include "server/scheduler/answer.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
@@ -64,11 +65,12 @@ class Planner {
       if (campaign_.precomputed.has_value()) {
         plan_.event = CampaignEvent::kStart;
       }
-    } else if (plan_.phase == "calibrating" && DecidesWhileRunning(definition_) && !replicating_) {
+    } else if (plan_.phase == campaign::Phase::kCalibrating && DecidesWhileRunning(definition_) &&
+               !replicating_) {
       status = GoOn();
     } else if (history_.open > 0) {
       return std::move(plan_);  // nothing to say
-    } else if (plan_.phase == "calibrating" && !campaign_.table.has_value()) {
+    } else if (plan_.phase == campaign::Phase::kCalibrating && !campaign_.table.has_value()) {
       status = Conclude(!BudgetSpent() && !replicating_);
     } else {
       Finish();  // the runs of a table are all there is
@@ -81,7 +83,7 @@ class Planner {
 
  private:
   void Finish() {
-    plan_.phase = "done";
+    plan_.phase = campaign::Phase::kDone;
     plan_.event = CampaignEvent::kFinish;
   }
 
@@ -117,9 +119,7 @@ class Planner {
       return Conclude(false);
     }
     if (grows) {
-      if (absl::Status status = Begin(*more); !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(Begin(*more));
     }
     const bool is_complete = !is_last || (grows && !more->continues);
     return is_complete && HasEnded(next) ? ConcludeEarlier() : absl::OkStatus();
@@ -135,11 +135,9 @@ class Planner {
 
   /// Posterior of the first iteration that has none, as if nothing had followed it.
   absl::Status ConcludeEarlier() {
-    auto history = LoadHistory(definition_, record_.submitted.id, reader_, history_.concluded + 1);
-    if (!history.ok()) {
-      return history.status();
-    }
-    history_ = *std::move(history);
+    ASSIGN_OR_RETURN(auto history, LoadHistory(definition_, record_.submitted.id, reader_,
+                                               history_.concluded + 1));
+    history_ = std::move(history);
     const auto outcome = MakeMethod(definition_)->Conclude(history_, true);
     if (!outcome.ok()) {
       return Fail(outcome.status());
@@ -324,9 +322,7 @@ class Planner {
                                .iteration = start.iteration,
                                .parameters = {own.begin(), own.end()},
                                .log_weight = -std::numeric_limits<double>::infinity()});
-      if (absl::Status status = requests_.Run(start.samples.back(), experiments); !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(requests_.Run(start.samples.back(), experiments));
     }
     plan_.draws = std::move(start);
     return absl::OkStatus();
@@ -424,9 +420,7 @@ class Planner {
            .parameters = {row.begin(), row.end()},
            .stop_below = batch->stop_below[position]});
       const bool refused = !batch->refused.empty() && batch->refused[position] != 0;
-      if (absl::Status status = requests_.Calibrate(start.samples.back(), refused); !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(requests_.Calibrate(start.samples.back(), refused));
     }
     plan_.start = std::move(start);
     return absl::OkStatus();
@@ -439,16 +433,14 @@ class Planner {
       Finish();
       return absl::OkStatus();
     }
-    plan_.phase = "validating";
+    plan_.phase = campaign::Phase::kValidating;
     if (answer.FromEmulator()) {
       return ValidateDraws(answer.emulated->draws, experiments);
     }
     const std::vector<double>& log_weights = plan_.conclusion->log_weights;
     for (const std::size_t i :
          answer.draws.rows() > 0 ? EvenlyByWeight(log_weights) : Heaviest(log_weights)) {
-      if (absl::Status status = requests_.Run(history_.samples[i], experiments); !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(requests_.Run(history_.samples[i], experiments));
     }
     return absl::OkStatus();
   }
@@ -466,9 +458,7 @@ class Planner {
            .iteration = start.iteration,
            .parameters = {row.begin(), row.end()},
            .log_weight = -std::numeric_limits<double>::infinity()});  // not of the ensemble
-      if (absl::Status status = requests_.Run(start.samples.back(), experiments); !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(requests_.Run(start.samples.back(), experiments));
     }
     plan_.draws = std::move(start);
     return absl::OkStatus();
@@ -492,24 +482,18 @@ class Planner {
 
 absl::StatusOr<Plan> PlanNext(const Definition& definition, const store::CampaignRecord& campaign,
                               store::Reader& reader) {
-  const auto iterations = reader.Iterations(campaign.submitted.id);
-  if (!iterations.ok()) {
-    return iterations.status();
-  }
+  ASSIGN_OR_RETURN(const auto iterations, reader.Iterations(campaign.submitted.id));
   // Replicates are the last runs of the calibration; what follows them is the end of its phase.
   const bool replicating =
-      campaign.progress.phase == "calibrating" &&
-      std::any_of(iterations->begin(), iterations->end(),
+      campaign.progress.phase == campaign::Phase::kCalibrating &&
+      std::any_of(iterations.begin(), iterations.end(),
                   [](const store::IterationRecord& i) { return i.proposal == kReplicates; });
   if (!replicating) {
     return Planner(definition, definition, campaign, reader, false, {}).Next();
   }
-  auto scatter = MeasureScatter(definition, campaign.submitted.id, reader);
-  if (!scatter.ok()) {
-    return scatter.status();
-  }
-  const Definition with = DefinitionWith(definition, *scatter);
-  return Planner(with, definition, campaign, reader, true, std::move(scatter->observables)).Next();
+  ASSIGN_OR_RETURN(auto scatter, MeasureScatter(definition, campaign.submitted.id, reader));
+  const Definition with = DefinitionWith(definition, scatter);
+  return Planner(with, definition, campaign, reader, true, std::move(scatter.observables)).Next();
 }
 
 }  // namespace calib::scheduler

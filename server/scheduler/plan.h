@@ -52,8 +52,8 @@ struct Plan {
   std::vector<std::pair<int, double>> audited;
   /// (sample under way, SampleRecord::stop_below), where what has arrived moves it.
   std::vector<std::pair<int, double>> stop_below;
-  std::vector<store::StateRecord> states;  ///< of runs made elsewhere
-  std::string phase;                       ///< afterwards
+  std::vector<store::StateRecord> states;                 ///< of runs made elsewhere
+  campaign::Phase phase = campaign::Phase::kCalibrating;  ///< afterwards
   bool converged = false;
   std::optional<CampaignEvent> event;  ///< start, finish or fail
   std::string reason;                  ///< of a failure

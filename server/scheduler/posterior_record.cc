@@ -20,18 +20,6 @@ namespace {
 constexpr double kTail = 1e-3;  // shown as the range of an unbounded prior
 constexpr Eigen::Index kDraws = 400;
 
-const char* ToString(inference::NoiseMode mode) {
-  switch (mode) {
-    case inference::NoiseMode::kGiven:
-      return "given";
-    case inference::NoiseMode::kInferred:
-      return "inferred";
-    case inference::NoiseMode::kEssTarget:
-      break;
-  }
-  return "ess_target";
-}
-
 void AddParameters(const Definition& definition, const Answer& answer, v1::Posterior& message) {
   const std::vector<inference::ParameterSummary> summaries = answer.Parameters();
   for (std::size_t i = 0; i < summaries.size(); ++i) {
@@ -254,7 +242,7 @@ v1::Posterior ToMessage(const Definition& definition, const Answer& answer, int 
   AddStages(definition, answer, message);
   message.mutable_warnings()->Add(answer.warnings.begin(), answer.warnings.end());
   AddTails(definition, answer, message);
-  message.set_noise(ToString(definition.campaign.filter.noise));
+  message.set_noise(campaign::WordOf(campaign::kNoiseModeWords, definition.campaign.filter.noise));
   return message;
 }
 

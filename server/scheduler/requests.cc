@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/scheduler/attempt_spec.h"
+#include "calib/return_if_error.h"
+#include "server/messages/attempt_spec.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/rungs.h"
 
@@ -47,15 +48,12 @@ absl::Status Requests::Request(const store::SampleRecord& sample,
   for (const int experiment : experiments) {
     store::EvaluationRecord evaluation{
         .key = {id_, sample.sample, experiment},
-        .digest =
-            SpecDigest(SpecOf(definition_.campaign, experiment, sample.parameters, sample.sample))};
+        .digest = messages::SpecDigest(
+            messages::SpecOf(definition_.campaign, experiment, sample.parameters, sample.sample))};
     if (reuse) {
-      const auto equal = reader_.FindEqual(evaluation.digest);
-      if (!equal.ok()) {
-        return equal.status();
-      }
-      if (equal->has_value()) {
-        plan_.reused.emplace_back(**equal, evaluation.key);
+      ASSIGN_OR_RETURN(const auto equal, reader_.FindEqual(evaluation.digest));
+      if (equal.has_value()) {
+        plan_.reused.emplace_back(*equal, evaluation.key);
       }
     }
     plan_.evaluations.push_back(std::move(evaluation));

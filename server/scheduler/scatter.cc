@@ -6,7 +6,8 @@
 #include <map>
 #include <utility>
 
-#include "server/campaign/scatter_fit.h"
+#include "calib/return_if_error.h"
+#include "server/campaign/model/scatter_fit.h"
 #include "server/scheduler/history.h"
 
 namespace calib::scheduler {
@@ -27,12 +28,9 @@ absl::StatusOr<Eigen::MatrixXd> ReplicateRuns(const campaign::Campaign& campaign
                                                    static_cast<Index>(data.readings.size()),
                                                    std::numeric_limits<double>::quiet_NaN());
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const auto states = reader.States(id, samples[i]);
-    if (!states.ok()) {
-      return states.status();
-    }
+    ASSIGN_OR_RETURN(const auto states, reader.States(id, samples[i]));
     Eigen::RowVectorXd row = runs.row(static_cast<Index>(i));
-    for (const store::StateRecord& state : *states) {
+    for (const store::StateRecord& state : states) {
       index.Place(state.key.experiment, state.load_step, state.observables, row);
     }
     runs.row(static_cast<Index>(i)) = row;
@@ -71,16 +69,11 @@ double LargestScatterShare(const campaign::Campaign& campaign) {
 
 absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std::int64_t campaign,
                                                store::Reader& reader) {
-  const auto iterations = reader.Iterations(campaign);
-  const auto all = reader.Samples(campaign);
-  for (const absl::Status& status : {iterations.status(), all.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
+  ASSIGN_OR_RETURN(const auto iterations, reader.Iterations(campaign));
+  ASSIGN_OR_RETURN(const auto all, reader.Samples(campaign));
   std::vector<int> samples;
-  for (const store::IterationRecord& iteration : *iterations) {
-    for (const store::SampleRecord& sample : *all) {
+  for (const store::IterationRecord& iteration : iterations) {
+    for (const store::SampleRecord& sample : all) {
       if (iteration.proposal == kReplicates && sample.iteration == iteration.number) {
         samples.push_back(sample.sample);
       }
@@ -89,14 +82,12 @@ absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std
   MeasuredScatter result;
   for (const Role role : {Role::kCalibrate, Role::kValidate}) {
     const inference::DataSet data = campaign::MakeDataSet(definition.campaign, role);
-    const auto runs = ReplicateRuns(definition.campaign, data, campaign, samples, reader);
-    if (!runs.ok()) {
-      return runs.status();
-    }
+    ASSIGN_OR_RETURN(const auto runs,
+                     ReplicateRuns(definition.campaign, data, campaign, samples, reader));
     if (role == Role::kCalibrate) {
       const auto packings = static_cast<Index>(campaign::PackingsOfAll(definition.campaign));
       result.departures =
-          inference::ScaledDepartures(runs->topRows(std::min(packings, runs->rows())),
+          inference::ScaledDepartures(runs.topRows(std::min(packings, runs.rows())),
                                       campaign::ScatterShares(definition.campaign, data));
     }
     for (const auto& group : inference::GroupsOf(data)) {
@@ -105,12 +96,12 @@ absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std
           definition.campaign.experiments[static_cast<std::size_t>(group.first.first)].specimens;
       const bool varies = VariesPackings(definition.campaign);
       const Index packings =
-          varies ? std::min(runs->rows(), static_cast<Index>(specimens.size())) : runs->rows();
+          varies ? std::min(runs.rows(), static_cast<Index>(specimens.size())) : runs.rows();
       Eigen::MatrixXd finished(packings, static_cast<Index>(group.second.size()));
       Index count = 0;
       for (Index r = 0; r < packings; ++r) {
         for (Index i = 0; i < finished.cols(); ++i) {
-          finished(count, i) = (*runs)(r, group.second[static_cast<std::size_t>(i)]);
+          finished(count, i) = runs(r, group.second[static_cast<std::size_t>(i)]);
         }
         count += finished.row(count).allFinite() ? 1 : 0;
       }

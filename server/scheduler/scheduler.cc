@@ -6,10 +6,12 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/catalog.h"
 
 namespace calib::scheduler {
 
+using store::AttemptOutcome;
 using store::EvaluationKey;
 using store::EvaluationStatus;
 using store::Transaction;
@@ -28,9 +30,8 @@ bool MayPass(const absl::Status& error) {
 absl::StatusOr<Plan> ReadAndPlan(Ports& ports, const Definition& definition,
                                  const store::CampaignRecord& record) {
   try {
-    auto reader = ports.Read();
-    if (!reader.ok()) return reader.status();
-    return PlanNext(definition, record, *reader);
+    ASSIGN_OR_RETURN(auto reader, ports.Read());
+    return PlanNext(definition, record, reader);
   } catch (const std::bad_alloc&) {
     return absl::FailedPreconditionError(absl::StrCat(
         "what follows from ", record.submitted.samples, " samples of ",
@@ -41,33 +42,23 @@ absl::StatusOr<Plan> ReadAndPlan(Ports& ports, const Definition& definition,
 }  // namespace
 
 absl::Status Scheduler::Load() {
-  auto reader = ports_.Read();
-  if (!reader.ok()) {
-    return reader.status();
-  }
-  const auto last_attempt = reader->LastAttempt();
-  const auto last_campaign = reader->LastCampaign();
-  const auto campaigns = reader->Campaigns();
-  const auto attempts = reader->ActiveAttempts();
-  for (const absl::Status& status :
-       {last_attempt.status(), last_campaign.status(), campaigns.status(), attempts.status()}) {
-    if (!status.ok()) {
-      return status;
+  ASSIGN_OR_RETURN(auto reader, ports_.Read());
+  ASSIGN_OR_RETURN(const auto last_attempt, reader.LastAttempt());
+  ASSIGN_OR_RETURN(const auto last_campaign, reader.LastCampaign());
+  ASSIGN_OR_RETURN(const auto campaigns, reader.Campaigns());
+  ASSIGN_OR_RETURN(const auto attempts, reader.ActiveAttempts());
+  last_attempt_ = last_attempt;
+  last_campaign_ = last_campaign;
+  for (const store::CampaignRecord& record : campaigns) {
+    if (!IsOver(record.progress.state)) {
+      TakeUp(record.submitted.id, reader);
     }
   }
-  last_attempt_ = *last_attempt;
-  last_campaign_ = *last_campaign;
-  for (const store::CampaignRecord& record : *campaigns) {
-    const auto state = ToCampaignState(record.progress.state);
-    if (!state.has_value() || !IsOver(*state)) {
-      TakeUp(record.submitted.id, *reader);
-    }
-  }
-  for (const store::ActiveAttempt& attempt : *attempts) {
+  for (const store::ActiveAttempt& attempt : attempts) {
     CampaignRun* run = FindRun(attempt.key.campaign);
     leases_.Grant(attempt.id, attempt.key, attempt.worker, ports_.Now());
     if (run == nullptr) {
-      GiveBack(*leases_.Release(attempt.id), {}, "lost", false);
+      GiveBack(*leases_.Release(attempt.id), {}, AttemptOutcome::kLost, false);
     }
   }
   for (auto& [id, run] : runs_) {
@@ -88,7 +79,7 @@ store::Store::Job Scheduler::BeginAnew(CampaignRun& run,
     v1::Finished finished;
     finished.set_attempt(lease.attempt);
     finished.set_reason("of other mechanics");
-    ends.push_back(ToRecord(finished, "stopped"));
+    ends.push_back(ToRecord(finished, AttemptOutcome::kStopped));
   }
   for (const auto& [key, digest] : others) {
     run.BeginAnew(key, digest);
@@ -134,7 +125,7 @@ void Scheduler::TakeUp(std::int64_t campaign, store::Reader& reader) {
     return;
   }
   // One campaign that cannot be read must not keep the others from going on.
-  const store::CampaignProgress failed{.state = ToString(CampaignState::kFailed),
+  const store::CampaignProgress failed{.state = CampaignState::kFailed,
                                        .reason = std::string(run.status().message())};
   ports_.Write(
       [=, now = ports_.UnixMs()](Transaction& transaction) {
@@ -334,7 +325,7 @@ void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, con
     leases_.Release(lease.attempt);
     v1::Finished finished;
     finished.set_attempt(lease.attempt);
-    ends.push_back(ToRecord(finished, "cancelled"));
+    ends.push_back(ToRecord(finished, AttemptOutcome::kCancelled));
     run->SetStatus(lease.key, EvaluationStatus::kWaiting, 0);
   }
   SetState(
@@ -488,7 +479,7 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
     Enqueue(*run);
     for (const LeaseEntry& lease : leases_.OfCampaign(campaign)) {
       leases_.Release(lease.attempt);
-      GiveBack(lease, {}, "cancelled", false);
+      GiveBack(lease, {}, AttemptOutcome::kCancelled, false);
       if (const WorkerEntry* worker = workers_.Find(lease.worker); worker != nullptr) {
         v1::ServerMessage message;
         message.mutable_stop()->set_attempt(lease.attempt);

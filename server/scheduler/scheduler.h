@@ -15,10 +15,10 @@
 #include "calib/v1/campaign.pb.h"
 #include "calib/v1/worker.pb.h"
 #include "server/scheduler/campaign_run.h"
-#include "server/scheduler/lease_table.h"
+#include "server/scheduler/leases/lease_table.h"
+#include "server/scheduler/leases/worker_table.h"
 #include "server/scheduler/plan.h"
 #include "server/scheduler/ports.h"
-#include "server/scheduler/worker_table.h"
 
 namespace calib::scheduler {
 
@@ -111,7 +111,7 @@ class Scheduler {
   void Refuse(std::int64_t session, std::int64_t attempt);
   /// The attempt is over without a result: back to the queue, or the campaign is paused when it
   /// failed too often.
-  void GiveBack(const LeaseEntry& lease, const v1::Finished& how, const std::string& outcome,
+  void GiveBack(const LeaseEntry& lease, const v1::Finished& how, store::AttemptOutcome outcome,
                 bool counts_as_failure);
   /// held_in: see store::EvaluationRecord.
   void End(std::int64_t session, const LeaseEntry& lease, store::EvaluationStatus status,
@@ -122,7 +122,7 @@ class Scheduler {
   /// The sample cannot count any more: stores what decided it and lets the worker stop.
   void StopEarly(std::int64_t session, const LeaseEntry& lease,
                  std::vector<store::StateRecord> records);
-  store::AttemptEnd ToRecord(const v1::Finished& finished, const std::string& outcome);
+  store::AttemptEnd ToRecord(const v1::Finished& finished, store::AttemptOutcome outcome);
 
   // Runs that another campaign makes as well (scheduler_reuse.cc)
   /// Whether it is computed for every campaign that waits for the same.

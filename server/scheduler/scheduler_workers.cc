@@ -2,13 +2,14 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
-#include "server/campaign/sha256.h"
-#include "server/scheduler/attempt_spec.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/model/sha256.h"
+#include "server/messages/attempt_spec.h"
 #include "server/scheduler/scheduler.h"
 
 namespace calib::scheduler {
 
+using store::AttemptOutcome;
 using store::EvaluationKey;
 using store::EvaluationStatus;
 using store::Transaction;
@@ -93,7 +94,8 @@ absl::Status Scheduler::Connected(std::int64_t session, const v1::Hello& hello) 
   for (const LeaseEntry& lease : leases_.OfWorker(hello.name())) {
     if (held.count(lease.attempt) == 0) {
       leases_.Release(lease.attempt);
-      GiveBack(lease, Because(lease.attempt, "the worker came back without it"), "lost", true);
+      GiveBack(lease, Because(lease.attempt, "the worker came back without it"),
+               AttemptOutcome::kLost, true);
     }
   }
   ++version_;
@@ -149,7 +151,7 @@ void Scheduler::Receive(std::int64_t session, const v1::Leaving& /*leaving*/) {
   worker->leaving = true;
   for (const LeaseEntry& lease : leases_.OfWorker(worker->hello.name())) {
     leases_.Release(lease.attempt);
-    GiveBack(lease, Because(lease.attempt, "the worker left"), "stopped", false);
+    GiveBack(lease, Because(lease.attempt, "the worker left"), AttemptOutcome::kStopped, false);
   }
   Dispatch();
 }
@@ -173,8 +175,8 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
                               .observables = {state.values().begin(), state.values().end()}};
     if (const std::string refusal = run.Refusal(key, record.load_step, record.observables);
         !refusal.empty()) {
-      GiveBack(*leases_.Release(batch.attempt()), Because(batch.attempt(), refusal), "failed",
-               true);
+      GiveBack(*leases_.Release(batch.attempt()), Because(batch.attempt(), refusal),
+               AttemptOutcome::kFailed, true);
       Refuse(session, batch.attempt());
       return;
     }
@@ -236,7 +238,7 @@ void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
         GiveBack(lease,
                  Because(lease.attempt, absl::StrCat("said to be complete, but ", missing,
                                                      " load steps are missing")),
-                 "failed", true);
+                 AttemptOutcome::kFailed, true);
         Refuse(session, finished.attempt());
       }
       break;
@@ -246,11 +248,11 @@ void Scheduler::Receive(std::int64_t session, const v1::Finished& finished) {
       break;
     case v1::Finished::OUTCOME_STOPPED:  // of its own accord: the node is going down
       worker->leaving = true;
-      GiveBack(lease, finished, "stopped", false);
+      GiveBack(lease, finished, AttemptOutcome::kStopped, false);
       Refuse(session, finished.attempt());
       break;
     default:
-      GiveBack(lease, finished, "failed", true);
+      GiveBack(lease, finished, AttemptOutcome::kFailed, true);
       Refuse(session, finished.attempt());
   }
   Dispatch();
@@ -281,7 +283,8 @@ void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
   message.mutable_stop()->set_attempt(lease.attempt);
   ports_.Write(
       [key = lease.key, failures, reason, records = std::move(records), now = ports_.UnixMs(),
-       spared, beside_reason, end = ToRecord(finished, "stopped_early")](Transaction& transaction) {
+       spared, beside_reason,
+       end = ToRecord(finished, AttemptOutcome::kStoppedEarly)](Transaction& transaction) {
         for (const store::StateRecord& record : records) {
           transaction.PutState(record, now);
         }
@@ -300,7 +303,7 @@ void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
   Dispatch();
 }
 
-store::AttemptEnd Scheduler::ToRecord(const v1::Finished& finished, const std::string& outcome) {
+store::AttemptEnd Scheduler::ToRecord(const v1::Finished& finished, AttemptOutcome outcome) {
   return {.id = finished.attempt(),
           .outcome = outcome,
           .reason = finished.reason(),
@@ -330,21 +333,21 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   const bool resting = status == EvaluationStatus::kStoppedEarly;
   const std::string digest = resting ? "" : run.Find(lease.key)->digest;
   ending_[lease.attempt] = digest;
-  const store::Store::Job end = [key = lease.key, status, failures, diverged, resting, held_in,
-                                 now = ports_.UnixMs(), name = NameOf(run, lease.key),
-                                 end =
-                                     ToRecord(finished, diverged  ? "diverged"
-                                                        : resting ? "resting"
-                                                                  : "completed")](Transaction& t) {
-    t.EndAttempt(end);
-    t.SetEvaluation(key, status, end.reason, failures);
-    if (resting) {
-      t.SetHeldIn(key, held_in);
-    }
-    if (diverged) {
-      t.Log(key.campaign, now, absl::StrCat(name, " diverged: ", end.reason));
-    }
-  };
+  const store::Store::Job end =
+      [key = lease.key, status, failures, diverged, resting, held_in, now = ports_.UnixMs(),
+       name = NameOf(run, lease.key),
+       end = ToRecord(finished, diverged  ? AttemptOutcome::kDiverged
+                                : resting ? AttemptOutcome::kResting
+                                          : AttemptOutcome::kCompleted)](Transaction& t) {
+        t.EndAttempt(end);
+        t.SetEvaluation(key, status, end.reason, failures);
+        if (resting) {
+          t.SetHeldIn(key, held_in);
+        }
+        if (diverged) {
+          t.Log(key.campaign, now, absl::StrCat(name, " diverged: ", end.reason));
+        }
+      };
   const Reply then = [this, session, lease, states = finished.states(),
                       digest](const absl::Status& committed) {
     ending_.erase(lease.attempt);
@@ -373,8 +376,8 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   }
 }
 
-void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how,
-                         const std::string& outcome, bool counts_as_failure) {
+void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, AttemptOutcome outcome,
+                         bool counts_as_failure) {
   v1::Finished finished = how;
   finished.set_attempt(lease.attempt);
   CampaignRun* run = FindRun(lease.key.campaign);
@@ -394,7 +397,7 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how,
     t.EndAttempt(end);
     t.SetEvaluation(key, status, end.reason, failures);
     t.Log(key.campaign, now,
-          absl::StrCat(name, ": attempt ", end.id, " ", end.outcome, ": ", end.reason));
+          absl::StrCat(name, ": attempt ", end.id, " ", ToString(end.outcome), ": ", end.reason));
   };
   if (too_often && IsLeasable(run->state())) {  // with its cause or not at all
     SetState(*run, CampaignEvent::kPause,
@@ -454,8 +457,8 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
   }
   v1::ServerMessage message;
   message.mutable_lease()->set_attempt(attempt);
-  *message.mutable_lease()->mutable_spec() =
-      SpecOf(run.definition().campaign, key.experiment, run.Parameters(key.sample), key.sample);
+  *message.mutable_lease()->mutable_spec() = messages::SpecOf(
+      run.definition().campaign, key.experiment, run.Parameters(key.sample), key.sample);
   message.mutable_lease()->mutable_spec()->set_threads(worker.hello.threads_per_slot());
   const CampaignRun::Evaluation& evaluation = *run.Find(key);
   if (evaluation.rest_after.has_value() || !evaluation.held_in.empty()) {
@@ -489,7 +492,7 @@ void Scheduler::Tick() {
     GiveBack(lease,
              Because(lease.attempt, absl::StrCat("nothing was heard from worker ", lease.worker,
                                                  " for ", options_.lease.count(), " ms")),
-             "lost", true);
+             AttemptOutcome::kLost, true);
     if (const WorkerEntry* worker = workers_.Find(lease.worker); worker != nullptr) {
       Refuse(worker->session, lease.attempt);
     }

@@ -15,7 +15,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "inference/prior/standard_normal.h"
+#include "calib/return_if_error.h"
+#include "inference/numerics/standard_normal.h"
 #include "inference/surrogate/expected_improvement.h"
 #include "inference/surrogate/response_surface.h"
 #include "server/scheduler/method.h"
@@ -80,36 +81,27 @@ class SurrogateMethod final : public Method {
   }
 
   absl::StatusOr<Batch> First() const override {
-    auto first = FirstPoints();
-    if (!first.ok()) {
-      return first.status();
-    }
+    ASSIGN_OR_RETURN(auto first, FirstPoints());
     inference::ResponseSurfaceOptions options = options_;
-    options.first_points = *std::move(first);
-    auto state = inference::StartResponseSurface(options);
-    if (!state.ok()) {
-      return state.status();
-    }
+    options.first_points = std::move(first);
+    ASSIGN_OR_RETURN(auto state, inference::StartResponseSurface(options));
     return MakeBatch(
-        state->design, 0,
-        std::vector<double>(static_cast<std::size_t>(state->design.rows()), store::kUnknown));
+        state.design, 0,
+        std::vector<double>(static_cast<std::size_t>(state.design.rows()), store::kUnknown));
   }
 
   absl::StatusOr<Outcome> Conclude(const History& history, bool goes_on) const override {
     const auto results = Results(history);
-    auto state = Known(history, results, true);
-    if (!state.ok()) {
-      return state.status();
-    }
-    if (state->best < 0) {
+    ASSIGN_OR_RETURN(auto state, Known(history, results, true));
+    if (state.best < 0) {
       return absl::FailedPreconditionError(
           "every run so far has diverged, so that there is nothing to fit: look at the reasons of "
           "the samples, then narrow the priors or change the model");
     }
-    Outcome outcome{.answer = AnswerOf(history, *state), .converged = false, .log = "", .next = {}};
+    Outcome outcome{.answer = AnswerOf(history, state), .converged = false, .log = "", .next = {}};
     outcome.log = absl::StrCat("best chi-squared per reading ",
-                               state->evaluations[static_cast<std::size_t>(state->best)].value,
-                               ", step ", state->step);
+                               state.evaluations[static_cast<std::size_t>(state.best)].value,
+                               ", step ", state.step);
     if (goes_on) {
       outcome.answer.warnings.push_back(outcome.answer.weighted.degeneracy);
       outcome.answer.warnings.emplace_back(kBestRun);
@@ -124,10 +116,7 @@ class SurrogateMethod final : public Method {
   absl::StatusOr<Batch> More(const History& history, std::int64_t affordable) const override {
     const bool at_once = campaign_.decisions == campaign::Decisions::kImmediate;
     const auto results = Results(history);
-    auto state = Known(history, results, at_once);
-    if (!state.ok()) {
-      return state.status();
-    }
+    ASSIGN_OR_RETURN(auto state, Known(history, results, at_once));
     const Eigen::Index size = campaign::LaterBatch(campaign_);
     const Eigen::Index last = history.iterations.back().parameters.rows();
     const bool continues = history.iterations.size() > 1 && last < size;
@@ -135,27 +124,23 @@ class SurrogateMethod final : public Method {
     std::size_t reported = 0;
     std::vector<double> stop_below;
     while (static_cast<std::int64_t>(stop_below.size()) < most) {
-      const auto point = at_once ? NextAtOnce(*state) : NextInOrder(*results, reported, *state);
-      if (!point.ok()) {
-        return point.status();
-      }
-      if (!point->has_value()) {
+      ASSIGN_OR_RETURN(const auto point,
+                       at_once ? NextAtOnce(state) : NextInOrder(*results, reported, state));
+      if (!point.has_value()) {
         break;
       }
-      const auto threshold = StopBelow(static_cast<int>(state->evaluations.size()) - 1, *state);
-      if (!threshold.ok()) {
-        return threshold.status();
-      }
-      stop_below.push_back(*threshold);
+      ASSIGN_OR_RETURN(const auto threshold,
+                       StopBelow(static_cast<int>(state.evaluations.size()) - 1, state));
+      stop_below.push_back(threshold);
     }
     if (stop_below.empty()) {
       return Batch{};
     }
     const Eigen::Index there = continues ? last : 0;
     Eigen::MatrixXd unit(there + static_cast<Eigen::Index>(stop_below.size()), options_.dimensions);
-    const std::size_t first = state->evaluations.size() - static_cast<std::size_t>(unit.rows());
+    const std::size_t first = state.evaluations.size() - static_cast<std::size_t>(unit.rows());
     for (Eigen::Index i = 0; i < unit.rows(); ++i) {
-      unit.row(i) = state->evaluations[first + static_cast<std::size_t>(i)].point;
+      unit.row(i) = state.evaluations[first + static_cast<std::size_t>(i)].point;
     }
     return MakeBatch(unit, there, std::move(stop_below));
   }
@@ -163,20 +148,14 @@ class SurrogateMethod final : public Method {
   absl::StatusOr<std::vector<std::pair<int, double>>> Thresholds(
       const History& history) const override {
     const auto results = Results(history);
-    auto state = Known(history, results, true);
-    if (!state.ok()) {
-      return state.status();
-    }
+    ASSIGN_OR_RETURN(auto state, Known(history, results, true));
     std::vector<std::pair<int, double>> changed;
     for (std::size_t i = 0; i < results->size(); ++i) {
       const store::SampleRecord& sample = history.samples[i];
-      const auto threshold = StopBelow(static_cast<int>(i), *state);
-      if (!threshold.ok()) {
-        return threshold.status();
-      }
+      ASSIGN_OR_RETURN(const auto threshold, StopBelow(static_cast<int>(i), state));
       // NaN, never stopped, equals nothing.
-      if (!(*results)[i].ended && !std::isnan(*threshold) && *threshold != sample.stop_below) {
-        changed.emplace_back(sample.sample, *threshold);
+      if (!(*results)[i].ended && !std::isnan(threshold) && threshold != sample.stop_below) {
+        changed.emplace_back(sample.sample, threshold);
       }
     }
     return changed;
@@ -279,14 +258,13 @@ class SurrogateMethod final : public Method {
 
   /// ln likelihood of a run that agrees with every reading.
   absl::StatusOr<double> Perfect() const {
-    const auto perfect = inference::LogLikelihoodBound(
-        definition_.data, campaign_.filter,
-        Eigen::MatrixXd::Constant(1, static_cast<Eigen::Index>(definition_.data.readings.size()),
-                                  kNone));
-    if (!perfect.ok()) {
-      return perfect.status();
-    }
-    return (*perfect)(0);
+    ASSIGN_OR_RETURN(
+        const auto perfect,
+        inference::LogLikelihoodBound(
+            definition_.data, campaign_.filter,
+            Eigen::MatrixXd::Constant(
+                1, static_cast<Eigen::Index>(definition_.data.readings.size()), kNone)));
+    return perfect(0);
   }
 
   /// Of every point in order. Chi-squared is twice what the log likelihood lacks to that of perfect
@@ -299,19 +277,17 @@ class SurrogateMethod final : public Method {
     }
     std::vector<Result> results;
     for (std::size_t k = 0; k < batches->size(); ++k) {
-      const auto highest =
-          inference::LogLikelihoodBound(definition_.data, campaign_.filter, history.stopped[k]);
-      if (!highest.ok()) {
-        return highest.status();
-      }
+      ASSIGN_OR_RETURN(
+          const auto highest,
+          inference::LogLikelihoodBound(definition_.data, campaign_.filter, history.stopped[k]));
       for (Eigen::Index i = 0; i < (*batches)[k].size(); ++i) {
         Result& result = results.emplace_back();
         result.ended = history.ended[k][static_cast<std::size_t>(i)] != 0;
         const double value = (*batches)[k](i);
         if (result.ended && std::isfinite(value)) {
           result.value = 2 * (*perfect - value) / Readings();
-        } else if (result.ended && std::isfinite((*highest)(i)) && (*highest)(i) < *perfect) {
-          result.at_least = 2 * (*perfect - (*highest)(i)) / Readings();
+        } else if (result.ended && std::isfinite(highest(i)) && highest(i) < *perfect) {
+          result.at_least = 2 * (*perfect - highest(i)) / Readings();
         }
       }
     }
@@ -323,20 +299,17 @@ class SurrogateMethod final : public Method {
     State state;
     state.step = options_.max_step;
     for (std::size_t k = 0; k < history.proposals.size(); ++k) {
-      const auto points = UnitPoints(history.proposals[k]);
-      if (!points.ok()) {
-        return points.status();
-      }
+      ASSIGN_OR_RETURN(const auto points, UnitPoints(history.proposals[k]));
       const Eigen::Index samples = history.iterations[k].parameters.rows();
-      if (points->rows() != samples) {
+      if (points.rows() != samples) {
         return absl::DataLossError(absl::StrCat("iteration ", k, " has ", samples, " samples but ",
-                                                points->rows(), " points"));
+                                                points.rows(), " points"));
       }
       if (k == 0) {
-        state.design = *points;
+        state.design = points;
       }
-      for (Eigen::Index i = 0; i < points->rows(); ++i) {
-        state.evaluations.push_back({.point = points->row(i)});
+      for (Eigen::Index i = 0; i < points.rows(); ++i) {
+        state.evaluations.push_back({.point = points.row(i)});
       }
     }
     return state;
@@ -356,11 +329,8 @@ class SurrogateMethod final : public Method {
       if (!result.ended) {
         continue;
       }
-      if (absl::Status status = inference::Report(options_, static_cast<int>(i), result.value,
-                                                  *state, result.at_least);
-          !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(
+          inference::Report(options_, static_cast<int>(i), result.value, *state, result.at_least));
     }
     return state;
   }
@@ -379,11 +349,8 @@ class SurrogateMethod final : public Method {
           return Point{};
         }
         const Result& result = results[reported];
-        if (absl::Status status = inference::Report(options_, static_cast<int>(reported),
-                                                    result.value, state, result.at_least);
-            !status.ok()) {
-          return status;
-        }
+        RETURN_IF_ERROR(inference::Report(options_, static_cast<int>(reported), result.value, state,
+                                          result.at_least));
       }
       auto point = Choose(state);
       if (!point.ok() || point->has_value()) {

@@ -12,11 +12,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "calib/return_if_error.h"
 #include "inference/data/gaussian_likelihood.h"
-#include "inference/filter/log_weights.h"
 #include "inference/filter/parameter_summary.h"
 #include "inference/filter/posterior_checks.h"
-#include "inference/filter/weighted_moments.h"
+#include "inference/numerics/log_weights.h"
+#include "inference/numerics/weighted_moments.h"
 #include "inference/sampling/shuffle.h"
 #include "inference/tmcmc/tmcmc.h"
 #include "server/scheduler/early_stopping.h"
@@ -44,28 +45,20 @@ class TmcmcMethod final : public Method {
   }
 
   absl::StatusOr<Batch> First() const override {
-    const auto state = inference::StartTmcmc(definition_.priors, options_);
-    if (!state.ok()) {
-      return state.status();
-    }
-    Batch batch = NextBatch(*state);
+    ASSIGN_OR_RETURN(const auto state, inference::StartTmcmc(definition_.priors, options_));
+    Batch batch = NextBatch(state);
     batch.proposal = ProposalToJson(options_.first);
     return batch;
   }
 
   absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const override {
-    const auto state = Replay(history);
-    if (!state.ok()) {
-      return state.status();
-    }
-    Outcome outcome{.answer = AnswerOf(*state, history),
-                    .converged = false,
-                    .log = Describe(*state),
-                    .next = {}};
-    outcome.converged = state->finished() && outcome.answer.HasIntervals();
-    const auto stages = static_cast<int>(state->stages.size());
-    if (!state->finished() && affordable && stages <= definition_.campaign.max_iterations) {
-      outcome.next = NextBatch(*state);
+    ASSIGN_OR_RETURN(const auto state, Replay(history));
+    Outcome outcome{
+        .answer = AnswerOf(state, history), .converged = false, .log = Describe(state), .next = {}};
+    outcome.converged = state.finished() && outcome.answer.HasIntervals();
+    const auto stages = static_cast<int>(state.stages.size());
+    if (!state.finished() && affordable && stages <= definition_.campaign.max_iterations) {
+      outcome.next = NextBatch(state);
     }
     return outcome;
   }
@@ -78,10 +71,7 @@ class TmcmcMethod final : public Method {
     const std::size_t first = goes_on ? memory.batches : 0;
     auto state = goes_on ? absl::StatusOr<inference::TmcmcState>(*memory.chains)
                          : inference::StartTmcmc(definition_.priors, options_);
-    const auto likelihoods = LogLikelihoodsByBatch(definition_, history, first);
-    if (!likelihoods.ok()) {
-      return likelihoods.status();
-    }
+    ASSIGN_OR_RETURN(const auto likelihoods, LogLikelihoodsByBatch(definition_, history, first));
     for (std::size_t k = first; state.ok() && k < history.iterations.size(); ++k) {
       if (state->proposals != history.iterations[k].parameters) {
         return absl::DataLossError(
@@ -89,11 +79,8 @@ class TmcmcMethod final : public Method {
                          " are not those that follow from the ones before; "
                          "was the campaign begun by another version of this program?"));
       }
-      if (auto advanced = inference::AdvanceTmcmc(definition_.priors, options_,
-                                                  (*likelihoods)[k - first], *state);
-          !advanced.ok()) {
-        return advanced;
-      }
+      RETURN_IF_ERROR(
+          inference::AdvanceTmcmc(definition_.priors, options_, likelihoods[k - first], *state));
     }
     if (state.ok()) {
       memory.chains = *state;

@@ -33,28 +33,7 @@ constexpr std::array kTransitions = {
     Transition{S::kPaused, E::kFinish, S::kFinished},  // likewise
 };
 
-constexpr std::array kStates = {S::kQueued,   S::kRunning, S::kPaused,
-                                S::kFinished, S::kFailed,  S::kCancelled};
-
 }  // namespace
-
-const char* ToString(CampaignState state) {
-  switch (state) {
-    case S::kQueued:
-      return "queued";
-    case S::kRunning:
-      return "running";
-    case S::kPaused:
-      return "paused";
-    case S::kFinished:
-      return "finished";
-    case S::kFailed:
-      return "failed";
-    case S::kCancelled:
-      break;
-  }
-  return "cancelled";
-}
 
 const char* ToString(CampaignEvent event) {
   switch (event) {
@@ -74,15 +53,6 @@ const char* ToString(CampaignEvent event) {
   return "fail";
 }
 
-std::optional<CampaignState> ToCampaignState(const std::string& text) {
-  for (const S state : kStates) {
-    if (text == ToString(state)) {
-      return state;
-    }
-  }
-  return std::nullopt;
-}
-
 absl::StatusOr<CampaignState> Next(CampaignState from, CampaignEvent event) {
   for (const Transition& transition : kTransitions) {
     if (transition.from == from && transition.event == event) {
@@ -91,10 +61,6 @@ absl::StatusOr<CampaignState> Next(CampaignState from, CampaignEvent event) {
   }
   return absl::FailedPreconditionError(
       absl::StrCat("cannot ", ToString(event), " a campaign that is ", ToString(from)));
-}
-
-bool IsOver(CampaignState state) {
-  return state == S::kFinished || state == S::kFailed || state == S::kCancelled;
 }
 
 bool IsLeasable(CampaignState state) { return state == S::kQueued || state == S::kRunning; }

@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "calib/return_if_error.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/status.h"
 #include "server/service/stream_reactor.h"
@@ -61,15 +62,9 @@ class BlobReceiver final : public grpc::ServerReadReactor<v1::BlobChunk> {
 grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core, const std::string& digest) {
   return new StreamReactor<v1::BlobChunk>(
       core, [&core, digest]() -> absl::StatusOr<std::vector<v1::BlobChunk>> {
-        auto reader = core.Read();
-        if (!reader.ok()) {
-          return reader.status();
-        }
-        const auto content = reader->Blob(digest);
-        if (!content.ok()) {
-          return content.status();
-        }
-        return rpc::ToChunks(*content);
+        ASSIGN_OR_RETURN(auto reader, core.Read());
+        ASSIGN_OR_RETURN(const auto content, reader.Blob(digest));
+        return rpc::ToChunks(content);
       });
 }
 

@@ -5,11 +5,12 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/catalog.h"
 #include "proto/rpc/status.h"
-#include "server/campaign/sha256.h"
+#include "server/campaign/model/sha256.h"
+#include "server/messages/folder_report.h"
 #include "server/service/blob_stream.h"
-#include "server/service/folder_report.h"
 #include "server/service/queries.h"
 #include "server/service/stream_reactor.h"
 #include "server/service/submission.h"
@@ -25,15 +26,9 @@ template <typename Message, typename Load>
 grpc::ServerWriteReactor<Message>* Stream(Core& core, const std::string& campaign, Load load) {
   return new StreamReactor<Message>(
       core, [&core, campaign, load]() -> absl::StatusOr<std::vector<Message>> {
-        const auto id = ParseCampaign(campaign);
-        if (!id.ok()) {
-          return id.status();
-        }
-        auto reader = core.Read();
-        if (!reader.ok()) {
-          return reader.status();
-        }
-        return load(*reader, *id);
+        ASSIGN_OR_RETURN(const auto id, ParseCampaign(campaign));
+        ASSIGN_OR_RETURN(auto reader, core.Read());
+        return load(reader, id);
       });
 }
 
@@ -105,15 +100,12 @@ grpc::ServerUnaryReactor* CampaignsService::GetPosterior(Context* context,
                                                          v1::Posterior* reply) {
   return Ask<v1::Posterior>(context, reply,
                             [request](store::Reader& reader) -> absl::StatusOr<v1::Posterior> {
-                              const auto id = ParseCampaign(request->campaign());
-                              if (!id.ok()) {
-                                return id.status();
-                              }
+                              ASSIGN_OR_RETURN(const auto id, ParseCampaign(request->campaign()));
                               std::optional<int> iteration;
                               if (request->has_iteration()) {
                                 iteration = request->iteration();
                               }
-                              return PosteriorOf(reader, *id, iteration);
+                              return PosteriorOf(reader, id, iteration);
                             });
 }
 
@@ -401,7 +393,7 @@ grpc::ServerUnaryReactor* CampaignsService::Examine(Context* context,
       reply->set_engine_version(dem::EngineVersion());
       reply->set_catalog_digest(campaign::Sha256Hex(dem::CatalogText()));
       reply->set_listen(site_.listen);
-      *reply->mutable_state_folder() = ExamineFolder(site_.state_folder);
+      *reply->mutable_state_folder() = messages::ExamineFolder(site_.state_folder);
       auto reader = core_.Read();
       const auto check = reader.ok() ? reader->CheckFile(kLookingThroughTheFile)
                                      : absl::StatusOr<store::Reader::FileCheck>(reader.status());

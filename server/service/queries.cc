@@ -6,21 +6,25 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
-#include "dem/catalog/catalog.h"
-#include "server/campaign/origin.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/file/origin.h"
 #include "server/scheduler/definition.h"
 #include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
 
 namespace calib::service {
 
+using campaign::CampaignState;
+using campaign::Phase;
+using campaign::SamplePurpose;
 using store::EvaluationRecord;
 using store::EvaluationStatus;
 
 namespace {
 
 struct SampleStatus {
-  std::string name = "waiting";
+  EvaluationStatus worst = EvaluationStatus::kWaiting;
   std::string reason{};
   bool at_rung = false;  // stopped there, which it may not be for ever
 };
@@ -35,7 +39,7 @@ SampleStatus Summarise(const std::vector<const EvaluationRecord*>& evaluations) 
       case EvaluationStatus::kDiverged:
       case EvaluationStatus::kStoppedEarly:
       case EvaluationStatus::kFailed:
-        return {.name = store::ToString(evaluation->status),
+        return {.worst = evaluation->status,
                 .reason = evaluation->reason,
                 .at_rung = evaluation->status == EvaluationStatus::kStoppedEarly &&
                            evaluation->rest_after.has_value()};
@@ -50,9 +54,9 @@ SampleStatus Summarise(const std::vector<const EvaluationRecord*>& evaluations) 
     }
   }
   if (finished == evaluations.size()) {
-    status.name = "finished";
+    status.worst = EvaluationStatus::kFinished;
   } else if (begun || finished > 0) {
-    status.name = "running";
+    status.worst = EvaluationStatus::kRunning;
   }
   return status;
 }
@@ -73,22 +77,24 @@ void CountSamples(const store::CampaignRecord& record,
                   const std::vector<EvaluationRecord>& evaluations, v1::CampaignStatus& status) {
   const int size = record.submitted.samples;
   // Whether what rests goes on is known when its iteration ends.
-  const bool open = record.progress.phase == "calibrating" &&
-                    (record.progress.state == "running" || record.progress.state == "paused");
+  const bool open = record.progress.phase == Phase::kCalibrating &&
+                    (record.progress.state == CampaignState::kRunning ||
+                     record.progress.state == CampaignState::kPaused);
   for (const auto& [sample, sample_status] : StatusBySample(evaluations)) {
     if (sample / size != record.progress.iteration) {
       continue;
     }
-    const bool diverged = sample_status.name == "diverged";
+    const bool diverged = sample_status.worst == EvaluationStatus::kDiverged;
     const bool resting = open && sample_status.at_rung;
-    const bool stopped = sample_status.name == "stopped_early" && !resting;
+    const bool stopped = sample_status.worst == EvaluationStatus::kStoppedEarly && !resting;
     status.set_samples_diverged(status.samples_diverged() + (diverged ? 1 : 0));
     status.set_samples_stopped_early(status.samples_stopped_early() + (stopped ? 1 : 0));
     status.set_samples_resting(status.samples_resting() + (resting ? 1 : 0));
     status.set_samples_running(status.samples_running() +
-                               (sample_status.name == "running" ? 1 : 0));
-    status.set_samples_done(status.samples_done() +
-                            (diverged || stopped || sample_status.name == "finished" ? 1 : 0));
+                               (sample_status.worst == EvaluationStatus::kRunning ? 1 : 0));
+    status.set_samples_done(
+        status.samples_done() +
+        (diverged || stopped || sample_status.worst == EvaluationStatus::kFinished ? 1 : 0));
   }
 }
 
@@ -98,24 +104,18 @@ struct Concluded {
 };
 
 absl::StatusOr<Concluded> ConcludedIterations(store::Reader& reader, std::int64_t campaign) {
-  const auto iterations = reader.Iterations(campaign);
-  if (!iterations.ok()) {
-    return iterations.status();
-  }
+  ASSIGN_OR_RETURN(const auto iterations, reader.Iterations(campaign));
   Concluded concluded;
-  for (const store::IterationRecord& iteration : *iterations) {
+  for (const store::IterationRecord& iteration : iterations) {
     if (!iteration.posterior.has_value()) {
       continue;
     }
-    auto posterior = scheduler::PosteriorFromJson(*iteration.posterior);
-    if (!posterior.ok()) {
-      return posterior.status();
-    }
-    const double misfit = posterior->best_misfit();
+    ASSIGN_OR_RETURN(auto posterior, scheduler::PosteriorFromJson(*iteration.posterior));
+    const double misfit = posterior.best_misfit();
     if (misfit > 0 && (concluded.best_misfit == 0 || misfit < concluded.best_misfit)) {
       concluded.best_misfit = misfit;
     }
-    concluded.last = *std::move(posterior);
+    concluded.last = std::move(posterior);
   }
   return concluded;
 }
@@ -137,47 +137,42 @@ absl::StatusOr<std::int64_t> ParseCampaign(const std::string& id) {
 
 absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t campaign,
                                             const std::optional<scheduler::LiveStatus>& live) {
-  const auto record = reader.Campaign(campaign);
-  const auto evaluations = reader.Evaluations(campaign);
-  const auto effort = reader.EffortOf(campaign);
-  const auto concluded = ConcludedIterations(reader, campaign);
-  for (const absl::Status& status :
-       {record.status(), evaluations.status(), effort.status(), concluded.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
+  ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(campaign));
+  ASSIGN_OR_RETURN(const auto effort, reader.EffortOf(campaign));
+  ASSIGN_OR_RETURN(const auto concluded, ConcludedIterations(reader, campaign));
   v1::CampaignStatus status;
   status.set_campaign(absl::StrCat("c", campaign));
-  status.set_name(record->submitted.name);
-  status.set_state(record->progress.state);
-  status.set_reason(record->progress.reason);
-  status.set_iteration(record->progress.iteration);
-  status.set_max_iterations(record->submitted.max_iterations);
-  status.set_samples(record->submitted.samples);
-  CountSamples(*record, *evaluations, status);
+  status.set_name(record.submitted.name);
+  status.set_state(ToString(record.progress.state));
+  status.set_reason(record.progress.reason);
+  status.set_iteration(record.progress.iteration);
+  status.set_max_iterations(record.submitted.max_iterations);
+  status.set_samples(record.submitted.samples);
+  CountSamples(record, evaluations, status);
   status.set_eta_seconds(-1);
-  if (concluded->last.has_value()) {
-    status.set_effective_sample_size(concluded->last->ess());
-    status.set_best_misfit(concluded->best_misfit);
+  if (concluded.last.has_value()) {
+    status.set_effective_sample_size(concluded.last->ess());
+    status.set_best_misfit(concluded.best_misfit);
   }
   // Nothing is known of it before all its samples have a reading in common.
-  if (live.has_value() && record->progress.phase == "calibrating" && live->view.best_misfit > 0) {
+  if (live.has_value() && record.progress.phase == Phase::kCalibrating &&
+      live->view.best_misfit > 0) {
     status.set_effective_sample_size(live->view.effective_samples);
-    if (concluded->best_misfit == 0) {  // that of whole curves, where there is one
+    if (concluded.best_misfit == 0) {  // that of whole curves, where there is one
       status.set_best_misfit(live->view.best_misfit);
     }
   }
   if (live.has_value()) {
     status.set_eta_seconds(live->eta_seconds);
   }
-  status.set_model_evaluations(effort->model_evaluations);
-  status.set_core_hours(effort->core_seconds / 3600);
-  status.set_converged(record->progress.converged);
-  status.set_method(record->submitted.method);
-  status.set_created_unix_ms(record->submitted.created_unix_ms);
-  status.set_phase(record->progress.phase);
-  campaign::Origin origin = campaign::OriginOf(record->submitted.yaml);
+  status.set_model_evaluations(effort.model_evaluations);
+  status.set_core_hours(effort.core_seconds / 3600);
+  status.set_converged(record.progress.converged);
+  status.set_method(ToString(record.submitted.method));
+  status.set_created_unix_ms(record.submitted.created_unix_ms);
+  status.set_phase(ToString(record.progress.phase));
+  campaign::Origin origin = campaign::OriginOf(record.submitted.yaml);
   status.set_parent(std::move(origin.parent));
   status.set_purpose(std::move(origin.purpose));
   status.mutable_effects()->Add(origin.effects.begin(), origin.effects.end());
@@ -186,37 +181,28 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
 
 absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
                                      const std::map<std::int64_t, scheduler::LiveStatus>& live) {
-  const auto campaigns = reader.Campaigns();
-  if (!campaigns.ok()) {
-    return campaigns.status();
-  }
+  ASSIGN_OR_RETURN(const auto campaigns, reader.Campaigns());
   v1::ListReply list;
-  for (const store::CampaignRecord& record : *campaigns) {
+  for (const store::CampaignRecord& record : campaigns) {
     const std::int64_t id = record.submitted.id;
     const auto known = live.find(id);
-    auto status = StatusOf(reader, id,
-                           known == live.end() ? std::nullopt : std::make_optional(known->second));
-    if (!status.ok()) {
-      return status.status();
-    }
-    *list.add_campaigns() = *std::move(status);
+    ASSIGN_OR_RETURN(
+        auto status,
+        StatusOf(reader, id,
+                 known == live.end() ? std::nullopt : std::make_optional(known->second)));
+    *list.add_campaigns() = std::move(status);
   }
   return list;
 }
 
 absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t campaign,
                                           std::optional<int> iteration) {
-  const auto record = reader.Campaign(campaign);
-  const auto iterations = reader.Iterations(campaign);
-  const auto effort = reader.EffortOf(campaign);
-  for (const absl::Status& status : {record.status(), iterations.status(), effort.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
+  ASSIGN_OR_RETURN(const auto iterations, reader.Iterations(campaign));
+  ASSIGN_OR_RETURN(const auto effort, reader.EffortOf(campaign));
   const std::string* found = nullptr;
   int complete = 0;
-  for (const store::IterationRecord& candidate : *iterations) {
+  for (const store::IterationRecord& candidate : iterations) {
     if (candidate.posterior.has_value()) {
       ++complete;
       if (!iteration.has_value() || candidate.number == *iteration) {
@@ -224,7 +210,7 @@ absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t ca
       }
     }
   }
-  if (found == nullptr && record->submitted.method == "table") {
+  if (found == nullptr && record.submitted.method == campaign::Method::kTable) {
     return absl::FailedPreconditionError(absl::StrCat(
         "campaign c", campaign,
         " runs the rows of its table and infers nothing: see samples, states and export"));
@@ -238,86 +224,73 @@ absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t ca
   auto posterior = scheduler::PosteriorFromJson(*found);
   if (posterior.ok()) {
     posterior->set_iterations(complete);
-    posterior->set_core_hours(effort->core_seconds / 3600);
+    posterior->set_core_hours(effort.core_seconds / 3600);
     // Held-out runs come after the last posterior and are part of what it has cost.
-    if (record->progress.phase != "calibrating" && posterior->iteration() + 1 == complete) {
-      posterior->set_model_evaluations(effort->model_evaluations);
+    if (record.progress.phase != Phase::kCalibrating && posterior->iteration() + 1 == complete) {
+      posterior->set_model_evaluations(effort.model_evaluations);
     }
   }
   return posterior;
 }
 
 absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::int64_t campaign) {
-  const auto record = reader.Campaign(campaign);
-  const auto samples = reader.Samples(campaign);
-  const auto evaluations = reader.Evaluations(campaign);
-  const auto attempts = reader.AttemptsBySample(campaign);
-  const auto iterations = reader.Iterations(campaign);
-  for (const absl::Status& status : {record.status(), samples.status(), evaluations.status(),
-                                     attempts.status(), iterations.status()}) {
-    if (!status.ok()) {
-      return status;
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
+  ASSIGN_OR_RETURN(const auto samples, reader.Samples(campaign));
+  ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(campaign));
+  ASSIGN_OR_RETURN(const auto attempts, reader.AttemptsBySample(campaign));
+  ASSIGN_OR_RETURN(const auto iterations, reader.Iterations(campaign));
+  std::map<int, SamplePurpose> purposes;  // by iteration
+  for (const store::IterationRecord& iteration : iterations) {
+    if (iteration.proposal == scheduler::kReplicates) {
+      purposes[iteration.number] = SamplePurpose::kReplicate;
+    }
+    if (iteration.proposal == scheduler::kHeldOutDraws) {
+      purposes[iteration.number] = SamplePurpose::kDraw;
     }
   }
-  std::map<int, std::string> purposes;  // by iteration
-  for (const store::IterationRecord& iteration : *iterations) {
-    if (iteration.proposal == scheduler::kReplicates) purposes[iteration.number] = "replicate";
-    if (iteration.proposal == scheduler::kHeldOutDraws) purposes[iteration.number] = "draw";
-  }
-  auto statuses = StatusBySample(*evaluations);
+  auto statuses = StatusBySample(evaluations);
   std::vector<v1::Sample> messages;
-  for (const store::SampleRecord& sample : *samples) {
+  for (const store::SampleRecord& sample : samples) {
     v1::Sample& message = messages.emplace_back();
     message.set_index(sample.sample);
     message.set_iteration(sample.iteration);
     message.mutable_parameters()->Add(sample.parameters.begin(), sample.parameters.end());
-    message.set_status(statuses[sample.sample].name);
+    message.set_status(ToString(statuses[sample.sample].worst));
     message.set_reason(statuses[sample.sample].reason);
     message.set_weight(std::exp(sample.log_weight));
     message.set_log_likelihood(sample.log_likelihood);
-    const auto made = attempts->find(sample.sample);
-    message.set_purpose(purposes[sample.iteration]);
-    message.set_attempts(made == attempts->end() ? 0 : made->second);
+    const auto made = attempts.find(sample.sample);
+    message.set_purpose(ToString(purposes[sample.iteration]));
+    message.set_attempts(made == attempts.end() ? 0 : made->second);
   }
   return messages;
 }
 
 absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, std::int64_t campaign,
                                                        std::optional<int> sample) {
-  const auto record = reader.Campaign(campaign);
-  if (!record.ok()) {
-    return record.status();
-  }
-  const auto definition = scheduler::LoadDefinition(reader, record->submitted);
-  const auto states = reader.States(campaign, sample);
-  const auto seconds = reader.CoreSeconds(campaign);
-  for (const absl::Status& status : {definition.status(), states.status(), seconds.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
+  ASSIGN_OR_RETURN(const auto definition, scheduler::LoadDefinition(reader, record.submitted));
+  ASSIGN_OR_RETURN(const auto states, reader.States(campaign, sample));
+  ASSIGN_OR_RETURN(const auto seconds, reader.CoreSeconds(campaign));
   if (sample.has_value()) {
-    const auto samples = reader.Samples(campaign);
-    if (!samples.ok()) {
-      return samples.status();
-    }
-    if (std::none_of(samples->begin(), samples->end(),
+    ASSIGN_OR_RETURN(const auto samples, reader.Samples(campaign));
+    if (std::none_of(samples.begin(), samples.end(),
                      [&](const auto& one) { return one.sample == *sample; })) {
       return absl::NotFoundError(absl::StrCat("campaign c", campaign, " has no sample ", *sample,
                                               "; see samples for the numbers there are"));
     }
   }
-  const campaign::Campaign& read = (*definition)->campaign;
+  const campaign::Campaign& read = definition->campaign;
   std::vector<v1::SampleStates> messages;
   const store::EvaluationKey* last = nullptr;
-  for (const store::StateRecord& state : *states) {
+  for (const store::StateRecord& state : states) {
     if (last == nullptr || *last != state.key) {
       const auto& experiment = read.experiments[static_cast<std::size_t>(state.key.experiment)];
       v1::SampleStates& message = messages.emplace_back();
       message.set_sample(state.key.sample);
       message.set_experiment(experiment.name);
-      const auto spent = seconds->find(state.key);
-      message.set_core_seconds(spent == seconds->end() ? 0 : spent->second);
+      const auto spent = seconds.find(state.key);
+      message.set_core_seconds(spent == seconds.end() ? 0 : spent->second);
       if (read.precomputed.has_value()) {
         for (const campaign::MeasuredObservable& observable : experiment.observables) {
           message.add_observables(observable.name);
@@ -336,33 +309,23 @@ absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, st
 }
 
 absl::StatusOr<v1::CampaignSource> SourceOf(store::Reader& reader, std::int64_t campaign) {
-  const auto record = reader.Campaign(campaign);
-  const auto files = reader.Files(campaign);
-  for (const absl::Status& status : {record.status(), files.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
+  ASSIGN_OR_RETURN(const auto files, reader.Files(campaign));
   v1::CampaignSource source;
-  source.set_campaign_file(record->submitted.yaml);
-  source.set_file_name(record->submitted.file_name);
-  source.mutable_files()->insert(files->begin(), files->end());
-  if (record->submitted.seed.has_value()) {
-    source.set_seed(*record->submitted.seed);
+  source.set_campaign_file(record.submitted.yaml);
+  source.set_file_name(record.submitted.file_name);
+  source.mutable_files()->insert(files.begin(), files.end());
+  if (record.submitted.seed.has_value()) {
+    source.set_seed(*record.submitted.seed);
   }
   return source;
 }
 
 absl::StatusOr<v1::FindingList> FindingsOf(store::Reader& reader, std::int64_t campaign) {
-  const auto record = reader.Campaign(campaign);
-  const auto findings = reader.Findings(campaign);
-  for (const absl::Status& status : {record.status(), findings.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
+  ASSIGN_OR_RETURN(const auto findings, reader.Findings(campaign));
   v1::FindingList list;
-  for (const store::FindingRecord& finding : *findings) {
+  for (const store::FindingRecord& finding : findings) {
     v1::Finding& message = *list.add_findings();
     message.set_kind(finding.kind);
     message.set_digest(finding.digest);
@@ -372,15 +335,10 @@ absl::StatusOr<v1::FindingList> FindingsOf(store::Reader& reader, std::int64_t c
 }
 
 absl::StatusOr<std::vector<v1::LogEntry>> LogOf(store::Reader& reader, std::int64_t campaign) {
-  const auto record = reader.Campaign(campaign);
-  const auto events = reader.Events(campaign);
-  for (const absl::Status& status : {record.status(), events.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
+  ASSIGN_OR_RETURN(const auto events, reader.Events(campaign));
   std::vector<v1::LogEntry> entries;
-  for (const store::EventRecord& event : *events) {
+  for (const store::EventRecord& event : events) {
     v1::LogEntry& entry = entries.emplace_back();
     entry.set_unix_ms(event.unix_ms);
     entry.set_what(event.what);

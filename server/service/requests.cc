@@ -1,6 +1,7 @@
 #include "server/service/requests.h"
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 
 namespace calib::service {
 namespace {
@@ -19,16 +20,13 @@ absl::StatusOr<std::optional<std::string>> Requests::Begin(const std::string& id
     return absl::InvalidArgumentError(
         absl::StrCat("request_id has ", id.size(), " characters, at most ", kLongestId));
   }
-  const auto stored = reader.Request(id);
-  if (!stored.ok()) {
-    return stored.status();
-  }
-  if (stored->has_value()) {
-    if ((*stored)->digest != digest) {
+  ASSIGN_OR_RETURN(const auto stored, reader.Request(id));
+  if (stored.has_value()) {
+    if (stored->digest != digest) {
       return absl::AlreadyExistsError(
           absl::StrCat("request ", id, " was made before with another content"));
     }
-    return std::optional<std::string>((*stored)->answer);
+    return std::optional<std::string>(stored->answer);
   }
   if (!in_progress_.insert(id).second) {
     return absl::UnavailableError(absl::StrCat("request ", id, " is in progress"));

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "proto/rpc/address.h"
 #include "server/service/campaigns_service.h"
 #include "server/service/core.h"
@@ -75,21 +76,14 @@ Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() { Shutdown(kDefaultShutdown); }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
-  auto folder = StateFolder::Open(options.state_dir);
-  if (!folder.ok()) {
-    return folder.status();
-  }
-  if (absl::Status status = StartLog(options.log_file); !status.ok()) {
-    return status;
-  }
-  auto store = store::Store::Open((*folder)->DatabasePath(), std::move(options.store_hooks));
-  if (!store.ok()) {
-    return store.status();
-  }
+  ASSIGN_OR_RETURN(auto folder, StateFolder::Open(options.state_dir));
+  RETURN_IF_ERROR(StartLog(options.log_file));
+  ASSIGN_OR_RETURN(auto store,
+                   store::Store::Open(folder->DatabasePath(), std::move(options.store_hooks)));
   auto impl = std::make_unique<Impl>();
-  impl->folder = *std::move(folder);
+  impl->folder = std::move(folder);
   impl->core = std::make_unique<Core>(
-      *std::move(store),
+      std::move(store),
       scheduler::SchedulerOptions{.lease = options.lease, .heartbeat = options.heartbeat},
       [on_failure = std::move(options.on_failure)](const absl::Status& status) {
         if (on_failure) {
@@ -102,15 +96,9 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   impl->workers = std::make_unique<WorkerLinkService>(*impl->core);
   std::promise<absl::Status> loaded;
   impl->core->Post([&] { loaded.set_value(impl->core->Start()); });
-  if (absl::Status status = loaded.get_future().get(); !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = impl->Listen(options.listen); !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = impl->folder->Announce(impl->address, options.stays); !status.ok()) {
-    return status;
-  }
+  RETURN_IF_ERROR(loaded.get_future().get());
+  RETURN_IF_ERROR(impl->Listen(options.listen));
+  RETURN_IF_ERROR(impl->folder->Announce(impl->address, options.stays));
   spdlog::info("serving address={} state={}", impl->address, options.state_dir);
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }

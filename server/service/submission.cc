@@ -5,8 +5,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "proto/rpc/digest.h"
-#include "server/campaign/campaign_file.h"
+#include "server/campaign/file/campaign_file.h"
 #include "server/scheduler/definition.h"
 #include "server/service/queries.h"
 
@@ -15,11 +16,8 @@ absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmissio
     const v1::SubmitRequest& request, store::Reader& reader) {
   const std::map<std::string, std::string> files(request.files().begin(), request.files().end());
   for (const auto& [path, digest] : files) {
-    const auto there = reader.HasBlob(digest);
-    if (!there.ok()) {
-      return there.status();
-    }
-    if (!*there) {
+    ASSIGN_OR_RETURN(const auto there, reader.HasBlob(digest));
+    if (!there) {
       return absl::FailedPreconditionError(
           absl::StrCat("the content of ", path, " (SHA-256 ", digest, ") was not put"));
     }
@@ -46,7 +44,7 @@ absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmissio
                               .yaml = request.campaign_file(),
                               .file_name = request.file_name(),
                               .seed = seed,
-                              .method = campaign::ToString(campaign.method),
+                              .method = campaign.method,
                               .samples = campaign.samples,
                               .max_iterations = campaign::MostBatches(campaign)};
   if (campaign.precomputed.has_value()) {
@@ -64,25 +62,17 @@ absl::StatusOr<NewFinding> CheckFinding(const v1::AddFindingRequest& request, st
     return absl::InvalidArgumentError(
         absl::StrCat("a finding is of a kind of 1 to ", kLongestKind, " of the letters a-z and _"));
   }
-  const auto campaign = ParseCampaign(request.campaign());
-  if (!campaign.ok()) {
-    return campaign.status();
-  }
-  const auto there = reader.HasBlob(request.digest());
-  const auto before = FindingsOf(reader, *campaign);
-  for (const absl::Status& status : {there.status(), before.status()}) {
-    if (!status.ok()) {
-      return status;
-    }
-  }
-  if (!*there) {
+  ASSIGN_OR_RETURN(const auto campaign, ParseCampaign(request.campaign()));
+  ASSIGN_OR_RETURN(const auto there, reader.HasBlob(request.digest()));
+  ASSIGN_OR_RETURN(const auto before, FindingsOf(reader, campaign));
+  if (!there) {
     return absl::FailedPreconditionError(
         absl::StrCat("the document of the finding (SHA-256 ", request.digest(), ") was not put"));
   }
   NewFinding finding{
-      .campaign = *campaign,
+      .campaign = campaign,
       .record = {.kind = kind, .digest = request.digest(), .created_unix_ms = unix_ms}};
-  for (const v1::Finding& earlier : before->findings()) {
+  for (const v1::Finding& earlier : before.findings()) {
     if (earlier.kind() == kind && earlier.digest() == request.digest()) {
       finding.record.created_unix_ms = earlier.created_unix_ms();
     }

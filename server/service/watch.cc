@@ -3,7 +3,7 @@
 #include <boost/asio/steady_timer.hpp>
 
 #include "proto/rpc/status.h"
-#include "server/scheduler/transitions.h"
+#include "server/messages/read_words.h"
 #include "server/service/queries.h"
 
 namespace calib::service {
@@ -26,10 +26,9 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
 
   void OnWriteDone(bool ok) override {
     core_.Post([this, ok] {
-      const auto state = scheduler::ToCampaignState(status_.state());
       if (!ok) {
         Finish(grpc::Status::CANCELLED);
-      } else if (state.has_value() && scheduler::IsOver(*state)) {
+      } else if (messages::IsOver(status_)) {
         Finish(grpc::Status::OK);
       } else {
         Wait();

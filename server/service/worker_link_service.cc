@@ -10,6 +10,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "calib/return_if_error.h"
 #include "proto/rpc/status.h"
 #include "server/service/blob_stream.h"
 
@@ -109,9 +110,7 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
       if (!message.has_hello()) {
         return absl::InvalidArgumentError("the first message must be Hello");
       }
-      if (absl::Status status = scheduler.Connected(session_, message.hello()); !status.ok()) {
-        return status;
-      }
+      RETURN_IF_ERROR(scheduler.Connected(session_, message.hello()));
       name_ = message.hello().name();
       spdlog::info("worker_connected name={} session={} slots={} held={}", name_, session_,
                    message.hello().slots(), message.hello().attempts_size());

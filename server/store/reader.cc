@@ -18,15 +18,23 @@ double ToDouble(const SQLite::Column& column) {
   return column.isNull() ? kUnknown : column.getDouble();
 }
 
+// The schema allows no other words than those of the tables.
 EvaluationStatus ToEvaluationStatus(const std::string& text) {
-  for (const auto status :
-       {EvaluationStatus::kWaiting, EvaluationStatus::kRunning, EvaluationStatus::kFinished,
-        EvaluationStatus::kDiverged, EvaluationStatus::kStoppedEarly}) {
-    if (text == ToString(status)) {
-      return status;
-    }
-  }
-  return EvaluationStatus::kFailed;
+  return campaign::ValueOf(campaign::kEvaluationStatusWords, text)
+      .value_or(EvaluationStatus::kFailed);
+}
+
+CampaignState ToCampaignState(const std::string& text) {
+  return campaign::ToCampaignState(text).value_or(CampaignState::kFailed);
+}
+
+Phase ToPhase(const std::string& text) {
+  return campaign::ValueOf(campaign::kPhaseWords, text).value_or(Phase::kDone);
+}
+
+// Written from campaign::Method alone.
+Method ToMethod(const std::string& text) {
+  return campaign::ValueOf(campaign::kMethodWords, text).value_or(Method::kTable);
 }
 
 CampaignRecord ToCampaign(SQLite::Statement& row) {
@@ -39,14 +47,14 @@ CampaignRecord ToCampaign(SQLite::Statement& row) {
   if (!row.isColumnNull(4)) {
     submitted.seed = std::bit_cast<std::uint64_t>(row.getColumn(4).getInt64());
   }
-  submitted.method = row.getColumn(5).getString();
+  submitted.method = ToMethod(row.getColumn(5).getString());
   submitted.samples = row.getColumn(6).getInt();
   submitted.max_iterations = row.getColumn(7).getInt();
   submitted.created_unix_ms = row.getColumn(8).getInt64();
   CampaignProgress& progress = record.progress;
-  progress.state = row.getColumn(9).getString();
+  progress.state = ToCampaignState(row.getColumn(9).getString());
   progress.reason = row.getColumn(10).getString();
-  progress.phase = row.getColumn(11).getString();
+  progress.phase = ToPhase(row.getColumn(11).getString());
   progress.iteration = row.getColumn(12).getInt();
   progress.converged = row.getColumn(13).getInt() != 0;
   progress.pause_waived = row.getColumn(14).getInt() != 0;

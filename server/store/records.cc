@@ -1,28 +1,29 @@
 #include "server/store/records.h"
 
+#include <array>
+
+#include "server/campaign/model/word_table.h"
+
 namespace calib::store {
+namespace {
 
-const char* ToString(EvaluationStatus status) {
-  switch (status) {
-    case EvaluationStatus::kWaiting:
-      return "waiting";
-    case EvaluationStatus::kRunning:
-      return "running";
-    case EvaluationStatus::kFinished:
-      return "finished";
-    case EvaluationStatus::kDiverged:
-      return "diverged";
-    case EvaluationStatus::kStoppedEarly:
-      return "stopped_early";
-    case EvaluationStatus::kFailed:
-      break;
-  }
-  return "failed";
-}
+using campaign::Word;
 
-bool IsTerminal(EvaluationStatus status) {
-  return status == EvaluationStatus::kFinished || status == EvaluationStatus::kDiverged ||
-         status == EvaluationStatus::kStoppedEarly;
+constexpr std::array kAttemptOutcomeWords = {
+    Word{AttemptOutcome::kCompleted, "completed"},
+    Word{AttemptOutcome::kResting, "resting"},
+    Word{AttemptOutcome::kStoppedEarly, "stopped_early"},
+    Word{AttemptOutcome::kStopped, "stopped"},
+    Word{AttemptOutcome::kDiverged, "diverged"},
+    Word{AttemptOutcome::kFailed, "failed"},
+    Word{AttemptOutcome::kLost, "lost"},
+    Word{AttemptOutcome::kCancelled, "cancelled"},
+};
+
+}  // namespace
+
+const char* ToString(AttemptOutcome outcome) {
+  return campaign::WordOf(kAttemptOutcomeWords, outcome);
 }
 
 }  // namespace calib::store

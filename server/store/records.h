@@ -8,7 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "server/campaign/model/words.h"
+
 namespace calib::store {
+
+using campaign::CampaignState;
+using campaign::EvaluationStatus;
+using campaign::Method;
+using campaign::Phase;
 
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -19,7 +26,7 @@ struct NewCampaign {
   std::string yaml{};
   std::string file_name{};
   std::optional<std::uint64_t> seed{};
-  std::string method{};
+  Method method = Method::kIterativeBayesianFilter;
   int samples = 0;
   int max_iterations = 1;
   std::int64_t created_unix_ms = 0;
@@ -27,9 +34,9 @@ struct NewCampaign {
 
 /// What changes while a campaign lives.
 struct CampaignProgress {
-  std::string state = "queued";  ///< queued running paused finished failed cancelled
+  CampaignState state = CampaignState::kQueued;
   std::string reason{};
-  std::string phase = "calibrating";  ///< calibrating validating done
+  Phase phase = Phase::kCalibrating;
   int iteration = 0;
   bool converged = false;
   bool pause_waived = false;
@@ -71,11 +78,6 @@ struct EvaluationKey {
   friend auto operator<=>(const EvaluationKey&, const EvaluationKey&) = default;
 };
 
-enum class EvaluationStatus { kWaiting, kRunning, kFinished, kDiverged, kStoppedEarly, kFailed };
-const char* ToString(EvaluationStatus status);
-/// True when nothing more is to be run for it.
-bool IsTerminal(EvaluationStatus status);
-
 struct EvaluationRecord {
   EvaluationKey key{};
   EvaluationStatus status = EvaluationStatus::kWaiting;
@@ -103,10 +105,22 @@ struct NewAttempt {
   std::int64_t started_unix_ms = 0;
 };
 
+/// How an attempt ended.
+enum class AttemptOutcome {
+  kCompleted,
+  kResting,  ///< at a rung, from where its evaluation can go on
+  kStoppedEarly,
+  kStopped,  ///< its worker left, or other mechanics have to run it
+  kDiverged,
+  kFailed,
+  kLost,  ///< nothing was heard of it any more
+  kCancelled
+};
+const char* ToString(AttemptOutcome outcome);
+
 struct AttemptEnd {
   std::int64_t id = 0;
-  std::string
-      outcome{};  ///< completed resting stopped_early stopped diverged failed lost cancelled
+  AttemptOutcome outcome = AttemptOutcome::kFailed;
   std::string reason{};
   std::int64_t ended_unix_ms = 0;
   std::int64_t steps = 0;

@@ -9,6 +9,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "calib/return_if_error.h"
 #include "server/store/connection.h"
 #include "server/store/migrations.h"
 
@@ -95,9 +96,7 @@ class Store::Writer {
         return transaction.status();  // rolls back
       }
       if (hooks_.before_commit) {
-        if (absl::Status status = hooks_.before_commit(); !status.ok()) {
-          return status;
-        }
+        RETURN_IF_ERROR(hooks_.before_commit());
       }
       scope->commit();
     } catch (const SQLite::Exception& error) {

@@ -68,8 +68,8 @@ void Transaction::SetProgress(std::int64_t campaign, const CampaignProgress& pro
     connection_.Run(
         "UPDATE campaign SET state = ?, reason = ?, phase = ?, iteration = ?, converged = ?, "
         "pause_waived = ? WHERE id = ?",
-        progress.state, progress.reason, progress.phase, progress.iteration, progress.converged,
-        progress.pause_waived, campaign);
+        ToString(progress.state), progress.reason, ToString(progress.phase), progress.iteration,
+        progress.converged, progress.pause_waived, campaign);
   });
 }
 
@@ -223,7 +223,7 @@ void Transaction::EndAttempt(const AttemptEnd& end) {
     connection_.Run(
         "UPDATE attempt SET ended_unix_ms = ?, outcome = ?, reason = ?, steps = ?, "
         "contact_updates = ?, core_seconds = ?, staging = ? WHERE id = ?",
-        end.ended_unix_ms, end.outcome, end.reason, end.steps, end.contact_updates,
+        end.ended_unix_ms, ToString(end.outcome), end.reason, end.steps, end.contact_updates,
         end.core_seconds, end.staging, end.id);
   });
 }

@@ -10,7 +10,8 @@
 #include <string>
 
 #include "dem/dynamics/quasi_static.h"
-#include "dem/simulation/shape_change.h"
+#include "dem/lab_tests/shared/shape_change.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -100,8 +101,8 @@ void SettleAndCompress(Assembly& assembly, benchmark::State& state) {
 
 void ContactUpdates(benchmark::State& state, Law law) {
   const Model model = BenchModel(law);
-  Assembly assembly(PackingOf(static_cast<int>(state.range(0))), model.density, ContactModel(model),
-                    static_cast<int>(state.range(1)));
+  Assembly assembly(PackingOf(static_cast<int>(state.range(0))), model.density,
+                    ContactModelOf(model), static_cast<int>(state.range(1)));
   SettleAndCompress(assembly, state);
 }
 
@@ -113,7 +114,7 @@ void Clumps(benchmark::State& state) {
     state.SkipWithError(std::string(packing.status().message()).c_str());
     return;
   }
-  Assembly assembly(*packing, model.density, ContactModel(model), 1);
+  Assembly assembly(*packing, model.density, ContactModelOf(model), 1);
   SettleAndCompress(assembly, state);
 }
 
@@ -153,12 +154,12 @@ void CostAgainstSize(benchmark::State& state) {
   static const std::map<std::int64_t, std::array<int, 3>> kTimes = {
       {1000, {1, 1, 1}}, {5000, {5, 1, 1}}, {20'000, {5, 2, 2}}, {100'000, {5, 5, 4}}};
   const Model model = BenchModel(Law::kHertzRolling);
-  Assembly one(PackingOf(1000), model.density, ContactModel(model), 1);
+  Assembly one(PackingOf(1000), model.density, ContactModelOf(model), 1);
   const double dt = SettleAt500kPa(one, state);
   if (dt == 0) {
     return;
   }
-  Assembly assembly(Tiled(one, kTimes.at(state.range(0))), model.density, ContactModel(model), 1);
+  Assembly assembly(Tiled(one, kTimes.at(state.range(0))), model.density, ContactModelOf(model), 1);
   if (!assembly.EvaluateForces().ok()) {
     state.SkipWithError("diverged");
     return;

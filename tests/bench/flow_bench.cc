@@ -14,6 +14,7 @@
 
 #include "dem/dynamics/flow.h"
 #include "dem/particles/loose_fill.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -151,7 +152,7 @@ Flowing FillAndOpen(Vessel vessel) {
   vessel.grains.length[0] = bounds.high.x + kDiameter;
   vessel.grains.length[1] = vessel.planar ? kDiameter : bounds.high.y + kDiameter;
   vessel.grains.length[2] = top;
-  Flowing flowing{.assembly = Assembly(vessel.grains, model.density, ContactModel(model),
+  Flowing flowing{.assembly = Assembly(vessel.grains, model.density, ContactModelOf(model),
                                        {.gravity = {0, 0, -kGravity},
                                         .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
                                                   MakeMeshWall("vessel", vessel.walls)},
@@ -351,7 +352,7 @@ void Moving(benchmark::State& state, Container (*make)(int, int)) {
     const FlowOptions options{.drop_height = top, .low = {-1, -1e300, -1}, .high = {10, 1e300, 10}};
     Packing& grains = container.grains;
     {
-      Assembly filling(grains, model.density, ContactModel(model), container.around, 1);
+      Assembly filling(grains, model.density, ContactModelOf(model), container.around, 1);
       Flow flow(filling, options, {});
       if (flow.Settle(kLongest, 0.3) != StageEnd::kDone) {
         state.SkipWithError(flow.reason().c_str());
@@ -363,7 +364,7 @@ void Moving(benchmark::State& state, Container (*make)(int, int)) {
       grains.z.assign(p.z.begin(), p.z.end());
       grains.radius.assign(p.radius.begin(), p.radius.end());
     }
-    Assembly assembly(grains, model.density, ContactModel(model), container.around, 1);
+    Assembly assembly(grains, model.density, ContactModelOf(model), container.around, 1);
     Flow flow(assembly, options, {});
     const int frames = static_cast<int>(container.moves / kEvery);
     std::ofstream out;

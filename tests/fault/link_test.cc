@@ -2,7 +2,7 @@
 // to say.
 #include <gtest/gtest.h>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "tests/fault/undisturbed.h"
 
 namespace calib::testing {

@@ -9,8 +9,8 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
            < { diagnosis discrepancy prediction sensitivity }
 proto      calib/v1 < rpc
 worker     .
-server     campaign/model < campaign/file < { store report/plot } < { scheduler report } < service < client < diagnosis
-           < ctl < ctl/verbs < .
+server     { campaign/model campaign/file/text } < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
+           < { scheduler report/plot } < { service report/html } < report/documents < client < diagnosis < ctl < ctl/verbs < .
 """
 
 # What a folder may include of other parts (prefixes), and which of the watched libraries. The longest row that fits counts;
@@ -23,16 +23,18 @@ inference         |                                                             
 proto/calib/v1    |                                                                        |
 proto/rpc         | proto/calib                                                            | grpcpp chrono
 worker            | dem proto                                                              | grpcpp spdlog chrono CLI
-server/campaign   | {CAMPAIGN_OF_DEM} inference server/campaign                            | yaml-cpp
-server/store      | inference server/campaign                                              | SQLiteCpp sqlite3 chrono spdlog
-server/scheduler  | dem inference proto/calib server/campaign server/store                 | chrono spdlog nlohmann
-server/service    | dem inference proto server/campaign server/store server/scheduler      | grpcpp spdlog chrono nlohmann
+server/campaign   | {CAMPAIGN_OF_DEM} inference                                            |
+server/campaign/file/text |                                                                | yaml-cpp
+server/messages   | dem proto/calib server/campaign                                        | chrono
+server/store      | server/campaign/model                                                  | SQLiteCpp sqlite3 chrono spdlog
+server/scheduler  | dem inference proto/calib server/campaign server/messages server/store | chrono spdlog nlohmann
+server/service    | dem inference proto server/campaign server/messages server/store server/scheduler | grpcpp spdlog chrono nlohmann
 server            | proto/rpc server/store server/scheduler server/service                 | spdlog CLI chrono
-server/report     | {ASKING_OF_DEM} inference proto/calib server/campaign                  | nlohmann chrono
-server/client     | inference proto server/campaign server/report                          | grpcpp chrono
-server/client/session | inference proto server/campaign server/report server/service       | grpcpp chrono
-server/diagnosis  | {ASKING_OF_DEM} dem/simulate inference proto/calib server/campaign server/report server/client | nlohmann
-server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/report server/client server/diagnosis | CLI nlohmann chrono
+server/report     | {ASKING_OF_DEM} inference proto/calib server/campaign server/messages  | nlohmann chrono
+server/client     | inference proto server/campaign server/messages server/report          | grpcpp chrono
+server/client/session | proto server/messages server/service server/client                 | grpcpp chrono
+server/diagnosis  | {ASKING_OF_DEM} dem/simulate inference proto/calib server/campaign server/messages server/report server/client | nlohmann
+server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/messages server/report server/client server/diagnosis | CLI nlohmann chrono
 """
 WATCHED = 'grpcpp SQLiteCpp sqlite3 yaml-cpp spdlog CLI nlohmann chrono'
 
@@ -40,7 +42,7 @@ WATCHED = 'grpcpp SQLiteCpp sqlite3 yaml-cpp spdlog CLI nlohmann chrono'
 MOST_FILES = 25
 MAY_HOLD_MORE = 'server/diagnosis server/ctl/verbs server/store/migrations dem/effects dem/contact/laws dem/lab_tests dem/measure/observables'
 
-# Doors: a README.md each. STAR stands for every folder directly inside.
+# Doors: a README.md each; * stands for every folder directly inside.
 DOORS = '. proto server worker tests dem/* inference/* server/* tests/*'
 MOST_README_LINES = 60
 MOST_README_LINES_AT_ROOT = 120

@@ -10,7 +10,7 @@
 
 #include "calib/v1/campaign.grpc.pb.h"
 #include "calib/v1/worker.grpc.pb.h"
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/client_options.h"
 #include "proto/rpc/digest.h"

@@ -1,7 +1,7 @@
 #pragma once
 // The smallest campaign that can be emulated: two parameters in the unit square and two readings.
 
-#include "server/campaign/campaign.h"
+#include "server/campaign/model/campaign.h"
 
 namespace calib::testing {
 

@@ -4,8 +4,8 @@
 #include <limits>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
 #include "dem/contact/contact_kernel.h"
+#include "dem/model/effect.h"
 
 namespace calib::dem {
 

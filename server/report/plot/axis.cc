@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "server/report/people_units.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::report {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/report/html.h"
+#include "server/report/text/html.h"
 
 namespace calib::report {
 namespace {

@@ -9,9 +9,9 @@
 
 #include "inference/data/gaussian_likelihood.h"
 #include "inference/filter/iterative_filter.h"
-#include "inference/filter/log_weights.h"
 #include "inference/filter/sequential_filter.h"
 #include "inference/filter/tempering.h"
+#include "inference/numerics/log_weights.h"
 #include "tests/data/inference/reference_files.h"
 
 namespace calib::inference {

@@ -193,7 +193,7 @@ TEST(TmcmcRestitution, StiffnessHasTwoModesAndDampingARidge) {
 }
 
 // Columns: speed, model, mu, k_t [1e8 N/m], gamma [1e4], alpha, variances of the normal and the
-// tangential coefficients, log evidence with its standard error; README.md beside this file.
+// tangential coefficients, log evidence with its standard error; RESULTS.md beside this file.
 // The impact speeds are those that the paper leaves open; CALIB_RESTITUTION sets the number of
 // samples.
 TEST(TmcmcRestitution, ThreeModelsOverTheImpactSpeed) {

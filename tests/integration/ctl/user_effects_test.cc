@@ -3,7 +3,7 @@
 #include <map>
 #include <vector>
 
-#include "server/campaign/sha256.h"
+#include "server/campaign/model/sha256.h"
 #include "tests/integration/ctl/calibctl_fixture.h"
 
 namespace calib::ctl {

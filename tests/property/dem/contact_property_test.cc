@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "dem/contact/contact_model.h"
+#include "dem/dynamics/contact_model.h"
 
 namespace calib::dem {
 namespace {

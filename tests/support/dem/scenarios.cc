@@ -9,6 +9,9 @@
 
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/flow.h"
+#include "dem/registry/registry.h"
+#include "dem/simulate/packing_generator.h"
+#include "dem/simulate/simulate.h"
 
 namespace calib::dem::test {
 
@@ -101,7 +104,7 @@ double AccelerationDownASlope(const Model& model, const std::string& material, d
   packing.z = {r};
   packing.radius = {r};
   packing.clump = {-1};
-  Assembly assembly(packing, model.density, ContactModel(model),
+  Assembly assembly(packing, model.density, ContactModelOf(model),
                     {.gravity = {g * std::sin(angle), 0, -g * std::cos(angle)},
                      .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1})},
                      .material = material},

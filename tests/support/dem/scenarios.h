@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "dem/contact/contact_model.h"
-#include "dem/simulation/scenario.h"
+#include "dem/dynamics/contact_model.h"
+#include "dem/model/scenario.h"
 
 namespace calib::dem::test {
 

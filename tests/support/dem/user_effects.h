@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "dem/formula/user_effect.h"
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
 
 namespace calib::dem::test {
 

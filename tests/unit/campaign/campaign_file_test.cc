@@ -1,4 +1,4 @@
-#include "server/campaign/campaign_file.h"
+#include "server/campaign/file/campaign_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/campaign/identity.h"
+#include "server/campaign/model/identity.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {

@@ -1,4 +1,4 @@
-#include "server/campaign/control_path.h"
+#include "server/campaign/model/control_path.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

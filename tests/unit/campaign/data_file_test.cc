@@ -1,4 +1,4 @@
-#include "server/campaign/data_file.h"
+#include "server/campaign/file/text/data_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

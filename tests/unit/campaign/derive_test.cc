@@ -1,9 +1,9 @@
-#include "server/campaign/derive.h"
+#include "server/campaign/file/derive.h"
 
 #include <gtest/gtest.h>
 
-#include "server/campaign/campaign_file.h"
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/campaign_file.h"
+#include "server/campaign/file/text/yaml_text.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {

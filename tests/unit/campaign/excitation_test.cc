@@ -1,6 +1,6 @@
 // Effects that no experiment can show are refused: their posterior would be their prior.
 
-#include "server/campaign/excitation.h"
+#include "server/campaign/model/excitation.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

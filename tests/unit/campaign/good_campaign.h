@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "server/campaign/campaign_file.h"
+#include "server/campaign/file/campaign_file.h"
 
 namespace calib::campaign::testing {
 

@@ -1,4 +1,4 @@
-#include "server/campaign/noise_check.h"
+#include "server/campaign/model/noise_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

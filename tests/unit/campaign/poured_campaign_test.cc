@@ -4,7 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
-#include "server/campaign/specimen_notes.h"
+#include "server/campaign/model/specimen_notes.h"
 #include "tests/support/stl_text.h"
 #include "tests/unit/campaign/good_campaign.h"
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "server/campaign/read_precomputed.h"
+#include "server/campaign/file/read_precomputed.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {

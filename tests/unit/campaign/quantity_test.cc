@@ -1,4 +1,4 @@
-#include "server/campaign/quantity.h"
+#include "server/campaign/file/text/quantity.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

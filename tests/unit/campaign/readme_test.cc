@@ -1,5 +1,5 @@
-// The examples of server/campaign/README.md are what a user copies first: all of them have to be
-// good campaigns.
+// The examples of server/campaign/CAMPAIGN_FILE.md are what a user copies first: all of them have
+// to be good campaigns.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -27,7 +27,7 @@ TEST(CampaignReadme, EveryExampleIsAGoodCampaign) {
   files["parameters.csv"] = "sample,E_GPa,km\n0,100,8000\n";
   files["states.csv"] = "sample,step,p_MPa,porosity\n0,0,1,0.4\n0,1,2,0.39\n";
   files["beads.dat"] = "#\te_a\tp\tn\n0.001\t1\t0.4\n0.002\t2\t0.39\n";
-  const auto blocks = YamlBlocks(CALIB_CAMPAIGN_README);
+  const auto blocks = YamlBlocks(CALIB_CAMPAIGN_FILE_REFERENCE);
   EXPECT_EQ(blocks.size(), 6U);
   for (std::string block : blocks) {
     if (block.rfind("name:", 0) != 0) {  // a part, to be joined to the whole file

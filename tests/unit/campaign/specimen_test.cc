@@ -12,7 +12,7 @@
 
 #include "absl/strings/str_replace.h"
 #include "dem/particles/packing.h"
-#include "server/campaign/specimen_notes.h"
+#include "server/campaign/model/specimen_notes.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {

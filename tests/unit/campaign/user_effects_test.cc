@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/campaign/derive.h"
-#include "server/campaign/formula_units.h"
+#include "server/campaign/file/derive.h"
+#include "server/campaign/file/formula_units.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {

@@ -2,34 +2,68 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/option_list.h"
+#include "server/ctl/verb_list.h"
 
 namespace calib::ctl {
 namespace {
 
-Parsed Parse(std::vector<const char*> words) {
+Parsed Parse(std::vector<const char*> words, const std::vector<Verb>& verbs = AllVerbs()) {
   words.insert(words.begin(), "calibctl");
-  return ParseCommandLine(static_cast<int>(words.size()), words.data());
+  return ParseCommandLine(verbs, static_cast<int>(words.size()), words.data());
 }
 
+// A verb with an option of each form, which shows what the command line gave it.
+struct Probe {
+  std::string campaign;
+  std::vector<std::string> set;
+  std::string output;
+  std::optional<std::uint64_t> seed;
+};
+struct ProbeVerb {
+  Probe given;
+  Verb verb{.help = {.name = "probe", .description = "p", .example = "probe"},
+            .declare =
+                [this](OptionList& list) {
+                  list.Campaign(given.campaign);
+                  list.Texts("--set", given.set, "s");
+                  list.Text("-o,--output", given.output, "o");
+                  list.Seed(given.seed);
+                },
+            .run = [](const CommonOptions&) { return kDone; }};
+};
+
 TEST(CommandLine, CommonOptionsStandOnEitherSideOfTheVerb) {
-  for (const auto& words :
-       {std::vector<const char*>{"--state", "s", "--json", "posterior", "c1"},
-        std::vector<const char*>{"posterior", "c1", "--json", "--state", "s"}}) {
-    const Parsed parsed = Parse(words);
+  for (const auto& words : {std::vector<const char*>{"--state", "s", "--json", "probe", "c1"},
+                            std::vector<const char*>{"probe", "c1", "--json", "--state", "s"}}) {
+    ProbeVerb probe;
+    const Parsed parsed = Parse(words, {probe.verb});
     ASSERT_TRUE(parsed.command.has_value());
-    EXPECT_EQ(parsed.command->arguments.server.state, "s");
-    EXPECT_EQ(parsed.command->arguments.campaign, "c1");
-    EXPECT_TRUE(parsed.command->arguments.json);
+    EXPECT_EQ(parsed.command->common.server.state, "s");
+    EXPECT_EQ(probe.given.campaign, "c1");
+    EXPECT_TRUE(parsed.command->common.json);
   }
 }
 
 TEST(CommandLine, ASettingMayHoldBlanks) {
-  const Parsed parsed =
-      Parse({"simulate", "a.yaml", "--set", "e=2 GPa", "--set", "f=0.5", "-o", "x.csv"});
-  ASSERT_TRUE(parsed.command.has_value());
-  EXPECT_EQ(parsed.command->arguments.set, (std::vector<std::string>{"e=2 GPa", "f=0.5"}));
-  EXPECT_EQ(parsed.command->arguments.output, "x.csv");
+  const std::vector<const char*> settings = {"a",     "--set", "e=2 GPa", "--set",
+                                             "f=0.5", "-o",    "x.csv"};
+  std::vector<const char*> words = settings;
+  words.insert(words.begin(), "simulate");
+  EXPECT_TRUE(Parse(words).command.has_value());
+  words.front() = "probe";
+  ProbeVerb probe;
+  ASSERT_TRUE(Parse(words, {probe.verb}).command.has_value());
+  EXPECT_EQ(probe.given.set, (std::vector<std::string>{"e=2 GPa", "f=0.5"}));
+  EXPECT_EQ(probe.given.output, "x.csv");
 }
 
 TEST(CommandLine, AServerIsHostAndPort) {
@@ -67,10 +101,52 @@ TEST(CommandLine, NumbersAreNotWrappedRound) {
   for (const char* seed : {"-1", "99999999999999999999", "", "1e3", "0x1"}) {
     EXPECT_EQ(Parse({"run", "a.yaml", "--seed", seed}).exit_code, kBadInput) << seed;
   }
-  const Parsed parsed = Parse({"run", "a.yaml", "--seed", "18446744073709551615"});
-  ASSERT_TRUE(parsed.command.has_value());
-  EXPECT_EQ(parsed.command->arguments.seed, 18446744073709551615U);
+  EXPECT_TRUE(Parse({"run", "a.yaml", "--seed", "18446744073709551615"}).command.has_value());
+  ProbeVerb probe;
+  ASSERT_TRUE(Parse({"probe", "a", "--seed", "18446744073709551615"}, {probe.verb}).command);
+  EXPECT_EQ(probe.given.seed, 18446744073709551615U);
   EXPECT_EQ(Parse({"states", "c1", "-1"}).exit_code, kBadInput);
+}
+
+TEST(CommandLine, AVerbBeginsWithTheDefaultsOfItsOptions) {
+  struct Options {
+    int draws = 20;
+  };
+  static int seen = 0;
+  const auto make = [] {
+    return MakeVerb<Options>(
+        {.name = "draw", .description = "d", .example = "draw"},
+        [](OptionList& list, Options& options) {
+          list.BoundedNumber("--draws", options.draws, {2, 400}, "n");
+        },
+        [](const CommonOptions&, const Options& options) -> absl::StatusOr<int> {
+          seen = options.draws;
+          return kDone;
+        });
+  };
+  EXPECT_EQ(Parse({"draw", "--draws", "401"}, {make()}).exit_code, kBadInput);
+  const std::vector<std::pair<std::vector<const char*>, int>> cases = {
+      {{"draw"}, 20}, {{"draw", "--draws", "7"}, 7}};
+  for (const auto& [words, draws] : cases) {
+    const Parsed parsed = Parse(words, {make()});
+    ASSERT_TRUE(parsed.command.has_value());
+    EXPECT_EQ(parsed.command->verb.run(parsed.command->common).value(), kDone);
+    EXPECT_EQ(seen, draws);
+  }
+}
+
+TEST(CommandLine, EveryVerbIsThereOnceAndShowsHelp) {
+  std::vector<std::string> names;
+  for (const Verb& verb : AllVerbs()) {
+    names.push_back(verb.help.name);
+    ::testing::internal::CaptureStdout();
+    EXPECT_EQ(Parse({verb.help.name.c_str(), "--help"}).exit_code, kDone);
+    EXPECT_NE(::testing::internal::GetCapturedStdout().find("calibctl " + verb.help.example),
+              std::string::npos);
+  }
+  EXPECT_EQ(names.size(), 30);
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
 }
 
 TEST(CommandLine, VerbsThatSpeakOfErrorsSayWhatTheyAre) {

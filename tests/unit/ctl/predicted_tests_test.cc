@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/text/yaml_text.h"
 
 namespace calib::ctl {
 namespace {

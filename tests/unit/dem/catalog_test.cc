@@ -1,4 +1,4 @@
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "dem/lab_tests/element_test.h"
-#include "dem/lab_tests/gravity_test.h"
+#include "dem/lab_tests/shared/element_test.h"
+#include "dem/lab_tests/shared/gravity_test.h"
 
 namespace calib::dem {
 namespace {

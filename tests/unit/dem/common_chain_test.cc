@@ -1,12 +1,12 @@
 // The chains in one pass against the same chains kernel by kernel: every bit.
-#include "dem/contact/common_chain.h"
+#include "dem/dynamics/common_chain.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <random>
 
-#include "dem/contact/contact_model.h"
+#include "dem/dynamics/contact_model.h"
 #include "dem/dynamics/pair_blocks.h"
 #include "dem/geometry/vector3.h"
 #include "tests/support/dem/scenarios.h"

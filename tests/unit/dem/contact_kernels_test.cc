@@ -5,7 +5,8 @@
 #include <cmath>
 
 #include "dem/contact/contact_kinematics.h"
-#include "dem/contact/contact_model.h"
+#include "dem/dynamics/contact_model.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -252,7 +253,7 @@ TEST(ContactModel, OrderOfEffectsDoesNotMatter) {
       b.wjx[k] = 0.3;
       b.wjz[k] = 0.7;
     }
-    ContactModel(m).Evaluate(b);
+    ContactModelOf(m).Evaluate(b);
     mx[order] = b.mx[0];
   }
   EXPECT_EQ(mx[0], mx[1]);

@@ -9,8 +9,10 @@
 #include <limits>
 #include <thread>
 
-#include "dem/contact/contact_model.h"
+#include "dem/dynamics/contact_model.h"
 #include "dem/elementary/functions.h"
+#include "dem/formula/user_effect.h"
+#include "dem/registry/declared_effects.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "dem/particles/packing.h"
+#include "dem/simulate/packing_generator.h"
 
 namespace calib::dem {
 namespace {

@@ -5,6 +5,7 @@
 
 #include "dem/neighbor/packing_overlap.h"
 #include "dem/particles/packing.h"
+#include "dem/simulate/packing_generator.h"
 
 namespace calib::dem {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/chunks.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -221,7 +222,7 @@ TEST(PairBlocks, ChangesByHandBetweenMotionAndForcesCount) {
   two.radius = {1e-3, 1e-3};
   two.clump = {-1, -1};
   two.length[0] = two.length[1] = two.length[2] = 1e-2;
-  Assembly assembly(two, 2650, ContactModel(test::LinearModel()), Surroundings{}, 1);
+  Assembly assembly(two, 2650, ContactModelOf(test::LinearModel()), Surroundings{}, 1);
   ASSERT_TRUE(assembly.EvaluateForces().ok());
   EXPECT_EQ(assembly.contacts(), 0);
   assembly.Move({.dt = 1e-9});
@@ -351,7 +352,7 @@ class Crowd {
       grains.clump.push_back(-1);
     }
     for (double& length : grains.length) length = kSize;
-    return {grains, 2650e3, ContactModel(test::LinearModel()), Surroundings{}, 1};
+    return {grains, 2650e3, ContactModelOf(test::LinearModel()), Surroundings{}, 1};
   }
 
   Random random_;

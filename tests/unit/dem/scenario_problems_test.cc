@@ -1,9 +1,12 @@
+#include "dem/registry/scenario_problems.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "dem/simulation/scenario.h"
+#include "dem/model/scenario.h"
+#include "dem/simulate/simulate.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

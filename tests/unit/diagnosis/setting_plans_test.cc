@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/control_way.h"
 
 namespace calib::diagnosis {

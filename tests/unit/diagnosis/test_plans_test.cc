@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/campaign/yaml_text.h"
+#include "server/campaign/file/text/yaml_text.h"
 
 namespace calib::diagnosis {
 namespace {

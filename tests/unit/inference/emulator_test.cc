@@ -8,13 +8,13 @@
 #include <numbers>
 #include <vector>
 
-#include "inference/emulator/bounded_minimizer.h"
 #include "inference/emulator/emulated_likelihood.h"
 #include "inference/emulator/emulated_posterior.h"
-#include "inference/emulator/gaussian_process.h"
-#include "inference/emulator/matern_kernel.h"
 #include "inference/emulator/principal_components.h"
 #include "inference/emulator/search_widening.h"
+#include "inference/numerics/bounded_minimizer.h"
+#include "inference/numerics/gaussian_process.h"
+#include "inference/numerics/matern_kernel.h"
 #include "inference/sampling/halton.h"
 #include "inference/sampling/philox.h"
 

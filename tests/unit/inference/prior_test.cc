@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/standard_normal.h"
 
 namespace calib::inference {
 namespace {

@@ -5,9 +5,9 @@
 #include "inference/evidence/importance_evidence.h"
 #include "inference/evidence/model_probabilities.h"
 #include "inference/evidence/pareto_tail.h"
-#include "inference/filter/log_weights.h"
 #include "inference/filter/tempering.h"
-#include "inference/filter/weighted_moments.h"
+#include "inference/numerics/log_weights.h"
+#include "inference/numerics/weighted_moments.h"
 #include "inference/sampling/philox.h"
 
 namespace calib::inference {

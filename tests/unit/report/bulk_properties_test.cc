@@ -1,7 +1,7 @@
 // Bulk properties of a drained triaxial curve that is known: elastic to 2 % axial strain (secant
 // modulus 20 MPa, Poisson's ratio 0.3), peak stress ratio 4 at 5 %, critical state 3 from 12 % on.
 
-#include "server/report/bulk_properties.h"
+#include "server/report/views/bulk_properties.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "server/report/comparison.h"
+#include "server/report/views/comparison.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "server/report/weighted_statistics.h"
+#include "server/report/views/weighted_statistics.h"
 #include "tests/unit/report/example_view.h"
 
 namespace calib::report {

@@ -1,6 +1,6 @@
 // The smooth misfit of a campaign: found where it is, not where there is only noise, carried to
 // other tests, and said in a sentence.
-#include "server/report/discrepancies.h"
+#include "server/report/views/discrepancies.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "server/report/json_documents.h"
-#include "server/report/residual_words.h"
+#include "server/report/documents/json_documents.h"
+#include "server/report/views/residual_words.h"
 
 namespace calib::report {
 namespace {

@@ -2,7 +2,7 @@
 // A finished campaign made up from closed formulas, for tests of everything that reads a
 // CampaignView.
 
-#include "server/report/campaign_view.h"
+#include "server/report/views/campaign_view.h"
 
 namespace calib::report::testing {
 

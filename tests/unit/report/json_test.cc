@@ -4,8 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "server/report/csv_export.h"
-#include "server/report/json_documents.h"
+#include "server/report/documents/csv_export.h"
+#include "server/report/documents/json_documents.h"
 #include "tests/unit/report/example_view.h"
 
 namespace calib::report {

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <iostream>
 
-#include "server/report/report.h"
+#include "server/report/html/report.h"
 #include "tests/unit/report/example_view.h"
 
 int main(int argc, char** argv) {

@@ -1,4 +1,4 @@
-#include "server/report/model_comparison.h"
+#include "server/report/views/model_comparison.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "server/report/json_documents.h"
+#include "server/report/documents/json_documents.h"
 #include "tests/unit/report/example_view.h"
 
 namespace calib::report {

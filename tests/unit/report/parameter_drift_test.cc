@@ -1,11 +1,11 @@
-#include "server/report/parameter_drift.h"
+#include "server/report/views/parameter_drift.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "inference/sampling/philox.h"
-#include "server/report/run_table.h"
+#include "server/report/views/run_table.h"
 
 namespace calib::report {
 namespace {

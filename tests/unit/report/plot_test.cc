@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "server/report/people_units.h"
 #include "server/report/plot/axis.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::report {
 namespace {

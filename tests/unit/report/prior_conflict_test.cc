@@ -1,10 +1,10 @@
-#include "server/report/prior_conflict.h"
+#include "server/report/views/prior_conflict.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/report/comparison.h"
-#include "server/report/residual_words.h"
+#include "server/report/views/comparison.h"
+#include "server/report/views/residual_words.h"
 #include "tests/unit/report/example_view.h"
 
 namespace calib::report {

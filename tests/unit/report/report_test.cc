@@ -1,4 +1,4 @@
-#include "server/report/report.h"
+#include "server/report/html/report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <regex>
 
-#include "server/report/comparison.h"
-#include "server/report/html.h"
+#include "server/report/text/html.h"
+#include "server/report/views/comparison.h"
 #include "tests/unit/report/example_view.h"
 
 namespace calib::report {
@@ -128,7 +128,7 @@ TEST(Report, TellsTheStoryOfAnAddedEffect) {
       r.parent = "c0";
       r.effects = {effect};
     }
-    r.purpose = purpose;
+    r.purpose = campaign::ToDerivedFor(purpose);
     r.log_evidence = log_evidence;
     return r;
   };

@@ -1,11 +1,11 @@
-#include "server/report/residual_pattern.h"
+#include "server/report/views/residual_pattern.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "server/report/residual_words.h"
+#include "server/report/views/residual_words.h"
 
 namespace calib::report {
 namespace {
@@ -32,7 +32,7 @@ TEST(ResidualPattern, NoiseHasNone) {
     std::mt19937 random(seed);
     std::normal_distribution<double> noise(0, 0.01);
     for (double& r : curve.residual) r = noise(random);
-    named += PatternOf(curve).name != "none" ? 1 : 0;
+    named += PatternOf(curve).shape != ResidualShape::kNone ? 1 : 0;
   }
   EXPECT_LE(named, 8);  // 2 expected at a level of 1 %
 }
@@ -40,29 +40,29 @@ TEST(ResidualPattern, NoiseHasNone) {
 TEST(ResidualPattern, NamesEachShapeAndItsSize) {
   ResidualCurve offset = Curve();
   offset.residual.array() += 0.02;
-  EXPECT_EQ(PatternOf(offset).name, "offset");
+  EXPECT_EQ(PatternOf(offset).shape, ResidualShape::kOffset);
   EXPECT_NEAR(PatternOf(offset).size, 0.02, 0.005);
 
   ResidualCurve slope = Curve();
   slope.residual += -0.8 * (slope.control.array() - slope.control.mean()).matrix();
-  EXPECT_EQ(PatternOf(slope).name, "slope");
+  EXPECT_EQ(PatternOf(slope).shape, ResidualShape::kSlope);
   EXPECT_NEAR(PatternOf(slope).size, -0.8, 0.2);
 
   ResidualCurve amplitude = Curve();
   amplitude.residual += 0.06 * amplitude.model;
-  EXPECT_EQ(PatternOf(amplitude).name, "amplitude");
+  EXPECT_EQ(PatternOf(amplitude).shape, ResidualShape::kAmplitude);
   EXPECT_NEAR(PatternOf(amplitude).size, 0.06, 0.01);
 
   ResidualCurve lag = Curve();  // the model's strain axis is behind by 0.3 %
   lag.residual += (-30 * (lag.control.array())).exp().matrix() * (-30 * 0.003);
-  EXPECT_EQ(PatternOf(lag).name, "lag");
+  EXPECT_EQ(PatternOf(lag).shape, ResidualShape::kLag);
   EXPECT_NEAR(PatternOf(lag).size, 0.003, 0.001);
 
   ResidualCurve irregular = Curve();
   for (Eigen::Index i = 0; i < irregular.residual.size(); ++i) {
     irregular.residual[i] += i % 2 == 0 ? 0.05 : -0.05;
   }
-  EXPECT_EQ(PatternOf(irregular).name, "irregular");
+  EXPECT_EQ(PatternOf(irregular).shape, ResidualShape::kIrregular);
 }
 
 TEST(ResidualPattern, WhiteningGivesChiSquaredOfTheChain) {
@@ -91,7 +91,7 @@ TEST(ResidualWords, SayStageSignAndShape) {
                       .readings = 20,
                       .rms_error = 4,
                       .chi2_share = 0.8};
-  stage.pattern = {.name = "offset", .size = -0.08, .z = -9, .explained = 0.9};
+  stage.pattern = {.shape = ResidualShape::kOffset, .size = -0.08, .z = -9, .explained = 0.9};
   comparison.by_segment = {stage};
   const auto said = WhereItFails(comparison);
   ASSERT_EQ(said.size(), 1U);

@@ -1,4 +1,4 @@
-#include "server/report/residual_words.h"
+#include "server/report/views/residual_words.h"
 
 #include <gmock/gmock.h>
 
@@ -10,17 +10,18 @@ using ::testing::HasSubstr;
 
 std::vector<std::string> Said(double amplitude) {
   Comparison comparison;
-  comparison.by_segment.push_back({.experiment = "tx",
-                                   .observable = "q_over_p",
-                                   .segment = "unload_1",
-                                   .from = 0.02,
-                                   .to = 0.01,
-                                   .bias = 0.2,
-                                   .z = 8.0,
-                                   .readings = 5,
-                                   .rms_error = 6,
-                                   .chi2_share = 0.5,
-                                   .pattern = {.name = "amplitude", .size = amplitude}});
+  comparison.by_segment.push_back(
+      {.experiment = "tx",
+       .observable = "q_over_p",
+       .segment = "unload_1",
+       .from = 0.02,
+       .to = 0.01,
+       .bias = 0.2,
+       .z = 8.0,
+       .readings = 5,
+       .rms_error = 6,
+       .chi2_share = 0.5,
+       .pattern = {.shape = ResidualShape::kAmplitude, .size = amplitude}});
   return WhereItFails(comparison);
 }
 

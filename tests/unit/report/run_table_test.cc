@@ -1,4 +1,4 @@
-#include "server/report/run_table.h"
+#include "server/report/views/run_table.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/report/setting_trend.h"
+#include "server/report/views/setting_trend.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <optional>
 
-#include "server/report/comparison.h"
-#include "server/report/residual_words.h"
+#include "server/report/views/comparison.h"
+#include "server/report/views/residual_words.h"
 
 namespace calib::report {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/report/text_table.h"
+#include "server/report/text/text_table.h"
 
 #include <gtest/gtest.h>
 

@@ -16,14 +16,14 @@ testing::SmallCampaign Small() {
 TEST(CampaignLife, WorkIsHandedOutInOrderAndAcknowledgedAfterItsCommit) {
   SimulatedService service("order");
   EXPECT_EQ(service.Submit(Small()), "c1");
-  EXPECT_EQ(service.Campaign().progress.state, "queued");
+  EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kQueued);
   const std::int64_t worker = service.Connect("w", 2);
   EXPECT_TRUE(service.Next(worker, Kind::kWelcome).has_welcome());
   const v1::Lease first = service.Next(worker, Kind::kLease).lease();
   const v1::Lease second = service.Next(worker, Kind::kLease).lease();
   EXPECT_LT(first.attempt(), second.attempt());
   EXPECT_FALSE(service.Next(worker, Kind::kLease).has_lease()) << "both slots are busy";
-  EXPECT_EQ(service.Campaign().progress.state, "running");
+  EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kRunning);
   service.SendStates(worker, first, 0, 4);
   EXPECT_EQ(service.Next(worker, Kind::kAck).ack().up_to(), 4);
   EXPECT_EQ(service.Read().States(1)->size(), 4U);
@@ -83,7 +83,7 @@ TEST(CampaignLife, CancelStopsWhatRuns) {
   service.ports().Run();
   EXPECT_TRUE(cancelled.ok()) << cancelled;
   EXPECT_EQ(service.Next(worker, Kind::kStop).stop().attempt(), lease.attempt());
-  EXPECT_EQ(service.Campaign().progress.state, "cancelled");
+  EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kCancelled);
   service.SendStates(worker, lease, 0, 1);
   EXPECT_TRUE(service.Next(worker, Kind::kAck).ack().refused());
 }
@@ -103,7 +103,7 @@ TEST(CampaignLife, WhatOtherMechanicsHaveBegunWaitsForAWord) {
   service.Write([](store::Transaction& t) { t.BeginAnew({1, 0, 0}, kOld); });
   service.Restart();
   EXPECT_EQ(digest(0), first);
-  EXPECT_EQ(service.Campaign().progress.state, "queued");
+  EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kQueued);
   // One has ended, another one has come half its way.
   const std::int64_t worker = service.Connect("w", 1);
   const v1::Lease done = service.Next(worker, Kind::kLease).lease();
@@ -122,7 +122,7 @@ TEST(CampaignLife, WhatOtherMechanicsHaveBegunWaitsForAWord) {
     }
   });
   service.Restart();
-  EXPECT_EQ(service.Campaign().progress.state, "paused");
+  EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kPaused);
   EXPECT_NE(service.Campaign().progress.reason.find("other mechanics"), std::string::npos);
   EXPECT_EQ(digest(1), kOld);
   service.scheduler().Resume(
@@ -167,7 +167,8 @@ TEST(CampaignLife, AFailureThatPausesIsWrittenWithItsPauseOrNotAtAll) {
                      : 0;
       }
       EXPECT_EQ(ended, writes == 0 ? 0 : 1);
-      EXPECT_EQ(service.Campaign().progress.state, ended > 0 ? "paused" : "running");
+      EXPECT_EQ(service.Campaign().progress.state,
+                ended > 0 ? store::CampaignState::kPaused : store::CampaignState::kRunning);
     }
   }
 }
@@ -193,7 +194,8 @@ TEST(CampaignLife, WhatSeveralCampaignsWaitForIsRunOnce) {
   service.RunToEnd(1, true);
   EXPECT_EQ(run(service, 1) + run(service, 2) + run(service, 3), run(alone, 1));
   for (const std::int64_t campaign : {1, 2, 3}) {
-    EXPECT_EQ(Value(service.Read().Campaign(campaign)).progress.state, "finished");
+    EXPECT_EQ(Value(service.Read().Campaign(campaign)).progress.state,
+              store::CampaignState::kFinished);
     EXPECT_TRUE(service.Runs(campaign) == alone.Runs(1)) << campaign;
   }
 }
@@ -210,7 +212,9 @@ TEST(CampaignLife, SeveralCampaignsHaveTheSameBitsWhateverGoesWrong) {
       for (int i = 0; i < 2; ++i) service.Submit(campaign);
       service.RunToEnd(seed, false);
       for (const std::int64_t id : {1, 2}) {
-        EXPECT_EQ(Value(service.Read().Campaign(id)).progress.state, "finished") << method << seed;
+        EXPECT_EQ(Value(service.Read().Campaign(id)).progress.state,
+                  store::CampaignState::kFinished)
+            << method << seed;
         EXPECT_TRUE(service.Runs(id) == alone.Runs(1)) << method << ", " << id << ", seed " << seed;
       }
     }

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/campaign/derive.h"
+#include "server/campaign/file/derive.h"
 #include "server/scheduler/posterior_record.h"
 #include "tests/unit/scheduler/simulated_service.h"
 

@@ -1,4 +1,4 @@
-#include "server/scheduler/lease_table.h"
+#include "server/scheduler/leases/lease_table.h"
 
 #include <gtest/gtest.h>
 

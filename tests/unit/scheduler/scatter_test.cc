@@ -49,7 +49,8 @@ Ended RunCampaign(const std::string& name, const testing::SmallCampaign& campaig
   service.packing_scatter = scatter;
   service.Submit(campaign);
   service.RunToEnd(seed, calm);
-  EXPECT_EQ(service.Campaign().progress.state, "finished") << service.Campaign().progress.reason;
+  EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kFinished)
+      << service.Campaign().progress.reason;
   Ended run{.posterior = {},
             .iterations = Value(service.Read().Iterations(1)),
             .samples = Value(service.Read().Samples(1)),

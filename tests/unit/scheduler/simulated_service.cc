@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <utility>
 
-#include "dem/catalog/catalog.h"
-#include "server/campaign/sha256.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/model/sha256.h"
 #include "server/scheduler/posterior_record.h"
 
 namespace calib::scheduler {
@@ -275,7 +275,8 @@ void SimulatedService::RunToEnd(unsigned seed, bool calm) {
       Step(workers[i], random);
     }
   }
-  EXPECT_EQ(Campaign().progress.state, "finished") << Campaign().progress.reason;
+  EXPECT_EQ(Campaign().progress.state, store::CampaignState::kFinished)
+      << Campaign().progress.reason;
 }
 
 SimulatedService::Shift SimulatedService::RunTimed(int workers,
@@ -342,7 +343,8 @@ SimulatedService::Shift SimulatedService::RunTimed(int workers,
       SendEnd(next->session, next->lease.attempt(), v1::Finished::OUTCOME_COMPLETED);
     }
   }
-  EXPECT_EQ(Campaign().progress.state, "finished") << Campaign().progress.reason;
+  EXPECT_EQ(Campaign().progress.state, store::CampaignState::kFinished)
+      << Campaign().progress.reason;
   return shift;
 }
 

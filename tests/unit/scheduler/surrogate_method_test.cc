@@ -255,7 +255,9 @@ TEST(SurrogateCampaign, PausesWhenItsLastPointsDiverge) {
   SimulatedService service("surrogate_pause");
   service.Submit(Campaign(kPoints, 10, 0.02));
   const std::int64_t worker = service.Connect("w", 1);
-  for (int k = 0; k < 3 * kPoints && service.Campaign().progress.state == "running"; ++k) {
+  for (int k = 0;
+       k < 3 * kPoints && service.Campaign().progress.state == store::CampaignState::kRunning;
+       ++k) {
     const v1::ServerMessage message = service.Next(worker, v1::ServerMessage::kLease);
     if (!message.has_lease()) break;
     if (k < kPoints) service.SendStates(worker, message.lease(), 0, 12);
@@ -264,7 +266,7 @@ TEST(SurrogateCampaign, PausesWhenItsLastPointsDiverge) {
                     k < kPoints ? "" : "a grain escaped");
   }
   const store::CampaignProgress progress = service.Campaign().progress;
-  EXPECT_EQ(progress.state, "paused");
+  EXPECT_EQ(progress.state, store::CampaignState::kPaused);
   EXPECT_THAT(progress.reason, HasSubstr("6 of 10 samples diverged"));
   EXPECT_THAT(progress.reason, HasSubstr(", last: "));
 }

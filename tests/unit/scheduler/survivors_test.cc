@@ -49,7 +49,8 @@ TEST(FewSurvivors, TheCampaignSaysHowManyAreLeftAndWhatWouldHelp) {
       SimulatedService service("survivors");
       RunIteration(service, survivors, noise);
       const store::CampaignProgress progress = service.Campaign().progress;
-      EXPECT_EQ(progress.state, "failed") << survivors << " of noise " << noise;
+      EXPECT_EQ(progress.state, store::CampaignState::kFailed)
+          << survivors << " of noise " << noise;
       EXPECT_THAT(
           progress.reason,
           AllOf(HasSubstr("of 8 samples " + std::to_string(survivors)),
@@ -64,7 +65,7 @@ TEST(FewSurvivors, TheCampaignSaysHowManyAreLeftAndWhatWouldHelp) {
 TEST(FewSurvivors, AfterTheLastIterationThereIsNoPosteriorAndWhatWouldHelp) {
   SimulatedService service("last_survivor");
   RunIteration(service, 1, "given", "sqmc");
-  EXPECT_EQ(service.Campaign().progress.state, "finished");
+  EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kFinished);
   const auto posterior = PosteriorFromJson(*Value(service.Read().Iterations(1)).front().posterior);
   ASSERT_TRUE(posterior.ok());
   EXPECT_EQ(posterior->posterior_from(), "none");
@@ -83,7 +84,7 @@ TEST(FewSurvivors, WhereAllDivergeTheCampaignSaysSo) {
   SimulatedService service("no_survivors");
   RunIteration(service, 0);
   const store::CampaignProgress progress = service.Campaign().progress;
-  EXPECT_EQ(progress.state, "failed");
+  EXPECT_EQ(progress.state, store::CampaignState::kFailed);
   EXPECT_THAT(progress.reason,
               AllOf(HasSubstr("no sample has a weight: of 8 samples 8 did not come to their ends"),
                     HasSubstr("narrow the priors to where the model runs")));
@@ -112,7 +113,7 @@ inference: {method: sqmc}
                              "sample,step,mean_stress\n0,0,1\n0,1,2\n1,0,1\n1,1,3\n2,0,1\n2,1,"
                              "4\n"}}});
   const store::CampaignProgress progress = service.Campaign().progress;
-  EXPECT_EQ(progress.state, "failed");
+  EXPECT_EQ(progress.state, store::CampaignState::kFailed);
   EXPECT_THAT(progress.reason,
               AllOf(HasSubstr("of 3 samples 0 did not come to their ends and 3 lie outside"),
                     HasSubstr("widen the priors"), HasSubstr("units")));

@@ -61,7 +61,8 @@ TEST(TiedPriors, NoRunOfAnyMethodViolatesAConstraint) {
     SimulatedService service("tied");
     service.Submit(Campaign(c.method, c.inference, std::string(kConstraint) + kCorrelation));
     service.RunToEnd(1, true);
-    EXPECT_EQ(service.Campaign().progress.state, "finished") << service.Campaign().progress.reason;
+    EXPECT_EQ(service.Campaign().progress.state, store::CampaignState::kFinished)
+        << service.Campaign().progress.reason;
     std::set<int> run;
     for (const auto& evaluation : Value(service.Read().Evaluations(1))) {
       if (evaluation.status == store::EvaluationStatus::kFinished)

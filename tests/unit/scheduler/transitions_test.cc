@@ -46,12 +46,5 @@ TEST(Transitions, PauseAndResumeUndoEachOther) {
   EXPECT_NE(Next(S::kPaused, E::kPause).status().message().find("paused"), std::string::npos);
 }
 
-TEST(Transitions, NamesAreTheirOwnInverse) {
-  for (const S state : kStates) {
-    EXPECT_EQ(ToCampaignState(ToString(state)), state);
-  }
-  EXPECT_FALSE(ToCampaignState("sleeping").has_value());
-}
-
 }  // namespace
 }  // namespace calib::scheduler

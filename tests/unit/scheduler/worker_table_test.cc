@@ -1,4 +1,4 @@
-#include "server/scheduler/worker_table.h"
+#include "server/scheduler/leases/worker_table.h"
 
 #include <gtest/gtest.h>
 

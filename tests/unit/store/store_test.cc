@@ -43,7 +43,7 @@ class StoreTest : public testing::Test {
   /// One campaign, one iteration, one sample, one evaluation.
   static void PutEvaluation(Transaction& t) {
     t.InsertCampaign(
-        {.id = 1, .name = "sand", .yaml = "name: sand", .method = "sqmc", .samples = 1}, {});
+        {.id = 1, .name = "sand", .yaml = "name: sand", .method = Method::kSqmc, .samples = 1}, {});
     t.InsertIteration(1, 0, "{}");
     t.InsertSample(1, {.sample = 0, .iteration = 0, .parameters = {1e9, 0.1}});
     t.InsertEvaluation({.key = kKey, .digest = "d"});
@@ -60,14 +60,16 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
                              .yaml = "name: sand\n",
                              .file_name = "sand.yaml",
                              .seed = std::numeric_limits<std::uint64_t>::max(),
-                             .method = "sqmc",
+                             .method = Method::kSqmc,
                              .samples = 10,
                              .max_iterations = 3,
                              .created_unix_ms = 1234};
   Write([&](Transaction& t) {
     t.PutBlob("abc", std::string("\0grains\n", 8));
     t.InsertCampaign(campaign, {{"packing.txt", "abc"}});
-    t.SetProgress(7, {.state = "paused", .reason = "asked", .iteration = 2, .pause_waived = true});
+    t.SetProgress(
+        7,
+        {.state = CampaignState::kPaused, .reason = "asked", .iteration = 2, .pause_waived = true});
     t.Log(7, 99, "submitted");
   });
   Reader reader = Read();
@@ -75,7 +77,7 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
   ASSERT_TRUE(record.ok());
   EXPECT_EQ(record->submitted.seed, campaign.seed);
   EXPECT_EQ(record->submitted.yaml, campaign.yaml);
-  EXPECT_EQ(record->progress.state, "paused");
+  EXPECT_EQ(record->progress.state, CampaignState::kPaused);
   EXPECT_TRUE(record->progress.pause_waived);
   EXPECT_EQ(reader.Files(7)->at("packing.txt"), "abc");
   EXPECT_EQ(*reader.Blob("abc"), std::string("\0grains\n", 8));
@@ -230,7 +232,7 @@ TEST_F(StoreTest, AReaderSeesOneMomentOnly) {
   Reader reader = Read();
   EXPECT_EQ(reader.Campaigns()->size(), 1U);
   Write([](Transaction& t) {
-    t.InsertCampaign({.id = 2, .name = "clay", .method = "sqmc", .samples = 1}, {});
+    t.InsertCampaign({.id = 2, .name = "clay", .method = Method::kSqmc, .samples = 1}, {});
   });
   EXPECT_EQ(reader.Campaigns()->size(), 1U);
   EXPECT_EQ(Read().Campaigns()->size(), 2U);

@@ -5,9 +5,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/campaign/campaign_file.h"
-#include "server/campaign/sha256.h"
-#include "server/scheduler/attempt_spec.h"
+#include "dem/model/state.h"
+#include "server/campaign/file/campaign_file.h"
+#include "server/campaign/model/sha256.h"
+#include "server/messages/attempt_spec.h"
 #include "tests/support/small_campaign.h"
 #include "worker/evaluate.h"
 
@@ -32,7 +33,7 @@ class RestingRun : public ::testing::Test {
           return campaign_.files.at(path);
         });
     EXPECT_TRUE(outcome.problems.empty());
-    spec_ = scheduler::SpecOf(outcome.campaign, 0, {2e8, 0.5}, 0);
+    spec_ = messages::SpecOf(outcome.campaign, 0, {2e8, 0.5}, 0);
     std::filesystem::remove_all(folder_);
   }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "server/scheduler/attempt_spec.h"
+#include "server/messages/attempt_spec.h"
 
 namespace calib::worker {
 namespace {
@@ -37,7 +37,7 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
                                   .depth_ratio = 1.1,
                                   .grading = {{1e-3, 0}, {2e-3, 1}}};
 
-  const v1::AttemptSpec spec = scheduler::ToSpec(scenario, recipe, "oedo");
+  const v1::AttemptSpec spec = messages::ToSpec(scenario, recipe, "oedo");
   const dem::Scenario back = ScenarioFromSpec(spec);
   EXPECT_EQ(back.model.contact, scenario.model.contact);
   EXPECT_EQ(back.model.effects, scenario.model.effects);
@@ -62,8 +62,8 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
   EXPECT_EQ(RecipeFromMessage(spec.recipe()).depth_ratio, 1.1);
   EXPECT_EQ(RecipeFromMessage(spec.recipe()).grading[1].radius, 2e-3);
   // Going round once more changes nothing.
-  EXPECT_EQ(scheduler::SpecDigest(scheduler::ToSpec(back, RecipeFromMessage(spec.recipe()), "x")),
-            scheduler::SpecDigest(spec));
+  EXPECT_EQ(messages::SpecDigest(messages::ToSpec(back, RecipeFromMessage(spec.recipe()), "x")),
+            messages::SpecDigest(spec));
 }
 
 TEST(ScenarioFromSpec, UserEffectsTravelWhereTheyAreUsed) {
@@ -84,12 +84,12 @@ TEST(ScenarioFromSpec, UserEffectsTravelWhereTheyAreUsed) {
   unused.info.name = "spare";
   dem::Scenario scenario;
   scenario.model.contact = "linear";
-  const v1::AttemptSpec without = scheduler::ToSpec(scenario, campaign::NoPacking{}, "x");
+  const v1::AttemptSpec without = messages::ToSpec(scenario, campaign::NoPacking{}, "x");
   scenario.model.user_effects = {unused, used};
-  EXPECT_EQ(scheduler::SpecDigest(scheduler::ToSpec(scenario, campaign::NoPacking{}, "x")),
-            scheduler::SpecDigest(without));
+  EXPECT_EQ(messages::SpecDigest(messages::ToSpec(scenario, campaign::NoPacking{}, "x")),
+            messages::SpecDigest(without));
   scenario.model.effects = {"mine"};
-  const v1::AttemptSpec spec = scheduler::ToSpec(scenario, campaign::NoPacking{}, "x");
+  const v1::AttemptSpec spec = messages::ToSpec(scenario, campaign::NoPacking{}, "x");
   const dem::Scenario back = ScenarioFromSpec(spec);
   ASSERT_EQ(back.model.user_effects.size(), 1U);
   const dem::UserEffect& effect = back.model.user_effects[0];
@@ -104,8 +104,8 @@ TEST(ScenarioFromSpec, UserEffectsTravelWhereTheyAreUsed) {
   EXPECT_FALSE(effect.info.parameters[0].default_value.has_value());
   EXPECT_EQ(effect.info.parameters[1].default_value, 0.3);
   scenario.model.user_effects[1].formula = "1 + g";
-  EXPECT_NE(scheduler::SpecDigest(scheduler::ToSpec(scenario, campaign::NoPacking{}, "x")),
-            scheduler::SpecDigest(spec));
+  EXPECT_NE(messages::SpecDigest(messages::ToSpec(scenario, campaign::NoPacking{}, "x")),
+            messages::SpecDigest(spec));
 }
 
 TEST(ScenarioFromSpec, WhatIsNotSetStaysUnset) {

@@ -5,6 +5,8 @@
 #include <atomic>
 #include <thread>
 
+#include "dem/model/state.h"
+#include "dem/simulate/packing_generator.h"
 #include "tests/support/stl_text.h"
 #include "worker/evaluate.h"
 

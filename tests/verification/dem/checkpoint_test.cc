@@ -4,7 +4,9 @@
 
 #include "dem/dynamics/archive.h"
 #include "dem/geometry/triangle_mesh.h"
-#include "dem/simulation/run_checkpoint.h"
+#include "dem/lab_tests/shared/run_checkpoint.h"
+#include "dem/simulate/packing_generator.h"
+#include "dem/simulate/simulate.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"
 

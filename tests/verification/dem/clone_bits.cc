@@ -10,8 +10,10 @@
 #include <map>
 #include <string>
 
-#include "dem/catalog/catalog.h"
 #include "dem/particles/grading.h"
+#include "dem/registry/catalog.h"
+#include "dem/simulate/packing_generator.h"
+#include "dem/simulate/simulate.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "dem/dynamics/quasi_static.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -167,7 +168,7 @@ TEST(EffectiveModuli, OfACubicPacking) {
   Model model = test::LinearModel();
   model.parameters["friction_coefficient"] = 10;
 
-  Assembly compressed(Lattice(kOverlap), 2650, ContactModel(model), 1);
+  Assembly compressed(Lattice(kOverlap), 2650, ContactModelOf(model), 1);
   QuasiStatic stages(compressed, options, {});
   CellTarget target;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -181,7 +182,7 @@ TEST(EffectiveModuli, OfACubicPacking) {
   EXPECT_NEAR(c11, kn / d, 1e-4 * kn / d);
   EXPECT_NEAR(compressed.stress()[0] - before[0], 0, 1e-4 * kn / d * kStrain);
 
-  Assembly sheared(Lattice(kOverlap), 2650, ContactModel(model), 1);
+  Assembly sheared(Lattice(kOverlap), 2650, ContactModelOf(model), 1);
   options.unbalanced = 1e-3;
   QuasiStatic shearing(sheared, options, {});
   for (std::size_t a = 0; a < 3; ++a) {
@@ -222,7 +223,7 @@ TEST(Balance, ElasticGrainsKeepEnergyAndMomentum) {
   model.parameters["friction_coefficient"] = 0;
   const double modulus = 2 * 8e8 / (3 * (1 - 0.04));
   for (int half = 0; half < 2; ++half) {
-    Assembly assembly(test::SmallPacking(200), 2650, ContactModel(model), 1);
+    Assembly assembly(test::SmallPacking(200), 2650, ContactModelOf(model), 1);
     ParticleArrays& p = assembly.mutable_particles();
     for (std::size_t g = 0; g < p.x.size(); ++g) {
       const double phase = 2.399963 * p.id[g];

@@ -5,11 +5,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "dem/catalog/catalog.h"
 #include "dem/dynamics/assembly.h"
+#include "dem/lab_tests/shared/shape_change.h"
 #include "dem/particles/disk_pair.h"
 #include "dem/particles/elongation.h"
-#include "dem/simulation/shape_change.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -81,7 +82,7 @@ Assembly Heavy(const Packing& packing, double friction, Surroundings surrounding
   Model model = test::HertzModel();
   model.density = kDensity;
   model.parameters["friction_coefficient"] = friction;
-  return {packing, kDensity, ContactModel(model), std::move(surroundings), 1};
+  return {packing, kDensity, ContactModelOf(model), std::move(surroundings), 1};
 }
 
 // An L of three spheres weighs what it weighs, once, at its centre of mass: it falls with g and does
@@ -190,7 +191,7 @@ TEST(Clump, InAPlaneAPairBouncesAsItsMassAndMomentSay) {
                                     {0, 0});
     Model model = test::HertzModel();
     model.parameters["friction_coefficient"] = 0;
-    Assembly assembly(packing, kDensity, ContactModel(model, thickness),
+    Assembly assembly(packing, kDensity, ContactModelOf(model, thickness),
                       {.walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1})},
                        .planar = true,
                        .thickness = thickness},
@@ -278,7 +279,7 @@ TEST(Clump, CollisionKeepsMomentumAngularMomentumAndEnergy) {
                                   {3, 3, 3, 1, 1});
   Model model = test::HertzModel();
   model.parameters["friction_coefficient"] = 0;
-  Assembly assembly(packing, kDensity, ContactModel(model), 1);
+  Assembly assembly(packing, kDensity, ContactModelOf(model), 1);
   ASSERT_EQ(assembly.clumps().all().size(), 2U);
   ASSERT_EQ(assembly.bodies(), 2);
   for (Clump& c : assembly.mutable_clumps().mutable_all()) {
@@ -357,8 +358,8 @@ TEST(NonsphericalShape, KeepsVolumesAndLetsTheGrainsGiveWay) {
   const auto packing = Elongate(spheres, 1.3, 1, {});
   ASSERT_TRUE(packing.ok()) << packing.status();
   Model model = test::LinearModel();
-  Assembly before(spheres, 2650, ContactModel(model), 1);
-  Assembly after(*packing, 2650, ContactModel(model), 1);
+  Assembly before(spheres, 2650, ContactModelOf(model), 1);
+  Assembly after(*packing, 2650, ContactModelOf(model), 1);
   EXPECT_EQ(after.bodies(), 200);
   EXPECT_NEAR(after.solid_volume(), before.solid_volume(), 1e-4 * before.solid_volume());
   EXPECT_NEAR(after.mean_diameter(), before.mean_diameter(), 1e-4 * before.mean_diameter());
@@ -445,7 +446,7 @@ TEST(MakeClumps, KeepsMassInertiaAndPorosity) {
   EXPECT_NEAR(made->porosity, PorosityOf(spheres), 1e-9);
   EXPECT_LT(made->largest_overlap, 2e-2);
   std::printf("largest overlap %.2g of a radius\n", made->largest_overlap);
-  const Assembly assembly(made->packing, kDensity, ContactModel(test::LinearModel()), 1);
+  const Assembly assembly(made->packing, kDensity, ContactModelOf(test::LinearModel()), 1);
   ASSERT_EQ(assembly.bodies(), 200);
   double mass = 0;
   std::array<double, 3> centre{};

@@ -6,7 +6,8 @@
 #include <limits>
 #include <numbers>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/scenario_problems.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"
 

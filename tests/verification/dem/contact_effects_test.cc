@@ -5,9 +5,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "dem/catalog/catalog.h"
 #include "dem/dynamics/assembly.h"
 #include "dem/elementary/power.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -119,7 +120,7 @@ double Restitution(const Model& model, double speed, double dt) {
   constexpr double kRadius = 1e-2;
   const double n[3] = {1, 0, 0};
   Assembly assembly(test::TwoSpheres(kRadius, 2.00001 * kRadius, n), model.density,
-                    ContactModel(model), 1);
+                    ContactModelOf(model), 1);
   ParticleArrays& p = assembly.mutable_particles();
   for (std::size_t g = 0; g < 2; ++g) {
     p.vx[g] = p.id[g] == 0 ? speed : -speed;
@@ -246,7 +247,7 @@ TEST(AdhesionJkr, ForceAndOverlapFollowTheContactRadius) {
 /// are drawn apart in steps; `forming` is set to the overlap at which they began to.
 double BreakingGap(const Model& model, double r, double step, double& forming) {
   const double n[3] = {1, 0, 0};
-  Assembly assembly(test::TwoSpheres(r, 2 * r + 5 * step, n), 2650, ContactModel(model), 1);
+  Assembly assembly(test::TwoSpheres(r, 2 * r + 5 * step, n), 2650, ContactModelOf(model), 1);
   ParticleArrays& p = assembly.mutable_particles();
   const auto right = static_cast<std::size_t>(p.x[0] > p.x[1] ? 0 : 1);
   const auto gap = [&] { return std::abs(p.x[1] - p.x[0]) - 2 * r; };

@@ -7,7 +7,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -15,8 +16,8 @@ namespace {
 
 TEST(ParticleCrushing, StrengthsAreWeibullWithSizeEffect) {
   const double n[3] = {1, 0, 0};
-  const Assembly assembly(test::TwoSpheres(1e-3, 2e-3, n), 2650, ContactModel(test::LinearModel()),
-                          1);
+  const Assembly assembly(test::TwoSpheres(1e-3, 2e-3, n), 2650,
+                          ContactModelOf(test::LinearModel()), 1);
   const CrushingLaw law{
       .weakness = 1e-7, .weibull_modulus = 3, .reference_diameter = 2e-3, .size_loss = 0.2};
   const Crushing crushing(law, 5, assembly);
@@ -38,7 +39,7 @@ TEST(ParticleCrushing, CrushesAtItsStrengthAndKeepsTheMass) {
   const double r = 1e-3;
   const double overlap = 1e-5;
   Assembly assembly(test::TwoSpheres(r, 2 * r - overlap, n), 2650,
-                    ContactModel(test::LinearModel()), 1);
+                    ContactModelOf(test::LinearModel()), 1);
   ASSERT_TRUE(assembly.EvaluateForces().ok());
   const double force = 1.2e8 * r * overlap;  // kn = 2 E r/2
   const double solid = assembly.solid_volume();

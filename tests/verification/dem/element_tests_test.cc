@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
+#include "dem/simulate/simulate.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

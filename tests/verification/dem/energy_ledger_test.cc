@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "dem/dynamics/assembly.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -37,7 +38,7 @@ struct Ledger {
 class Book {
  public:
   Book(const Model& model, double damping)
-      : assembly_(test::SmallPacking(60), kDensity, ContactModel(model), 1), damping_(damping) {
+      : assembly_(test::SmallPacking(60), kDensity, ContactModelOf(model), 1), damping_(damping) {
     EXPECT_TRUE(assembly_.EvaluateForces().ok());
     Look(0);
   }

@@ -6,8 +6,10 @@
 #include <numbers>
 #include <set>
 
-#include "dem/catalog/catalog.h"
 #include "dem/geometry/triangle_mesh.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/scenario_problems.h"
+#include "dem/simulate/packing_generator.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "dem/dynamics/assembly.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -36,8 +37,8 @@ struct Impact {
 
 /// Approaching along n with an optional spin of the first sphere about the cell's z axis.
 Impact Collide(const double n[3], double spin) {
-  Assembly assembly(test::TwoSpheres(kRadius, 2.0001 * kRadius, n), kDensity, ContactModel(Glass()),
-                    1);
+  Assembly assembly(test::TwoSpheres(kRadius, 2.0001 * kRadius, n), kDensity,
+                    ContactModelOf(Glass()), 1);
   ParticleArrays& p = assembly.mutable_particles();
   for (std::size_t g = 0; g < 2; ++g) {
     const double sign = p.id[g] == 0 ? 1 : -1;

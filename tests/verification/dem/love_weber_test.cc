@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dem/dynamics/assembly.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -33,7 +34,7 @@ TEST(LoveWeber, CubicLatticeCarriesForceOverCellArea) {
   const double r = 1e-3;
   const double spacing[3] = {1.99 * r, 1.98 * r,
                              2.01 * r};  // touching along x and y, apart along z
-  Assembly assembly(Lattice(5, r, spacing), 2650, ContactModel(test::LinearModel()), 1);
+  Assembly assembly(Lattice(5, r, spacing), 2650, ContactModelOf(test::LinearModel()), 1);
   ASSERT_TRUE(assembly.EvaluateForces().ok());
   const double kn = 2 * 1.2e8 * r / 2;
   const double expected_x = kn * 0.01 * r / (spacing[1] * spacing[2]);
@@ -49,7 +50,7 @@ TEST(LoveWeber, AffineStiffnessOfTheLatticePredictsItsStress) {
   // A cubic lattice deforms affinely: compressing z by 1e-5 raises the stress by modulus * 1e-5.
   const double r = 1e-3;
   const double spacing[3] = {1.99 * r, 1.99 * r, 1.99 * r};
-  Assembly assembly(Lattice(5, r, spacing), 2650, ContactModel(test::LinearModel()), 1);
+  Assembly assembly(Lattice(5, r, spacing), 2650, ContactModelOf(test::LinearModel()), 1);
   ASSERT_TRUE(assembly.EvaluateForces().ok());
   StiffnessEstimate estimate;
   ASSERT_TRUE(assembly.EstimateStiffness(estimate).ok());
@@ -66,7 +67,7 @@ TEST(TimeStep, CriticalStepOfALatticeIsThatOfItsSprings) {
   const double spacing[3] = {1.99 * r, 1.99 * r, 1.99 * r};
   Model model = test::LinearModel();
   model.parameters["poisson_ratio"] = 0;  // central forces only
-  Assembly assembly(Lattice(5, r, spacing), 2650, ContactModel(model), 1);
+  Assembly assembly(Lattice(5, r, spacing), 2650, ContactModelOf(model), 1);
   ASSERT_TRUE(assembly.EvaluateForces().ok());
   StiffnessEstimate estimate;
   ASSERT_TRUE(assembly.EstimateStiffness(estimate).ok());

@@ -5,10 +5,14 @@
 #include <cmath>
 #include <numbers>
 
-#include "dem/catalog/catalog.h"
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/flow.h"
 #include "dem/particles/material_shares.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/registry.h"
+#include "dem/registry/scenario_problems.h"
+#include "dem/simulate/packing_generator.h"
+#include "dem/simulate/simulate.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -101,7 +105,7 @@ TEST(MaterialPair, TwoGrainsKeepMomentumAndPartAsTheirMassesSay) {
   const double along[3] = {1, 0, 0};
   Packing packing = test::TwoSpheres(r, 2.001 * r, along);
   packing.material = {"", "steel"};
-  Assembly assembly(packing, kAluminium.density, ContactModel(Metals()), Surroundings{}, 1);
+  Assembly assembly(packing, kAluminium.density, ContactModelOf(Metals()), Surroundings{}, 1);
   ParticleArrays& p = assembly.mutable_particles();
   const std::size_t light = p.material[0] == 0 ? 0 : 1;
   const double m1 = MassOf(kAluminium, r);
@@ -217,7 +221,7 @@ TEST(MaterialStack, EveryContactIsPressedInAsItsPairSays) {
   Packing packing = test::TwoSpheres(r, 2 * r, up);
   packing.z = {r, 3 * r};
   packing.material = {"grains", "steel"};
-  Assembly assembly(packing, kAluminium.density, ContactModel(Metals()),
+  Assembly assembly(packing, kAluminium.density, ContactModelOf(Metals()),
                     {.gravity = {0, 0, -g},
                      .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1})},
                      .material = "steel"},

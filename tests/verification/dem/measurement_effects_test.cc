@@ -6,9 +6,10 @@
 #include <cmath>
 #include <cstdint>
 
-#include "dem/catalog/catalog.h"
 #include "dem/particles/packing.h"
-#include "dem/simulation/element_test_run.h"
+#include "dem/registry/catalog.h"
+#include "dem/simulate/packing_generator.h"
+#include "dem/simulate/simulate.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -98,7 +99,7 @@ TEST(MembraneStiffness, ConfinesTheBulgingSpecimenWhileTheCellPressureIsReported
   std::vector<State> states;
   std::vector<double> lateral;
   const auto summary =
-      RunElementTest(With(s, "membrane_stiffness", {{"stiffness", kMembrane}}),
+      SimulateGrains(With(s, "membrane_stiffness", {{"stiffness", kMembrane}}),
                      [&](const State& state, const Assembly& assembly) {
                        states.push_back(state);
                        lateral.push_back(0.5 * (assembly.stress()[0] + assembly.stress()[1]));
@@ -161,7 +162,7 @@ TEST(InitialDensity, ShiftsThePorosityAtTheStart) {
 double FabricAnisotropy(const Scenario& scenario) {
   double fabric = 0;
   const auto summary =
-      RunElementTest(scenario,
+      SimulateGrains(scenario,
                      [&](const State& state, const Assembly& assembly) {
                        EXPECT_NEAR(Value(state, "stress_ratio"), 1, 2e-3);
                        int contacts = 0;

@@ -1,3 +1,5 @@
+#include "dem/simulate/packing_generator.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,6 +8,7 @@
 #include <vector>
 
 #include "dem/dynamics/assembly.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -27,7 +30,7 @@ TEST(GeneratePacking, HitsPorosityAndPressure) {
   // stress.
   Model model = test::LinearModel();
   model.parameters["young_modulus"] = 5e3 * recipe.pressure;
-  Assembly assembly(*packing, 2650, ContactModel(model), 1);
+  Assembly assembly(*packing, 2650, ContactModelOf(model), 1);
   ASSERT_TRUE(assembly.EvaluateForces().ok());
   const auto& s = assembly.stress();
   EXPECT_NEAR((s[0] + s[1] + s[2]) / 3, recipe.pressure, 0.01 * recipe.pressure);

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
-#include "dem/contact/contact_model.h"
+#include "dem/registry/catalog.h"
+#include "dem/dynamics/contact_model.h"
 #include "dem/contact/materials.h"
-#include "dem/simulation/model_parameters.h"
+#include "dem/registry/model_parameters.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

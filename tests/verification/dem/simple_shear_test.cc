@@ -5,8 +5,10 @@
 
 #include <cmath>
 
-#include "dem/catalog/catalog.h"
-#include "dem/simulation/element_test_run.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/registry.h"
+#include "dem/registry/scenario_problems.h"
+#include "dem/simulate/simulate.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -107,7 +109,7 @@ TEST(SimpleShear, StressesAreTheForcesThroughHorizontalPlanes) {
     }
     return absl::OkStatus();
   };
-  const auto summary = RunElementTest(s, sink, {});
+  const auto summary = SimulateGrains(s, sink, {});
   ASSERT_TRUE(summary.ok());
   ASSERT_EQ(summary->outcome, Outcome::kCompleted) << summary->reason;
   EXPECT_NEAR(normal, Value(last, "axial_stress"), 1e-9 * normal);
@@ -147,7 +149,7 @@ TEST(SimpleShear, LargeStrainsMissNoContact) {
     furthest = assembly.cell().displacement / assembly.cell().length[0];
     return absl::OkStatus();
   };
-  const auto summary = RunElementTest(s, sink, {});
+  const auto summary = SimulateGrains(s, sink, {});
   ASSERT_TRUE(summary.ok());
   EXPECT_EQ(summary->outcome, Outcome::kCompleted) << summary->reason;
   EXPECT_EQ(states, 9);
@@ -170,7 +172,7 @@ TEST(SimpleShear, StressOfASlightlyShearedLattice) {
     packing.radius.push_back(r);
     packing.clump.push_back(-1);
   }
-  Assembly assembly(packing, 2650, ContactModel(test::LinearModel()), 1);
+  Assembly assembly(packing, 2650, ContactModelOf(test::LinearModel()), 1);
   ASSERT_TRUE(assembly.EvaluateForces().ok());
   constexpr double kShear = 1e-6;
   assembly.Move({.shear = kShear / 1e-9, .dt = 1e-9});

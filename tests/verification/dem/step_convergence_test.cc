@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "dem/dynamics/quasi_static.h"
+#include "dem/registry/registry.h"
 #include "tests/verification/dem/yade_cases.h"
 
 namespace calib::dem {
@@ -32,7 +33,7 @@ struct Curve {
 
 /// One repeat to `strain`: consolidates, then strains the axis in stages at constant lateral stress.
 Curve Run(const Packing& packing, const Model& model, const Walk& walk, double strain) {
-  Assembly assembly(packing, model.density, ContactModel(model), 1);
+  Assembly assembly(packing, model.density, ContactModelOf(model), 1);
   QuasiStatic stages(assembly, {.rate = walk.rate, .step_share = walk.share}, {});
   const AxisTarget held{.mode = AxisTarget::Mode::kStress, .value = kPressure};
   for (const double part : {0.1, 0.2, 0.5, 1.0}) {

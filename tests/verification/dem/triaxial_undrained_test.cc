@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

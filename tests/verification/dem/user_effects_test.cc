@@ -7,7 +7,8 @@
 
 #include <cmath>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/scenario_problems.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {

@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
 #include "dem/dynamics/assembly.h"
+#include "dem/registry/catalog.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -113,7 +114,7 @@ double ByEngine(const Model& model, const Pair& pair, double speed) {
   } else {
     around.walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1})};
   }
-  Assembly assembly(packing, kDensity, ContactModel(model, pair.thickness), around, 1);
+  Assembly assembly(packing, kDensity, ContactModelOf(model, pair.thickness), around, 1);
   const auto approach = [&] {  // of the first grain and its partner
     const ParticleArrays& p = assembly.particles();
     double v = 0;

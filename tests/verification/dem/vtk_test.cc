@@ -10,8 +10,9 @@
 #include <filesystem>
 
 #include "absl/strings/escaping.h"
-#include "dem/simulation/element_test_run.h"
-#include "dem/simulation/vtk_series.h"
+#include "dem/simulate/packing_generator.h"
+#include "dem/simulate/simulate.h"
+#include "dem/simulate/vtk_series.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -81,7 +82,7 @@ TEST_F(Vtk, GrainsComeBackBitForBitInTheOrderOfThePacking) {
   const Scenario scenario = test::SmallTriaxial(test::HertzModel());
   VtkSeries series(folder_.string());
   std::vector<Assembly> seen;
-  const auto summary = RunElementTest(scenario,
+  const auto summary = SimulateGrains(scenario,
                                       [&](const State& state, const Assembly& assembly) {
                                         seen.push_back(assembly);
                                         return series.Add(assembly, state.load_step);
@@ -144,7 +145,7 @@ TEST_F(Vtk, ContactsCarryTheMeanStress) {
   scenario.path = {{.target = 0, .load_step = 0}, {.target = 0.02, .load_step = 1}};
   VtkSeries series(folder_.string());
   std::vector<double> trace;
-  const auto summary = RunElementTest(
+  const auto summary = SimulateGrains(
       scenario,
       [&](const State& state, const Assembly& assembly) {
         const auto& stress = assembly.stress();

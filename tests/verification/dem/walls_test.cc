@@ -7,6 +7,7 @@
 
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/flow.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -79,7 +80,7 @@ struct Ball {
   double dt = 0;
 
   Ball(const Model& model, const Vec3& at, Surroundings surroundings)
-      : assembly(OneGrain(at), model.density, ContactModel(model), std::move(surroundings), 1),
+      : assembly(OneGrain(at), model.density, ContactModelOf(model), std::move(surroundings), 1),
         dt(0.1 * assembly.NominalCriticalStep()) {
     EXPECT_TRUE(assembly.EvaluateForces().ok());
   }
@@ -214,7 +215,8 @@ TEST(Bounce, RestitutionOfViscousDampingIsThatOfTheGrainsMass) {
   wall.grain().vz[0] = -0.5;
   wall.Advance(2e-4);
   const double n[3] = {0, 0, 1};
-  Assembly pair(test::TwoSpheres(kRadius, 2 * kRadius + 1e-5, n), kDensity, ContactModel(model), 1);
+  Assembly pair(test::TwoSpheres(kRadius, 2 * kRadius + 1e-5, n), kDensity, ContactModelOf(model),
+                1);
   ASSERT_TRUE(pair.EvaluateForces().ok());
   ParticleArrays& p = pair.mutable_particles();
   const std::size_t low = p.z[0] < p.z[1] ? 0 : 1;
@@ -325,7 +327,7 @@ TEST(Membership, RemovedGrainsLeaveTheMemoryOfOthersAlone) {
   }
   const Model model = Hard(0.5);
   const Surroundings between{.gravity = {0, 0, -kGravity}, .walls = {Floor()}};
-  Assembly with(packing, kDensity, ContactModel(model), between, 1);
+  Assembly with(packing, kDensity, ContactModelOf(model), between, 1);
   ASSERT_TRUE(with.EvaluateForces().ok());
   const double dt = 0.1 * with.NominalCriticalStep();
   with.mutable_particles().vy[0] = 0.01;
@@ -388,7 +390,7 @@ class Pouring {
     model.parameters["young_modulus"] = 5e6;
     return {grains,
             kDensity,
-            ContactModel(model),
+            ContactModelOf(model),
             {.gravity = {0, 0, -kGravity}, .walls = {Floor(), funnel}},
             1};
   }

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "dem/catalog/catalog.h"
+#include "dem/registry/catalog.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem::test {

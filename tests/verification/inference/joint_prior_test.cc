@@ -12,7 +12,7 @@
 #include "inference/data/gaussian_likelihood.h"
 #include "inference/emulator/emulated_posterior.h"
 #include "inference/filter/iterative_filter.h"
-#include "inference/prior/standard_normal.h"
+#include "inference/numerics/standard_normal.h"
 #include "inference/tmcmc/tmcmc.h"
 #include "tests/verification/inference/linear_model.h"
 

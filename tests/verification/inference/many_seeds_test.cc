@@ -16,7 +16,7 @@
 
 #include "inference/data/gaussian_likelihood.h"
 #include "inference/emulator/emulated_posterior.h"
-#include "inference/filter/weighted_moments.h"
+#include "inference/numerics/weighted_moments.h"
 #include "inference/tmcmc/tmcmc.h"
 #include "tests/verification/inference/linear_model.h"
 

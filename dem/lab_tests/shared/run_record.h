@@ -1,0 +1,62 @@
+#pragma once
+// What is told and kept of a run while it goes from point to point of its path.
+
+#include <functional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "dem/dynamics/assembly.h"
+#include "dem/lab_tests/shared/run_checkpoint.h"
+#include "dem/model/state.h"
+
+namespace calib::dem {
+
+/// Called at each load step with its state and the grains that made it, null where a test has none. An error ends the run
+/// with that error.
+using LoadStepSink = std::function<absl::Status(const State& state, const Assembly* assembly)>;
+
+/// Between the procedure of a test and whoever wants its states and checkpoints.
+class RunRecord {
+ public:
+  /// Without checkpoints.
+  explicit RunRecord(LoadStepSink sink) : sink_(std::move(sink)) {}
+
+  /// With checkpoints for `keep` after each point.
+  RunRecord(LoadStepSink sink, const Scenario& scenario, CheckpointSink keep)
+      : sink_(std::move(sink)), keep_(std::move(keep)), head_(CheckpointHead(scenario)) {}
+
+  /// The run begins behind what a checkpoint of it holds.
+  void GoOnFrom(RunCheckpoint checkpoint) { so_far_ = std::move(checkpoint); }
+
+  [[nodiscard]] bool resumed() const { return so_far_.next > 0; }
+  /// Where on the path to begin.
+  [[nodiscard]] std::size_t next() const { return so_far_.next; }
+  /// What the procedure gave to Keep() when it was interrupted.
+  [[nodiscard]] const std::string& procedure() const { return so_far_.procedure; }
+
+  /// A load step has been reached. Errors: those of the sink.
+  absl::Status Reach(const State& state, const Assembly* assembly) {
+    if (keeps()) {
+      so_far_.states.push_back(state);
+    }
+    return sink_(state, assembly);
+  }
+
+  [[nodiscard]] bool keeps() const { return static_cast<bool>(keep_); }
+
+  /// From here the run could go on at point `next` of the path with these bytes. Precondition:
+  /// keeps(). Errors: those of the checkpoint sink.
+  absl::Status Keep(std::size_t next, std::string procedure) {
+    so_far_.next = next;
+    so_far_.procedure = std::move(procedure);
+    return keep_(PackCheckpoint(head_, so_far_));
+  }
+
+ private:
+  LoadStepSink sink_;
+  CheckpointSink keep_;
+  std::string head_;
+  RunCheckpoint so_far_;
+};
+
+}  // namespace calib::dem

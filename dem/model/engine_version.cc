@@ -1,0 +1,7 @@
+#include "dem/model/engine_version.h"
+
+namespace calib::dem {
+
+std::string EngineVersion() { return "14"; }
+
+}  // namespace calib::dem

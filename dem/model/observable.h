@@ -1,0 +1,25 @@
+#pragma once
+// What a lab test reads, as data.
+
+#include <string>
+
+namespace calib::dem {
+
+struct ObservableInfo {
+  std::string name;
+  std::string unit;  ///< SI
+  std::string description;
+};
+
+class Assembly;  // dynamics/assembly.h
+
+/// An observable of a specimen in the periodic cell beyond its readings (model/readings.h), or one that the procedure of a
+/// test gives itself.
+struct ObservableEntry {
+  ObservableInfo info;
+  int place = 1000;  ///< observables are listed in this order, then by name
+  double (*read)(const Assembly& settled) =
+      nullptr;  ///< of a settled specimen; null: the procedure gives it
+};
+
+}  // namespace calib::dem

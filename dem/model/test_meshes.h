@@ -1,0 +1,23 @@
+#pragma once
+// Meshes of the user's in place of pieces of a test's boundary.
+
+#include <string>
+#include <vector>
+
+#include "dem/model/parameter.h"
+#include "dem/model/scenario.h"
+
+namespace calib::dem {
+
+/// Adds what is wrong with the scenario's meshes whatever its grains are, one sentence each: a
+/// piece that the test does not let be replaced, a surface with the problems of MeshProblems(),
+/// settings that the mesh leaves without meaning, a place out of the frame that MeshInfo states.
+void CheckMeshes(const Scenario& scenario, const TestInfo& test,
+                 std::vector<std::string>& problems);
+
+/// Why meshes do not go with grains of this size, in a sentence; empty: they do. A mesh is at least
+/// one, at most ten thousand largest diameters long: beyond that its unit is another one. A silo
+/// stands on the floor, z = 0, within a largest diameter.
+std::string MeshSizeProblem(const Scenario& scenario, double largest_diameter);
+
+}  // namespace calib::dem

@@ -1,0 +1,25 @@
+#pragma once
+// An effect that a user writes as a formula in the campaign file, as data; formula/ says what it may speak of and runs it.
+
+#include <string>
+
+#include "dem/model/effect.h"
+
+namespace calib::dem {
+
+/// What a formula does to its target.
+enum class FormulaAction {
+  kAdds,   ///< target + formula, in the target's unit; 0: no effect
+  kScales  ///< target * formula, dimensionless; 1: no effect
+};
+
+/// A user's effect. info.kind says where it acts: "contact" between grains and at walls,
+/// "measurement" on the readings.
+struct UserEffect {
+  EffectInfo info;  ///< one-sided or not, parameters, rays, ... as of those of the build
+  FormulaAction action = FormulaAction::kAdds;
+  std::string target;   ///< of ContactTargets() or ReadingTargets()
+  std::string formula;  ///< over the quantities of its kind and the effect's own parameters
+};
+
+}  // namespace calib::dem

@@ -1,0 +1,28 @@
+#pragma once
+// What may have a value in a model: contact law, effects, materials and pairs of them; what of it
+// cannot be together.
+
+#include <string>
+#include <vector>
+
+#include "dem/model/scenario.h"
+#include "dem/registry/catalog.h"
+
+namespace calib::dem {
+
+/// Parameter of a model by its dotted campaign name, those of its effects and materials included,
+/// or nullptr when the model has none of that name.
+const ParameterInfo* FindParameter(const Model& model, const std::string& dotted_name);
+
+/// Dotted names that the model's materials and pairs of them may give values to; pairs once, in the
+/// order in which the materials are named.
+std::vector<std::string> MaterialParameters(const Model& model);
+
+/// Everything wrong with the names and values of the model's materials, one sentence each.
+std::vector<std::string> MaterialProblems(const Model& model);
+
+/// Everything wrong with the model's effects that know single spheres only, one sentence each.
+/// clumps: whether the packing has any.
+std::vector<std::string> ShapeProblems(const Model& model, bool clumps);
+
+}  // namespace calib::dem

@@ -1,0 +1,185 @@
+#include "inference/numerics/gaussian_process.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "inference/numerics/bounded_minimizer.h"
+#include "inference/numerics/decompositions.h"
+#include "inference/numerics/matern_kernel.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+
+constexpr Index kBlock = 256;  // of points: their cross-covariances stay in the cache
+
+// Standard deviation about the mean, and one where there is no spread to scale by.
+double Spread(const Eigen::VectorXd& values, double mean) {
+  const double sd = std::sqrt((values.array() - mean).square().mean());
+  return sd > 1e-12 * (std::abs(mean) + std::numeric_limits<double>::min()) ? sd : 1;
+}
+
+// Smooth and wiggly.
+std::vector<Eigen::VectorXd> FixedStarts(Index d) {
+  struct Start {
+    double length, signal, scatter;
+  };
+  std::vector<Eigen::VectorXd> starts;
+  for (const Start& start : {Start{4, 1, 1e-3}, Start{1, 0.3, 1e-2}}) {
+    starts.emplace_back(d + 2) << Eigen::VectorXd::Constant(d, std::log(start.length)),
+        std::log(start.signal), std::log(start.scatter);
+  }
+  return starts;
+}
+
+Minimum MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs,
+                     double max_scatter, const std::vector<Eigen::VectorXd>& starts) {
+  const Index d = inputs.cols();
+  const KernelObjective objective(inputs, outputs);
+  Eigen::VectorXd lower(d + 2);
+  Eigen::VectorXd upper(d + 2);
+  lower << Eigen::VectorXd::Constant(d, std::log(0.2)), std::log(1e-8), std::log(1e-9);
+  upper << Eigen::VectorXd::Constant(d, std::log(100.0)), std::log(1e3), std::log(max_scatter);
+  Minimum best{.x = {}, .value = std::numeric_limits<double>::infinity()};
+  for (const Eigen::VectorXd& start : starts) {
+    const Eigen::VectorXd x = start.cwiseMax(lower).cwiseMin(upper);
+    Eigen::VectorXd gradient(d + 2);
+    if (!std::isfinite(objective(x, gradient))) continue;
+    const Minimum minimum =
+        MinimizeInBox(objective, x, lower, upper, {.max_iterations = 40, .tolerance = 1e-2});
+    if (minimum.value < best.value) best = minimum;
+  }
+  return best;
+}
+
+}  // namespace
+
+absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inputs,
+                                                     const Eigen::VectorXd& outputs,
+                                                     const GaussianProcessOptions& options) {
+  assert(inputs.rows() == outputs.size() && inputs.rows() >= 4);
+  assert(options.max_scatter >= 1e-8 && options.max_scatter <= 2);
+  const Index n = inputs.rows();
+  const Index d = inputs.cols();
+  GaussianProcess process;
+  process.input_mean_ = inputs.colwise().mean();
+  process.input_sd_.resize(d);
+  for (Index j = 0; j < d; ++j)
+    process.input_sd_[j] = Spread(inputs.col(j), process.input_mean_[j]);
+  process.output_mean_ = outputs.mean();
+  process.output_sd_ = Spread(outputs, process.output_mean_);
+  process.train_ =
+      (inputs.rowwise() - process.input_mean_).array().rowwise() / process.input_sd_.array();
+  const Eigen::VectorXd scaled = (outputs.array() - process.output_mean_) / process.output_sd_;
+
+  assert(options.like == nullptr || !options.like->constant());
+  const Minimum hyper = MostProbable(
+      process.train_, scaled, options.max_scatter,
+      options.like == nullptr ? FixedStarts(d)
+                              : std::vector<Eigen::VectorXd>{options.like->HyperParameters()});
+  if (!std::isfinite(hyper.value)) {
+    return absl::FailedPreconditionError(
+        "the emulator's covariance matrix cannot be factorised: are the runs' parameters all the "
+        "same?");
+  }
+  // The same density of the best constant, whose scatter has the outputs' variance, one; Gaussian
+  // normalisers and the prior of the scatter, which both have, left out.
+  const auto count = static_cast<double>(n);
+  if (options.may_be_constant &&
+      hyper.value > 0.5 * count + 0.5 * std::log1p(count * kTrendVariance)) {
+    process.SetConstant(outputs);
+    return process;
+  }
+  process.lengths_ = hyper.x.head(d).array().exp().transpose();
+  process.signal_ = std::exp(hyper.x[d]);
+  const double scatter = std::exp(hyper.x[d + 1]);
+  const double output_variance = process.output_sd_ * process.output_sd_;
+  process.scatter_variance_ = scatter * output_variance;
+
+  Eigen::MatrixXd covariance = KernelMatrix(
+      process.train_, process.train_, {.lengths = process.lengths_, .signal = process.signal_});
+  covariance.diagonal().array() += scatter;
+  const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+  process.cholesky_ = factor.matrixL();
+  process.alpha_ = factor.solve(scaled);
+  const Eigen::VectorXd precision = Solved(factor, Eigen::MatrixXd::Identity(n, n)).diagonal();
+  process.leave_one_out_.error = process.output_sd_ * process.alpha_.cwiseQuotient(precision);
+  process.leave_one_out_.variance = output_variance * precision.cwiseInverse();
+  return process;
+}
+
+Eigen::VectorXd GaussianProcess::HyperParameters() const {
+  Eigen::VectorXd x(lengths_.size() + 2);
+  x << lengths_.transpose().array().log().matrix(), std::log(signal_),
+      std::log(scatter_variance_ / (output_sd_ * output_sd_));
+  return x;
+}
+
+void GaussianProcess::SetConstant(const Eigen::VectorXd& outputs) {
+  const auto n = static_cast<double>(outputs.size());
+  constant_ = true;
+  lengths_ =
+      Eigen::RowVectorXd::Constant(input_sd_.size(), std::numeric_limits<double>::infinity());
+  const Eigen::ArrayXd deviation = outputs.array() - output_mean_;
+  scatter_variance_ = deviation.square().sum() / (n - 1);
+  leave_one_out_.error = deviation * (n / (n - 1));
+  leave_one_out_.variance =
+      Eigen::VectorXd::Constant(outputs.size(), scatter_variance_ * (1 + 1 / (n - 1)));
+  constant_variance_ = scatter_variance_ / n;
+}
+
+GaussianProcessPrediction GaussianProcess::Predict(const Eigen::MatrixXd& inputs) const {
+  const Index m = inputs.rows();
+  GaussianProcessPrediction prediction{
+      .mean = Eigen::VectorXd::Constant(m, output_mean_),
+      .variance = Eigen::VectorXd::Constant(m, constant_variance_)};
+  if (constant_) return prediction;
+  for (Index first = 0; first < m; first += kBlock) {
+    const Index size = std::min(kBlock, m - first);
+    const GaussianProcessPrediction block = PredictBlock(inputs.middleRows(first, size));
+    prediction.mean.segment(first, size) = block.mean;
+    prediction.variance.segment(first, size) = block.variance;
+  }
+  return prediction;
+}
+
+Eigen::VectorXd GaussianProcess::PredictMean(const Eigen::MatrixXd& inputs) const {
+  const Index m = inputs.rows();
+  Eigen::VectorXd mean = Eigen::VectorXd::Constant(m, output_mean_);
+  for (Index first = 0; !constant_ && first < m; first += kBlock) {
+    const Index size = std::min(kBlock, m - first);
+    mean.segment(first, size) = MeanFrom(CrossCovariances(Scaled(inputs.middleRows(first, size))));
+  }
+  return mean;
+}
+
+Eigen::MatrixXd GaussianProcess::Scaled(const Eigen::MatrixXd& inputs) const {
+  return (inputs.rowwise() - input_mean_).array().rowwise() / input_sd_.array();
+}
+
+Eigen::MatrixXd GaussianProcess::CrossCovariances(const Eigen::MatrixXd& points) const {
+  return KernelMatrix(train_, points, {.lengths = lengths_, .signal = signal_});
+}
+
+Eigen::VectorXd GaussianProcess::MeanFrom(const Eigen::MatrixXd& cross) const {
+  return (cross.transpose() * alpha_ * output_sd_).array() + output_mean_;
+}
+
+GaussianProcessPrediction GaussianProcess::PredictBlock(const Eigen::MatrixXd& inputs) const {
+  const Eigen::MatrixXd points = Scaled(inputs);
+  Eigen::MatrixXd cross = CrossCovariances(points);
+  GaussianProcessPrediction prediction;
+  prediction.mean = MeanFrom(cross);
+  cholesky_.triangularView<Eigen::Lower>().solveInPlace(cross);
+  prediction.variance = kTrendVariance * (1 + points.rowwise().squaredNorm().array()) + signal_;
+  prediction.variance -= cross.colwise().squaredNorm().transpose();
+  // Cancellation leaves at most a few hundred epsilon of the prior variance.
+  prediction.variance = output_sd_ * output_sd_ * prediction.variance.cwiseMax(0);
+  return prediction;
+}
+
+}  // namespace calib::inference

@@ -1,0 +1,194 @@
+#include "server/campaign/file/campaign_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
+#include "dem/model/test_meshes.h"
+#include "dem/registry/scenario_problems.h"
+#include "server/campaign/file/map_reader.h"
+#include "server/campaign/file/read_context.h"
+#include "server/campaign/file/read_experiment.h"
+#include "server/campaign/file/read_inference.h"
+#include "server/campaign/file/read_joint_prior.h"
+#include "server/campaign/file/read_materials.h"
+#include "server/campaign/file/read_model.h"
+#include "server/campaign/file/read_noise_groups.h"
+#include "server/campaign/file/read_precomputed.h"
+#include "server/campaign/file/text/yaml_tree.h"
+#include "server/campaign/model/excitation.h"
+
+namespace calib::campaign {
+namespace {
+
+absl::StatusOr<std::string> ExpandPath(const std::string& path) {
+  constexpr const char* kVariable = "$CALIB_DATA";
+  const std::size_t at = path.find(kVariable);
+  if (at == std::string::npos) return path;
+  const char* value = std::getenv("CALIB_DATA");
+  if (value == nullptr) {
+    return absl::NotFoundError("the environment variable CALIB_DATA is not set");
+  }
+  return path.substr(0, at) + value + path.substr(at + std::string(kVariable).size());
+}
+
+absl::StatusOr<std::string> ReadFromDisk(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return absl::NotFoundError("no such file");
+  if (!std::filesystem::is_regular_file(path, error)) return absl::NotFoundError("not a file");
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream content;
+  content << file.rdbuf();
+  if (!file) return absl::NotFoundError("no permission to read it");
+  return std::move(content).str();
+}
+
+void ReadName(MapReader& map, Campaign& campaign) {
+  constexpr std::size_t kLongest = 200;
+  campaign.name =
+      map.RequiredText("name", "what the campaign is called, e.g. toyoura-0.2MPa").value_or("");
+  const auto control = [](unsigned char c) { return std::iscntrl(c) != 0; };
+  const bool printable = std::none_of(campaign.name.begin(), campaign.name.end(), control);
+  if (map.Has("name") && (campaign.name.empty() || campaign.name.size() > kLongest || !printable)) {
+    map.Problem("name", "has to be one line of 1 to 200 characters");
+  }
+}
+
+// Of the grains in all specimens [m]; 0 where there are none.
+double LargestDiameter(const Experiment& experiment) {
+  double largest = 0;
+  for (const Specimen& specimen : experiment.specimens) {
+    if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
+      largest = std::max(largest, 2 * dem::LargestRadius(*recipe));
+    } else if (const auto* file = std::get_if<PackingFile>(&specimen)) {
+      for (const double radius : file->packing.radius) largest = std::max(largest, 2 * radius);
+    }
+  }
+  return largest;
+}
+
+// What the engine itself would refuse. Asked last, at the middle of the priors, where only rare
+// things are left.
+void AskEngine(const MapReader& map, const Campaign& campaign) {
+  std::vector<double> middle;
+  for (const CalibratedParameter& parameter : campaign.parameters) {
+    middle.push_back(parameter.prior.Quantile(0.5));
+  }
+  for (const Experiment& experiment : campaign.experiments) {
+    dem::Scenario scenario = MakeScenario(campaign, experiment, middle, 0);
+    std::set<std::string> said;
+    const auto ask = [&](const dem::Packing& packing, const std::string& path) {
+      scenario.packing = packing;
+      for (const std::string& problem : dem::ScenarioProblems(scenario)) {
+        if (!said.insert(problem).second) continue;
+        map.Problem("experiments",
+                    absl::StrCat(experiment.name, ": ", path, path.empty() ? "" : ": ", problem));
+      }
+    };
+    // Without a file first, in place of a recipe's packing, which does not exist yet: what is wrong
+    // with any packing is not said of a file.
+    ask({.length = {1, 1, 1},
+         .x = {0, 0.5},
+         .y = {0, 0.5},
+         .z = {0, 0.5},
+         .radius = {0.1, 0.1},
+         .clump = {-1, -1}},
+        "");
+    for (const Specimen& specimen : experiment.specimens) {
+      if (const auto* file = std::get_if<PackingFile>(&specimen)) ask(file->packing, file->path);
+    }
+    if (const double grain = LargestDiameter(experiment); grain > 0) {
+      if (const std::string problem = dem::MeshSizeProblem(scenario, grain); !problem.empty()) {
+        map.Problem("experiments", experiment.name + ": " + problem);
+      }
+    }
+  }
+}
+
+// Errors that go together over very much more than the whole path are one number, and their
+// covariance is singular.
+void CheckCorrelationLengths(const MapReader& map, const Campaign& campaign) {
+  constexpr double kMost = 1e6;  // times the path
+  for (const Experiment& experiment : campaign.experiments) {
+    const std::vector<double> travelled = TravelledControl(experiment, 0);
+    const double path = travelled.empty() ? 0 : travelled.back();
+    for (const MeasuredObservable& observable : experiment.observables) {
+      if (!(observable.correlation_length > kMost * path) || !(path > 0)) continue;
+      map.Problem("experiments",
+                  absl::StrCat(experiment.name, ", ", observable.name,
+                               ": noise.correlation_length is ", observable.correlation_length,
+                               ", more than a million times the path of the readings, ", path));
+    }
+  }
+}
+
+}  // namespace
+
+FileReader DiskReader(const std::string& campaign_file_path) {
+  const std::filesystem::path folder = std::filesystem::path(campaign_file_path).parent_path();
+  return [folder](const std::string& path) -> absl::StatusOr<std::string> {
+    ASSIGN_OR_RETURN(const auto expanded, ExpandPath(path));
+    return ReadFromDisk(folder / expanded);  // an absolute path replaces the folder
+  };
+}
+
+ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name,
+                         const FileReader& reader, std::optional<std::uint64_t> seed_override,
+                         CampaignIs is) {
+  ReadOutcome outcome;
+  ProblemList problems(file_name);
+  const YamlParse parse = ParseYaml(yaml_text);
+  if (parse.error) {
+    problems.Add(parse.error->line, "", parse.error->message);
+    outcome.problems = problems.Sorted();
+    return outcome;
+  }
+  Campaign& campaign = outcome.campaign;
+  const bool is_new = is == CampaignIs::kNew;
+  ReadContext context(reader, problems, is_new);
+  MapReader map(*parse.root, "", problems);
+  if (parse.root->kind == YamlNode::Kind::kMap) {
+    ReadName(map, campaign);
+    ReadModel(map, context, campaign);
+    ReadInference(map, campaign);
+    const std::size_t sound = problems.size();
+    ReadParameters(map, campaign);
+    if (problems.size() == sound) {
+      ReadJointPrior(map, campaign);
+    } else {
+      map.Ignore({"prior_correlation", "constraints"});  // of parameters that could not be read
+    }
+    CheckSamples(map, campaign);
+    ReadStart(map, campaign);
+    const std::size_t before = problems.size();
+    ReadExperiments(map, context, campaign);
+    if (problems.size() == before) ReadNoiseGroups(map, campaign);
+    if (is_new && problems.size() == before) CheckCorrelationLengths(map, campaign);
+    if (is_new && !campaign.precomputed) CheckBudget(map, campaign);
+    if (is_new) CheckReplicates(map, campaign);
+    if (campaign.precomputed) {
+      ReadPrecomputed(map, context, campaign);
+      if (campaign.table || campaign.first_proposal) {
+        map.Problem("inference", "runs that exist already can neither be a table nor be proposed");
+      }
+    }
+    map.Finish();
+    if (is_new && problems.size() == 0 && !campaign.precomputed) {
+      for (const std::string& inert : EffectsWithoutPart(campaign)) map.Problem("model", inert);
+      CheckMaterialsUsed(map, campaign);
+      AskEngine(map, campaign);
+    }
+  }
+  if (seed_override) campaign.seed = campaign.filter.seed = *seed_override;
+  outcome.problems = problems.Sorted();
+  outcome.files = context.files();
+  return outcome;
+}
+
+}  // namespace calib::campaign

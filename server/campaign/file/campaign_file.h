@@ -1,0 +1,41 @@
+#pragma once
+// The campaign file (YAML) and the data, packing, mesh and table files it names -> Campaign, or
+// everything that is wrong.
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/campaign/file/problem_list.h"
+#include "server/campaign/model/campaign.h"
+
+namespace calib::campaign {
+
+/// Content of a file named in the campaign file, by the path as written there. NOT_FOUND when there
+/// is none. On the user's machine it reads the disk (DiskReader); in the server it reads stored
+/// blobs.
+using FileReader = std::function<absl::StatusOr<std::string>(const std::string& path)>;
+
+/// Reader for paths relative to the folder of the campaign file; expands $CALIB_DATA.
+FileReader DiskReader(const std::string& campaign_file_path);
+
+struct ReadOutcome {
+  Campaign campaign;               ///< meaningful only when problems is empty
+  std::vector<Problem> problems;   ///< in order of file and line
+  std::vector<std::string> files;  ///< paths the campaign names, as written, that could be read
+};
+
+/// A campaign that was accepted once, maybe by an earlier build, is not asked again what only says
+/// that its runs would be of no use (overlaps, holes, the budget of one iteration).
+enum class CampaignIs { kNew, kStored };
+
+/// Parses and validates everything `submit` checks. Never throws; reads files only through
+/// `reader`.
+ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name,
+                         const FileReader& reader,
+                         std::optional<std::uint64_t> seed_override = std::nullopt,
+                         CampaignIs is = CampaignIs::kNew);
+
+}  // namespace calib::campaign

@@ -1,0 +1,273 @@
+#include "server/campaign/file/read_experiment.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/file/read_materials.h"
+#include "server/campaign/file/read_measurements.h"
+#include "server/campaign/file/read_meshes.h"
+#include "server/campaign/file/read_specimen.h"
+#include "server/campaign/file/text/quantity.h"
+#include "server/campaign/file/text/suggestion.h"
+
+namespace calib::campaign {
+namespace {
+
+constexpr Range kDamping{.min = 0, .max = 1, .max_open = true};
+
+std::vector<std::string> TestNames() {
+  std::vector<std::string> names;
+  for (const dem::TestInfo& test : dem::Tests()) names.push_back(test.name);
+  return names;
+}
+
+// Names stand in tables, file names and on the command line.
+std::string ReadName(MapReader& map, const ReadContext& context, const Campaign& campaign) {
+  std::string name = map.RequiredText("name", "a short word, e.g. tx02").value_or("");
+  const auto plain = [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '_' || c == '-' || c == '.' || c == '+';
+  };
+  constexpr std::size_t kLongest = 64;
+  if (map.Has("name") &&
+      (name.empty() || name.size() > kLongest || !std::all_of(name.begin(), name.end(), plain))) {
+    map.Problem("name",
+                absl::StrCat(Quoted(name), " is not a short word of letters, digits and _ - . +"));
+  }
+  const unsigned char first = name.empty() ? 'a' : static_cast<unsigned char>(name.front());
+  if (context.is_new() && std::isalnum(first) == 0 && first != '_') {  // a folder of this name: ..
+    map.Problem("name", absl::StrCat(Quoted(name), " has to begin with a letter, a digit or _"));
+  }
+  for (const Experiment& other : campaign.experiments) {
+    if (!name.empty() && other.name == name) {
+      map.Problem("name", absl::StrCat(Quoted(name), " is the name of two experiments"));
+    }
+  }
+  return name;
+}
+
+// Our name of the control, as far as it can be told before the measurements are read.
+std::string ControlNameOf(MapReader& map) {
+  const YamlNode* node = map.Find("control");
+  if (node == nullptr) return "";
+  if (node->kind == YamlNode::Kind::kScalar) return node->scalar;
+  for (const YamlEntry& entry : node->entries) {
+    if (entry.key == "column") return entry.value.scalar;
+  }
+  return "";
+}
+
+// Pressures of a few Pa without a unit were meant in MPa or kPa.
+void CheckUnitOf(MapReader& map, const dem::ParameterInfo& setting, double value) {
+  constexpr double kFewest = 10;  // Pa
+  const YamlNode* node = map.Find(setting.name);
+  if (setting.unit != "Pa" || !(value > 0 && value < kFewest) || node == nullptr) return;
+  const auto written = SplitQuantity(node->scalar);
+  if (written.ok() && written->unit.empty()) {
+    map.Problem(setting.name,
+                absl::StrCat("is ", value, " Pa, for no unit stands there; write it, ", "e.g. ",
+                             value, " MPa"));
+  }
+}
+
+// Runs made elsewhere need no settings; what is given is read. What the test is driven along is
+// none.
+void ReadSettings(MapReader& map, const dem::TestInfo& test, bool needed, Experiment& experiment) {
+  const std::string control = ControlNameOf(map);
+  for (const dem::ParameterInfo& setting : test.settings) {
+    if (setting.name == control) {
+      if (map.Has(setting.name)) {
+        map.Problem(setting.name, "is the control of this experiment; remove it here");
+      }
+      map.Ignore({setting.name});
+      continue;
+    }
+    const Range range{
+        .min = setting.min,
+        .max = setting.max,
+        .min_open = setting.min_open,
+        .infinite_allowed = setting.default_value && std::isinf(*setting.default_value)};
+    if (const auto value = map.Quantity(setting.name, setting.unit, range)) {
+      CheckUnitOf(map, setting, *value);
+      if (setting.whole && *value != std::round(*value)) {
+        map.Problem(setting.name, absl::StrCat("is ", *value, ", allowed are whole numbers from ",
+                                               setting.min, " to ", setting.max));
+      }
+      experiment.settings[setting.name] = *value;
+    } else if (!map.Has(setting.name)) {
+      if (setting.default_value) {
+        experiment.settings[setting.name] = *setting.default_value;
+      } else if (needed) {
+        map.Problem(setting.name,
+                    absl::StrCat("is missing; ", test.name, " needs it: ", setting.description));
+      }
+    }
+  }
+}
+
+void ReadConsolidation(MapReader& map, Experiment& experiment) {
+  auto consolidation = map.Map("consolidation");
+  if (!consolidation) return;
+  experiment.consolidation.friction_coefficient =
+      consolidation->Quantity("friction_coefficient", "1", {.min = 0, .max = 10});
+  experiment.consolidation.porosity = consolidation->Quantity(
+      "porosity", "1", {.min = 0.2, .max = 0.6, .min_open = true, .max_open = true});
+  consolidation->Finish();
+  if (consolidation->Has("friction_coefficient") == consolidation->Has("porosity")) {
+    map.Problem("consolidation", "needs exactly one of friction_coefficient and porosity");
+  }
+}
+
+void ReadInitialStress(MapReader& map, Experiment& experiment) {
+  auto stress = map.Map("initial_stress");
+  if (!stress) return;
+  for (const char* key : {"axial", "lateral"}) {
+    stress->Require(key, "both principal stresses are needed");
+  }
+  const auto axial = stress->Quantity("axial", "Pa", kPositive);
+  const auto lateral = stress->Quantity("lateral", "Pa", kPositive);
+  stress->Finish();
+  if (axial && lateral) {
+    experiment.initial_stress = dem::InitialStress{.axial = *axial, .lateral = *lateral};
+  }
+}
+
+void ReadDamping(MapReader& staging, dem::Staging& out) {
+  const YamlNode* damping = staging.Find("damping");
+  if (damping == nullptr) return;
+  if (damping->kind != YamlNode::Kind::kSequence || damping->items.size() != 2) {
+    staging.Problem("damping",
+                    "is a list of two: [while straining, while settling], e.g. [0.2, 0.9]");
+    return;
+  }
+  const std::string path = staging.PathOf("damping");
+  out.damping_loading = ReadQuantity(damping->items[0], path, "1", kDamping, staging.problems());
+  out.damping_settling = ReadQuantity(damping->items[1], path, "1", kDamping, staging.problems());
+}
+
+void ReadStaging(MapReader& map, Experiment& experiment) {
+  experiment.loading_rate = map.Quantity("loading_rate", "1/s", kPositive);
+  auto staging = map.Map("staging");
+  if (!staging) return;
+  if (map.Has("loading_rate")) {
+    map.Problem(
+        "staging",
+        "goes without loading_rate: loading at a real rate has no stages; keep one of them");
+  }
+  experiment.staging.rate = staging->Quantity("rate", "1/s", kPositive);
+  experiment.staging.step =
+      staging->Quantity("step", "1", {.min = 0, .max = 0.1, .min_open = true});
+  experiment.staging.unbalanced =
+      staging->Quantity("unbalanced", "1", {.min = 0, .max = 1, .min_open = true});
+  ReadDamping(*staging, experiment.staging);
+  experiment.staging.adaptive =
+      staging->TrueOrFalse("adaptive").value_or(experiment.staging.adaptive);
+  staging->Finish();
+}
+
+const dem::TestInfo* ReadTest(MapReader& map, const Campaign& campaign, Experiment& experiment) {
+  const std::vector<std::string> names = TestNames();
+  if (!campaign.precomputed && map.Require("test", "one of " + Listed(names)) == nullptr) {
+    return nullptr;
+  }
+  experiment.test = map.Choice("test", names).value_or("");
+  return dem::FindTest(experiment.test);
+}
+
+constexpr std::array<const char*, 8> kSpecimenKeys = {
+    "packing",        "realizations", "specimen_grains", "consolidation",
+    "initial_stress", "loading_rate", "staging",         "meshes"};
+
+// Keys that only a specimen of grains needs: all problems with them at once.
+void RefuseKeys(MapReader& map, const std::string& why) {
+  for (const char* key : kSpecimenKeys) {
+    map.Ignore({key});
+    if (map.Has(key)) map.Problem(key, why);
+  }
+}
+
+// Grains that are poured are neither consolidated nor strained in stages.
+void RefusePreparationKeys(MapReader& map, const dem::TestInfo& test) {
+  map.Ignore({"consolidation", "initial_stress", "loading_rate", "staging"});
+  for (const char* key : {"consolidation", "initial_stress", "loading_rate", "staging"}) {
+    if (map.Has(key)) {
+      map.Problem(key, absl::StrCat("has no meaning in ", test.name, "; remove it"));
+    }
+  }
+}
+
+void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
+  Experiment experiment;
+  experiment.name = ReadName(map, context, campaign);
+  const dem::TestInfo* test = ReadTest(map, campaign, experiment);
+  if (test != nullptr) ReadSettings(map, *test, !campaign.precomputed, experiment);
+  experiment.role = map.Choice("role", kRoleWords).value_or(Role::kCalibrate);
+  if (campaign.precomputed) {
+    if (test == nullptr) map.Ignore({"confining_pressure"});
+    RefuseKeys(map, "has no meaning with precomputed runs; remove it");
+    map.Ignore({"materials"});
+    if (map.Has("materials")) {
+      map.Problem("materials", "has no meaning with precomputed runs; remove it");
+    }
+  } else {
+    if (test != nullptr) experiment.materials = ReadMaterialUse(map, *test, campaign.model);
+    const bool poured = test != nullptr && test->poured;
+    const bool bodiless = test != nullptr && !test->needs_packing;
+    if (bodiless) {
+      experiment.specimens = {NoPacking{}};
+      RefuseKeys(map, absl::StrCat("has no meaning in ", test->name,
+                                   ", which makes its bodies from its settings; remove it"));
+    } else {
+      experiment.specimens = ReadSpecimens(map, poured, context);
+      experiment.specimen_grains = map.Quantity("specimen_grains", "1", {.min = 1});
+      if (test != nullptr) experiment.meshes = ReadMeshes(map, *test, context);
+    }
+    if (poured) {
+      RefusePreparationKeys(map, *test);
+    } else if (!bodiless) {
+      ReadConsolidation(map, experiment);
+      ReadInitialStress(map, experiment);
+      ReadStaging(map, experiment);
+    }
+  }
+  const MeasurementRules rules{
+      .precomputed = campaign.precomputed.has_value(),
+      .noise_needed = campaign.filter.noise != inference::NoiseMode::kEssTarget,
+      .measured = campaign.method != Method::kTable};
+  if (campaign.precomputed || test != nullptr) {
+    ReadMeasurements(map, rules, context, experiment);
+    map.Finish();
+  }  // with an unknown test neither its settings nor its observables can be told from mistakes
+  campaign.experiments.push_back(std::move(experiment));
+}
+
+}  // namespace
+
+void ReadExperiments(MapReader& campaign_map, ReadContext& context, Campaign& campaign) {
+  const YamlNode* node = campaign_map.Require(
+      "experiments", "a list of measurements and the lab tests that reproduce them");
+  if (node == nullptr) return;
+  if (node->kind != YamlNode::Kind::kSequence || node->items.empty()) {
+    campaign_map.Problem(
+        "experiments",
+        "has to be a list with at least one experiment, each beginning with '- name: ...'");
+    return;
+  }
+  for (std::size_t i = 0; i < node->items.size(); ++i) {
+    MapReader map(node->items[i], absl::StrCat("experiments[", i + 1, "]"), context.problems());
+    if (node->items[i].kind == YamlNode::Kind::kMap) ReadExperiment(map, context, campaign);
+  }
+  const auto calibrates = [](const Experiment& experiment) {
+    return experiment.role == Role::kCalibrate;
+  };
+  if (!campaign.experiments.empty() &&
+      std::none_of(campaign.experiments.begin(), campaign.experiments.end(), calibrates)) {
+    campaign_map.Problem("experiments",
+                         "are all for validation; at least one needs role: calibrate");
+  }
+}
+
+}  // namespace calib::campaign

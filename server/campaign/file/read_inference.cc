@@ -1,0 +1,446 @@
+#include "server/campaign/file/read_inference.h"
+
+#include <algorithm>
+#include <array>
+#include <set>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "server/campaign/file/text/suggestion.h"
+
+namespace calib::campaign {
+namespace {
+
+using inference::NoiseMode;
+
+constexpr Range kFraction{.min = 0, .max = 1, .min_open = true, .max_open = true};
+
+void ReadNoiseMode(MapReader& map, inference::FilterOptions& filter) {
+  const YamlNode* node = map.Find("noise");
+  if (node == nullptr) return;
+  if (node->kind == YamlNode::Kind::kMap) {
+    auto noise = map.Map("noise");
+    if (noise->Has("inferred")) {  // its groups are read once the experiments are known
+      filter.noise = NoiseMode::kInferred;
+      noise->Ignore({"inferred"});
+      noise->Finish();
+      return;
+    }
+    noise->Require("ess_target",
+                   "allowed: given, inferred, {inferred: [...]} or {ess_target: 0.2}");
+    filter.noise = NoiseMode::kEssTarget;
+    filter.ess_target = noise->Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
+    noise->Finish();
+    return;
+  }
+  filter.noise = map.Choice("noise", kNoiseModeWords).value_or(filter.noise);
+}
+
+constexpr int kMostStages = 100;  // of tmcmc, unless max_iterations says otherwise
+
+void ReadMethod(MapReader& map, Campaign& campaign) {
+  campaign.method = map.Choice("method", kMethodWords).value_or(campaign.method);
+  if (campaign.method == Method::kTmcmc) campaign.max_iterations = kMostStages;
+  if (IsFilter(campaign.method) || campaign.method == Method::kTable) return;
+  if (campaign.precomputed) {
+    map.Problem("method", absl::StrCat(ToString(campaign.method),
+                                       " chooses its own samples, and runs that exist "
+                                       "already are what they are; use sqmc"));
+  } else if (campaign.filter.noise == NoiseMode::kEssTarget) {
+    map.Problem("method", absl::StrCat(ToString(campaign.method),
+                                       " needs the errors of the readings; use noise: "
+                                       "given or noise: inferred with it"));
+  }
+}
+
+using inference::Design;
+constexpr std::array kDesignWords = {
+    Word{Design::kHalton, "halton"},
+    Word{Design::kSobol, "sobol"},
+    Word{Design::kLatinHypercube, "latin_hypercube"},
+    Word{Design::kSymmetricLatinHypercube, "symmetric_latin_hypercube"},
+};
+
+void ReadDesign(MapReader& map, inference::FilterOptions& filter) {
+  filter.design = map.Choice("design", kDesignWords).value_or(filter.design);
+}
+
+void ReadTmcmcOptions(MapReader& map, inference::TmcmcOptions& tmcmc) {
+  constexpr int kMostSteps = 1000;
+  tmcmc.steps = static_cast<int>(map.Integer("steps", 1, kMostSteps).value_or(tmcmc.steps));
+  tmcmc.target_cv = map.Quantity("target_cv", "1", {.min = 0, .max = 2, .min_open = true})
+                        .value_or(tmcmc.target_cv);
+}
+
+void ReadTermination(MapReader& map, Campaign& campaign) {
+  constexpr double kLeast = 4;  // a quarter of it, at the end, is the best run's own misfit
+  constexpr double kMost = 1e6;
+  const YamlNode* node = map.Find("termination");
+  if (node == nullptr) return;
+  if (node->kind == YamlNode::Kind::kScalar && node->scalar == "off") {
+    campaign.termination.reset();
+    return;
+  }
+  campaign.termination = map.Quantity("termination", "1", {.min = kLeast, .max = kMost});
+}
+
+void ReadDecisions(MapReader& map, Campaign& campaign) {
+  if (map.Choice("decisions", kDecisionsWords) != Decisions::kImmediate) return;
+  if (campaign.method != Method::kSurrogateMsrs && !IsFilter(campaign.method)) {
+    map.Problem("decisions", absl::StrCat(ToString(campaign.method),
+                                          " decides nothing while runs are under way; immediate "
+                                          "is for surrogate_msrs, and for sqmc and "
+                                          "iterative_bayesian_filter with early_stopping"));
+    return;
+  }
+  campaign.decisions = Decisions::kImmediate;
+}
+
+using inference::MixtureOver;
+constexpr std::array kMixtureWords = {
+    Word{MixtureOver::kParameters, "parameters"},
+    Word{MixtureOver::kParametersAndStates, "parameters_and_states"},
+};
+
+void ReadFilterOptions(MapReader& map, Campaign& campaign) {
+  inference::FilterOptions& filter = campaign.filter;
+  filter.tolerance = map.Quantity("tolerance", "1", kFraction).value_or(filter.tolerance);
+  filter.defensive_share =
+      map.Quantity("defensive_share", "1", {.min = 0, .max = 1, .max_open = true})
+          .value_or(filter.defensive_share);
+  filter.max_components =
+      static_cast<int>(map.Integer("max_components", 1, 1000).value_or(filter.max_components));
+  filter.concentration =
+      map.Quantity("concentration", "1", kPositive).value_or(filter.concentration);
+  filter.mixture = map.Choice("mixture", kMixtureWords).value_or(filter.mixture);
+  ReadDesign(map, filter);
+  filter.reversed_path = map.TrueOrFalse("reversed_path").value_or(filter.reversed_path);
+  if (campaign.filter.noise != NoiseMode::kEssTarget) {
+    filter.ess_target = map.Quantity("ess_target", "1", kFraction).value_or(filter.ess_target);
+  } else if (map.Has("ess_target")) {
+    map.Ignore({"ess_target"});
+    map.Problem("ess_target", "is given by noise: {ess_target: ...} already; remove it here");
+  }
+}
+
+// freeze: {2: [young_modulus], 3: converged}; the names are looked at once the parameters are
+// known.
+void ReadFreeze(MapReader& inference, Campaign& campaign) {
+  inference.Ignore({"freeze"});
+  if (!inference.Has("freeze")) return;
+  if (campaign.method != Method::kIterativeBayesianFilter || campaign.precomputed) {
+    inference.Problem("freeze",
+                      "belongs to method: iterative_bayesian_filter with runs still to be made");
+    return;
+  }
+  auto map = inference.Map("freeze");
+  if (!map) return;
+  for (const std::string& key : map->Keys()) {
+    int iteration = 0;
+    if (!absl::SimpleAtoi(key, &iteration) || iteration < 1 ||
+        iteration >= campaign.max_iterations) {
+      map->Ignore({key});
+      map->Problem(key, absl::StrCat("is no iteration after the first; allowed: 1 to ",
+                                     campaign.max_iterations - 1, " (the first is 0)"));
+      continue;
+    }
+    Freeze freeze;
+    const auto names = map->TextList(key);
+    if (!names) continue;
+    freeze.converged = *names == std::vector<std::string>{"converged"};
+    if (!freeze.converged) freeze.names = *names;
+    campaign.freeze[iteration] = std::move(freeze);
+  }
+  map->Finish();
+}
+
+// Keys that this method does not read.
+void RefuseKeysOfOthers(MapReader& map, Method method) {
+  const auto refuse = [&map](const std::vector<std::string>& keys, const std::string& owner) {
+    map.Ignore(keys);
+    for (const std::string& key : keys) {
+      if (map.Has(key)) map.Problem(key, "belongs to " + owner + "; remove it");
+    }
+  };
+  if (!IsFilter(method)) {
+    refuse({"tolerance", "ess_target", "design", "defensive_share", "max_components",
+            "concentration", "mixture", "reversed_path"},
+           "method: iterative_bayesian_filter and sqmc");
+  }
+  if (method != Method::kSurrogateMsrs) {
+    refuse({"surrogate", "termination", "in_flight"}, "method: surrogate_msrs");
+  }
+  if (method != Method::kTmcmc) refuse({"steps", "target_cv"}, "method: tmcmc");
+}
+
+void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
+  constexpr std::int64_t kMostSamples = 1'000'000;
+  constexpr std::int64_t kMostIterations = 1000;
+  constexpr int kFewestChains = 20;
+  constexpr int kMostReplicates = 1000;
+  constexpr int kMostInFlight = 1000;
+  auto map = campaign_map.Map("inference");
+  if (map) {
+    ReadMethod(*map, campaign);
+    const int fewest = campaign.method == Method::kTmcmc ? kFewestChains : 2;
+    campaign.samples =
+        static_cast<int>(map->Integer("samples", fewest, kMostSamples).value_or(campaign.samples));
+    campaign.max_iterations = static_cast<int>(
+        map->Integer("max_iterations", 1, kMostIterations).value_or(campaign.max_iterations));
+    if (IsFilter(campaign.method)) ReadFilterOptions(*map, campaign);
+    if (const auto replicates = map->Integer("replicates", 0, kMostReplicates)) {
+      campaign.replicates = static_cast<int>(*replicates);
+    }
+    ReadFreeze(*map, campaign);
+    if (campaign.method == Method::kSurrogateMsrs) {
+      campaign.surrogate =
+          map->Choice("surrogate", kSurrogateModelWords).value_or(campaign.surrogate);
+      ReadTermination(*map, campaign);
+      campaign.in_flight = static_cast<int>(
+          map->Integer("in_flight", 1, kMostInFlight).value_or(campaign.in_flight));
+    }
+    ReadDecisions(*map, campaign);
+    if (campaign.method == Method::kTmcmc) ReadTmcmcOptions(*map, campaign.tmcmc);
+    RefuseKeysOfOthers(*map, campaign.method);
+    map->Ignore({"rows", "first_proposal"});  // read once the parameters are known
+    if (campaign.method == Method::kSqmc && map->Has("max_iterations") &&
+        campaign.max_iterations != 1) {
+      map->Problem(
+          "max_iterations",
+          "has to be 1 with sqmc, which has one iteration; use iterative_bayesian_filter for more");
+    }
+    map->Finish();
+  }
+  if (campaign.method == Method::kSqmc || campaign.method == Method::kTable)
+    campaign.max_iterations = 1;
+}
+
+/// Numbers within (0, 1), increasing; empty after a problem.
+std::vector<double> ReadRungs(MapReader& map) {
+  const YamlNode* node = map.Find("rungs");
+  if (node == nullptr) return {};
+  if (node->kind != YamlNode::Kind::kSequence || node->items.empty()) {
+    map.Problem("rungs", "has to be a list of shares of the load steps, e.g. [0.25, 0.5]");
+    return {};
+  }
+  std::vector<double> rungs;
+  for (const YamlNode& item : node->items) {
+    const auto rung = ReadQuantity(item, map.PathOf("rungs"), "1", kFraction, map.problems());
+    if (!rung.has_value()) return {};
+    if (!rungs.empty() && *rung <= rungs.back()) {
+      map.Problem("rungs", absl::StrCat("has ", *rung, " after ", rungs.back(),
+                                        "; each rung has to be above the one before"));
+      return {};
+    }
+    rungs.push_back(*rung);
+  }
+  return rungs;
+}
+
+void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
+  const YamlNode* node = campaign_map.Find("early_stopping");
+  if (node == nullptr) return;
+  if (node->kind == YamlNode::Kind::kScalar &&
+      (node->scalar == "off" || node->scalar == "none" || node->scalar == "false")) {
+    return;
+  }
+  auto map = campaign_map.Map("early_stopping");
+  if (!map) return;
+  const YamlNode* discard = map->Find("discard_at_most");
+  const bool off =
+      discard != nullptr && discard->kind == YamlNode::Kind::kScalar && discard->scalar == "off";
+  EarlyStopping stopping;
+  map->Require("discard_at_most", "the posterior mass that stopping early may lose, e.g. 1e-3");
+  if (!off) {
+    stopping.discard_at_most =
+        map->Quantity("discard_at_most", "1", kFraction).value_or(stopping.discard_at_most);
+  }
+  stopping.rungs = ReadRungs(*map);
+  stopping.exponent = map->Quantity("exponent", "1", {.min = 0, .max = 1, .min_open = true});
+  if (!stopping.rungs.empty() && !IsFilter(campaign.method)) {
+    map->Problem("rungs",
+                 "is for sqmc and iterative_bayesian_filter; chains and optimisers judge each run "
+                 "on its own");
+  } else if (!stopping.rungs.empty() && campaign.decisions == Decisions::kImmediate) {
+    map->Problem("rungs",
+                 "makes samples wait for each other, which inference.decisions: immediate does "
+                 "not; remove one of the two");
+  }
+  map->Finish();
+  // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing
+  // to stop; the surrogate would take a bound for a value.
+  if (!off && campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed &&
+      campaign.method != Method::kSurrogateMsrs) {
+    campaign.early_stopping = stopping;
+  }
+}
+
+void ReadFailure(MapReader& campaign_map, Campaign& campaign) {
+  auto map = campaign_map.Map("failure");
+  if (!map) return;
+  campaign.failure.attempts =
+      static_cast<int>(map->Integer("attempts", 1, 100).value_or(campaign.failure.attempts));
+  campaign.failure.pause_above =
+      map->Quantity("pause_above", "1", {.min = 0, .max = 1, .min_open = true})
+          .value_or(campaign.failure.pause_above);
+  map->Finish();
+}
+
+void ReadBudget(MapReader& campaign_map, Campaign& campaign) {
+  auto map = campaign_map.Map("budget");
+  if (!map) return;
+  constexpr std::int64_t kMost = 1'000'000'000;
+  campaign.budget.model_evaluations = map->Integer("model_evaluations", 1, kMost);
+  campaign.budget.core_hours = map->Quantity("core_hours", "1", kPositive);
+  map->Finish();
+}
+
+// One row of the table: a value for every parameter, and the sample it is to be like.
+void ReadRow(const YamlNode& node, const std::string& path, Eigen::Index row, Campaign& campaign,
+             ProblemList& problems) {
+  MapReader map(node, path, problems);
+  constexpr std::int64_t kMostSamples = 1'000'000;
+  campaign.table->like.push_back(
+      static_cast<int>(map.Integer("like", 0, kMostSamples).value_or(row)));
+  for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
+    const CalibratedParameter& parameter = campaign.parameters[j];
+    const auto value = map.Require(parameter.name, "every row gives every parameter") != nullptr
+                           ? map.Quantity(parameter.name, parameter.unit, {})
+                           : std::nullopt;
+    campaign.table->parameters(row, static_cast<Eigen::Index>(j)) = value.value_or(0);
+  }
+  map.Finish();
+}
+
+void ReadTable(MapReader& map, Campaign& campaign) {
+  if (campaign.method != Method::kTable) {
+    if (map.Has("rows")) map.Problem("rows", "belongs to method: table");
+    return;
+  }
+  const YamlNode* rows = map.Require("rows", "the parameter values to run, a list of maps");
+  if (rows == nullptr) return;
+  if (rows->kind != YamlNode::Kind::kSequence || rows->items.empty()) {
+    map.Problem("rows", "has to be a list of maps, one per run");
+    return;
+  }
+  campaign.samples = static_cast<int>(rows->items.size());
+  campaign.table.emplace();
+  campaign.table->parameters.setZero(static_cast<Eigen::Index>(rows->items.size()),
+                                     static_cast<Eigen::Index>(campaign.parameters.size()));
+  for (std::size_t i = 0; i < rows->items.size(); ++i) {
+    ReadRow(rows->items[i], absl::StrCat(map.PathOf("rows"), "[", i, "]"),
+            static_cast<Eigen::Index>(i), campaign, map.problems());
+  }
+}
+
+void ReadFirstProposal(MapReader& inference_map, Campaign& campaign) {
+  if (!inference_map.Has("first_proposal")) return;
+  auto map = inference_map.Map("first_proposal");
+  if (!map) return;
+  FirstProposal proposal;
+  proposal.prior_share =
+      map->Quantity("prior_share", "1", {.min = 0, .max = 1}).value_or(proposal.prior_share);
+  for (const CalibratedParameter& parameter : campaign.parameters) {
+    if (!map->Has(parameter.name)) continue;
+    auto place = map->Map(parameter.name);
+    if (!place) continue;
+    place->Require("center", "where samples of this parameter are drawn");
+    place->Require("sd", "how widely samples of this parameter are drawn");
+    const auto center = place->Quantity("center", parameter.unit, {});
+    const auto sd = place->Quantity("sd", parameter.unit, kPositive);
+    place->Finish();
+    if (!center || !sd) continue;
+    if (!parameter.prior.InSupport(*center)) {
+      place->Problem("center", "lies outside the prior of the parameter");
+      continue;
+    }
+    proposal.places[parameter.name] = {.center = *center, .sd = *sd};
+  }
+  map->Finish();
+  campaign.first_proposal = std::move(proposal);
+}
+
+void CheckFreeze(MapReader& inference, const Campaign& campaign) {
+  std::set<std::string> held;
+  for (const auto& [iteration, freeze] : campaign.freeze) {
+    for (const std::string& name : freeze.names) {
+      const auto is_it = [&name](const CalibratedParameter& p) { return p.name == name; };
+      if (std::none_of(campaign.parameters.begin(), campaign.parameters.end(), is_it)) {
+        inference.Problem("freeze", absl::StrCat("'", name,
+                                                 "' is not calibrated here; write names "
+                                                 "of parameters, or converged alone"));
+      }
+      held.insert(name);
+    }
+  }
+  if (!held.empty() && held.size() >= campaign.parameters.size()) {
+    inference.Problem("freeze", "holds every parameter; leave at least one to be inferred");
+  }
+}
+
+void ReadLineage(MapReader& campaign_map, Campaign& campaign) {
+  auto map = campaign_map.Map("lineage");
+  if (!map) return;
+  Lineage lineage;
+  lineage.parent =
+      map->RequiredText("parent", "id of the campaign this one comes from").value_or("");
+  lineage.purpose = map->RequiredText("purpose", "why it was derived").value_or("");
+  map->Finish();
+  campaign.lineage = std::move(lineage);
+}
+
+}  // namespace
+
+void ReadStart(MapReader& campaign_map, Campaign& campaign) {
+  ReadLineage(campaign_map, campaign);
+  if (!campaign_map.Has("inference")) return;
+  auto map = campaign_map.Map("inference");
+  if (!map) return;
+  ReadTable(*map, campaign);
+  CheckFreeze(*map, campaign);
+  ReadFirstProposal(*map, campaign);
+}
+
+void ReadInference(MapReader& campaign_map, Campaign& campaign) {
+  ReadNoiseMode(campaign_map, campaign.filter);
+  ReadMethodSection(campaign_map, campaign);
+  ReadEarlyStopping(campaign_map, campaign);
+  ReadFailure(campaign_map, campaign);
+  ReadBudget(campaign_map, campaign);
+  campaign.seed = campaign_map.Seed("seed").value_or(campaign.seed);
+  campaign.filter.seed = campaign.seed;
+}
+
+void CheckSamples(MapReader& campaign_map, const Campaign& campaign) {
+  const std::size_t fewest = 2 * campaign.parameters.size() + 1;
+  if (campaign.method == Method::kSurrogateMsrs &&
+      static_cast<std::size_t>(campaign.samples) < fewest) {
+    campaign_map.Problem("inference", absl::StrCat("samples is ", campaign.samples,
+                                                   "; surrogate_msrs starts from "
+                                                   "at least ",
+                                                   fewest, " for ", campaign.parameters.size(),
+                                                   " parameters (two each and one)"));
+  }
+}
+
+void CheckReplicates(const MapReader& campaign_map, const Campaign& campaign) {
+  if (campaign.replicates != 1 || campaign.lineage) return;
+  campaign_map.Problem("inference",
+                       "replicates is 1, but one run shows no scatter; allowed: 0 (not measured) "
+                       "or 2 to 1000");
+}
+
+void CheckBudget(const MapReader& campaign_map, const Campaign& campaign) {
+  if (!campaign.budget.model_evaluations || campaign.method == Method::kTable) return;
+  const auto fitted = std::count_if(campaign.experiments.begin(), campaign.experiments.end(),
+                                    [](const Experiment& e) { return e.role == Role::kCalibrate; });
+  const std::int64_t first = static_cast<std::int64_t>(campaign.samples) * fitted;
+  if (*campaign.budget.model_evaluations >= first) return;
+  campaign_map.Problem(
+      "budget", absl::StrCat("model_evaluations is ", *campaign.budget.model_evaluations,
+                             ", but the first iteration takes ", first, " (", campaign.samples,
+                             " samples, ", fitted, fitted == 1 ? " fitted test" : " fitted tests",
+                             "); allow more, or lower inference.samples"));
+}
+
+}  // namespace calib::campaign

@@ -1,0 +1,16 @@
+#pragma once
+// The key `model.precomputed`: runs that exist already, one table of parameters and one of states.
+
+#include "server/campaign/file/read_context.h"
+
+namespace calib::campaign {
+
+/// Reads both tables for the campaign's parameters and experiments (known). Samples whose states
+/// are incomplete keep NaN and so count as diverged.
+void ReadPrecomputed(MapReader& campaign_map, ReadContext& context, Campaign& campaign);
+
+/// A sentence where rows of the parameter table hold exactly what another one does; empty
+/// otherwise. Pure.
+std::vector<std::string> RepeatedRunWarnings(const Campaign& campaign);
+
+}  // namespace calib::campaign

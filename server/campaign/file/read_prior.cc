@@ -1,0 +1,148 @@
+#include "server/campaign/file/read_prior.h"
+
+#include <array>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "server/campaign/file/text/quantity.h"
+#include "server/campaign/file/text/suggestion.h"
+
+namespace calib::campaign {
+namespace {
+
+using inference::Prior;
+using inference::PriorKind;
+
+constexpr std::array kKindWords = {
+    Word{PriorKind::kUniform, "uniform"},
+    Word{PriorKind::kLogUniform, "log_uniform"},
+    Word{PriorKind::kNormal, "normal"},
+    Word{PriorKind::kLogNormal, "log_normal"},
+};
+
+// A number that has to be there; NaN after a problem.
+double Required(MapReader& map, const std::string& key, const std::string& unit, const Range& range,
+                const std::string& kind) {
+  if (map.Require(key, absl::StrCat("the prior ", kind, " needs it")) == nullptr) {
+    return std::nan("");
+  }
+  return map.Quantity(key, unit, range).value_or(std::nan(""));
+}
+
+bool ReadBounds(MapReader& map, const std::string& unit, const std::string& kind, Prior& prior) {
+  prior.min = Required(map, "min", unit, {}, kind);
+  prior.max = Required(map, "max", unit, {}, kind);
+  if (std::isnan(prior.min) || std::isnan(prior.max)) return false;
+  if (prior.min >= prior.max) {
+    map.Problem("min",
+                absl::StrCat("the prior is upside down: min ", prior.min, " is not below max ",
+                             prior.max, unit == "1" ? "" : " " + unit));
+    return false;
+  }
+  if (prior.kind == PriorKind::kLogUniform && prior.min <= 0) {
+    map.Problem(
+        "min",
+        "a log_uniform prior needs a min greater than 0; use uniform for ranges that hold 0");
+    return false;
+  }
+  return true;
+}
+
+bool ReadMoments(MapReader& map, const std::string& unit, const std::string& kind, Prior& prior) {
+  const bool log = prior.kind == PriorKind::kLogNormal;
+  const Range positive{.min = 0, .min_open = true};
+  // log_normal: `mean` is the median in units and `sd` the spread of ln x, so that both read
+  // naturally.
+  prior.mean = Required(map, "mean", unit, log ? positive : Range{}, kind);
+  prior.sd = Required(map, "sd", log ? "1" : unit, positive, kind);
+  if (const auto min = map.Quantity("min", unit, {})) prior.min = *min;
+  if (const auto max = map.Quantity("max", unit, {})) prior.max = *max;
+  if (std::isnan(prior.mean) || std::isnan(prior.sd)) return false;
+  if (log) prior.mean = std::log(prior.mean);
+  if (prior.min >= prior.max) {
+    map.Problem("min", absl::StrCat("the prior is upside down: min ", prior.min,
+                                    " is not below max ", prior.max));
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool HoldsMass(const Prior& prior, const std::string& key, MapReader& map) {
+  constexpr double kLeast = 1e-4;  // as constraints, inference::JointPrior
+  const double mass = prior.MassBetweenBounds();
+  if (mass >= kLeast) return true;
+  map.Problem(key, absl::StrCat("only a share of ", absl::StrFormat("%.2g", mass),
+                                " of this prior lies between ", prior.min, " and ", prior.max,
+                                "; at least ", absl::StrFormat("%g", kLeast),
+                                " is needed: move its mean or the bounds, or widen its sd"));
+  return false;
+}
+
+namespace {
+
+std::optional<Prior> ReadFrom(MapReader& map, const std::string& unit) {
+  if (map.Require("prior", "one of " + Listed(AllWords(kKindWords))) == nullptr) {
+    map.Ignore({"min", "max", "mean", "sd"});
+    map.Finish();
+    return std::nullopt;
+  }
+  const auto kind = map.Choice("prior", kKindWords);
+  if (!kind) {
+    map.Ignore({"min", "max", "mean", "sd"});
+    map.Finish();
+    return std::nullopt;
+  }
+  Prior prior;
+  prior.kind = *kind;
+  const bool bounded = prior.kind == PriorKind::kUniform || prior.kind == PriorKind::kLogUniform;
+  const std::string word = WordOf(kKindWords, *kind);
+  const bool read =
+      bounded ? ReadBounds(map, unit, word, prior) : ReadMoments(map, unit, word, prior);
+  map.Finish();
+  if (!read) return std::nullopt;
+  if (const auto valid = prior.Validate(); !valid.ok()) {
+    map.Problem("prior", std::string(valid.message()));
+    return std::nullopt;
+  }
+  if (!HoldsMass(prior, "prior", map)) return std::nullopt;
+  return prior;
+}
+
+// The SI unit that the numbers of a free prior carry; the first that has one decides.
+std::string UnitOfNumbers(MapReader& map) {
+  if (const auto unit = map.Text("unit")) {
+    const auto parsed = ParseUnit(*unit);
+    if (parsed.ok()) return SiName(parsed->dimension);
+    map.Problem("unit", std::string(parsed.status().message()));
+    return "1";
+  }
+  for (const char* key : {"min", "max", "mean"}) {
+    const YamlNode* node = map.Find(key);
+    if (node == nullptr || node->kind != YamlNode::Kind::kScalar) continue;
+    const auto quantity = SplitQuantity(node->scalar);
+    if (!quantity.ok() || quantity->unit.empty()) continue;
+    if (const auto unit = ParseUnit(quantity->unit); unit.ok()) return SiName(unit->dimension);
+  }
+  return "1";
+}
+
+}  // namespace
+
+std::optional<Prior> ReadPrior(const YamlNode& node, const std::string& path,
+                               const std::string& si_unit, ProblemList& problems) {
+  MapReader map(node, path, problems);
+  return node.kind == YamlNode::Kind::kMap ? ReadFrom(map, si_unit) : std::nullopt;
+}
+
+std::optional<Prior> ReadFreePrior(const YamlNode& node, const std::string& path,
+                                   ProblemList& problems, std::string& si_unit) {
+  MapReader map(node, path, problems);
+  if (node.kind != YamlNode::Kind::kMap) return std::nullopt;
+  si_unit = UnitOfNumbers(map);
+  return ReadFrom(map, si_unit);
+}
+
+}  // namespace calib::campaign

@@ -1,0 +1,27 @@
+#pragma once
+// One prior: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}.
+
+#include <optional>
+#include <string>
+
+#include "inference/prior/prior.h"
+#include "server/campaign/file/map_reader.h"
+
+namespace calib::campaign {
+
+/// Problem at `key` of `map` when bounds cut off all but 1e-4 of a normal prior: they contradict
+/// it.
+bool HoldsMass(const inference::Prior& prior, const std::string& key, MapReader& map);
+
+/// uniform, log_uniform: min and max. normal: mean, sd, optional min and max. log_normal: mean is
+/// the median in units, sd the standard deviation of ln x (a plain number), optional min and max.
+/// Empty: a problem was added.
+std::optional<inference::Prior> ReadPrior(const YamlNode& node, const std::string& path,
+                                          const std::string& si_unit, ProblemList& problems);
+
+/// The same for a parameter that no catalogue knows (precomputed runs): its unit is what its
+/// numbers carry, or `unit:`. si_unit receives the SI unit ("1" for plain numbers).
+std::optional<inference::Prior> ReadFreePrior(const YamlNode& node, const std::string& path,
+                                              ProblemList& problems, std::string& si_unit);
+
+}  // namespace calib::campaign

@@ -1,0 +1,274 @@
+#pragma once
+// A campaign as the program holds it: read from YAML and its files (campaign_file.h), SI inside,
+// compression positive.
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "dem/model/scenario.h"
+#include "inference/data/data_set.h"
+#include "inference/filter/iterative_filter.h"
+#include "inference/prior/joint_prior.h"
+#include "inference/tmcmc/tmcmc.h"
+#include "server/campaign/model/words.h"
+
+namespace calib::campaign {
+
+struct CalibratedParameter {
+  std::string name;  ///< dotted
+  std::string unit;  ///< SI, for display
+  inference::Prior prior;
+};
+
+/// Stated error of a reading as a function of what is read: sd = absolute, or
+/// sqrt((relative y)^2 + floor^2).
+struct NoiseLaw {
+  double relative = 0;             ///< >= 0
+  double floor = 0;                ///< >= 0, in the observable's SI unit
+  std::optional<double> absolute;  ///< > 0, in the observable's SI unit; takes the place of both
+};
+/// Standard deviation of a reading of `value`, SI.
+double ErrorOf(const NoiseLaw& law, double value);
+
+struct MeasuredObservable {
+  std::string name;
+  /// One per reading, SI, compression positive, strains logarithmic; none where the observable is
+  /// only predicted (method table).
+  std::vector<double> values;
+  std::vector<double> sd;         ///< one per reading, > 0 (may be empty with ess_target)
+  double correlation_length = 0;  ///< in the control; 0: independent
+  /// Of the errors of all readings, in the square of their SI unit, sd^2 its diagonal; empty: sd
+  /// and correlation_length say it all.
+  Eigen::MatrixXd covariance = {};
+  double ess_weight = 1;  ///< w_j of ess_target
+  /// What sd follows from, and would where nothing is measured yet; empty: the file states no such
+  /// law (a column, a covariance, nothing).
+  std::optional<NoiseLaw> noise = {};
+};
+
+/// A specimen: the packing file's content (path as written, parsed), or a recipe.
+struct PackingFile {
+  std::string path;
+  std::string digest;  ///< SHA-256 of the text
+  dem::Packing packing;
+};
+/// Another packing of a packing file's grains, for realizations beyond the files.
+struct PackingLike {
+  std::string path;    ///< of the file
+  std::string digest;  ///< SHA-256 of its text
+  /// radii empty: the worker takes them from the file. The seed follows from the digest and the
+  /// number of the realization.
+  dem::PackingRecipe recipe;
+};
+/// Of tests that make their bodies from their settings.
+struct NoPacking {};
+
+using Specimen = std::variant<PackingFile, dem::PackingRecipe, NoPacking, PackingLike>;
+
+/// An STL file in place of a piece of the test's boundary.
+struct MeshFile {
+  std::string path;        ///< as written
+  std::string digest;      ///< SHA-256 of the content
+  double scale = 1;        ///< m per unit of the file
+  dem::TriangleMesh mesh;  ///< [m]
+};
+
+struct Experiment {
+  std::string name;
+  std::string test;  ///< may be empty when precomputed
+  std::map<std::string, double> settings;
+  Role role = Role::kCalibrate;
+  /// Realizations: sample i uses specimen i mod size. A PackingLike stands behind all files. Empty
+  /// when precomputed.
+  std::vector<Specimen> specimens;
+  /// Of the specimen that was measured; empty: unknown, taken for as few as the model's.
+  std::optional<double> specimen_grains;
+  std::map<std::string, MeshFile> meshes;  ///< by name of dem::TestInfo::meshes
+  dem::MaterialUse materials;
+  dem::Consolidation consolidation;
+  std::optional<dem::InitialStress> initial_stress;
+  std::optional<double> loading_rate;
+  dem::Staging staging;
+  /// Observable that drives the loading; empty: readings are merely counted.
+  std::string control_name;
+  /// Where loading starts: 0 for strains, the start pressure for stresses.
+  double control_start = 0;
+  std::vector<dem::ControlPoint> path;  ///< load_step = index of the reading
+  std::vector<double> control;  ///< measured control at each reading (as compared, logarithmic)
+  /// Loading stage of each reading: "initial_loading", "unload_1", "reload_1", ...
+  std::vector<std::string> segment;
+  std::vector<MeasuredObservable> observables;
+};
+
+/// Runs that exist already, from any code.
+struct Precomputed {
+  Eigen::MatrixXd parameters;  ///< N x d, the campaign's parameters in order
+  /// [experiment][sample][reading * observables + observable], the experiment's observables in
+  /// order.
+  std::vector<std::vector<std::vector<double>>> values;
+  /// ln density from which the rows were drawn; empty: the prior.
+  std::optional<Eigen::VectorXd> log_proposal;
+};
+
+/// Parameter values to run, given one by one.
+struct Table {
+  Eigen::MatrixXd parameters;  ///< N x d, the campaign's parameters in order
+  /// Number of the sample whose specimen and seed each row takes, so that a run can be paired with
+  /// one of another campaign.
+  std::vector<int> like;
+};
+
+/// Where the first iteration looks: a share of the prior, the rest independent normals about
+/// `center` in the coordinate of the prior. Parameters that are not named are drawn from the width
+/// of their prior.
+struct FirstProposal {
+  double prior_share = 0.5;
+  struct Place {
+    double center = 0, sd = 0;  ///< in the parameter's SI unit, sd > 0
+  };
+  std::map<std::string, Place> places{};
+};
+
+/// Where a campaign comes from.
+struct Lineage {
+  std::string parent;   ///< id of the campaign it was derived from
+  std::string purpose;  ///< screen, nuisance, warm_fit, extension
+};
+
+/// Parameters that an iteration of the filter and all later ones hold at their mean so far.
+struct Freeze {
+  bool converged = false;          ///< those whose mean the iteration before has left alone
+  std::vector<std::string> names;  ///< and these
+};
+
+inline constexpr std::array kNoiseModeWords = {
+    Word{inference::NoiseMode::kGiven, "given"},
+    Word{inference::NoiseMode::kInferred, "inferred"},
+    Word{inference::NoiseMode::kEssTarget, "ess_target"},
+};
+
+/// Observables that share one inferred factor of their noise.
+struct SharedNoise {
+  std::vector<std::pair<int, int>> members;  ///< (experiment, observable)
+  inference::VarianceFactorPrior prior = {};
+};
+
+/// What surrogate_msrs asks where to look next.
+enum class SurrogateModel { kCubicRbf, kGaussianProcess };
+inline constexpr std::array kSurrogateModelWords = {
+    Word{SurrogateModel::kCubicRbf, "cubic_rbf"},
+    Word{SurrogateModel::kGaussianProcess, "gaussian_process"},
+};
+
+/// When a campaign decides while runs are under way (the next point of surrogate_msrs, which run
+/// to end early). kReproducible: by what follows from results in their order, whatever arrived
+/// first; kImmediate: at once, by what has arrived.
+enum class Decisions { kReproducible, kImmediate };
+inline constexpr std::array kDecisionsWords = {
+    Word{Decisions::kReproducible, "reproducible"},
+    Word{Decisions::kImmediate, "immediate"},
+};
+
+struct EarlyStopping {
+  double discard_at_most = 1e-3;
+  /// Shares of an experiment's load steps, increasing, within (0, 1): all samples come to the first
+  /// rung, those that can still count go on to the next. Empty: every run goes to its end at once.
+  std::vector<double> rungs{};
+  /// Of the likelihood in the weights that are bounded, (0, 1]: 1 the posterior's own; empty: the
+  /// one that guides proposals.
+  std::optional<double> exponent{};
+};
+struct Failure {
+  int attempts = 5;
+  double pause_above = 0.25;
+};
+struct Budget {
+  std::optional<std::int64_t> model_evaluations;
+  std::optional<double> core_hours;
+};
+
+struct Campaign {
+  std::string name;
+  dem::Model model;  ///< parameters: the fixed ones
+  std::optional<Precomputed> precomputed;
+  std::vector<CalibratedParameter> parameters;
+  /// Where correlations or constraints tie them; their priors are its marginals.
+  std::optional<inference::JointPrior> tied_prior;
+  std::vector<Experiment> experiments;
+  Method method = Method::kIterativeBayesianFilter;
+  int samples = 100;
+  /// tmcmc: tempering stages; surrogate_msrs: its evaluations are at most this times `samples`.
+  int max_iterations = 4;
+  std::optional<Table> table;  ///< with kTable
+  std::optional<FirstProposal> first_proposal;
+  /// How often the best estimate is run to measure the scatter of packings; empty: as its number.
+  std::optional<int> replicates;
+  std::optional<Lineage> lineage;
+  std::map<int, Freeze> freeze;  ///< by iteration, from 1
+  std::vector<SharedNoise> shared_noise;
+  inference::FilterOptions filter;
+  SurrogateModel surrogate = SurrogateModel::kCubicRbf;
+  /// Of surrogate_msrs: a run ends when its misfit so far exceeds this times the best run's (a half
+  /// and a quarter of it later, inference::TerminationBound); empty: never.
+  std::optional<double> termination = 10;
+  /// Of surrogate_msrs: points under way at most, >= 1. With kReproducible point k is chosen once
+  /// all up to k - in_flight have ended, and by their results alone.
+  int in_flight = 8;
+  Decisions decisions = Decisions::kReproducible;
+  inference::TmcmcOptions tmcmc;  ///< steps and target_cv; the rest is set where it is used
+  std::optional<EarlyStopping> early_stopping;
+  Failure failure;
+  Budget budget;
+  std::uint64_t seed = 0;
+};
+
+/// Points of surrogate_msrs that make an iteration after the first; they are chosen one by one.
+inline constexpr int kSurrogateBatch = 8;
+
+/// Samples of an iteration after the first.
+int LaterBatch(const Campaign& campaign);
+/// The most batches it can come to: iterations of a filter, Metropolis steps of tmcmc and its prior
+/// draws, eights of surrogate_msrs.
+int MostBatches(const Campaign& campaign);
+
+/// Path length of the control at each reading: the distance in the correlation of errors. Readings
+/// closer than 1 % of the correlation length count as that far apart, because errors of two
+/// readings are never quite the same.
+std::vector<double> TravelledControl(const Experiment& experiment, double correlation_length);
+
+/// Part of the variance between packings that the measurement has as well: grains of the model over
+/// grains of the measured specimen, at most 1; 1 where that is unknown.
+double ScatterShare(const Experiment& experiment);
+
+/// The fewest packings of a calibrated experiment that varies them; 0: none does.
+std::size_t PackingsOfAll(const Campaign& campaign);
+
+/// The share of each reading of MakeDataSet; -1 where the experiment has one packing only.
+Eigen::VectorXd ScatterShares(const Campaign& campaign, const inference::DataSet& data);
+
+/// Readings of the experiments of a role, flat, in processing order; experiment = index in
+/// campaign.experiments.
+inference::DataSet MakeDataSet(const Campaign& campaign, Role role = Role::kCalibrate);
+
+/// The priors of the calibrated parameters in order, without and with what ties them.
+std::vector<inference::Prior> MarginalPriors(const Campaign& campaign);
+inference::JointPrior Priors(const Campaign& campaign);
+
+/// The sample number that decides on specimen and seed: its own, or the one a table's row names.
+int StreamOf(const Campaign& campaign, int sample);
+
+/// What first_proposal says, in the coordinates of the priors; the prior alone without it.
+inference::Proposal FirstProposalOf(const Campaign& campaign);
+
+/// The scenario of one evaluation. values: SI, in the order of campaign.parameters. With a recipe
+/// the packing is left empty for the worker to generate.
+dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
+                           const std::vector<double>& values, int sample);
+
+}  // namespace calib::campaign

@@ -1,0 +1,111 @@
+#include "server/campaign/model/noise_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "inference/data/reading_noise.h"
+
+namespace calib::campaign {
+namespace {
+
+using Eigen::Index;
+using inference::ReadingRun;
+
+Eigen::MatrixXd CovarianceOf(const Experiment& experiment, const MeasuredObservable& observable) {
+  if (observable.covariance.size() > 0) return observable.covariance;
+  const auto n = static_cast<Index>(observable.sd.size());
+  const Eigen::Map<const Eigen::VectorXd> sd(observable.sd.data(), n);
+  Eigen::MatrixXd covariance = sd.cwiseAbs2().asDiagonal();
+  const double length = observable.correlation_length;
+  if (!(length > 0)) return covariance;
+  const std::vector<double> at = TravelledControl(experiment, length);
+  for (Index i = 0; i < n; ++i) {
+    for (Index j = 0; j < n; ++j) {
+      const double apart =
+          std::abs(at[static_cast<std::size_t>(i)] - at[static_cast<std::size_t>(j)]);
+      covariance(i, j) = sd[i] * sd[j] * std::exp(-apart / length);
+    }
+  }
+  return covariance;
+}
+
+bool IsInOrder(const std::vector<double>& control, std::size_t from, std::size_t to) {
+  const auto begin = control.begin() + static_cast<std::ptrdiff_t>(from);
+  const auto end = control.begin() + static_cast<std::ptrdiff_t>(to);
+  return std::is_sorted(begin, end) || std::is_sorted(begin, end, std::greater<>());
+}
+
+// The loading stages, each a smooth curve; readings in any other order are none.
+std::vector<ReadingRun> RunsOf(const Experiment& experiment, const MeasuredObservable& observable) {
+  std::vector<ReadingRun> runs;
+  const std::size_t n = observable.values.size();
+  if (n == 0 || observable.sd.size() != n || experiment.segment.size() != n ||
+      experiment.control.size() != n) {
+    return runs;
+  }
+  const Eigen::MatrixXd covariance = CovarianceOf(experiment, observable);
+  for (std::size_t from = 0; from < n;) {
+    std::size_t to = from + 1;
+    while (to < n && experiment.segment[to] == experiment.segment[from]) ++to;
+    if (IsInOrder(experiment.control, from, to)) {
+      const auto begin = static_cast<Index>(from);
+      const auto size = static_cast<Index>(to - from);
+      runs.push_back(
+          {.values = Eigen::Map<const Eigen::VectorXd>(observable.values.data() + from, size),
+           .covariance = covariance.block(begin, begin, size, size)});
+    }
+    from = to;
+  }
+  return runs;
+}
+
+std::string Sentence(const std::string& where, const std::string& observable,
+                     const inference::ReadingNoise& noise) {
+  const std::string found = absl::StrFormat(
+      "%s, %s: the readings scatter from one to the next by %.2g times the stated noise (%d "
+      "differences of neighbours)",
+      where, observable, noise.surely_larger ? noise.robust : noise.scale, noise.differences);
+  return noise.surely_larger
+             ? absl::StrCat(found,
+                            ": it is stated too small, so that no model can fit them; state it "
+                            "larger, or noise: inferred")
+             : absl::StrCat(found,
+                            ": it is stated too large, or its errors go together over many "
+                            "readings (correlation_length); an effect can hide in it");
+}
+
+}  // namespace
+
+std::vector<std::string> NoiseWarnings(const Campaign& campaign) {
+  std::vector<std::string> warnings;
+  if (campaign.filter.noise != inference::NoiseMode::kGiven) return warnings;
+  std::map<std::string, std::vector<ReadingRun>> together;  // of all that calibrate
+  std::map<std::string, int> experiments;
+  std::vector<std::string> said;
+  for (const Experiment& experiment : campaign.experiments) {
+    for (const MeasuredObservable& observable : experiment.observables) {
+      const std::vector<ReadingRun> runs = RunsOf(experiment, observable);
+      if (experiment.role == Role::kCalibrate) {
+        auto& all = together[observable.name];
+        all.insert(all.end(), runs.begin(), runs.end());
+        ++experiments[observable.name];
+      }
+      const auto noise = inference::CompareReadingNoise(runs);
+      if (!noise.ok() || !(noise->surely_larger || noise->surely_smaller)) continue;
+      warnings.push_back(Sentence(experiment.name, observable.name, *noise));
+      said.push_back(observable.name);
+    }
+  }
+  for (const auto& [name, runs] : together) {
+    if (experiments[name] < 2 || std::find(said.begin(), said.end(), name) != said.end()) continue;
+    const auto noise = inference::CompareReadingNoise(runs);
+    if (!noise.ok() || !(noise->surely_larger || noise->surely_smaller)) continue;
+    warnings.push_back(Sentence("all fitted experiments", name, *noise));
+  }
+  return warnings;
+}
+
+}  // namespace calib::campaign

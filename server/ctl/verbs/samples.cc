@@ -1,0 +1,63 @@
+#include <iostream>
+#include <string>
+
+#include "calib/return_if_error.h"
+#include "server/client/load_view.h"
+#include "server/client/session.h"
+#include "server/ctl/exit_codes.h"
+#include "server/ctl/option_list.h"
+#include "server/ctl/verb.h"
+#include "server/report/documents/json_documents.h"
+#include "server/report/text/people_units.h"
+#include "server/report/text/text_table.h"
+
+namespace calib::ctl {
+namespace {
+
+struct SamplesOptions {
+  std::string campaign;
+};
+
+void Declare(OptionList& list, SamplesOptions& options) { list.Campaign(options.campaign); }
+
+absl::StatusOr<int> Samples(const CommonOptions& common, const SamplesOptions& options) {
+  ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
+  client::Client& client = session->client();
+  ASSIGN_OR_RETURN(const auto samples, client.GetSamples(options.campaign));
+  ASSIGN_OR_RETURN(const auto source, client.GetSource(options.campaign));
+  ASSIGN_OR_RETURN(const auto campaign, client::LoadCampaign(client, source));
+  std::vector<std::string> names;
+  std::vector<std::string> columns = {"sample", "iteration", "<status", "weight", "log likelihood"};
+  for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
+    names.push_back(parameter.name);
+    columns.push_back(parameter.name);
+  }
+  if (common.json) {
+    std::cout << report::SamplesJson(options.campaign, names, samples);
+    return kDone;
+  }
+  report::TextTable table(columns);
+  for (const v1::Sample& s : samples) {
+    std::vector<std::string> row = {std::to_string(s.index()), std::to_string(s.iteration()),
+                                    s.status(), report::Number(s.weight(), 3),
+                                    report::Number(s.log_likelihood(), 5)};
+    for (int k = 0; k < s.parameters_size(); ++k) {
+      const campaign::CalibratedParameter& p = campaign.parameters[static_cast<std::size_t>(k)];
+      row.push_back(report::NumberWithUnit(s.parameters(k), p.name, p.unit));
+    }
+    table.AddRow(std::move(row));
+  }
+  std::cout << table.ToString();
+  return kDone;
+}
+
+}  // namespace
+
+Verb SamplesVerb() {
+  return MakeVerb<SamplesOptions>({.name = "samples",
+                                   .description = "The ensemble with weights and status",
+                                   .example = "samples c1 --state calib-state"},
+                                  &Declare, &Samples);
+}
+
+}  // namespace calib::ctl

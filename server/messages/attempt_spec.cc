@@ -1,0 +1,161 @@
+#include "server/messages/attempt_spec.h"
+
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+
+#include <algorithm>
+#include <variant>
+
+#include "absl/strings/str_cat.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/model/sha256.h"
+
+namespace calib::messages {
+namespace {
+
+void SetSpecimen(const campaign::PackingFile& file, v1::AttemptSpec& spec) {
+  spec.set_packing_digest(file.digest);
+}
+
+void SetSpecimen(const dem::PackingRecipe& recipe, v1::AttemptSpec& spec) {
+  v1::PackingRecipe& message = *spec.mutable_recipe();
+  message.set_particles(recipe.particles);
+  message.set_porosity(recipe.porosity);
+  message.set_mean_radius(recipe.mean_radius);
+  message.set_radius_spread(recipe.radius_spread);
+  message.set_aspect(recipe.aspect);
+  message.set_pressure(recipe.pressure);
+  message.set_seed(recipe.seed);
+  if (recipe.depth_ratio != 1) message.set_depth_ratio(recipe.depth_ratio);
+  for (const dem::GradingPoint& point : recipe.grading) {
+    v1::GradingPoint& added = *message.add_grading();
+    added.set_radius(point.radius);
+    added.set_finer(point.finer);
+  }
+}
+
+void SetSpecimen(const campaign::PackingLike& like, v1::AttemptSpec& spec) {
+  SetSpecimen(like.recipe, spec);
+  spec.mutable_recipe()->set_sizes_digest(like.digest);
+}
+
+void SetSpecimen(const campaign::NoPacking& /*none*/, v1::AttemptSpec& /*spec*/) {}
+
+v1::Staging ToMessage(const dem::Staging& staging) {
+  v1::Staging message;
+  if (staging.rate.has_value()) {
+    message.set_rate(*staging.rate);
+  }
+  if (staging.step.has_value()) {
+    message.set_step(*staging.step);
+  }
+  if (staging.damping_loading.has_value()) {
+    message.set_damping_loading(*staging.damping_loading);
+  }
+  if (staging.damping_settling.has_value()) {
+    message.set_damping_settling(*staging.damping_settling);
+  }
+  if (staging.unbalanced.has_value()) {
+    message.set_unbalanced(*staging.unbalanced);
+  }
+  message.set_adaptive(staging.adaptive);
+  return message;
+}
+
+// Declared effects that the model does not use have no part in what a run is.
+void SetUserEffects(const dem::Model& model, v1::AttemptSpec& spec) {
+  for (const dem::UserEffect& effect : model.user_effects) {
+    if (std::find(model.effects.begin(), model.effects.end(), effect.info.name) ==
+        model.effects.end()) {
+      continue;
+    }
+    v1::UserEffect& message = *spec.add_user_effects();
+    message.set_name(effect.info.name);
+    message.set_scales(effect.action == dem::FormulaAction::kScales);
+    message.set_target(effect.target);
+    message.set_formula(effect.formula);
+    for (const dem::ParameterInfo& p : effect.info.parameters) {
+      v1::UserParameter& parameter = *message.add_parameters();
+      parameter.set_name(p.name);
+      parameter.set_min(p.min);
+      parameter.set_max(p.max);
+      if (p.default_value) parameter.set_default_value(*p.default_value);
+    }
+  }
+}
+
+}  // namespace
+
+v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& specimen,
+                       const std::string& experiment) {
+  v1::AttemptSpec spec;
+  spec.set_contact(scenario.model.contact);
+  spec.mutable_effects()->Add(scenario.model.effects.begin(), scenario.model.effects.end());
+  spec.set_density(scenario.model.density);
+  spec.mutable_parameters()->insert(scenario.model.parameters.begin(),
+                                    scenario.model.parameters.end());
+  spec.set_test(scenario.test);
+  spec.mutable_settings()->insert(scenario.settings.begin(), scenario.settings.end());
+  std::visit([&spec](const auto& known) { SetSpecimen(known, spec); }, specimen);
+  if (scenario.consolidation.friction_coefficient.has_value()) {
+    spec.set_consolidation_friction(*scenario.consolidation.friction_coefficient);
+  }
+  if (scenario.consolidation.porosity.has_value()) {
+    spec.set_consolidation_porosity(*scenario.consolidation.porosity);
+  }
+  if (scenario.initial_stress.has_value()) {
+    spec.set_initial_axial_stress(scenario.initial_stress->axial);
+    spec.set_initial_lateral_stress(scenario.initial_stress->lateral);
+  }
+  if (scenario.loading_rate.has_value()) {
+    spec.set_loading_rate(*scenario.loading_rate);
+  }
+  *spec.mutable_staging() = ToMessage(scenario.staging);
+  for (const dem::ControlPoint& point : scenario.path) {
+    v1::ControlPoint& message = *spec.add_path();
+    message.set_target(point.target);
+    message.set_load_step(point.load_step);
+  }
+  spec.set_seed(scenario.seed);
+  spec.set_threads(scenario.threads);
+  spec.set_experiment(experiment);
+  SetUserEffects(scenario.model, spec);
+  spec.mutable_materials()->Add(scenario.model.materials.begin(), scenario.model.materials.end());
+  spec.mutable_body_materials()->insert(scenario.materials.bodies.begin(),
+                                        scenario.materials.bodies.end());
+  spec.mutable_grain_materials()->insert(scenario.materials.grains.begin(),
+                                         scenario.materials.grains.end());
+  if (!scenario.materials.grains.empty()) spec.set_mixture_seed(scenario.materials.seed);
+  return spec;
+}
+
+v1::AttemptSpec SpecOf(const campaign::Campaign& campaign, int experiment,
+                       const std::vector<double>& values, int sample) {
+  const campaign::Experiment& measured = campaign.experiments[static_cast<std::size_t>(experiment)];
+  const auto specimen =
+      static_cast<std::size_t>(campaign::StreamOf(campaign, sample)) % measured.specimens.size();
+  v1::AttemptSpec spec = ToSpec(campaign::MakeScenario(campaign, measured, values, sample),
+                                measured.specimens[specimen], measured.name);
+  for (const auto& [name, file] : measured.meshes) {
+    v1::Mesh& message = *spec.add_meshes();
+    message.set_name(name);
+    message.set_digest(file.digest);
+    message.set_scale(file.scale);
+  }
+  return spec;
+}
+
+std::string SpecDigest(v1::AttemptSpec spec) {
+  spec.clear_experiment();
+  spec.clear_threads();
+  std::string bytes;
+  {
+    google::protobuf::io::StringOutputStream stream(&bytes);
+    google::protobuf::io::CodedOutputStream coded(&stream);
+    coded.SetSerializationDeterministic(true);  // maps in the order of their keys
+    spec.SerializeToCodedStream(&coded);
+  }
+  return campaign::Sha256Hex(absl::StrCat(dem::EngineVersion(), "\n", bytes));
+}
+
+}  // namespace calib::messages

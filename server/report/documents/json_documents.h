@@ -1,0 +1,53 @@
+#pragma once
+// The JSON documents that the command line prints and exports. NaN and infinities become null.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dem/formula/user_effect.h"
+#include "server/campaign/file/problem_list.h"
+#include "server/campaign/model/campaign.h"
+#include "server/report/views/campaign_view.h"
+#include "server/report/views/comparison.h"
+#include "server/report/views/model_comparison.h"
+#include "server/report/views/sensitivity.h"
+
+namespace calib::report {
+
+/// parameters: of the campaign; where given, bounds that a prior does not have are null.
+std::string PosteriorJson(const v1::Posterior& posterior,
+                          std::span<const campaign::CalibratedParameter> parameters = {});
+/// The same fields of a table that has run: what it has cost, everything else null or empty.
+std::string TablePosteriorJson(const v1::CampaignStatus& status);
+std::string ComparisonJson(const std::string& campaign, const Comparison& comparison);
+std::string SensitivityJson(const std::string& campaign, const Sensitivity& sensitivity);
+std::string ModelsJson(const ModelComparison& comparison);
+std::string StatusJson(const v1::CampaignStatus& status);
+/// With what comes from it directly and what was concluded about it.
+std::string ShownJson(const v1::CampaignStatus& status,
+                      const std::vector<v1::CampaignStatus>& children,
+                      const std::vector<v1::Finding>& findings);
+std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses);
+/// parameters: names in the order of each sample's values.
+std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,
+                        const std::vector<v1::Sample>& samples);
+std::string StatesJson(const std::string& campaign, int sample,
+                       const std::map<std::string, StateHistory>& by_experiment);
+/// A table of states (experiment,load_step,...) row by row.
+std::string StateTableJson(const std::string& csv);
+std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers);
+/// warnings, and notes on what follows without being said: of a campaign that is valid.
+std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
+                         const std::vector<std::string>& warnings = {},
+                         const std::vector<std::string>& notes = {});
+/// The measurements as compared: SI, logarithmic strains, standard deviations.
+std::string DataJson(const campaign::Campaign& campaign);
+
+/// What this build offers.
+std::string ContactsJson();
+/// declared: effects of a campaign file, after those of the build.
+std::string EffectsJson(std::span<const dem::UserEffect> declared = {});
+std::string TestsJson();
+
+}  // namespace calib::report

@@ -1,0 +1,141 @@
+#include "server/report/views/model_comparison.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
+#include "server/campaign/model/identity.h"
+#include "server/messages/read_words.h"
+
+namespace calib::report {
+namespace {
+
+constexpr double kRounding = 1e-9;  // of a stated error
+
+absl::Status CheckRivals(const std::vector<RivalModel>& rivals) {
+  if (rivals.size() < 2) {
+    return absl::InvalidArgumentError("name at least two campaigns to compare");
+  }
+  std::set<std::string> seen;
+  for (const RivalModel& rival : rivals) {
+    if (!seen.insert(rival.posterior.campaign()).second) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("campaign ", rival.posterior.campaign(), " is named twice"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckEvidence(const RivalModel& rival) {
+  const v1::Posterior& posterior = rival.posterior;
+  if (rival.campaign.filter.noise == inference::NoiseMode::kEssTarget) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("campaign ", posterior.campaign(),
+                     " has its errors tempered to an effective sample size (ess_target), so that "
+                     "its evidence says nothing about the model; run it with noise: given or "
+                     "noise: inferred"));
+  }
+  if (messages::SourceOf(posterior) == campaign::PosteriorSource::kNone ||
+      !std::isfinite(posterior.log_evidence()) || !std::isfinite(posterior.log_evidence_se())) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("campaign ", posterior.campaign(),
+                     " has no evidence, because it has no posterior: see `calibctl posterior ",
+                     posterior.campaign(), "` for why"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckSameData(const std::vector<RivalModel>& rivals) {
+  const std::string first = campaign::DataDigest(rivals.front().campaign);
+  for (const RivalModel& rival : rivals) {
+    if (campaign::DataDigest(rival.campaign) != first) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "campaigns ", rivals.front().posterior.campaign(), " and ", rival.posterior.campaign(),
+          " were fitted to different readings; evidences of different data cannot be compared"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+// The errors that weigh the readings are the same in both.
+bool SameErrors(const campaign::Campaign& a, const campaign::Campaign& b) {
+  const inference::DataSet x = campaign::MakeDataSet(a);
+  const inference::DataSet y = campaign::MakeDataSet(b);
+  if (a.filter.noise != b.filter.noise) return false;
+  return std::equal(x.readings.begin(), x.readings.end(), y.readings.begin(), y.readings.end(),
+                    [](const auto& i, const auto& j) {
+                      return std::abs(i.sd - j.sd) <= kRounding * std::max(i.sd, j.sd);
+                    });
+}
+
+std::vector<std::string> Warnings(const std::vector<RivalModel>& rivals) {
+  std::vector<std::string> warnings;
+  const auto names = [&rivals](auto chosen) {
+    std::string list;
+    for (const RivalModel& rival : rivals) {
+      if (chosen(rival))
+        absl::StrAppend(&list, list.empty() ? "" : ", ", rival.posterior.campaign());
+    }
+    return list;
+  };
+  const campaign::Campaign& first = rivals.front().campaign;
+  const std::string others =
+      names([&first](const RivalModel& r) { return !SameErrors(first, r.campaign); });
+  if (!others.empty()) {
+    warnings.push_back(absl::StrCat(
+        "The errors of the readings are not stated as in ", rivals.front().posterior.campaign(),
+        ": ", others, "; the evidence compares models and errors together, not the models alone."));
+  }
+  const std::string methods =
+      names([&first](const RivalModel& r) { return r.campaign.method != first.method; });
+  if (!methods.empty()) {
+    warnings.push_back(
+        absl::StrCat("The evidence was not found by the same method as that of ",
+                     rivals.front().posterior.campaign(), ": ", methods,
+                     "; differences within a few standard errors may be those of the methods."));
+  }
+  const std::string open = names([](const RivalModel& r) { return !r.posterior.converged(); });
+  if (!open.empty()) {
+    warnings.push_back(absl::StrCat("Not converged: ", open, "; its evidence is provisional."));
+  }
+  const std::string emulated = names([](const RivalModel& r) {
+    return messages::SourceOf(r.posterior) == campaign::PosteriorSource::kEmulator;
+  });
+  if (!emulated.empty()) {
+    warnings.push_back(
+        absl::StrCat("Evidence from an emulator of the runs: ", emulated,
+                     "; its standard error holds what halves of the runs differ by."));
+  }
+  return warnings;
+}
+
+}  // namespace
+
+absl::StatusOr<ModelComparison> CompareModels(const std::vector<RivalModel>& rivals) {
+  RETURN_IF_ERROR(CheckRivals(rivals));
+  std::vector<inference::EvidenceEstimate> evidence;
+  for (const RivalModel& rival : rivals) {
+    RETURN_IF_ERROR(CheckEvidence(rival));
+    evidence.push_back({.log_evidence = rival.posterior.log_evidence(),
+                        .standard_error = rival.posterior.log_evidence_se()});
+  }
+  RETURN_IF_ERROR(CheckSameData(rivals));
+  const auto probabilities = inference::ModelProbabilities(evidence);
+  ModelComparison comparison{.models = {}, .warnings = Warnings(rivals)};
+  for (std::size_t k = 0; k < rivals.size(); ++k) {
+    comparison.models.push_back({.campaign = rivals[k].posterior.campaign(),
+                                 .name = rivals[k].campaign.name,
+                                 .log_evidence = evidence[k].log_evidence,
+                                 .log_evidence_se = evidence[k].standard_error,
+                                 .probability = probabilities[k]});
+  }
+  std::stable_sort(comparison.models.begin(), comparison.models.end(),
+                   [](const ComparedModel& a, const ComparedModel& b) {
+                     return a.log_evidence > b.log_evidence;
+                   });
+  return comparison;
+}
+
+}  // namespace calib::report

@@ -1,0 +1,121 @@
+#include "server/report/views/stored_diagnosis.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "server/report/text/people_units.h"
+#include "server/report/views/lenient_json.h"
+
+namespace calib::report {
+namespace {
+
+using Json = nlohmann::json;
+
+TriedEffect ReadTried(const Json& json) {
+  TriedEffect tried;
+  Read(json, "effect", tried.effect);
+  Read(json, "p_value", tried.p_value);
+  Read(json, "explained_fraction", tried.explained_fraction);
+  Read(json, "predicted_rms_error", tried.predicted_rms_error);
+  Read(json, "amplitude", tried.amplitude);
+  Read(json, "confusable_with", tried.confusable_with);
+  Read(json, "angles", tried.angles);
+  const auto fit = json.find("warm_fit");
+  if (fit != json.end() && fit->is_object()) {
+    Read(*fit, "p_value", tried.refit_p_value);
+    Read(*fit, "advantage_nats", tried.advantage_nats);
+    Read(*fit, "left_out_error", tried.left_out_error);
+  }
+  return tried;
+}
+
+}  // namespace
+
+absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& text) {
+  const Json json = Json::parse(text, nullptr, false);
+  StoredDiagnosis d;
+  if (json.is_object()) {
+    Read(json, "campaign", d.campaign);
+    Read(json, "verdict", d.verdict);
+  }
+  if (d.campaign.empty() || d.verdict.empty()) {
+    return absl::InvalidArgumentError("the document kept as a diagnosis is none");
+  }
+  Read(json, "effect", d.effect);
+  Read(json, "sentence", d.sentence);
+  Read(json, "only_adequacy", d.only_adequacy);
+  if (const auto adequacy = json.find("adequacy");
+      adequacy != json.end() && adequacy->is_object()) {
+    Read(*adequacy, "rms", d.rms);
+    Read(*adequacy, "chi2", d.chi2);
+    Read(*adequacy, "degrees", d.degrees);
+    Read(*adequacy, "p_value", d.p_value);
+    Read(*adequacy, "p_chi2", d.p_chi2);
+    Read(*adequacy, "p_stages", d.p_stages);
+    Read(*adequacy, "left_out_error", d.left_out_error);
+  }
+  if (const auto candidates = json.find("candidates");
+      candidates != json.end() && candidates->is_array()) {
+    for (const Json& candidate : *candidates) {
+      if (candidate.is_object()) d.candidates.push_back(ReadTried(candidate));
+    }
+  }
+  Read(json, "units", d.units);
+  Read(json, "not_excitable", d.not_excitable);
+  Read(json, "undetectable", d.undetectable);
+  Read(json, "warnings", d.warnings);
+  if (const auto found = json.find("detectable"); found != json.end() && found->is_object()) {
+    for (const auto& [effect, strength] : found->items()) {
+      Read(*found, effect.c_str(), d.detectable[effect]);
+    }
+  }
+  if (const auto next = json.find("next_experiment"); next != json.end() && next->is_object()) {
+    Read(*next, "snippet", d.next_experiment);
+    Read(*next, "in_words", d.next_in_words);
+    Read(*next, "separates", d.next_separates);
+    Read(*next, "expected_power", d.next_power);
+    if (const auto pairs = next->find("not_separated"); pairs != next->end()) {
+      for (const Json& pair : *pairs) {
+        if (pair.is_array() && pair.size() == 2 && pair[0].is_string() && pair[1].is_string()) {
+          d.next_together.emplace_back(pair[0], pair[1]);
+        }
+      }
+    }
+  }
+  return d;
+}
+
+const StoredDiagnosis* LatestOf(const std::vector<StoredDiagnosis>& diagnoses,
+                                const std::string& campaign) {
+  const StoredDiagnosis* latest = nullptr;
+  for (const StoredDiagnosis& d : diagnoses) {
+    if (d.campaign != campaign) continue;
+    const bool says_less = latest != nullptr && d.verdict == latest->verdict &&
+                           d.chi2 == latest->chi2 && d.next_experiment.empty() &&
+                           !latest->next_experiment.empty();
+    if (says_less) continue;  // improve asks for no next experiment
+    if (latest == nullptr || latest->only_adequacy || !d.only_adequacy) latest = &d;
+  }
+  return latest;
+}
+
+std::string PValuesInWords(double p_value, std::optional<double> p_chi2,
+                           std::optional<double> p_stages) {
+  if (!p_chi2 || !p_stages) return fmt::format("p = {}", Number(p_value, 2));
+  return fmt::format("p = {}; of means and trends of the stages {}; together {}",
+                     Number(*p_chi2, 2), Number(*p_stages, 2), Number(p_value, 2));
+}
+
+std::string StrengthInWords(const std::map<std::string, double>& amplitude,
+                            const std::map<std::string, std::string>& units) {
+  std::string text;
+  for (const auto& [name, value] : amplitude) {
+    const auto unit = units.find(name);
+    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name,
+                        NumberWithUnit(value, name, unit == units.end() ? "1" : unit->second, 3));
+  }
+  return text;
+}
+
+}  // namespace calib::report
