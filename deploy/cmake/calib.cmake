@@ -1,4 +1,5 @@
-# Build conventions shared by every folder: calib_library(), calib_program(), calib_test(), calib_bench().
+# Build conventions shared by every folder: calib_library(), calib_program(), calib_test(), calib_bench(), and how everything
+# is compiled. There is one way of compiling: users (deploy/quickstart) and developers (deploy/test) make the same objects.
 include(CTest)
 
 set(CMAKE_CXX_STANDARD 20)
@@ -11,75 +12,111 @@ find_package(Threads REQUIRED)
 
 find_program(CALIB_CCACHE ccache)
 if(CALIB_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CALIB_CCACHE})
+  # What ccache asks for where headers are precompiled.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CALIB_CCACHE})
 endif()
 
-# Shortens a first build; off where builds are incremental and ccache keeps objects.
-option(CALIB_PRECOMPILE "precompile the large headers of others, compile short files together" OFF)
+# Short files of one folder are compiled together, large headers of others once. Preset `tidy` turns both off, so that each
+# file is also seen alone.
+if(NOT DEFINED CMAKE_UNITY_BUILD)
+  set(CMAKE_UNITY_BUILD ON)
+endif()
 
 # One flag set for the whole tree. -ffp-contract=off: the same bits whatever the compiler fuses.
 add_library(calib_flags INTERFACE)
-target_compile_options(calib_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
-                                             -ffp-contract=off
-                                             # g++ 12 at -O3 sees overlaps in std::string that are not there (GCC bug 105651)
-                                             $<$<CONFIG:Release>:-Wno-restrict>)
-target_compile_options(calib_flags INTERFACE -Werror)
-if(CALIB_PRECOMPILE)
-  # g++ 12 forgets there that standard headers are system headers, and warns of their insides. Names of one file's
-  # anonymous namespace are seen by the next one.
-  target_compile_options(calib_flags INTERFACE
-    -Wno-shadow $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>
-    $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overread> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>
-    $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>)
-endif()
+target_compile_options(calib_flags INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror -ffp-contract=off
+  # g++ 12 sees overlaps and overruns in the standard library that are not there (GCC bugs 105651, 105329), and forgets in a
+  # precompiled header that the library's insides are not ours.
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overread;-Wno-stringop-overflow;-Wno-array-bounds>)
+target_link_libraries(calib_flags INTERFACE Threads::Threads)
 target_include_directories(calib_flags INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_SOURCE_DIR}/deploy/cmake)  # calib/return_if_error.h
 
-function(calib_precompile name)
-  if(ARGN AND CALIB_PRECOMPILE)
-    target_precompile_headers(${name} PRIVATE ${ARGN})
-  endif()
+# calib_precompiled(NAME HEADERS <a> ... LINKS x ... [FLAGS ...]): headers compiled once for every target that names it after
+# PRECOMPILED. The targets are linked to LINKS too, since the compiler takes precompiled headers only where macros agree.
+function(calib_precompiled name)
+  cmake_parse_arguments(ARG "" "" "HEADERS;LINKS;FLAGS" ${ARGN})
+  set(empty ${CMAKE_BINARY_DIR}/precompiled/${name}.cc)
+  file(CONFIGURE OUTPUT ${empty} CONTENT "// compiles nothing but the headers\n")
+  add_library(${name} OBJECT ${empty})
+  target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_flags)
+  target_compile_options(${name} PRIVATE ${ARG_FLAGS})
+  target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
+  set_target_properties(${name} PROPERTIES CALIB_LINKS "${ARG_LINKS}" CXX_CLANG_TIDY "")
 endfunction()
 
-# calib_library(NAME SOURCES a.cc ... LINKS x ... [PRECOMPILE <header> ...] [TOGETHER]): a static library of this tree; sources by
-# name, no globs (but effects: dem/CMakeLists.txt). PRECOMPILE: large headers of others that most of its files include anyway.
-# TOGETHER: its files are short beside what they include, and compiled several at a time where that is on; names in anonymous
-# namespaces then meet.
-function(calib_library name)
-  cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;LINKS;PRECOMPILE" ${ARGN})
-  add_library(${name} STATIC ${ARG_SOURCES})
-  if(ARG_TOGETHER AND CALIB_PRECOMPILE)
-    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+function(calib_use_precompiled target name)
+  get_target_property(links ${name} CALIB_LINKS)
+  if(links)
+    target_link_libraries(${target} PRIVATE ${links})
   endif()
-  calib_precompile(${name} ${ARG_PRECOMPILE})
+  target_precompile_headers(${target} REUSE_FROM ${name})
+endfunction()
+
+# Groups the sources of a target by folder, TOGETHER of them a unit; names in anonymous namespaces then meet. Generated files
+# and the files and folders after APART stay alone: folders of one file per name, whose files have the same names inside.
+function(calib_group_sources target together apart)
+  set(count_of "")
+  get_target_property(sources ${target} SOURCES)
+  foreach(source IN LISTS sources)
+    get_filename_component(folder ${source} DIRECTORY)
+    if(IS_ABSOLUTE ${source} OR source IN_LIST apart OR folder IN_LIST apart)
+      set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+      continue()
+    endif()
+    string(MAKE_C_IDENTIFIER "files_${folder}" folder)
+    if(NOT DEFINED number_${folder})
+      set(number_${folder} 0)
+    endif()
+    math(EXPR unit "${number_${folder}} / ${together} + 1")
+    math(EXPR number_${folder} "${number_${folder}} + 1")
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${folder}_${unit})
+  endforeach()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+endfunction()
+
+# calib_library(NAME SOURCES a.cc ... LINKS x ... [PRECOMPILED headers] [TOGETHER n] [APART a.cc ...]): a static library of this
+# tree; sources by name, no globs (but effects: dem/CMakeLists.txt). n files of a folder are one unit (8).
+function(calib_library name)
+  cmake_parse_arguments(ARG "" "PRECOMPILED;TOGETHER" "SOURCES;LINKS;APART" ${ARGN})
+  if(NOT ARG_TOGETHER)
+    set(ARG_TOGETHER 8)
+  endif()
+  add_library(${name} STATIC ${ARG_SOURCES})
+  calib_group_sources(${name} ${ARG_TOGETHER} "${ARG_APART}")
   target_link_libraries(${name} PUBLIC ${ARG_LINKS} PRIVATE calib_flags)
   target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
+  if(ARG_PRECOMPILED)
+    calib_use_precompiled(${name} ${ARG_PRECOMPILED})
+  endif()
 endfunction()
 
-# calib_program(NAME SOURCES ... LINKS ...): an executable in <build>/bin.
+# calib_program(NAME SOURCES ... LINKS ... [PRECOMPILED headers]): an executable in <build>/bin.
 function(calib_program name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "" "PRECOMPILED" "SOURCES;LINKS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
+  set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_flags)
+  if(ARG_PRECOMPILED)
+    calib_use_precompiled(${name} ${ARG_PRECOMPILED})
+  endif()
 endfunction()
 
-# calib_test(NAME LABEL label SOURCES ... LINKS ... [TIMEOUT s] [APART]): one GoogleTest binary, one ctest entry with a label
-# (unit, property, verification, integration, fault, browser, data, layering, bench), or several: verification physics.
-# Where CALIB_PRECOMPILE is on, its files are compiled together but for those of APART, whose anonymous names would meet.
+# calib_test(NAME LABEL label SOURCES ... LINKS ... [TIMEOUT s] [TOGETHER n] [APART a.cc ...]): one GoogleTest binary, one ctest
+# entry with a label (unit, property, verification, integration, fault, browser, data, layering, bench), or several:
+# verification physics. Sources are compiled as those of libraries are.
 function(calib_test name)
-  cmake_parse_arguments(ARG "APART" "TIMEOUT" "LABEL;SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;TOGETHER" "LABEL;SOURCES;LINKS;APART" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
-  find_package(GTest REQUIRED)
-  if(NOT TARGET calib_test_main)
-    add_library(calib_test_main STATIC ${CMAKE_SOURCE_DIR}/tests/support/main.cc)
-    target_link_libraries(calib_test_main PUBLIC GTest::gmock GTest::gtest PRIVATE calib_flags)
+  if(NOT ARG_TOGETHER)
+    set(ARG_TOGETHER 8)
   endif()
   add_executable(${name} ${ARG_SOURCES})
-  if(CALIB_PRECOMPILE AND NOT ARG_APART)
-    set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
-  endif()
+  calib_group_sources(${name} ${ARG_TOGETHER} "${ARG_APART}")
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_test_main calib_flags)
+  calib_use_precompiled(${name} calib_precompiled_tests)
   add_test(NAME ${name} COMMAND ${name})
   # COST: the longest begin first, so that none is left to run alone at the end.
   set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT ${ARG_TIMEOUT} COST ${ARG_TIMEOUT})
@@ -97,6 +134,7 @@ function(calib_bench name)
   cmake_parse_arguments(ARG "" "TINY" "SOURCES;LINKS" ${ARGN})
   find_package(benchmark REQUIRED)
   add_executable(${name} ${ARG_SOURCES})
+  set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} benchmark::benchmark calib_flags)
   if(ARG_TINY)
     add_test(NAME ${name} COMMAND ${name} --benchmark_filter=${ARG_TINY} --benchmark_min_time=0.001)
