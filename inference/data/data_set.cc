@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 
 namespace calib::inference {
 namespace {
@@ -227,15 +228,15 @@ absl::Status ValidateData(const DataSet& data, NoiseMode noise) {
           absl::StrCat(Name(reading), " or its control is not a finite number."));
     }
     if (noise == NoiseMode::kEssTarget) {
-      if (auto valid = ValidateEssTarget(data, reading); !valid.ok()) return valid;
+      RETURN_IF_ERROR(ValidateEssTarget(data, reading));
     } else if (!(reading.sd > 0) || !std::isfinite(reading.sd)) {
       return absl::InvalidArgumentError(absl::StrCat(Name(reading), " has the standard deviation ",
                                                      reading.sd, "; it must be positive."));
     }
   }
   if (noise == NoiseMode::kEssTarget) return absl::OkStatus();
-  if (auto valid = ValidateCorrelations(data); !valid.ok()) return valid;
-  if (auto valid = ValidateCovariances(data); !valid.ok()) return valid;
+  RETURN_IF_ERROR(ValidateCorrelations(data));
+  RETURN_IF_ERROR(ValidateCovariances(data));
   return ValidateNoiseGroups(data);
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "calib/return_if_error.h"
 #include "inference/numerics/special_functions.h"
 
 namespace calib::inference {
@@ -84,9 +85,7 @@ double LimitFactor(double degrees, bool upper) {
 absl::StatusOr<ReadingNoise> CompareReadingNoise(const std::vector<ReadingRun>& runs) {
   OfOrder third, fourth;
   for (const int order : kOrders) {
-    auto of_order = Differences(runs, order);
-    if (!of_order.ok()) return of_order.status();
-    (order == 3 ? third : fourth) = *std::move(of_order);
+    ASSIGN_OR_RETURN((order == 3 ? third : fourth), Differences(runs, order));
   }
   ReadingNoise noise;
   if (fourth.sizes.empty()) return noise;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/filter/ensemble.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/filter/joint_states.h"
@@ -133,14 +134,13 @@ int MostComponents(const FilterOptions& options, const WeightedPoints& points) {
 
 absl::StatusOr<Proposal> FitMixture(const FilterOptions& options, const WeightedPoints& points,
                                     std::size_t iterations) {
-  const auto mixture =
-      FitDirichletMixture(points, {.max_components = MostComponents(options, points),
-                                   .concentration = options.concentration,
-                                   .seed = options.seed,
-                                   .stream = iterations});
-  if (!mixture.ok()) return mixture.status();
+  ASSIGN_OR_RETURN(const auto mixture,
+                   FitDirichletMixture(points, {.max_components = MostComponents(options, points),
+                                                .concentration = options.concentration,
+                                                .seed = options.seed,
+                                                .stream = iterations}));
   Proposal proposal;
-  proposal.components = mixture->Predictive(kNegligibleWeight);
+  proposal.components = mixture.Predictive(kNegligibleWeight);
   proposal.defensive_share = options.defensive_share;
   return proposal;
 }
@@ -194,9 +194,8 @@ void Complete(const JointPrior& priors, const std::vector<Eigen::Index>& free,
 absl::StatusOr<double> GuidingExponent(const JointPrior& priors, const DataSet& data,
                                        const FilterOptions& options,
                                        std::span<const Iteration> iterations) {
-  const auto ensemble = MakeEnsemble(priors, data, options, iterations);
-  if (!ensemble.ok()) return ensemble.status();
-  return TemperingExponent(options, *ensemble);
+  ASSIGN_OR_RETURN(const auto ensemble, MakeEnsemble(priors, data, options, iterations));
+  return TemperingExponent(options, ensemble);
 }
 
 namespace {
@@ -262,25 +261,23 @@ absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& da
                                      const FilterOptions& options,
                                      std::span<const Iteration> iterations,
                                      const std::vector<std::optional<double>>& frozen) {
-  if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
-  const auto ensemble = MakeEnsemble(priors, data, options, iterations);
-  if (!ensemble.ok()) return ensemble.status();
+  RETURN_IF_ERROR(ValidateFrozen(priors, frozen));
+  ASSIGN_OR_RETURN(const auto ensemble, MakeEnsemble(priors, data, options, iterations));
   const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
   const Eigen::VectorXd log_weights =
-      TemperedLogWeights(*ensemble, TemperingExponent(options, *ensemble));
-  StandardPoints points = Standardized(priors, free, ensemble->parameters, log_weights);
+      TemperedLogWeights(ensemble, TemperingExponent(options, ensemble));
+  StandardPoints points = Standardized(priors, free, ensemble.parameters, log_weights);
   if (points.samples.size() <= free.size() || !(points.weighted.counts.sum() > 1)) {
-    return TooFew(*ensemble, points.samples.size(), free.size());
+    return TooFew(ensemble, points.samples.size(), free.size());
   }
   if (options.mixture == MixtureOver::kParametersAndStates) {
     points.weighted =
-        JoinStates(points.weighted, StatesOf(*ensemble, points.samples, data, options));
+        JoinStates(points.weighted, StatesOf(ensemble, points.samples, data, options));
   }
-  auto proposal = FitMixture(options, points.weighted, iterations.size());
-  if (!proposal.ok()) return proposal;
-  proposal->components =
-      MarginalOfFirst(proposal->components, static_cast<Eigen::Index>(free.size()));
-  Complete(priors, free, frozen, *proposal);
+  ASSIGN_OR_RETURN(auto proposal, FitMixture(options, points.weighted, iterations.size()));
+  proposal.components =
+      MarginalOfFirst(proposal.components, static_cast<Eigen::Index>(free.size()));
+  Complete(priors, free, frozen, proposal);
   return proposal;
 }
 
@@ -303,7 +300,7 @@ absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const Filt
                                             const Eigen::MatrixXd& draws, std::size_t iterations,
                                             const std::vector<std::optional<double>>& frozen,
                                             const Eigen::MatrixXd& closest) {
-  if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
+  RETURN_IF_ERROR(ValidateFrozen(priors, frozen));
   const auto d = static_cast<Eigen::Index>(priors.size());
   if (draws.rows() == 0 || draws.cols() != d || (closest.rows() > 0 && closest.cols() != d)) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -311,21 +308,19 @@ absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const Filt
         closest.rows(), " x ", closest.cols(), " closest of ", d, " parameters."));
   }
   const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
-  auto proposal = FitToEqual(priors, options, free, draws, iterations);
-  if (!proposal.ok()) return proposal;
-  for (MixtureComponent& component : proposal->components) {
+  ASSIGN_OR_RETURN(auto proposal, FitToEqual(priors, options, free, draws, iterations));
+  for (MixtureComponent& component : proposal.components) {
     component.covariance *= kWidening * kWidening;
   }
   if (closest.rows() > 0) {
-    auto near = FitToEqual(priors, options, free, closest, iterations);
-    if (!near.ok()) return near;
-    for (MixtureComponent& component : proposal->components) component.weight *= 0.5;
-    for (MixtureComponent& component : near->components) {
+    ASSIGN_OR_RETURN(auto near, FitToEqual(priors, options, free, closest, iterations));
+    for (MixtureComponent& component : proposal.components) component.weight *= 0.5;
+    for (MixtureComponent& component : near.components) {
       component.weight *= 0.5;
-      proposal->components.push_back(std::move(component));
+      proposal.components.push_back(std::move(component));
     }
   }
-  Complete(priors, free, frozen, *proposal);
+  Complete(priors, free, frozen, proposal);
   return proposal;
 }
 

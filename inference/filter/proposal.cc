@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/numerics/log_weights.h"
 #include "inference/sampling/halton.h"
@@ -87,11 +88,10 @@ absl::StatusOr<Eigen::MatrixXd> FirstSamples(const JointPrior& priors, const Fil
   Eigen::MatrixXd samples(n, d);
   int points = sequence && priors.is_constrained() ? static_cast<int>(1.1 * n / share) + 16 : n;
   for (;; points *= 2) {
-    const auto design = UnitDesign(options, points, d);
-    if (!design.ok()) return design;
+    ASSIGN_OR_RETURN(const auto design, UnitDesign(options, points, d));
     int filled = 0;
     for (int i = 0; i < points && filled < n; ++i) {
-      Eigen::VectorXd x = priors.FromUnit(design->row(i));
+      Eigen::VectorXd x = priors.FromUnit(design.row(i));
       if (!priors.MeetsConstraints(x)) {
         if (sequence) continue;
         PhiloxStream stream = DrawStream(options, 0, i);
@@ -138,15 +138,15 @@ absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, const Join
   }
   if (!proposal.frozen.empty()) {
     const std::vector<Eigen::Index> free = FreeColumns(proposal, priors.size());
-    auto drawn = DrawSamples(WithoutFrozen(proposal), priors.Of(free), options, iteration, n);
-    if (!drawn.ok()) return drawn;
+    ASSIGN_OR_RETURN(auto drawn,
+                     DrawSamples(WithoutFrozen(proposal), priors.Of(free), options, iteration, n));
     Eigen::MatrixXd all(n, d);
     for (int j = 0; j < d; ++j) {
       const auto& held = proposal.frozen[static_cast<std::size_t>(j)];
       if (held) all.col(j).setConstant(*held);
     }
     for (std::size_t k = 0; k < free.size(); ++k)
-      all.col(free[k]) = drawn->col(static_cast<Eigen::Index>(k));
+      all.col(free[k]) = drawn.col(static_cast<Eigen::Index>(k));
     return all;
   }
   // A design may be used once only: a later iteration that falls back to the prior draws new

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/mixture/k_means.h"
 #include "inference/mixture/softmax_moments.h"
 #include "inference/numerics/decompositions.h"
@@ -133,8 +134,8 @@ DirichletMixture FitFrom(const WeightedPoints& data, const DirichletMixtureOptio
 
 absl::StatusOr<DirichletMixture> FitDirichletMixture(const WeightedPoints& data,
                                                      const DirichletMixtureOptions& options) {
-  if (auto valid = options.Validate(); !valid.ok()) return valid;
-  if (auto valid = ValidateData(data); !valid.ok()) return valid;
+  RETURN_IF_ERROR(options.Validate());
+  RETURN_IF_ERROR(ValidateData(data));
   const MixturePrior prior = EmpiricalPrior(data, options.concentration, options.covariance_floor);
   if (Eigen::LLT<Eigen::MatrixXd>(prior.inverse_scale).info() != Eigen::Success) {
     return absl::FailedPreconditionError(

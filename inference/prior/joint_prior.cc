@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/numerics/decompositions.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/sampling/sobol.h"
@@ -31,7 +32,7 @@ absl::StatusOr<JointPrior> JointPrior::Create(std::vector<Prior> marginals,
                                               std::vector<LinearConstraint> constraints) {
   JointPrior prior(std::move(marginals));
   const auto d = static_cast<Index>(prior.size());
-  if (auto valid = prior.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(prior.Validate());
   if (correlation.size() > 0) {
     const bool shaped = correlation.rows() == d && correlation.cols() == d &&
                         correlation.allFinite() && correlation.isApprox(correlation.transpose()) &&
@@ -90,7 +91,7 @@ void JointPrior::MeasureMass() {
 
 absl::Status JointPrior::Validate() const {
   for (const Prior& prior : marginals_) {
-    if (auto valid = prior.Validate(); !valid.ok()) return valid;
+    RETURN_IF_ERROR(prior.Validate());
   }
   return absl::OkStatus();
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/numerics/decompositions.h"
 #include "inference/sampling/philox.h"
 
@@ -102,7 +103,7 @@ absl::Status LatinHypercubeOptions::Validate() const {
 }
 
 absl::StatusOr<Eigen::MatrixXd> LatinHypercube(const LatinHypercubeOptions& options) {
-  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(options.Validate());
   Eigen::MatrixXd best = Candidate(options, 0);
   if (options.candidates == 1) return best;
   double largest = SmallestDistance(best);

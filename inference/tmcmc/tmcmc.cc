@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/sampling/philox.h"
 #include "inference/tmcmc/tempering_step.h"
 
@@ -187,9 +188,9 @@ double TmcmcState::LogEvidenceStandardError() const {
 }
 
 absl::StatusOr<TmcmcState> StartTmcmc(const JointPrior& priors, const TmcmcOptions& options) {
-  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(options.Validate());
   if (priors.empty()) return absl::InvalidArgumentError("tmcmc: there is no parameter to sample.");
-  if (auto valid = priors.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(priors.Validate());
   TmcmcState state;
   if (BeginsAtPrior(options)) {
     state.proposals.resize(options.samples, static_cast<Index>(priors.size()));
@@ -198,9 +199,8 @@ absl::StatusOr<TmcmcState> StartTmcmc(const JointPrior& priors, const TmcmcOptio
       state.proposals.row(i) = priors.Draw(stream);
     }
   } else {
-    auto drawn = DrawSamples(options.first, priors, {.seed = options.seed}, 0, options.samples);
-    if (!drawn.ok()) return drawn.status();
-    state.proposals = *std::move(drawn);
+    ASSIGN_OR_RETURN(state.proposals, DrawSamples(options.first, priors, {.seed = options.seed}, 0,
+                                                  options.samples));
   }
   state.accept_above = Eigen::VectorXd::Constant(options.samples, -kInfinity);
   state.scale = FirstScale(priors.size());
@@ -258,7 +258,7 @@ absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
       state = std::move(next);
       return absl::OkStatus();
     }
-    if (auto begun = BeginStage(priors, options, next); !begun.ok()) return begun;
+    RETURN_IF_ERROR(BeginStage(priors, options, next));
   }
   Propose(priors, options, next);
   state = std::move(next);
@@ -271,9 +271,8 @@ absl::StatusOr<TmcmcState> RunTmcmc(const JointPrior& priors, const TmcmcOptions
   auto state = StartTmcmc(priors, options);
   while (state.ok() && !state->finished()) {
     if (stop.stop_requested()) return absl::CancelledError("tmcmc was stopped.");
-    const auto advanced =
-        AdvanceTmcmc(priors, options, EvaluateInSupport(*state, log_likelihood), *state);
-    if (!advanced.ok()) return advanced;
+    RETURN_IF_ERROR(
+        AdvanceTmcmc(priors, options, EvaluateInSupport(*state, log_likelihood), *state));
   }
   return state;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/decompositions.h"
 #include "server/campaign/noise_check.h"
 #include "server/diagnosis/diagnosis_support.h"
 #include "server/diagnosis/effect_screen.h"

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/decompositions.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/surrogate/expected_improvement.h"
 #include "inference/surrogate/response_surface.h"
