@@ -66,9 +66,9 @@ Eigen::MatrixXd Candidate(const LatinHypercubeOptions& options, int candidate) {
   return points;
 }
 
-// The smallest distance between two points, or one that is no larger than `enough`, the first found.
-// Points are looked at in the order of their first coordinate: those further along it than the
-// smallest distance so far cannot be nearer.
+// The smallest distance between two points, or one that is no larger than `enough`, the first
+// found. Points are looked at in the order of their first coordinate: those further along it than
+// the smallest distance so far cannot be nearer.
 double SmallestAbove(const Eigen::MatrixXd& points, double enough) {
   std::vector<Index> order(static_cast<std::size_t>(points.rows()));
   std::iota(order.begin(), order.end(), Index{0});
