@@ -13,6 +13,10 @@ namespace {
 
 using Group = std::pair<int, int>;  // experiment, observable
 
+// What a covariance may depart from symmetry and from the squares of the stated sd, over those
+// squares; chosen: text files carry nine digits and more.
+constexpr double kAgrees = 1e-9;
+
 std::string Name(const Reading& reading) {
   return absl::StrCat("the reading of experiment ", reading.experiment, ", load step ",
                       reading.load_step, ", observable ", reading.observable);
@@ -95,7 +99,7 @@ absl::Status ValidateCovariances(const DataSet& data) {
     }
     for (Eigen::Index i = 0; i < size; ++i) {
       const double sd = data.readings[group->second[i]].sd;
-      if (!(std::abs(matrix(i, i) - sd * sd) <= 1e-9 * sd * sd)) {
+      if (!(std::abs(matrix(i, i) - sd * sd) <= kAgrees * sd * sd)) {
         return absl::InvalidArgumentError(absl::StrCat(name, " has the variance ", matrix(i, i),
                                                        " for reading ", i,
                                                        " whose standard deviation is ", sd, "."));
@@ -103,7 +107,8 @@ absl::Status ValidateCovariances(const DataSet& data) {
     }
     const Eigen::VectorXd sd = matrix.diagonal().cwiseSqrt();
     const Eigen::MatrixXd asymmetry = (matrix - matrix.transpose()).cwiseAbs();
-    if (!matrix.allFinite() || (asymmetry.array() > 1e-9 * (sd * sd.transpose()).array()).any()) {
+    if (!matrix.allFinite() ||
+        (asymmetry.array() > kAgrees * (sd * sd.transpose()).array()).any()) {
       return absl::InvalidArgumentError(absl::StrCat(name, " is not finite and symmetric."));
     }
   }

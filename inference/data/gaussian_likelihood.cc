@@ -123,7 +123,8 @@ CALIB_INFERENCE_CLONES void SubtractEarlier(const double* factors, const double*
   }
 }
 
-// The same for kRows readings at once, which load each earlier one together.
+// SubtractEarlier for kRows readings at once, which load each earlier one together. Chosen: so many
+// sums, a factor and a term fit into sixteen vector registers.
 constexpr Eigen::Index kRows = 6;
 CALIB_INFERENCE_CLONES void SubtractEarlierFromRows(const double* const* factors,
                                                     const double* const* earlier,

@@ -10,6 +10,9 @@
 namespace calib::inference {
 namespace {
 
+constexpr double kLeastScale = 0.1;  // of a mean near zero, in prior sd; chosen
+constexpr double kImmaterial = 3;    // sd per move that nobody can act on; chosen
+
 absl::StatusOr<GaussianLikelihood> LikelihoodFor(const DataSet& data, const FilterOptions& options,
                                                  const Eigen::MatrixXd& predictions) {
   if (options.noise == NoiseMode::kEssTarget) {
@@ -57,10 +60,10 @@ std::vector<char> ConvergedMeans(const Posterior& before, const Posterior& now,
   std::vector<char> converged;
   for (std::size_t j = 0; j < now.parameters.size(); ++j) {
     const ParameterSummary& parameter = now.parameters[j];
-    const double scale = std::max(std::abs(parameter.mean), 0.1 * parameter.prior_sd);
+    const double scale = std::max(std::abs(parameter.mean), kLeastScale * parameter.prior_sd);
     const double change = std::abs(parameter.mean - before.parameters[j].mean);
     const bool tempered = options.noise == NoiseMode::kEssTarget || std::isnan(parameter.sd);
-    const double immaterial = tempered ? 0 : parameter.sd / 3;
+    const double immaterial = tempered ? 0 : parameter.sd / kImmaterial;
     converged.push_back(change <= std::max(options.tolerance * scale, immaterial) ? 1 : 0);
   }
   return converged;

@@ -20,8 +20,14 @@ namespace calib::inference {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kLeastAcceptance = 1e-3;
-constexpr int kMostRedraws = 100'000;  // below 1e-43 of ever being reached at that acceptance
+constexpr double kLeastAcceptance = 1e-3;  // chosen: a thousand draws for a sample are no time
+constexpr int kMostRedraws = 100'000;      // reached with a chance below 1e-43 at that acceptance
+constexpr int kDesigns = 1000;             // drawn for the best of them [Samuelsson 2023, sec. 3.2]
+constexpr Eigen::Index kBlock = 64;        // rows shuffled together; chosen, packings are fewer
+// Points of a sequence asked for beyond those that are likely to meet the constraints; chosen: more
+// are asked for where these do not do.
+constexpr double kMorePoints = 1.1;
+constexpr int kAtLeastMore = 16;
 
 // One sample of (1 - share) mixture, truncated, + share prior; false when the mixture never meets
 // the support.
@@ -42,13 +48,12 @@ bool DrawOne(const GaussianMixture& mixture, double defensive_share, const Joint
 absl::StatusOr<Eigen::MatrixXd> UnitDesign(const FilterOptions& options, int n, int d) {
   if (options.design == Design::kHalton) return Halton(n, d);
   if (options.design == Design::kSobol) return ScrambledSobol(n, d, options.seed);
-  constexpr int kCandidates = 1000;  // [Samuelsson 2023, sec. 3.2]
   const bool symmetric = options.design == Design::kSymmetricLatinHypercube;
   return LatinHypercube({.points = n,
                          .dimensions = d,
                          .symmetric = symmetric,
                          .centred = symmetric,
-                         .candidates = symmetric ? kCandidates : 1,
+                         .candidates = symmetric ? kDesigns : 1,
                          .seed = options.seed});
 }
 
@@ -62,11 +67,10 @@ PhiloxStream DrawStream(const FilterOptions& options, int iteration, int sample)
 // Rows shuffled within blocks (sampling/shuffle.h): sample i runs on packing i mod R, which in the
 // order of a sequence would be a digit of a parameter. Whole blocks do not depend on the number of
 // rows, so that a larger campaign finds the runs of a smaller one.
-Eigen::MatrixXd InAnOrderOfItsOwn(const Eigen::MatrixXd& samples, std::uint64_t seed) {
-  constexpr Eigen::Index kRows = 64;
+Eigen::MatrixXd ShuffledInBlocks(const Eigen::MatrixXd& samples, std::uint64_t seed) {
   Eigen::MatrixXd shuffled(samples.rows(), samples.cols());
-  for (Eigen::Index first = 0; first < samples.rows(); first += kRows) {
-    const Eigen::Index rows = std::min(kRows, samples.rows() - first);
+  for (Eigen::Index first = 0; first < samples.rows(); first += kBlock) {
+    const Eigen::Index rows = std::min(kBlock, samples.rows() - first);
     const std::vector<Eigen::Index> order =
         Shuffled(rows, PhiloxStream({.seed = seed,
                                      .purpose = StreamPurpose::kDesignOrder,
@@ -86,7 +90,9 @@ absl::StatusOr<Eigen::MatrixXd> FirstSamples(const JointPrior& priors, const Fil
   const bool sequence = options.design == Design::kHalton || options.design == Design::kSobol;
   const double share = std::exp(priors.log_mass());
   Eigen::MatrixXd samples(n, d);
-  int points = sequence && priors.is_constrained() ? static_cast<int>(1.1 * n / share) + 16 : n;
+  int points = sequence && priors.is_constrained()
+                   ? static_cast<int>(kMorePoints * n / share) + kAtLeastMore
+                   : n;
   for (;; points *= 2) {
     ASSIGN_OR_RETURN(const auto design, UnitDesign(options, points, d));
     int filled = 0;
@@ -99,7 +105,7 @@ absl::StatusOr<Eigen::MatrixXd> FirstSamples(const JointPrior& priors, const Fil
       }
       samples.row(filled++) = x;
     }
-    if (filled == n) return InAnOrderOfItsOwn(samples, options.seed);
+    if (filled == n) return ShuffledInBlocks(samples, options.seed);
   }
 }
 

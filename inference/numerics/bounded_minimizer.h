@@ -32,7 +32,7 @@ struct Minimum {
 /// Local minimum in the box lower <= x <= upper by projected BFGS: variables at a bound that the
 /// gradient pushes outwards are held, the quasi-Newton step of the others is cut back at the
 /// bounds, Armijo's rule decides on its length.
-///                               [Bertsekas 1982; Nocedal & Wright 2006, sec. 3.1, 6.1 and 16.7]
+///                                  [Bertsekas 1982; Nocedal & Wright 2006, sec. 3.1, 6.1 and 16.7]
 /// Deterministic; thread safe where `function` is.
 /// in: n entries each, lower <= start <= upper, all finite, function finite at start
 Minimum MinimizeInBox(const SmoothFunction& function, const Eigen::VectorXd& start,

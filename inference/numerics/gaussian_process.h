@@ -60,7 +60,7 @@ class GaussianProcess {
 
   /// Leave-one-out predictions of the n training outputs in closed form:
   ///   error_i = alpha_i / (K^-1)_ii, variance_i = 1 / (K^-1)_ii, alpha = K^-1 outputs
-  ///                                                   [Rasmussen & Williams 2006, Eqs. 5.10-5.12]
+  ///                                                    [Rasmussen & Williams 2006, Eqs. 5.10-5.12]
   const LeaveOneOut& leave_one_out() const { return leave_one_out_; }
   /// Variance of the scatter of a single run, in the square of the output's unit.
   double scatter_variance() const { return scatter_variance_; }

@@ -12,7 +12,7 @@ namespace calib::inference {
 
 /// 0 .. n-1 in an order by chance, every order equally likely. n >= 0. Deterministic in the stream,
 /// of which it takes a copy.
-///                                                        [Fisher & Yates 1938; Durstenfeld 1964]
+///                                                          [Fisher & Yates 1938; Durstenfeld 1964]
 std::vector<Eigen::Index> Shuffled(Eigen::Index n, PhiloxStream stream);
 
 /// The half, 0 or 1, that each of n rows belongs to: rows 2k and 2k+1 are in different halves,

@@ -16,6 +16,10 @@ namespace {
 using Eigen::Index;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Metropolis steps of a stage; chosen: with 15 in ten dimensions the stated error of the evidence
+// is 30 % too small (inference_tmcmc_verification_test, fifty seeds).
+constexpr int kFewestSteps = 10;
+constexpr int kStepsPerParameter = 3;
 
 // Stage 0 holds the draws from the prior; step 0 of a later stage is its resampling.
 PhiloxStream Stream(const TmcmcOptions& options, std::size_t stage, int step, Index row) {
@@ -169,9 +173,8 @@ absl::Status TmcmcOptions::Validate() const {
 }
 
 int StepsPerStage(const TmcmcOptions& options, std::size_t d) {
-  constexpr int kFewest = 10;
-  constexpr int kPerParameter = 3;
-  return options.steps > 0 ? options.steps : std::max(kFewest, kPerParameter * static_cast<int>(d));
+  if (options.steps > 0) return options.steps;
+  return std::max(kFewestSteps, kStepsPerParameter * static_cast<int>(d));
 }
 
 double TmcmcState::LogEvidenceStandardError() const {
