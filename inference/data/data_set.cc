@@ -6,11 +6,16 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 
 namespace calib::inference {
 namespace {
 
 using Group = std::pair<int, int>;  // experiment, observable
+
+// What a covariance may depart from symmetry and from the squares of the stated sd, over those
+// squares; chosen: text files carry nine digits and more.
+constexpr double kAgrees = 1e-9;
 
 std::string Name(const Reading& reading) {
   return absl::StrCat("the reading of experiment ", reading.experiment, ", load step ",
@@ -94,7 +99,7 @@ absl::Status ValidateCovariances(const DataSet& data) {
     }
     for (Eigen::Index i = 0; i < size; ++i) {
       const double sd = data.readings[group->second[i]].sd;
-      if (!(std::abs(matrix(i, i) - sd * sd) <= 1e-9 * sd * sd)) {
+      if (!(std::abs(matrix(i, i) - sd * sd) <= kAgrees * sd * sd)) {
         return absl::InvalidArgumentError(absl::StrCat(name, " has the variance ", matrix(i, i),
                                                        " for reading ", i,
                                                        " whose standard deviation is ", sd, "."));
@@ -102,7 +107,8 @@ absl::Status ValidateCovariances(const DataSet& data) {
     }
     const Eigen::VectorXd sd = matrix.diagonal().cwiseSqrt();
     const Eigen::MatrixXd asymmetry = (matrix - matrix.transpose()).cwiseAbs();
-    if (!matrix.allFinite() || (asymmetry.array() > 1e-9 * (sd * sd.transpose()).array()).any()) {
+    if (!matrix.allFinite() ||
+        (asymmetry.array() > kAgrees * (sd * sd.transpose()).array()).any()) {
       return absl::InvalidArgumentError(absl::StrCat(name, " is not finite and symmetric."));
     }
   }
@@ -227,15 +233,15 @@ absl::Status ValidateData(const DataSet& data, NoiseMode noise) {
           absl::StrCat(Name(reading), " or its control is not a finite number."));
     }
     if (noise == NoiseMode::kEssTarget) {
-      if (auto valid = ValidateEssTarget(data, reading); !valid.ok()) return valid;
+      RETURN_IF_ERROR(ValidateEssTarget(data, reading));
     } else if (!(reading.sd > 0) || !std::isfinite(reading.sd)) {
       return absl::InvalidArgumentError(absl::StrCat(Name(reading), " has the standard deviation ",
                                                      reading.sd, "; it must be positive."));
     }
   }
   if (noise == NoiseMode::kEssTarget) return absl::OkStatus();
-  if (auto valid = ValidateCorrelations(data); !valid.ok()) return valid;
-  if (auto valid = ValidateCovariances(data); !valid.ok()) return valid;
+  RETURN_IF_ERROR(ValidateCorrelations(data));
+  RETURN_IF_ERROR(ValidateCovariances(data));
   return ValidateNoiseGroups(data);
 }
 

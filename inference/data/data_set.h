@@ -1,5 +1,6 @@
 #pragma once
-// The measurements as the inference sees them: a flat vector of readings with Gaussian errors.
+// The measurements as the inference sees them: a flat vector of T readings with Gaussian errors.
+// Plain values; functions of them are pure and thread safe.
 
 #include <Eigen/Core>
 #include <map>
@@ -11,110 +12,127 @@
 
 namespace calib::inference {
 
-/// One measured number. Readings are held in processing order: experiment, load step, observable.
+/// One measured number. Readings are held in processing order: by experiment, load step,
+/// observable.
 struct Reading {
-  int experiment = 0;
-  int observable = 0;  ///< index within the experiment
-  int load_step = 0;
-  /// Path length of the control since the start of loading: distance for the correlation.
+  int experiment = 0;  ///< index, >= 0
+  int observable = 0;  ///< index within the experiment, >= 0
+  int load_step = 0;   ///< index within the experiment, >= 0
+  /// Path length of the control since the start of loading, in the control's unit: what the
+  /// distance between correlated errors is measured in.
   double control = 0;
   double value = 0;
-  double sd = 0;  ///< standard deviation of its error (noise: given) > 0; unused with ess_target
+  /// Standard deviation of the error, in the unit of `value`, > 0; not used with kEssTarget.
+  double sd = 0;
 };
 
-/// Errors of one observable of one experiment are correlated as exp(-|c_i - c_j| / length); 0:
-/// independent.
+/// Correlation of the errors of one observable of one experiment: exp(-|c_i - c_j| / length) for
+/// readings at the controls c_i and c_j.
 struct Correlation {
   int experiment = 0;
   int observable = 0;
-  double length = 0;
+  double length = 0;  ///< > 0, in the control's unit
 };
 
-/// Covariance of the errors of one observable of one experiment, in the place of their correlation
-/// length: n x n for its n readings in processing order, in the square of their unit; the sd of
-/// each reading is the root of its diagonal.
+/// Covariance of the errors of one observable of one experiment, given in full in the place of a
+/// correlation length.
 struct GroupCovariance {
   int experiment = 0;
   int observable = 0;
+  /// n x n for the n readings of the observable in processing order, in the square of their unit;
+  /// the square of each reading's sd is its diagonal.
   Eigen::MatrixXd matrix;
 };
 
-/// Prior of the variance factor f of noise: inferred, inverse gamma:
-///   p(f) = rate^shape / Gamma(shape) f^(-shape-1) exp(-rate / f),  shape > 0, rate > 0.
+/// Inverse gamma prior of the factor f by which inferred noise multiplies the stated variances:
+///   p(f) = rate^shape / Gamma(shape) f^(-shape-1) exp(-rate / f).
 /// The default weighs as much as one reading that lies one stated sd off: the stated sd is trusted
 /// within a factor of a few (f in [0.26, 254] with 90 %), and a handful of readings overrules it.
 struct VarianceFactorPrior {
-  double shape = 0.5;
-  double rate = 0.5;
+  double shape = 0.5;  ///< > 0
+  double rate = 0.5;   ///< > 0
 };
 
-/// Readings whose errors share one variance factor [Hadjidoukas 2014, sec. 2.3]: those of each
-/// (experiment, observable) named.
+/// Readings whose errors share one variance factor: those of each (experiment, observable) named.
+///                                                                     [Hadjidoukas 2014, sec. 2.3]
 struct NoiseGroup {
   std::vector<std::pair<int, int>> members;  ///< (experiment, observable), at least one
   VarianceFactorPrior prior = {};
 };
 
+/// How large the errors of the readings are taken to be.
 enum class NoiseMode {
-  kGiven,  ///< the sd of each reading
-  /// sd of each reading times sqrt(f), one variance factor f per noise group, marginalised over its
-  /// prior (gaussian_likelihood.h).
+  /// Their stated standard deviations.
+  kGiven,
+  /// The stated standard deviations times sqrt(f), one variance factor f per noise group,
+  /// integrated
+  /// out over its prior (gaussian_likelihood.h).
   kInferred,
-  /// Sigma = sigma w_j y^2, sigma from the effective sample size [Cheng 2019, sec. 3.4]; a
-  /// tempering, not an estimate.
+  /// Variances sigma w_j y^2 of a reading y of observable j, independent, with the sigma that
+  /// leaves
+  /// a wanted share of the samples effective: a tempering, not an estimate.
+  ///                                                                         [Cheng 2019, sec. 3.4]
   kEssTarget,
 };
 
+/// The readings of all experiments with what is stated of their errors.
 struct DataSet {
-  std::vector<Reading> readings;
-  std::vector<Correlation> correlations;     ///< only those with length > 0
-  std::vector<GroupCovariance> covariances;  ///< of groups that have one
-  /// Of kInferred; an (experiment, observable) that stands in none has a factor of its own.
+  std::vector<Reading> readings;             ///< T, in processing order
+  std::vector<Correlation> correlations;     ///< observables without one: independent errors
+  std::vector<GroupCovariance> covariances;  ///< each in the place of sd and correlation
+  /// For NoiseMode::kInferred: who shares a factor; an (experiment, observable) that stands in no
+  /// group has a factor of its own.
   std::vector<NoiseGroup> noise_groups = {};
-  /// w_j of kEssTarget, indexed [experiment][observable]; multiplies the variance. Empty: all one.
+  /// For NoiseMode::kEssTarget: w_j, indexed [experiment][observable]; it multiplies the variance.
+  /// Empty: all one.
   std::vector<std::vector<double>> ess_weights;
 };
 
-/// INVALID_ARGUMENT with one sentence: no readings, negative index, value or control that is not
-/// finite, sd that is not positive (value zero with kEssTarget), correlation length that is not
-/// positive or given twice, correlated readings at one and the same control, a covariance that is
-/// not symmetric, does not fit its readings or stands beside another one or a correlation length,
-/// a noise group without members or with one that stands in another, a factor's prior whose shape
-/// or rate is not positive, ess_weights that are not positive or missing for an observable.
+/// Whether the data can be used with this noise. Errors: INVALID_ARGUMENT with one sentence: no
+/// readings, negative index, value or control that is not finite, sd that is not positive (value
+/// zero with kEssTarget), correlation length that is not positive or given twice, correlated
+/// readings at one and the same control, a covariance that is not symmetric, does not fit its
+/// readings or stands beside another one or a correlation length, a noise group without members or
+/// with one that stands in another, a factor's prior whose shape or rate is not positive,
+/// ess_weights that are not positive or missing for an observable.
 absl::Status ValidateData(const DataSet& data, NoiseMode noise);
 
 /// Indices of the readings of each (experiment, observable), in processing order.
 using ReadingGroups = std::map<std::pair<int, int>, std::vector<int>>;
+
+/// The readings of `data` by (experiment, observable).
 ReadingGroups GroupsOf(const DataSet& data);
 
 /// All groups of readings that share a variance factor: those of data.noise_groups and one for
-/// every other (experiment, observable); members without readings left out, members and groups in
-/// ascending order of (experiment, observable), the group by its first member.
+/// every other (experiment, observable). Members without readings are left out; members, and groups
+/// by their first member, are in ascending order of (experiment, observable).
 std::vector<NoiseGroup> NoiseGroupsOf(const DataSet& data);
 
-/// True where the errors of a group are correlated.
+/// True where the errors of a group, an (experiment, observable), have a correlation length or a
+/// covariance.
 bool IsCorrelated(const DataSet& data, std::pair<int, int> group);
 
 /// Covariance matrix of the errors of all readings, T x T, in the square of their units.
 Eigen::MatrixXd ErrorCovariance(const DataSet& data);
 
-/// Correlation matrix of the errors of a group's readings: the identity, exp(-distance / length) or
-/// that of its covariance.
+/// Correlation matrix of the errors of the n readings of a group, an (experiment, observable), n x
+/// n: the identity, exp(-|c_i - c_j| / length) or that of its covariance. readings: the group's, as
+/// GroupsOf gives them.
 Eigen::MatrixXd ErrorCorrelation(const DataSet& data, std::pair<int, int> group,
                                  const std::vector<int>& readings);
 
-/// Some of the readings, ascending indices, with the errors that go with them.
+/// The data with some of the readings alone, ascending indices, and the errors that go with them.
 DataSet Restricted(const DataSet& data, const std::vector<int>& readings);
 
-/// The same readings in reversed processing order.
+/// The data with the readings in reversed processing order.
 DataSet Reversed(const DataSet& data);
 
-/// The same readings with every error `factor` times as large and correlated as before. factor > 0.
+/// The data with every error `factor` > 0 times as large and correlated as before.
 DataSet WithLargerErrors(const DataSet& data, double factor);
 
-/// The same readings with independent errors of variance sigma w_j y^2, the Sigma of kEssTarget, so
-/// that the likelihood of kGiven serves both. sigma > 0; multiplies the variance. Needs
-/// ValidateData(data, kEssTarget).
+/// The data with independent errors of variance sigma w_j y^2 in the place of the stated ones,
+/// those of NoiseMode::kEssTarget, so that a likelihood by kGiven serves that mode too. sigma > 0.
+/// Needs data that ValidateData accepts with kEssTarget.
 DataSet WithRelativeErrors(const DataSet& data, double sigma);
 
 }  // namespace calib::inference

@@ -11,67 +11,74 @@
 namespace calib::inference {
 
 /// What the earlier readings leave open of a reading: the share of its error's variance that they
-/// do not explain, the pivot of the correlation matrix in the order of readings.
+/// do not explain, the squared pivot of the correlation matrix in the order of readings.
 struct OpenShare {
-  Eigen::Index reading = 0;
-  double share = 1;
+  Eigen::Index reading = 0;  ///< its index
+  double share = 1;          ///< (0, 1], or less where rounding leaves nothing
 };
-/// A likelihood needs more than this of each.
+
+/// The share of each reading's error variance that the earlier readings must leave open for a
+/// likelihood. Chosen: some hundred machine epsilons, below which the share is rounding.
 inline constexpr double kLeastOpenShare = 1e-13;
 
-/// The first reading of which no more than kLeastOpenShare is left open, else the one of which the
-/// least is.
-/// in: covariance, symmetric, its diagonal positive, at least one reading
+/// The first reading of which the earlier ones leave no more than kLeastOpenShare open, else the
+/// one of which they leave the least. Pure. in: covariance T x T of the readings' errors,
+/// symmetric, its diagonal positive, T >= 1
 OpenShare LeastOpenShare(const Eigen::MatrixXd& covariance);
 
-/// ln p(y | x) of readings y given predictions x, one independent block per (experiment,
+/// ln p(y | x) of T readings y given predictions x, one independent block per (experiment,
 /// observable) group g:
-///   kGiven:    N(y_g; x_g, S_g),  S_ij = sd_i sd_j exp(-|c_i - c_j| / length),
+///   kGiven:    N(y_g; x_g, S_g),  S_ij = sd_i sd_j exp(-|c_i - c_j| / length) or as given in full,
 ///              with the proper |2 pi S|^(-1/2)
-///   kInferred: the same with f S_g, f common to the groups of a NoiseGroup and integrated out over
-///              its VarianceFactorPrior: a multivariate t density
+///   kInferred: N(y_g; x_g, f S_g) with f common to the groups of a NoiseGroup and integrated out
+///              over its VarianceFactorPrior: a multivariate t density
 /// Written with S = L L^T and z = L^-1 (y - x), reading k of a group contributes a function of z_0
 /// ... z_k alone (kInferred: of the noise group), its density conditional on the earlier readings.
 /// Summed along the processing order the increments are the exact density after every reading,
-/// whatever the order [Cheng 2019, Eq. 14 and 15, normaliser corrected]. Errors that are correlated
-/// exponentially along a control that only grows (or falls) are a Markov chain: z_k needs the
-/// reading before alone, and the cost is O(T); a covariance given in full costs O(T^2) a sample.
-/// Thread safety: const after Create.
+/// whatever the order [Cheng 2019, Eqs. 14 and 15, normaliser corrected]. Errors that are
+/// correlated exponentially along a control that only grows (or falls) are a Markov chain: z_k
+/// needs the reading before alone, and the cost is O(T); a covariance given in full costs O(T^2) a
+/// sample. A row of predictions gives the same bits whatever other rows there are. Immutable after
+/// Create; thread safety: const.
 class GaussianLikelihood {
  public:
-  /// noise: kGiven or kInferred (kEssTarget: pass WithRelativeErrors(data, sigma) and kGiven).
-  /// Errors: INVALID_ARGUMENT from ValidateData, or when correlated readings lie so close that
-  /// their covariance is singular.
+  /// The likelihood of `data`, of which it keeps no reference. noise: kGiven or kInferred (for
+  /// kEssTarget pass WithRelativeErrors(data, sigma) and kGiven). Errors: INVALID_ARGUMENT from
+  /// ValidateData, or when correlated readings lie so close that their covariance is singular.
   static absl::StatusOr<GaussianLikelihood> Create(const DataSet& data, NoiseMode noise);
 
-  int readings() const { return readings_; }
+  int readings() const { return readings_; }  ///< T
 
-  /// N x T increments from N x T predictions. From the first prediction of an (experiment,
-  /// observable) that is not finite on, its increments are NaN.
+  /// ln p(y_t | earlier readings, x) of each reading t for each row of N x T predictions; N x T.
+  /// NaN from the first prediction of an (experiment, observable) on that is not finite.
   Eigen::MatrixXd Increments(const Eigen::MatrixXd& predictions) const;
 
-  /// Sum of each row of increments in the order of readings, N; -inf where one is NaN.
+  /// Sum of each row of N x T increments in the order of readings, N entries; -infinity where one
+  /// is NaN.
   static Eigen::VectorXd Sum(const Eigen::MatrixXd& increments);
 
-  /// ln p(y | x) of each row, N; -inf where any prediction is not finite (a diverged sample).
+  /// ln p(y | x) of each row of N x T predictions, N entries; -infinity where any prediction is not
+  /// finite (a diverged sample).
   Eigen::VectorXd LogLikelihood(const Eigen::MatrixXd& predictions) const;
 
-  /// ln p of the readings reached so far: those of each group before its first prediction that is
-  /// not finite. N.
+  /// ln p of the readings reached so far, those of each (experiment, observable) before its first
+  /// prediction that is not finite, for each row of N x T predictions; N entries.
   Eigen::VectorXd ReachedLogLikelihood(const Eigen::MatrixXd& predictions) const;
 
-  /// The largest value LogLikelihood can still take once the predictions that are not finite yet
-  /// arrive: those of a group from the first missing one on have zero residual given its past,
-  /// z = 0. N. Sound because each increment is largest at z = 0, and with kInferred the marginal
-  /// falls with every z^2.
+  /// The largest value LogLikelihood can still take for each row of N x T predictions once those
+  /// that are not finite yet arrive; N entries. Readings of an (experiment, observable) from the
+  /// first missing one on are given zero residual given its past, z = 0: each increment is largest
+  /// there, and with kInferred the marginal falls with every z^2.
   Eigen::VectorXd LogLikelihoodBound(const Eigen::MatrixXd& predictions) const;
 
-  /// kInferred: given x the variance factor of noise group g (NoiseGroupsOf) is inverse gamma of
-  /// shape shapes[g] and rate rates(i, g). NaN rates where a prediction is not finite.
+  /// Posterior of the variance factors of G noise groups (NoiseGroupsOf), given each of N rows of
+  /// predictions: that of group g is inverse gamma of shape shapes[g] and rate rates(i, g).
   struct FactorPosterior {
     Eigen::VectorXd shapes;  ///< G
-    Eigen::MatrixXd rates;   ///< N x G
+    Eigen::MatrixXd rates;   ///< N x G; NaN where a prediction is not finite
   };
+  /// The posterior of the variance factors for N x T predictions. For kInferred alone; no groups
+  /// (G = 0) with kGiven.
   FactorPosterior VarianceFactors(const Eigen::MatrixXd& predictions) const;
 
  private:
@@ -80,8 +87,8 @@ class GaussianLikelihood {
     std::vector<int> readings;  // indices in processing order
     RowMajor cholesky;          // L, lower; empty: independent errors or a chain
   };
-  /// Of independent errors and chains: L^-1 has entries for a reading and the one before it alone,
-  /// z = (r - carried r_previous) / pivot for residuals r.
+  // How a reading with independent errors or of a chain is whitened: L^-1 has entries for it and
+  // the one before it alone, z = (r - carried r_previous) / pivot for residuals r.
   struct Link {
     int previous = -1;  // reading; -1: none
     double carried = 0;

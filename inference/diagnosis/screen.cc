@@ -8,6 +8,7 @@
 #include <numeric>
 #include <set>
 
+#include "calib/return_if_error.h"
 #include "inference/diagnosis/drawn_tail.h"
 #include "inference/diagnosis/fall_tail.h"
 #include "inference/diagnosis/whitened.h"
@@ -142,10 +143,9 @@ double IndependentJudgements(const Eigen::MatrixXd& squares, const std::vector<D
 }  // namespace
 
 absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
-  const auto whitened = Whiten(model);
-  if (!whitened.ok()) return whitened.status();
+  ASSIGN_OR_RETURN(const auto whitened, Whiten(model));
   Adequacy adequacy;
-  adequacy.chi2 = whitened->squares.minCoeff(&adequacy.best);
+  adequacy.chi2 = whitened.squares.minCoeff(&adequacy.best);
   if (model.draws.rows() == 0) {
     adequacy.degrees = static_cast<double>(model.histories.readings() - model.parameters);
     adequacy.p_chi2 =
@@ -158,11 +158,10 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
       return absl::InvalidArgumentError("diagnosis: shapes do not fit the histories");
     }
   }
-  const auto groups = DrawsOf(model);
-  if (!groups.ok()) return groups.status();
+  ASSIGN_OR_RETURN(const auto groups, DrawsOf(model));
   // Of each draw: chi-squared, and that of the residual's part in the span of each set of shapes.
   Eigen::MatrixXd squares(model.draws.rows(), static_cast<Index>(1 + model.shapes.size()));
-  for (const DrawnGroup& group : *groups) {
+  for (const DrawnGroup& group : groups) {
     const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.Point(adequacy.best);
     const Nearest nearest = NearestTo(group.model, offsets);
     squares(group.number, 0) = nearest.squares;
@@ -186,9 +185,9 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
   }
   adequacy.degrees = tails.front().mean();
   adequacy.p_chi2 = tails.front()(adequacy.chi2);
-  const Eigen::VectorXd residual = whitened->Point(adequacy.best);
+  const Eigen::VectorXd residual = whitened.Point(adequacy.best);
   for (std::size_t k = 0; k < model.shapes.size(); ++k) {
-    const double square = (SpanOf(model.shapes[k], *whitened).transpose() * residual).squaredNorm();
+    const double square = (SpanOf(model.shapes[k], whitened).transpose() * residual).squaredNorm();
     adequacy.p_shapes = std::min(adequacy.p_shapes.value_or(1), tails[k + 1](square));
   }
   adequacy.p_value = std::min(1.0, IndependentJudgements(squares, tails) *
@@ -197,9 +196,8 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
 }
 
 absl::StatusOr<std::vector<Index>> PointsNotExcluded(const FittedModel& model, int count) {
-  const auto whitened = Whiten(model);
-  if (!whitened.ok()) return whitened.status();
-  const Eigen::VectorXd& squares = whitened->squares;
+  ASSIGN_OR_RETURN(const auto whitened, Whiten(model));
+  const Eigen::VectorXd& squares = whitened.squares;
   std::vector<Index> near(static_cast<std::size_t>(squares.size()));
   std::iota(near.begin(), near.end(), Index{0});
   const double most =
@@ -222,12 +220,9 @@ double ExplainableMisfit(const Adequacy& base) {
 absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
                                           const std::vector<Signature>& candidates,
                                           const ScreenOptions& options) {
-  const auto whitened = Whiten(model);
-  if (!whitened.ok()) return whitened.status();
-  const auto adequacy = TestAdequacy(model);
-  if (!adequacy.ok()) return adequacy.status();
-  const auto groups = DrawsOf(model);
-  if (!groups.ok()) return groups.status();
+  ASSIGN_OR_RETURN(const auto whitened, Whiten(model));
+  ASSIGN_OR_RETURN(const auto adequacy, TestAdequacy(model));
+  ASSIGN_OR_RETURN(const auto groups, DrawsOf(model));
   const Index t = model.histories.readings();
   for (const Signature& candidate : candidates) {
     for (const Eigen::VectorXd& difference : candidate.differences) {
@@ -236,13 +231,13 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
       }
     }
   }
-  const std::vector<std::vector<Direction>> directions = DirectionsOf(candidates, *whitened);
+  const std::vector<std::vector<Direction>> directions = DirectionsOf(candidates, whitened);
   // Measurements of the fitted model itself.
-  const Eigen::VectorXd fitted = whitened->Point(adequacy->best);
+  const Eigen::VectorXd fitted = whitened.Point(adequacy.best);
   std::vector<std::vector<double>> simulated(candidates.size());
   const auto simulate = [&](const Whitened& own, const std::vector<std::vector<Direction>>& along,
                             const Eigen::VectorXd& drawn) {
-    const Eigen::VectorXd offset = drawn - own.Point(adequacy->best);
+    const Eigen::VectorXd offset = drawn - own.Point(adequacy.best);
     const Eigen::VectorXd distances = DistancesFrom(own, offset);
     const double base = distances.minCoeff();
     for (std::size_t c = 0; c < candidates.size(); ++c) {
@@ -251,22 +246,22 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
                                         .chi2);
     }
   };
-  for (const DrawnGroup& group : *groups) {
+  for (const DrawnGroup& group : groups) {
     const std::vector<std::vector<Direction>> along = DirectionsOf(candidates, group.model);
     for (Index k = 0; k < group.draws.cols(); ++k) simulate(group.model, along, group.draws.col(k));
   }
-  for (int s = 0; groups->empty() && s < options.simulations; ++s) {
+  for (int s = 0; groups.empty() && s < options.simulations; ++s) {
     PhiloxStream stream({.seed = options.seed,
                          .purpose = StreamPurpose::kDiagnosisNull,
                          .iteration = 0,
                          .sample = static_cast<std::uint64_t>(s)});
     Eigen::VectorXd drawn(t);
     for (Index k = 0; k < t; ++k) drawn[k] = stream.Normal();
-    simulate(*whitened, directions, drawn);
+    simulate(whitened, directions, drawn);
   }
   std::vector<Score> scores;
   std::vector<Eigen::VectorXd> visible;  // what no choice of the parameters imitates
-  const double excess = ExplainableMisfit(*adequacy);
+  const double excess = ExplainableMisfit(adequacy);
   // In sd along a direction: either sign of every difference of every candidate is a chance.
   const auto reach = [&](std::size_t differences) {
     const auto chances = static_cast<double>(candidates.size() * differences);
@@ -274,10 +269,10 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
   };
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     Score score{.name = candidates[c].name};
-    const Fit fit = BestFit(directions[c], whitened->squares, nullptr, candidates[c].two_sided,
+    const Fit fit = BestFit(directions[c], whitened.squares, nullptr, candidates[c].two_sided,
                             options.max_amplitude);
     if (std::isfinite(fit.chi2)) {
-      score.gain = std::max(0.0, adequacy->chi2 - fit.chi2);
+      score.gain = std::max(0.0, adequacy.chi2 - fit.chi2);
       score.amplitude = fit.amplitude;
       score.difference = fit.difference;
       score.explained = std::clamp(score.gain / excess, 0.0, 1.0);
@@ -294,8 +289,8 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
     for (const Direction& direction : directions[c]) {
       // The point that imitates the effect best, seen from the fitted one.
       Index imitation = 0;
-      (whitened->squares - 2 * Along(*whitened, fitted + direction.whitened)).minCoeff(&imitation);
-      rests.emplace_back(fitted + direction.whitened - whitened->Point(imitation));
+      (whitened.squares - 2 * Along(whitened, fitted + direction.whitened)).minCoeff(&imitation);
+      rests.emplace_back(fitted + direction.whitened - whitened.Point(imitation));
     }
     const auto longest = std::max_element(
         rests.begin(), rests.end(),
@@ -303,7 +298,7 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
     const Eigen::VectorXd strongest = rests.empty() ? Eigen::VectorXd::Zero(t) : *longest;
     const double length = strongest.norm();
     visible.push_back(length > 0 ? Eigen::VectorXd(strongest / length) : strongest);
-    const double sd = std::sqrt(VarianceAlong(visible.back(), *whitened, *groups));
+    const double sd = std::sqrt(VarianceAlong(visible.back(), whitened, groups));
     const double square = SquareOfEffect(rests, candidates[c].strengths, length);
     score.detectable = square > 0 ? reach(rests.size()) * sd / std::sqrt(square)
                                   : std::numeric_limits<double>::infinity();
@@ -327,7 +322,7 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
       scores[a].angles[scores[b].name] = angle;
       const double sine = std::sin(angle * std::numbers::pi / 180);
       const double left = sine * sine * std::max(scores[a].gain, scores[b].gain);
-      if (angle < kClose && left < kToldApart * adequacy->degrees) {
+      if (angle < kClose && left < kToldApart * adequacy.degrees) {
         scores[a].confusable_with.push_back(scores[b].name);
       }
     }
@@ -344,27 +339,25 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
 }
 
 absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedModel& extended) {
-  const auto whitened = Whiten(base);
-  if (!whitened.ok()) return whitened.status();
+  ASSIGN_OR_RETURN(const auto whitened, Whiten(base));
   if (base.draws.rows() == 0 || extended.parameters <= base.parameters ||
       extended.histories.readings() != base.histories.readings() ||
       extended.histories.points() < 1 || !extended.histories.AllFinite()) {
     return absl::InvalidArgumentError(
         "diagnosis: a gain needs draws of the base model and an extension of it");
   }
-  const auto groups = DrawsOf(base);
-  if (!groups.ok()) return groups.status();
+  ASSIGN_OR_RETURN(const auto groups, DrawsOf(base));
   Index best = 0;
-  const double chi2 = whitened->squares.minCoeff(&best);
+  const double chi2 = whitened.squares.minCoeff(&best);
   std::vector<double> gains;
-  for (const DrawnGroup& group : *groups) {
+  for (const DrawnGroup& group : groups) {
     const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.Point(best);
     const Eigen::VectorXd own =
         NearestTo(group.model, offsets).squares -
         NearestTo(WhitenBy(group.model.factor, extended.histories), offsets).squares;
     for (const double gain : own) gains.push_back(std::max(0.0, gain));
   }
-  const Whitened larger = WhitenBy(whitened->factor, extended.histories);
+  const Whitened larger = WhitenBy(whitened.factor, extended.histories);
   return ChanceOfFall(std::max(0.0, chi2 - larger.squares.minCoeff()),
                       {.simulated = std::move(gains),
                        .freedom = std::max(1, extended.parameters - base.parameters),
@@ -375,12 +368,11 @@ absl::StatusOr<double> SignificanceOfGain(const FittedModel& base, const FittedM
 absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, int block) {
   std::vector<Eigen::VectorXd> terms;  // minus log density, reading given the earlier ones
   for (const FittedModel* model : {&a, &b}) {
-    const auto whitened = Whiten(*model);
-    if (!whitened.ok()) return whitened.status();
+    ASSIGN_OR_RETURN(const auto whitened, Whiten(*model));
     Index best = 0;
-    whitened->squares.minCoeff(&best);
-    const Eigen::MatrixXd lower = whitened->factor->matrixL();
-    terms.emplace_back(0.5 * whitened->Point(best).array().square() +
+    whitened.squares.minCoeff(&best);
+    const Eigen::MatrixXd lower = whitened.factor->matrixL();
+    terms.emplace_back(0.5 * whitened.Point(best).array().square() +
                        lower.diagonal().array().log());
   }
   if (terms[0].size() != terms[1].size() || block < 1) {
@@ -424,13 +416,11 @@ absl::StatusOr<double> LeftOutError(const FittedModel& model, const std::vector<
     std::vector<Index> others;
     for (Index k = 0; k < t; ++k)
       (group[static_cast<std::size_t>(k)] == one ? own : others).push_back(k);
-    const auto fitted = Whiten(at(others));
-    if (!fitted.ok()) return fitted.status();
-    const auto judged = Whiten(at(own));
-    if (!judged.ok()) return judged.status();
+    ASSIGN_OR_RETURN(const auto fitted, Whiten(at(others)));
+    ASSIGN_OR_RETURN(const auto judged, Whiten(at(own)));
     Index best = 0;
-    fitted->squares.minCoeff(&best);
-    sum += judged->squares[best];
+    fitted.squares.minCoeff(&best);
+    sum += judged.squares[best];
   }
   return std::sqrt(sum / static_cast<double>(t));
 }

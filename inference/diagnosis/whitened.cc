@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "calib/return_if_error.h"
 #include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
@@ -77,14 +78,13 @@ absl::StatusOr<std::vector<DrawnGroup>> DrawsOf(const FittedModel& model) {
   }
   for (std::size_t g = 0; g < numbers.size(); ++g) {
     if (numbers[g].empty()) continue;
-    auto whitened = WhitenByCovariance(model.without.empty() ? model.covariance : model.without[g],
-                                       model.histories);
-    if (!whitened.ok()) return whitened.status();
+    ASSIGN_OR_RETURN(auto whitened,
+                     WhitenByCovariance(model.without.empty() ? model.covariance : model.without[g],
+                                        model.histories));
     const Eigen::MatrixXd own = model.draws(numbers[g], Eigen::all).transpose();
-    Eigen::MatrixXd draws = LowerSolved(*whitened->factor, own);
-    groups.push_back({.model = *std::move(whitened),
-                      .number = std::move(numbers[g]),
-                      .draws = std::move(draws)});
+    Eigen::MatrixXd draws = LowerSolved(*whitened.factor, own);
+    groups.push_back(
+        {.model = std::move(whitened), .number = std::move(numbers[g]), .draws = std::move(draws)});
   }
   return groups;
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
@@ -84,7 +85,7 @@ Eigen::MatrixXd Discrepancy::Kernel(const Basis& basis, int curve, const Eigen::
 
 absl::StatusOr<Discrepancy> Discrepancy::Fit(std::vector<DiscrepancyCurve> curves,
                                              const DiscrepancyOptions& options) {
-  if (auto status = Check(curves, options); !status.ok()) return status;
+  RETURN_IF_ERROR(Check(curves, options));
   Discrepancy fit;
   Index n = 0;
   double travelled = 0;

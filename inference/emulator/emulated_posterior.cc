@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "calib/return_if_error.h"
 #include "inference/data/gaussian_likelihood.h"
 #include "inference/emulator/emulated_likelihood.h"
 #include "inference/emulator/emulated_path.h"
@@ -193,16 +194,14 @@ absl::Status AddPaths(const EmulatedTarget& target, const EmulatedLikelihood& li
                                  .seed = options.seed};
   auto forward = EmulatedPath(target, likelihood, data, path, stop);
   if (absl::IsFailedPrecondition(forward.status())) return absl::OkStatus();
-  if (!forward.ok()) return forward.status();
-  result.path = *std::move(forward);
+  ASSIGN_OR_RETURN(result.path, std::move(forward));
   if (!options.reversed_path) return absl::OkStatus();
   const DataSet reversed = Reversed(data);
-  const auto of_reversed = EmulatedLikelihood::Create(
-      reversed, emulator, {.scatter_share = options.training.scatter_share, .reversed = true});
-  if (!of_reversed.ok()) return of_reversed.status();
-  auto backward = EmulatedPath(target, *of_reversed, reversed, path, stop);
-  if (!backward.ok()) return backward.status();
-  result.reversed_path = *std::move(backward);
+  ASSIGN_OR_RETURN(
+      const auto of_reversed,
+      EmulatedLikelihood::Create(
+          reversed, emulator, {.scatter_share = options.training.scatter_share, .reversed = true}));
+  ASSIGN_OR_RETURN(result.reversed_path, EmulatedPath(target, of_reversed, reversed, path, stop));
   return absl::OkStatus();
 }
 
@@ -273,7 +272,7 @@ absl::Status EmulatorOptions::Validate() const {
         "no emulated posterior; "
         "give the noise or let it be inferred.");
   }
-  if (auto valid = training.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(training.Validate());
   if (replicates && replicates->departures.rows() < 2) {
     return wrong("replicates", static_cast<double>(replicates->departures.rows()), "2 or more");
   }
@@ -294,20 +293,18 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
                                                  const EmulatorOptions& options,
                                                  std::span<const Iteration> iterations,
                                                  const std::stop_token& stop) {
-  if (auto valid = options.Validate(); !valid.ok()) return valid;
-  if (auto valid = ValidateData(data, options.noise); !valid.ok()) return valid;
-  if (auto valid = priors.Validate(); !valid.ok()) return valid;
-  const auto runs = CollectRuns(priors, data, iterations);
-  if (!runs.ok()) return runs.status();
-  const auto trained = TrainEmulator(*runs, data, options.training);
-  if (!trained.ok()) return trained.status();
-  const auto likelihood = EmulatedLikelihood::Create(
-      data, trained->emulator, {.scatter_share = options.training.scatter_share});
-  if (!likelihood.ok()) return likelihood.status();
+  RETURN_IF_ERROR(options.Validate());
+  RETURN_IF_ERROR(ValidateData(data, options.noise));
+  RETURN_IF_ERROR(priors.Validate());
+  ASSIGN_OR_RETURN(const auto runs, CollectRuns(priors, data, iterations));
+  ASSIGN_OR_RETURN(const auto trained, TrainEmulator(runs, data, options.training));
+  ASSIGN_OR_RETURN(const auto likelihood,
+                   EmulatedLikelihood::Create(data, trained.emulator,
+                                              {.scatter_share = options.training.scatter_share}));
 
   const auto d = static_cast<Index>(priors.size());
   int known = 0;  // points sampled where the emulator knows the model's history
-  const EmulatedTarget target(priors, data, options.noise, options.max_error, trained->emulator,
+  const EmulatedTarget target(priors, data, options.noise, options.max_error, trained.emulator,
                               iterations);
   const TmcmcOptions sampler{.samples = options.draws,
                              .target_cv = options.target_cv,
@@ -317,7 +314,7 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
       target.prior(), sampler,
       [&](const Eigen::MatrixXd& points) {
         const EmulatedPoints at = target.At(points);
-        Eigen::VectorXd values = likelihood->LogLikelihood(at.prediction, at.factors);
+        Eigen::VectorXd values = likelihood.LogLikelihood(at.prediction, at.factors);
         for (Index i = 0; i < values.size(); ++i) {
           if (target.IsKnown(at.unknown[i])) {
             ++known;
@@ -330,9 +327,9 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
       stop);
   // The sampler needs two to begin with.
   if (!state.ok() && known < 2 && absl::IsFailedPrecondition(state.status())) {
-    return KnowsNothing(options, *trained);
+    return KnowsNothing(options, trained);
   }
-  if (!state.ok()) return state.status();
+  RETURN_IF_ERROR(state.status());
 
   EmulatedResult result;
   result.draws = target.Complete(state->samples);
@@ -342,11 +339,11 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   const Eigen::MatrixXd factors = target.Factors(state->samples);
   const double unknown = target.Unknown(prediction.sd, factors).sum();
   if (options.noise == NoiseMode::kGiven) {
-    result.predictive_p = PredictiveP(*likelihood, prediction, data.readings.size(), options.known);
-    result.stage_p = StageP(*likelihood, prediction, options.stages);
+    result.predictive_p = PredictiveP(likelihood, prediction, data.readings.size(), options.known);
+    result.stage_p = StageP(likelihood, prediction, options.stages);
   }
   if (options.replicates && options.noise == NoiseMode::kGiven) {
-    Widen(priors, data, options, trained->emulator, prediction, target.free(), result);
+    Widen(priors, data, options, trained.emulator, prediction, target.free(), result);
     prediction = target.Predict(result.draws);
   }
   const Index n = result.draws.rows();
@@ -381,18 +378,15 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
       variance[static_cast<Index>(k)] = result.variance_factors[target.group()[k]];
     }
   }
-  StateErrors(*trained, variance, result);
+  StateErrors(trained, variance, result);
   result.emulator_sd =
       std::sqrt(unknown / (static_cast<double>(n) * static_cast<double>(data.readings.size())));
-  result.misfit = MisfitOf(trained->emulator, prediction);
-  AddScatter(data, trained->emulator, result);
-  AddPredictive(data, trained->emulator, prediction, options.seed, result);
+  result.misfit = MisfitOf(trained.emulator, prediction);
+  AddScatter(data, trained.emulator, result);
+  AddPredictive(data, trained.emulator, prediction, options.seed, result);
   Judge(options, result);
   if (options.path_draws > 0 && result.adequate) {
-    if (auto along = AddPaths(target, *likelihood, data, trained->emulator, options, stop, result);
-        !along.ok()) {
-      return along;
-    }
+    RETURN_IF_ERROR(AddPaths(target, likelihood, data, trained.emulator, options, stop, result));
   }
   return result;
 }

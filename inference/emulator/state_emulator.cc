@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "calib/return_if_error.h"
 #include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
@@ -31,9 +32,8 @@ absl::StatusOr<StateEmulator> StateEmulator::Fit(const Eigen::MatrixXd& inputs,
         "there is nothing to emulate.");
   }
   for (Index k = 0; k < emulator.scores_.cols(); ++k) {
-    auto process = GaussianProcess::Fit(inputs, emulator.scores_.col(k));
-    if (!process.ok()) return process.status();
-    emulator.processes_.push_back(*std::move(process));
+    ASSIGN_OR_RETURN(auto process, GaussianProcess::Fit(inputs, emulator.scores_.col(k)));
+    emulator.processes_.push_back(std::move(process));
   }
   emulator.CrossValidate(histories, relevant);
   return emulator;

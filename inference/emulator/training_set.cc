@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/emulator/emulated_likelihood.h"
 
 namespace calib::inference {
@@ -55,24 +56,24 @@ absl::StatusOr<Trained> Train(const Runs& runs, std::vector<Index> rows,
     const auto found = std::lower_bound(rows.begin(), rows.end(), row);
     if (found != rows.end() && *found == row) positions.push_back(found - rows.begin());
   }
-  auto emulator =
-      StateEmulator::Fit(Rows(runs.inputs, rows), Rows(runs.histories, rows), positions, options);
-  if (!emulator.ok()) return emulator.status();
-  return Trained{.emulator = *std::move(emulator), .rows = std::move(rows)};
+  ASSIGN_OR_RETURN(
+      auto emulator,
+      StateEmulator::Fit(Rows(runs.inputs, rows), Rows(runs.histories, rows), positions, options));
+  return Trained{.emulator = std::move(emulator), .rows = std::move(rows)};
 }
 
 // Log likelihood of every run's parameters by its emulated history: left out where the run was
 // learned from.
 absl::StatusOr<Eigen::VectorXd> EmulatedScores(const Runs& runs, const DataSet& data,
                                                const Trained& trained, double scatter_share) {
-  const auto likelihood =
-      EmulatedLikelihood::Create(data, trained.emulator, {.scatter_share = scatter_share});
-  if (!likelihood.ok()) return likelihood.status();
+  ASSIGN_OR_RETURN(
+      const auto likelihood,
+      EmulatedLikelihood::Create(data, trained.emulator, {.scatter_share = scatter_share}));
   const Eigen::MatrixXd one_factor;
   Eigen::VectorXd scores =
-      likelihood->LogLikelihood(trained.emulator.Predict(runs.inputs), one_factor);
+      likelihood.LogLikelihood(trained.emulator.Predict(runs.inputs), one_factor);
   const Eigen::VectorXd left_out =
-      likelihood->LogLikelihood(trained.emulator.PredictLeftOut(), one_factor);
+      likelihood.LogLikelihood(trained.emulator.PredictLeftOut(), one_factor);
   for (std::size_t i = 0; i < trained.rows.size(); ++i)
     scores[trained.rows[i]] = left_out[static_cast<Index>(i)];
   return scores;
@@ -82,15 +83,14 @@ absl::StatusOr<Eigen::VectorXd> EmulatedScores(const Runs& runs, const DataSet& 
 // the other runs.
 absl::StatusOr<double> LeftOutDensity(const Runs& runs, const DataSet& data, const Trained& trained,
                                       const std::vector<Index>& relevant) {
-  const auto likelihood =
-      EmulatedLikelihood::Create(data, trained.emulator, {.correlated_noise = false});
-  if (!likelihood.ok()) return likelihood.status();
+  ASSIGN_OR_RETURN(const auto likelihood,
+                   EmulatedLikelihood::Create(data, trained.emulator, {.correlated_noise = false}));
   const ScorePrediction prediction = trained.emulator.PredictLeftOut();
   double sum = 0;
   for (std::size_t i = 0; i < trained.rows.size(); ++i) {
     const Index row = trained.rows[i];
     if (std::find(relevant.begin(), relevant.end(), row) == relevant.end()) continue;
-    sum += likelihood->LogDensity(prediction, static_cast<Index>(i), runs.histories.row(row));
+    sum += likelihood.LogDensity(prediction, static_cast<Index>(i), runs.histories.row(row));
   }
   return sum;
 }
@@ -136,12 +136,11 @@ absl::StatusOr<TrainedEmulator> TrainEmulator(const Runs& runs, const DataSet& d
   };
 
   const std::vector<Index> by_outcome = Ranking(-runs.histories.rowwise().squaredNorm());
-  auto broad = Train(runs, BestAndOthers(by_outcome, limit / 2, limit - limit / 2),
-                     first(by_outcome, std::min(count, limit / 2)), options.principal);
-  if (!broad.ok()) return broad.status();
-  const auto scores = EmulatedScores(runs, data, *broad, options.scatter_share);
-  if (!scores.ok()) return scores.status();
-  const std::vector<Index> order = Ranking(*scores);
+  ASSIGN_OR_RETURN(Trained broad,
+                   Train(runs, BestAndOthers(by_outcome, limit / 2, limit - limit / 2),
+                         first(by_outcome, std::min(count, limit / 2)), options.principal));
+  ASSIGN_OR_RETURN(const auto scores, EmulatedScores(runs, data, broad, options.scatter_share));
+  const std::vector<Index> order = Ranking(scores);
   std::vector<Index> relevant = first(order, count);
 
   const auto rest = static_cast<std::size_t>(
@@ -151,17 +150,18 @@ absl::StatusOr<TrainedEmulator> TrainEmulator(const Runs& runs, const DataSet& d
   // The broad set judged on the same runs, as far as it holds them.
   std::vector<Index> common;
   for (const Index row : relevant) {
-    if (std::binary_search(broad->rows.begin(), broad->rows.end(), row)) common.push_back(row);
+    if (std::binary_search(broad.rows.begin(), broad.rows.end(), row)) common.push_back(row);
   }
-  if (common.size() >= count / 2) broad = Train(runs, broad->rows, common, options.principal);
-  if (!broad.ok()) return broad.status();
+  if (common.size() >= count / 2) {
+    ASSIGN_OR_RETURN(broad, Train(runs, broad.rows, common, options.principal));
+  }
   bool use_local = local.ok();
   if (local.ok() && common.size() >= count / 2) {
     const auto locally = LeftOutDensity(runs, data, *local, common);
-    const auto broadly = LeftOutDensity(runs, data, *broad, common);
+    const auto broadly = LeftOutDensity(runs, data, broad, common);
     use_local = locally.ok() && broadly.ok() && *locally > *broadly;
   }
-  Trained& chosen = use_local ? *local : *broad;
+  Trained& chosen = use_local ? *local : broad;
   return TrainedEmulator{.emulator = std::move(chosen.emulator),
                          .runs = static_cast<int>(chosen.rows.size()),
                          .relevant = use_local ? std::move(relevant) : std::move(common),

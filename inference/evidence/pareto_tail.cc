@@ -8,14 +8,21 @@
 #include "inference/numerics/log_weights.h"
 
 namespace calib::inference {
+namespace {
+
+constexpr std::size_t kFewest = 5;  // excesses that a shape is fitted to [Vehtari et al. 2024]
+constexpr double kPriorSpread = 3;  // of the candidates [Zhang & Stephens 2009, Eq. 4]
+constexpr int kCandidates = 30;     // beside sqrt(n) more [Zhang & Stephens 2009]
+constexpr double kShrinkage = 10;   // observations that the shape 1/2 counts as
+//                                                                  [Vehtari et al. 2024, app. C]
+
+}  // namespace
 
 double GeneralizedParetoShape(const std::vector<double>& x) {
   const int n = static_cast<int>(x.size());
-  assert(n >= 5 && x.front() > 0);
-  // Candidates of theta = -k / scale spread around the reciprocal of the first quartile [Zhang &
-  // Stephens 2009, eq. 4].
-  constexpr double kPriorSpread = 3;
-  const int candidates = 30 + static_cast<int>(std::sqrt(n));
+  assert(x.size() >= kFewest && x.front() > 0);
+  // Candidates of theta = -k / scale, spread around the reciprocal of the first quartile.
+  const int candidates = kCandidates + static_cast<int>(std::sqrt(n));
   const double quartile = x[static_cast<std::size_t>(std::floor(n / 4.0 + 0.5)) - 1];
   const auto shape_at = [&x, n](double theta) {
     double sum = 0;
@@ -32,7 +39,6 @@ double GeneralizedParetoShape(const std::vector<double>& x) {
   const Eigen::VectorXd log_weights = NormalizedLogWeights(log_likelihood);
   double average = 0;
   for (int j = 0; j < candidates; ++j) average += std::exp(log_weights[j]) * theta[j];
-  constexpr double kShrinkage = 10;
   return (n * shape_at(average) + kShrinkage * 0.5) / (n + kShrinkage);
 }
 
@@ -40,7 +46,7 @@ double ParetoTailIndex(const Eigen::VectorXd& log_weights) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const auto n = static_cast<double>(log_weights.size());
   const auto tail = static_cast<std::size_t>(std::ceil(std::min(n / 5, 3 * std::sqrt(n))));
-  if (tail < 5) return kInfinity;
+  if (tail < kFewest) return kInfinity;
   std::vector<double> sorted(log_weights.begin(), log_weights.end());
   std::sort(sorted.begin(), sorted.end());
   const double threshold = sorted[sorted.size() - tail - 1];
@@ -54,7 +60,7 @@ double ParetoTailIndex(const Eigen::VectorXd& log_weights) {
   // Equal weights have no tail; a few that stand out of equal (or underflowing) others are all
   // tail.
   if (excesses.empty()) return 0;
-  if (excesses.size() < 5) return kInfinity;
+  if (excesses.size() < kFewest) return kInfinity;
   return GeneralizedParetoShape(excesses);
 }
 

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/data/gaussian_likelihood.h"
 
 namespace calib::inference {
@@ -34,9 +35,9 @@ absl::Status ValidateShapes(const JointPrior& priors, const DataSet& data,
 // that 1 / sigma is an exponent of exp(-chi^2 / 2).
 absl::Status FindSigma(const DataSet& data, const FilterOptions& options,
                        const Eigen::MatrixXd& predictions, Ensemble& ensemble) {
-  const auto unit = GaussianLikelihood::Create(WithRelativeErrors(data, 1), NoiseMode::kGiven);
-  if (!unit.ok()) return unit.status();
-  const Eigen::VectorXd log_likelihood = unit->LogLikelihood(predictions);
+  ASSIGN_OR_RETURN(const auto unit,
+                   GaussianLikelihood::Create(WithRelativeErrors(data, 1), NoiseMode::kGiven));
+  const Eigen::VectorXd log_likelihood = unit.LogLikelihood(predictions);
   ensemble.tempering =
       FindExponent({.log_start = ensemble.log_start,
                     .log_likelihood = log_likelihood,
@@ -140,10 +141,10 @@ absl::StatusOr<GaussianLikelihood> LikelihoodOf(const Ensemble& ensemble, const 
 absl::StatusOr<Ensemble> MakeEnsemble(const JointPrior& priors, const DataSet& data,
                                       const FilterOptions& options,
                                       std::span<const Iteration> iterations) {
-  if (auto valid = options.Validate(); !valid.ok()) return valid;
-  if (auto valid = ValidateData(data, options.noise); !valid.ok()) return valid;
-  if (auto valid = priors.Validate(); !valid.ok()) return valid;
-  if (auto valid = ValidateShapes(priors, data, iterations); !valid.ok()) return valid;
+  RETURN_IF_ERROR(options.Validate());
+  RETURN_IF_ERROR(ValidateData(data, options.noise));
+  RETURN_IF_ERROR(priors.Validate());
+  RETURN_IF_ERROR(ValidateShapes(priors, data, iterations));
 
   Ensemble ensemble;
   const bool last_only = options.noise == NoiseMode::kEssTarget;
@@ -170,13 +171,10 @@ absl::StatusOr<Ensemble> MakeEnsemble(const JointPrior& priors, const DataSet& d
   }
   ensemble.log_start = LogImportance(priors, used);
   if (last_only) {
-    if (auto found = FindSigma(data, options, used.back().predictions, ensemble); !found.ok()) {
-      return found;
-    }
+    RETURN_IF_ERROR(FindSigma(data, options, used.back().predictions, ensemble));
   }
-  const auto likelihood = LikelihoodOf(ensemble, data, options);
-  if (!likelihood.ok()) return likelihood.status();
-  ensemble.increments = IncrementsOf(*likelihood, used, false);
+  ASSIGN_OR_RETURN(const auto likelihood, LikelihoodOf(ensemble, data, options));
+  ensemble.increments = IncrementsOf(likelihood, used, false);
   ensemble.log_likelihood = GaussianLikelihood::Sum(ensemble.increments);
   ensemble.strangers = CountStrangers(ensemble);
   MarkDiverged(ensemble);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/filter/ensemble.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/filter/joint_states.h"
@@ -23,11 +24,17 @@ namespace calib::inference {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kInsignificantShare = 1e-3;
-constexpr double kNegligibleWeight =
-    1e-4;                              // of a component: fewer than one in ten thousand samples
-constexpr double kWorthOfDraws = 100;  // draws of an emulator know no more than its runs
-constexpr double kWidening = 2;        // of their sd: an emulator is good inside its runs only
+constexpr double kInsignificantShare = 1e-3;  // of the weight, in the lightest samples; chosen
+constexpr double kNegligibleWeight = 1e-4;    // of a component: no sample is drawn from it; chosen
+// Effective samples that the draws of an emulator count as; chosen: they know no more than its
+// runs.
+constexpr double kWorthOfDraws = 100;
+// Factor on the sd of such draws; chosen: an emulator is good inside its runs only.
+constexpr double kWidening = 2;
+constexpr double kPerComponent = 10;   // effective samples [Cheng 2019, sec. 3.5.3: K_max = N / 10]
+constexpr double kPerParameter = 2;    // effective samples; chosen: fewer follow single samples
+constexpr double kMostTempered = 0.5;  // share of all samples that is asked for at most; chosen
+constexpr int kRegionPoints = 1 << 14;  // of a component: its mass to 1e-3, as the header states
 
 // Indices, ascending, of the samples that matter: the lightest, which hold a thousandth of the
 // weight together and are often most of the samples, are left out. It costs the proposal nothing
@@ -56,8 +63,8 @@ struct StandardPoints {
 };
 
 // Samples with weight, in standard coordinates, standing for as many observations as they are
-// worth: the counts sum to the effective sample size, not to a multiple of N as copies would [Cheng
-// 2019, footnote 1].
+// worth: the counts sum to the effective sample size, not to a multiple of N as copies would.
+//                                                                          [Cheng 2019, footnote 1]
 StandardPoints Standardized(const JointPrior& priors, const std::vector<Eigen::Index>& columns,
                             const Eigen::MatrixXd& parameters, const Eigen::VectorXd& log_weights) {
   const double ess = EffectiveSampleSize(log_weights);
@@ -104,12 +111,12 @@ Eigen::MatrixXd StatesOf(const Ensemble& ensemble, const std::vector<Eigen::Inde
 double TemperingExponent(const FilterOptions& options, const Ensemble& ensemble) {
   if (options.noise == NoiseMode::kEssTarget) return 1;
   const double wanted = std::max(options.ess_target * static_cast<double>(ensemble.last_size),
-                                 2.0 * static_cast<double>(ensemble.parameters.cols()));
-  return FindExponent(
-             {.log_start = ensemble.log_start,
-              .log_likelihood = ensemble.log_likelihood,
-              .target = std::min(wanted, 0.5 * static_cast<double>(ensemble.log_start.size())),
-              .max_exponent = 1})
+                                 kPerParameter * static_cast<double>(ensemble.parameters.cols()));
+  return FindExponent({.log_start = ensemble.log_start,
+                       .log_likelihood = ensemble.log_likelihood,
+                       .target = std::min(
+                           wanted, kMostTempered * static_cast<double>(ensemble.log_start.size())),
+                       .max_exponent = 1})
       .exponent;
 }
 
@@ -123,24 +130,23 @@ Eigen::VectorXd TemperedLogWeights(const Ensemble& ensemble, double exponent) {
   return NormalizedLogWeights(result);
 }
 
-// Ten effective samples a component on average, as K_max = N_p / 10 [Cheng 2019, sec. 3.5.3], and
-// no fewer than two per parameter: more components would follow single samples.
+// As many components as there are enough effective samples for.
 int MostComponents(const FilterOptions& options, const WeightedPoints& points) {
-  const double least_size = std::max(10.0, 2.0 * static_cast<double>(points.points.rows()));
+  const double least_size =
+      std::max(kPerComponent, kPerParameter * static_cast<double>(points.points.rows()));
   const int affordable = static_cast<int>(points.counts.sum() / least_size);
   return std::clamp(affordable, 1, options.max_components);
 }
 
 absl::StatusOr<Proposal> FitMixture(const FilterOptions& options, const WeightedPoints& points,
                                     std::size_t iterations) {
-  const auto mixture =
-      FitDirichletMixture(points, {.max_components = MostComponents(options, points),
-                                   .concentration = options.concentration,
-                                   .seed = options.seed,
-                                   .stream = iterations});
-  if (!mixture.ok()) return mixture.status();
+  ASSIGN_OR_RETURN(const auto mixture,
+                   FitDirichletMixture(points, {.max_components = MostComponents(options, points),
+                                                .concentration = options.concentration,
+                                                .seed = options.seed,
+                                                .stream = iterations}));
   Proposal proposal;
-  proposal.components = mixture->Predictive(kNegligibleWeight);
+  proposal.components = mixture.Predictive(kNegligibleWeight);
   proposal.defensive_share = options.defensive_share;
   return proposal;
 }
@@ -194,30 +200,28 @@ void Complete(const JointPrior& priors, const std::vector<Eigen::Index>& free,
 absl::StatusOr<double> GuidingExponent(const JointPrior& priors, const DataSet& data,
                                        const FilterOptions& options,
                                        std::span<const Iteration> iterations) {
-  const auto ensemble = MakeEnsemble(priors, data, options, iterations);
-  if (!ensemble.ok()) return ensemble.status();
-  return TemperingExponent(options, *ensemble);
+  ASSIGN_OR_RETURN(const auto ensemble, MakeEnsemble(priors, data, options, iterations));
+  return TemperingExponent(options, ensemble);
 }
 
 namespace {
 
 // ln of the mass of the mixture where the support is more than a box.
 double LogMassInRegion(std::span<const MixtureComponent> components, const JointPrior& priors) {
-  constexpr int kPoints = 1 << 14;
   const auto d = static_cast<int>(priors.size());
-  const Eigen::MatrixXd unit = ScrambledSobol(kPoints, d, 0);
+  const Eigen::MatrixXd unit = ScrambledSobol(kRegionPoints, d, 0);
   Eigen::VectorXd z(d);
   double total = 0;
   double inside = 0;
   for (const MixtureComponent& component : components) {
     const Eigen::MatrixXd factor = Eigen::LLT<Eigen::MatrixXd>(component.covariance).matrixL();
     int met = 0;
-    for (int i = 0; i < kPoints; ++i) {
+    for (int i = 0; i < kRegionPoints; ++i) {
       for (Eigen::Index j = 0; j < d; ++j) z[j] = NormalQuantile(unit(i, j));
       met += priors.InSupport(priors.FromStandard(component.mean + factor * z)) ? 1 : 0;
     }
     total += component.weight;
-    inside += component.weight * met / kPoints;
+    inside += component.weight * met / kRegionPoints;
   }
   return std::log(inside / total);
 }
@@ -262,25 +266,23 @@ absl::StatusOr<Proposal> FitProposal(const JointPrior& priors, const DataSet& da
                                      const FilterOptions& options,
                                      std::span<const Iteration> iterations,
                                      const std::vector<std::optional<double>>& frozen) {
-  if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
-  const auto ensemble = MakeEnsemble(priors, data, options, iterations);
-  if (!ensemble.ok()) return ensemble.status();
+  RETURN_IF_ERROR(ValidateFrozen(priors, frozen));
+  ASSIGN_OR_RETURN(const auto ensemble, MakeEnsemble(priors, data, options, iterations));
   const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
   const Eigen::VectorXd log_weights =
-      TemperedLogWeights(*ensemble, TemperingExponent(options, *ensemble));
-  StandardPoints points = Standardized(priors, free, ensemble->parameters, log_weights);
+      TemperedLogWeights(ensemble, TemperingExponent(options, ensemble));
+  StandardPoints points = Standardized(priors, free, ensemble.parameters, log_weights);
   if (points.samples.size() <= free.size() || !(points.weighted.counts.sum() > 1)) {
-    return TooFew(*ensemble, points.samples.size(), free.size());
+    return TooFew(ensemble, points.samples.size(), free.size());
   }
   if (options.mixture == MixtureOver::kParametersAndStates) {
     points.weighted =
-        JoinStates(points.weighted, StatesOf(*ensemble, points.samples, data, options));
+        JoinStates(points.weighted, StatesOf(ensemble, points.samples, data, options));
   }
-  auto proposal = FitMixture(options, points.weighted, iterations.size());
-  if (!proposal.ok()) return proposal;
-  proposal->components =
-      MarginalOfFirst(proposal->components, static_cast<Eigen::Index>(free.size()));
-  Complete(priors, free, frozen, *proposal);
+  ASSIGN_OR_RETURN(auto proposal, FitMixture(options, points.weighted, iterations.size()));
+  proposal.components =
+      MarginalOfFirst(proposal.components, static_cast<Eigen::Index>(free.size()));
+  Complete(priors, free, frozen, proposal);
   return proposal;
 }
 
@@ -303,7 +305,7 @@ absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const Filt
                                             const Eigen::MatrixXd& draws, std::size_t iterations,
                                             const std::vector<std::optional<double>>& frozen,
                                             const Eigen::MatrixXd& closest) {
-  if (auto valid = ValidateFrozen(priors, frozen); !valid.ok()) return valid;
+  RETURN_IF_ERROR(ValidateFrozen(priors, frozen));
   const auto d = static_cast<Eigen::Index>(priors.size());
   if (draws.rows() == 0 || draws.cols() != d || (closest.rows() > 0 && closest.cols() != d)) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -311,21 +313,19 @@ absl::StatusOr<Proposal> FitProposalToDraws(const JointPrior& priors, const Filt
         closest.rows(), " x ", closest.cols(), " closest of ", d, " parameters."));
   }
   const std::vector<Eigen::Index> free = FreeOf(priors, frozen);
-  auto proposal = FitToEqual(priors, options, free, draws, iterations);
-  if (!proposal.ok()) return proposal;
-  for (MixtureComponent& component : proposal->components) {
+  ASSIGN_OR_RETURN(auto proposal, FitToEqual(priors, options, free, draws, iterations));
+  for (MixtureComponent& component : proposal.components) {
     component.covariance *= kWidening * kWidening;
   }
   if (closest.rows() > 0) {
-    auto near = FitToEqual(priors, options, free, closest, iterations);
-    if (!near.ok()) return near;
-    for (MixtureComponent& component : proposal->components) component.weight *= 0.5;
-    for (MixtureComponent& component : near->components) {
+    ASSIGN_OR_RETURN(auto near, FitToEqual(priors, options, free, closest, iterations));
+    for (MixtureComponent& component : proposal.components) component.weight *= 0.5;
+    for (MixtureComponent& component : near.components) {
       component.weight *= 0.5;
-      proposal->components.push_back(std::move(component));
+      proposal.components.push_back(std::move(component));
     }
   }
-  Complete(priors, free, frozen, *proposal);
+  Complete(priors, free, frozen, proposal);
   return proposal;
 }
 

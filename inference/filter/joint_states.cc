@@ -11,8 +11,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kMostStates = 3;  // beside some four parameters: p, q and porosity of the paper
-constexpr double kLeastVariance = 0.01;  // of the states' variance, in a coordinate
+constexpr Index kMostStates = 3;  // as many as the paper's states: p, q and porosity [Cheng 2019]
+constexpr double kLeastVariance = 0.01;  // chosen: share of the states' variance of a coordinate
 
 Eigen::MatrixXd Centred(const Eigen::MatrixXd& rows, const Eigen::VectorXd& shares) {
   return rows.rowwise() - shares.transpose() * rows;

@@ -10,8 +10,10 @@ namespace calib::inference {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// A posterior is at a bound where more than this share of it lies in this outer share of its prior;
+// chosen: five times what the prior alone has there.
 constexpr double kOuterShare = 0.02;  // of the prior's probability at one end
-constexpr double kBoundShare = 0.1;   // of the posterior's
+constexpr double kBoundShare = 0.1;   // of the posterior
 
 double MassWhere(const Eigen::VectorXd& log_weights, const Eigen::VectorXd& values, double low,
                  double high) {

@@ -1,5 +1,5 @@
 #pragma once
-// One parameter of a weighted sample in the numbers that reports show.
+// One parameter of weighted samples in the numbers that reports show. Pure functions.
 
 #include <Eigen/Core>
 
@@ -8,17 +8,20 @@
 
 namespace calib::inference {
 
-/// |sd / mean|; NaN where the mean is zero.
+/// |sd / mean|, the coefficient of variation; NaN where the mean is zero.
 double CoefficientOfVariation(double mean, double sd);
 
-/// Weights as normalised logs; variance is the plain weighted one (no small-sample correction).
-/// at_bound: at a finite bound alone; InTail has the others.
+/// Summary of the weighted values of one parameter under its prior. log_weights: n, logarithms of
+/// weights that sum to one; values: n, in the parameter's unit. The variance is the plain weighted
+/// one (no small-sample correction). at_bound speaks of finite bounds alone, InTail of the other
+/// ends.
 ParameterSummary Summarize(const Prior& prior, const Eigen::VectorXd& log_weights,
                            const Eigen::VectorXd& values);
 
-/// The same of the end where the prior has no bound: whether a tenth of the posterior, by its 5 %, 50
-/// % and 95 % quantiles (that of 10 % on the normal through two of them, in the prior's standardised
-/// coordinate), lies in the outer 2 % of the prior's probability. False where a quantile is NaN.
+/// Whether more than a tenth of a posterior lies in the outer 2 % of its prior's probability at an
+/// end where the prior has no bound, by the posterior's 5 %, 50 % and 95 % quantiles (the 10 % and
+/// 90 % ones are taken from normals through two of them, in the prior's standardised coordinate).
+/// False where a quantile is NaN.
 bool InTail(const Prior& prior, const ParameterSummary& summary);
 
 }  // namespace calib::inference

@@ -1,5 +1,6 @@
 #pragma once
-// What a posterior of weighted samples says about itself beside its moments.
+// What a posterior of N weighted samples says about itself beside its moments. log_weights are the
+// logarithms of weights that sum to one, N entries. Pure functions.
 
 #include <Eigen/Core>
 #include <span>
@@ -12,19 +13,20 @@
 
 namespace calib::inference {
 
-/// Quantiles of sqrt(f) of each noise group over the posterior, G x 3 (5, 50, 95 %), by equally
-/// probable draws: given a sample the factor is inverse gamma. log_weights: N, normalised, of the
-/// rows of factors.rates.
+/// Posterior::noise_scale: quantiles (5, 50, 95 %) of sqrt(f) over the posterior of the variance
+/// factor f of each of G noise groups, G x 3, by 2000 equally probable draws: given a sample the
+/// factor is inverse gamma. factors: of the samples, N rows of rates.
 Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
                            const Eigen::VectorXd& log_weights);
 
-/// Posterior::predictive_p of samples with these ln L by stated errors (NoiseMode::kGiven); NaN for
-/// data that have none. Both N, log_weights normalised. known: of the errors.
+/// Posterior::predictive_p of samples with these log likelihoods (N) by stated errors
+/// (NoiseMode::kGiven); NaN for data that have no likelihood. known: how well the errors are known.
 double PredictiveP(const DataSet& data, const Eigen::VectorXd& log_likelihood,
                    const Eigen::VectorXd& log_weights, const KnownFrom& known = {});
 
-/// Posterior::split_half: differences, d, of the means of the samples (N x d) of half 0 and of half
-/// 1 over the parameters' sd; NaN where a half has no weight. log_weights, halves: N.
+/// Posterior::split_half: for each of d parameters the difference of the weighted means of the
+/// samples (N x d) of half 0 and of half 1 over the parameter's sd; NaN where a half has no weight.
+/// halves: N numbers, 0 or 1; parameters: d, of all samples together.
 Eigen::VectorXd SplitHalf(const Eigen::MatrixXd& samples, const Eigen::VectorXd& log_weights,
                           const std::vector<int>& halves,
                           std::span<const ParameterSummary> parameters);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/filter/iterative_filter.h"
 #include "inference/numerics/log_weights.h"
 #include "inference/sampling/halton.h"
@@ -19,8 +20,14 @@ namespace calib::inference {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kLeastAcceptance = 1e-3;
-constexpr int kMostRedraws = 100'000;  // below 1e-43 of ever being reached at that acceptance
+constexpr double kLeastAcceptance = 1e-3;  // chosen: a thousand draws for a sample are no time
+constexpr int kMostRedraws = 100'000;      // reached with a chance below 1e-43 at that acceptance
+constexpr int kDesigns = 1000;             // drawn for the best of them [Samuelsson 2023, sec. 3.2]
+constexpr Eigen::Index kBlock = 64;        // rows shuffled together; chosen, packings are fewer
+// Points of a sequence asked for beyond those that are likely to meet the constraints; chosen: more
+// are asked for where these do not do.
+constexpr double kMorePoints = 1.1;
+constexpr int kAtLeastMore = 16;
 
 // One sample of (1 - share) mixture, truncated, + share prior; false when the mixture never meets
 // the support.
@@ -41,13 +48,12 @@ bool DrawOne(const GaussianMixture& mixture, double defensive_share, const Joint
 absl::StatusOr<Eigen::MatrixXd> UnitDesign(const FilterOptions& options, int n, int d) {
   if (options.design == Design::kHalton) return Halton(n, d);
   if (options.design == Design::kSobol) return ScrambledSobol(n, d, options.seed);
-  constexpr int kCandidates = 1000;  // [Samuelsson 2023, sec. 3.2]
   const bool symmetric = options.design == Design::kSymmetricLatinHypercube;
   return LatinHypercube({.points = n,
                          .dimensions = d,
                          .symmetric = symmetric,
                          .centred = symmetric,
-                         .candidates = symmetric ? kCandidates : 1,
+                         .candidates = symmetric ? kDesigns : 1,
                          .seed = options.seed});
 }
 
@@ -61,11 +67,10 @@ PhiloxStream DrawStream(const FilterOptions& options, int iteration, int sample)
 // Rows shuffled within blocks (sampling/shuffle.h): sample i runs on packing i mod R, which in the
 // order of a sequence would be a digit of a parameter. Whole blocks do not depend on the number of
 // rows, so that a larger campaign finds the runs of a smaller one.
-Eigen::MatrixXd InAnOrderOfItsOwn(const Eigen::MatrixXd& samples, std::uint64_t seed) {
-  constexpr Eigen::Index kRows = 64;
+Eigen::MatrixXd ShuffledInBlocks(const Eigen::MatrixXd& samples, std::uint64_t seed) {
   Eigen::MatrixXd shuffled(samples.rows(), samples.cols());
-  for (Eigen::Index first = 0; first < samples.rows(); first += kRows) {
-    const Eigen::Index rows = std::min(kRows, samples.rows() - first);
+  for (Eigen::Index first = 0; first < samples.rows(); first += kBlock) {
+    const Eigen::Index rows = std::min(kBlock, samples.rows() - first);
     const std::vector<Eigen::Index> order =
         Shuffled(rows, PhiloxStream({.seed = seed,
                                      .purpose = StreamPurpose::kDesignOrder,
@@ -85,13 +90,14 @@ absl::StatusOr<Eigen::MatrixXd> FirstSamples(const JointPrior& priors, const Fil
   const bool sequence = options.design == Design::kHalton || options.design == Design::kSobol;
   const double share = std::exp(priors.log_mass());
   Eigen::MatrixXd samples(n, d);
-  int points = sequence && priors.is_constrained() ? static_cast<int>(1.1 * n / share) + 16 : n;
+  int points = sequence && priors.is_constrained()
+                   ? static_cast<int>(kMorePoints * n / share) + kAtLeastMore
+                   : n;
   for (;; points *= 2) {
-    const auto design = UnitDesign(options, points, d);
-    if (!design.ok()) return design;
+    ASSIGN_OR_RETURN(const auto design, UnitDesign(options, points, d));
     int filled = 0;
     for (int i = 0; i < points && filled < n; ++i) {
-      Eigen::VectorXd x = priors.FromUnit(design->row(i));
+      Eigen::VectorXd x = priors.FromUnit(design.row(i));
       if (!priors.MeetsConstraints(x)) {
         if (sequence) continue;
         PhiloxStream stream = DrawStream(options, 0, i);
@@ -99,7 +105,7 @@ absl::StatusOr<Eigen::MatrixXd> FirstSamples(const JointPrior& priors, const Fil
       }
       samples.row(filled++) = x;
     }
-    if (filled == n) return InAnOrderOfItsOwn(samples, options.seed);
+    if (filled == n) return ShuffledInBlocks(samples, options.seed);
   }
 }
 
@@ -138,15 +144,15 @@ absl::StatusOr<Eigen::MatrixXd> DrawSamples(const Proposal& proposal, const Join
   }
   if (!proposal.frozen.empty()) {
     const std::vector<Eigen::Index> free = FreeColumns(proposal, priors.size());
-    auto drawn = DrawSamples(WithoutFrozen(proposal), priors.Of(free), options, iteration, n);
-    if (!drawn.ok()) return drawn;
+    ASSIGN_OR_RETURN(auto drawn,
+                     DrawSamples(WithoutFrozen(proposal), priors.Of(free), options, iteration, n));
     Eigen::MatrixXd all(n, d);
     for (int j = 0; j < d; ++j) {
       const auto& held = proposal.frozen[static_cast<std::size_t>(j)];
       if (held) all.col(j).setConstant(*held);
     }
     for (std::size_t k = 0; k < free.size(); ++k)
-      all.col(free[k]) = drawn->col(static_cast<Eigen::Index>(k));
+      all.col(free[k]) = drawn.col(static_cast<Eigen::Index>(k));
     return all;
   }
   // A design may be used once only: a later iteration that falls back to the prior draws new

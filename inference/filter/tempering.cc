@@ -14,7 +14,18 @@ namespace calib::inference {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kPointsPerDecade = 24;
+constexpr double kPointsPerDecade = 24;  // chosen
+// Exponents of the grid's ends, times the largest and the smallest gap of log likelihoods: beyond
+// the one the best sample alone has weight (the others e^-60 of it), below the other the data move
+// no weight by more than a part in a million. Chosen.
+constexpr double kSharp = 60;
+constexpr double kFlat = 1e-6;
+constexpr double kRootTolerance = 1e-14;        // of ln exponent, times 1 + its size
+constexpr std::uintmax_t kMostSteps = 200;      // of the root finder, which takes some ten
+constexpr double kHumpTolerance = 1e-9;         // of ln exponent at a hump, flat there; chosen
+constexpr double kGolden = 0.6180339887498949;  // (sqrt 5 - 1) / 2
+// By how much a hump must exceed the effective samples at exponent zero, relative; chosen.
+constexpr double kRises = 1e-6;
 
 // The samples that count, their log likelihood relative to the best one: small differences keep
 // their digits.
@@ -69,8 +80,8 @@ Tempering FindExponent(const TemperingProblem& problem) {
   }
   // Above `sharp` the best sample alone has weight, whatever the start; below `flat` the data
   // change nothing.
-  const double sharp = std::min(problem.max_exponent, (60 + curve.StartSpread()) / smallest);
-  const double flat = std::min(1e-6 / largest, 0.5 * sharp);
+  const double sharp = std::min(problem.max_exponent, (kSharp + curve.StartSpread()) / smallest);
+  const double flat = std::min(kFlat / largest, 0.5 * sharp);
   const int points = 2 + static_cast<int>(std::ceil(kPointsPerDecade * std::log10(sharp / flat)));
   const double step = std::log(flat / sharp) / (points - 1);
   const auto grid = [&](int k) { return k == 0 ? sharp : sharp * std::exp(step * k); };
@@ -87,9 +98,9 @@ Tempering FindExponent(const TemperingProblem& problem) {
         const auto excess = [&](double log_exponent) {
           return curve.At(std::exp(log_exponent)) - wanted;
         };
-        std::uintmax_t evaluations = 200;
+        std::uintmax_t evaluations = kMostSteps;
         const auto close = [](double a, double b) {
-          return std::abs(a - b) < 1e-14 * (1 + std::abs(a));
+          return std::abs(a - b) < kRootTolerance * (1 + std::abs(a));
         };
         const auto [low, high] = ess == wanted
                                      ? std::pair(std::log(below), std::log(below))
@@ -121,12 +132,11 @@ Tempering FindExponent(const TemperingProblem& problem) {
       highest = k;
     }
   }
-  if (ess_highest > curve.AtZero() * (1 + 1e-6)) {
+  if (ess_highest > curve.AtZero() * (1 + kRises)) {
     // Golden section between the neighbours of the highest grid point.
     double low = std::log(grid(std::min(highest + 1, points - 1)));
     double high = std::log(grid(std::max(highest - 1, 0)));
-    constexpr double kGolden = 0.6180339887498949;
-    while (high - low > 1e-9) {
+    while (high - low > kHumpTolerance) {
       const double left = high - kGolden * (high - low);
       const double right = low + kGolden * (high - low);
       if (curve.At(std::exp(left)) < curve.At(std::exp(right))) {

@@ -10,7 +10,7 @@
 namespace calib::inference {
 namespace {
 
-constexpr int kPoints = 4096;
+constexpr int kPoints = 4096;  // of the sequence; the error they leave stands in the header
 
 }  // namespace
 

@@ -62,7 +62,7 @@ Eigen::MatrixXd Seeds(const WeightedPoints& data, int clusters, PhiloxStream& st
 
 std::vector<int> KMeans(const WeightedPoints& data, int clusters, PhiloxStream& stream) {
   assert(clusters >= 1 && data.points.cols() > 0);
-  constexpr int kMostIterations = 300;
+  constexpr int kMostIterations = 300;  // scikit-learn's default; some ten are the rule
   const Eigen::Index n = data.points.cols();
   Eigen::MatrixXd centres = Seeds(data, clusters, stream);
   std::vector<int> labels(n, -1);

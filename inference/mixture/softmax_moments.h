@@ -9,20 +9,23 @@
 
 namespace calib::inference {
 
-/// For features f_n (F entries), counts c_n and coefficients a_k of K components:
+/// Moments of n samples under a mixture: for features f_n (F entries), counts c_n and coefficients
+/// a_k of K components
 ///   ln rho_nk = f_n . a_k,  r_nk = rho_nk / sum_l rho_nl,
 ///   moments_k = sum_n c_n r_nk f_n,  entropy = - sum_n c_n sum_k r_nk ln r_nk.
-/// Eight samples side by side, in the order of the samples: the bits depend neither on threads nor
-/// on how wide the machine's vectors are. r_nk below e^-700 of the largest counts as e^-700 of it.
+/// Eight samples are treated side by side, in the order of the samples: the bits depend neither on
+/// threads nor on how wide the machine's vectors are. r_nk below e^-700 of the largest counts as
+/// e^-700 of it. Thread safety: none, Pass writes its results into the object; a thread makes its
+/// own.
 class SoftmaxMoments {
  public:
-  /// features n x F, counts n; both finite, n, F and components >= 1
+  /// Takes copies of features (n x F) and counts (n), both finite; n, F and components >= 1.
   SoftmaxMoments(const Eigen::MatrixXd& features, const Eigen::VectorXd& counts, int components);
 
-  /// coefficients F x K, finite. Results until the next call:
+  /// Computes moments() and entropy() for these coefficients, F x K, finite.
   void Pass(const Eigen::MatrixXd& coefficients);
-  const Eigen::MatrixXd& moments() const { return moments_; }  ///< F x K
-  double entropy() const { return entropy_; }                  ///< nats
+  const Eigen::MatrixXd& moments() const { return moments_; }  ///< F x K, by the last Pass
+  double entropy() const { return entropy_; }                  ///< nats, by the last Pass
 
  private:
   struct alignas(8 * kLanes) Group {  // one number of each of eight samples

@@ -42,8 +42,7 @@ double LogDeterminantOfScale(const MixtureState& state, const CovarianceFactors&
          static_cast<double>(state.means.rows()) * std::log(state.degrees_of_freedom[k]);
 }
 
-// E ln |L_k|                                                                      [Bishop 2006,
-// Eq. 10.65]
+// E ln |L_k|                                                              [Bishop 2006, Eq. 10.65]
 double ExpectedLogPrecision(const MixtureState& state, const CovarianceFactors& factors,
                             Eigen::Index k) {
   const Eigen::Index d = state.means.rows();
@@ -133,8 +132,8 @@ Eigen::MatrixXd LogDensityCoefficients(const MixtureState& state, const Covarian
   Eigen::MatrixXd precision(d, d);
   Eigen::VectorXd pulled(d);
   for (Eigen::Index k = 0; k < state.size(); ++k) {
-    // E ln N = (E ln|L| - d/beta - nu (x - m)^T W (x - m) - d ln 2 pi) / 2  [Bishop 2006,
-    // Eq. 10.64]
+    // E ln N = (E ln|L| - d/beta - nu (x - m)^T W (x - m) - d ln 2 pi) / 2
+    //                                                                    [Bishop 2006, Eq. 10.64]
     const auto lower = factors.lower[k].triangularView<Eigen::Lower>();
     precision.setIdentity();
     lower.solveInPlace(precision);

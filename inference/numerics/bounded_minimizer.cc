@@ -9,6 +9,14 @@ namespace {
 
 using Eigen::Index;
 
+constexpr double kArmijo =
+    1e-4;                      // share of the slope that a step must go down by [Nocedal & Wright]
+constexpr double kCut = 0.4;   // chosen: factor on a step that goes down by less
+constexpr int kMostCuts = 20;  // chosen: to 1e-8 of the first step
+// Cosine between step and change of the gradient below which the curvature along the step is
+// rounding; chosen.
+constexpr double kLeastCurvature = 1e-10;
+
 // Variables that may move: not at a bound, or pulled back inside by the gradient.
 std::vector<Index> FreeVariables(const Eigen::VectorXd& x, const Eigen::VectorXd& gradient,
                                  const Eigen::VectorXd& lower, const Eigen::VectorXd& upper) {
@@ -36,7 +44,7 @@ Eigen::VectorXd Direction(const Eigen::MatrixXd& inverse_hessian, const Eigen::V
 void Update(const Eigen::VectorXd& step, const Eigen::VectorXd& change, bool first,
             Eigen::MatrixXd& inverse_hessian) {
   const double curvature = step.dot(change);
-  if (!(curvature > 1e-10 * step.norm() * change.norm())) return;
+  if (!(curvature > kLeastCurvature * step.norm() * change.norm())) return;
   const Index n = step.size();
   if (first) inverse_hessian = Eigen::MatrixXd::Identity(n, n) * (curvature / change.squaredNorm());
   const Eigen::MatrixXd left =
@@ -74,10 +82,9 @@ Minimum MinimizeInBox(const SmoothFunction& function, const Eigen::VectorXd& sta
     }
     if (first) direction *= std::min(1.0, 1 / largest);  // no scale known yet: at most a unit step
 
-    constexpr double kArmijo = 1e-4;
     bool found = false;
     double length = 1;
-    for (int cut = 0; cut < 20; ++cut, length *= 0.4) {
+    for (int cut = 0; cut < kMostCuts; ++cut, length *= kCut) {
       const Eigen::VectorXd x = (best.x + length * direction).cwiseMax(lower).cwiseMin(upper);
       const double value = function(x, trial_gradient);
       if (!(value <= best.value + kArmijo * gradient.dot(x - best.x))) continue;

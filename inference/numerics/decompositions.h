@@ -1,7 +1,8 @@
 #pragma once
-// Eigen's decompositions of dense real matrices of any size, instantiated in one source file. A file
-// that includes this one instead of Eigen's headers compiles in about half the time and computes the
-// same bits. For source files: no header of this library includes it, so that its users do not.
+// Eigen's decompositions of dense real matrices of any size, instantiated in one source file. A
+// file that includes this one instead of Eigen's headers compiles in about half the time and
+// computes the same bits. For source files: no header of this library includes it, so that its
+// users do not.
 //
 // Pure functions of their arguments; thread safety: const.
 

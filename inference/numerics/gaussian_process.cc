@@ -16,20 +16,40 @@ namespace {
 using Eigen::Index;
 
 constexpr Index kBlock = 256;  // of points: their cross-covariances stay in the cache
+// Standard deviation over the mean below which values differ by rounding; chosen, a few thousand
+// machine epsilons.
+constexpr double kRounding = 1e-12;
+constexpr double kLeastScatter = 1e-8;  // smallest GaussianProcessOptions::max_scatter
+constexpr double kMostScatter = 2;      // largest one: a constant's scatter is 1, its estimate more
+
+// Where the search begins, in units of the scaled inputs and outputs; chosen: a smooth function and
+// a wiggly one, of which either may be the lower of two minima.
+struct Start {
+  double length, signal, scatter;
+};
+constexpr Start kStarts[] = {{4, 1, 1e-3}, {1, 0.3, 1e-2}};
+
+// The box of the search in the same units; chosen: lengths from a fifth of the inputs' standard
+// deviation, below which runs say nothing of each other, to where nothing differs from the trend;
+// variances from what rounding hides to far beyond the outputs'.
+constexpr double kShortest = 0.2;
+constexpr double kLongest = 100;
+constexpr double kLeastSignal = 1e-8;
+constexpr double kMostSignal = 1e3;
+constexpr double kLeastNoise = 1e-9;
+// Nats of the log posterior density; chosen: hyper-parameters known better than this move no
+// prediction by more than they are uncertain.
+constexpr MinimizerOptions kSearch{.max_iterations = 40, .tolerance = 1e-2};
 
 // Standard deviation about the mean, and one where there is no spread to scale by.
 double Spread(const Eigen::VectorXd& values, double mean) {
   const double sd = std::sqrt((values.array() - mean).square().mean());
-  return sd > 1e-12 * (std::abs(mean) + std::numeric_limits<double>::min()) ? sd : 1;
+  return sd > kRounding * (std::abs(mean) + std::numeric_limits<double>::min()) ? sd : 1;
 }
 
-// Smooth and wiggly.
 std::vector<Eigen::VectorXd> FixedStarts(Index d) {
-  struct Start {
-    double length, signal, scatter;
-  };
   std::vector<Eigen::VectorXd> starts;
-  for (const Start& start : {Start{4, 1, 1e-3}, Start{1, 0.3, 1e-2}}) {
+  for (const Start& start : kStarts) {
     starts.emplace_back(d + 2) << Eigen::VectorXd::Constant(d, std::log(start.length)),
         std::log(start.signal), std::log(start.scatter);
   }
@@ -42,15 +62,16 @@ Minimum MostProbable(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outpu
   const KernelObjective objective(inputs, outputs);
   Eigen::VectorXd lower(d + 2);
   Eigen::VectorXd upper(d + 2);
-  lower << Eigen::VectorXd::Constant(d, std::log(0.2)), std::log(1e-8), std::log(1e-9);
-  upper << Eigen::VectorXd::Constant(d, std::log(100.0)), std::log(1e3), std::log(max_scatter);
+  lower << Eigen::VectorXd::Constant(d, std::log(kShortest)), std::log(kLeastSignal),
+      std::log(kLeastNoise);
+  upper << Eigen::VectorXd::Constant(d, std::log(kLongest)), std::log(kMostSignal),
+      std::log(max_scatter);
   Minimum best{.x = {}, .value = std::numeric_limits<double>::infinity()};
   for (const Eigen::VectorXd& start : starts) {
     const Eigen::VectorXd x = start.cwiseMax(lower).cwiseMin(upper);
     Eigen::VectorXd gradient(d + 2);
     if (!std::isfinite(objective(x, gradient))) continue;
-    const Minimum minimum =
-        MinimizeInBox(objective, x, lower, upper, {.max_iterations = 40, .tolerance = 1e-2});
+    const Minimum minimum = MinimizeInBox(objective, x, lower, upper, kSearch);
     if (minimum.value < best.value) best = minimum;
   }
   return best;
@@ -62,7 +83,7 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
                                                      const Eigen::VectorXd& outputs,
                                                      const GaussianProcessOptions& options) {
   assert(inputs.rows() == outputs.size() && inputs.rows() >= 4);
-  assert(options.max_scatter >= 1e-8 && options.max_scatter <= 2);
+  assert(options.max_scatter >= kLeastScatter && options.max_scatter <= kMostScatter);
   const Index n = inputs.rows();
   const Index d = inputs.cols();
   GaussianProcess process;
@@ -86,8 +107,8 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
         "the emulator's covariance matrix cannot be factorised: are the runs' parameters all the "
         "same?");
   }
-  // The same density of the best constant, whose scatter has the outputs' variance, one; Gaussian
-  // normalisers and the prior of the scatter, which both have, left out.
+  // Against the density of the best constant, whose scatter has the outputs' variance, one;
+  // Gaussian normalisers and the prior of the scatter, which both have, left out.
   const auto count = static_cast<double>(n);
   if (options.may_be_constant &&
       hyper.value > 0.5 * count + 0.5 * std::log1p(count * kTrendVariance)) {

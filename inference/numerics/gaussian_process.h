@@ -7,26 +7,29 @@
 
 namespace calib::inference {
 
-/// Leave-one-out prediction of each training output, the hyper-parameters held.
+/// Prediction of each of the n training outputs from the n - 1 others, the hyper-parameters held.
 struct LeaveOneOut {
-  Eigen::VectorXd error;     ///< output - its prediction from the others, n
-  Eigen::VectorXd variance;  ///< of that error: of the function and of the scatter of one run, n
+  Eigen::VectorXd error;     ///< n: output - its prediction
+  Eigen::VectorXd variance;  ///< n, of `error`: what is not known of the function, and the scatter
 };
 
+/// What a process says of its function at m inputs.
 struct GaussianProcessPrediction {
-  Eigen::VectorXd mean;
-  Eigen::VectorXd variance;  ///< of the function itself, without the scatter of a run
+  Eigen::VectorXd mean;      ///< m
+  Eigen::VectorXd variance;  ///< m, of the function itself; a run scatters about it besides
 };
 
 class GaussianProcess;
 
+/// How GaussianProcess::Fit searches.
 struct GaussianProcessOptions {
-  /// Whether a constant takes the place of a function that explains the outputs no better. A search
-  /// says no: it must know where it has not looked yet.
+  /// Whether a constant takes the place of a function that explains the outputs no better. False
+  /// for a search of the minimum, which must know where it has not looked yet.
   bool may_be_constant = true;
-  double max_scatter = 2;  ///< variance of the scatter over that of the outputs, [1e-8, 2]
-  /// Not constant, of nearly the same runs: its hyper-parameters are where the search begins, in
-  /// place of both starts.
+  /// Largest variance of the scatter, over the variance of the outputs; [1e-8, 2].
+  double max_scatter = 2;
+  /// A process of nearly the same runs, not constant(): the search begins at its hyper-parameters
+  /// alone. Null: it begins at two fixed starts.
   const GaussianProcess* like = nullptr;
 };
 
@@ -38,13 +41,13 @@ struct GaussianProcessOptions {
 /// squared exponential, which takes every function for analytic, then claims too small a variance
 /// between the runs. Inputs are shifted and scaled to zero mean and unit standard deviation over
 /// the training set, outputs likewise, so that hyper-parameters have order one. l_j, s and the
-/// scatter are those of highest posterior density: marginal likelihood times weak log-normal
-/// priors, from two fixed starts (smooth, wiggly) or from options.like. Thread safety: const after
-/// Fit.
+/// scatter are those of highest posterior density (KernelObjective).
+/// A value; immutable after Fit. Thread safety: const.
 class GaussianProcess {
  public:
-  /// in: inputs n x d, outputs n, n >= 4, all finite.
-  /// Errors: FAILED_PRECONDITION when no start can be factorised.
+  /// Fits to n >= 4 runs. Deterministic.
+  /// in: inputs n x d, outputs n, all finite
+  /// Errors: FAILED_PRECONDITION when the covariance matrix can be factorised at no start.
   static absl::StatusOr<GaussianProcess> Fit(const Eigen::MatrixXd& inputs,
                                              const Eigen::VectorXd& outputs,
                                              const GaussianProcessOptions& options = {});
@@ -52,15 +55,18 @@ class GaussianProcess {
   /// Mean and variance of f at the rows of an m x d matrix; O(m n^2).
   GaussianProcessPrediction Predict(const Eigen::MatrixXd& inputs) const;
 
-  /// The mean alone, the same bits; O(m n d).
+  /// Mean of f at the rows of an m x d matrix, m entries, the bits of Predict().mean; O(m n d).
   Eigen::VectorXd PredictMean(const Eigen::MatrixXd& inputs) const;
 
-  /// Closed form [Rasmussen & Williams 2006, Eqs. 5.10-5.12]: error_i = alpha_i / (K^-1)_ii,
-  /// variance_i = 1 / (K^-1)_ii.
+  /// Leave-one-out predictions of the n training outputs in closed form:
+  ///   error_i = alpha_i / (K^-1)_ii, variance_i = 1 / (K^-1)_ii, alpha = K^-1 outputs
+  ///                                                    [Rasmussen & Williams 2006, Eqs. 5.10-5.12]
   const LeaveOneOut& leave_one_out() const { return leave_one_out_; }
+  /// Variance of the scatter of a single run, in the square of the output's unit.
   double scatter_variance() const { return scatter_variance_; }
+  /// True where the process is a constant: no function explains the outputs better.
   bool constant() const { return constant_; }
-  /// l_j in units of the inputs.
+  /// d correlation lengths in units of the inputs; infinite where constant().
   Eigen::VectorXd lengths() const { return lengths_.cwiseProduct(input_sd_); }
 
  private:

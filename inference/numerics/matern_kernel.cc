@@ -14,7 +14,8 @@ struct LogPrior {
   double mean, sd;
 };
 
-// Of the logarithm of hyper-parameter j among d lengths, signal and scatter.
+// Prior of the logarithm of hyper-parameter j among d lengths, signal and scatter: as the header
+// states it.
 LogPrior HyperPrior(Index j, Index d) {
   if (j < d) return {std::log(3.0), 1};
   if (j == d) return {0, 2};

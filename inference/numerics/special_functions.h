@@ -8,28 +8,30 @@ namespace calib::inference {
 
 /// Regularised upper incomplete gamma function Q(a, x) = Gamma(a, x) / Gamma(a), in [0, 1]: the
 /// chance that a gamma variable of shape a and rate 1 exceeds x; a chi-squared with k degrees of
-/// freedom exceeds x with chance Q(k / 2, x / 2).                 [Abramowitz & Stegun 6.5.3, 26.4.19]
+/// freedom exceeds x with chance Q(k / 2, x / 2).            [Abramowitz & Stegun 6.5.3, 26.4.19]
 /// in: shape a > 0, x >= 0
 double GammaQ(double shape, double x);
 
-/// Q(a, x) computed in double alone where GammaQ computes in long double: the last digits differ,
-/// and it takes a fraction of the time.
+/// Regularised upper incomplete gamma function Q(a, x) as GammaQ, computed in double alone where
+/// GammaQ computes in long double: the last digits differ, and it takes a fraction of the time.
 /// in: shape a > 0, x >= 0
 double GammaQInDouble(double shape, double x);
 
-/// x with Q(shape, x) = q. in: shape > 0, q in [0, 1]; q = 0 overflows: +infinity is thrown, not
-/// returned
+/// x with GammaQ(shape, x) = q. in: shape > 0, q in (0, 1]
 double GammaQInverse(double shape, double q);
 
-/// x with 1 - Q(shape, x) = p. in: shape > 0, p in [0, 1)
+/// x with 1 - GammaQ(shape, x) = p, p kept with its digits where it is tiny. in: shape > 0, p in
+/// [0, 1)
 double GammaPInverse(double shape, double p);
 
 /// Gamma(a) / Gamma(a + delta), without the cancellation of a difference of two logarithms.
 /// in: a > 0, a + delta > 0
 double GammaRatio(double a, double delta);
 
-/// ln Gamma(x) and its derivative psi(x), in double alone. in: x > 0
+/// ln Gamma(x), computed in double alone. in: x > 0
 double LogGamma(double x);
+
+/// The derivative psi(x) of ln Gamma(x), computed in double alone. in: x > 0
 double Digamma(double x);
 
 /// z that a standard normal variable exceeds with this chance, in (0, 1). It computes in long
@@ -53,13 +55,13 @@ struct StudentLaw {
   double TailQuantile(double chance) const;  ///< what it exceeds with this chance, in (0, 1)
 };
 
-/// By how much wider the interval from the 5 % to the 95 % quantile is where a standard deviation is
-/// known from `freedom` > 0 degrees of freedom only: Student's quantile over the normal one.
+/// By how much wider the interval from the 5 % to the 95 % quantile is where a standard deviation
+/// is known from `freedom` > 0 degrees of freedom only: Student's quantile over the normal one.
 double StudentRatio(double freedom);
 
-/// Student's quantile over the normal one, both of the value that is exceeded with chance `tail`, in
-/// [0, 0.5]; freedom > 0. Infinite for tail 0; for tail 0.5, where both are 0, the limit, which is
-/// the ratio of the densities at the median.
+/// Student's quantile over the normal one, both of the value that is exceeded with chance `tail`,
+/// in [0, 0.5]; freedom > 0. Infinite for tail 0; for tail 0.5, where both are 0, the limit, which
+/// is the ratio of the densities at the median.
 double StudentRatio(double freedom, double tail);
 
 }  // namespace calib::inference

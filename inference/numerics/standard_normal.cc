@@ -10,6 +10,12 @@ namespace {
 
 const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kLeastOfErfc = -37;  // x where erfc(-x / sqrt 2) / 2 nears the least normal number
+// Width of an interval (times 1 + |its middle|) below which the next term of its mass, relative to
+// the two that are taken, is below 1e-15.
+constexpr double kNarrow = 1e-3;
+constexpr double kLeastOfExp = -700;  // ln p where p nears the least normal number
+constexpr int kNewtonSteps = 4;       // each doubles the digits; the start has two
 
 // double throughout: long double would give other bits on other machines.
 using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;
@@ -28,7 +34,7 @@ double LogNormalDensity(double x) { return -0.5 * x * x - kLogSqrtTwoPi; }
 
 double LogNormalCdf(double x) {
   if (x > 0) return std::log1p(-LowerTail(-x));
-  if (x > -37) return std::log(LowerTail(x));
+  if (x > kLeastOfErfc) return std::log(LowerTail(x));
   if (x == -kInfinity) return -kInfinity;
   const double q = 1 / (x * x);
   const double series = -q * (1 - 3 * q * (1 - 5 * q * (1 - 7 * q * (1 - 9 * q * (1 - 11 * q)))));
@@ -39,8 +45,8 @@ double LogNormalMass(double a, double b) {
   if (!(a < b)) return -kInfinity;
   const double middle = 0.5 * (a + b);
   const double width = b - a;
-  if (std::isfinite(width) && width * (1 + std::abs(middle)) < 1e-3) {
-    // phi(m) (w + (m^2 - 1) w^3 / 24); the next term is below 1e-15 of this one.
+  if (std::isfinite(width) && width * (1 + std::abs(middle)) < kNarrow) {
+    // phi(m) (w + (m^2 - 1) w^3 / 24)
     return LogNormalDensity(middle) + std::log(width) +
            std::log1p((middle * middle - 1) * width * width / 24);
   }
@@ -52,12 +58,12 @@ double LogNormalMass(double a, double b) {
 
 double NormalQuantileFromLog(double log_p) {
   if (log_p > -std::numbers::ln2) return -LowerQuantile(-std::expm1(log_p));
-  if (log_p > -700) return LowerQuantile(std::exp(log_p));
+  if (log_p > kLeastOfExp) return LowerQuantile(std::exp(log_p));
   if (log_p == -kInfinity) return -kInfinity;
   // Newton on ln Phi(x) = log_p, whose slope is phi/Phi; ln Phi is concave, so the steps stay on
   // one side.
   double x = -std::sqrt(-2 * log_p - 2 * kLogSqrtTwoPi - std::log(-2 * log_p));
-  for (int step = 0; step < 4; ++step) {
+  for (int step = 0; step < kNewtonSteps; ++step) {
     const double log_cdf = LogNormalCdf(x);
     x -= (log_cdf - log_p) * std::exp(log_cdf - LogNormalDensity(x));
   }

@@ -18,8 +18,11 @@
 
 namespace calib::inference {
 
+/// Numbers that are treated side by side: as many doubles as the widest x86 register holds.
 constexpr int kLanes = 8;
+/// kLanes doubles, with the arithmetic of GCC's vector extension lane by lane.
 using Lanes = double __attribute__((vector_size(64)));
+/// kLanes integers, the bits of Lanes.
 using Bits = std::int64_t __attribute__((vector_size(64)));
 
 /// 1 / k!, the Taylor coefficients of the exponential.
@@ -33,12 +36,13 @@ inline constexpr std::array<double, 14> kReciprocalFactorials = [] {
   return result;
 }();
 
-/// x <- e^x for x <= 0, -700 for what lies below it: x = n ln 2 + r, |r| <= ln 2 / 2, whose first
-/// neglected term r^14 / 14! is below 1e-17.
+/// x <- e^x in each lane, x <= 0; an x below -700 is taken for -700, whose exponential is still a
+/// normal number. x = n ln 2 + r with |r| <= ln 2 / 2, e^r by its Taylor polynomial of degree 13,
+/// whose first neglected term r^14 / 14! is below 1e-17.
 [[gnu::always_inline]] inline void Exponential(Lanes& x) {
-  constexpr double kLog2E = 0x1.71547652b82fep+0;
+  constexpr double kLog2E = 0x1.71547652b82fep+0;    // 1 / ln 2
   constexpr double kLn2High = 0x1.62e42fee00000p-1;  // with n of ten bits the product is exact
-  constexpr double kLn2Low = 0x1.a39ef35793c76p-33;
+  constexpr double kLn2Low = 0x1.a39ef35793c76p-33;  // ln 2 - kLn2High
   constexpr double kRound = 0x1.8p52;  // adding it leaves the nearest integer in the low bits
   const Lanes least = Lanes{} - 700.0;
   x = x > least ? x : least;

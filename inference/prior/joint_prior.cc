@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/numerics/decompositions.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/sampling/sobol.h"
@@ -17,12 +18,18 @@ namespace {
 using Eigen::Index;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kLeastMass = 1e-4;        // redrawing a point takes ten thousand draws there
-constexpr double kLeastPivot = 1e-6;       // of the correlation's Cholesky factor, squared 1e-12
-constexpr double kMassTolerance = 1e-3;    // relative, of the share inside the constraints
+constexpr double kLeastMass = 1e-4;  // chosen: redrawing a point takes ten thousand draws there
+// Pivot of the correlation's Cholesky factor; chosen: a parameter that others determine to a part
+// in a million is a copy of them.
+constexpr double kLeastPivot = 1e-6;
+// Error of the share inside the constraints over that share; chosen: so many nats is the evidence
+// off, little beside the weights' own error.
+constexpr double kMassTolerance = 1e-3;
 constexpr int kMassSets = 16;              // independent scrambles: their spread is the error
-constexpr int kFewestMassPoints = 1 << 9;  // of a set
-constexpr int kMostMassPoints = 1 << 15;
+constexpr int kFewestMassPoints = 1 << 9;  // of a set, at first
+constexpr int kMostMassPoints = 1 << 15;   // of a set, at last
+// Largest normal score, Phi^-1(1 - 1e-16): a bound is a set of measure zero with an infinite score.
+constexpr double kFarthest = 8.2;
 
 }  // namespace
 
@@ -31,7 +38,7 @@ absl::StatusOr<JointPrior> JointPrior::Create(std::vector<Prior> marginals,
                                               std::vector<LinearConstraint> constraints) {
   JointPrior prior(std::move(marginals));
   const auto d = static_cast<Index>(prior.size());
-  if (auto valid = prior.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(prior.Validate());
   if (correlation.size() > 0) {
     const bool shaped = correlation.rows() == d && correlation.cols() == d &&
                         correlation.allFinite() && correlation.isApprox(correlation.transpose()) &&
@@ -90,7 +97,7 @@ void JointPrior::MeasureMass() {
 
 absl::Status JointPrior::Validate() const {
   for (const Prior& prior : marginals_) {
-    if (auto valid = prior.Validate(); !valid.ok()) return valid;
+    RETURN_IF_ERROR(prior.Validate());
   }
   return absl::OkStatus();
 }
@@ -116,8 +123,6 @@ double JointPrior::LogCopula(const Eigen::VectorXd& x) const {
   Eigen::VectorXd z(correlation_.rows());
   for (Index j = 0; j < z.size(); ++j) {
     z[j] = marginals_[static_cast<std::size_t>(j)].NormalScore(x[j]);
-    // A bound itself is a set of measure zero with an infinite score; the density next to it.
-    constexpr double kFarthest = 8.2;  // Phi^-1(1 - 1e-16)
     z[j] = std::clamp(z[j], -kFarthest, kFarthest);
   }
   const Eigen::VectorXd whitened = cholesky_.triangularView<Eigen::Lower>().solve(z);

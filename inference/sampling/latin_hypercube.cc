@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/numerics/decompositions.h"
 #include "inference/sampling/philox.h"
 
@@ -65,9 +66,9 @@ Eigen::MatrixXd Candidate(const LatinHypercubeOptions& options, int candidate) {
   return points;
 }
 
-// The smallest distance between two points, or one that is no larger than `enough`, the first found.
-// Points are looked at in the order of their first coordinate: those further along it than the
-// smallest distance so far cannot be nearer.
+// The smallest distance between two points, or one that is no larger than `enough`, the first
+// found. Points are looked at in the order of their first coordinate: those further along it than
+// the smallest distance so far cannot be nearer.
 double SmallestAbove(const Eigen::MatrixXd& points, double enough) {
   std::vector<Index> order(static_cast<std::size_t>(points.rows()));
   std::iota(order.begin(), order.end(), Index{0});
@@ -102,7 +103,7 @@ absl::Status LatinHypercubeOptions::Validate() const {
 }
 
 absl::StatusOr<Eigen::MatrixXd> LatinHypercube(const LatinHypercubeOptions& options) {
-  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(options.Validate());
   Eigen::MatrixXd best = Candidate(options, 0);
   if (options.candidates == 1) return best;
   double largest = SmallestDistance(best);

@@ -30,10 +30,13 @@ enum class StreamPurpose : std::uint64_t {
   kEmulatedPath = 29,
 };
 
-/// Stream of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration, sample,
-/// draw / 4). Cheap to make, never shared.
+/// Random numbers of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration,
+/// sample, draw / 4). Cheap to make. Thread safety: none, each draw moves on; a thread makes its
+/// own.
 class PhiloxStream {
  public:
+  /// What names a stream: equal keys give equal numbers. What `iteration` and `sample` count is up
+  /// to the purpose.
   struct Key {
     std::uint64_t seed = 0;
     StreamPurpose purpose = StreamPurpose::kTest;
@@ -42,10 +45,10 @@ class PhiloxStream {
   };
   explicit PhiloxStream(const Key& key) : key_(key) {}
 
-  std::uint64_t Bits();
-  /// Uniform in the open interval (0, 1): (k + 1/2) 2^-53.
+  std::uint64_t Bits();  ///< the next 64 random bits
+  /// The next number uniform in the open interval (0, 1): (k + 1/2) 2^-53, k of 53 random bits.
   double Uniform();
-  /// Standard normal by inversion of one uniform.
+  /// The next standard normal number, by inversion of one uniform.
   double Normal();
 
  private:

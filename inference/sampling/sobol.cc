@@ -9,7 +9,7 @@
 namespace calib::inference {
 namespace {
 
-constexpr int kBits = 32;
+constexpr int kBits = 32;  // of a coordinate
 
 // Nested uniform scramble of one coordinate. The prefix of b leading bits, with a one in front so
 // that 0 and 00 differ, names the node of the binary tree whose two halves are or are not

@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int kAttempts = 100;
+constexpr int kAttempts = 100;  // chosen: a draw that fails so often lies in a corner
 
 Eigen::MatrixXd ToStandard(const JointPrior& priors, const Eigen::MatrixXd& draws,
                            const std::vector<Index>& free) {

@@ -12,12 +12,13 @@ namespace {
 
 using Eigen::Index;
 
+// What runs depart by from the mean over their packings.
 struct Departures {
-  Eigen::MatrixXd rows;
-  std::vector<int> packing;
+  Eigen::MatrixXd rows;      // n x T
+  std::vector<int> packing;  // n
 };
 
-// Of the runs on all packings but one, from the mean over those.
+// Departures of the runs on all packings but one from the mean over those.
 Departures Without(int left_out, const Eigen::MatrixXd& departures,
                    const std::vector<int>& packing) {
   std::map<int, std::vector<Index>> by_packing;

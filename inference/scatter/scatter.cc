@@ -13,12 +13,17 @@ namespace {
 
 using Eigen::Index;
 
+// The grid of the likelihood; chosen: finer steps move no sd by what few packings know of it.
 constexpr int kLengths = 100;
-constexpr std::array kAtStart{1e-4, 1e-3, 1e-2, 1e-1, 1.0};
+constexpr double kShortest = 0.1;  // length over the closest readings' distance
+constexpr double kLongest = 100;   // length over the whole path
+constexpr double kClosest = 1e-6;  // closest distance over the whole path, where readings coincide
+constexpr std::array kAtStart{1e-4, 1e-3, 1e-2, 1e-1, 1.0};  // share of the final variance
 constexpr std::array kPowers{1, 2, 3};
 // Readings that scatter by less than this part of the largest sd, as at the start itself, count as
-// if they scattered by so much.
+// if they scattered by so much; chosen: they would otherwise be all of the likelihood.
 constexpr double kNegligible = 1e-3;
+constexpr double kLeastOpen = 1e-9;  // of a reading's variance beside its neighbour's; chosen
 
 // The shape of a process that starts with the part `at_start` of its final variance.
 struct Shape {
@@ -54,7 +59,7 @@ double MarkovLikelihood(const ScatterMoments& moments, const Eigen::VectorXd& va
   double sum = -0.5 * (std::log(variance[0]) + moments.variance[0] / variance[0]);
   for (Index i = 0; i + 1 < variance.size(); ++i) {
     const double rho = std::exp(clock[i] - clock[i + 1]);
-    const double open = std::max(1e-9, 1 - rho * rho);
+    const double open = std::max(kLeastOpen, 1 - rho * rho);
     const double here = moments.variance[i] / variance[i];
     const double next = moments.variance[i + 1] / variance[i + 1];
     const double both = moments.neighbour[i] / std::sqrt(variance[i] * variance[i + 1]);
@@ -92,8 +97,8 @@ GroupScatter FitScatter(const ScatterMoments& moments, const std::vector<int>& s
   floored.variance =
       moments.variance.cwiseMax(kNegligible * kNegligible * moments.variance.maxCoeff());
   const Eigen::VectorXd distance = control.tail(n - 1) - control.head(n - 1);
-  const double shortest = 0.1 * std::max(distance.minCoeff(), 1e-6 * whole);
-  const double ratio = std::log(100 * whole / shortest) / (kLengths - 1);
+  const double shortest = kShortest * std::max(distance.minCoeff(), kClosest * whole);
+  const double ratio = std::log(kLongest * whole / shortest) / (kLengths - 1);
   double best = -std::numeric_limits<double>::infinity();
   for (int k = 0; k < kLengths; ++k) {
     const double length = shortest * std::exp(ratio * k);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/sampling/shuffle.h"
 #include "inference/sensitivity/spread.h"
 
@@ -149,9 +150,8 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
   rows.resize(static_cast<std::size_t>(used));
   const Eigen::MatrixXd inputs = ToStandard(priors, parameters(rows, Eigen::all));
   const Eigen::VectorXd values = outputs(rows);
-  auto whole = GaussianProcess::Fit(inputs, values);
-  if (!whole.ok()) return whole.status();
-  EmulatedOutput emulated(*std::move(whole));
+  ASSIGN_OR_RETURN(auto whole, GaussianProcess::Fit(inputs, values));
+  EmulatedOutput emulated(std::move(whole));
   const double average = values.mean();
   const double variance = (values.array() - average).square().mean();
   emulated.range_ = inputs.colwise().maxCoeff() - inputs.colwise().minCoeff();
@@ -165,10 +165,9 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
     for (Index i = 0; i < used; ++i) {
       if (i % options.folds != fold) kept.push_back(i);
     }
-    auto part =
-        GaussianProcess::Fit(inputs(kept, Eigen::all), values(kept), {.like = &emulated.whole_});
-    if (!part.ok()) return part.status();
-    emulated.parts_.push_back(*std::move(part));
+    ASSIGN_OR_RETURN(auto part, GaussianProcess::Fit(inputs(kept, Eigen::all), values(kept),
+                                                     {.like = &emulated.whole_}));
+    emulated.parts_.push_back(std::move(part));
   }
   return emulated;
 }
@@ -234,9 +233,9 @@ absl::StatusOr<std::vector<OutputSensitivity>> AnalyseSensitivity(
       SobolSets(static_cast<int>(priors.size()), options.sobol);
   std::vector<OutputSensitivity> all;
   for (Index o = 0; o < outputs.cols(); ++o) {
-    const auto emulated = EmulatedOutput::Fit(priors, parameters, outputs.col(o), options);
-    if (!emulated.ok()) return emulated.status();
-    all.push_back(emulated->Over(priors, ranked, sets));
+    ASSIGN_OR_RETURN(const auto emulated,
+                     EmulatedOutput::Fit(priors, parameters, outputs.col(o), options));
+    all.push_back(emulated.Over(priors, ranked, sets));
   }
   return all;
 }

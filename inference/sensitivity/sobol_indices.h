@@ -11,7 +11,7 @@ namespace calib::inference {
 
 /// Of one output y(x_1 ... x_d), independent x_j:
 ///   first_j = Var(E[y | x_j]) / Var(y),   total_j = 1 - Var(E[y | x_-j]) / Var(y)
-///                                                        [Sobol 1993; Homma & Saltelli 1996]
+///                                                              [Sobol 1993; Homma & Saltelli 1996]
 /// An index may come out slightly below 0 or above 1: its error is stated, it is not clipped.
 struct SobolIndices {
   Eigen::VectorXd first, total;              ///< d; NaN where the output does not vary

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "calib/return_if_error.h"
 #include "inference/numerics/gaussian_process.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/sampling/philox.h"
@@ -94,9 +95,8 @@ absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
   Eigen::MatrixXd done;
   Eigen::VectorXd values;
   const bool logarithmic = ValuesDone(state, done, values);
-  auto process = GaussianProcess::Fit(done, values, kProcess);
-  if (!process.ok()) return process.status();
-  const Eigen::VectorXd at_done = process->PredictMean(done);
+  ASSIGN_OR_RETURN(auto process, GaussianProcess::Fit(done, values, kProcess));
+  const Eigen::VectorXd at_done = process.PredictMean(done);
   const double best = at_done.minCoeff();
   Eigen::MatrixXd others;
   Eigen::VectorXd least;
@@ -105,15 +105,14 @@ absl::StatusOr<std::optional<Eigen::VectorXd>> NextByExpectedImprovement(
     Eigen::MatrixXd all(done.rows() + others.rows(), d);
     all << done, others;
     Eigen::VectorXd believed(all.rows());
-    believed << values, process->PredictMean(others).cwiseMax(least);
-    process = GaussianProcess::Fit(all, believed, kProcess);
-    if (!process.ok()) return process.status();
+    believed << values, process.PredictMean(others).cwiseMax(least);
+    ASSIGN_OR_RETURN(process, GaussianProcess::Fit(all, believed, kProcess));
   }
 
   Candidate chosen;
   Candidate farthest;  // where nothing promises to improve
   const auto consider = [&](const Eigen::MatrixXd& points) {
-    const GaussianProcessPrediction prediction = process->Predict(points);
+    const GaussianProcessPrediction prediction = process.Predict(points);
     for (Index i = 0; i < points.rows(); ++i) {
       const Eigen::VectorXd point = points.row(i);
       if (options.admissible && !options.admissible(point)) continue;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/sampling/latin_hypercube.h"
 #include "inference/sampling/philox.h"
 #include "inference/surrogate/merit.h"
@@ -169,7 +170,7 @@ absl::Status ResponseSurfaceOptions::Validate() const {
 }
 
 absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceOptions& options) {
-  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(options.Validate());
   const auto first = static_cast<int>(options.first_points.rows());
   LatinHypercubeOptions design{.points = InitialPoints(options) - first,
                                .dimensions = options.dimensions,
@@ -181,10 +182,9 @@ absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceO
   constexpr int kTries =
       100;  // a design that does not span the tail is rare: its points would lie in a plane
   for (int i = 0; i < kTries; ++i) {
-    auto points = LatinHypercube(design);
-    if (!points.ok()) return points.status();
-    state.design = Joined(options.first_points, *points);
-    if (auto replaced = ReplaceInadmissible(options, state.design); !replaced.ok()) return replaced;
+    ASSIGN_OR_RETURN(auto points, LatinHypercube(design));
+    state.design = Joined(options.first_points, points);
+    RETURN_IF_ERROR(ReplaceInadmissible(options, state.design));
     if (SpansLinearFunctions(state.design)) return state;
     ++design.seed;
   }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "inference/sampling/philox.h"
 #include "inference/tmcmc/tempering_step.h"
 
@@ -15,6 +16,10 @@ namespace {
 using Eigen::Index;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Metropolis steps of a stage; chosen: with 15 in ten dimensions the stated error of the evidence
+// is 30 % too small (inference_tmcmc_verification_test, fifty seeds).
+constexpr int kFewestSteps = 10;
+constexpr int kStepsPerParameter = 3;
 
 // Stage 0 holds the draws from the prior; step 0 of a later stage is its resampling.
 PhiloxStream Stream(const TmcmcOptions& options, std::size_t stage, int step, Index row) {
@@ -168,9 +173,8 @@ absl::Status TmcmcOptions::Validate() const {
 }
 
 int StepsPerStage(const TmcmcOptions& options, std::size_t d) {
-  constexpr int kFewest = 10;
-  constexpr int kPerParameter = 3;
-  return options.steps > 0 ? options.steps : std::max(kFewest, kPerParameter * static_cast<int>(d));
+  if (options.steps > 0) return options.steps;
+  return std::max(kFewestSteps, kStepsPerParameter * static_cast<int>(d));
 }
 
 double TmcmcState::LogEvidenceStandardError() const {
@@ -187,9 +191,9 @@ double TmcmcState::LogEvidenceStandardError() const {
 }
 
 absl::StatusOr<TmcmcState> StartTmcmc(const JointPrior& priors, const TmcmcOptions& options) {
-  if (auto valid = options.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(options.Validate());
   if (priors.empty()) return absl::InvalidArgumentError("tmcmc: there is no parameter to sample.");
-  if (auto valid = priors.Validate(); !valid.ok()) return valid;
+  RETURN_IF_ERROR(priors.Validate());
   TmcmcState state;
   if (BeginsAtPrior(options)) {
     state.proposals.resize(options.samples, static_cast<Index>(priors.size()));
@@ -198,9 +202,8 @@ absl::StatusOr<TmcmcState> StartTmcmc(const JointPrior& priors, const TmcmcOptio
       state.proposals.row(i) = priors.Draw(stream);
     }
   } else {
-    auto drawn = DrawSamples(options.first, priors, {.seed = options.seed}, 0, options.samples);
-    if (!drawn.ok()) return drawn.status();
-    state.proposals = *std::move(drawn);
+    ASSIGN_OR_RETURN(state.proposals, DrawSamples(options.first, priors, {.seed = options.seed}, 0,
+                                                  options.samples));
   }
   state.accept_above = Eigen::VectorXd::Constant(options.samples, -kInfinity);
   state.scale = FirstScale(priors.size());
@@ -258,7 +261,7 @@ absl::Status AdvanceTmcmc(const JointPrior& priors, const TmcmcOptions& options,
       state = std::move(next);
       return absl::OkStatus();
     }
-    if (auto begun = BeginStage(priors, options, next); !begun.ok()) return begun;
+    RETURN_IF_ERROR(BeginStage(priors, options, next));
   }
   Propose(priors, options, next);
   state = std::move(next);
@@ -271,9 +274,8 @@ absl::StatusOr<TmcmcState> RunTmcmc(const JointPrior& priors, const TmcmcOptions
   auto state = StartTmcmc(priors, options);
   while (state.ok() && !state->finished()) {
     if (stop.stop_requested()) return absl::CancelledError("tmcmc was stopped.");
-    const auto advanced =
-        AdvanceTmcmc(priors, options, EvaluateInSupport(*state, log_likelihood), *state);
-    if (!advanced.ok()) return advanced;
+    RETURN_IF_ERROR(
+        AdvanceTmcmc(priors, options, EvaluateInSupport(*state, log_likelihood), *state));
   }
   return state;
 }

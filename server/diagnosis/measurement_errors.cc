@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "inference/numerics/decompositions.h"
 #include "inference/sampling/philox.h"
 #include "inference/scatter/packing_scatter.h"
 

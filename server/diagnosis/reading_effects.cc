@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "inference/numerics/decompositions.h"
+
 namespace calib::diagnosis {
 namespace {
 

@@ -10,6 +10,7 @@
 #include "calib/return_if_error.h"
 #include "inference/emulator/training_set.h"
 #include "inference/filter/iterative_filter.h"
+#include "inference/numerics/decompositions.h"
 #include "server/diagnosis/left_out_packings.h"
 #include "server/diagnosis/stage_shapes.h"
 

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/decompositions.h"
 #include "calib/return_if_error.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/surrogate/expected_improvement.h"

@@ -10,6 +10,7 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/decompositions.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
 

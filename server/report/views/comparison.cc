@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "inference/numerics/decompositions.h"
 #include "inference/scatter/chi_squared_law.h"
 #include "server/campaign/model/noise_check.h"
 #include "server/messages/read_words.h"
