@@ -8,6 +8,7 @@
 
 namespace calib::client {
 
+/// Looks at the statuses that a verb waits on. Not thread-safe.
 class NoWorkerNotice {
  public:
   /// session must outlive it. patience: how long nothing may run before the workers are counted.

@@ -17,7 +17,7 @@
 
 namespace calib::service {
 
-/// A worker's stream as the strand sees it. Both calls return at once.
+/// A worker's stream as the strand sees it. Called on the strand only; both calls return at once.
 class Session {
  public:
   virtual ~Session() = default;
@@ -26,6 +26,7 @@ class Session {
   virtual void Close(const absl::Status& status) = 0;
 };
 
+/// Post(), Query() and Read() may be called on any thread; everything else as said beside it.
 class Core final : public scheduler::Ports {
  public:
   /// on_failure is called once, on the strand, when the store can no longer be written.
