@@ -1,7 +1,7 @@
 #pragma once
 // The posterior propagated to the readings: mean and band of every observable of every experiment.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "server/report/views/campaign_view.h"

@@ -1,7 +1,7 @@
 #pragma once
 // Residuals of one observable of one experiment with what is known of their errors.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 

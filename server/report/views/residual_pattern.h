@@ -1,7 +1,7 @@
 #pragma once
 // The shape of what a model leaves unexplained along a curve, in one word and one number.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::report {
 

@@ -1,7 +1,7 @@
 #pragma once
 // The finished runs of a campaign as matrices, the way the inference and the diagnosis see them.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "inference/data/data_set.h"
