@@ -19,6 +19,7 @@ class NoWorkerNotice {
   /// worker is connected, a line on standard error says what to do; again only after one has come.
   void Look(const v1::CampaignStatus& status);
 
+  /// A worker that was just started has connected within this time [s].
   static constexpr std::chrono::seconds kPatience{5};
 
  private:

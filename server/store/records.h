@@ -17,6 +17,7 @@ using campaign::EvaluationStatus;
 using campaign::Method;
 using campaign::Phase;
 
+/// A number that is not known yet; NULL in the store.
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// A campaign as submitted, before anything has happened to it.

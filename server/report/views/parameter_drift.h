@@ -44,6 +44,7 @@ struct ParameterDrift {
 /// emulate any part.
 absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& view);
 
+/// Readings of a stage or experiment below which it is not fitted alone.
 inline constexpr int kLeastReadings = 6;
 
 }  // namespace calib::report

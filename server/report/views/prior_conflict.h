@@ -26,6 +26,8 @@ struct PriorConflict {
 /// without a known size of the errors.
 std::vector<PriorConflict> PriorConflicts(const CampaignView& view);
 
+/// Finished runs from the prior below which nothing is said of a conflict: an extreme of fewer is
+/// chance.
 inline constexpr int kLeastRuns = 20;
 
 /// One sentence.
