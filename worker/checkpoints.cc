@@ -86,7 +86,7 @@ std::optional<HeldRun> Checkpoints::Find(const std::string& run) const {
   return held;
 }
 
-absl::Status Checkpoints::Keep(const std::string& run, const HeldRun& held) const {
+absl::Status Checkpoints::Save(const std::string& run, const HeldRun& held) const {
   std::string bytes(kMagic);
   bytes.append(reinterpret_cast<const char*>(&held.steps), sizeof held.steps);
   bytes.append(reinterpret_cast<const char*>(&held.contact_updates), sizeof held.contact_updates);

@@ -20,10 +20,10 @@ struct OnceOptions {
   std::string checkpoint{};
 };
 
-inline constexpr int kCompleted = 0;
-inline constexpr int kDiverged = 1;
-inline constexpr int kBadSpec = 2;
-inline constexpr int kRefusedCheckpoint = 3;  ///< it is there, but this run cannot go on from it
+inline constexpr int kCompleted = 0;  ///< exit code: all load steps were reached
+inline constexpr int kDiverged = 1;   ///< exit code: the model cannot do it
+inline constexpr int kBadSpec = 2;    ///< exit code: the spec is unusable, or the run failed
+inline constexpr int kRefusedCheckpoint = 3;  ///< exit code: the checkpoint is of another run
 
 /// Writes `load_step,<observables>` and a row per state as soon as it is reached (17 significant
 /// digits), of a resumed run all rows, messages to `errors`. Returns one of the exit codes above.

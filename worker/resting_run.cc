@@ -78,7 +78,7 @@ v1::Finished EvaluateToRung(const v1::AttemptSpec& spec, const RestingRun& resti
     return finished;
   }
   if (finished.outcome() == v1::Finished::OUTCOME_RESTING && !so_far.checkpoint.empty()) {
-    if (const absl::Status kept = checkpoints->Keep(resting.run, so_far); !kept.ok()) {
+    if (const absl::Status kept = checkpoints->Save(resting.run, so_far); !kept.ok()) {
       spdlog::warn("checkpoint run={} not_kept=\"{}\"", resting.run, std::string(kept.message()));
     }
   } else if (finished.outcome() != v1::Finished::OUTCOME_RESTING &&

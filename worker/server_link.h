@@ -19,7 +19,7 @@ struct LinkEvents {
       closed;  ///< last event of one Open(); OK: the server ended the stream
 };
 
-/// Thread-safe.
+/// The connection to one server. Thread-safe.
 class ServerLink {
  public:
   ServerLink(const std::string& address, LinkEvents events);
@@ -30,7 +30,7 @@ class ServerLink {
 
   /// Starts a stream with this first message. The one before must have closed.
   void Open(const v1::Hello& hello);
-  /// Queued in order; dropped when no stream is open.
+  /// Queues a message behind those before it; it is dropped when no stream is open.
   void Send(v1::WorkerMessage message);
   /// No more messages follow; the server then ends the stream.
   void FinishSending();

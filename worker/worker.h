@@ -16,7 +16,7 @@ struct WorkerOptions {
   std::string name{};                     ///< unique among the server's workers
   int slots = 1;                          ///< attempts at a time, > 0
   int threads_per_slot = 1;               ///< > 0
-  double contact_updates_per_second = 0;  ///< of one thread, as measured
+  double contact_updates_per_second = 0;  ///< speed of one thread, as measured
   std::string cpu{};                      ///< model name, recorded with every attempt
   std::string checkpoints{};              ///< folder for runs that rest; empty: none are kept
   std::int64_t most_checkpoint_bytes = std::int64_t{4} << 30;
@@ -27,6 +27,7 @@ struct WorkerOptions {
 /// Runs until SIGTERM or SIGINT (simulations are stopped, what they have computed is sent), until
 /// the server has drained it, or until the server refuses it. A lost connection is opened again
 /// with growing, jittered waits.
+/// Run() is called once; nothing here is thread-safe.
 class Worker {
  public:
   explicit Worker(WorkerOptions options);

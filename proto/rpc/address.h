@@ -10,7 +10,7 @@ namespace calib::rpc {
 /// up.
 std::string ProblemOfAddress(const std::string& address, int least_port = 1);
 
-/// Of HOST:PORT.
+/// The HOST of HOST:PORT, which has no problem (ProblemOfAddress).
 std::string HostOf(const std::string& address);
 
 /// True where only this machine is reached by the address. Names are not looked up.

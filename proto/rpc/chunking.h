@@ -11,7 +11,9 @@
 
 namespace calib::rpc {
 
+/// Content of one chunk at most [bytes]: far below the 4 MiB of a gRPC message.
 inline constexpr std::size_t kChunkBytes = std::size_t{512} * 1024;
+/// Content of a file at most [bytes]; it is put together in memory.
 inline constexpr std::size_t kLargestBlob = std::size_t{256} * 1024 * 1024;
 
 /// Content as chunks in order; the first carries the digest. Empty content is one chunk without

@@ -12,7 +12,10 @@ class ClientContext;
 
 namespace calib::rpc {
 
+/// A question that is answered from the store takes well under a second; this is for a full disk or
+/// a machine that swaps.
 inline constexpr std::chrono::seconds kUnaryDeadline{30};
+/// For calls that carry a file of at most kLargestBlob (chunking.h).
 inline constexpr std::chrono::seconds kBlobDeadline{120};
 
 /// Plain-text channel with quick reconnects (at most 2 s between tries) and keep-alive pings, so

@@ -4,8 +4,8 @@
 
 namespace calib::client {
 
-void KeepFinding(Client& client, const std::string& campaign, const std::string& kind,
-                 const std::string& document) {
+void StoreFinding(Client& client, const std::string& campaign, const std::string& kind,
+                  const std::string& document) {
   if (auto kept = client.AddFinding(campaign, kind, document); !kept.ok()) {
     std::cerr << "the " << kind << " of " << campaign
               << " is not kept, so reports will not show it: " << kept.message() << "\n";

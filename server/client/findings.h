@@ -11,9 +11,9 @@ namespace calib::client {
 inline constexpr const char* kDiagnosis = "diagnosis";      ///< the JSON of `calibctl diagnose`
 inline constexpr const char* kImprovement = "improvement";  ///< the JSON of `calibctl improve`
 
-/// Keeps a document. Where that fails the answer is as good as without: a line on standard error
+/// Stores a document at the server. Where that fails the answer is as good as without: a line on standard error
 /// says so.
-void KeepFinding(Client& client, const std::string& campaign, const std::string& kind,
-                 const std::string& document);
+void StoreFinding(Client& client, const std::string& campaign, const std::string& kind,
+                  const std::string& document);
 
 }  // namespace calib::client

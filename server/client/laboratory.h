@@ -12,6 +12,7 @@
 
 namespace calib::client {
 
+/// Not thread-safe.
 class Laboratory {
  public:
   /// Session and choice must outlive it. Starts local workers when there is something to run and the state

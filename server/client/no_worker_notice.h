@@ -8,6 +8,7 @@
 
 namespace calib::client {
 
+/// Looks at the statuses that a verb waits on. Not thread-safe.
 class NoWorkerNotice {
  public:
   /// session must outlive it. patience: how long nothing may run before the workers are counted.
@@ -18,6 +19,7 @@ class NoWorkerNotice {
   /// worker is connected, a line on standard error says what to do; again only after one has come.
   void Look(const v1::CampaignStatus& status);
 
+  /// A worker that was just started has connected within this time [s].
   static constexpr std::chrono::seconds kPatience{5};
 
  private:

@@ -13,6 +13,7 @@ namespace calib::client {
 /// min 20 s left"
 std::string ProgressText(const v1::CampaignStatus& status);
 
+/// One line of progress on standard error. Not thread-safe.
 class ProgressLine {
  public:
   /// quiet: says nothing at all.

@@ -113,12 +113,12 @@ absl::Status Session::ServeOrJoin() {
   }
   host_stays_ = is_guest() && service::IsServedForGood(state_);
   if (client_ != nullptr) {
-    client_->OnLoss([this] { return Succeed(); });
+    client_->OnLoss([this] { return TakeOverOrFind(); });
   }
   return last;
 }
 
-std::string Session::Succeed() {
+std::string Session::TakeOverOrFind() {
   if (!failure_->Get().ok()) return "";
   if (server_ != nullptr) return address_;  // it is not gone, only slow
   if (host_stays_) {

@@ -20,6 +20,7 @@ class Server;
 
 namespace calib::client {
 
+/// Not thread-safe.
 class Session {
  public:
   /// For most verbs: --state if given (which must exist unless may_create), else --server. Local
@@ -33,7 +34,7 @@ class Session {
   Session& operator=(const Session&) = delete;
 
   Client& client() { return *client_; }
-  const std::string& address() const { return address_; }  ///< HOST:PORT of its server
+  const std::string& address() const { return address_; }  ///< HOST:PORT of the server
   /// The folder is served by another process, to which this session is connected. When that ends,
   /// this one serves the folder, unless it was calibd, which is waited for.
   bool is_guest() const { return server_ == nullptr; }
@@ -55,11 +56,12 @@ class Session {
   absl::StatusOr<std::string> ServeOrFind(const std::string& listen);
   /// After the process that served the folder has ended: serves it, or finds who does; the address
   /// for the client, "" when it is hopeless (Check() says why). A server that stays is waited for.
-  std::string Succeed();
+  std::string TakeOverOrFind();
   std::string GiveUp(const absl::Status& why);
   absl::Status StartWorkers(int count);
   bool AllEnded();
-  std::string Checkpoints() const;  ///< of local workers
+  /// Folder of the checkpoints of local workers.
+  std::string Checkpoints() const;
 
   /// What ended the service of the folder; may be set on another thread.
   struct Failure {

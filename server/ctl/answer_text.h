@@ -14,7 +14,7 @@ namespace calib::ctl {
 /// Identified parameters, evidence, effective samples and warnings.
 std::string PosteriorText(const v1::Posterior& posterior, const std::vector<std::string>& warnings);
 
-/// Of a table whose rows have run, which has no posterior.
+/// The answer for a table whose rows have run, which has no posterior.
 std::string TableText(const v1::CampaignStatus& status);
 
 /// Overall misfit in a sentence, then per observable and per loading stage.

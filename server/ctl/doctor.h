@@ -16,7 +16,7 @@ std::string ToString(Health health);  ///< "ok", "unknown", "warning", "problem"
 /// One thing that was looked at.
 struct Check {
   std::string name;  ///< build | clock | file_system | time_step | certificates | server | workers
-  std::string subject{};  ///< of what
+  std::string subject{};  ///< what the check is about
   Health health = Health::kOk;
   std::string found{};   ///< a sentence or two
   std::string advice{};  ///< what to do; empty when nothing is to be done
@@ -47,18 +47,18 @@ Check JudgeDatabase(const v1::ServerReport& server);
 
 /// address: by which the server was reached; listen: what the server was told, if known.
 Check JudgeConnection(const std::string& address, const std::optional<std::string>& listen);
-/// Empty folder of workers and refused ones included. now: [ms] of the server's clock.
+/// One check for each worker that is silent or was turned away, or one that all is well.
 std::vector<Check> JudgeWorkers(const std::vector<v1::WorkerInfo>& workers,
                                 const v1::ServerReport& server);
 
 /// A collision and an assembly that a worker has made, beside what is known of them.
 struct TrialRuns {
-  double restitution = 0;   ///< of an elastic Hertz collision; 1
+  double restitution = 0;   ///< of an elastic Hertz collision, which has 1
   double peak_overlap = 0;  ///< [m]
   double duration = 0;      ///< [s]
   double mean_stress = 0;   ///< [Pa] of 64 grains compressed to `TrialStress()`
-  std::string digest;       ///< of all digits of both tables
-  std::string failure{};    ///< why there is none of this; empty: there is
+  std::string digest;       ///< SHA-256 of all digits of both tables
+  std::string failure{};    ///< why no trial could be made; empty: it was
 };
 Check JudgeTimeStep(const TrialRuns& runs);
 

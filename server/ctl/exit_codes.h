@@ -5,7 +5,7 @@
 
 namespace calib::ctl {
 
-inline constexpr int kDone = 0;
+inline constexpr int kDone = 0;         ///< the answer was printed
 inline constexpr int kFailed = 1;       ///< the campaign or the request failed
 inline constexpr int kBadInput = 2;     ///< bad usage or bad input
 inline constexpr int kUnreachable = 3;  ///< no server answered

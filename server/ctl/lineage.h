@@ -8,6 +8,7 @@
 
 namespace calib::ctl {
 
+/// A campaign in the tree of who comes from whom.
 struct Branch {
   v1::CampaignStatus status;
   int depth = 0;  ///< 0: its parent is not in the list
@@ -22,7 +23,7 @@ std::vector<Branch> AsTree(const std::vector<v1::CampaignStatus>& campaigns);
 std::vector<v1::CampaignStatus> Descendants(const std::vector<v1::CampaignStatus>& campaigns,
                                             const std::string& campaign);
 
-/// Those that come from it directly, in the same order.
+/// The campaigns that come from `campaign` directly, in the order of AsTree().
 std::vector<v1::CampaignStatus> ChildrenOf(const std::vector<v1::CampaignStatus>& campaigns,
                                            const std::string& campaign);
 

@@ -18,7 +18,7 @@ namespace calib::ctl {
 struct PredictedTests {
   std::vector<campaign::YamlNode> experiments;
   std::map<std::string, std::string> files;  ///< path as written -> content
-  std::set<std::string> observables;         ///< of any of them
+  std::set<std::string> observables;         ///< that any of the tests has
 };
 
 /// Gives an experiment without `packing` that of another one, with its `realizations` and, where it

@@ -16,7 +16,7 @@ struct TrialCollision {
   double young_modulus = 2.1e11;  ///< [Pa]
   double poisson_ratio = 0.3;
   double density = 7800;  ///< [kg/m^3]
-  /// Of Hertz' theory (Johnson 1985, sec. 11.4): the largest overlap [m] and how long the bodies
+  /// By Hertz' theory (Johnson 1985, sec. 11.4) the largest overlap [m] and how long the bodies
   /// touch [s].
   double PeakOverlap() const;
   double Duration() const;

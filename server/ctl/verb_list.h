@@ -1,4 +1,5 @@
 #pragma once
+// Which verbs calibctl has.
 
 #include <vector>
 

@@ -143,7 +143,7 @@ absl::StatusOr<Diagnosis> Improvement::Ask(const report::CampaignView& view, boo
     diagnosis = Diagnose(laboratory_, view, options);
   }
   if (!diagnosis.ok()) return diagnosis;
-  client::KeepFinding(client_, diagnosis->campaign, client::kDiagnosis, DiagnosisJson(*diagnosis));
+  client::StoreFinding(client_, diagnosis->campaign, client::kDiagnosis, DiagnosisJson(*diagnosis));
   if (!diagnosis->only_adequacy) nuisance_ = diagnosis->nuisance;
   evaluations_ += diagnosis->screen_evaluations + diagnosis->warm_evaluations;
   return diagnosis;
@@ -324,9 +324,9 @@ absl::Status Improvement::Open() {
     opened_before_ = std::move(before);
   }
   const std::string opened = Json();
-  client::KeepFinding(client_, steps_.front().campaign, client::kImprovement, opened);
+  client::StoreFinding(client_, steps_.front().campaign, client::kImprovement, opened);
   if (steps_.size() > 1)
-    client::KeepFinding(client_, steps_.back().campaign, client::kImprovement, opened);
+    client::StoreFinding(client_, steps_.back().campaign, client::kImprovement, opened);
   return absl::OkStatus();
 }
 

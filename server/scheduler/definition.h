@@ -2,7 +2,7 @@
 // A stored campaign as it is worked on: read again from what was submitted, with what follows from
 // it.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <map>
 #include <memory>
 #include <optional>

@@ -1,7 +1,7 @@
 #pragma once
 // For which samples held-out experiments are run: those that carry the posterior.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstddef>
 #include <vector>
 

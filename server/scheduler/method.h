@@ -2,7 +2,7 @@
 // A calibration method as the planner sees it: which samples come first, and what follows from all
 // that have ended. One .cc per family: filter_method, tmcmc_method, surrogate_method.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cstdint>
 #include <limits>
 #include <memory>

@@ -1,7 +1,7 @@
 #pragma once
 // How well the posterior fits each observable and each of its loading stages.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "inference/emulator/emulated_posterior.h"

@@ -3,7 +3,12 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <memory>
 #include <utility>
 
 namespace calib::service {
@@ -14,23 +19,29 @@ constexpr int kPoolThreads = 2;  // so that questions are answered meanwhile
 
 }  // namespace
 
+struct Core::Threads {
+  boost::asio::io_context strand;
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> keep_running{
+      strand.get_executor()};
+  boost::asio::steady_timer tick{strand};
+  boost::asio::thread_pool plans{kPlanThreads};
+  boost::asio::thread_pool pool{kPoolThreads};
+};
+
 Core::Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions options,
            std::function<void(const absl::Status&)> on_failure)
     : options_(options),
       on_failure_(std::move(on_failure)),
-      keep_running_(strand_.get_executor()),
-      tick_(strand_),
-      plans_(kPlanThreads),
-      pool_(kPoolThreads),
+      threads_(std::make_unique<Threads>()),
       store_(std::move(store)),
       scheduler_(*this, options),
-      thread_([this] { strand_.run(); }) {}
+      thread_([this] { threads_->strand.run(); }) {}
 
 Core::~Core() {
   BeginShutdown();
-  plans_.join();
-  pool_.join();
-  keep_running_.reset();
+  threads_->plans.join();
+  threads_->pool.join();
+  threads_->keep_running.reset();
   thread_.join();
   // The store then finishes what it was given; nobody waits for those answers any more.
 }
@@ -51,13 +62,17 @@ void Core::BeginShutdown() {
     for (const auto& [id, session] : sessions_) {
       session->Close(absl::UnavailableError("the server is going down"));
     }
-    tick_.cancel();
+    threads_->tick.cancel();
   });
 }
 
-void Core::Post(std::function<void()> task) { boost::asio::post(strand_, std::move(task)); }
+boost::asio::io_context& Core::strand() { return threads_->strand; }
 
-void Core::Query(std::function<void()> task) { boost::asio::post(pool_, std::move(task)); }
+void Core::Post(std::function<void()> task) {
+  boost::asio::post(threads_->strand, std::move(task));
+}
+
+void Core::Query(std::function<void()> task) { boost::asio::post(threads_->pool, std::move(task)); }
 
 std::int64_t Core::AddSession(Session* session) {
   sessions_[++last_session_] = session;
@@ -93,7 +108,7 @@ void Core::Fail(const absl::Status& status) {
 }
 
 void Core::Compute(std::function<std::function<void()>()> work) {
-  boost::asio::post(plans_, [this, work = std::move(work)] { Post(work()); });
+  boost::asio::post(threads_->plans, [this, work = std::move(work)] { Post(work()); });
 }
 
 void Core::Send(std::int64_t session, v1::ServerMessage message) {
@@ -117,9 +132,9 @@ std::int64_t Core::UnixMs() {
 }
 
 void Core::ScheduleTick() {
-  tick_.expires_after(std::clamp<std::chrono::milliseconds>(
+  threads_->tick.expires_after(std::clamp<std::chrono::milliseconds>(
       options_.lease / 4, std::chrono::milliseconds(20), std::chrono::milliseconds(1000)));
-  tick_.async_wait([this](const boost::system::error_code& error) {
+  threads_->tick.async_wait([this](const boost::system::error_code& error) {
     if (!error && health_.ok()) {
       scheduler_.Tick();
       ScheduleTick();

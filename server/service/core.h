@@ -2,10 +2,6 @@
 // The threads of the service and what they own: the strand with the scheduler, the store, and the
 // pool for reading and computing. The gRPC reactors only move data between the wire and here.
 
-#include <boost/asio/executor_work_guard.hpp>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/thread_pool.hpp>
 #include <functional>
 #include <map>
 #include <memory>
@@ -15,9 +11,13 @@
 #include "server/scheduler/scheduler.h"
 #include "server/store/store.h"
 
+namespace boost::asio {
+class io_context;
+}
+
 namespace calib::service {
 
-/// A worker's stream as the strand sees it. Both calls return at once.
+/// A worker's stream as the strand sees it. Called on the strand only; both calls return at once.
 class Session {
  public:
   virtual ~Session() = default;
@@ -26,6 +26,7 @@ class Session {
   virtual void Close(const absl::Status& status) = 0;
 };
 
+/// Post(), Query() and Read() may be called on any thread; everything else as said beside it.
 class Core final : public scheduler::Ports {
  public:
   /// on_failure is called once, on the strand, when the store can no longer be written.
@@ -51,7 +52,7 @@ class Core final : public scheduler::Ports {
   const absl::Status& health() const { return health_; }
   std::int64_t AddSession(Session* session);
   void RemoveSession(std::int64_t session);
-  boost::asio::io_context& strand() { return strand_; }
+  boost::asio::io_context& strand();
 
   // ---- Ports ----
   void Write(store::Store::Job job, std::function<void(const absl::Status&)> then) override;
@@ -68,11 +69,9 @@ class Core final : public scheduler::Ports {
 
   const scheduler::SchedulerOptions options_;
   const std::function<void(const absl::Status&)> on_failure_;
-  boost::asio::io_context strand_;
-  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> keep_running_;
-  boost::asio::steady_timer tick_;
-  boost::asio::thread_pool plans_;
-  boost::asio::thread_pool pool_;
+  struct Threads;
+  // Goes after the store, which posts to the strand to its end.
+  const std::unique_ptr<Threads> threads_;
   std::unique_ptr<store::Store> store_;
   scheduler::Scheduler scheduler_;
   absl::Status health_;

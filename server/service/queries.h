@@ -17,9 +17,10 @@ namespace calib::service {
 /// "c12" -> 12; NOT_FOUND for anything else.
 absl::StatusOr<std::int64_t> ParseCampaign(const std::string& id);
 
+/// live: what the scheduler knows beyond the store; empty: nothing, the campaign is over.
 absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t campaign,
                                             const std::optional<scheduler::LiveStatus>& live);
-/// Of all campaigns, in the order of their ids.
+/// The status of every campaign, in the order of their ids.
 absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
                                      const std::map<std::int64_t, scheduler::LiveStatus>& live);
 absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t campaign,

@@ -11,7 +11,7 @@
 
 namespace calib::service {
 
-/// Lives on the strand.
+/// Which requests are being carried out. Not thread-safe: it is used on the strand only.
 class Requests {
  public:
   /// The stored answer if the request was carried out before; nothing if it is new, and then it is

@@ -15,7 +15,8 @@ namespace calib::service {
 struct ServerOptions {
   std::string state_dir{};             ///< created if need be; holds calib.db, lock and server.json
   std::string listen = "127.0.0.1:0";  ///< HOST:PORT; port 0: a free one, see Server::port()
-  /// Its owner starts it again when it ends, so that nobody else should serve the folder then.
+  /// The owner of this server starts it again when it ends, so that nobody else should serve the
+  /// folder in between.
   bool stays = false;
   std::chrono::milliseconds lease{
       15'000};  ///< a worker is lost when nothing was heard from it for this long
@@ -27,6 +28,7 @@ struct ServerOptions {
   store::StoreHooks store_hooks{};  ///< for tests
 };
 
+/// Not thread-safe; it runs threads of its own.
 class Server {
  public:
   /// Serves when it returns; unfinished campaigns go on. Errors: ALREADY_EXISTS when another

@@ -8,7 +8,7 @@
 
 namespace calib::service {
 
-/// Holds DIR/lock (an open file description lock) while it lives and says in DIR/server.json who
+/// Not thread-safe. Holds DIR/lock (an open file description lock) while it lives and says in DIR/server.json who
 /// serves the folder.
 class StateFolder {
  public:

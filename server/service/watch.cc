@@ -1,5 +1,6 @@
 #include "server/service/watch.h"
 
+#include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
 
 #include "proto/rpc/status.h"

@@ -6,6 +6,7 @@
 
 namespace calib::service {
 
+/// Its functions are called on any of gRPC's threads; what they do is posted to the strand.
 class WorkerLinkService final : public v1::WorkerLink::CallbackService {
  public:
   explicit WorkerLinkService(Core& core) : core_(core) {}

@@ -26,6 +26,7 @@ struct DoubleBlob {
 /// INTERNAL otherwise.
 absl::Status ToStatus(const SQLite::Exception& error);
 
+/// Not thread-safe: one thread at a time.
 class Connection {
  public:
   /// Throws SQLite::Exception. Sets WAL, FULL synchronisation and foreign keys on a writable
@@ -78,6 +79,7 @@ class Connection {
   std::map<std::string_view, std::unique_ptr<SQLite::Statement>> statements_;  // keys: literals
 };
 
+/// The doubles of a DoubleBlob, bit for bit.
 std::vector<double> ToDoubles(const SQLite::Column& column);
 
 }  // namespace calib::store

@@ -39,13 +39,13 @@ class Reader {
   absl::StatusOr<std::optional<RequestRecord>> Request(const std::string& id);
 
   absl::StatusOr<std::vector<IterationRecord>> Iterations(std::int64_t campaign);
-  /// Those with the number `first` or a larger one.
+  /// The samples with the number `first` or a larger one.
   absl::StatusOr<std::vector<SampleRecord>> Samples(std::int64_t campaign, int first = 0);
   absl::StatusOr<std::vector<EvaluationRecord>> Evaluations(std::int64_t campaign);
-  /// Of one sample, or of all.
+  /// The states of one sample, or of all.
   absl::StatusOr<std::vector<StateRecord>> States(std::int64_t campaign,
                                                   std::optional<int> sample = std::nullopt);
-  /// Of the samples with the number `first` or a larger one.
+  /// The states of the samples with the number `first` or a larger one.
   absl::StatusOr<std::vector<StateRecord>> StatesFrom(std::int64_t campaign, int first);
   /// An evaluation that ended with a result (finished or diverged) and was determined by the same
   /// things.
@@ -56,8 +56,9 @@ class Reader {
   absl::StatusOr<std::int64_t> LastAttempt();
   /// Attempts made so far, by sample.
   absl::StatusOr<std::map<int, int>> AttemptsBySample(std::int64_t campaign);
-  /// Of all attempts that ended, by evaluation; of one that was reused those of the equal one that
-  /// ran, where that is still there. Those that nothing is known of are not in it.
+  /// Core time of all attempts that ended [s], by evaluation; for an evaluation that was reused that
+  /// of the equal one that ran, where it is still there. Evaluations of which nothing is known are
+  /// left out.
   absl::StatusOr<std::map<EvaluationKey, double>> CoreSeconds(std::int64_t campaign);
   absl::StatusOr<Effort> EffortOf(std::int64_t campaign);
   absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);

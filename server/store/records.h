@@ -17,6 +17,7 @@ using campaign::EvaluationStatus;
 using campaign::Method;
 using campaign::Phase;
 
+/// A number that is not known yet; NULL in the store.
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// A campaign as submitted, before anything has happened to it.
@@ -39,7 +40,7 @@ struct CampaignProgress {
   Phase phase = Phase::kCalibrating;
   int iteration = 0;
   bool converged = false;
-  bool pause_waived = false;
+  bool pause_waived = false;  ///< it was resumed although too many samples diverged
 
   friend bool operator==(const CampaignProgress&, const CampaignProgress&) = default;
 };
@@ -61,9 +62,10 @@ struct SampleRecord {
   std::vector<double> parameters{};
   double log_weight = kUnknown;
   double log_likelihood = kUnknown;
-  double stop_below =
-      kUnknown;  ///< of its largest log likelihood still possible; unknown: never stopped
-  /// Of a sample that was stopped and is run to its end to see what that would have lost: the share
+  /// The sample is stopped when the largest log likelihood that it can still reach falls below this;
+  /// unknown: it is never stopped.
+  double stop_below = kUnknown;
+  /// For a sample that was stopped and is run to its end to see what that would have lost: the share
   /// of the finished mass that its bound left it. Unknown: not audited.
   double audited = kUnknown;
 };
@@ -96,6 +98,7 @@ struct ActiveAttempt {
   std::string worker{};
 };
 
+/// An attempt as it is leased to a worker.
 struct NewAttempt {
   std::int64_t id = 0;
   EvaluationKey key{};
@@ -118,6 +121,7 @@ enum class AttemptOutcome {
 };
 const char* ToString(AttemptOutcome outcome);
 
+/// What is recorded when an attempt ends.
 struct AttemptEnd {
   std::int64_t id = 0;
   AttemptOutcome outcome = AttemptOutcome::kFailed;
@@ -147,6 +151,7 @@ struct FindingRecord {
   std::int64_t created_unix_ms = 0;
 };
 
+/// What was asked under a request_id, and what was answered.
 struct RequestRecord {
   std::string digest{};
   std::string answer{};

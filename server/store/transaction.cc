@@ -54,8 +54,9 @@ void Transaction::InsertCampaign(const NewCampaign& campaign,
     connection_.Run(
         "INSERT INTO campaign(id, name, yaml, file_name, seed, method, samples, max_iterations, "
         "created_unix_ms, state) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
-        campaign.id, campaign.name, campaign.yaml, campaign.file_name, seed, campaign.method,
-        campaign.samples, campaign.max_iterations, campaign.created_unix_ms);
+        campaign.id, campaign.name, campaign.yaml, campaign.file_name, seed,
+        ToString(campaign.method), campaign.samples, campaign.max_iterations,
+        campaign.created_unix_ms);
     for (const auto& [path, digest] : files) {
       connection_.Run("INSERT INTO campaign_file(campaign, path, digest) VALUES(?, ?, ?)",
                       campaign.id, path, digest);

@@ -32,13 +32,13 @@ class Transaction {
   /// files: path -> digest of a stored blob.
   void InsertCampaign(const NewCampaign& campaign, const std::map<std::string, std::string>& files);
   void SetProgress(std::int64_t campaign, const CampaignProgress& progress);
-  /// Requests that were answered so are new again.
+  /// Requests that were given this answer are new again.
   void ForgetRequests(const std::string& answer);
-  /// With everything that belongs to it; blobs stay.
+  /// Deletes the campaign with everything that belongs to it; blobs stay.
   void DeleteCampaign(std::int64_t campaign);
 
   void InsertIteration(std::int64_t campaign, int number, const std::string& proposal);
-  /// Of an iteration that goes on growing.
+  /// Replaces the proposal of an iteration that goes on growing.
   void SetProposal(std::int64_t campaign, int number, const std::string& proposal);
   void SetPosterior(std::int64_t campaign, int number, const std::string& posterior);
   void InsertSample(std::int64_t campaign, const SampleRecord& sample);
@@ -53,9 +53,9 @@ class Transaction {
   void InsertEvaluation(const EvaluationRecord& evaluation);
   void SetEvaluation(const EvaluationKey& key, EvaluationStatus status, const std::string& reason,
                      int failures);
-  /// The next attempt of it rests after this load step; empty: it runs to the end.
+  /// The next attempt of the evaluation rests after this load step; empty: it runs to the end.
   void SetRest(const EvaluationKey& key, std::optional<int> rest_after);
-  /// It rests, and workers with this checkpoint folder can go on with it.
+  /// The evaluation rests, and workers with this checkpoint folder can go on with it.
   void SetHeldIn(const EvaluationKey& key, const std::string& folder);
   /// Forgets what has been computed of an evaluation, which from now on is this one and waits.
   void BeginAnew(const EvaluationKey& key, const std::string& digest);

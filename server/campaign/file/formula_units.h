@@ -11,8 +11,8 @@ namespace calib::campaign {
 
 struct FormulaUnits {
   std::string problem;    ///< a sentence that names the mismatch; empty: the formula is sound
-  int position = 0;       ///< of the problem, 1-based character
-  Dimension dimension;    ///< of what the formula gives
+  int position = 0;       ///< 1-based character at which the problem is
+  Dimension dimension;    ///< dimension of what the formula gives
   bool anything = false;  ///< a bare 0 (or infinite) fits every unit
 };
 

@@ -6,17 +6,19 @@
 
 namespace calib::campaign {
 
+/// Reads noise, inference, early_stopping, failure, budget and seed.
 void ReadInference(MapReader& campaign_map, Campaign& campaign);
 
-/// What can be said only once the parameters are known.
+/// Adds a problem where the number of samples does not suit the parameters. To be called once these
+/// are known.
 void CheckSamples(MapReader& campaign_map, const Campaign& campaign);
-/// What needs the parameters: rows of a table, the first proposal; and where the campaign comes
-/// from.
+/// Reads what needs the parameters: rows of a table, the first proposal; and where the campaign
+/// comes from (lineage).
 void ReadStart(MapReader& campaign_map, Campaign& campaign);
 
-/// One replicate measures no scatter.
+/// Adds a problem for a single replicate, which measures no scatter.
 void CheckReplicates(const MapReader& campaign_map, const Campaign& campaign);
-/// The budget has to allow one iteration. To be called once the experiments are known.
+/// Adds a problem where the budget does not allow one iteration. To be called once the experiments are known.
 void CheckBudget(const MapReader& campaign_map, const Campaign& campaign);
 
 }  // namespace calib::campaign

@@ -19,7 +19,7 @@ bool HoldsMass(const inference::Prior& prior, const std::string& key, MapReader&
 std::optional<inference::Prior> ReadPrior(const YamlNode& node, const std::string& path,
                                           const std::string& si_unit, ProblemList& problems);
 
-/// The same for a parameter that no catalogue knows (precomputed runs): its unit is what its
+/// ReadPrior() for a parameter that no catalogue knows (precomputed runs): its unit is what its
 /// numbers carry, or `unit:`. si_unit receives the SI unit ("1" for plain numbers).
 std::optional<inference::Prior> ReadFreePrior(const YamlNode& node, const std::string& path,
                                               ProblemList& problems, std::string& si_unit);

@@ -43,8 +43,8 @@ struct MeasuredObservable {
   std::vector<double> values;
   std::vector<double> sd;         ///< one per reading, > 0 (may be empty with ess_target)
   double correlation_length = 0;  ///< in the control; 0: independent
-  /// Of the errors of all readings, in the square of their SI unit, sd^2 its diagonal; empty: sd
-  /// and correlation_length say it all.
+  /// Covariance of the errors of all readings, in the square of their SI unit, sd^2 its diagonal;
+  /// empty: sd and correlation_length say it all.
   Eigen::MatrixXd covariance = {};
   double ess_weight = 1;  ///< w_j of ess_target
   /// What sd follows from, and would where nothing is measured yet; empty: the file states no such
@@ -60,20 +60,20 @@ struct PackingFile {
 };
 /// Another packing of a packing file's grains, for realizations beyond the files.
 struct PackingLike {
-  std::string path;    ///< of the file
+  std::string path;    ///< path of the packing file, as written
   std::string digest;  ///< SHA-256 of its text
   /// radii empty: the worker takes them from the file. The seed follows from the digest and the
   /// number of the realization.
   dem::PackingRecipe recipe;
 };
-/// Of tests that make their bodies from their settings.
+/// The specimen of a test that makes its bodies from its settings.
 struct NoPacking {};
 
 using Specimen = std::variant<PackingFile, dem::PackingRecipe, NoPacking, PackingLike>;
 
 /// An STL file in place of a piece of the test's boundary.
 struct MeshFile {
-  std::string path;        ///< as written
+  std::string path;        ///< path as written
   std::string digest;      ///< SHA-256 of the content
   double scale = 1;        ///< m per unit of the file
   dem::TriangleMesh mesh;  ///< [m]
@@ -87,7 +87,8 @@ struct Experiment {
   /// Realizations: sample i uses specimen i mod size. A PackingLike stands behind all files. Empty
   /// when precomputed.
   std::vector<Specimen> specimens;
-  /// Of the specimen that was measured; empty: unknown, taken for as few as the model's.
+  /// Number of grains of the specimen that was measured; empty: unknown, taken for as few as the
+  /// model's.
   std::optional<double> specimen_grains;
   std::map<std::string, MeshFile> meshes;  ///< by name of dem::TestInfo::meshes
   dem::MaterialUse materials;
@@ -176,18 +177,21 @@ inline constexpr std::array kDecisionsWords = {
 };
 
 struct EarlyStopping {
-  double discard_at_most = 1e-3;
+  double discard_at_most = 1e-3;  ///< share of the posterior mass that stopped runs may hold
   /// Shares of an experiment's load steps, increasing, within (0, 1): all samples come to the first
   /// rung, those that can still count go on to the next. Empty: every run goes to its end at once.
   std::vector<double> rungs{};
-  /// Of the likelihood in the weights that are bounded, (0, 1]: 1 the posterior's own; empty: the
-  /// one that guides proposals.
+  /// Exponent of the likelihood in the weights that are bounded, (0, 1]: 1 is that of the posterior
+  /// itself; empty: the one that guides proposals.
   std::optional<double> exponent{};
 };
+/// What happens when runs fail or diverge.
 struct Failure {
-  int attempts = 5;
-  double pause_above = 0.25;
+  int attempts = 5;  ///< failed ones of one evaluation after which the campaign is paused
+  double pause_above =
+      0.25;  ///< share of diverged samples of an iteration above which it is paused
 };
+/// No iteration begins that could exceed one of these; empty: no bound.
 struct Budget {
   std::optional<std::int64_t> model_evaluations;
   std::optional<double> core_hours;
@@ -214,10 +218,10 @@ struct Campaign {
   std::vector<SharedNoise> shared_noise;
   inference::FilterOptions filter;
   SurrogateModel surrogate = SurrogateModel::kCubicRbf;
-  /// Of surrogate_msrs: a run ends when its misfit so far exceeds this times the best run's (a half
+  /// With surrogate_msrs a run ends when its misfit so far exceeds this times the best run's (a half
   /// and a quarter of it later, inference::TerminationBound); empty: never.
   std::optional<double> termination = 10;
-  /// Of surrogate_msrs: points under way at most, >= 1. With kReproducible point k is chosen once
+  /// With surrogate_msrs the points under way at most, >= 1. With kReproducible point k is chosen once
   /// all up to k - in_flight have ended, and by their results alone.
   int in_flight = 8;
   Decisions decisions = Decisions::kReproducible;

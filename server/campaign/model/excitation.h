@@ -8,11 +8,12 @@
 
 namespace calib::campaign {
 
-/// Its bodies come from its settings: there is no packing whose grains chance has placed.
+/// Whether the bodies of the experiment come from its settings, so that there is no packing whose
+/// grains chance has placed.
 bool MakesItsBodies(const Experiment& experiment);
 
-/// Walked in stages that end when the specimen has come to rest: a test in the periodic cell
-/// without a loading_rate.
+/// Whether the test is walked in stages that end when the specimen has come to rest: it is in the
+/// periodic cell and has no loading_rate.
 bool ReadAtRest(const Experiment& experiment);
 
 /// Whether a reading of the experiment can depend on the effect: it is one of the effect's tests, a

@@ -8,7 +8,7 @@
 
 namespace calib::campaign {
 
-/// Admissible values of a number.
+/// An interval of admissible values.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();

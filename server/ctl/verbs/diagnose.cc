@@ -51,8 +51,8 @@ absl::StatusOr<int> Diagnose(const CommonOptions& common, const DiagnoseOptions&
   RETURN_IF_ERROR(diagnosis::CheckLeftOut(options.without, view.campaign));
   ASSIGN_OR_RETURN(const auto diagnosis,
                    diagnosis::Diagnose(laboratory, view, {.without = options.without}));
-  client::KeepFinding(session->client(), options.campaign, client::kDiagnosis,
-                      diagnosis::DiagnosisJson(diagnosis));
+  client::StoreFinding(session->client(), options.campaign, client::kDiagnosis,
+                       diagnosis::DiagnosisJson(diagnosis));
   std::cout << (common.json
                     ? diagnosis::DiagnosisJson(diagnosis)
                     : diagnosis::DiagnosisText(diagnosis) + Next(common, options, view, diagnosis));

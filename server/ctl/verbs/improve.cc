@@ -69,8 +69,7 @@ std::string ToText(const diagnosis::Improvement& improvement) {
   return text + fmt::format("{} model evaluations.\n", improvement.evaluations());
 }
 
-std::string Next(const CommonOptions& common, const ImproveOptions& options,
-                 const diagnosis::ImproveStep& last) {
+std::string Next(const CommonOptions& common, const diagnosis::ImproveStep& last) {
   if (last.verdict == "adequate") {
     return NextStep(CommandOf(common.server, fmt::format("report {0} -o {0}.html", last.campaign)),
                     "parameters, curves and what was tried on the way, in one file");
@@ -101,9 +100,8 @@ absl::StatusOr<int> Improve(const CommonOptions& common, const ImproveOptions& o
                                       .evaluations = options.max_evaluations,
                                       .without = options.without});
   RETURN_IF_ERROR(improvement.From(std::move(view)));
-  std::cout << (common.json
-                    ? improvement.Json()
-                    : ToText(improvement) + Next(common, options, improvement.steps().back()));
+  std::cout << (common.json ? improvement.Json()
+                            : ToText(improvement) + Next(common, improvement.steps().back()));
   return kDone;
 }
 

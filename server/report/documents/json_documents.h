@@ -18,7 +18,8 @@ namespace calib::report {
 /// parameters: of the campaign; where given, bounds that a prior does not have are null.
 std::string PosteriorJson(const v1::Posterior& posterior,
                           std::span<const campaign::CalibratedParameter> parameters = {});
-/// The same fields of a table that has run: what it has cost, everything else null or empty.
+/// The fields of PosteriorJson() for a table that has run: what it has cost, everything else null
+/// or empty.
 std::string TablePosteriorJson(const v1::CampaignStatus& status);
 std::string ComparisonJson(const std::string& campaign, const Comparison& comparison);
 std::string SensitivityJson(const std::string& campaign, const Sensitivity& sensitivity);

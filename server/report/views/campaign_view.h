@@ -15,7 +15,7 @@ namespace calib::report {
 struct StateHistory {
   std::vector<std::string> observables;  ///< what the values of each state are, in order
   std::vector<v1::State> states;
-  double core_seconds = 0;  ///< of all attempts; 0: not known
+  double core_seconds = 0;  ///< spent on all attempts; 0: not known
 };
 
 struct CampaignView {
@@ -24,7 +24,7 @@ struct CampaignView {
   v1::CampaignSource source;
   v1::Posterior posterior;  ///< the latest
   std::vector<v1::Posterior>
-      iterations;  ///< as known after each iteration, the last one being `posterior`
+      iterations;  ///< the posterior after each iteration, the last being `posterior`
   std::vector<v1::Sample> samples;
   std::map<std::pair<std::string, int>, StateHistory> states;  ///< by (experiment, sample index)
 };

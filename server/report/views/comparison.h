@@ -16,7 +16,7 @@ namespace calib::report {
 
 struct ObservableMisfit {
   std::string experiment, observable;
-  bool heldout = false;  ///< of a validation experiment: never used for fitting
+  bool heldout = false;  ///< a validation experiment's: never used for fitting
   int readings = 0;
   double rms_error = 0;        ///< rms of residual / sd of noise and packing scatter together
   double rms_residual = 0;     ///< rms of residual [SI]
@@ -50,7 +50,7 @@ struct SegmentMisfit {
   int readings = 0;
   double effective_readings = 0;  ///< as ObservableMisfit::effective_readings
   double rms_error = 0;           ///< rms of residual / standard deviation
-  /// Of the chi-squared of everything fitted, or of everything held out.
+  /// Share of the chi-squared of everything fitted, or of everything held out.
   std::optional<double> chi2_share;
   ResidualPattern pattern = {};  ///< none where the errors are not known
 };
@@ -71,7 +71,7 @@ struct ObservableDiscrepancy {
   double probability = 0;        ///< that there is one
   double log_bayes_factor = 0;   ///< for one, of all experiments of the observable together
   double amplitude = 0;          ///< root mean square of `mean`
-  double length = 0;             ///< of the control, over which it changes
+  double length = 0;             ///< stretch of the control over which it changes
   bool throughout = false;       ///< that is more than the whole path
   int experiments = 1;           ///< from which it is known
   double alike = 0;              ///< correlation between their discrepancies, [0, 1)
@@ -85,7 +85,8 @@ struct Comparison {
   double rms_error = 0;  ///< over all calibrated readings; NaN: nothing to compare yet
   std::optional<double> reduced_chi2;  ///< chi-squared / (readings - parameters)
   std::optional<double> p_value;
-  /// Of chi-squared by a replicate at draws from the posterior, all fitted data: the record's.
+  /// Probability of a larger chi-squared in a replicate at draws from the posterior, over all fitted
+  /// data, as the posterior's record has it.
   std::optional<double> predictive_p{};
   std::optional<double> heldout_rms_error;  ///< over all validation readings
   std::vector<ObservableMisfit> by_observable;

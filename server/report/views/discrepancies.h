@@ -15,7 +15,8 @@ namespace calib::report {
 /// The process of one observable over the fitted experiments that share a control.
 struct FittedDiscrepancy {
   std::string observable, control;
-  std::vector<std::size_t> experiments;  ///< of the campaign, in the order of the fit's curves
+  std::vector<std::size_t>
+      experiments;  ///< indices in the campaign, in the order of the fit's curves
   inference::Discrepancy fit;
 };
 

@@ -1,5 +1,7 @@
 #include "server/report/views/lenient_json.h"
 
+#include <nlohmann/json.hpp>
+
 namespace calib::report {
 
 using nlohmann::json;

@@ -3,7 +3,7 @@
 // another type stays as it was.
 
 #include <map>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -11,6 +11,8 @@
 
 namespace calib::report {
 
+/// Each function reads the field `key` of an object into `value`, which stays as it is where the
+/// field is missing, null or of another type.
 void Read(const nlohmann::json& document, const char* key, double& value);
 void Read(const nlohmann::json& document, const char* key, std::optional<double>& value);
 void Read(const nlohmann::json& document, const char* key, std::string& value);
@@ -19,7 +21,7 @@ void Read(const nlohmann::json& document, const char* key, std::vector<std::stri
 void Read(const nlohmann::json& document, const char* key, std::map<std::string, double>& value);
 void Read(const nlohmann::json& document, const char* key,
           std::map<std::string, std::string>& value);
-/// Of objects with "effect" and "reason".
+/// Reads a list of objects with "effect" and "reason" as pairs.
 void Read(const nlohmann::json& document, const char* key,
           std::vector<std::pair<std::string, std::string>>& value);
 

@@ -13,8 +13,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kUninformed = 0.8;  // of the prior's sd: the part says nothing
-constexpr double kDrifts = 0.01;     // p below which a trend is stated
+constexpr double kUninformed = 0.8;     // of the prior's sd: the part says nothing
+constexpr double kTrendIsClear = 0.01;  // p below which a trend is stated
 constexpr int kDraws = 500;
 
 struct Part {
@@ -185,7 +185,7 @@ absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& 
       const double per_standard = std::exp(-priors[j].LogJacobian(center));
       const bool whole = list == &experiments[j];
       (whole ? drift.p_experiments : drift.p_segments) = common.p_value;
-      if (whole && common.p_value && *common.p_value < kDrifts) {
+      if (whole && common.p_value && *common.p_value < kTrendIsClear) {
         AddTrend(view.campaign, parts, *list, per_standard, drift);
       }
       for (const Estimate& e : *list) {

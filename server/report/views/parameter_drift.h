@@ -26,7 +26,7 @@ struct ParameterDrift {
   /// Probability of fits at least as far apart if one value served all experiments; empty with
   /// fewer than two experiments that say something about the parameter.
   std::optional<double> p_experiments;
-  /// The same of the stages, over all experiments.
+  /// Chi-squared test of the fits to single stages, over all experiments.
   std::optional<double> p_segments;
   /// Setting with which the fits of the experiments go up or down, and the change of the parameter
   /// per factor ten in it [SI] with its sd; empty: no setting takes two values, or no drift.
@@ -44,6 +44,7 @@ struct ParameterDrift {
 /// emulate any part.
 absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& view);
 
+/// Readings of a stage or experiment below which it is not fitted alone.
 inline constexpr int kLeastReadings = 6;
 
 }  // namespace calib::report

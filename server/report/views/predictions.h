@@ -1,7 +1,7 @@
 #pragma once
 // The posterior propagated to the readings: mean and band of every observable of every experiment.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "server/report/views/campaign_view.h"
@@ -12,7 +12,7 @@ namespace calib::report {
 /// (posterior_from: none) the quantiles are NaN and the mean is that of the weighted samples.
 struct ObservablePrediction {
   std::vector<double> mean, q05, q95;
-  /// Of held-out experiments, covariance of single runs at draws from the posterior, readings x
+  /// For held-out experiments the covariance of single runs at draws from the posterior, readings x
   /// readings, SI. Empty: no posterior, or no two runs that have reached every reading.
   Eigen::MatrixXd of_runs{};
   double runs = 0;  ///< effective number of these runs, 1 / sum of squared weights

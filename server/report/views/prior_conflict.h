@@ -15,7 +15,8 @@ struct PriorConflict {
   double from = 0, to = 0;  ///< control at its first and last reading [SI]
   int readings = 0;
   bool too_low = false;  ///< all runs lie below the readings; otherwise above
-  double nearest = 0;  ///< of its worst reading, in sd of one run and a measurement: noise, scatter
+  double nearest = 0;    ///< distance of the run that comes nearest at the worst reading, in sd of
+                         ///< one run and a measurement: noise and scatter
 };
 
 /// The runs of the first iteration; of a campaign that begins near another's posterior half of them
@@ -25,6 +26,8 @@ struct PriorConflict {
 /// without a known size of the errors.
 std::vector<PriorConflict> PriorConflicts(const CampaignView& view);
 
+/// Finished runs from the prior below which nothing is said of a conflict: an extreme of fewer is
+/// chance.
 inline constexpr int kLeastRuns = 20;
 
 /// One sentence.

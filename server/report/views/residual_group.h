@@ -1,7 +1,7 @@
 #pragma once
 // Residuals of one observable of one experiment with what is known of their errors.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -14,13 +14,13 @@ namespace calib::report {
 struct ResidualGroup {
   const campaign::Experiment* experiment = nullptr;
   const campaign::MeasuredObservable* observable = nullptr;
-  std::vector<std::size_t> readings;  ///< of the experiment
+  std::vector<std::size_t> readings;  ///< their indices in the experiment
   Eigen::VectorXd residual;           ///< model - measurement
-  Eigen::MatrixXd covariance;         ///< of noise and packing scatter together
+  Eigen::MatrixXd covariance;         ///< errors by noise and packing scatter together
   double scatter = 0;                 ///< rms of its sd over that of the noise
   std::string scatter_from{};
-  /// Of the mean of the model's runs, for data that were not fitted: how far its parameters may be
-  /// off, and that the runs are finitely many. Zero where it is not known.
+  /// Covariance of the mean of the model's runs, for data that were not fitted: how far its
+  /// parameters may be off, and that the runs are finitely many. Zero where it is not known.
   Eigen::MatrixXd of_prediction;
   /// Covariance of a single run by packings, and how many it is known from; 0 x 0 and 0 where
   /// packings were not varied.
@@ -29,7 +29,7 @@ struct ResidualGroup {
   Eigen::VectorXd model;
 };
 
-/// Of the experiment's observable j.
+/// The group of the readings of the experiment's observable j.
 ResidualGroup MakeResidualGroup(const CampaignView& view, const campaign::Experiment& experiment,
                                 std::size_t j, const ObservablePrediction& prediction);
 

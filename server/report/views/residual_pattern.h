@@ -1,15 +1,15 @@
 #pragma once
 // The shape of what a model leaves unexplained along a curve, in one word and one number.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 namespace calib::report {
 
 /// Readings of one observable in the order of loading.
 struct ResidualCurve {
   Eigen::VectorXd residual;     ///< model - measurement
-  Eigen::VectorXd sd;           ///< of the error of each reading, > 0
-  Eigen::VectorXd correlation;  ///< of the errors of readings i - 1 and i, [0, 1); first: unused
+  Eigen::VectorXd sd;           ///< standard deviation of the error of each reading, > 0
+  Eigen::VectorXd correlation;  ///< of errors i - 1 and i, in [0, 1); first: unused
   Eigen::VectorXd control;
   Eigen::VectorXd model;
 };
@@ -32,7 +32,7 @@ const char* ToString(ResidualShape shape);
 
 struct ResidualPattern {
   ResidualShape shape = ResidualShape::kNone;
-  double size = 0;       ///< of the named shape by weighted least squares; 0 with none, irregular
+  double size = 0;       ///< by weighted least squares; 0 with kNone and kIrregular
   double z = 0;          ///< size over its standard deviation
   double explained = 0;  ///< share of chi-squared beyond the number of readings that it takes away
 };

@@ -1,7 +1,7 @@
 #pragma once
 // The finished runs of a campaign as matrices, the way the inference and the diagnosis see them.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <vector>
 
 #include "inference/data/data_set.h"
@@ -19,8 +19,8 @@ struct RunTable {
 
 /// Samples that did not get to the last reading of every calibrated experiment are left out.
 RunTable RunsOf(const CampaignView& view);
-/// The same in the sd of `units`: the same readings in the same order with errors of their own. Its
-/// numbers of experiments may differ, as they do where a derived campaign leaves held-out ones out.
+/// RunsOf() with histories in the sd of `units`, which are the same readings in the same order with
+/// errors of their own. Their numbers of experiments may differ, as they do where a derived campaign leaves held-out ones out.
 RunTable RunsOf(const CampaignView& view, const inference::DataSet& units);
 
 /// The readings of the calibrated experiments with the scatter in their errors that the campaign
@@ -29,8 +29,8 @@ struct ScatteredReadings {
   inference::DataSet of_mean;  ///< scatter of the measured specimen, and 1/R of it for the model's
                                ///< mean history, which R packings know no better (repeats do)
   inference::DataSet of_run;   ///< scatter of the specimen and of one run of the model
-  /// Of the best estimate on every packing, for fits to some of the readings: R x T, see
-  /// inference::Replicates; none where fewer than two runs came to their ends.
+  /// Departures of the runs of the best estimate on every packing from their mean, for fits to some
+  /// of the readings: R x T, see inference::Replicates; none where fewer than two runs came to their ends.
   Eigen::MatrixXd departures{};
   std::vector<int> departure_stream{};  ///< R, campaign::StreamOf of each
   /// False where packings were not varied and no repeats made: both are MakeDataSet, and the

@@ -1,7 +1,7 @@
 #pragma once
 // The scatter of the model as a posterior's record holds it.
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <string>
 
 #include "calib/v1/campaign.pb.h"

@@ -17,7 +17,7 @@ struct Quantity {
   std::string
       name;  ///< a bulk property, or "final_" and an observable: its value at the last reading
   std::string unit;                    ///< SI
-  int runs = 0;                        ///< finished ones that have it
+  int runs = 0;                        ///< finished runs that have it
   inference::OutputSensitivity prior;  ///< over the prior
   inference::OutputSensitivity
       posterior;  ///< correlations, mean and sd over the posterior; empty: none, or nothing explained
@@ -30,7 +30,7 @@ struct Sensitivity {
   campaign::PosteriorSource points_from = campaign::PosteriorSource::kNone;
   std::vector<Quantity> quantities;
   std::vector<std::string> left_out;  ///< "tx02: secant_modulus: ...", a clause each
-  std::vector<std::string> warnings;  ///< of the posterior: Warnings()
+  std::vector<std::string> warnings;  ///< Warnings() of the posterior
 };
 
 /// All experiments, held-out ones where runs have them. Deterministic. Errors: FAILED_PRECONDITION

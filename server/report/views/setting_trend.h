@@ -18,7 +18,7 @@ struct ValueInExperiment {
 struct SettingTrend {
   std::string with;       ///< a setting of the tests (confining_pressure, ...) or loading_rate
   double per_decade = 0;  ///< change of the value per factor ten in it
-  double sd = 0;          ///< of that
+  double sd = 0;          ///< standard deviation of per_decade
 };
 
 /// Weighted regression of the values on the logarithm of each setting that all these experiments

@@ -16,15 +16,15 @@ namespace calib::report {
 /// An effect that was tried on the model.
 struct TriedEffect {
   std::string effect{};
-  double p_value = 1;             ///< of the screen, adjusted for the number of candidates
-  double explained_fraction = 0;  ///< of the misfit beyond noise and scatter, 0 to 1
+  double p_value = 1;             ///< p of the screen, adjusted for the number of candidates
+  double explained_fraction = 0;  ///< share of the misfit beyond noise and scatter, 0 to 1
   double predicted_rms_error = 0;
   std::map<std::string, double>
       amplitude{};  ///< dotted parameter -> strength [StoredDiagnosis::units]
   std::vector<std::string> confusable_with{};
   std::map<std::string, double> angles{};  ///< to the other effects [degrees]
   std::optional<double> refit_p_value{}, left_out_error{};
-  std::optional<double> advantage_nats{};  ///< of the refit over the model without the effect
+  std::optional<double> advantage_nats{};  ///< gain of the refit over the model without the effect
 };
 
 struct StoredDiagnosis {
@@ -35,7 +35,7 @@ struct StoredDiagnosis {
   std::string effect{};        ///< named, with missing_effect
   std::string sentence{};      ///< the verdict in words
   bool only_adequacy = false;  ///< no effect was tried
-  double rms = 0;              ///< of the best fit, in sd of a measurement
+  double rms = 0;              ///< error of the best fit, in sd of a measurement
   double chi2 = 0, degrees = 0, p_value = 1;
   std::optional<double> p_chi2{}, p_stages{};  ///< p_value is of both together
   std::optional<double> left_out_error{};
@@ -55,7 +55,7 @@ struct StoredDiagnosis {
 /// INVALID_ARGUMENT when the text is no such document; fields of other versions are left out.
 absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& json);
 
-/// Of several the one to show: the latest that tried effects, else the latest; of equal verdicts
+/// The diagnosis of a campaign to show among several: the latest that tried effects, else the latest; of equal verdicts
 /// the one that planned the next experiment. nullptr: there is none of the campaign.
 const StoredDiagnosis* LatestOf(const std::vector<StoredDiagnosis>& diagnoses,
                                 const std::string& campaign);

@@ -26,17 +26,18 @@ struct ErrorStep {
   std::string campaign;
   std::vector<std::string> effects;
   double rms_error = 0;
-  /// Of the first and the last model alone: held-out data do not choose between models.
+  /// Set for the first and the last model alone: held-out data do not choose between models.
   std::optional<double> heldout_rms_error;
   std::vector<ObservableMisfit> by_observable;
   std::vector<SegmentMisfit> by_segment{};
 };
 
+/// All that a report tells of how a model came about.
 struct Story {
   std::vector<Relative> family;  ///< parents before their children
   std::vector<ErrorStep> steps;  ///< base first; fewer than two: nothing was added
   std::vector<ParameterDrift> drift;
-  /// Of the campaigns on the way, in the order in which they were kept.
+  /// Diagnoses of the campaigns on the way, in the order in which they were stored.
   std::vector<StoredDiagnosis> diagnoses{};
   /// The last improvement that the campaign took part in.
   std::optional<StoredImprovement> improvement{};

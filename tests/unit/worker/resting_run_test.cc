@@ -131,7 +131,7 @@ TEST_F(RestingRun, TheFolderKeepsItsIdentityAndItsSize) {
   EXPECT_EQ(Open().identity(), first.identity());
   const Checkpoints small = Open(2000);
   for (const char* run : {"a", "b", "c"}) {
-    ASSERT_TRUE(small.Keep(run, {.checkpoint = std::string(900, 'x')}).ok());
+    ASSERT_TRUE(small.Save(run, {.checkpoint = std::string(900, 'x')}).ok());
   }
   int kept = 0;
   for (const char* run : {"a", "b", "c"}) kept += small.Find(run).has_value() ? 1 : 0;
@@ -142,8 +142,8 @@ TEST_F(RestingRun, TheFolderKeepsItsIdentityAndItsSize) {
 }
 
 TEST_F(RestingRun, WhatNobodyGoesOnFromIsNotKeptForEver) {
-  ASSERT_TRUE(Open().Keep("old", {.checkpoint = "x"}).ok());
-  ASSERT_TRUE(Open().Keep("new", {.checkpoint = "x"}).ok());
+  ASSERT_TRUE(Open().Save("old", {.checkpoint = "x"}).ok());
+  ASSERT_TRUE(Open().Save("new", {.checkpoint = "x"}).ok());
   for (const auto& file : std::filesystem::directory_iterator(folder_)) {
     if (file.path().filename().string().starts_with("old")) {
       std::filesystem::last_write_time(

@@ -1,4 +1,5 @@
 #pragma once
+// Whether a text is UTF-8.
 
 #include <cstddef>
 #include <string>

@@ -20,7 +20,7 @@ struct YamlNode {
 
 struct YamlEntry {
   std::string key;
-  int line = 0;  ///< of the key
+  int line = 0;  ///< 1-based line of the key
   YamlNode value;
 };
 
