@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -15,6 +14,7 @@
 #include "inference/filter/joint_states.h"
 #include "inference/mixture/dirichlet_mixture.h"
 #include "inference/numerics/decompositions.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/sampling/sobol.h"
@@ -22,7 +22,6 @@
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInsignificantShare = 1e-3;
 constexpr double kNegligibleWeight =
     1e-4;                              // of a component: fewer than one in ten thousand samples

@@ -4,12 +4,12 @@
 #include <limits>
 #include <vector>
 
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/weighted_moments.h"
 
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kOuterShare = 0.02;  // of the prior's probability at one end
 constexpr double kBoundShare = 0.1;   // of the posterior's
 

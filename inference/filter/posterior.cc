@@ -14,6 +14,7 @@
 #include "inference/filter/parameter_summary.h"
 #include "inference/filter/posterior_checks.h"
 #include "inference/filter/sequential_filter.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 #include "inference/numerics/weighted_moments.h"
 #include "inference/sampling/shuffle.h"
@@ -21,7 +22,6 @@
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastEss = 50;
 constexpr double kLeastTempered = 2;
 constexpr double kLargestParetoIndex = 0.7;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "inference/filter/iterative_filter.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 #include "inference/sampling/halton.h"
 #include "inference/sampling/latin_hypercube.h"
@@ -18,7 +18,6 @@
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastAcceptance = 1e-3;
 constexpr int kMostRedraws = 100'000;  // below 1e-43 of ever being reached at that acceptance
 

@@ -4,16 +4,15 @@
 #include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <utility>
 #include <vector>
 
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPointsPerDecade = 24;
 
 // The samples that count, their log likelihood relative to the best one: small differences keep

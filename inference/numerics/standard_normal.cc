@@ -2,14 +2,14 @@
 
 #include <boost/math/special_functions/erf.hpp>
 #include <cmath>
-#include <limits>
 #include <numbers>
+
+#include "inference/numerics/infinity.h"
 
 namespace calib::inference {
 namespace {
 
 const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // double throughout: long double would give other bits on other machines.
 using Policy = boost::math::policies::policy<boost::math::policies::promote_double<false>>;

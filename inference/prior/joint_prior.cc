@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "inference/numerics/decompositions.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/sampling/sobol.h"
 
@@ -16,7 +16,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastMass = 1e-4;        // redrawing a point takes ten thousand draws there
 constexpr double kLeastPivot = 1e-6;       // of the correlation's Cholesky factor, squared 1e-12
 constexpr double kMassTolerance = 1e-3;    // relative, of the share inside the constraints

@@ -6,12 +6,11 @@
 #include <numbers>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/standard_normal.h"
 
 namespace calib::inference {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 bool IsLog(PriorKind kind) {
   return kind == PriorKind::kLogUniform || kind == PriorKind::kLogNormal;

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/infinity.h"
 #include "inference/sampling/philox.h"
 #include "inference/tmcmc/tempering_step.h"
 
@@ -14,7 +14,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Stage 0 holds the draws from the prior; step 0 of a later stage is its resampling.
 PhiloxStream Stream(const TmcmcOptions& options, std::size_t stage, int step, Index row) {
