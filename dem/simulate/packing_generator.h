@@ -1,9 +1,10 @@
 #pragma once
-// Specimens made by the engine itself.
+// Specimens made by the engine itself: of spheres here, of clumps by MakeClumps().
 
 #include <stop_token>
 
 #include "absl/status/statusor.h"
+#include "dem/lab_tests/shared/shape_change.h"  // MakeClumps()
 #include "dem/particles/packing.h"
 
 namespace calib::dem {

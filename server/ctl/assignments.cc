@@ -8,7 +8,6 @@
 #include "absl/strings/str_join.h"
 #include "dem/registry/catalog.h"
 #include "dem/registry/model_parameters.h"
-#include "server/campaign/admissible_range.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/model/range.h"

@@ -4,7 +4,7 @@
 # left. Folders in one pair of braces do not know each other. A folder in no line is an error.
 ORDER = """
 dem        elementary < geometry < particles < model < contact < contact/laws < effects/shared < effects < formula < neighbor
-           < measure < measure/observables < dynamics < lab_tests/shared < lab_tests < registry < simulate
+           < dynamics < measure < measure/observables < lab_tests/shared < lab_tests < registry < simulate
 inference  numerics < sampling < prior < data < mixture < scatter < evidence < filter < tmcmc < surrogate < emulator
            < { diagnosis discrepancy prediction sensitivity }
 proto      calib/v1 < rpc

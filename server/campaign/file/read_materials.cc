@@ -4,11 +4,9 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
-#include "dem/contact/materials.h"
 #include "dem/model/model.h"
 #include "dem/registry/material_use.h"
 #include "dem/registry/model_parameters.h"
-#include "server/campaign/admissible_range.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/model/range.h"
 

@@ -6,7 +6,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/registry/catalog.h"
-#include "server/campaign/admissible_range.h"
 #include "server/campaign/file/laboratory_table.h"
 #include "server/campaign/file/observable_range.h"
 #include "server/campaign/file/read_noise.h"

@@ -4,12 +4,10 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
-#include "dem/contact/materials.h"
 #include "dem/model/model.h"
 #include "dem/registry/catalog.h"
 #include "dem/registry/declared_effects.h"
 #include "dem/registry/model_parameters.h"
-#include "server/campaign/admissible_range.h"
 #include "server/campaign/file/read_materials.h"
 #include "server/campaign/file/read_prior.h"
 #include "server/campaign/file/read_user_effects.h"

@@ -14,7 +14,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/strip.h"
 #include "calib/return_if_error.h"
-#include "dem/lab_tests/shared/shape_change.h"
+#include "dem/simulate/packing_generator.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
