@@ -1,4 +1,4 @@
-# Shared by quickstart, test and bench: the repository root, the number of cores, installing Debian packages once.
+# Shared by every command here: the repository root, the number of cores, installing Debian packages once, building, data.
 # Sourced, not run.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -23,10 +23,19 @@ need() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 }
 
-# build PRESET [CMake cache options]: configures and builds; a second call does only what changed.
+# build PRESET [TARGET...]: configures and builds all, or these; a second call does only what changed.
 build() {
-  local preset=$1; shift
-  cmake --preset "$preset" -S "$root" "$@" >"$root/build-$preset.log" 2>&1 || { cat "$root/build-$preset.log" >&2; return 1; }
-  rm -f "$root/build-$preset.log"
-  cmake --build "$root/build/$preset" --parallel "$cores"
+  local preset=$1 log; shift
+  log=$(mktemp)
+  (cd "$root" && cmake --preset "$preset") >"$log" 2>&1 || { cat "$log" >&2; rm -f "$log"; return 1; }
+  rm -f "$log"
+  (cd "$root" && cmake --build --preset "$preset" --parallel "$cores" ${1:+--target "$@"})
+}
+
+# find_data: exports CALIB_DATA, the folder of measurements, where it is not set: ../shared/data when that is there, else `none`.
+find_data() {
+  if [ -z "${CALIB_DATA:-}" ] && [ -d "$root/../shared/data" ]; then
+    CALIB_DATA=$(realpath "$root/../shared/data")
+  fi
+  export CALIB_DATA=${CALIB_DATA:-none}
 }

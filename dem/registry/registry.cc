@@ -20,7 +20,7 @@ std::vector<Entry> InPlace(std::vector<Entry> found) {
 }
 
 template <class Entry>
-const Entry* FindByName(std::span<const Entry> entries, const std::string& name) {
+const Entry* EntryNamed(std::span<const Entry> entries, const std::string& name) {
   const auto it = std::find_if(entries.begin(), entries.end(),
                                [&](const Entry& entry) { return entry.info.name == name; });
   return it == entries.end() ? nullptr : &*it;
@@ -56,10 +56,10 @@ std::span<const TestEntry> TestEntries() {
   return entries;
 }
 
-const TestEntry* FindTestEntry(const std::string& name) { return FindByName(TestEntries(), name); }
+const TestEntry* FindTestEntry(const std::string& name) { return EntryNamed(TestEntries(), name); }
 
 ModelEntries EntriesOf(const Model& model) {
-  ModelEntries entries{.law = FindByName(ContactEntries(), model.contact)};
+  ModelEntries entries{.law = EntryNamed(ContactEntries(), model.contact)};
   assert(entries.law != nullptr);
   for (const EffectEntry& effect : EffectEntries()) {
     if (std::find(model.effects.begin(), model.effects.end(), effect.info.name) !=

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/infinity.h"
 #include "calib/return_if_error.h"
 #include "inference/numerics/special_functions.h"
 #include "inference/numerics/wide_exponential.h"
@@ -17,7 +18,6 @@ namespace calib::inference {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
 
 // No early exit, so that it is vectorised: 0 x is NaN for what is not finite.

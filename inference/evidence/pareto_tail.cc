@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <limits>
 
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 
 namespace calib::inference {
@@ -43,7 +43,6 @@ double GeneralizedParetoShape(const std::vector<double>& x) {
 }
 
 double ParetoTailIndex(const Eigen::VectorXd& log_weights) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const auto n = static_cast<double>(log_weights.size());
   const auto tail = static_cast<std::size_t>(std::ceil(std::min(n / 5, 3 * std::sqrt(n))));
   if (tail < kFewest) return kInfinity;

@@ -1,16 +1,14 @@
 #include "inference/filter/ensemble.h"
 
 #include <cmath>
-#include <limits>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "inference/data/gaussian_likelihood.h"
+#include "inference/numerics/infinity.h"
 
 namespace calib::inference {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 absl::Status ValidateShapes(const JointPrior& priors, const DataSet& data,
                             std::span<const Iteration> iterations) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -16,6 +15,7 @@
 #include "inference/filter/joint_states.h"
 #include "inference/mixture/dirichlet_mixture.h"
 #include "inference/numerics/decompositions.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/sampling/sobol.h"
@@ -23,7 +23,6 @@
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kInsignificantShare = 1e-3;  // of the weight, in the lightest samples; chosen
 constexpr double kNegligibleWeight = 1e-4;    // of a component: no sample is drawn from it; chosen
 // Effective samples that the draws of an emulator count as; chosen: they know no more than its

@@ -4,12 +4,12 @@
 #include <limits>
 #include <vector>
 
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/weighted_moments.h"
 
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A posterior is at a bound where more than this share of it lies in this outer share of its prior;
 // chosen: five times what the prior alone has there.
 constexpr double kOuterShare = 0.02;  // of the prior's probability at one end

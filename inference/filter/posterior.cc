@@ -15,6 +15,7 @@
 #include "inference/filter/parameter_summary.h"
 #include "inference/filter/posterior_checks.h"
 #include "inference/filter/sequential_filter.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 #include "inference/numerics/weighted_moments.h"
 #include "inference/sampling/shuffle.h"
@@ -22,7 +23,6 @@
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastEss = 50;             // chosen: a mean is then known to 0.14 sd
 constexpr double kLeastTempered = 2;         // chosen: of one sample there is no spread
 constexpr double kLargestParetoIndex = 0.7;  // [Vehtari et al. 2024]

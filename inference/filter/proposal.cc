@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "inference/filter/iterative_filter.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 #include "inference/sampling/halton.h"
 #include "inference/sampling/latin_hypercube.h"
@@ -19,7 +19,6 @@
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastAcceptance = 1e-3;  // chosen: a thousand draws for a sample are no time
 constexpr int kMostRedraws = 100'000;      // reached with a chance below 1e-43 at that acceptance
 constexpr int kDesigns = 1000;             // drawn for the best of them [Samuelsson 2023, sec. 3.2]

@@ -3,9 +3,9 @@
 #include <cassert>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "inference/filter/parameter_summary.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 #include "inference/numerics/wide_exponential.h"
 
@@ -37,7 +37,6 @@ CALIB_INFERENCE_CLONES void RelativeWeights(const double* log_weights, double la
 SequentialResult SequentialFilter(const Eigen::VectorXd& log_start,
                                   const Eigen::MatrixXd& increments, const StepOffsets& steps,
                                   const Eigen::MatrixXd& parameters) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const Eigen::Index n = log_start.size();
   const Eigen::Index d = parameters.cols();
   assert(increments.rows() == n && parameters.rows() == n && steps.steps() >= 0);

@@ -4,16 +4,15 @@
 #include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <utility>
 #include <vector>
 
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/log_weights.h"
 
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPointsPerDecade = 24;  // chosen
 // Exponents of the grid's ends, times the largest and the smallest gap of log likelihoods: beyond
 // the one the best sample alone has weight (the others e^-60 of it), below the other the data move

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "inference/numerics/infinity.h"
 
 namespace calib::inference {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double Largest(const Eigen::VectorXd& values) {
   double largest = -kInfinity;

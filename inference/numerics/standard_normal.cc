@@ -2,14 +2,14 @@
 
 #include <boost/math/special_functions/erf.hpp>
 #include <cmath>
-#include <limits>
 #include <numbers>
+
+#include "inference/numerics/infinity.h"
 
 namespace calib::inference {
 namespace {
 
 const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastOfErfc = -37;  // x where erfc(-x / sqrt 2) / 2 nears the least normal number
 // Width of an interval (times 1 + |its middle|) below which the next term of its mass, relative to
 // the two that are taken, is below 1e-15.

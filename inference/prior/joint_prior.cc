@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "inference/numerics/decompositions.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/sampling/sobol.h"
 
@@ -17,7 +17,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLeastMass = 1e-4;  // chosen: redrawing a point takes ten thousand draws there
 // Pivot of the correlation's Cholesky factor; chosen: a parameter that others determine to a part
 // in a million is a copy of them.

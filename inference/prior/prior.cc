@@ -6,12 +6,12 @@
 #include <numbers>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/standard_normal.h"
 
 namespace calib::inference {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Variance of a truncated normal over the square of what it is a difference of, below which half of
 // the digits have cancelled.
 constexpr double kCancelled = 1e-8;

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/infinity.h"
 #include "calib/return_if_error.h"
 #include "inference/sampling/latin_hypercube.h"
 #include "inference/sampling/philox.h"
@@ -16,7 +16,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 int InitialPoints(const ResponseSurfaceOptions& options) {
   return options.initial_points > 0 ? options.initial_points

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "inference/numerics/infinity.h"
 #include "calib/return_if_error.h"
 #include "inference/sampling/philox.h"
 #include "inference/tmcmc/tempering_step.h"
@@ -15,7 +15,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Metropolis steps of a stage; chosen: with 15 in ten dimensions the stated error of the evidence
 // is 30 % too small (inference_tmcmc_verification_test, fifty seeds).
 constexpr int kFewestSteps = 10;

@@ -32,7 +32,7 @@ absl::StatusOr<std::string> ExpandPath(const std::string& path) {
   const std::size_t at = path.find(kVariable);
   if (at == std::string::npos) return path;
   const char* value = std::getenv("CALIB_DATA");
-  if (value == nullptr) {
+  if (value == nullptr || *value == '\0') {
     return absl::NotFoundError("the environment variable CALIB_DATA is not set");
   }
   return path.substr(0, at) + value + path.substr(at + std::string(kVariable).size());

@@ -11,7 +11,7 @@
 
 #include "dem/dynamics/quasi_static.h"
 #include "dem/registry/registry.h"
-#include "tests/verification/dem/yade_cases.h"
+#include "tests/support/dem/yade_cases.h"
 
 namespace calib::dem {
 namespace {

@@ -2,7 +2,7 @@
 // by 1e-6 m) scatter by 1.3 / 0.5 / 0.2 % in stress ratio at 0.2 / 0.5 / 1.0 MPa and by 1-3e-4 in
 // volumetric strain in either code, so closer agreement than the tolerances below would mean
 // nothing; at 0.2 MPa ours is a mean of three repeats.
-#include "tests/verification/dem/yade_cases.h"
+#include "tests/support/dem/yade_cases.h"
 
 #include <gtest/gtest.h>
 

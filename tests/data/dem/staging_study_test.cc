@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/verification/dem/yade_cases.h"
+#include "tests/support/dem/yade_cases.h"
 
 namespace calib::dem {
 namespace {
