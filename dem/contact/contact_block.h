@@ -9,19 +9,23 @@
 
 namespace calib::dem {
 
-inline constexpr int kBlock = 32;       ///< lanes; a block stays well inside the first-level cache
-inline constexpr int kMaxHistory = 16;  ///< doubles that one contact can remember between steps
+/// Lanes of a block [-]. Chosen: a block stays well inside the first-level cache (dem/DECISIONS.md,
+/// blocks of contacts).
+inline constexpr int kBlock = 32;
+/// Doubles that one contact can remember between steps [-]. Chosen: ContactModel asserts that no
+/// model asks for more.
+inline constexpr int kMaxHistory = 16;
 
-/// One block. Grain i is the one with the smaller index; n points from i to j. All lanes are always
-/// valid numbers: lanes from `count` on repeat lane 0, so that kernels need no remainder loop and
-/// can raise no spurious NaN. SI units; forces and moments act on grain j, the opposite ones on
-/// grain i.
+/// A block of contacts. Grain i is the one with the smaller index; n points from i to j. All lanes
+/// are always valid numbers: lanes from `count` on repeat lane 0, so that kernels need no remainder
+/// loop and can raise no spurious NaN. SI units; forces and moments act on grain j, the opposite
+/// ones on grain i.
 struct alignas(64) ContactBlock {
   using Lane = double[kBlock];
 
   ContactBlock() = default;
   ~ContactBlock() = default;
-  /// Precondition: what the other remembers is its own.
+  /// Precondition: other.history is other.own_history.
   ContactBlock(const ContactBlock& other) {
     assert(other.history == other.own_history);
     std::memcpy(static_cast<void*>(this), static_cast<const void*>(&other), sizeof other);
@@ -37,7 +41,7 @@ struct alignas(64) ContactBlock {
   double mass_factor = 1;       ///< m* over m_i m_j/(m_i + m_j): 2 where j mirrors i for a wall
   double viscous = 1;           ///< 1: viscous effects act; 0: not, as during consolidation
   double stretch[3] = {0, 0, 0};  ///< homogeneous velocity gradient of the cell, diagonal [1/s]
-  double shear = 0;               ///< its component dvx/dz [1/s]
+  double shear = 0;               ///< component dvx/dz of the cell's velocity gradient [1/s]
 
   // Set by the caller per contact.
   int pair[kBlock];         ///< slot in the neighbour list
@@ -60,21 +64,21 @@ struct alignas(64) ContactBlock {
   Lane tilt_x, tilt_y, tilt_z;  ///< half the change of n during dt
 
   // Response, filled by the kernels in the order of ContactStage.
-  Lane normal_force;          ///< repulsion positive [N]
-  Lane normal_stiffness;      ///< tangent dFn/du [N/m]
-  Lane may_stiffen = {};      ///< what it may grow by from one step to the next, as where contacts
-                              ///< unload stiffer than they load, for the time step [N/m] >= 0
+  Lane normal_force;      ///< repulsion positive [N]
+  Lane normal_stiffness;  ///< tangent dFn/du [N/m]
+  Lane may_stiffen = {};  ///< what normal_stiffness may grow by from one step to the next, as where
+                          ///< contacts unload stiffer than they load; for the time step [N/m] >= 0
   Lane tangential_stiffness;  ///< ks [N/m]
   Lane attraction;            ///< part of the normal force that pulls, which friction does not feel
                               ///< missing: its limit is tan(phi_mu) (normal_force + attraction) [N]
   Lane holds;                 ///< above zero: the contact goes on acting although overlap <= 0
-  Lane normal_damping;        ///< viscous coefficients, for the time step [N s/m]
-  Lane tangential_damping;
-  Lane sliding_limit;       ///< largest |Fs| [N]
-  Lane fx, fy, fz;          ///< shear force [N]
-  Lane mx, my, mz;          ///< moment [N m]
-  Lane rolling_stiffness;   ///< bending stiffness, for the time step [N m/rad]
-  Lane twisting_stiffness;  ///< [N m/rad]
+  Lane normal_damping;        ///< viscous coefficient, for the time step [N s/m] >= 0
+  Lane tangential_damping;    ///< viscous coefficient of slip, for the time step [N s/m] >= 0
+  Lane sliding_limit;         ///< largest |Fs| [N]
+  Lane fx, fy, fz;            ///< shear force [N]
+  Lane mx, my, mz;            ///< moment [N m]
+  Lane rolling_stiffness;     ///< bending stiffness, for the time step [N m/rad]
+  Lane twisting_stiffness;    ///< stiffness about the normal, for the time step [N m/rad]
 
   // Totals (contact_kinematics), after the last kernel.
   Lane force_x, force_y, force_z;        ///< on j [N]
@@ -86,11 +90,11 @@ struct alignas(64) ContactBlock {
   Lane own_history[kMaxHistory];
   Lane* history = own_history;
 
-  // Of models with several materials only, set by the caller per contact; what follows from the
-  // pair is filled in by Materials::Complete().
+  // Only used by models with several materials: set by the caller per contact; what follows from
+  // the pair of materials is filled in by Materials::Complete().
   bool mixed = false;     ///< there are several materials
   int materials[kBlock];  ///< Materials::Pair() of i and j
-  Lane friction;          ///< stands for sliding_friction; at walls set by the caller [-] >= 0
+  Lane friction;          ///< in place of sliding_friction; at walls set by the caller [-] >= 0
   Lane effective_mass;    ///< m* [kg]
 };
 

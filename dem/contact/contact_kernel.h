@@ -10,7 +10,8 @@
 
 namespace calib::dem {
 
-/// Immutable after construction, so one instance serves all threads.
+/// One kernel of the chain that a block of contacts passes. Immutable after construction;
+/// thread-safe: one instance serves all threads.
 class ContactKernel {
  public:
   ContactKernel() = default;
@@ -35,18 +36,19 @@ class ContactKernel {
   virtual void Apply(ContactBlock& block, int first) const = 0;
 };
 
-class Materials;
+class Materials;  // contact/materials.h
 
 /// What a law or an effect may know when it is made: its own parameters and the law it joins.
 struct KernelContext {
-  std::string contact;      ///< name of the contact law
-  std::string effect = {};  ///< its name; empty: the law itself
-  double density = 0;       ///< of the grains [kg/m^3]
-  double thickness = 0;     ///< of disks [m]; 0: the grains are spheres
-  ParameterSet law;         ///< parameters of the law, defaults filled in
-  ParameterSet
-      parameters;  ///< of the law, or of the effect (without its prefix), defaults filled in
-  const Materials* materials = nullptr;  ///< while the kernel is made; null: there is one material
+  bool linear_springs = false;  ///< trait of the contact law: ContactInfo::linear_springs
+  std::string effect = {};      ///< name of the effect; empty: the kernel is the law's own
+  double density = 0;           ///< of the grains [kg/m^3]
+  double thickness = 0;         ///< of disks [m]; 0: the grains are spheres
+  ParameterSet law;             ///< parameters of the law, defaults filled in
+  ParameterSet parameters;  ///< of the effect, without its prefix, or of the law where the kernel
+                            ///< is the law's own, defaults filled in
+  const Materials* materials =
+      nullptr;  ///< lives while the kernel is made; null: there is one material
 };
 
 }  // namespace calib::dem

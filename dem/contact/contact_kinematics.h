@@ -6,20 +6,23 @@
 
 namespace calib::dem {
 
-/// From branch vector, radii and velocities to normal, overlap, and the increments of slip, rolling
-/// and twisting during block.dt. The homogeneous velocity of the cell acts over the branch vector.
+/// Computes, for contacts of two grains, normal, overlap and the increments of slip, rolling and
+/// twisting during block.dt from branch vector, radii and velocities. The homogeneous velocity of
+/// the cell acts over the branch vector.
 ///   n = d/|d|, u = r_i + r_j - |d|, v = v_j - v_i + L d
 ///   slip  = dt [ (r_i + r_j)/|d| (v - n (n.v)) - (r_i w_i + r_j w_j) x n ]
 ///   roll  = dt [ (w_j - w_i) - n (n.(w_j - w_i)) ]
 ///   twist = dt n.(w_j - w_i),   spin = dt/2 n.(w_i + w_j)
 /// Slip uses rigid arms r_i, r_j (the translation scaled by (r_i + r_j)/|d|): objective, and
-/// without the ratcheting that arms changing with the overlap give in cycles [McNamara,
-/// Garcia-Rojo, Herrmann, Phys. Rev. E 77 (2008) 031304]. Precondition: |d| > 0 in every lane.
+/// without the ratcheting that arms changing with the overlap give in cycles.
+/// [McNamara, Garcia-Rojo, Herrmann, Phys. Rev. E 77 (2008) 031304]
+/// Precondition: |d| > 0 in every lane.
 void ComputeKinematics(ContactBlock& block);
 
-/// The same for grain i at a wall j: d points from the centre to the nearest point of the wall, v
-/// is the wall's velocity there minus that of the centre, w_j the wall's angular velocity. The wall
-/// is a partner of infinite radius,
+/// Computes normal, overlap, slip, rolling and twisting, as ComputeKinematics() does for two
+/// grains, for grain i at a wall j: d points from the centre to the nearest point of the wall, v is
+/// the wall's velocity there minus that of the centre, w_j the wall's angular velocity. The wall is
+/// a partner of infinite radius,
 ///   n = d/|d|, u = r_i - |d|, r* = r_i, slip = dt [ (v - n (n.v)) - r_i w_i x n ],
 /// except where laws use the radii themselves (moments): there it counts as a mirror image, r_j =
 /// r_i, and the effective mass is that of the grain (block.mass_factor = 2).
@@ -44,7 +47,7 @@ CALIB_DEM_INLINE void TransportLane(const ContactBlock& b, int k, double& x, dou
   z = keep * pz + spin * (nx * py - ny * px);
 }
 
-/// The same for all lanes of three history columns from `first` on.
+/// TransportLane() for all lanes of the vector in the three history columns from `first` on.
 void TransportTangential(ContactBlock& block, int first);
 
 /// Adds up what the contact does to its grains: force on j, torques with arms to the middle of the

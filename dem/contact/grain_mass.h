@@ -7,18 +7,20 @@
 
 namespace calib::dem {
 
-/// m = unit r^3 of spheres, unit r^2 depth of disks, which is rho pi r^2 t [InertiaOf()].
+/// Masses of grains by their radius r: m = unit r^3 for spheres, m = unit r^2 depth = rho pi r^2 t
+/// for disks, as InertiaOf() has them.
 struct GrainMass {
   double unit = 0;   ///< 4/3 pi rho [kg/m^3]
   double depth = 0;  ///< 3/4 of the thickness t of disks [m]; 0: the grains are spheres
 };
 
-/// density [kg/m^3], thickness of disks, or 0 [m].
+/// Masses of grains of a density [kg/m^3] > 0; thickness: of disks [m], 0: the grains are spheres.
 inline GrainMass GrainMassOf(double density, double thickness) {
   return {.unit = 4.0 / 3.0 * std::numbers::pi * density, .depth = 0.75 * thickness};
 }
 
-/// m_i m_j/(m_i + m_j) [kg]; factor: ContactBlock::mass_factor.
+/// Effective mass m* = factor m_i m_j/(m_i + m_j) [kg] of grains of radii ri, rj [m] > 0; factor:
+/// ContactBlock::mass_factor.
 CALIB_DEM_INLINE double EffectiveMass(const GrainMass& grains, double factor, double ri,
                                       double rj) {
   const double i = ri * ri * (grains.depth > 0 ? grains.depth : ri);

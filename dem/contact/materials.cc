@@ -43,7 +43,7 @@ Materials::Materials(const Model& model, const ContactInfo& law, const Parameter
       friction_.push_back(std::min(a, b));
     }
   }
-  TakePairs("friction_coefficient", friction_);
+  ApplyPairParameters("friction_coefficient", friction_);
 }
 
 int Materials::IndexOf(const std::string& name) const {
@@ -55,7 +55,7 @@ int Materials::IndexOf(const std::string& name) const {
   return static_cast<int>(it - names_.begin());
 }
 
-std::optional<double> Materials::Said(int a, int b, const std::string& name) const {
+std::optional<double> Materials::PairParameter(int a, int b, const std::string& name) const {
   const std::string& one = names_[static_cast<std::size_t>(a)];
   const std::string& other = names_[static_cast<std::size_t>(b)];
   for (const std::string& pair : {absl::StrCat(one, "-", other), absl::StrCat(other, "-", one)}) {
@@ -67,11 +67,11 @@ std::optional<double> Materials::Said(int a, int b, const std::string& name) con
   return std::nullopt;
 }
 
-void Materials::TakePairs(const std::string& name, std::vector<double>& values) const {
+void Materials::ApplyPairParameters(const std::string& name, std::vector<double>& values) const {
   for (int a = 0; a < count(); ++a) {
     for (int b = 0; b < count(); ++b) {
       double& value = values[static_cast<std::size_t>(Pair(a, b))];
-      value = Said(a, b, name).value_or(value);
+      value = PairParameter(a, b, name).value_or(value);
     }
   }
 }
@@ -107,7 +107,7 @@ std::vector<double> PairValues(const KernelContext& context, const std::string& 
     return {own};
   }
   std::vector<double> values(static_cast<std::size_t>(context.materials->pairs()), own);
-  context.materials->TakePairs(absl::StrCat(context.effect, ".", parameter), values);
+  context.materials->ApplyPairParameters(absl::StrCat(context.effect, ".", parameter), values);
   return values;
 }
 

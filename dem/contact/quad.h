@@ -6,27 +6,30 @@
 
 #include <cstdint>
 
-/// Of what kernels call lane by lane: becomes part of each of their copies.
+/// Before a function that kernels call lane by lane: it becomes part of each copy of the kernel.
 #define CALIB_DEM_INLINE inline __attribute__((always_inline))
 
 namespace calib::dem {
 
+/// Four doubles; + - * / act on each of them alone.
 using Quad = double __attribute__((vector_size(32)));
-/// Of a comparison: all bits of an element where it holds, none where not.
+/// Result of comparing two Quads: all bits of an element are set where the comparison holds, none
+/// where it does not.
 using QuadMask = std::int64_t __attribute__((vector_size(32)));
 
-/// Any four doubles in a row, aligned or not.
+/// Reads four doubles in a row from any address, aligned or not.
 CALIB_DEM_INLINE void LoadQuad(const double* from, Quad& to) {
   using Loose = double __attribute__((vector_size(32), aligned(8), may_alias));
   to = *reinterpret_cast<const Loose*>(from);
 }
 
+/// Writes four doubles in a row to any address, aligned or not.
 CALIB_DEM_INLINE void StoreQuad(const Quad& from, double* to) {
   using Loose = double __attribute__((vector_size(32), aligned(8), may_alias));
   *reinterpret_cast<Loose*>(to) = from;
 }
 
-/// Rows become columns: element l of row q and element q of row l change places.
+/// Transposes four rows of four: element l of row q and element q of row l change places.
 CALIB_DEM_INLINE void Transpose(Quad (&row)[4]) {
   const Quad low01 = __builtin_shufflevector(row[0], row[1], 0, 4, 2, 6);
   const Quad high01 = __builtin_shufflevector(row[0], row[1], 1, 5, 3, 7);

@@ -135,7 +135,7 @@ std::unique_ptr<ContactKernel> MakeViscoelasticDashpot(const KernelContext& cont
   std::vector<double> damping = ForPairs<double>(
       context, [](const ParameterSet& law) { return law.Get("damping"); }, &InSeries);
   if (context.materials != nullptr) {
-    context.materials->TakePairs("damping", damping);
+    context.materials->ApplyPairParameters("damping", damping);
   }
   return std::make_unique<DashpotKernel>(std::move(damping), exponent);
 }

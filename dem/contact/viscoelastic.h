@@ -9,24 +9,28 @@
 
 namespace calib::dem {
 
+/// Exponent of the overlap in the dashpot of a viscoelastic contact
 ///   F = k u^{3/2} + gamma u' u^alpha,   k = 4/3 E* sqrt(r*),   E* = E/(2(1 - nu^2))
 ///   dFs = k_t dus,   |Fs| <= tan(phi_mu) |F|
 /// u' is the rate of overlap. F may pull for the last moments of a collision, and friction is
 /// limited by its size then too. The dashpot acts on top of everything that effects make of the
-/// elastic force; it is off during consolidation. [Hadjidoukas et al. 2014, Table 1, Eq. 3]
+/// elastic force; it is off during consolidation.
+/// [Hadjidoukas et al. 2014, Table 1, Eq. 3]
 struct ViscoelasticExponent {
   enum class Kind { kQuarter, kHalf, kGiven };
   Kind kind = Kind::kGiven;
   double value = 0;  ///< alpha, where given [-] >= 0
 };
 
-/// Kernels from the parameters young_modulus, poisson_ratio and tangential_stiffness, and damping.
+/// Kernel of the springs, from the parameters young_modulus, poisson_ratio and
+/// tangential_stiffness.
 std::unique_ptr<ContactKernel> MakeViscoelasticSprings(const KernelContext& context);
+/// Kernel of the dashpot, from the parameter damping (gamma).
 std::unique_ptr<ContactKernel> MakeViscoelasticDashpot(const KernelContext& context,
                                                        const ViscoelasticExponent& exponent);
 
-/// young_modulus, poisson_ratio, tangential_stiffness, damping [unit], friction_angle,
-/// friction_coefficient.
+/// Catalogue entries of young_modulus, poisson_ratio, tangential_stiffness, damping [damping_unit],
+/// friction_angle and friction_coefficient.
 std::vector<ParameterInfo> ViscoelasticParameters(const std::string& damping_unit);
 
 }  // namespace calib::dem

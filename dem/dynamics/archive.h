@@ -9,11 +9,12 @@
 
 namespace calib::dem {
 
-/// Goes to an archive as it lies in memory, unless it has a Visit() of its own and stands alone.
+/// Types that go to an archive as they lie in memory, unless they have a Visit() of their own and are no
+/// elements of a vector.
 template <class T>
 inline constexpr bool kPlain = std::is_trivially_copyable_v<T>;
 
-/// Appends members to `bytes`. Plain numbers and structs as they lie in memory (little-endian IEEE
+/// Appends members to bytes(). Not thread-safe. Plain numbers and structs as they lie in memory (little-endian IEEE
 /// machines only), vectors and strings with their length in front, other types by their Visit().
 class SaveArchive {
  public:
@@ -55,7 +56,7 @@ class SaveArchive {
 };
 
 /// Reads what SaveArchive wrote. ok() is false once the bytes have not sufficed; members are then
-/// undefined.
+/// undefined. Not thread-safe; the bytes have to outlive it.
 class LoadArchive {
  public:
   explicit LoadArchive(const std::string& bytes) : bytes_(bytes) {}
@@ -64,8 +65,9 @@ class LoadArchive {
   void operator()(T&... members) {
     (Get(members), ...);
   }
-  /// Everything was there, and nothing more.
+  /// Whether the bytes held all members that were read, and nothing more.
   [[nodiscard]] bool complete() const { return ok_ && at_ == bytes_.size(); }
+  /// Whether the bytes held all members that were read.
   [[nodiscard]] bool ok() const { return ok_; }
 
  private:
@@ -94,7 +96,8 @@ class LoadArchive {
     text.assign(Size(1), '\0');
     Take(text.data(), text.size());
   }
-  /// A length of which the remaining bytes could hold all elements of `least` bytes.
+  /// Reads a number of elements; sets ok_ to false where the remaining bytes cannot hold as many elements
+  /// of at least `least` bytes each.
   std::uint64_t Size(std::size_t least) {
     std::uint64_t size = 0;
     Get(size);

@@ -61,7 +61,7 @@ Assembly::Assembly(const Packing& packing, double density, ContactModel model,
   reach_ = model_.Reach(largest_radius_);
   skin_ = surroundings.skin * mean_diameter_ + reach_;
   wall_reach_ = walls_.empty() ? 0 : model_.Reach(2 * largest_radius_);
-  JudgeSmallestGrains();
+  SetNominalStep();
 }
 
 /// Masses of grains that are not of the model's own material. Precondition: no clumps.
@@ -92,7 +92,7 @@ void Assembly::Shrink(const std::vector<std::pair<int, double>>& radii) {
     particles_.inverse_mass[g] *= ratio * ratio * ratio;
     particles_.inverse_inertia[g] *= ratio * ratio * ratio * ratio * ratio;
   }
-  JudgeSmallestGrains();
+  SetNominalStep();
   PackAllGrains();
 }
 

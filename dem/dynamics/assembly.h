@@ -24,16 +24,16 @@
 
 namespace calib::dem {
 
-/// Stiffness seen by the slowest-allowed time step and by the servo.
+/// Stiffness of all contacts as the choice of the time step and the servo need it.
 struct StiffnessEstimate {
   FastestRates fastest;  ///< of all bodies together; zero without contacts
   double critical_step =
       0;  ///< min over grains and axes of sqrt(m/K), translation and rotation [s]; 0: no contact
-  double elastic_step = 0;    ///< the same without dashpots [s]
-  double step_by_forces = 0;  ///< the same without moment stiffness either [s]
-  bool by_twisting = false;   ///< of the moment stiffnesses twisting is larger than rolling
+  double elastic_step = 0;    ///< critical_step if there were no dashpots [s]
+  double step_by_forces = 0;  ///< critical_step without dashpots and moment stiffness [s]
+  bool by_twisting = false;   ///< contacts are stiffer in twisting than in rolling
   std::array<double, 3> modulus = {0, 0, 0};    ///< affine (Voigt) stiffness of each axis [Pa]
-  std::array<double, 3> viscosity = {0, 0, 0};  ///< the same of the dashpots [Pa s]
+  std::array<double, 3> viscosity = {0, 0, 0};  ///< affine viscosity of each axis by dashpots [Pa s]
 };
 
 /// What surrounds the grains where it is not a periodic cell.
@@ -43,50 +43,52 @@ struct Surroundings {
   std::vector<Wall> walls{};          ///< in a periodic axis they reach a diameter beyond the cell
   bool planar = false;                ///< grains move in the plane of x and z only
   double thickness = 0;               ///< of disks, planar only [m]; 0: the grains are spheres
-  std::string material{};             ///< of the walls; "": the model's own
-  double skin = 0.25;  ///< gap up to which pairs are listed, over the mean diameter; flows search
-                       ///< less often with a wide one
+  std::string material{};             ///< name of the walls' material; "": the model's own
+  double skin = 0.25;  ///< gap up to which pairs are listed, over the mean diameter [-] > 0.
+                       ///< Chosen: flows search less often with a wide one
 };
 
 /// A grain that joins others.
 struct NewGrain {
-  Vec3 centre{}, velocity{};  ///< [m, m/s]
+  Vec3 centre{}, velocity{};  ///< [m], [m/s]
   double radius = 0;          ///< [m] > 0
   int material = 0;           ///< index in Materials
-  int clump = -1;             ///< >= 0: one rigid body with those of this number that join with it
+  int clump = -1;             ///< >= 0: one rigid body with the grains of this number that join in the
+                              ///< same call; -1: a sphere of its own
 };
 
-/// Copyable: a copy is a snapshot that goes on to the same bits. Not thread-safe; uses `threads`
-/// threads inside.
+/// Grains, contacts and cell of one specimen. Copyable: a copy is a snapshot that goes on to the same bits.
+/// Not thread-safe; uses `threads` threads inside.
 class Assembly {
  public:
-  /// Spheres of one clump id move as one rigid body. Preconditions: the packing has grains; density
-  /// > 0; threads >= 1.
+  /// A specimen in its periodic cell, at rest. Spheres of one clump id move as one rigid body. density:
+  /// of the grains [kg/m^3] > 0. Preconditions: the packing has grains; threads >= 1.
   Assembly(const Packing& packing, double density, ContactModel model, int threads);
 
-  /// The same with gravity and walls around the grains; `packing.length` only says where they
-  /// usually are along open axes, 0 .. length. Grains like these may join later.
+  /// Grains at rest with gravity and walls around them; `packing.length` only says where they usually are
+  /// along open axes, 0 .. length. Grains of these sizes may join later. density: of the grains [kg/m^3]
+  /// > 0. Preconditions: the packing has grains; threads >= 1.
   Assembly(const Packing& packing, double density, ContactModel model, Surroundings surroundings,
            int threads);
 
-  /// Takes out the grains at these indices of particles(), ascending. To be followed by
-  /// EvaluateForces. Precondition: of a clump all spheres or none.
+  /// Takes out the grains at these indices of particles(), ascending. To be followed by EvaluateForces.
+  /// Precondition: all spheres of a clump are taken out, or none.
   void Remove(const std::vector<int>& grains);
 
   /// Lets grains join, with the next free ids. To be followed by EvaluateForces. Preconditions: the
-  /// skin and the step were chosen for grains like these; those of one clump follow one another, have
-  /// one velocity and the model's own material.
+  /// skin and the step were chosen for grains like these; those of one clump follow one another,
+  /// have one velocity and the model's own material.
   void Insert(const std::vector<NewGrain>& grains);
 
   /// Takes a clump (index in clumps().all()) out of its contacts and sets it down at rest, farther
   /// by `shift` [m]. To be followed by EvaluateForces.
   void Relocate(int clump, const Vec3& shift);
 
-  /// Velocities, activity and friction of walls may be set between steps.
+  /// Walls and their contacts. Velocities, activity and friction of walls may be set between steps.
   [[nodiscard]] const WallContacts& walls() const { return walls_; }
   std::vector<Wall>& mutable_walls() { return walls_.mutable_walls(); }
 
-  /// Forgets the list, so that the next EvaluateForces searches: after a wall was opened or placed
+  /// Lets the next EvaluateForces search neighbours anew. To be called after a wall was opened or placed
   /// by hand.
   void SearchAgain() { stale_ = true; }
 
@@ -102,7 +104,7 @@ class Assembly {
   /// Sets one cell length exactly, after a Move that reached it up to rounding.
   void SetLength(int axis, double length) { cell_.length[axis] = length; }
 
-  /// The same for the displacement of the top along x.
+  /// Sets the displacement of the top along x [m] exactly, after a Move that reached it up to rounding.
   void SetDisplacement(double displacement) { cell_.displacement = displacement; }
 
   /// Stiffnesses of the present contacts; their memory is not touched. Errors: OUT_OF_RANGE when
@@ -113,46 +115,50 @@ class Assembly {
   /// bounds the step where contacts are few or about to form.
   [[nodiscard]] double NominalCriticalStep() const { return nominal_critical_step_; }
 
-  /// The fastest rates of those two grains.
+  /// The fastest rates of two touching grains of the smallest size at an overlap of 1e-4 radii.
   [[nodiscard]] const FastestRates& NominalRates() const { return nominal_rates_; }
 
-  /// The same at any overlap, in radii > 0.
+  /// Critical step of two touching grains of the smallest size at an overlap in radii [-] > 0 [s].
   [[nodiscard]] double CriticalStepAt(double overlap) const;
 
   /// How many times shorter the step is than without the moment stiffness of contacts, which are
   /// taken for no softer than at an overlap of 1e-4 radii [-].
   [[nodiscard]] double MomentDelay(const StiffnessEstimate& estimate) const;
 
-  /// The same in words, naming the effect.
+  /// What MomentDelay() finds, in words that name the effect.
   [[nodiscard]] std::string MomentStepText(const StiffnessEstimate& estimate) const;
 
-  /// Beyond this delay no run ends: the 200 000 steps in which a specimen has to settle
-  /// (StageOptions) are then fewer than 70 of those that the forces would allow.
+  /// Largest MomentDelay() with which a run goes on [-]. Chosen: the 200 000 steps in which a specimen has
+  /// to settle (StageOptions) are beyond it fewer than 70 of those that the forces would allow.
   static constexpr double kLongestMomentDelay = 3000;
 
   /// Mean net force of the loaded grains over mean contact force [-]; 0 without contacts, infinite
   /// when not finite.
   [[nodiscard]] double UnbalancedForce() const;
 
-  [[nodiscard]] Vec3 gravity() const { return gravity_; }  ///< [m/s^2]
+  /// Acceleration of free fall; zero in a periodic cell [m/s^2].
+  [[nodiscard]] Vec3 gravity() const { return gravity_; }
 
-  /// Grains whose net force is not a number, in words; empty: none.
+  /// The first grain whose net force is not a number, in words; empty: there is none.
   [[nodiscard]] std::string FirstNotFinite() const;
 
   /// Whether viscous effects act; they do until told otherwise.
   void SetViscous(bool viscous) { viscous_ = viscous; }
 
+  /// tan(phi_mu) between grains [-] >= 0, in place of the model's until set again.
   void SetSlidingFriction(double friction) { sliding_friction_ = friction; }
   [[nodiscard]] double sliding_friction() const { return sliding_friction_; }
   [[nodiscard]] const ContactModel& model() const { return model_; }
   [[nodiscard]] const PeriodicCell& cell() const { return cell_; }
   [[nodiscard]] const ParticleArrays& particles() const { return particles_; }
   [[nodiscard]] const NeighborList& neighbors() const { return list_; }
+  /// Whether the two grains of a slot of neighbors() are in contact.
   [[nodiscard]] bool touching(int slot) const {
     return touching_[static_cast<std::size_t>(slot)] != 0;
   }
 
-  /// Force of slot s of neighbors() on its grain j; zero where they do not touch [N].
+  /// Force that the contact of a slot of neighbors() puts on its grain j [N]; zero where the two grains do
+  /// not touch.
   [[nodiscard]] Vec3 force_on_j(int slot) const {
     const BlockForces& f = forces_[static_cast<std::size_t>(slot) / kBlock];
     const std::size_t lane = static_cast<std::size_t>(slot) % kBlock;
@@ -161,11 +167,12 @@ class Assembly {
 
   /// Love-Weber stress sum_c f_a d_a / V of the last EvaluateForces, compression positive [Pa].
   [[nodiscard]] const std::array<double, 3>& stress() const { return stress_; }
-  /// Minus its component xz (mean of xz and zx): positive when the top is sheared along +x [Pa].
+  /// Minus the component xz (mean of xz and zx) of the Love-Weber stress: positive when the top is sheared
+  /// along +x [Pa].
   [[nodiscard]] double shear_stress() const { return shear_stress_; }
-  /// Contacts between grains; those with walls are counted by walls().
+  /// Number of contacts between grains; contacts with walls are counted by walls().
   [[nodiscard]] std::int64_t contacts() const { return contacts_; }
-  /// Single spheres and clumps.
+  /// Number of bodies: single spheres and clumps.
   [[nodiscard]] int bodies() const { return bodies_; }
   [[nodiscard]] const RigidClumps& clumps() const { return clumps_; }
   RigidClumps& mutable_clumps() { return clumps_; }
@@ -177,9 +184,11 @@ class Assembly {
   /// Sum of the volumes of grains, unions for clumps, of the packing as it was given, less what
   /// Remove() took out, with what Insert() put in [m^3].
   [[nodiscard]] double solid_volume() const { return solid_volume_; }
-  /// Of the spheres that have the volumes of the bodies.
+  /// Mean diameter of the spheres that have the volumes of the bodies [m].
   [[nodiscard]] double mean_diameter() const { return mean_diameter_; }
+  /// Number of calls of Move().
   [[nodiscard]] std::int64_t steps() const { return steps_; }
+  /// Sum over evaluations of the number of contacts.
   [[nodiscard]] std::int64_t contact_updates() const { return contact_updates_; }
 
   /// Everything that determines what follows, but the model and the number of threads, for archives
@@ -247,17 +256,18 @@ class Assembly {
   [[nodiscard]] bool ListMayMissPairs() const;
   [[nodiscard]] double ShearSinceSearch() const;
   void TakeBranchesBetweenBodies();
-  void JudgeChunk(int chunk, ChunkStiffness& stiffness) const;
+  void SumStiffnessOfChunk(int chunk, ChunkStiffness& stiffness) const;
   void SetStepsAlongAxes(StiffnessEstimate& estimate);
   [[nodiscard]] double FastestOf(const std::vector<OwnStiffness>& own) const;
-  void JudgeSmallestGrains();
+  void SetNominalStep();
   [[nodiscard]] absl::Status FormulasFinite() const;
-  /// NominalCriticalStep() if contacts had no moment stiffness [s].
+  /// What NominalCriticalStep() would be if contacts had no moment stiffness [s].
   [[nodiscard]] double NominalStepByForces() const;
-  /// Calls with the smallest grain of each material and each pair of it with another (0 where there is
-  /// one only).
+  /// Calls with the smallest grain of each material and each pair of it with another (0 where there
+  /// is one only).
   void VisitSmallestGrains(const std::function<void(std::size_t grain, int pair)>& visit) const;
-  /// Of the smallest grain, of each material where there are several; overlap: in radii.
+  /// The least critical step of two touching grains of the smallest size, over all pairs of materials [s];
+  /// overlap: in radii [-] > 0.
   [[nodiscard]] double LeastNominalStep(double overlap, bool with_moments) const;
 
   PeriodicCell cell_;
@@ -273,9 +283,9 @@ class Assembly {
   bool planar_ = false;
   WallContacts walls_;
   bool stale_ = false;     ///< the list must be made anew
-  bool loads_fit_ = true;  ///< are those of the grains as they are numbered now
+  bool loads_fit_ = true;  ///< loads are of the grains as they are numbered now
   double reach_ = 0;       ///< gap up to which formed contacts may act [m]
-  double wall_reach_ = 0;  ///< the same at walls, whose r* is that of two grains twice as large [m]
+  double wall_reach_ = 0;  ///< reach_ at walls, whose r* is that of two grains twice as large [m]
   double last_dt_ = 0;
 
   NeighborList list_;
@@ -301,8 +311,8 @@ class Assembly {
   double shear_stress_ = 0;
   std::int64_t contacts_ = 0;
 
-  /// What a search leaves for the next one: the list before it with what contacts remembered, and
-  /// memory that none asks for anew.
+  /// What a search leaves for the next one: the list before it with what contacts remembered, and memory
+  /// that is used again.
   struct Searching {
     NeighborSearch search;
     NeighborList old, sorted;
@@ -313,12 +323,12 @@ class Assembly {
   Searching searching_;
 
   /// What an estimate of stiffness works in, kept from one to the next.
-  struct Judging {
+  struct Estimating {
     std::vector<ChunkStiffness> chunks;  ///< a few at a time
     std::vector<OwnStiffness> springs;   ///< per grain
-    std::vector<OwnStiffness> dashpots;  ///< likewise; empty where none acts
+    std::vector<OwnStiffness> dashpots;  ///< per grain; empty where no dashpot acts
   };
-  Judging judging_;
+  Estimating estimating_;
 
   RigidClumps clumps_;
   int bodies_ = 0;

@@ -4,15 +4,14 @@
 #include <cstring>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/chunks.h"
 
 namespace calib::dem {
 absl::Status Assembly::EvaluateForces() {
   if (stale_ || list_.row.empty() || ListMayMissPairs()) {
-    if (auto s = SearchNeighbors(); !s.ok()) {
-      return s;
-    }
+    RETURN_IF_ERROR(SearchNeighbors());
   }
   loads_fit_ = true;
   SetShifts();
@@ -22,9 +21,7 @@ absl::Status Assembly::EvaluateForces() {
   packed_ = false;  // who drives grains by hand may move them after this
   ForEachChunk(static_cast<int>(sums_.size()), threads_,
                [this](int chunk) { EvaluateChunk(chunk); });
-  if (auto s = FormulasFinite(); !s.ok()) {
-    return s;
-  }
+  RETURN_IF_ERROR(FormulasFinite());
   stress_ = {0, 0, 0};
   shear_stress_ = 0;
   contacts_ = 0;
@@ -47,15 +44,12 @@ absl::Status Assembly::EvaluateForces() {
   }
   contact_updates_ += contacts_;
   if (!walls_.empty()) {
-    if (auto s = walls_.Evaluate(particles_, model_,
-                                 {.dt = last_dt_,
+    const WallContacts::Step step{.dt = last_dt_,
                                   .viscous = viscous_,
                                   .reach = wall_reach_,
                                   .moved = moved_,
-                                  .threads = threads_});
-        !s.ok()) {
-      return s;
-    }
+                                  .threads = threads_};
+    RETURN_IF_ERROR(walls_.Evaluate(particles_, model_, step));
     contact_updates_ += walls_.contacts();
     return FormulasFinite();
   }

@@ -44,8 +44,8 @@ struct Held {
   double twisting = 0;
 };
 
-/// What lane k does to the grain on the side of i, whose share of it is 1 where the other never moves
-/// (a wall), 2 where it is a grain like it.
+/// What lane k does to the grain on the side of i, whose share of it is 1 where the other never
+/// moves (a wall), 2 where it is a grain like it.
 void AddLane(const ContactBlock& w, int k, const Held& by, double share, OwnStiffness& to) {
   const double n[3] = {w.nx[k], w.ny[k], w.nz[k]};
   const double r = w.radius_i[k];
@@ -151,7 +151,7 @@ double Assembly::LeastNominalStep(double overlap, bool with_moments) const {
   return least;
 }
 
-void Assembly::JudgeSmallestGrains() {
+void Assembly::SetNominalStep() {
   nominal_critical_step_ = CriticalStepAt(kNominalOverlap);
   nominal_rates_ = {};
   VisitSmallestGrains([this](std::size_t grain, int pair) {
@@ -168,7 +168,8 @@ void Assembly::JudgeSmallestGrains() {
   });
 }
 
-/// At most the largest rate of all bodies together, from the shares of each (dem/dynamics/stable_step).
+/// At most the largest rate of all bodies together, from the shares of each
+/// (dem/dynamics/stable_step).
 double Assembly::FastestOf(const std::vector<OwnStiffness>& own) const {
   const ParticleArrays& p = particles_;
   double fastest = 0;
@@ -194,7 +195,7 @@ double Assembly::CriticalStepAt(double overlap) const { return LeastNominalStep(
 double Assembly::NominalStepByForces() const { return LeastNominalStep(kNominalOverlap, false); }
 
 /// What pair chunk `chunk` adds to the estimate.
-void Assembly::JudgeChunk(int chunk, ChunkStiffness& stiffness) const {
+void Assembly::SumStiffnessOfChunk(int chunk, ChunkStiffness& stiffness) const {
   constexpr int kBlocks = kPairChunk / kBlock;
   stiffness.Clear();
   ContactBlock b;
@@ -223,10 +224,11 @@ void Assembly::JudgeChunk(int chunk, ChunkStiffness& stiffness) const {
   }
 }
 
-/// The steps that the axes of single bodies allow; clumps become their first spheres in judging_.
+/// The steps that the axes of single bodies allow; clumps become their first spheres in
+/// estimating_.
 void Assembly::SetStepsAlongAxes(StiffnessEstimate& estimate) {
-  std::vector<OwnStiffness>& springs = judging_.springs;
-  std::vector<OwnStiffness>& dashpots = judging_.dashpots;
+  std::vector<OwnStiffness>& springs = estimating_.springs;
+  std::vector<OwnStiffness>& dashpots = estimating_.dashpots;
   clumps_.Fold(springs);
   if (!dashpots.empty()) {
     clumps_.Fold(dashpots);
@@ -260,9 +262,9 @@ void Assembly::SetStepsAlongAxes(StiffnessEstimate& estimate) {
 absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) {
   const ParticleArrays& p = particles_;
   const auto n = p.x.size();
-  std::vector<ChunkStiffness>& chunks = judging_.chunks;
-  std::vector<OwnStiffness>& springs = judging_.springs;
-  std::vector<OwnStiffness>& dashpots = judging_.dashpots;
+  std::vector<ChunkStiffness>& chunks = estimating_.chunks;
+  std::vector<OwnStiffness>& springs = estimating_.springs;
+  std::vector<OwnStiffness>& dashpots = estimating_.dashpots;
   springs.assign(n, OwnStiffness{});
   dashpots.clear();
   double rolling = 0;  // sum over contacts [N m/rad]
@@ -276,7 +278,7 @@ absl::Status Assembly::EstimateStiffness(StiffnessEstimate& estimate) {
   for (int c = 0; c < count; ++c) {
     if (c % together == 0) {
       ForEachChunk(std::min(together, count - c), threads_, [this, c, &chunks](int k) {
-        JudgeChunk(c + k, chunks[static_cast<std::size_t>(k)]);
+        SumStiffnessOfChunk(c + k, chunks[static_cast<std::size_t>(k)]);
       });
     }
     const ChunkStiffness& chunk = chunks[static_cast<std::size_t>(c % together)];

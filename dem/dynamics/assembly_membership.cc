@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kGone = -1;
 
-/// Keeps what is not gone, in order.
-void Keep(const std::vector<int>& to, ParticleArrays& p) {
+/// Leaves out the grains whose new index is kGone; the others stay in order.
+void DropGone(const std::vector<int>& to, ParticleArrays& p) {
   for (auto* a : {&p.x, &p.y, &p.z, &p.vx, &p.vy, &p.vz, &p.wx, &p.wy, &p.wz, &p.fx, &p.fy, &p.fz,
                   &p.tx, &p.ty, &p.tz, &p.radius, &p.inverse_mass, &p.inverse_inertia}) {
     std::size_t kept = 0;
@@ -79,7 +79,7 @@ void Assembly::Remove(const std::vector<int>& grains) {
   }
   Renumber(to);
   clumps_.Renumber(to, particles_.body);
-  Keep(to, particles_);
+  DropGone(to, particles_);
 }
 
 void Assembly::Relocate(int clump, const Vec3& shift) {

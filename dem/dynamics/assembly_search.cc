@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "calib/return_if_error.h"
 #include "dem/dynamics/assembly.h"
 #include "dem/dynamics/chunks.h"
 
@@ -38,9 +39,7 @@ absl::Status Assembly::SearchNeighbors() {
   std::swap(list_, searching_.old);
   std::swap(order_, searching_.old_order);
   list_.row.clear();
-  if (auto s = searching_.search.Build(cell_, skin_, particles_, searching_.sorted); !s.ok()) {
-    return s;
-  }
+  RETURN_IF_ERROR(searching_.search.Build(cell_, skin_, particles_, searching_.sorted));
   const bool rests = !cell_.open[0];  // grains in a periodic cell search seldom: room counts more
   if (rests) {
     searching_.search = {};

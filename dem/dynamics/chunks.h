@@ -4,9 +4,13 @@
 
 namespace calib::dem {
 
-inline constexpr int kPairChunk = 256;   ///< neighbour pairs per chunk
-inline constexpr int kGrainChunk = 256;  ///< grains per chunk
+/// Neighbour pairs of a chunk [-], a multiple of kBlock. Chosen: the loads of a chunk's grains stay in the
+/// first-level cache (dem/DECISIONS.md, loads are added up chunk by chunk). Changing it changes bits.
+inline constexpr int kPairChunk = 256;
+/// Grains of a chunk [-]. Chosen: enough work for a thread at a time. Changing it may change bits.
+inline constexpr int kGrainChunk = 256;
 
+/// Number of chunks of `chunk` > 0 items that hold `items` >= 0 items.
 inline constexpr int ChunkCount(int items, int chunk) { return (items + chunk - 1) / chunk; }
 
 /// Calls body(c) for c in [0, count), on `threads` threads; one thread means a plain loop.

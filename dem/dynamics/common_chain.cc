@@ -365,7 +365,7 @@ std::optional<CommonChain> CommonChainOf(const Model& model, const ModelEntries&
       continue;
     }
     const KernelContext context{
-        .contact = model.contact,
+        .linear_springs = entries.law->info.linear_springs,
         .effect = name,
         .density = model.density,
         .thickness = thickness,

@@ -15,27 +15,28 @@
 
 namespace calib::dem {
 
+/// One of the commonest chains. Immutable once made; may be shared between threads.
 struct CommonChain {
   bool hertz = true;      ///< hertz_mindlin; false: linear
-  double normal = 0;      ///< kn = normal sqrt(r* u), of linear normal r* [Pa]
-  double tangential = 0;  ///< ks = tangential sqrt(r* u) [Pa], of linear tangential kn [-]
+  double normal = 0;      ///< kn = normal sqrt(r* u), with linear kn = normal r* [Pa]
+  double tangential = 0;  ///< ks = tangential sqrt(r* u) [Pa], with linear ks = tangential kn [-]
   std::optional<MomentLaw> rolling, twisting;  ///< twisting only beside rolling
   std::optional<Dashpot> dashpot;
 };
 
-/// The chain of a model, where it is one of these; else empty. thickness: of disks [m]; 0: spheres.
+/// The chain of a model where it is one of the commonest, which the head of this file lists; else empty. thickness: of disks [m]; 0: spheres.
 std::optional<CommonChain> CommonChainOf(const Model& model, const ModelEntries& entries,
                                          double thickness = 0);
 
-/// What ContactModel::Evaluate() and CloseBlock() do together, with the same bits: overlap, forces,
-/// torques and memory of all lanes; zero where the lane does not overlap or is not in use. Columns
+/// Does what ContactModel::Evaluate() and CloseBlock() (pair_blocks.h) do together, with the same bits:
+/// overlap, forces, torques and memory of all lanes; zero where the lane does not overlap or is not in use. Columns
 /// of memory: shear force, rolling moment, twisting moment. Sets touching (kBlock of them) and
-/// returns how many lanes overlap. Stiffnesses are not set: see
-/// CommonChainStiffness().
+/// returns how many lanes overlap. Stiffnesses are not set; CommonChainStiffness()
+/// does.
 int EvaluateCommonChain(const CommonChain& chain, ContactBlock& block, std::uint8_t* touching);
 
-/// Of what ContactModel::Evaluate() sets, with the same bits where lanes overlap: normals, overlap,
-/// all stiffnesses and dampings. Neither memory nor velocities are read.
+/// Sets normals, overlap, all stiffnesses and dampings of a block, with the bits of
+/// ContactModel::Evaluate() where lanes overlap. Neither memory nor velocities are read.
 void CommonChainStiffness(const CommonChain& chain, ContactBlock& block);
 
 }  // namespace calib::dem

@@ -35,7 +35,7 @@ ContactModel::ContactModel(const Model& model, const ModelEntries& entries, doub
   if (!model.materials.empty()) {
     materials_ = std::make_shared<const Materials>(model, law.info, law_parameters, thickness);
   }
-  const KernelContext law_context{.contact = model.contact,
+  const KernelContext law_context{.linear_springs = law.info.linear_springs,
                                   .density = model.density,
                                   .thickness = thickness,
                                   .law = law_parameters,
@@ -48,7 +48,7 @@ ContactModel::ContactModel(const Model& model, const ModelEntries& entries, doub
   for (const EffectEntry* effect : entries.effects) {
     const std::string& name = effect->info.name;
     const KernelContext context{
-        .contact = model.contact,
+        .linear_springs = law.info.linear_springs,
         .effect = name,
         .density = model.density,
         .thickness = thickness,

@@ -14,11 +14,13 @@ struct Motion {
   double drag = 0;                ///< global viscous damping: a -= drag v, also of spin [1/s] >= 0
 };
 
-/// Moves grains [begin, end) by their loads fx .. tz:
-///   v += dt F'/m,  F' = F (1 - damping sign(F (v + dt F/2m))) per component;  w likewise;
+/// Moves grains [begin, end) by their loads fx .. tz. Calls for ranges apart may run at the same time.
+///   v += dt F'/m,  F' = F (1 - damping sign(F (v + dt F/2m))) per component,
+///   w += dt T'/I,  T' = T (1 - damping sign(T (w + dt T/2I))) per component,
 ///   x += dt (v + L x)
 /// v is peculiar; the inertia of the homogeneous motion is left out, being of the order of the
-/// squared inertial number. [local damping: Cundall 1987; sign at mid-step]
+/// squared inertial number. Local damping takes the sign of the velocity at mid-step.
+/// [Cundall 1987]
 void AdvanceGrains(const Motion& motion, int begin, int end, ParticleArrays& particles);
 
 }  // namespace calib::dem

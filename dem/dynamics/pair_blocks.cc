@@ -121,7 +121,7 @@ CALIB_DEM_CLONES void Grains(const LanePairs lanes, const GrainRecord* grains, C
   }
 }
 
-CALIB_DEM_CLONES void Keep(const double* keep, double* lane) {
+CALIB_DEM_CLONES void ClearUnkept(const double* keep, double* lane) {
   for (int k = 0; k < kBlock; ++k) {
     lane[k] = keep[k] > 0 ? lane[k] : 0.0;
   }
@@ -286,10 +286,10 @@ int CloseBlock(int count, double reach, int width, ContactBlock& b, std::uint8_t
   if (acting < kBlock) {
     for (ContactBlock::Lane* lane : {&b.force_x, &b.force_y, &b.force_z, &b.torque_ix, &b.torque_iy,
                                      &b.torque_iz, &b.torque_jx, &b.torque_jy, &b.torque_jz}) {
-      Keep(keep, *lane);
+      ClearUnkept(keep, *lane);
     }
     for (int c = 0; c < width; ++c) {
-      Keep(keep, b.history[c]);
+      ClearUnkept(keep, b.history[c]);
     }
   }
   return overlaps;

@@ -16,48 +16,51 @@ namespace calib::dem {
 
 /// A grain as contacts read it: three vector registers from neighbouring addresses. SI units.
 struct alignas(32) GrainRecord {
-  double at[4];        ///< centre, radius
-  double velocity[4];  ///< peculiar; last zero
-  double spin[4];      ///< angular velocity, radius
+  double at[4];        ///< centre [m], radius [m]
+  double velocity[4];  ///< peculiar velocity [m/s], zero
+  double spin[4];      ///< angular velocity [rad/s], radius [m]
 };
 
-/// Records of grains [begin, end).
+/// Writes the records of grains [begin, end) to records[begin] .. records[end - 1].
 void PackGrains(const ParticleArrays& particles, int begin, int end, GrainRecord* records);
 
 /// Listed pairs, lane by lane; padded to whole blocks with copies of the first pair of the last
 /// block, which never act.
 struct PairLanes {
   std::vector<int> first, second;               ///< grains i and j
-  std::vector<std::uint16_t> place_i, place_j;  ///< theirs among the places of the chunk
+  std::vector<std::uint16_t> place_i, place_j;  ///< places of i and j among those of the chunk
   std::vector<std::uint8_t> image;              ///< ImageCode of the cell that j is seen in
 
+  /// Number of blocks of kBlock lanes.
   [[nodiscard]] int blocks() const { return static_cast<int>(first.size()) / kBlock; }
 };
 
 /// Where pairs leave what they do to grains. Every chunk of kPairChunk pairs has one place for each
 /// grain that it touches, side by side, so that loads are added up in the first-level cache; a
-/// grain then gathers its few places.
+/// grain then gathers its few places. Threads may work on different chunks, or gather different grains, at
+/// the same time.
 class LoadPlaces {
  public:
-  /// Sets places and those of the lanes for `grains` grains; all loads are zero.
+  /// Makes the places for `grains` grains and sets place_i and place_j of the lanes; all loads are zero.
   void Assign(int grains, PairLanes& lanes);
 
-  /// Loads of the chunk at its places, all zero.
+  /// Sets the loads at the places of a chunk to zero; returns the first of them.
   GrainLoad* Clear(int chunk);
 
   /// Sums the loads of grains [begin, end) over their places, in ascending order of chunks, into
   /// fx .. tz. Precondition: begin is a multiple of four.
   void Gather(int begin, int end, ParticleArrays& particles) const;
 
-  /// Grains of the places of a chunk.
+  /// The grain of each place of a chunk.
   [[nodiscard]] std::span<const int> GrainsOf(int chunk) const {
     const auto c = static_cast<std::size_t>(chunk);
     return {grain_of_.data() + chunk_row_[c], grain_of_.data() + chunk_row_[c + 1]};
   }
 
-  /// The sum of forces of one grain, in the same order [N].
+  /// Sum of the forces on one grain over its places, in ascending order of chunks [N].
   [[nodiscard]] Vec3 ForceOn(int grain) const;
 
+  /// For archives: all state.
   template <class Archive>
   void Visit(Archive& archive) {
     archive(chunk_row_, grain_of_, row_, place_, load_);
@@ -70,8 +73,8 @@ class LoadPlaces {
   std::vector<int> place_;      ///< of four grains in turn, those that have fewer with the last one
   std::vector<GrainLoad> load_;  ///< of all places, and one more that stays zero
 
-  /// Of a grain, while places are assigned: the last chunk that met it, its place there, and how
-  /// many have.
+  /// What is known of a grain while places are assigned: the last chunk that met it, its place there, and
+  /// how many chunks have met it.
   struct Met {
     int chunk, place, count;
   };
@@ -89,30 +92,31 @@ struct alignas(64) LaneColumn {
 };
 using LaneMemory = std::vector<LaneColumn>;
 
-/// The translation of each image; the last element of each zero.
+/// Translation of one periodic image [m]; the fourth element is zero.
 using ImageShift = double[4];
 
-/// Sets dx .. dz of all lanes of block `b` and says whether any two grains of it overlap.
+/// Sets dx .. dz of all lanes of `block`, which is block `b` of the lanes; returns whether any two of its
+/// grains overlap. shift: one per image code.
 bool LoadBranches(const PairLanes& lanes, int b, const GrainRecord* grains, const ImageShift* shift,
                   ContactBlock& block);
 
-/// Sets radii and velocities of all lanes.
+/// Sets radii and velocities of all lanes of `block`, which is block `b` of the lanes.
 void LoadGrains(const PairLanes& lanes, int b, const GrainRecord* grains, ContactBlock& block);
 
-/// Sums over contacts, kept in lanes until the end so that every compiler adds them in one order:
-/// f_x d_x, f_y d_y, f_z d_z, f_x d_z + f_z d_x [N m].
+/// Sums over contacts of f_x d_x, f_y d_y, f_z d_z, f_x d_z + f_z d_x [N m], force times branch vector,
+/// kept in four partial sums each until the end so that every compiler adds them in one order.
 struct alignas(32) LaneSums {
   double at[4][4] = {};
 };
 
-/// Which of the lanes act: those that overlap, and those that were formed and that a kernel holds
+/// Decides which of the lanes act: those that overlap, and those that were formed and that a kernel holds
 /// at a gap below `reach` [m]. Sets touching (kBlock of them) and returns how many overlap; lanes
 /// from `count` on never act. Where not all act, forces, torques and memory (the first `width`
 /// columns) of those that do not become zero.
 int CloseBlock(int count, double reach, int width, ContactBlock& block, std::uint8_t* touching);
 
-/// Adds the loads of all lanes to those at their places, which begin at `loads`, keeps the forces
-/// and adds to the sums.
+/// Adds the loads of all lanes of `block`, which is block `b` of the lanes, to those at their places, which
+/// begin at `loads`; writes the forces on grains j to `forces` and adds to `sums`.
 void AddLoads(const PairLanes& lanes, int b, const ContactBlock& block, GrainLoad* loads,
               BlockForces& forces, LaneSums& sums);
 

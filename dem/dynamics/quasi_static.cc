@@ -68,7 +68,7 @@ void StrainingSpeed::Adapt(double unbalanced, double settled) {
 QuasiStatic::QuasiStatic(Assembly& assembly, const StageOptions& options, std::stop_token stop)
     : assembly_(&assembly), options_(options), stop_(std::move(stop)) {}
 
-void QuasiStatic::LookBeforeNextStep() { since_inspection_ = interval_; }
+void QuasiStatic::InspectBeforeNextStep() { since_inspection_ = interval_; }
 
 StageEnd QuasiStatic::Diverge(std::string reason) {
   reason_ = std::move(reason);
@@ -133,7 +133,8 @@ void QuasiStatic::Adopt(const StiffnessEstimate& estimate) {
   ChooseStep();
 }
 
-/// Local damping makes forces larger where they slow grains down, and the largest stable step shorter.
+/// Local damping makes forces larger where they slow grains down, and the largest stable step
+/// shorter.
 void QuasiStatic::SetDamping(double damping) {
   if (damping != damping_) {
     damping_ = damping;

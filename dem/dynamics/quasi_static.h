@@ -14,7 +14,7 @@
 
 namespace calib::dem {
 
-/// Goal of one axis: a cell length to reach exactly, or a stress to hold.
+/// Goal of one axis of the cell: a cell length to reach exactly, or a stress to hold.
 struct AxisTarget {
   enum class Mode { kLength, kStress };
   Mode mode = Mode::kLength;
@@ -39,47 +39,54 @@ struct StageOptions {
                             ///< moment (StableStep) [-], 0 .. 1
   double least_volume = 0;  ///< a settling ends where the cell has shrunk to this [m^3]
   bool adaptive = false;    ///< strained stages go faster than `rate` where forces stay balanced
-  std::int64_t max_settling_steps = 200'000;  ///< a settling that takes longer has diverged
-  std::int64_t max_loading_steps = 20'000'000;
+  std::int64_t max_settling_steps = 200'000;   ///< a settling that takes longer has diverged > 0
+  std::int64_t max_loading_steps = 20'000'000;  ///< a loading that takes longer has diverged > 0
 };
 
-/// A target that follows the specimen: looked at before every step. `target` is what was asked for
-/// and becomes what to do now, given the affine stiffness of each axis [Pa]; the answer is how far
-/// the stage is from its end, in tolerances (settled when at most one) and in strain still to go.
+/// How far a followed target (Follow) is from its end.
 struct FollowGap {
-  double tolerances = 0;  ///< >= 0
-  double strain = 0;      ///< >= 0
+  double tolerances = 0;  ///< error in tolerances [-] >= 0; settled when at most one
+  double strain = 0;      ///< strain still to go [-] >= 0
 };
+/// Lets a target follow the specimen, called before every step: `target` is what was asked for and becomes
+/// what to do now, given the affine stiffness of each axis [Pa]; returns how far the stage is from its end.
 using Follow = std::function<FollowGap(const std::array<double, 3>& modulus, CellTarget& target)>;
 
+/// How a stage of a run ended: its goal was reached, the stop token was set, or it failed.
 enum class StageEnd { kDone, kStopped, kDiverged };
 
-/// Rate of strained stages over StageOptions::rate, chosen at every inspection while straining so
+/// The rate of strained stages over StageOptions::rate, chosen at every inspection while straining so
 /// that the unbalanced force stays near kTarget times the one that ends a settling:
 ///   f <- min(kFastest, max(1, f (kTarget unbalanced / U)^kGain))
 /// Elastic stages, which leave little unbalanced, go at several times the rate; where grains
-/// rearrange it is the rate asked for. All-stress stages keep the rate.
+/// rearrange it is the rate asked for. Stages that hold stresses on
+/// all axes keep the rate. Not thread-safe.
 class StrainingSpeed {
  public:
-  /// U: mean unbalanced over mean contact force [-] >= 0; settled: StageOptions::unbalanced.
+  /// Chooses the factor anew. unbalanced: mean unbalanced over mean contact force, U [-] >= 0; settled:
+  /// StageOptions::unbalanced.
   void Adapt(double unbalanced, double settled);
+  /// The present rate over StageOptions::rate [-], 1 .. kFastest.
   [[nodiscard]] double factor() const { return factor_; }
 
+  /// For archives: all state.
   template <class Archive>
   void Visit(Archive& archive) {
     archive(factor_);
   }
 
+  /// Largest factor() [-]. Chosen; what it does to curves and steps is measured in dem/VERIFICATION.md,
+  /// adaptive staging.
   static constexpr double kFastest = 8;
 
  private:
-  static constexpr double kTarget = 2;
-  static constexpr double kGain = 0.25;
+  static constexpr double kTarget = 2;    ///< unbalanced force aimed at, in those that settle [-]. Chosen
+  static constexpr double kGain = 0.25;  ///< exponent of the correction [-]. Chosen: inspections are short
   double factor_ = 1;
 };
 
-/// Drives an assembly. Between calls its forces are those of its present configuration. Looks at
-/// the stop token every step.
+/// Drives an assembly, which has to outlive it. Between calls its forces are those of its present
+/// configuration. Looks at the stop token every step. Not thread-safe.
 class QuasiStatic {
  public:
   QuasiStatic(Assembly& assembly, const StageOptions& options, std::stop_token stop);
@@ -94,24 +101,25 @@ class QuasiStatic {
   /// within tolerance.
   StageEnd Settle(const CellTarget& target);
 
-  /// Lets every target from now on be followed; empty: targets are what they are.
+  /// Lets every target from now on follow the specimen; empty: targets are taken as they are given.
   void SetFollow(Follow follow) { follow_ = std::move(follow); }
 
-  /// Called at every inspection (20 steps); may change grains, as those that crush. An error ends
-  /// the stage, with its message as the reason.
+  /// Sets what is called at every inspection (20 steps); it may change grains, as crushing does. An error
+  /// ends the stage, with its message as the reason.
   void SetIntervention(std::function<absl::Status(Assembly&)> intervention) {
     intervention_ = std::move(intervention);
   }
 
-  /// To be called when what contacts do has been changed from outside, as dashpots that begin to act:
-  /// stiffness is looked at anew before the next step.
-  void LookBeforeNextStep();
+  /// To be called when what contacts do has been changed from outside, as dashpots that begin to
+  /// act: stiffness is looked at anew before the next step.
+  void InspectBeforeNextStep();
 
   [[nodiscard]] StageOptions& options() { return options_; }
   [[nodiscard]] Assembly& assembly() { return *assembly_; }
+  /// The present time step [s].
   [[nodiscard]] double time_step() const { return dt_; }
 
-  /// For archives: all that options, follow and intervention do not bring with them.
+  /// For archives: all state but options, Follow and intervention, which the caller sets again.
   template <class Archive>
   void Visit(Archive& archive) {
     archive(servo_, stiffness_.spring, stiffness_.dashpot, elastic_modulus_, viscosity_, modulus_,
@@ -145,8 +153,8 @@ class QuasiStatic {
   std::stop_token stop_;
   std::array<StressServo, 3> servo_;
   FastestRates stiffness_;                             ///< by the last inspection
-  std::array<double, 3> elastic_modulus_ = {0, 0, 0};  ///< the same [Pa]
-  std::array<double, 3> viscosity_ = {0, 0, 0};        ///< the same [Pa s]
+  std::array<double, 3> elastic_modulus_ = {0, 0, 0};  ///< by the last inspection [Pa]
+  std::array<double, 3> viscosity_ = {0, 0, 0};        ///< by the last inspection [Pa s]
   std::array<double, 3> modulus_ = {0, 0, 0};          ///< what servos see in steps of dt_ [Pa]
   double damping_ = 0;                                 ///< that dt_ was chosen for
   StrainingSpeed speed_;

@@ -17,11 +17,11 @@ namespace calib::dem {
 
 /// What contacts do to one of their bodies: springs, or dashpots per rate. SI units: [N/m], [N m/rad].
 struct alignas(64) OwnStiffness {
-  // When it moves and all others stay: along and about the axes x, y, z; the last of four is zero.
+  // When the body moves and all others stay: along and about the axes x, y, z; the fourth is zero.
   double translation[4];
   double rotation[4];
   double moment[4];  ///< part of `rotation` that moments of contacts do, not forces
-  // Its share when all move: matrices of order three, xx, yy, zz and xy, yz, zx.
+  // The body's share when all bodies move: matrices of order three, xx, yy, zz and xy, yz, zx.
   double shared[4];           ///< translation; and couple x
   double shared_off[4];       ///< translation; and couple y
   double shared_turn[4];      ///< rotation; and couple z
@@ -34,19 +34,21 @@ struct MemberStiffness {
   std::array<double, 3> arm;
 };
 
-/// An upper bound of the largest eigenvalue of M^-1 K of a sphere, by its shares [1/s^2] (of dashpots
-/// [1/s]). Couple: sum of the shares of c_s r n, n away from its centre. Inverse mass [1/kg], inverse
+/// An upper bound of the largest eigenvalue of M^-1 K of a sphere, by its shares [1/s^2] ([1/s]
+/// where k is of dashpots). Couple: sum of the shares of c_s r n, n away from its centre. Inverse mass [1/kg], inverse
 /// moment of inertia [1/(kg m^2)].
 double OwnRate(const OwnStiffness& k, double inverse_mass, double inverse_inertia);
 
-/// The same of a clump of spheres; inverse_inertia: of its smallest moment.
+/// An upper bound of the largest eigenvalue of M^-1 K of a clump of spheres, by the shares of its members
+/// [1/s^2] ([1/s] where they are of dashpots). inverse_mass [1/kg]; inverse_inertia: of the clump's smallest
+/// moment [1/(kg m^2)].
 double OwnRate(std::span<const MemberStiffness> members, double inverse_mass,
                double inverse_inertia);
 
 /// Rates of all bodies together, as bounds from above: the largest of OwnRate.
 struct FastestRates {
   double spring = 0;   ///< square of the angular frequency [1/s^2] >= 0
-  double dashpot = 0;  ///< [1/s] >= 0
+  double dashpot = 0;  ///< rate of what dashpots slow [1/s] >= 0
 };
 
 /// The step dt at which (1 + d)(spring dt^2 + 2 dashpot dt) = 4 [s]; infinite where nothing holds.

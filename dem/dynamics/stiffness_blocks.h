@@ -13,18 +13,19 @@
 
 namespace calib::dem {
 
-/// Of a chunk of pairs, at its places: what springs hold its grains by; of dashpots the same per rate.
+/// What the contacts of a chunk of pairs hold its grains by, one element per place of the chunk, springs and
+/// dashpots apart.
 struct ChunkStiffness {
   std::vector<OwnStiffness> spring;
-  std::vector<OwnStiffness> dashpot;            ///< empty where none acts
+  std::vector<OwnStiffness> dashpot;            ///< per rate; empty where no dashpot acts
   std::array<double, 3> modulus = {0, 0, 0};    ///< sum of stiffness times squared branch [N m]
-  std::array<double, 3> viscosity = {0, 0, 0};  ///< the same of dashpots [N m s]
-  double rolling = 0;                           ///< sum over contacts [N m/rad]
-  double twisting = 0;
+  std::array<double, 3> viscosity = {0, 0, 0};  ///< sum of damping times squared branch [N m s]
+  double rolling = 0;                           ///< sum of rolling stiffness over contacts [N m/rad]
+  double twisting = 0;                          ///< sum of twisting stiffness over contacts [N m/rad]
   int too_deep = -1;         ///< first slot that overlaps by more than half the smaller radius
-  double deepest_there = 0;  ///< its overlap [m]
+  double deepest_there = 0;  ///< overlap of slot too_deep [m]
 
-  /// As new, but with the memory it has.
+  /// Makes it as new, but keeps the memory of its vectors.
   void Clear() {
     std::vector<OwnStiffness> rows[2] = {std::move(spring), std::move(dashpot)};
     *this = {};
@@ -35,7 +36,8 @@ struct ChunkStiffness {
   }
 };
 
-/// Adds the lanes of block `b` that touch; the block's stiffnesses are set. places: of the chunk.
+/// Adds to `chunk` what the lanes that touch do, of `block`, which is block `b` of the lanes. places: number
+/// of places of the chunk. Precondition: the block's stiffnesses are set.
 void AddStiffness(const PairLanes& lanes, int b, const ContactBlock& block,
                   const std::uint8_t* touching, int places, ChunkStiffness& chunk);
 

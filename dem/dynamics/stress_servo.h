@@ -8,9 +8,10 @@ namespace calib::dem {
 /// removes the lag that a steadily straining specimen would otherwise have; it is overdamped down
 /// to a real stiffness of a fifth of K. What an axis needs while others are driven it no longer needs
 /// when they stop: the integral is to be forgotten then, or it drives the stress away from its target
-/// and unwinds only over hundreds of steps.
+/// and unwinds only over hundreds of steps. Not thread-safe.
 class StressServo {
  public:
+  /// What the servo sees of its axis.
   struct Reading {
     double error = 0;     ///< target - stress [Pa]
     double modulus = 0;   ///< affine stiffness of the axis [Pa]; 0: nothing touches yet
@@ -39,10 +40,12 @@ class StressServo {
     return rate;
   }
 
-  /// Nothing is driven any more.
+  /// Forgets the integral: what the axis needed while others were driven.
   void Forget() { integral_ = 0; }
 
  private:
+  /// Gains of the control [-]. Chosen: overdamped down to a real stiffness of a fifth of K, which
+  /// StressServo.* in tests/unit/dem/stress_servo_test.cc holds.
   static constexpr double kProportional = 0.3;
   static constexpr double kIntegral = 0.005;
   double integral_ = 0;  ///< compression rate that the axis needs in the long run [1/s]

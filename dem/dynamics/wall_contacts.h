@@ -18,10 +18,13 @@ namespace calib::dem {
 /// Walls and their contacts. A grain has one contact with a plane that it overlaps and one for each
 /// local minimum of the distance from its centre to a mesh: a face counts once, an edge or corner
 /// that triangles share counts once, and not where one of them is nearer elsewhere. A contact that
-/// rolls from one triangle to the next keeps what it remembers. Copyable, as Assembly.
+/// rolls from one triangle to the next keeps what it remembers. Copyable: a copy goes on to the same bits. Not
+/// thread-safe; Evaluate() uses threads inside.
 class WallContacts {
  public:
-  static constexpr int kMost = 8;  ///< contacts that one grain may have with walls
+  /// Contacts that one grain may have with walls [-]. Chosen: more than the faces that meet at a corner of a
+  /// box, or at a ridge in it.
+  static constexpr int kMost = 8;
 
   explicit WallContacts(std::vector<Wall> walls = {}) : walls_(std::move(walls)) {}
 
@@ -30,14 +33,14 @@ class WallContacts {
   /// Velocities, activity and friction may be set between steps; places change by Move() only.
   std::vector<Wall>& mutable_walls() { return walls_; }
 
-  /// Of all walls, an index in Materials; the model's own unless set.
+  /// Sets the material of all walls, an index in Materials; 0, the model's own, unless set.
   void SetMaterial(int material) { material_ = material; }
 
   /// Lists what each grain may touch until grains and walls have moved by `skin` together; what
   /// contacts remember goes along.
   void Search(const ParticleArrays& particles, double skin);
 
-  /// Moves the walls on.
+  /// Moves all walls on by dt [s].
   void Move(double dt);
 
   /// Largest displacement of any wall since the search [m].
@@ -65,7 +68,7 @@ class WallContacts {
   /// Force of the grains on a wall in the last Evaluate [N].
   [[nodiscard]] Vec3 ForceOn(int wall) const { return force_[static_cast<std::size_t>(wall)]; }
 
-  /// Contacts of the last Evaluate.
+  /// Number of contacts of the last Evaluate.
   [[nodiscard]] std::int64_t contacts() const { return contacts_; }
 
   /// Calls visit(block, grains) for blocks of the present contacts without moving them on: lane k
@@ -80,8 +83,7 @@ class WallContacts {
     archive(walls_, searched_, moved_, rows_, candidates_, slots_, force_, contacts_);
   }
 
-  /// Grain q leaves: to[q] is the new index of a grain, -1 of one that is taken out. The search has
-  /// to follow.
+  /// Gives grains new indices: grain q becomes to[q]; -1: it is taken out. To be followed by Search.
   void Renumber(const std::vector<int>& to);
 
  private:
@@ -121,7 +123,8 @@ class WallContacts {
                      int chunk, ChunkResult& result);
   void LoadLane(const ParticleArrays& p, const ContactModel& model, const Row& row,
                 const Contact& contact, ContactBlock& block) const;
-  /// pair: of materials, where the model has several.
+  /// tan(phi_w) of a contact with a wall [-]. pair: Materials::Pair() of grain and wall, where the model has
+  /// several materials.
   [[nodiscard]] double FrictionOf(int wall, const ContactModel& model, int pair) const;
   [[nodiscard]] int PairOf(const ParticleArrays& p, int grain, const ContactModel& model) const {
     return model.materials() == nullptr
@@ -137,8 +140,8 @@ class WallContacts {
   std::vector<Row> rows_;  ///< ascending by grain
   std::vector<Candidate> candidates_;
   std::vector<Contact> slots_;      ///< per candidate; the first `contacts` of each row are in use
-  std::vector<Row> old_rows_;       ///< of the search before; memory that none asks for anew
-  std::vector<Contact> old_slots_;  ///< the same
+  std::vector<Row> old_rows_;       ///< of the search before; its memory is used again
+  std::vector<Contact> old_slots_;  ///< of the search before; its memory is used again
   std::vector<ChunkResult> results_;
   std::vector<Vec3> force_;
   std::int64_t contacts_ = 0;

@@ -57,10 +57,8 @@ class NonlinearityKernel final : public ContactKernel {
   double reference_pressure_;   ///< [Pa]
 };
 
-double ExponentOf(const std::string& contact) { return contact == "linear" ? 1.0 : 1.5; }
-
 std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
-  const double base = ExponentOf(context.contact);
+  const double base = context.linear_springs ? 1.0 : 1.5;  // of the law itself
   std::vector<Exponent> laws;
   for (const double exponent : PairValues(context, "exponent")) {
     laws.push_back({.force = (exponent - base) / base,

@@ -8,8 +8,8 @@
 namespace calib::dem {
 
 /// A vessel open at the top, the bottom or both. A place lies within where lines from it along +x,
-/// -x, +y and -y all meet the mesh. Thread-safe; cost: one look at each triangle's box per
-/// question.
+/// -x, +y and -y all meet the mesh. Immutable; thread-safe. Cost: one look at each triangle's box
+/// per question.
 class MeshInterior {
  public:
   /// The mesh must outlive it. Precondition: MeshProblems() finds nothing.

@@ -14,11 +14,14 @@ namespace calib::dem {
 /// point. Precondition: MeshProblems() finds nothing.
 std::string FunnelProblem(const TriangleMesh& mesh);
 
-/// The same of a slide, a closed body or a sheet with one outline. Precondition as above.
+/// What is wrong with a mesh as a slide, in a sentence that goes on from its name; empty: nothing.
+/// A slide is a closed body, or a sheet whose edges of one triangle form one outline. Precondition:
+/// MeshProblems() finds nothing.
 std::string SlideProblem(const TriangleMesh& mesh);
 
-/// The same of a slide's outline in a slice of y in [-reach, reach] [m]: its sides lie outside, and
-/// two ends cross it, straight along y within 1e-3 of the slide's length. Precondition:
+/// What is wrong with a slide where grains slide on it, at y in [-reach, reach] [m], in a sentence
+/// that goes on from its name; empty: nothing. The sides of its outline have to lie outside this
+/// strip, and two ends cross it, straight along y within 1e-3 of the slide's length. Precondition:
 /// SlideProblem() finds nothing.
 std::string SlideProblemAcross(const TriangleMesh& mesh, double reach);
 

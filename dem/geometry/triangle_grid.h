@@ -8,7 +8,8 @@
 
 namespace calib::dem {
 
-/// A regular grid over a mesh as it lies now; a mesh that moves needs a new one.
+/// A regular grid over a mesh as it lies when the grid is made; a mesh that moves needs a new one.
+/// Immutable; thread-safe. It keeps no reference to the mesh.
 class TriangleGrid {
  public:
   /// range [m] > 0: the largest distance that will be asked for. A mesh without triangles has
@@ -20,7 +21,8 @@ class TriangleGrid {
   void Near(const Vec3& p, double distance, std::vector<int>& near) const;
 
  private:
-  static constexpr int kMostCells = 16;  ///< per axis: a grid must not cost more than it saves
+  static constexpr int kMostCells =
+      16;  ///< per axis [-]. Chosen: a grid must not cost more than it saves
 
   [[nodiscard]] std::array<int, 3> CellOf(const Vec3& p) const;
   [[nodiscard]] std::size_t Index(const std::array<int, 3>& cell) const;

@@ -5,6 +5,7 @@
 
 namespace calib::dem {
 
+/// A vector; the unit is that of what it stands for.
 struct Vec3 {
   double x = 0, y = 0, z = 0;
 };

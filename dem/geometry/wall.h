@@ -21,7 +21,7 @@ struct Wall {
   Vec3 angular_velocity;           ///< about `centre` [rad/s]
   Vec3 centre;                     ///< moves with the wall [m]
   Vec3 surface_velocity;           ///< of a conveyor: the surface runs, the wall stays [m/s]
-  std::optional<double> friction;  ///< tan(phi) against grains; unset: that of the model's walls
+  std::optional<double> friction;  ///< tan(phi) against grains; unset: the friction of the model's walls
 
   [[nodiscard]] bool IsPlane() const { return mesh.triangle.empty(); }
   [[nodiscard]] bool Moves() const {
@@ -45,9 +45,11 @@ struct Wall {
   void Move(double dt);
 };
 
-/// An infinite plane through `point`; normal of any length.
+/// A wall at rest that is an infinite plane through `point` [m]. normal: towards the grains, of any
+/// length > 0.
 Wall MakePlane(std::string name, const Vec3& point, const Vec3& normal);
 
+/// A wall at rest that is a mesh; its `centre` is the origin.
 Wall MakeMeshWall(std::string name, TriangleMesh mesh);
 
 }  // namespace calib::dem

@@ -50,10 +50,10 @@ StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
               .upper_radius = radius,
               .sides = kSides},
              side);
-  Assembly assembly = run.Make(grains, {.walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
-                                                  MakeMeshWall("cylinder", side)}});
+  Assembly assembly = run.MakeAssembly(grains, {.walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
+                                                          MakeMeshWall("cylinder", side)}});
   const double far = 100 * radius + 10 * top;
-  Flow flow = run.Drive(
+  Flow flow = run.MakeFlow(
       assembly, {.drop_height = top, .low = {-far, -far, -d}, .high = {far, far, top + far}});
   const double longest = 40 * std::sqrt(top / run.gravity());
   StageEnd end = flow.Settle(longest, GravityRun::kSettling);
@@ -71,7 +71,7 @@ StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
     assembly.SearchAgain();
     end = flow.Settle(longest, run.Setting("local_damping"));
   }
-  end = run.Close(end, flow, {}, absl::StrCat("repetition ", point.target));
+  end = run.AddToSummary(end, flow, {}, absl::StrCat("repetition ", point.target));
   if (end != StageEnd::kDone) {
     return end;
   }

@@ -42,8 +42,9 @@ Device Plan(const GravityRun& run) {
   const double length = run.SettingOr("slide_length", 16 * d);
   const double dx = length * Cosine(angle);
   const double dz = length * Sine(angle);
-  device.lower_z = run.SettingOr(
-      "slide_height", std::max(10 * d, std::sqrt(2 * run.solid() / (kPiled * device.depth))));
+  device.lower_z =
+      run.SettingOr("slide_height",
+                    std::max(10 * d, std::sqrt(2 * run.solid_volume() / (kPiled * device.depth))));
   device.upper_x = device.opening;
   device.upper_z = device.lower_z + dz;
   device.lower_x = device.upper_x - dx;
@@ -113,7 +114,7 @@ Masses Weigh(const ParticleArrays& p, int spheres, const Device& device) {
 double LongestFlow(const GravityRun& run, const Device& device) {
   const double width = 4.2 * run.mean_diameter();
   const double flow = kPiled * std::sqrt(run.gravity()) * width * std::sqrt(width) * device.depth;
-  return std::max(200 * run.fall_time(), 3 * run.solid() / flow);
+  return std::max(200 * run.fall_time(), 3 * run.solid_volume() / flow);
 }
 
 StageEnd Measure(GravityRun& run, const Device& device, const ControlPoint& point, Flow& flow) {
@@ -217,12 +218,12 @@ StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point
     AddPlate(here.upper_x, here.upper_z, here.lower_x, here.lower_z, device.depth, d, slide);
   }
   AddPlate(here.upper_x, here.upper_z, here.upper_x, device.outlet, device.depth, d, slide);
-  Assembly assembly = run.Make(
+  Assembly assembly = run.MakeAssembly(
       grains, {.open = {true, false, true},
                .walls = {MakePlane("floor", {0, 0, 0}, {0, 0, 1}),
                          MakePlane("corner", {0, 0, 0}, {1, 0, 0}), MakeMeshWall("hopper", hopper),
                          MakeMeshWall("slide", slide), MakeMeshWall("trapdoor", trapdoor)}});
-  Flow flow = run.Drive(
+  Flow flow = run.MakeFlow(
       assembly,
       {.drop_height = top, .low = {-d, -1e300, -d}, .high = {100 * width, 1e300, 2 * top}});
   StageEnd end = flow.Settle(40 * std::sqrt(top / run.gravity()), GravityRun::kSettling);
@@ -231,7 +232,7 @@ StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point
     assembly.SearchAgain();
     end = Measure(run, here, point, flow);
   }
-  return run.Close(end, flow, {}, absl::StrCat("repetition ", point.target));
+  return run.AddToSummary(end, flow, {}, absl::StrCat("repetition ", point.target));
 }
 
 StageEnd Walk(GravityRun& run) {

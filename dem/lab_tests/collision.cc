@@ -405,8 +405,8 @@ class CollisionRun {
            block_.mz[k];
   }
 
-  /// Of the stiffest oscillation of any lane, up to the overlap where the elastic force has taken up
-  /// the energy of the normal motion.
+  /// Of the stiffest oscillation of any lane, up to the overlap where the elastic force has taken
+  /// up the energy of the normal motion.
   struct Rates {
     double elastic = 0;  ///< w = sqrt(k/m) [1/s]
     double damped = 0;   ///< c/m + sqrt((c/m)^2 + w^2), what an explicit step has to follow [1/s]
@@ -467,9 +467,10 @@ class CollisionRun {
   std::int64_t steps_ = 0;
 };
 
-/// Runs every reading of the path as a collision of its own, up to 32 at a time as lanes of one block of contacts, with 5000
-/// steps in half a period of the contact at its largest overlap (the first order of the leapfrog's damping then stays below
-/// 1e-5 of restitution), in the order of the path.
+/// Runs every reading of the path as a collision of its own, up to 32 at a time as lanes of one
+/// block of contacts, with 5000 steps in half a period of the contact at its largest overlap (the
+/// first order of the leapfrog's damping then stays below 1e-5 of restitution), in the order of the
+/// path.
 absl::StatusOr<Summary> Collide(const TestRun& test) {
   const Scenario& scenario = test.scenario;
   const std::vector<Impact> impacts = ImpactsOf(scenario);
@@ -520,7 +521,7 @@ absl::StatusOr<Summary> Collide(const TestRun& test) {
                       "this model gives: its stiffness or damping is too large to be followed"));
         return summary;
       }
-      RETURN_IF_ERROR(test.record.Reach(state, nullptr));
+      RETURN_IF_ERROR(test.record.ReportLoadStep(state, nullptr));
     }
   }
   return summary;

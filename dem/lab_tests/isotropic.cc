@@ -24,7 +24,8 @@ TestEntry Isotropic() {
                    .observables = ElementObservables(),
                    .control = "mean_stress",
                    .may_reverse = true,
-                   .reference = "Cheng et al. 2018, sec. 2.2"},
+                   .reference = "Cheng et al. 2018, sec. 2.2",
+                   .stress_driven = true},
           .place = 10,
           .procedure = CellProcedure(&Plan)};
 }

@@ -59,7 +59,7 @@ StageEnd Turn(GravityRun& run, const Assembly& filled, const FlowOptions& option
   Assembly assembly = filled;
   const auto first = GravityRun::MarkOf(assembly);
   assembly.mutable_walls()[0].angular_velocity = {0, -speed, 0};
-  Flow flow = run.Drive(assembly, options);
+  Flow flow = run.MakeFlow(assembly, options);
   StageEnd end = flow.Advance(0.25 * 2 * std::numbers::pi / speed);
   const double stop = flow.time() + run.Setting("turns") * 2 * std::numbers::pi / speed;
   double sum = 0;
@@ -75,7 +75,7 @@ StageEnd Turn(GravityRun& run, const Assembly& filled, const FlowOptions& option
     squares += *slope * *slope;
     ++looks;
   }
-  end = run.Close(end, flow, first, absl::StrCat("rotation_speed ", speed, " rad/s"));
+  end = run.AddToSummary(end, flow, first, absl::StrCat("rotation_speed ", speed, " rad/s"));
   if (end != StageEnd::kDone) {
     return end;
   }
@@ -125,7 +125,7 @@ StageEnd Walk(GravityRun& run) {
                    side);
   Wall drum = MakeMeshWall("drum", side);
   drum.centre = axis;
-  Assembly assembly = run.Make(grains, {.open = {true, false, true}, .walls = {drum}});
+  Assembly assembly = run.MakeAssembly(grains, {.open = {true, false, true}, .walls = {drum}});
   const double far = 2 * radius + d;
   const FlowOptions options{
       .drop_height = 2 * radius, .low = {-d, -1e300, -d}, .high = {far, 1e300, far}};

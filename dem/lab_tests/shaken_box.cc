@@ -56,7 +56,7 @@ StageEnd Walk(GravityRun& run) {
   if (run.CountOf(grains) < run.radii().size()) {
     return run.Fail("box_width is too small: no grain fits into the box");
   }
-  run.Mix(grains);
+  run.MixMaterials(grains);
   if (const std::string made_of = run.MaterialOf("intruder");
       !made_of.empty() || !grains.material.empty()) {
     grains.material.resize(grains.x.size());
@@ -85,19 +85,19 @@ StageEnd Walk(GravityRun& run) {
   Wall box = MakeMeshWall("box", mesh);
   box.centre = {side + 0.5 * width, 0, 0.5 * top};
   const Vec3 rest = box.centre;
-  Assembly assembly =
-      run.Make(grains, {.walls = {box}, .planar = true, .thickness = run.Setting("thickness")});
+  Assembly assembly = run.MakeAssembly(
+      grains, {.walls = {box}, .planar = true, .thickness = run.Setting("thickness")});
   const double reach = 2 * top + shaking.az;
   const double fastest =
       shaking.w * (shaking.az + shaking.ax) + shaking.tilt * shaking.tilt_w * top;
-  Flow flow = run.Drive(assembly, {.drop_height = top + fastest * fastest / (2 * run.gravity()),
-                                   .low = {-reach, -reach, -reach},
-                                   .high = {side + width + reach, reach, 2 * reach}});
+  Flow flow = run.MakeFlow(assembly, {.drop_height = top + fastest * fastest / (2 * run.gravity()),
+                                      .low = {-reach, -reach, -reach},
+                                      .high = {side + width + reach, reach, 2 * reach}});
   StageEnd end = StageEnd::kDone;
   double begun = 0;
   if (run.resumed()) {
     std::string moving;
-    end = run.Recall(moving, begun, watch);
+    end = run.RestoreState(moving, begun, watch);
     if (auto s = end == StageEnd::kDone ? flow.Restore(moving) : absl::OkStatus(); !s.ok()) {
       end = run.Abandon(std::move(s));
     }
@@ -145,7 +145,7 @@ StageEnd Walk(GravityRun& run) {
     return std::move(archive.bytes());
   };
   end = end == StageEnd::kDone ? run.Walk(shake, state) : end;
-  return run.Close(end, flow, {}, "shaking");
+  return run.AddToSummary(end, flow, {}, "shaking");
 }
 
 }  // namespace

@@ -139,7 +139,7 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
   const auto first = GravityRun::MarkOf(assembly);
   assembly.mutable_walls()[0] = FloorWithOutlet(silo, opening, run.largest_diameter());
   assembly.SearchAgain();
-  Flow flow = run.Drive(assembly, options);
+  Flow flow = run.MakeFlow(assembly, options);
   flow.SetDrain(-2 * run.largest_diameter());
   bool jammed = false;
   flow.SetBeforeStep([&](double, double) {  // forces follow for the grains as they then are
@@ -174,7 +174,7 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
     jammed = true;
     since = flow.time();
   }
-  end = run.Close(end, flow, first, absl::StrCat("opening ", opening, " m"));
+  end = run.AddToSummary(end, flow, first, absl::StrCat("opening ", opening, " m"));
   if (end != StageEnd::kDone) {
     return end;
   }
@@ -255,7 +255,7 @@ StageEnd Walk(GravityRun& run) {
                side);
     walls.walls.push_back(MakeMeshWall("cylinder", side));
   }
-  Assembly assembly = run.Make(grains, std::move(walls));
+  Assembly assembly = run.MakeAssembly(grains, std::move(walls));
   const double far = silo.width + top;
   const FlowOptions options{
       .drop_height = top, .low = {-far, -far, -far}, .high = {2 * far, 2 * far, 3 * far}};

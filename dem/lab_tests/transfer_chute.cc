@@ -231,16 +231,16 @@ StageEnd Convey(GravityRun& run, const ControlPoint& point) {
   patterns.length[0] = (kBeltLength + 2 * kPlate) * d;
   patterns.length[1] = kWidth * d;
   patterns.length[2] = chute.belt_z + 5 * d;
-  Assembly assembly = run.Make(patterns, {.walls = chute.walls});
+  Assembly assembly = run.MakeAssembly(patterns, {.walls = chute.walls});
   std::vector<int> all(patterns.x.size());
   std::iota(all.begin(), all.end(), 0);
   assembly.Remove(all);
   Feed feed(run, chute, speed, rate);
   feed.Act(0, assembly);
   const double fall = chute.belt_z + speed * speed / (2 * run.gravity());
-  Flow flow = run.Drive(assembly, {.drop_height = fall,
-                                   .low = {-kWidth * d, -kWidth * d, -10 * d},
-                                   .high = {2 * kWidth * d, 2 * kWidth * d, 10 * fall}});
+  Flow flow = run.MakeFlow(assembly, {.drop_height = fall,
+                                      .low = {-kWidth * d, -kWidth * d, -10 * d},
+                                      .high = {2 * kWidth * d, 2 * kWidth * d, 10 * fall}});
   flow.SetDrain(-d);
   bool met = false;  // whether any grain has touched the funnel
   flow.SetBeforeStep([&](double time, double) {
@@ -261,7 +261,7 @@ StageEnd Convey(GravityRun& run, const ControlPoint& point) {
       break;  // what is left stays
     }
   }
-  end = run.Close(end, flow, {}, absl::StrCat("belt_speed ", speed, " m/s"));
+  end = run.AddToSummary(end, flow, {}, absl::StrCat("belt_speed ", speed, " m/s"));
   if (end != StageEnd::kDone) {
     return end;
   }

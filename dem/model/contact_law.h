@@ -10,20 +10,24 @@
 
 namespace calib::dem {
 
+/// Catalogue entry of a contact law.
 struct ContactInfo {
-  std::string name;
+  std::string name;  ///< as users write it, "hertz_mindlin"
   std::string description;
-  std::vector<ParameterInfo> parameters;
-  std::string reference;
+  std::vector<ParameterInfo> parameters;  ///< all of the law, with SI units and ranges
+  std::string reference;                  ///< paper and equations
+  bool linear_springs = false;  ///< the elastic normal force grows in proportion to the overlap, as
+                                ///< of a linear spring
 };
 
-/// A contact law; its kernel runs at ContactStage::kNormal, friction and shear spring follow for
-/// every law. A dashpot, where there is one, runs at the end of kNormalExtra.
+/// A contact law as the registry holds it: catalogue entry and kernels. The kernel of `make` runs
+/// at ContactStage::kNormal; Coulomb's limit and the shear spring, which are no part of a law,
+/// follow it.
 struct ContactEntry {
   ContactInfo info;
-  int place = 1000;  ///< laws are listed in this order, then by name
-  MakeKernel make = nullptr;
-  MakeKernel make_dashpot = nullptr;
+  int place = 1000;                   ///< laws are listed in this order, then by name
+  MakeKernel make = nullptr;          ///< sets normal force and stiffnesses; never null in a list
+  MakeKernel make_dashpot = nullptr;  ///< runs last in kNormalExtra; null: the law has no dashpot
 };
 
 }  // namespace calib::dem

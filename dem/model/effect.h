@@ -1,5 +1,6 @@
 #pragma once
-// A physical effect as data: its catalogue entry, the ways to turn it up from nothing, and what it sets where it acts.
+// A physical effect as data: its catalogue entry, the ways to turn it up from nothing, and what it
+// sets where it acts.
 
 #include <array>
 #include <map>
@@ -28,6 +29,7 @@ struct StrengthRay {
   double order = 1;
 };
 
+/// Catalogue entry of an effect.
 struct EffectInfo {
   std::string name;
   std::string kind;  ///< "contact" | "particle" | "initial_state" | "boundary" | "measurement"
@@ -35,7 +37,7 @@ struct EffectInfo {
       description;  ///< formula, sign (one- or two-sided) and the value at which it vanishes
   std::vector<std::string> contacts;  ///< contact laws it can join; empty: all
   std::vector<ParameterInfo> parameters;
-  std::string reference;
+  std::string reference;               ///< paper and equations
   bool two_sided = false;              ///< parameters of the rays may leave their null either way
   std::vector<StrengthRay> rays = {};  ///< 1 .. 3, for paired runs with and without the effect
   std::vector<std::string> excited_by = {};  ///< tests whose curves it can change; empty: all
@@ -53,23 +55,23 @@ struct EffectInfo {
   std::optional<std::string> one_material = {};
 };
 
-/// One of them says that it excludes the other.
+/// Whether `a` names `b` among its `excludes` or `b` names `a`: the two may not act together.
 bool Exclude(const EffectInfo& a, const EffectInfo& b);
 
-/// Dotted parameters and their SI values that turn `effect` on at a distance `step` (in units of
-/// scale) from the null of a ray; step 0: the model without the effect, bit for bit. Add the
+/// Parameters by dotted name, with SI values, that turn `effect` on at a distance `step` (in units
+/// of scale) from the null of a ray; step 0: the model without the effect, bit for bit. Add the
 /// effect's name to Model::effects and these to Model::parameters. Parameters at their default are
-/// left out. The value may leave [min, max] for steps other than the ray's own: see
-/// RayAdmits().
+/// left out. The value may leave [min, max] for steps other than the ray's own; RayAdmits() tells.
 std::map<std::string, double> ParametersOnRay(const EffectInfo& effect, const StrengthRay& ray,
                                               double step, const std::string& contact,
                                               const ReferenceState& state);
 
-/// Whether the ray's parameter is in its admissible range at that step.
+/// Whether the value that ParametersOnRay() gives to the ray's parameter at distance `step` (in
+/// units of its scale) from its null lies in the parameter's admissible range.
 bool RayAdmits(const EffectInfo& effect, const StrengthRay& ray, double step,
                const std::string& contact, const ReferenceState& state);
 
-/// Order in which a block passes the kernels of a model.
+/// The stages through which a block of contacts passes the kernels of a model, in this order.
 enum class ContactStage {
   kNormal,        ///< sets normal_force, normal_stiffness, tangential_stiffness
   kNormalExtra,   ///< adds to the normal force (adhesion, viscosity, plasticity)
@@ -81,6 +83,7 @@ enum class ContactStage {
 
 class ContactKernel;   // contact/contact_kernel.h
 struct KernelContext;  // contact/contact_kernel.h
+/// Makes one kernel from the parameters in `context`; never null.
 using MakeKernel = std::unique_ptr<ContactKernel> (*)(const KernelContext& context);
 
 /// One kernel of an effect and where in the chain it acts.
@@ -94,11 +97,10 @@ struct Preparation {
   double densification = 0;      ///< fall of porosity [-]
   double stress_anisotropy = 0;  ///< q/p during consolidation [-]
   double aspect = 1;             ///< length over width of the grains; 1: as they are [-]
-  // The law by which grains crush: CrushingLaw in dynamics/crushing.h.
-  double weakness = 0;               ///< [1/Pa]
-  double weibull_modulus = 3;        ///< [-]
-  double reference_diameter = 1e-3;  ///< [m]
-  double size_loss = 0;              ///< [-]
+  double weakness = 0;  ///< CrushingLaw::weakness (dynamics/crushing.h) [1/Pa]; 0: none crush
+  double weibull_modulus = 3;        ///< CrushingLaw::weibull_modulus [-] > 0
+  double reference_diameter = 1e-3;  ///< CrushingLaw::reference_diameter [m] > 0
+  double size_loss = 0;              ///< CrushingLaw::size_loss [-], 0 .. 1
 };
 
 /// What distinguishes contacts with walls from those between grains.
@@ -107,17 +109,21 @@ struct WallProperties {
   std::optional<double> friction;  ///< tan(phi_w) itself, in place of the ratio [-]
 };
 
-/// An effect acts between grains, at walls, on the readings, or on the initial state: it sets what
-/// it needs.
+/// An effect as the registry holds it: catalogue entry and what it does. It acts between grains
+/// (kernels), at walls (bound), on the readings (alter) or on the initial state (prepare), and sets
+/// the members for that; the others stay empty.
 struct EffectEntry {
   EffectInfo info;
   int place = 1000;  ///< effects of one stage act, and all are listed, in this order, then by name
-  /// Whether it can change the curves of a test, by the test's traits; null: of every test. The registry writes the names of
-  /// these tests into info.excited_by.
+  /// Whether the effect can change the curves of a test, by the test's traits; null: of every test.
+  /// The registry writes the names of those tests into info.excited_by.
   bool (*shows_in)(const TestInfo& test) = nullptr;
-  std::vector<EffectKernel> kernels = {};
+  std::vector<EffectKernel> kernels = {};  ///< of effects at contacts
+  /// Sets the apparatus through which readings are taken.
   void (*alter)(const ParameterSet& parameters, Apparatus& apparatus) = nullptr;
+  /// Sets how the specimen is prepared.
   void (*prepare)(const ParameterSet& parameters, Preparation& preparation) = nullptr;
+  /// Sets what holds at walls.
   void (*bound)(const ParameterSet& parameters, WallProperties& walls) = nullptr;
 };
 

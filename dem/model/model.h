@@ -1,5 +1,6 @@
 #pragma once
-// Contact law, effects, materials and the values of their parameters: what all experiments of a campaign share.
+// Contact law, effects, materials and the values of their parameters: what all experiments of a
+// campaign share.
 
 #include <map>
 #include <string>
@@ -21,16 +22,18 @@ struct Model {
                                              ///< their values are parameters (contact/materials.h)
 };
 
-/// The model's own material, of everything that nobody says otherwise of.
+/// Name of the model's own material: whatever is not said to be of another material is of this one.
 inline constexpr const char* kOwnMaterial = "grains";
 
-/// Materials that a model may have besides its own.
+/// Materials that a model may have besides its own [-]. Chosen: the table of pairs stays small, and
+/// an index fits the byte that ParticleArrays::material has for it.
 inline constexpr int kMostMaterials = 16;
 
-/// The model's own material first, then its others in their order.
+/// Names of all materials of the model: kOwnMaterial, then Model::materials in their order.
 std::vector<std::string> MaterialNames(const Model& model);
 
-/// Whether a name is "A-B" of two materials of the model, or "A-A" of one that is not its own.
+/// Whether a name is "A-B", A and B two materials of the model, or "A-A", A a material of the model
+/// other than kOwnMaterial.
 bool IsMaterialPair(const Model& model, const std::string& name);
 
 }  // namespace calib::dem

@@ -1,5 +1,5 @@
 #pragma once
-// What the names of a model stand for.
+// What the names of a model (contact law, effects) stand for: entries of the registry.
 
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace calib::dem {
 
-/// Entries of the registry, which live as long as the program.
+/// Entries of the contact law and the effects that a model names. They live as long as the program.
 struct ModelEntries {
   const ContactEntry* law = nullptr;
   std::vector<const EffectEntry*> effects =

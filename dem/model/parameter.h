@@ -1,6 +1,6 @@
 #pragma once
-// One scalar parameter of a contact law, an effect or a lab test: unit, admissible range, default prior, and the
-// scale at which an effect's parameter begins to matter.
+// One scalar parameter of a contact law, an effect or a lab test: unit, admissible range, default
+// prior, and the scale at which an effect's parameter begins to matter.
 
 #include <map>
 #include <optional>
@@ -16,8 +16,8 @@ struct DefaultPrior {
   double max = 0;
 };
 
-/// What makes strengths of effects comparable between grain sizes and stresses; one for a whole
-/// campaign, since some effects have parameters that must not differ between experiments.
+/// State by which strengths of effects become comparable between grain sizes and stresses. One for
+/// a whole campaign, since some effects have parameters that must not differ between experiments.
 struct ReferenceState {
   double pressure = 0;  ///< p, at which the test starts [Pa] > 0
   double diameter = 0;  ///< d, mean of the grains [m] > 0
@@ -51,27 +51,29 @@ struct ParameterInfo {
                                ///< <-> friction_coefficient)
   std::string description;
 
-  // Of an effect's parameters only.
+  // What follows is set for parameters of effects only.
   std::optional<double> null_value;  ///< the effect vanishes when this parameter alone has this
                                      ///< value; empty: it shapes the effect but cannot remove it
   std::map<std::string, double> null_by_contact;  ///< where the null depends on the contact law
-  ReferenceScale scale;                           ///< see ScaleOf()
-  std::map<std::string, ReferenceScale> scale_by_contact;  ///< where it depends on the contact law
+  ReferenceScale scale;                           ///< value at which it begins to matter: ScaleOf()
+  std::map<std::string, ReferenceScale> scale_by_contact;  ///< where the scale depends on the law
   std::optional<DefaultPrior> scaled_prior;  ///< of value / scale, 0.01 .. 10 and wider; PriorOf()
   bool of_pairs = false;  ///< pairs of materials may have values of their own, A-B.EFFECT.NAME
 };
 
-/// Unit of a parameter under a contact law.
+/// SI unit of a parameter under a contact law (a name of Contacts()).
 const std::string& UnitFor(const ParameterInfo& parameter, const std::string& contact);
 
 /// Reference scale of an effect's parameter under a contact law, in the parameter's SI unit.
 double ScaleOf(const ParameterInfo& parameter, const std::string& contact,
                const ReferenceState& state);
 
-/// Null value under a contact law; empty when the parameter has none.
+/// Value at which the parameter switches its effect off under a contact law [the parameter's SI
+/// unit]; empty when it cannot.
 std::optional<double> NullValueOf(const ParameterInfo& parameter, const std::string& contact);
 
-/// scaled_prior times ScaleOf() where there is one, default_prior otherwise, cut to [min, max]; SI.
+/// Prior to offer for a parameter, in SI: scaled_prior times ScaleOf() where there is one,
+/// otherwise default_prior, cut to [min, max].
 DefaultPrior PriorOf(const ParameterInfo& parameter, const std::string& contact,
                      const ReferenceState& state);
 

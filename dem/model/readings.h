@@ -20,7 +20,7 @@ struct Measurement {
   double porosity = 0, void_ratio = 0, coordination_number = 0;
 };
 
-/// One observable that every specimen in a cell has.
+/// One observable that every specimen in a periodic cell has, and the member that holds its value.
 struct ReadingEntry {
   ObservableInfo info;
   double Measurement::*member = nullptr;
@@ -30,15 +30,16 @@ struct ReadingEntry {
 /// All members of Measurement, in their order.
 std::span<const ReadingEntry> Readings();
 
-/// The measurement as the laboratory reads it through an apparatus that loads the specimen with x
-/// [Pa]; `by_axial` where volume follows from the axial strain. Readings derived from others
-/// follow.
+/// The measurement `m` as the laboratory reads it through an apparatus that loads the specimen with
+/// x [Pa] (model/rig.h). by_axial: the laboratory takes the volume from the axial strain. Readings
+/// that are derived from others are renewed. Pure; never fails.
 Measurement ReadThrough(const Apparatus& apparatus, double x, bool by_axial, Measurement m);
 
-/// A member of Measurement by the name of its observable, or null.
+/// The member of Measurement that holds the observable of this name, or null where there is none.
 double Measurement::*MemberNamed(const std::string& name);
 
-/// Renews what follows from the axial and lateral stress, the shear stress and the porosity.
+/// Renews the members that follow from the axial, lateral and shear stress and from the porosity:
+/// mean and deviatoric stress, the ratios, the void ratio.
 void DeriveReadings(Measurement& measurement);
 
 }  // namespace calib::dem

@@ -13,20 +13,21 @@
 
 namespace calib::dem {
 
-/// Who is not of the model's own material. Grains of a packing may say so themselves.
+/// What is not of the model's own material. Grains of a packing may also name theirs themselves
+/// (Packing::material).
 struct MaterialUse {
   std::map<std::string, std::string> bodies{};  ///< by name: `walls` of tests under gravity (all of
                                                 ///< them), `intruder` of shaken_box, `partner` of
                                                 ///< collision, its wall included
   std::map<std::string, double> grains{};       ///< share of the number of grains, (0, 1] in all
-  std::uint64_t seed = 0;                       ///< of the draw of `grains`, that of the specimen
+  std::uint64_t seed = 0;  ///< of the draw of `grains`: the seed of the specimen
 };
 
 /// Friction during consolidation, restored before loading. At most one is set; none: the model's
 /// own friction.
 struct Consolidation {
-  std::optional<double> friction_coefficient;
-  std::optional<double> porosity;  ///< friction is lowered until it holds
+  std::optional<double> friction_coefficient;  ///< tan(phi) [-] >= 0
+  std::optional<double> porosity;  ///< friction is lowered until the specimen has this porosity [-]
 };
 
 /// Principal stresses that replace the isotropic start [Pa].
@@ -59,6 +60,7 @@ struct ControlPoint {
   int load_step = -1;  ///< index of the state reported here; -1: a turning point without a reading
 };
 
+/// One model evaluation. The same scenario gives the same bits for any number of threads.
 struct Scenario {
   Model model;
   std::string test;  ///< a name of Tests()
@@ -73,7 +75,7 @@ struct Scenario {
   std::optional<double> loading_rate;  ///< [1/s]: real-rate loading instead of staged quasi-static
   Staging staging;
   std::vector<ControlPoint> path;
-  int threads = 1;
+  int threads = 1;         ///< >= 1; changes no result
   std::uint64_t seed = 0;  ///< for effects that draw random numbers
 };
 

@@ -5,8 +5,9 @@
 
 namespace calib::dem {
 
-/// Staging with every field set: the scenario's, or the engine's choice for a packing of this mean
-/// diameter [m] > 0. Precondition: the test is one in the periodic cell, with a confining_pressure.
+/// Staging with every field set: what the scenario sets, and the engine's choice, for a packing of
+/// this mean diameter [m] > 0, of what it leaves open. Pure. Precondition: the test is in the
+/// periodic cell and has a setting confining_pressure.
 Staging ResolveStaging(const Scenario& scenario, double mean_diameter);
 
 }  // namespace calib::dem

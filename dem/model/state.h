@@ -17,6 +17,7 @@ struct State {
   std::vector<double> values;
 };
 
+/// How a run ended.
 enum class Outcome {
   kCompleted,  ///< every point of the path was reached
   kStopped,    ///< the stop token was set
@@ -24,6 +25,7 @@ enum class Outcome {
                ///< where and when
 };
 
+/// What a run tells of itself at its end.
 struct Summary {
   Outcome outcome = Outcome::kCompleted;
   std::string reason;                ///< empty when completed
@@ -33,10 +35,11 @@ struct Summary {
   Staging staging;                   ///< as used, every field set
 };
 
+/// Takes the state of each load step as soon as it is reached, from the thread that runs.
 using StateSink = std::function<void(const State&)>;
 
-/// Bytes from which a run goes on, after a point of its path; they replace those of before. An
-/// error ends the run with that error.
+/// Takes the bytes from which a run can go on after a point of its path; they replace those that
+/// the sink was given before. An error ends the run with that error.
 using CheckpointSink = std::function<absl::Status(const std::string& checkpoint)>;
 
 }  // namespace calib::dem

@@ -14,12 +14,15 @@ namespace calib::dem {
 
 struct TestRun;  // lab_tests/shared/test_run.h
 
+/// A lab test as the registry holds it: catalogue entry, procedure, checks.
 struct TestEntry {
   TestInfo info;
   int place = 1000;  ///< tests are listed in this order, then by name
-  /// Walks the scenario of the run, whose ScenarioProblems() are none. Errors as Simulate().
+  /// Runs the scenario of the run and reports its load steps. Errors: those of Simulate().
+  /// Precondition: ScenarioProblems() finds nothing.
   std::function<absl::StatusOr<Summary>(const TestRun& run)> procedure;
-  /// What is wrong with a scenario of this test beyond ranges of settings and control, a sentence each; null: nothing.
+  /// What is wrong with a scenario of this test beyond ranges of settings and control, a sentence
+  /// each; null: nothing can be.
   std::vector<std::string> (*problems)(const Scenario& scenario) = nullptr;
 };
 

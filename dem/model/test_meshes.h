@@ -1,5 +1,5 @@
 #pragma once
-// Meshes of the user's in place of pieces of a test's boundary.
+// Meshes that users put in place of pieces of a test's boundary.
 
 #include <string>
 #include <vector>
@@ -15,9 +15,10 @@ namespace calib::dem {
 void CheckMeshes(const Scenario& scenario, const TestInfo& test,
                  std::vector<std::string>& problems);
 
-/// Why meshes do not go with grains of this size, in a sentence; empty: they do. A mesh is at least
-/// one, at most ten thousand largest diameters long: beyond that its unit is another one. A silo
-/// stands on the floor, z = 0, within a largest diameter.
+/// Why the scenario's meshes do not go with grains whose largest diameter is this [m] > 0, in a
+/// sentence; empty: they do. A mesh is at least one, at most ten thousand largest diameters long:
+/// beyond that it is taken to be in another unit of length. A silo stands on the floor, z = 0,
+/// within a largest diameter.
 std::string MeshSizeProblem(const Scenario& scenario, double largest_diameter);
 
 }  // namespace calib::dem

@@ -1,5 +1,6 @@
 #pragma once
-// An effect that a user writes as a formula in the campaign file, as data; formula/ says what it may speak of and runs it.
+// An effect that a user writes as a formula in the campaign file, as data; dem/formula says what it
+// may speak of and runs it.
 
 #include <string>
 
@@ -16,9 +17,9 @@ enum class FormulaAction {
 /// A user's effect. info.kind says where it acts: "contact" between grains and at walls,
 /// "measurement" on the readings.
 struct UserEffect {
-  EffectInfo info;  ///< one-sided or not, parameters, rays, ... as of those of the build
+  EffectInfo info;  ///< name, parameters, rays, ... in the words of the effects of the build
   FormulaAction action = FormulaAction::kAdds;
-  std::string target;   ///< of ContactTargets() or ReadingTargets()
+  std::string target;   ///< a name of ContactTargets() or ReadingTargets()
   std::string formula;  ///< over the quantities of its kind and the effect's own parameters
 };
 

@@ -17,6 +17,7 @@ struct GridRun {
   int largest = -1;  ///< index of a grain among them; -1: there is none
 };
 
+/// Which grains lie in which cell of the grid. Reading is thread-safe, Sort() is not.
 class CellGrid {
  public:
   CellGrid() = default;
@@ -29,9 +30,12 @@ class CellGrid {
   /// its tilt and are longer. Memory of an earlier sorting is used again.
   void Sort(const PeriodicCell& cell, const ParticleArrays& particles, double range);
 
-  /// Grains of one grid cell in ascending order: grains()[begin(c)] .. grains()[begin(c + 1) - 1].
+  /// Where the grains of a grid cell begin: those of cell c are grains()[begin(c)] ..
+  /// grains()[begin(c + 1) - 1], in ascending order.
   [[nodiscard]] int begin(int cell) const { return begin_[static_cast<std::size_t>(cell)]; }
+  /// Indices of all grains, cell after cell.
   [[nodiscard]] const std::vector<int>& grains() const { return grains_; }
+  /// Grid cell of a grain.
   [[nodiscard]] int cell_of(int grain) const { return cell_of_[static_cast<std::size_t>(grain)]; }
 
   /// The grains of up to 27 cells around and including `cell`, as runs. With fewer than three cells

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 
 namespace calib::dem {
 namespace {
@@ -48,9 +49,10 @@ constexpr std::uint64_t kImageMask = (std::uint64_t{1} << kImageBits) - 1;
 
 /// Appends those grains of a run that are listed with `self`: written always, counted where near,
 /// since which they are cannot be foreseen.
-NeighborSearch::Neighbor* NeighborSearch::KeepNear(const GridGrain& self, double skin,
-                                                   const double (&shift)[3], int code,
-                                                   std::span<const GridGrain> run, Neighbor* end) {
+NeighborSearch::Neighbor* NeighborSearch::AppendNear(const GridGrain& self, double skin,
+                                                     const double (&shift)[3], int code,
+                                                     std::span<const GridGrain> run,
+                                                     Neighbor* end) {
   const double sx = shift[0] - self.x;
   const double sy = shift[1] - self.y;
   const double sz = shift[2] - self.z;
@@ -69,9 +71,7 @@ NeighborSearch::Neighbor* NeighborSearch::KeepNear(const GridGrain& self, double
 
 absl::Status NeighborSearch::Build(const PeriodicCell& cell, double skin, ParticleArrays& p,
                                    NeighborList& list) {
-  if (auto s = WrapAll(cell, p); !s.ok()) {
-    return s;
-  }
+  RETURN_IF_ERROR(WrapAll(cell, p));
   const double largest = *std::max_element(p.radius.begin(), p.radius.end());
   const double range = 2 * largest + skin;
   for (int a = 0; a < 3; ++a) {
@@ -115,10 +115,10 @@ absl::Status NeighborSearch::Build(const PeriodicCell& cell, double skin, Partic
           found_.resize(2 * room);
           end = found_.data() + size;
         }
-        end = KeepNear(self, skin, shift, code,
-                       {&grains_[static_cast<std::size_t>(run.begin)],
-                        static_cast<std::size_t>(run.end - run.begin)},
-                       end);
+        end = AppendNear(self, skin, shift, code,
+                         {&grains_[static_cast<std::size_t>(run.begin)],
+                          static_cast<std::size_t>(run.end - run.begin)},
+                         end);
       }
     }
     std::sort(found_.data(), end);

@@ -24,7 +24,7 @@ struct NeighborList {
 };
 
 /// Finds lists of neighbours. Keeps the memory of a search for the next one, so that flows, which
-/// search every few dozen steps, ask for none.
+/// search every few dozen steps, ask for none. Not thread-safe.
 class NeighborSearch {
  public:
   /// Wraps all centres into the cell along its periodic axes (its tilt at most half of Lx) and
@@ -43,8 +43,9 @@ class NeighborSearch {
   /// Grain j and the image it is seen in, in one number that sorts by j.
   using Neighbor = std::uint64_t;
 
-  static Neighbor* KeepNear(const GridGrain& self, double skin, const double (&shift)[3], int code,
-                            std::span<const GridGrain> run, Neighbor* end);
+  /// Writes the grains of `run` that are near `self` to `end` and on; returns the new end.
+  static Neighbor* AppendNear(const GridGrain& self, double skin, const double (&shift)[3],
+                              int code, std::span<const GridGrain> run, Neighbor* end);
 
   CellGrid grid_;
   std::vector<GridGrain> grains_;

@@ -7,10 +7,12 @@
 
 namespace calib::dem {
 
+/// How far grains of a packing lie within each other.
 struct PackingOverlap {
   int first = 0, second = 0;  ///< the pair that overlaps most in smaller radii, first < second
   double overlap = 0;         ///< [m]
-  int pairs = 0;              ///< that overlap by more than half the smaller radius, this one too
+  int pairs = 0;              ///< number of pairs that overlap by more than half the smaller
+                              ///< radius, this pair included
 };
 
 /// Pairs of grains, not of one clump, that overlap by more than half the smaller radius, from which

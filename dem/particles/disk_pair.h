@@ -5,6 +5,7 @@
 
 namespace calib::dem {
 
+/// Moments of a flat plate.
 struct PlateMoments {
   double area = 0;   ///< [m^2]
   double polar = 0;  ///< second moment about the normal through the middle [m^4]
@@ -14,8 +15,8 @@ struct PlateMoments {
 /// the middle; exact while they overlap or just touch (offset <= radius).
 PlateMoments MomentsOfDiskPair(double radius, double offset);
 
-/// Two equal disks along z whose union has the area of a disk of radius 1; length over width `aspect`
-/// in (1, 2].
+/// Two equal disks along z whose union has the area of a disk of radius 1; length over width
+/// `aspect` in (1, 2].
 ClumpTemplate DiskPairTemplate(double aspect);
 
 }  // namespace calib::dem

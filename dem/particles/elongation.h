@@ -11,7 +11,8 @@ struct Dumbbell {
   double offset = 0;  ///< of each centre from the middle [-]
 };
 
-/// Length over width `aspect` = 1 + offset/radius, in [1, 2]; 2: the spheres just touch.
+/// The dumbbell whose length over width is `aspect` = 1 + offset/radius, in [1, 2]; at 2 the
+/// spheres just touch.
 ///   4/3 pi = 8/3 pi r^3 - pi/12 (4 r + 2 c)(2 r - 2 c)^2  with c = (aspect - 1) r
 Dumbbell DumbbellOf(double aspect);
 

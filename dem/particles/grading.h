@@ -5,17 +5,19 @@
 
 namespace calib::dem {
 
+/// One point of a grading curve.
 struct GradingPoint {
   double radius = 0;  ///< [m] > 0
   double finer = 0;   ///< share of the mass in grains of smaller radius, 0 .. 1
 };
 
-/// Between two points the mass is spread evenly over ln r, as a straight line of the usual
-/// semi-logarithmic plot says. Radii increase, shares do not fall, from 0 at the first point to 1 at
-/// the last.
+/// A grading curve. Between two points the mass is spread evenly over ln r, as a straight line of
+/// the usual semi-logarithmic plot says. Radii increase, shares do not fall, from 0 at the first
+/// point to 1 at the last.
 using Grading = std::vector<GradingPoint>;
 
-/// Whether it is one: at least two points, as said.
+/// Whether the points are a grading curve: at least two, radii increasing, shares not falling, from
+/// 0 at the first point to 1 at the last.
 bool IsGrading(const Grading& curve);
 
 /// Radii [m] of `particles` (>= 1) grains that follow the curve, largest first. Grains are many
@@ -25,7 +27,8 @@ bool IsGrading(const Grading& curve);
 /// less than the mass of one grain off. No draw is random. Precondition: IsGrading.
 std::vector<double> GradedRadii(const Grading& curve, int particles);
 
-/// Share of the mass in the largest of grains: by how much at most GradedRadii leaves its curve.
+/// Share of the mass of all grains that is in the largest of them [-]: what GradedRadii() misses
+/// its curve by at most. radii: all grains, [m] > 0, at least one.
 double LargestShare(const std::vector<double>& radii);
 
 /// The curve of sizes whose logarithm is normal by mass: half of the mass is finer than `median`

@@ -9,9 +9,9 @@
 
 namespace calib::dem {
 
-/// Gives each material its share of the number of grains, rounded, drawn among them; the others are
-/// of the model's own. The same seed and number of grains give the same draw. Preconditions: shares
-/// are positive and at most 1 in all.
+/// Gives each material its share of the number of grains, rounded, drawn among them; the other
+/// grains are of the model's own material. The same seed and number of grains give the same draw.
+/// Preconditions: shares are positive and at most 1 in all.
 void DrawMaterials(const std::map<std::string, double>& shares, std::uint64_t seed,
                    Packing& packing);
 

@@ -10,12 +10,13 @@
 
 namespace calib::dem {
 
+/// Grains of one specimen; arrays have one element per sphere.
 struct Packing {
   double length[3] = {0, 0, 0};         ///< periodic cell [m], axial direction last (z)
   std::vector<double> x, y, z, radius;  ///< [m], size N each
   std::vector<int> clump;               ///< -1: single sphere; equal ids move as one rigid body
-  std::vector<std::string> material{};  ///< of each grain, "" or `grains`: the model's own; empty:
-                                        ///< of all grains
+  std::vector<std::string> material{};  ///< of each grain, "" or `grains`: the model's own; no
+                                        ///< elements: all grains are of the model's own
 };
 
 /// One thing wrong in a text file. line is 1-based; 0: the file as a whole.
@@ -25,17 +26,18 @@ struct PackingProblem {
 };
 
 /// Reads `##PERIODIC:: Lx Ly Lz` followed by `x y z r clump` or `x y z r clump material` per line
-/// (blank lines, # comments and a byte order mark allowed) [m]. Appends everything wrong to problems
-/// (not a number, missing fields, radius <= 0 or too large for the cell, a grain outside the cell by
-/// more than half its length, fewer than two grains); centres outside by less belong to an image;
-/// the result is meaningful only if none was added.
+/// (blank lines, # comments and a byte order mark allowed) [m]. Appends everything wrong to
+/// problems (not a number, missing fields, radius <= 0 or too large for the cell, a grain outside
+/// the cell by more than half its length, fewer than two grains); centres outside by less belong to
+/// an image; the result is meaningful only if none was added.
 Packing ParsePacking(const std::string& text, std::vector<PackingProblem>& problems);
 
-/// The same text format, with 17 digits: ParsePacking() gives the same bits back.
+/// The packing as text that ParsePacking() reads, with 17 digits: reading it gives the same bits
+/// back.
 std::string FormatPacking(const Packing& packing);
 
-/// How to make a specimen: cloud -> isotropic compression -> friction lowered step by step until
-/// the target porosity holds at the pressure [Cheng 2018, sec. 2.2].
+/// How to make a specimen: a cloud, compressed isotropically, then friction lowered step by step
+/// until the target porosity holds at the pressure. [Cheng 2018, sec. 2.2]
 struct PackingRecipe {
   int particles = 1000;        ///< 20 .. 1e6
   double porosity = 0.4;       ///< target, in (0.2, 0.6), or of a cloud, [0.7, 1)
@@ -47,7 +49,7 @@ struct PackingRecipe {
   double depth_ratio = 1.0;  ///< of the cell, y / x, 0.2 .. 5
   /// Sizes by a grading curve in place of mean and spread, the same for every seed.
   Grading grading{};
-  /// [m], of every grain, in place of all that; `particles` of them.
+  /// Radius of every grain [m], `particles` of them, in place of mean, spread and grading.
   std::vector<double> radii{};
 };
 
@@ -59,7 +61,8 @@ double LargestRadius(const PackingRecipe& recipe);
 /// near that shape.
 PackingRecipe RecipeLike(const Packing& packing);
 
-/// 1 - volume of all spheres / volume of the cell.
+/// Porosity of the packing [-]: 1 - volume of all spheres / volume of the cell. Overlaps count
+/// twice.
 double PorosityOf(const Packing& packing);
 
 }  // namespace calib::dem

@@ -8,6 +8,7 @@
 
 namespace calib::dem {
 
+/// One element per sphere in every array that is not said to be empty.
 struct ParticleArrays {
   std::vector<double> x, y, z;     ///< centres, unwrapped between neighbour searches [m]
   std::vector<double> vx, vy, vz;  ///< peculiar velocity: without the cell's homogeneous part [m/s]
@@ -30,8 +31,8 @@ struct Inertia {
   double moment = 0;  ///< about the centre; of a disk about its axis [kg m^2]
 };
 
-/// A sphere, m = 4/3 pi r^3 rho and 2/5 m r^2, or with a thickness [m] > 0 a disk, m = pi r^2 t rho
-/// and m r^2/2. radius [m] > 0, density [kg/m^3] > 0.
+/// Mass and moment of a sphere, m = 4/3 pi r^3 rho and 2/5 m r^2, or, with a thickness [m] > 0, of
+/// a disk, m = pi r^2 t rho and m r^2/2. radius [m] > 0, density [kg/m^3] > 0.
 Inertia InertiaOf(double radius, double density, double thickness);
 
 /// Grains at rest, in an order that keeps neighbours close in memory: by grid cell, then by

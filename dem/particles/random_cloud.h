@@ -6,14 +6,16 @@
 
 namespace calib::dem {
 
-/// The densest cloud that leaves every grain a place quickly.
+/// Porosity of the densest cloud [-]. Chosen: random sequential addition still finds every grain a
+/// place quickly.
 inline constexpr double kCloudPorosity = 0.7;
 
 /// The recipe's radii (given one by one, by a grading curve, or uniform in mean_radius (1 -/+
 /// radius_spread)), placed by random sequential addition, largest first, in a cell of the recipe's
 /// shape with the given solid fraction (0 < fraction <= 1 - kCloudPorosity).
-/// Deterministic: Philox with key = seed, counter = draw [Salmon et al. 2011]. Errors:
-/// RESOURCE_EXHAUSTED when a grain finds no place in 100 000 attempts.
+/// Deterministic: Philox with key = seed, counter = draw.
+/// [Salmon et al. 2011]
+/// Errors: RESOURCE_EXHAUSTED when a grain finds no place in 100 000 attempts.
 absl::StatusOr<Packing> RandomCloud(const PackingRecipe& recipe, double solid_fraction);
 
 }  // namespace calib::dem

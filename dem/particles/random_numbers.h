@@ -9,7 +9,8 @@
 namespace calib::dem {
 
 /// Three numbers in [0, 1): draw `draw` of grain `grain` for a purpose. Philox with key = seed,
-/// counter = (purpose, grain, draw) [Salmon et al. 2011].
+/// counter = (purpose, grain, draw). Pure.
+/// [Salmon et al. 2011]
 inline std::array<double, 3> Uniform(std::uint64_t seed, std::uint32_t purpose, int grain,
                                      int draw) {
   const r123::Philox4x32::key_type key = {
@@ -20,8 +21,9 @@ inline std::array<double, 3> Uniform(std::uint64_t seed, std::uint32_t purpose, 
   return {bits[0] / 4294967296.0, bits[1] / 4294967296.0, bits[2] / 4294967296.0};
 }
 
-/// Purposes in use, one for each kind of draw. Two of them share a number where no run makes both:
-/// elongation and crushing are of tests in the periodic cell, fill and order of those that pour.
+/// Purposes of Uniform(), one number for each kind of draw. Two kinds share a number where no run
+/// makes both: elongation and crushing happen in the periodic cell only, fill and order where
+/// grains are poured.
 inline constexpr std::uint32_t kRadiusDraw = 1;
 inline constexpr std::uint32_t kPositionDraw = 2;
 inline constexpr std::uint32_t kElongationDraw = 3;

@@ -6,11 +6,13 @@
 
 namespace calib::dem {
 
+/// A sphere in space.
 struct Sphere {
   std::array<double, 3> centre{};  ///< [m]
   double radius = 0;               ///< [m] > 0
 };
 
+/// Volume and moments of a solid body.
 struct SolidMoments {
   double volume = 0;                               ///< [m^3]
   std::array<double, 3> centroid{};                ///< [m]

@@ -157,7 +157,7 @@ void CheckFormulas(const Scenario& scenario, Problems& problems) {
                                       test->name, " does not have"));
     }
     const bool stress = effect.target == "axial_stress" || effect.target == "lateral_stress";
-    if (effect.target == test->control || (stress && test->control == "mean_stress")) {
+    if (effect.target == test->control || (stress && test->stress_driven)) {
       problems.push_back(absl::StrCat("effect ", name, " changes ", effect.target,
                                       ", by which test ", test->name, " is driven"));
     }
@@ -270,7 +270,7 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
       problems.push_back(std::move(problem));
     }
   }
-  const bool stress_driven = test->control == "mean_stress";
+  const bool stress_driven = test->stress_driven;
   const auto& range = test->control_range;
   const std::string control = ControlOf(*test, scenario.settings);
   const auto driven = std::find_if(test->settings.begin(), test->settings.end(),

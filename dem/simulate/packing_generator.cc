@@ -1,4 +1,5 @@
-// Cloud -> isotropic compression -> friction lowered until the porosity holds. [Cheng 2018, sec. 2.2]
+// Cloud -> isotropic compression -> friction lowered until the porosity holds. [Cheng 2018,
+// sec. 2.2]
 #include "dem/simulate/packing_generator.h"
 
 #include <cmath>
@@ -6,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "calib/return_if_error.h"
 #include "dem/contact/laws/linear.h"
 #include "dem/dynamics/quasi_static.h"
 #include "dem/lab_tests/shared/consolidation.h"
@@ -93,10 +95,7 @@ absl::StatusOr<Packing> GeneratePacking(const PackingRecipe& recipe, int threads
   if (IsCloud(recipe)) {
     return RandomCloud(recipe, 1 - recipe.porosity);
   }
-  auto cloud = RandomCloud(recipe, kCloudFraction);
-  if (!cloud.ok()) {
-    return cloud.status();
-  }
+  ASSIGN_OR_RETURN(const Packing cloud, RandomCloud(recipe, kCloudFraction));
   Model model;
   model.contact = "linear";
   model.density = kDensity;
@@ -104,7 +103,7 @@ absl::StatusOr<Packing> GeneratePacking(const PackingRecipe& recipe, int threads
                       {"poisson_ratio", 0.5},
                       {"friction_coefficient", kInitialFriction}};
   const ContactEntry law = Linear();
-  Assembly assembly(*cloud, kDensity, ContactModel(model, {.law = &law}), threads);
+  Assembly assembly(cloud, kDensity, ContactModel(model, {.law = &law}), threads);
   StageOptions options;
   options.rate = kInertialNumber / (2 * recipe.mean_radius) * std::sqrt(recipe.pressure / kDensity);
   options.damping_settling = kDamping;
@@ -113,9 +112,7 @@ absl::StatusOr<Packing> GeneratePacking(const PackingRecipe& recipe, int threads
   const AxisTarget axis{.mode = AxisTarget::Mode::kStress, .value = recipe.pressure};
   StageEnd end = stages.MoveTo({{axis, axis, axis}});
   if (end == StageEnd::kDone) {
-    if (auto s = LowerFrictionToPorosity(recipe.porosity, recipe.pressure, stages, end); !s.ok()) {
-      return s;
-    }
+    RETURN_IF_ERROR(LowerFrictionToPorosity(recipe.porosity, recipe.pressure, stages, end));
   }
   if (end == StageEnd::kStopped) {
     return absl::CancelledError("packing generation was stopped");

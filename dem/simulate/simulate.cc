@@ -51,10 +51,10 @@ absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink
     for (const State& state : checkpoint.states) {
       sink(state);
       if (series) {
-        series->Recall(state.load_step);
+        series->AddExisting(state.load_step);
       }
     }
-    record.GoOnFrom(std::move(checkpoint));
+    record.ResumeFrom(std::move(checkpoint));
   }
   return Walk(scenario, record, std::move(stop));
 }

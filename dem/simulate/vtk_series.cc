@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "calib/return_if_error.h"
 #include "dem/simulate/whole_file.h"
 
 namespace calib::dem {
@@ -160,10 +161,7 @@ VtkSeriesEntry VtkSeries::EntryOf(const Series& series, int load_step) {
 
 absl::Status VtkSeries::Write(Series& series, int load_step, const VtkPiece& piece) const {
   const VtkSeriesEntry entry = EntryOf(series, load_step);
-  if (auto s = WriteWholeFile(absl::StrCat(directory_, "/", entry.file), VtkDocument(piece));
-      !s.ok()) {
-    return s;
-  }
+  RETURN_IF_ERROR(WriteWholeFile(absl::StrCat(directory_, "/", entry.file), VtkDocument(piece)));
   series.entries.push_back(entry);
   return WriteWholeFile(absl::StrCat(directory_, "/", series.name, ".pvd"),
                         VtkCollection(series.entries));
@@ -172,17 +170,13 @@ absl::Status VtkSeries::Write(Series& series, int load_step, const VtkPiece& pie
 absl::Status VtkSeries::Add(const Assembly& assembly, int load_step) {
   std::error_code error;  // shows when the first file cannot be written
   std::filesystem::create_directories(directory_, error);
-  if (auto s = Write(grains_, load_step, GrainsOf(assembly, load_step)); !s.ok()) {
-    return s;
-  }
-  if (auto s = Write(contacts_, load_step, ContactsOf(assembly)); !s.ok()) {
-    return s;
-  }
+  RETURN_IF_ERROR(Write(grains_, load_step, GrainsOf(assembly, load_step)));
+  RETURN_IF_ERROR(Write(contacts_, load_step, ContactsOf(assembly)));
   const VtkPiece walls = WallsOf(assembly);
   return walls.points.empty() ? absl::OkStatus() : Write(walls_, load_step, walls);
 }
 
-void VtkSeries::Recall(int load_step) {
+void VtkSeries::AddExisting(int load_step) {
   for (Series* series : {&grains_, &contacts_, &walls_}) {
     const VtkSeriesEntry entry = EntryOf(*series, load_step);
     std::error_code error;

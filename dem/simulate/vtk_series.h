@@ -29,7 +29,7 @@ class VtkSeries {
   absl::Status Add(const Assembly& assembly, int load_step);
 
   /// A load step of before an interruption: belongs to the series where its files are there.
-  void Recall(int load_step);
+  void AddExisting(int load_step);
 
  private:
   struct Series {

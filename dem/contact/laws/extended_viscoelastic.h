@@ -5,8 +5,9 @@
 
 namespace calib::dem {
 
-///   F = k u^{3/2} + gamma u' u^alpha: see viscoelastic.h.
-/// alpha = `damping_exponent`. [Hadjidoukas 2014, Table 1, M3, Eq. 3]
+/// Entry of `extended_viscoelastic`, in the words of contact/viscoelastic.h
+///   F = k u^{3/2} + gamma u' u^alpha,   alpha = `damping_exponent` [-] >= 0.
+/// [Hadjidoukas 2014, Table 1, M3, Eq. 3]
 ContactEntry ExtendedViscoelastic();
 
 }  // namespace calib::dem

@@ -84,7 +84,8 @@ ContactEntry Linear() {
                .description = "Linear springs: kn = 2E r*, Fn = kn u; ks = 2E nu r*, dFs = ks dus; "
                               "|Fs| <= tan(phi_mu) Fn; nu = ks/kn is given as poisson_ratio",
                .parameters = {YoungModulus(), ratio, FrictionAngle(), FrictionCoefficient()},
-               .reference = "Cheng et al. 2018, Eqs. 1-4, Table 1"},
+               .reference = "Cheng et al. 2018, Eqs. 1-4, Table 1",
+               .linear_springs = true},
       .place = 20,
       .make = &Make};
 }

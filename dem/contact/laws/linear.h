@@ -6,9 +6,10 @@
 
 namespace calib::dem {
 
+/// Entry of `linear`, u the overlap:
 ///   Fn = kn u,  kn = 2E r*,    dFs = ks dus,  ks = 2E nu r* = nu kn,    r* = r1 r2/(r1 + r2)
-/// E is a contact modulus and the parameter named poisson_ratio is the ratio ks/kn. [Cheng 2018,
-/// Eqs. 3-4]
+/// E is a contact modulus and the parameter named poisson_ratio is the ratio ks/kn.
+/// [Cheng 2018, Eqs. 3-4]
 ContactEntry Linear();
 
 }  // namespace calib::dem

@@ -64,7 +64,7 @@ CALIB_DEM_CLONES void EvaluateOfPairs(const MomentLaw* laws, const ContactBlock&
 }  // namespace
 
 MomentLaw MomentLawFrom(const KernelContext& context) {
-  return LawOf(context.contact == "linear", context.parameters.Get("friction"),
+  return LawOf(context.linear_springs, context.parameters.Get("friction"),
                context.parameters.Find("stiffness_ratio"), context.parameters.Find("stiffness"));
 }
 
@@ -77,12 +77,12 @@ std::vector<MomentLaw> MomentLawsFrom(const KernelContext& context) {
   for (int a = 0; a < materials.count(); ++a) {
     for (int b = 0; b < materials.count(); ++b) {
       const auto said = [&](const char* parameter) {
-        return materials.Said(a, b, absl::StrCat(context.effect, ".", parameter));
+        return materials.PairParameter(a, b, absl::StrCat(context.effect, ".", parameter));
       };
       const auto ratio = said("stiffness_ratio");
       const auto stiffness = said("stiffness");
       const bool own = ratio || stiffness;
-      laws.push_back(LawOf(context.contact == "linear",
+      laws.push_back(LawOf(context.linear_springs,
                            said("friction").value_or(context.parameters.Get("friction")),
                            own ? ratio : context.parameters.Find("stiffness_ratio"),
                            own ? stiffness : context.parameters.Find("stiffness")));

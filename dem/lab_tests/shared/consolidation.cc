@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "dem/elementary/functions.h"
 #include "dem/measure/observables.h"
 
@@ -253,9 +254,7 @@ absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, Sta
     if (start && Porosity(assembly) < *porosity) {
       assembly = *start;
       assembly.SetSlidingFriction(own_friction);
-      if (auto s = assembly.EvaluateForces(); !s.ok()) {
-        return s;
-      }
+      RETURN_IF_ERROR(assembly.EvaluateForces());
       end = Compress(plan, stages);
       if (end != StageEnd::kDone) {
         return absl::OkStatus();
@@ -264,9 +263,7 @@ absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, Sta
     if (plan.initial_stress && plan.consolidation.porosity) {
       return ReachPorosityAtStart(plan, *porosity, own_friction, stages, end);
     }
-    if (auto s = LowerFrictionToPorosity(*porosity, plan.pressure, stages, end); !s.ok()) {
-      return s;
-    }
+    RETURN_IF_ERROR(LowerFrictionToPorosity(*porosity, plan.pressure, stages, end));
     if (end != StageEnd::kDone) {
       return absl::OkStatus();
     }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "dem/dynamics/archive.h"
 #include "dem/dynamics/contact_model.h"
 #include "dem/dynamics/crushing.h"
@@ -62,9 +63,7 @@ class ElementTestRun {
     if (crushing_ || assembly_.model().stage() != nullptr) {
       stages_.SetIntervention([this](Assembly& assembly) {
         if (crushing_ && crushing_->Crush(assembly) > 0) {
-          if (auto s = crushing_->FinesFit(assembly); !s.ok()) {
-            return s;
-          }
+          RETURN_IF_ERROR(crushing_->FinesFit(assembly));
         }
         SetStage();
         return absl::OkStatus();
@@ -77,14 +76,14 @@ class ElementTestRun {
       if (const auto ended = Prepare()) {
         return *ended;
       }
-    } else if (!Restore(record.procedure())) {
+    } else if (!Restore(record.procedure_state())) {
       return absl::InvalidArgumentError("the checkpoint does not fit the specimen");
     }
     FollowReadings();
     if (scenario_.loading_rate) {
       stages_.options().rate = *scenario_.loading_rate;
     }
-    for (std::size_t k = record.next(); k < scenario_.path.size(); ++k) {
+    for (std::size_t k = record.next_point(); k < scenario_.path.size(); ++k) {
       const ControlPoint& point = scenario_.path[k];
       const std::string where =
           absl::StrCat("path point ", k, " (", test_.control, " ", point.target, ")");
@@ -99,16 +98,12 @@ class ElementTestRun {
           summary.reason = absl::StrCat(where, ": ", problem);
           return summary;
         }
-        if (auto s = record.Reach(state, &assembly_); !s.ok()) {
-          return s;
-        }
+        RETURN_IF_ERROR(record.ReportLoadStep(state, &assembly_));
       }
-      if (record.keeps()) {
+      if (record.wants_checkpoints()) {
         SaveArchive archive;
         archive(*this);
-        if (auto s = record.Keep(k + 1, std::move(archive.bytes())); !s.ok()) {
-          return s;
-        }
+        RETURN_IF_ERROR(record.WriteCheckpoint(k + 1, std::move(archive.bytes())));
       }
     }
     return Finish(StageEnd::kDone, "");
@@ -147,7 +142,7 @@ class ElementTestRun {
       return summary;
     }
     assembly_.SetViscous(true);
-    stages_.LookBeforeNextStep();
+    stages_.InspectBeforeNextStep();
     if (end != StageEnd::kDone) {
       return Finish(end, "consolidation");
     }
@@ -284,10 +279,10 @@ class ElementTestRun {
       control_ = target;
       return stages_.MoveThrough(TargetFor(target));
     }
-    const bool by_stress = test_.control == "mean_stress";
     const double from = control_;
     const double exact = std::abs(target - from) / *staging_.step;
-    const int steps = by_stress ? 1 : std::max(1, static_cast<int>(std::ceil(exact - 1e-6)));
+    const int steps =
+        test_.stress_driven ? 1 : std::max(1, static_cast<int>(std::ceil(exact - 1e-6)));
     for (int k = 1; k <= steps; ++k) {
       control_ = k == steps ? target : from + (target - from) * k / steps;
       if (const StageEnd end = stages_.MoveTo(TargetFor(control_)); end != StageEnd::kDone) {

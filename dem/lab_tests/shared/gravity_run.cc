@@ -41,7 +41,7 @@ GravityRun::GravityRun(const TestRun& run)
   }
   mean_diameter_ = sum / static_cast<double>(radii().size());
   if (resumed()) {
-    LoadArchive archive(record_.procedure());
+    LoadArchive archive(record_.procedure_state());
     archive(summary_.steps, summary_.contact_updates, summary_.time_step, state_);
     if (!archive.complete()) {
       Abandon(DoesNotFit());
@@ -58,20 +58,20 @@ StageEnd GravityRun::Abandon(absl::Status status) {
   return StageEnd::kDiverged;
 }
 
-StageEnd GravityRun::Keep(std::size_t next, std::string state) {
+StageEnd GravityRun::WriteCheckpoint(std::size_t next, std::string state) {
   SaveArchive archive;
   archive(summary_.steps, summary_.contact_updates, summary_.time_step, state);
-  status_ = record_.Keep(next, std::move(archive.bytes()));
+  status_ = record_.WriteCheckpoint(next, std::move(archive.bytes()));
   return status_.ok() ? StageEnd::kDone : StageEnd::kDiverged;
 }
 
 StageEnd GravityRun::Walk(const std::function<StageEnd(const ControlPoint& point)>& visit,
                           const std::function<std::string()>& state) {
   StageEnd end = status_.ok() ? StageEnd::kDone : StageEnd::kDiverged;
-  for (std::size_t k = record_.next(); k < path().size() && end == StageEnd::kDone; ++k) {
+  for (std::size_t k = record_.next_point(); k < path().size() && end == StageEnd::kDone; ++k) {
     end = visit(path()[k]);
-    if (end == StageEnd::kDone && record_.keeps()) {
-      end = Keep(k + 1, state ? state() : "");
+    if (end == StageEnd::kDone && record_.wants_checkpoints()) {
+      end = WriteCheckpoint(k + 1, state ? state() : "");
     }
   }
   return end;
@@ -99,7 +99,7 @@ const TriangleMesh* GravityRun::Mesh(const std::string& name) const {
 
 double GravityRun::fall_time() const { return std::sqrt(mean_diameter_ / gravity()); }
 
-double GravityRun::solid() const {
+double GravityRun::solid_volume() const {
   double sum = 0;
   for (const double r : radii()) {
     sum += 4.0 / 3.0 * std::numbers::pi * r * r * r;
@@ -116,23 +116,23 @@ Packing GravityRun::Fill(const FillRegion& region, std::uint64_t seed) const {
   return aspect_ > 1 ? RandomFill(radii(), shape_, region, seed) : LooseFill(radii(), region, seed);
 }
 
-void GravityRun::Mix(Packing& grains) const {
+void GravityRun::MixMaterials(Packing& grains) const {
   DrawMaterials(scenario_.materials.grains, scenario_.materials.seed, grains);
 }
 
-Assembly GravityRun::Make(const Packing& grains, Surroundings surroundings) const {
+Assembly GravityRun::MakeAssembly(const Packing& grains, Surroundings surroundings) const {
   surroundings.gravity = {0, 0, -gravity()};
   surroundings.material = MaterialOf("walls");
   ContactModel model(scenario_.model, entries_, surroundings.thickness);
   Packing mixture = grains;
   if (mixture.material.empty()) {
-    Mix(mixture);
+    MixMaterials(mixture);
   }
   return {mixture, scenario_.model.density, std::move(model), std::move(surroundings),
           scenario_.threads};
 }
 
-Flow GravityRun::Drive(Assembly& assembly, FlowOptions options) const {
+Flow GravityRun::MakeFlow(Assembly& assembly, FlowOptions options) const {
   options.damping = Setting("local_damping");
   options.drag = Setting("drag");
   return {assembly, options, stop_};
@@ -147,10 +147,10 @@ StageEnd GravityRun::WalkFrom(Assembly& assembly, const FlowOptions& options, do
                               const std::function<StageEnd(const ControlPoint& point)>& visit) {
   StageEnd end = StageEnd::kDone;
   if (resumed()) {
-    end = Recall(assembly);
+    end = RestoreState(assembly);
   } else {
-    Flow filling = Drive(assembly, options);
-    end = Close(filling.Settle(longest, kSettling), filling, {}, "filling");
+    Flow filling = MakeFlow(assembly, options);
+    end = AddToSummary(filling.Settle(longest, kSettling), filling, {}, "filling");
   }
   const auto filled = [&assembly] {
     SaveArchive archive;
@@ -171,12 +171,12 @@ StageEnd GravityRun::Report(const ControlPoint& point, const std::vector<double>
                                " is not finite"));
     }
   }
-  status_ = record_.Reach({.load_step = point.load_step, .values = values}, &assembly);
+  status_ = record_.ReportLoadStep({.load_step = point.load_step, .values = values}, &assembly);
   return status_.ok() ? StageEnd::kDone : StageEnd::kDiverged;
 }
 
-StageEnd GravityRun::Close(StageEnd end, const Flow& flow, const Mark& first,
-                           const std::string& where) {
+StageEnd GravityRun::AddToSummary(StageEnd end, const Flow& flow, const Mark& first,
+                                  const std::string& where) {
   const Mark last = MarkOf(flow.assembly());
   summary_.steps += last.steps - first.steps;
   summary_.contact_updates += last.updates - first.updates;

@@ -41,7 +41,7 @@ class GravityRun {
 
   /// Takes members back from what Walk's `state` gave before the interruption.
   template <class... T>
-  StageEnd Recall(T&... members) {
+  StageEnd RestoreState(T&... members) {
     LoadArchive archive(state_);
     archive(members...);
     return archive.complete() ? StageEnd::kDone : Abandon(DoesNotFit());
@@ -72,7 +72,7 @@ class GravityRun {
   /// Longest way through a grain [m].
   [[nodiscard]] double largest_length() const { return ReachOf(shape_) * largest_diameter_; }
   /// Volume of all grains [m^3].
-  [[nodiscard]] double solid() const;
+  [[nodiscard]] double solid_volume() const;
   [[nodiscard]] std::uint64_t seed() const { return scenario_.seed; }
   /// sqrt(d/g), the time of a fall by half a mean diameter [s].
   [[nodiscard]] double fall_time() const;
@@ -81,7 +81,7 @@ class GravityRun {
   [[nodiscard]] std::string MaterialOf(const std::string& body) const;
 
   /// Draws the materials of grains where the scenario mixes some.
-  void Mix(Packing& grains) const;
+  void MixMaterials(Packing& grains) const;
 
   /// The grains in a region: LooseFill of spheres, RandomFill of others.
   [[nodiscard]] Packing Fill(const FillRegion& region, std::uint64_t seed) const;
@@ -92,10 +92,10 @@ class GravityRun {
 
   /// Grains between walls; surroundings get the test's gravity and the walls' material. Grains
   /// without materials are mixed first.
-  [[nodiscard]] Assembly Make(const Packing& grains, Surroundings surroundings) const;
+  [[nodiscard]] Assembly MakeAssembly(const Packing& grains, Surroundings surroundings) const;
 
   /// drop_height and the box of the options are the procedure's; damping and drag the settings'.
-  [[nodiscard]] Flow Drive(Assembly& assembly, FlowOptions options) const;
+  [[nodiscard]] Flow MakeFlow(Assembly& assembly, FlowOptions options) const;
 
   /// Local damping while poured grains come to rest.
   static constexpr double kSettling = 0.3;
@@ -115,13 +115,14 @@ class GravityRun {
   static Mark MarkOf(const Assembly& assembly) {
     return {assembly.steps(), assembly.contact_updates()};
   }
-  StageEnd Close(StageEnd end, const Flow& flow, const Mark& first, const std::string& where);
+  StageEnd AddToSummary(StageEnd end, const Flow& flow, const Mark& first,
+                        const std::string& where);
 
   [[nodiscard]] absl::StatusOr<Summary> Finish(StageEnd end) const;
 
  private:
   [[nodiscard]] static absl::Status DoesNotFit();
-  StageEnd Keep(std::size_t next, std::string state);
+  StageEnd WriteCheckpoint(std::size_t next, std::string state);
 
   const Scenario& scenario_;
   RunRecord& record_;
@@ -138,8 +139,8 @@ class GravityRun {
   std::string state_;  ///< of the procedure, at the interruption
 };
 
-/// The procedure of a test that pours its grains. Errors: those of the record, and INVALID_ARGUMENT for a checkpoint that
-/// does not fit.
+/// The procedure of a test that pours its grains. Errors: those of the record, and INVALID_ARGUMENT
+/// for a checkpoint that does not fit.
 std::function<absl::StatusOr<Summary>(const TestRun&)> GravityProcedure(
     StageEnd (*walk)(GravityRun&));
 

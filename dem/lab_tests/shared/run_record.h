@@ -11,8 +11,8 @@
 
 namespace calib::dem {
 
-/// Called at each load step with its state and the grains that made it, null where a test has none. An error ends the run
-/// with that error.
+/// Called at each load step with its state and the grains that made it, null where a test has none.
+/// An error ends the run with that error.
 using LoadStepSink = std::function<absl::Status(const State& state, const Assembly* assembly)>;
 
 /// Between the procedure of a test and whoever wants its states and checkpoints.
@@ -23,38 +23,40 @@ class RunRecord {
 
   /// With checkpoints for `keep` after each point.
   RunRecord(LoadStepSink sink, const Scenario& scenario, CheckpointSink keep)
-      : sink_(std::move(sink)), keep_(std::move(keep)), head_(CheckpointHead(scenario)) {}
+      : sink_(std::move(sink)),
+        checkpoint_sink_(std::move(keep)),
+        head_(CheckpointHead(scenario)) {}
 
   /// The run begins behind what a checkpoint of it holds.
-  void GoOnFrom(RunCheckpoint checkpoint) { so_far_ = std::move(checkpoint); }
+  void ResumeFrom(RunCheckpoint checkpoint) { so_far_ = std::move(checkpoint); }
 
   [[nodiscard]] bool resumed() const { return so_far_.next > 0; }
   /// Where on the path to begin.
-  [[nodiscard]] std::size_t next() const { return so_far_.next; }
+  [[nodiscard]] std::size_t next_point() const { return so_far_.next; }
   /// What the procedure gave to Keep() when it was interrupted.
-  [[nodiscard]] const std::string& procedure() const { return so_far_.procedure; }
+  [[nodiscard]] const std::string& procedure_state() const { return so_far_.procedure; }
 
   /// A load step has been reached. Errors: those of the sink.
-  absl::Status Reach(const State& state, const Assembly* assembly) {
-    if (keeps()) {
+  absl::Status ReportLoadStep(const State& state, const Assembly* assembly) {
+    if (wants_checkpoints()) {
       so_far_.states.push_back(state);
     }
     return sink_(state, assembly);
   }
 
-  [[nodiscard]] bool keeps() const { return static_cast<bool>(keep_); }
+  [[nodiscard]] bool wants_checkpoints() const { return static_cast<bool>(checkpoint_sink_); }
 
   /// From here the run could go on at point `next` of the path with these bytes. Precondition:
   /// keeps(). Errors: those of the checkpoint sink.
-  absl::Status Keep(std::size_t next, std::string procedure) {
+  absl::Status WriteCheckpoint(std::size_t next, std::string procedure) {
     so_far_.next = next;
     so_far_.procedure = std::move(procedure);
-    return keep_(PackCheckpoint(head_, so_far_));
+    return checkpoint_sink_(PackCheckpoint(head_, so_far_));
   }
 
  private:
   LoadStepSink sink_;
-  CheckpointSink keep_;
+  CheckpointSink checkpoint_sink_;
   std::string head_;
   RunCheckpoint so_far_;
 };

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "dem/contact/laws/linear.h"
 #include "dem/dynamics/assembly.h"
 #include "dem/elementary/functions.h"
@@ -37,9 +38,7 @@ ContactModel SoftGrains(double friction) {
 
 /// Lets the grains push each other apart for a number of steps.
 absl::Status Relax(Assembly& assembly, int steps, const std::stop_token& stop) {
-  if (auto s = assembly.EvaluateForces(); !s.ok()) {
-    return s;
-  }
+  RETURN_IF_ERROR(assembly.EvaluateForces());
   double dt = 0;
   for (int step = 0; step < steps; ++step) {
     if (stop.stop_requested()) {
@@ -50,17 +49,13 @@ absl::Status Relax(Assembly& assembly, int steps, const std::stop_token& stop) {
         return absl::OutOfRangeError(bad);
       }
       StiffnessEstimate estimate;
-      if (auto s = assembly.EstimateStiffness(estimate); !s.ok()) {
-        return s;
-      }
+      RETURN_IF_ERROR(assembly.EstimateStiffness(estimate));
       const double nominal = assembly.NominalCriticalStep();
       dt = kSafety *
            (estimate.critical_step > 0 ? std::min(nominal, estimate.critical_step) : nominal);
     }
     assembly.Move({.dt = dt, .damping = kDamping});
-    if (auto s = assembly.EvaluateForces(); !s.ok()) {
-      return s;
-    }
+    RETURN_IF_ERROR(assembly.EvaluateForces());
   }
   return absl::OkStatus();
 }
