@@ -15,7 +15,8 @@ namespace {
 constexpr std::int64_t kInspection = 20;
 
 /// Steps to the next look where stiffness has grown by more than the factor kGrowth since the last
-/// one, as where grains come into contact all at once [-]. Chosen; source as of kInspection.
+/// one, as where grains come into contact all at once [-]. Chosen, as kInspection
+/// (dem/DECISIONS.md, stiffness is looked at every 20 steps).
 constexpr std::int64_t kSoon = 5;
 constexpr double kGrowth = 1.25;
 

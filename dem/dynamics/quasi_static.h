@@ -39,8 +39,10 @@ struct StageOptions {
                             ///< moment (StableStep) [-], 0 .. 1
   double least_volume = 0;  ///< a settling ends where the cell has shrunk to this [m^3]
   bool adaptive = false;    ///< strained stages go faster than `rate` where forces stay balanced
-  std::int64_t max_settling_steps = 200'000;    ///< a settling that takes longer has diverged > 0
-  std::int64_t max_loading_steps = 20'000'000;  ///< a loading that takes longer has diverged > 0
+  std::int64_t max_settling_steps =
+      200'000;  ///< time steps [-] > 0: a settling that takes longer has diverged
+  std::int64_t max_loading_steps =
+      20'000'000;  ///< time steps [-] > 0: a loading that takes longer has diverged
 };
 
 /// How far a followed target (Follow) is from its end.
@@ -60,8 +62,8 @@ enum class StageEnd { kDone, kStopped, kDiverged };
 /// so that the unbalanced force stays near kTarget times the one that ends a settling:
 ///   f <- min(kFastest, max(1, f (kTarget unbalanced / U)^kGain))
 /// Elastic stages, which leave little unbalanced, go at several times the rate; where grains
-/// rearrange it is the rate asked for. Stages that hold stresses on
-/// all axes keep the rate. Not thread-safe.
+/// rearrange it is the rate asked for. Stages that hold stresses on all axes keep the rate. Not
+/// thread-safe.
 class StrainingSpeed {
  public:
   /// Chooses the factor anew. unbalanced: mean unbalanced over mean contact force, U [-] >= 0;
@@ -81,9 +83,10 @@ class StrainingSpeed {
   static constexpr double kFastest = 8;
 
  private:
-  static constexpr double kTarget =
-      2;  ///< unbalanced force aimed at over the one that settles [-]. Chosen
-  static constexpr double kGain = 0.25;  ///< exponent of the correction [-]. Chosen
+  /// Unbalanced force that is aimed at, over the one that ends a settling [-]. Chosen.
+  static constexpr double kTarget = 2;
+  /// Exponent of the correction [-]. Chosen.
+  static constexpr double kGain = 0.25;
   double factor_ = 1;
 };
 

@@ -86,8 +86,8 @@ bool Mentions(const UserEffect& effect, std::span<const FormulaQuantity> names) 
 
 /// Values that quantities usually have, for probing a formula; `which` chooses among them.
 double Probe(const FormulaQuantity& quantity, int which) {
-  static constexpr double kFactor[] = {1, 0.2,
-                                       5};  // [-], chosen: about the usual value, either way
+  // About the usual value, either way [-]. Chosen.
+  static constexpr double kFactor[] = {1, 0.2, 5};
   const double factor = kFactor[which % 3];
   if (quantity.unit == "Pa") return 1e5 * factor;
   if (quantity.unit == "N") return 0.1 * factor;

@@ -570,8 +570,8 @@ std::vector<std::string> Problems(const Scenario& scenario) {
 /// A body of `radius` hits a body of the same material at rest, of `partner_radius` (infinite: a
 /// flat wall that does not move), free of gravity. Spheres; with a `thickness` disks that move in
 /// their plane (mass rho pi r^2 t, inertia m r^2/2) under the same law of force. Driven by
-/// impact_angle, impact_speed or impact_spin: the one that is not a setting. [Hadjidoukas et al.
-/// 2014, sec. 4]
+/// impact_angle, impact_speed or impact_spin: the one that is not a setting.
+/// [Hadjidoukas et al. 2014, sec. 4]
 TestEntry Collision() {
   return {.info = Info(), .place = 120, .procedure = &Collide, .problems = &Problems};
 }

@@ -112,8 +112,8 @@ class GravityRun {
   /// and drag are set here from the settings.
   [[nodiscard]] Flow MakeFlow(Assembly& assembly, FlowOptions options) const;
 
-  /// Local damping while poured grains come to rest [-]. Chosen: stronger damping
-  /// would let the last rearrangements creep.
+  /// Local damping while poured grains come to rest [-]. Chosen: stronger damping would let the
+  /// last rearrangements creep.
   static constexpr double kSettling = 0.3;
 
   /// Gives a state to the sink where the point wants one. kDiverged where a value is not finite or
