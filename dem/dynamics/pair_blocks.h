@@ -37,8 +37,8 @@ struct PairLanes {
 
 /// Where pairs leave what they do to grains. Every chunk of kPairChunk pairs has one place for each
 /// grain that it touches, side by side, so that loads are added up in the first-level cache; a
-/// grain then gathers its few places. Threads may work on different chunks, or gather different
-/// grains, at the same time.
+/// grain then gathers its few places. Thread-safe as far as threads Clear() and
+/// fill different chunks, or Gather() different grains; otherwise not thread-safe.
 class LoadPlaces {
  public:
   /// Makes the places for `grains` grains and sets place_i and place_j of the lanes; all loads are
