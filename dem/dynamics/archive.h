@@ -9,13 +9,14 @@
 
 namespace calib::dem {
 
-/// Types that go to an archive as they lie in memory, unless they have a Visit() of their own and are no
-/// elements of a vector.
+/// Types that go to an archive as they lie in memory, unless they have a Visit() of their own and
+/// are no elements of a vector.
 template <class T>
 inline constexpr bool kPlain = std::is_trivially_copyable_v<T>;
 
-/// Appends members to bytes(). Not thread-safe. Plain numbers and structs as they lie in memory (little-endian IEEE
-/// machines only), vectors and strings with their length in front, other types by their Visit().
+/// Appends members to bytes(). Not thread-safe. Plain numbers and structs as they lie in memory
+/// (little-endian IEEE machines only), vectors and strings with their length in front, other types
+/// by their Visit().
 class SaveArchive {
  public:
   template <class... T>
@@ -96,8 +97,8 @@ class LoadArchive {
     text.assign(Size(1), '\0');
     Take(text.data(), text.size());
   }
-  /// Reads a number of elements; sets ok_ to false where the remaining bytes cannot hold as many elements
-  /// of at least `least` bytes each.
+  /// Reads a number of elements; sets ok_ to false where the remaining bytes cannot hold as many
+  /// elements of at least `least` bytes each.
   std::uint64_t Size(std::size_t least) {
     std::uint64_t size = 0;
     Get(size);

@@ -11,8 +11,9 @@
 namespace calib::dem {
 namespace {
 
-/// Gap up to which pairs are listed, over the mean diameter: a wider skin lists more pairs, a
-/// narrower one searches more often. Measured best on dense packings of 1000 to 10 000 grains.
+/// Gap up to which pairs are listed in a periodic cell, over the mean diameter [-]. Chosen: a wider
+/// skin lists more pairs, a narrower one searches more often; the fastest on dense packings of 1000
+/// to 10 000 grains, measured by hand.
 constexpr double kSkin = 0.03;
 
 Surroundings NoSurroundings() { return {.open = {false, false, false}, .skin = kSkin}; }

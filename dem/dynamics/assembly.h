@@ -32,8 +32,9 @@ struct StiffnessEstimate {
   double elastic_step = 0;    ///< critical_step if there were no dashpots [s]
   double step_by_forces = 0;  ///< critical_step without dashpots and moment stiffness [s]
   bool by_twisting = false;   ///< contacts are stiffer in twisting than in rolling
-  std::array<double, 3> modulus = {0, 0, 0};    ///< affine (Voigt) stiffness of each axis [Pa]
-  std::array<double, 3> viscosity = {0, 0, 0};  ///< affine viscosity of each axis by dashpots [Pa s]
+  std::array<double, 3> modulus = {0, 0, 0};  ///< affine (Voigt) stiffness of each axis [Pa]
+  std::array<double, 3> viscosity = {0, 0,
+                                     0};  ///< affine viscosity of each axis by dashpots [Pa s]
 };
 
 /// What surrounds the grains where it is not a periodic cell.
@@ -53,31 +54,31 @@ struct NewGrain {
   Vec3 centre{}, velocity{};  ///< [m], [m/s]
   double radius = 0;          ///< [m] > 0
   int material = 0;           ///< index in Materials
-  int clump = -1;             ///< >= 0: one rigid body with the grains of this number that join in the
-                              ///< same call; -1: a sphere of its own
+  int clump = -1;  ///< >= 0: one rigid body with the grains of this number that join in the
+                   ///< same call; -1: a sphere of its own
 };
 
-/// Grains, contacts and cell of one specimen. Copyable: a copy is a snapshot that goes on to the same bits.
-/// Not thread-safe; uses `threads` threads inside.
+/// Grains, contacts and cell of one specimen. Copyable: a copy is a snapshot that goes on to the
+/// same bits. Not thread-safe; uses `threads` threads inside.
 class Assembly {
  public:
-  /// A specimen in its periodic cell, at rest. Spheres of one clump id move as one rigid body. density:
-  /// of the grains [kg/m^3] > 0. Preconditions: the packing has grains; threads >= 1.
+  /// A specimen in its periodic cell, at rest. Spheres of one clump id move as one rigid body.
+  /// density: of the grains [kg/m^3] > 0. Preconditions: the packing has grains; threads >= 1.
   Assembly(const Packing& packing, double density, ContactModel model, int threads);
 
-  /// Grains at rest with gravity and walls around them; `packing.length` only says where they usually are
-  /// along open axes, 0 .. length. Grains of these sizes may join later. density: of the grains [kg/m^3]
-  /// > 0. Preconditions: the packing has grains; threads >= 1.
+  /// Grains at rest with gravity and walls around them; `packing.length` only says where they
+  /// usually are along open axes, 0 .. length. Grains of these sizes may join later. density: of
+  /// the grains [kg/m^3] > 0. Preconditions: the packing has grains; threads >= 1.
   Assembly(const Packing& packing, double density, ContactModel model, Surroundings surroundings,
            int threads);
 
-  /// Takes out the grains at these indices of particles(), ascending. To be followed by EvaluateForces.
-  /// Precondition: all spheres of a clump are taken out, or none.
+  /// Takes out the grains at these indices of particles(), ascending. To be followed by
+  /// EvaluateForces. Precondition: all spheres of a clump are taken out, or none.
   void Remove(const std::vector<int>& grains);
 
-  /// Lets grains join, with the next free ids. To be followed by EvaluateForces. Preconditions: the
-  /// skin and the step were chosen for grains like these; those of one clump follow one another,
-  /// have one velocity and the model's own material.
+  /// Lets grains join, with the next free ids. To be followed by EvaluateForces. Preconditions: no
+  /// radius is larger than the largest that the assembly was made with; spheres of one clump follow
+  /// one another, have one velocity and the model's own material.
   void Insert(const std::vector<NewGrain>& grains);
 
   /// Takes a clump (index in clumps().all()) out of its contacts and sets it down at rest, farther
@@ -88,8 +89,8 @@ class Assembly {
   [[nodiscard]] const WallContacts& walls() const { return walls_; }
   std::vector<Wall>& mutable_walls() { return walls_.mutable_walls(); }
 
-  /// Lets the next EvaluateForces search neighbours anew. To be called after a wall was opened or placed
-  /// by hand.
+  /// Lets the next EvaluateForces search neighbours anew. To be called after a wall was opened or
+  /// placed by hand.
   void SearchAgain() { stale_ = true; }
 
   /// Contact forces, torques and stress of the present configuration; searches neighbours first
@@ -104,7 +105,8 @@ class Assembly {
   /// Sets one cell length exactly, after a Move that reached it up to rounding.
   void SetLength(int axis, double length) { cell_.length[axis] = length; }
 
-  /// Sets the displacement of the top along x [m] exactly, after a Move that reached it up to rounding.
+  /// Sets the displacement of the top along x [m] exactly, after a Move that reached it up to
+  /// rounding.
   void SetDisplacement(double displacement) { cell_.displacement = displacement; }
 
   /// Stiffnesses of the present contacts; their memory is not touched. Errors: OUT_OF_RANGE when
@@ -128,8 +130,9 @@ class Assembly {
   /// What MomentDelay() finds, in words that name the effect.
   [[nodiscard]] std::string MomentStepText(const StiffnessEstimate& estimate) const;
 
-  /// Largest MomentDelay() with which a run goes on [-]. Chosen: the 200 000 steps in which a specimen has
-  /// to settle (StageOptions) are beyond it fewer than 70 of those that the forces would allow.
+  /// Largest MomentDelay() with which a run goes on [-]. Chosen: the 200 000 steps in which a
+  /// specimen has to settle (StageOptions) are beyond it fewer than 70 of those that the forces
+  /// would allow.
   static constexpr double kLongestMomentDelay = 3000;
 
   /// Mean net force of the loaded grains over mean contact force [-]; 0 without contacts, infinite
@@ -157,8 +160,8 @@ class Assembly {
     return touching_[static_cast<std::size_t>(slot)] != 0;
   }
 
-  /// Force that the contact of a slot of neighbors() puts on its grain j [N]; zero where the two grains do
-  /// not touch.
+  /// Force that the contact of a slot of neighbors() puts on its grain j [N]; zero where the two
+  /// grains do not touch.
   [[nodiscard]] Vec3 force_on_j(int slot) const {
     const BlockForces& f = forces_[static_cast<std::size_t>(slot) / kBlock];
     const std::size_t lane = static_cast<std::size_t>(slot) % kBlock;
@@ -167,8 +170,8 @@ class Assembly {
 
   /// Love-Weber stress sum_c f_a d_a / V of the last EvaluateForces, compression positive [Pa].
   [[nodiscard]] const std::array<double, 3>& stress() const { return stress_; }
-  /// Minus the component xz (mean of xz and zx) of the Love-Weber stress: positive when the top is sheared
-  /// along +x [Pa].
+  /// Minus the component xz (mean of xz and zx) of the Love-Weber stress: positive when the top is
+  /// sheared along +x [Pa].
   [[nodiscard]] double shear_stress() const { return shear_stress_; }
   /// Number of contacts between grains; contacts with walls are counted by walls().
   [[nodiscard]] std::int64_t contacts() const { return contacts_; }
@@ -263,11 +266,11 @@ class Assembly {
   [[nodiscard]] absl::Status FormulasFinite() const;
   /// What NominalCriticalStep() would be if contacts had no moment stiffness [s].
   [[nodiscard]] double NominalStepByForces() const;
-  /// Calls with the smallest grain of each material and each pair of it with another (0 where there
-  /// is one only).
+  /// Calls visit with the smallest grain of each material and each pair of its material with
+  /// another (pair 0 where the model has one material).
   void VisitSmallestGrains(const std::function<void(std::size_t grain, int pair)>& visit) const;
-  /// The least critical step of two touching grains of the smallest size, over all pairs of materials [s];
-  /// overlap: in radii [-] > 0.
+  /// The least critical step of two touching grains of the smallest size, over all pairs of
+  /// materials [s]; overlap: in radii [-] > 0.
   [[nodiscard]] double LeastNominalStep(double overlap, bool with_moments) const;
 
   PeriodicCell cell_;
@@ -311,8 +314,8 @@ class Assembly {
   double shear_stress_ = 0;
   std::int64_t contacts_ = 0;
 
-  /// What a search leaves for the next one: the list before it with what contacts remembered, and memory
-  /// that is used again.
+  /// What a search leaves for the next one: the list before it with what contacts remembered, and
+  /// memory that is used again.
   struct Searching {
     NeighborSearch search;
     NeighborList old, sorted;

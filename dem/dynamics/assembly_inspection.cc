@@ -77,10 +77,12 @@ Held DashpotsOf(const ContactBlock& b, int k) {
   return {.normal = b.normal_damping[k], .tangential = b.tangential_damping[k]};
 }
 
-/// Chunks of pairs whose stiffnesses are kept at a time, of each of several threads.
+/// Chunks of pairs whose stiffnesses are kept at a time for each of several threads [-]. Chosen:
+/// enough work for each thread, little memory.
 constexpr int kChunksOfThread = 4;
 
-/// Where new contacts are judged, in radii.
+/// Overlap at which new contacts are judged, in radii [-]. Chosen: small, but not so small that a
+/// Hertz contact has no stiffness.
 constexpr double kNominalOverlap = 1e-4;
 
 enum class Moments { kWith, kWithout };

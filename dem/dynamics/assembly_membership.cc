@@ -8,7 +8,7 @@
 namespace calib::dem {
 namespace {
 
-constexpr int kGone = -1;
+constexpr int kGone = -1;  ///< new index of a grain that is taken out
 
 /// Leaves out the grains whose new index is kGone; the others stay in order.
 void DropGone(const std::vector<int>& to, ParticleArrays& p) {

@@ -16,7 +16,7 @@ CALIB_DEM_CLONES double LargestShift2(const ParticleArrays& p,
                                       const std::array<std::vector<double>, 3>& searched,
                                       const double* scale, double shear, std::size_t begin,
                                       std::size_t end) {
-  constexpr std::size_t kLanes = 8;
+  constexpr std::size_t kLanes = 8;  // partial maxima: a vector register of doubles or two
   const double* const x = p.x.data();
   const double* const y = p.y.data();
   const double* const z = p.z.data();

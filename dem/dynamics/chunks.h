@@ -4,8 +4,9 @@
 
 namespace calib::dem {
 
-/// Neighbour pairs of a chunk [-], a multiple of kBlock. Chosen: the loads of a chunk's grains stay in the
-/// first-level cache (dem/DECISIONS.md, loads are added up chunk by chunk). Changing it changes bits.
+/// Neighbour pairs of a chunk [-], a multiple of kBlock. Chosen: the loads of a chunk's grains stay
+/// in the first-level cache (dem/DECISIONS.md, loads are added up chunk by chunk). Changing it
+/// changes bits.
 inline constexpr int kPairChunk = 256;
 /// Grains of a chunk [-]. Chosen: enough work for a thread at a time. Changing it may change bits.
 inline constexpr int kGrainChunk = 256;

@@ -24,15 +24,16 @@ struct CommonChain {
   std::optional<Dashpot> dashpot;
 };
 
-/// The chain of a model where it is one of the commonest, which the head of this file lists; else empty. thickness: of disks [m]; 0: spheres.
+/// The chain of a model where it is one of the commonest, which the head of this file lists; else
+/// empty. thickness: of disks [m]; 0: spheres.
 std::optional<CommonChain> CommonChainOf(const Model& model, const ModelEntries& entries,
                                          double thickness = 0);
 
-/// Does what ContactModel::Evaluate() and CloseBlock() (pair_blocks.h) do together, with the same bits:
-/// overlap, forces, torques and memory of all lanes; zero where the lane does not overlap or is not in use. Columns
-/// of memory: shear force, rolling moment, twisting moment. Sets touching (kBlock of them) and
-/// returns how many lanes overlap. Stiffnesses are not set; CommonChainStiffness()
-/// does.
+/// Does what ContactModel::Evaluate() and CloseBlock() (pair_blocks.h) do together, with the same
+/// bits: overlap, forces, torques and memory of all lanes; zero where the lane does not overlap or
+/// is not in use. Columns of memory: shear force, rolling moment, twisting moment. Sets touching
+/// (kBlock of them) and returns how many lanes overlap. Stiffnesses are not set;
+/// CommonChainStiffness() does.
 int EvaluateCommonChain(const CommonChain& chain, ContactBlock& block, std::uint8_t* touching);
 
 /// Sets normals, overlap, all stiffnesses and dampings of a block, with the bits of

@@ -14,12 +14,13 @@
 
 namespace calib::dem {
 
-/// The chain of kernels of one model. Immutable and shared between copies; thread-safe, but for what
-/// stage() points to.
+/// The chain of kernels of one model. Immutable and shared between copies; thread-safe, but for
+/// what stage() points to.
 class ContactModel {
  public:
-  /// entries: what the names of the model stand for; they are not kept. Precondition: ScenarioProblems()
-  /// finds nothing wrong with the model. thickness: of disks [m]; 0: the grains are spheres.
+  /// entries: what the names of the model stand for; they are not kept. Precondition:
+  /// ScenarioProblems() finds nothing wrong with the model. thickness: of disks [m]; 0: the grains
+  /// are spheres.
   ContactModel(const Model& model, const ModelEntries& entries, double thickness = 0);
 
   /// Number of doubles that each contact remembers between steps, <= kMaxHistory.
@@ -31,24 +32,26 @@ class ContactModel {
   /// Largest factor by which what contacts remember may stiffen their normal force [-] >= 1.
   [[nodiscard]] double Stiffening() const;
 
-  /// tan(phi_mu) between grains of the model's own material [-]; consolidation may put another one into the block.
+  /// tan(phi_mu) between grains of the model's own material [-]; consolidation may put another one
+  /// into the block.
   [[nodiscard]] double sliding_friction() const { return sliding_friction_; }
 
   /// tan(phi_w) of contacts with walls [-].
   [[nodiscard]] double wall_friction() const { return wall_friction_; }
 
-  /// The materials of the model; null: it has one material. Where it is not null, blocks need `mixed` and
-  /// `materials`, and at walls `friction`, too.
+  /// The materials of the model; null: it has one material. Where it is not null, blocks need
+  /// `mixed` and `materials`, and at walls `friction`, too.
   [[nodiscard]] const Materials* materials() const { return materials_.get(); }
 
-  /// Computes kinematics, runs every kernel in the order of ContactStage and sums totals. Its history is
-  /// read and updated. Precondition: all inputs of the block are set.
+  /// Computes kinematics, runs every kernel in the order of ContactStage and sums totals. Its
+  /// history is read and updated. Precondition: all inputs of the block are set.
   void Evaluate(ContactBlock& block) const;
 
   /// The chain by which EvaluateCommonChain() can do the work of Evaluate(); empty: it cannot.
   [[nodiscard]] const std::optional<CommonChain>& common() const { return common_; }
 
-  /// The contact at which a formula of a user has given no finite number since the model was made, if any.
+  /// The contact at which a formula of a user has given no finite number since the model was made,
+  /// if any.
   [[nodiscard]] std::optional<ContactFault> Fault() const;
 
   /// What user's formulas know of the specimen, to be kept up to date by whoever drives it; null:

@@ -14,8 +14,12 @@
 namespace calib::dem {
 namespace {
 
-constexpr double kComminutionLimit = 0.1;  ///< of the first diameter
-constexpr double kDensestFines = 0.64;     ///< of the pores: random close packing
+/// Diameter over the first one below which grains do not crush [-]. Chosen: smaller grains cost
+/// steps and carry little.
+constexpr double kComminutionLimit = 0.1;
+/// Largest share of the pores that fines fill [-]: random close packing.
+/// [Scott & Kilgour, J. Phys. D 2 (1969) 863]
+constexpr double kDensestFines = 0.64;
 
 double Volume(double radius) { return 4.0 / 3.0 * std::numbers::pi * radius * radius * radius; }
 

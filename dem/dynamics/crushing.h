@@ -38,16 +38,17 @@ class Crushing {
   /// many. The forces are those of before until the next evaluation.
   int Crush(Assembly& assembly);
 
-  /// OK while the fines fit the pores between what is left of the grains. Beyond a random close packing of
-  /// fines there, 0.64 of the pores, they would carry the load, which the law has grains do alone.
-  /// [Scott & Kilgour, J. Phys. D 2 (1969) 863]
-  /// Errors: OUT_OF_RANGE with the porosity.
+  /// OK while the fines fit the pores between what is left of the grains. Beyond a random close
+  /// packing of fines there, 0.64 of the pores, they would carry the load, which the law has grains
+  /// do alone. [Scott & Kilgour, J. Phys. D 2 (1969) 863] Errors: OUT_OF_RANGE with the porosity.
   [[nodiscard]] absl::Status FinesFit(const Assembly& assembly) const;
 
-  /// Volume of the fines: what has crumbled away from grains of the radii that the assembly has now [m^3].
+  /// Volume of the fines: what has crumbled away from grains of the radii that the assembly has now
+  /// [m^3].
   [[nodiscard]] double FinesVolume(const Assembly& assembly) const;
 
-  /// Strength [Pa] of the grain with this id at a diameter [m] > 0 after it has crushed `times` >= 0 times.
+  /// Strength [Pa] of the grain with this id at a diameter [m] > 0 after it has crushed `times` >=
+  /// 0 times.
   [[nodiscard]] double Strength(int id, int times, double diameter) const;
 
  private:

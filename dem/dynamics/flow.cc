@@ -9,6 +9,8 @@
 namespace calib::dem {
 namespace {
 
+/// Steps between two looks at stiffness, finiteness and escaped grains [-]. Chosen: the step of a
+/// flow is that of its fastest impact already.
 constexpr std::int64_t kInspection = 50;
 
 /// sqrt(m/K) of two of the smallest grains that meet at a speed: the overlap u = v sqrt(m/K) and

@@ -30,13 +30,13 @@ struct Drained {
   double y = 0;     ///< coordinate at which it was taken out [m]
 };
 
-/// Drives an assembly, which has to outlive it, through time. Looks at the stop token every step. Not
-/// thread-safe.
+/// Drives an assembly, which has to outlive it, through time. Looks at the stop token every step.
+/// Not thread-safe.
 class Flow {
  public:
-  /// The step over sqrt(m/K) [-], K the stiffness of two of the smallest grains that meet at the speed of
-  /// the largest fall, unloading included. Chosen: about ten steps in the shortest collision
-  /// (dem/DECISIONS.md, the step of a flow follows the fastest impact).
+  /// The step over sqrt(m/K) [-], K the stiffness of two of the smallest grains that meet at the
+  /// speed of the largest fall, unloading included. Chosen: about ten steps in the shortest
+  /// collision (dem/DECISIONS.md, the step of a flow follows the fastest impact).
   static constexpr double kSafety = 0.3;
 
   /// The assembly's surroundings have gravity.
@@ -45,13 +45,13 @@ class Flow {
   /// Lets a duration [s] pass, to the end of the step that reaches it.
   StageEnd Advance(double duration);
 
-  /// Lets time pass with this local damping [-], 0 .. 1, until the grains are at rest or the longest time
-  /// [s] has passed, which is no failure. Rest is looked for every sqrt(d/g) and found when seen three
-  /// times in a row.
+  /// Lets time pass with this local damping [-], 0 .. 1, until the grains are at rest or the
+  /// longest time [s] has passed, which is no failure. Rest is looked for every sqrt(d/g) and found
+  /// when seen three times in a row.
   StageEnd Settle(double longest, double damping);
 
-  /// Sets what is called between motion and forces of every step, with the time [s] and the step [s] that is
-  /// likely to follow; it may set velocities of walls and let grains join.
+  /// Sets what is called between motion and forces of every step, with the time [s] and the step
+  /// [s] that is likely to follow; it may set velocities of walls and let grains join.
   void SetBeforeStep(std::function<void(double time, double dt)> before) {
     before_ = std::move(before);
   }

@@ -14,7 +14,8 @@ struct Motion {
   double drag = 0;                ///< global viscous damping: a -= drag v, also of spin [1/s] >= 0
 };
 
-/// Moves grains [begin, end) by their loads fx .. tz. Calls for ranges apart may run at the same time.
+/// Moves grains [begin, end) by their loads fx .. tz. Calls for ranges apart may run at the same
+/// time.
 ///   v += dt F'/m,  F' = F (1 - damping sign(F (v + dt F/2m))) per component,
 ///   w += dt T'/I,  T' = T (1 - damping sign(T (w + dt T/2I))) per component,
 ///   x += dt (v + L x)

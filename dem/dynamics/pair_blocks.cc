@@ -11,7 +11,7 @@
 namespace calib::dem {
 namespace {
 
-constexpr int kQuad = 4;
+constexpr int kQuad = 4;  ///< doubles of a Quad
 
 /// Three arrays of a ParticleArrays.
 template <class Pointer>

@@ -37,11 +37,12 @@ struct PairLanes {
 
 /// Where pairs leave what they do to grains. Every chunk of kPairChunk pairs has one place for each
 /// grain that it touches, side by side, so that loads are added up in the first-level cache; a
-/// grain then gathers its few places. Threads may work on different chunks, or gather different grains, at
-/// the same time.
+/// grain then gathers its few places. Thread-safe as far as threads Clear() and
+/// fill different chunks, or Gather() different grains; otherwise not thread-safe.
 class LoadPlaces {
  public:
-  /// Makes the places for `grains` grains and sets place_i and place_j of the lanes; all loads are zero.
+  /// Makes the places for `grains` grains and sets place_i and place_j of the lanes; all loads are
+  /// zero.
   void Assign(int grains, PairLanes& lanes);
 
   /// Sets the loads at the places of a chunk to zero; returns the first of them.
@@ -73,8 +74,8 @@ class LoadPlaces {
   std::vector<int> place_;      ///< of four grains in turn, those that have fewer with the last one
   std::vector<GrainLoad> load_;  ///< of all places, and one more that stays zero
 
-  /// What is known of a grain while places are assigned: the last chunk that met it, its place there, and
-  /// how many chunks have met it.
+  /// What is known of a grain while places are assigned: the last chunk that met it, its place
+  /// there, and how many chunks have met it.
   struct Met {
     int chunk, place, count;
   };
@@ -95,28 +96,29 @@ using LaneMemory = std::vector<LaneColumn>;
 /// Translation of one periodic image [m]; the fourth element is zero.
 using ImageShift = double[4];
 
-/// Sets dx .. dz of all lanes of `block`, which is block `b` of the lanes; returns whether any two of its
-/// grains overlap. shift: one per image code.
+/// Sets dx .. dz of all lanes of `block`, which is block `b` of the lanes; returns whether any two
+/// of its grains overlap. shift: one per image code.
 bool LoadBranches(const PairLanes& lanes, int b, const GrainRecord* grains, const ImageShift* shift,
                   ContactBlock& block);
 
 /// Sets radii and velocities of all lanes of `block`, which is block `b` of the lanes.
 void LoadGrains(const PairLanes& lanes, int b, const GrainRecord* grains, ContactBlock& block);
 
-/// Sums over contacts of f_x d_x, f_y d_y, f_z d_z, f_x d_z + f_z d_x [N m], force times branch vector,
-/// kept in four partial sums each until the end so that every compiler adds them in one order.
+/// Sums over contacts of f_x d_x, f_y d_y, f_z d_z, f_x d_z + f_z d_x [N m], force times branch
+/// vector, kept in four partial sums each until the end so that every compiler adds them in one
+/// order.
 struct alignas(32) LaneSums {
   double at[4][4] = {};
 };
 
-/// Decides which of the lanes act: those that overlap, and those that were formed and that a kernel holds
-/// at a gap below `reach` [m]. Sets touching (kBlock of them) and returns how many overlap; lanes
-/// from `count` on never act. Where not all act, forces, torques and memory (the first `width`
-/// columns) of those that do not become zero.
+/// Decides which of the lanes act: those that overlap, and those that were formed and that a kernel
+/// holds at a gap below `reach` [m]. Sets touching (kBlock of them) and returns how many overlap;
+/// lanes from `count` on never act. Where not all act, forces, torques and memory (the first
+/// `width` columns) of those that do not become zero.
 int CloseBlock(int count, double reach, int width, ContactBlock& block, std::uint8_t* touching);
 
-/// Adds the loads of all lanes of `block`, which is block `b` of the lanes, to those at their places, which
-/// begin at `loads`; writes the forces on grains j to `forces` and adds to `sums`.
+/// Adds the loads of all lanes of `block`, which is block `b` of the lanes, to those at their
+/// places, which begin at `loads`; writes the forces on grains j to `forces` and adds to `sums`.
 void AddLoads(const PairLanes& lanes, int b, const ContactBlock& block, GrainLoad* loads,
               BlockForces& forces, LaneSums& sums);
 

@@ -10,27 +10,33 @@
 namespace calib::dem {
 namespace {
 
-/// Steps between two looks at stiffness, balance and finiteness.
+/// Steps between two looks at stiffness, balance and finiteness [-]. Chosen: what steps exceed the
+/// bound by in between is in dem/DECISIONS.md, stiffness is looked at every 20 steps.
 constexpr std::int64_t kInspection = 20;
 
-/// The same where stiffness has grown by more than kGrowth since the last one, as where grains come
-/// into contact all at once.
+/// Steps to the next look where stiffness has grown by more than the factor kGrowth since the last
+/// one, as where grains come into contact all at once [-]. Chosen, as kInspection
+/// (dem/DECISIONS.md, stiffness is looked at every 20 steps).
 constexpr std::int64_t kSoon = 5;
 constexpr double kGrowth = 1.25;
 
-/// Stress-controlled axes beside a driven one may have to move several times faster than it.
+/// Largest rate of stress-controlled axes over that of a driven one [-]. Chosen: they may have to
+/// move several times faster.
 constexpr double kServoRateOverDriven = 10;
 
-/// A stress target counts as reached for the end of loading; settling then closes the rest.
+/// Relative error of a stress within which loading ends [-]. Chosen: settling then closes the rest.
 constexpr double kLoadingTolerance = 1e-2;
 
-/// How many times shorter moments make the step before a settling that fails says so.
+/// Assembly::MomentDelay() from which on a settling that fails says so [-]. Chosen: below it
+/// moments are not why it fails.
 constexpr double kDelayToTell = 10;
 
-/// Strain of an axis under a held stress from which on its cell is said to have collapsed.
+/// Strain of an axis under a held stress from which on its cell is said to have collapsed [-].
+/// Chosen: the words of a message hang on it, no result.
 constexpr double kCollapse = 0.05;
 
-/// Largest strain in one step, where no stiffness limits the step yet.
+/// Largest strain in one step where no stiffness limits the step yet [-]. Chosen: overlaps of new
+/// contacts stay small.
 constexpr double kMaxStrainPerStep = 1e-4;
 
 bool Drives(const CellTarget& target, const PeriodicCell& cell) {

@@ -39,8 +39,10 @@ struct StageOptions {
                             ///< moment (StableStep) [-], 0 .. 1
   double least_volume = 0;  ///< a settling ends where the cell has shrunk to this [m^3]
   bool adaptive = false;    ///< strained stages go faster than `rate` where forces stay balanced
-  std::int64_t max_settling_steps = 200'000;   ///< a settling that takes longer has diverged > 0
-  std::int64_t max_loading_steps = 20'000'000;  ///< a loading that takes longer has diverged > 0
+  std::int64_t max_settling_steps =
+      200'000;  ///< time steps [-] > 0: a settling that takes longer has diverged
+  std::int64_t max_loading_steps =
+      20'000'000;  ///< time steps [-] > 0: a loading that takes longer has diverged
 };
 
 /// How far a followed target (Follow) is from its end.
@@ -48,23 +50,24 @@ struct FollowGap {
   double tolerances = 0;  ///< error in tolerances [-] >= 0; settled when at most one
   double strain = 0;      ///< strain still to go [-] >= 0
 };
-/// Lets a target follow the specimen, called before every step: `target` is what was asked for and becomes
-/// what to do now, given the affine stiffness of each axis [Pa]; returns how far the stage is from its end.
+/// Lets a target follow the specimen, called before every step: `target` is what was asked for and
+/// becomes what to do now, given the affine stiffness of each axis [Pa]; returns how far the stage
+/// is from its end.
 using Follow = std::function<FollowGap(const std::array<double, 3>& modulus, CellTarget& target)>;
 
 /// How a stage of a run ended: its goal was reached, the stop token was set, or it failed.
 enum class StageEnd { kDone, kStopped, kDiverged };
 
-/// The rate of strained stages over StageOptions::rate, chosen at every inspection while straining so
-/// that the unbalanced force stays near kTarget times the one that ends a settling:
+/// The rate of strained stages over StageOptions::rate, chosen at every inspection while straining
+/// so that the unbalanced force stays near kTarget times the one that ends a settling:
 ///   f <- min(kFastest, max(1, f (kTarget unbalanced / U)^kGain))
 /// Elastic stages, which leave little unbalanced, go at several times the rate; where grains
-/// rearrange it is the rate asked for. Stages that hold stresses on
-/// all axes keep the rate. Not thread-safe.
+/// rearrange it is the rate asked for. Stages that hold stresses on all axes keep the rate. Not
+/// thread-safe.
 class StrainingSpeed {
  public:
-  /// Chooses the factor anew. unbalanced: mean unbalanced over mean contact force, U [-] >= 0; settled:
-  /// StageOptions::unbalanced.
+  /// Chooses the factor anew. unbalanced: mean unbalanced over mean contact force, U [-] >= 0;
+  /// settled: StageOptions::unbalanced.
   void Adapt(double unbalanced, double settled);
   /// The present rate over StageOptions::rate [-], 1 .. kFastest.
   [[nodiscard]] double factor() const { return factor_; }
@@ -75,13 +78,15 @@ class StrainingSpeed {
     archive(factor_);
   }
 
-  /// Largest factor() [-]. Chosen; what it does to curves and steps is measured in dem/VERIFICATION.md,
-  /// adaptive staging.
+  /// Largest factor() [-]. Chosen; what it does to curves and steps is measured in
+  /// dem/VERIFICATION.md, adaptive staging.
   static constexpr double kFastest = 8;
 
  private:
-  static constexpr double kTarget = 2;    ///< unbalanced force aimed at, in those that settle [-]. Chosen
-  static constexpr double kGain = 0.25;  ///< exponent of the correction [-]. Chosen: inspections are short
+  /// Unbalanced force that is aimed at, over the one that ends a settling [-]. Chosen.
+  static constexpr double kTarget = 2;
+  /// Exponent of the correction [-]. Chosen.
+  static constexpr double kGain = 0.25;
   double factor_ = 1;
 };
 
@@ -104,14 +109,14 @@ class QuasiStatic {
   /// Lets every target from now on follow the specimen; empty: targets are taken as they are given.
   void SetFollow(Follow follow) { follow_ = std::move(follow); }
 
-  /// Sets what is called at every inspection (20 steps); it may change grains, as crushing does. An error
-  /// ends the stage, with its message as the reason.
+  /// Sets what is called at every inspection (20 steps); it may change grains, as crushing does. An
+  /// error ends the stage, with its message as the reason.
   void SetIntervention(std::function<absl::Status(Assembly&)> intervention) {
     intervention_ = std::move(intervention);
   }
 
-  /// To be called when what contacts do has been changed from outside, as dashpots that begin to
-  /// act: stiffness is looked at anew before the next step.
+  /// Lets stiffness be looked at anew before the next step. To be called when what contacts do has
+  /// been changed from outside, as when dashpots begin to act.
   void InspectBeforeNextStep();
 
   [[nodiscard]] StageOptions& options() { return options_; }

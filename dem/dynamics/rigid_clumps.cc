@@ -20,6 +20,7 @@ using Quaternion = std::array<double, 4>;
 
 /// Bodies of a chunk move kLanes at a time, each in a lane of its own.
 constexpr int kLanes = 8;
+/// Bodies of a chunk [-]. Chosen: enough work for a thread at a time.
 constexpr int kClumpChunk = 8 * kLanes;
 
 // Plain members, so that a loop over lanes vectorises.

@@ -16,17 +16,18 @@ namespace calib::dem {
 
 /// One rigid body. Vectors in the axes of the cell.
 struct Clump {
-  std::vector<int> members;                ///< indices in the arrays, ascending
-  double mass = 0;                         ///< of the union of its spheres [kg]
-  double volume = 0;                       ///< of the union [m^3]
-  std::array<double, 3> inertia{};         ///< principal moments [kg m^2], > 0
-  std::array<double, 3> centre{};          ///< of mass, not wrapped [m]
-  std::array<double, 3> velocity{};        ///< peculiar, at half steps [m/s]
-  std::array<double, 3> momentum{};        ///< angular, at half steps [kg m^2/s]
-  std::array<double, 4> orientation{};     ///< unit quaternion (w, x, y, z): principal to cell axes
-  std::vector<std::array<double, 3>> at;   ///< centres of the members, principal axes [m]
-  std::vector<std::array<double, 3>> arm;  ///< centres of the members from the body's, cell axes, now [m]
-  std::vector<std::array<int, 3>> image;   ///< whole lattice vectors between member and body
+  std::vector<int> members;               ///< indices in the arrays, ascending
+  double mass = 0;                        ///< of the union of its spheres [kg]
+  double volume = 0;                      ///< of the union [m^3]
+  std::array<double, 3> inertia{};        ///< principal moments [kg m^2], > 0
+  std::array<double, 3> centre{};         ///< of mass, not wrapped [m]
+  std::array<double, 3> velocity{};       ///< peculiar, at half steps [m/s]
+  std::array<double, 3> momentum{};       ///< angular, at half steps [kg m^2/s]
+  std::array<double, 4> orientation{};    ///< unit quaternion (w, x, y, z): principal to cell axes
+  std::vector<std::array<double, 3>> at;  ///< centres of the members, principal axes [m]
+  std::vector<std::array<double, 3>>
+      arm;  ///< centres of the members from the body's, cell axes, now [m]
+  std::vector<std::array<int, 3>> image;  ///< whole lattice vectors between member and body
 
   /// For archives: all state.
   template <class Archive>
@@ -44,10 +45,10 @@ struct ClumpMatter {
       0;  ///< planar: of disks, of which each body has two equal ones [m]; 0: spheres
 };
 
-/// Clumps of an assembly; none where every grain is a sphere of its own. Mass and inertia are those of the
-/// union, so that overlapping members count once. Leapfrog: forces and momenta at half steps, orientation
-/// by the angular velocity at mid-step, with rational rotations (Cayley), so that the same bits come out on
-/// every processor. Not thread-safe; Advance() uses threads inside.
+/// Clumps of an assembly; none where every grain is a sphere of its own. Mass and inertia are those
+/// of the union, so that overlapping members count once. Leapfrog: forces and momenta at half
+/// steps, orientation by the angular velocity at mid-step, with rational rotations (Cayley), so
+/// that the same bits come out on every processor. Not thread-safe; Advance() uses threads inside.
 /// [Fincham 1992, Mol. Simul. 8, 165]
 class RigidClumps {
  public:
@@ -58,9 +59,9 @@ class RigidClumps {
   /// at the images nearest to their first.
   RigidClumps(const Packing& packing, const ClumpMatter& matter, ParticleArrays& particles);
 
-  /// Adds one clump of the particles at these indices, ascending, which belong to no clump, in a cell of
-  /// these three lengths [m]. It does not turn yet and has the velocity of its first member. Precondition:
-  /// particles.body is as long as the other arrays.
+  /// Adds one clump of the particles at these indices, ascending, which belong to no clump, in a
+  /// cell of these three lengths [m]. It does not turn yet and has the velocity of its first
+  /// member. Precondition: particles.body is as long as the other arrays.
   void Add(const std::vector<int>& members, const double* length, const ClumpMatter& matter,
            ParticleArrays& particles);
 
@@ -69,9 +70,9 @@ class RigidClumps {
   std::vector<Clump>& mutable_all() { return clumps_; }
 
   /// One step under the members' loads (fx .. tz of the particles) and the weight of the bodies,
-  /// gravity [m/s^2], with local damping and drag. Places members and gives them velocities such that their displacement is exactly that of the body.
-  /// Afterwards the body's loads stand at its first member and zero at the others. cell: after its
-  /// own step.
+  /// gravity [m/s^2], with local damping and drag. Places members and gives them velocities such
+  /// that their displacement is exactly that of the body. Afterwards the body's loads stand at its
+  /// first member and zero at the others. cell: after its own step.
   void Advance(const Motion& motion, const Vec3& gravity, const PeriodicCell& cell, int threads,
                ParticleArrays& particles);
 
@@ -83,8 +84,8 @@ class RigidClumps {
   void Renumber(const std::vector<int>& to, std::vector<int>& body);
 
   /// Adds up, at the first member of each clump, what holds its members when all other bodies stay
-  /// (translation and rotation of OwnStiffness, not the shares): translations add up, rotations gain what
-  /// translation does on the arms.
+  /// (translation and rotation of OwnStiffness, not the shares): translations add up, rotations
+  /// gain what translation does on the arms.
   void Fold(std::vector<OwnStiffness>& stiffness) const;
 
   /// For archives: all state.

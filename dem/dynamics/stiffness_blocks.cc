@@ -8,7 +8,7 @@
 namespace calib::dem {
 namespace {
 
-constexpr int kQuad = 4;
+constexpr int kQuad = 4;  ///< doubles of a Quad
 
 /// Stiffnesses or damping coefficients of the lanes; those of moments may be zero.
 struct Coefficients {
@@ -86,10 +86,10 @@ CALIB_DEM_INLINE void AddSide(const FourContacts& c, const Quad& r, const Quad& 
   AddRow(turn_off[0], turn_off[1], turn_off[2], none, place, &OwnStiffness::shared_turn_off, to);
 }
 
-/// Of a contact with normal n, against translation: c_n n n' + c_s (1 - n n'); against rotation: (c_s
-/// r^2 + c_r)(1 - n n') + c_t n n'; the couple: c_s r n. keep: above zero where a lane counts. along:
-/// adds translation times squared branch of each axis, in four sums, without what the contact may
-/// stiffen by.
+/// Of a contact with normal n, against translation: c_n n n' + c_s (1 - n n'); against rotation:
+/// (c_s r^2 + c_r)(1 - n n') + c_t n n'; the couple: c_s r n. keep: above zero where a lane counts.
+/// along: adds translation times squared branch of each axis, in four sums, without what the
+/// contact may stiffen by.
 CALIB_DEM_CLONES void AddTerms(const LanePlaces place, const Coefficients c, const ContactBlock& b,
                                const double* keep, OwnStiffness* to, double (*along)[kQuad]) {
   const Quad zero = {0, 0, 0, 0};

@@ -6,9 +6,9 @@ namespace calib::dem {
 /// Proportional-integral control of the compression rate, in units of what the affine stiffness K
 /// would need in one step: rate = (0.3 e + 0.005 sum e) / (K dt), e = target - stress. The integral
 /// removes the lag that a steadily straining specimen would otherwise have; it is overdamped down
-/// to a real stiffness of a fifth of K. What an axis needs while others are driven it no longer needs
-/// when they stop: the integral is to be forgotten then, or it drives the stress away from its target
-/// and unwinds only over hundreds of steps. Not thread-safe.
+/// to a real stiffness of a fifth of K. What an axis needs while others are driven it no longer
+/// needs when they stop: the integral is to be forgotten then, or it drives the stress away from
+/// its target and unwinds only over hundreds of steps. Not thread-safe.
 class StressServo {
  public:
   /// What the servo sees of its axis.
@@ -44,8 +44,8 @@ class StressServo {
   void Forget() { integral_ = 0; }
 
  private:
-  /// Gains of the control [-]. Chosen: overdamped down to a real stiffness of a fifth of K, which
-  /// StressServo.* in tests/unit/dem/stress_servo_test.cc holds.
+  /// Gains of the control [-]. Chosen: overdamped down to a real stiffness of a fifth of K;
+  /// what an axis does with them is held by tests/unit/dem/stress_servo_test.cc.
   static constexpr double kProportional = 0.3;
   static constexpr double kIntegral = 0.005;
   double integral_ = 0;  ///< compression rate that the axis needs in the long run [1/s]

@@ -11,12 +11,16 @@
 namespace calib::dem {
 namespace {
 
+/// Grains at walls in a chunk [-]. Chosen: enough work for a thread at a time. Changing it may
+/// change bits.
 constexpr int kRowChunk = 64;
 
-/// Nearest points closer than this are one, over the radius: far above rounding, far below grains.
+/// Distance over the radius below which nearest points are one [-]. Chosen: far above rounding, far
+/// below grains.
 constexpr double kSamePlace = 1e-7;
 
-/// A contact that has moved less than this since the last step is the same one, over the radius.
+/// Way over the radius below which a contact of the step before is taken to be the same one [-].
+/// Chosen: far more than a step's way, far less than a grain.
 constexpr double kSameContact = 0.1;
 
 /// A triangle or plane within range, before contacts are told from each other. Left without values
@@ -40,7 +44,7 @@ double WallContacts::FrictionOf(int wall, const ContactModel& model, int pair) c
 
 void WallContacts::FindContacts(const ParticleArrays& p, const Step& step, std::size_t r,
                                 ChunkResult& result) {
-  constexpr int kMostNear = 64;
+  constexpr int kMostNear = 64;  // triangles within range of a grain [-], chosen: more end the run
   Row& row = rows_[r];
   const auto g = static_cast<std::size_t>(row.grain);
   const Vec3 centre{p.x[g], p.y[g], p.z[g]};

@@ -18,12 +18,12 @@ namespace calib::dem {
 /// Walls and their contacts. A grain has one contact with a plane that it overlaps and one for each
 /// local minimum of the distance from its centre to a mesh: a face counts once, an edge or corner
 /// that triangles share counts once, and not where one of them is nearer elsewhere. A contact that
-/// rolls from one triangle to the next keeps what it remembers. Copyable: a copy goes on to the same bits. Not
-/// thread-safe; Evaluate() uses threads inside.
+/// rolls from one triangle to the next keeps what it remembers. Copyable: a copy goes on to the
+/// same bits. Not thread-safe; Evaluate() uses threads inside.
 class WallContacts {
  public:
-  /// Contacts that one grain may have with walls [-]. Chosen: more than the faces that meet at a corner of a
-  /// box, or at a ridge in it.
+  /// Contacts that one grain may have with walls [-]. Chosen: a grain in the corner of a box has
+  /// three; one that has more than these ends the run.
   static constexpr int kMost = 8;
 
   explicit WallContacts(std::vector<Wall> walls = {}) : walls_(std::move(walls)) {}
@@ -83,7 +83,8 @@ class WallContacts {
     archive(walls_, searched_, moved_, rows_, candidates_, slots_, force_, contacts_);
   }
 
-  /// Gives grains new indices: grain q becomes to[q]; -1: it is taken out. To be followed by Search.
+  /// Gives grains new indices: grain q becomes to[q]; -1: it is taken out. To be followed by
+  /// Search.
   void Renumber(const std::vector<int>& to);
 
  private:
@@ -123,8 +124,8 @@ class WallContacts {
                      int chunk, ChunkResult& result);
   void LoadLane(const ParticleArrays& p, const ContactModel& model, const Row& row,
                 const Contact& contact, ContactBlock& block) const;
-  /// tan(phi_w) of a contact with a wall [-]. pair: Materials::Pair() of grain and wall, where the model has
-  /// several materials.
+  /// tan(phi_w) of a contact with a wall [-]. pair: Materials::Pair() of grain and wall, where the
+  /// model has several materials.
   [[nodiscard]] double FrictionOf(int wall, const ContactModel& model, int pair) const;
   [[nodiscard]] int PairOf(const ParticleArrays& p, int grain, const ContactModel& model) const {
     return model.materials() == nullptr

@@ -15,8 +15,8 @@ void Alter(const ParameterSet& parameters, Apparatus& apparatus) {
 /// x is the load on the frame since the start of loading: q in triaxial tests, sigma_a - sigma_a0
 /// in oedometric ones. The reading drives the test: a stage ends when it, not the specimen's
 /// strain, has reached the control. In oedometric tests volume follows the reading, in triaxial
-/// ones it is measured apart. One-sided, vanishes at compliance 1/K = 0. [Jardine, Symes & Burland
-/// 1984]
+/// ones it is measured apart. One-sided, vanishes at compliance 1/K = 0.
+/// [Jardine, Symes & Burland 1984]
 EffectEntry ApparatusCompliance() {
   ParameterInfo compliance;
   compliance.name = "compliance";

@@ -78,10 +78,11 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 /// since p = Z phi F/(pi d^2) [Rumpf 1958] with coordination number times solid fraction near pi.
 /// In terms of the law's force F = F_b (F_b/(p_ref d*^2))^((n-m)/m), so no modulus enters.
 /// The shear stiffness goes with the tangent of the force: for elastic bodies of any axisymmetric
-/// profile their ratio is that of Mindlin, 2(1-nu)/(2-nu) [Jaeger, Arch. Appl. Mech. 65 (1995)
-/// 478]. Two-sided, vanishes at n = m. Below a thousandth of the reference force (n < m) the factor
-/// is held, since stiffness would grow without bound as u -> 0. [Walton 1987; Agnolin & Roux 2007,
-/// sec. II, on the exponent's part in elastic moduli of packings]
+/// profile their ratio is that of Mindlin, 2(1-nu)/(2-nu).
+/// [Jaeger, Arch. Appl. Mech. 65 (1995) 478]
+/// Two-sided, vanishes at n = m. Below a thousandth of the reference force (n < m) the factor
+/// is held, since stiffness would grow without bound as u -> 0.
+/// [Walton 1987; Agnolin & Roux 2007, sec. II, the exponent in moduli of packings]
 EffectEntry HertzNonlinearity() {
   ParameterInfo exponent;
   exponent.name = "exponent";

@@ -14,8 +14,8 @@ void Alter(const ParameterSet& parameters, Apparatus& apparatus) {
 
 ///   sigma_a reported = sigma_a + g x + s0,   x as in apparatus_compliance
 /// The cell is taken to zero at the start of loading; what it then reads is wrong by a factor and
-/// by a shift. Changes reports only, not the test. Two-sided, vanishes at g = 0 and s0 = 0. [ASTM
-/// E74]
+/// by a shift. Changes reports only, not the test. Two-sided, vanishes at g = 0 and s0 = 0.
+/// [ASTM E74]
 EffectEntry LoadCellError() {
   ParameterInfo gain;
   gain.name = "gain";

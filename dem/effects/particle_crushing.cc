@@ -15,8 +15,9 @@ void Prepare(const ParameterSet& parameters, Preparation& preparation) {
 }  // namespace
 
 /// Law and size-loss rule: dynamics/crushing.h. Vanishes at weakness 0 (infinite strength) and at
-/// size_loss 0. One-sided. Fines carry no force and count as solid volume. [McDowell & Bolton 1998;
-/// crushed material taken out of the skeleton as in Marketos & Bolton 2009]
+/// size_loss 0. One-sided. Fines carry no force and count as solid volume.
+/// [McDowell & Bolton 1998]
+/// [Marketos & Bolton 2009: crushed material is taken out of the skeleton]
 EffectEntry ParticleCrushing() {
   ParameterInfo weakness;
   weakness.name = "weakness";

@@ -63,8 +63,8 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 /// since p = Z phi F/(pi d^2) [Rumpf 1958] with coordination number times solid fraction near pi.
 /// In one test at one pressure this is nearly another constant friction; it shows between
 /// pressures. Fn is without adhesive pull. Two-sided, vanishes at m = 0; for Hertz contacts of
-/// constant shear strength per area m = 1/3. sigma/p_ref below 1e-6 counts as 1e-6. [Bowden & Tabor
-/// 1950; Archard 1957]
+/// constant shear strength per area m = 1/3. sigma/p_ref below 1e-6 counts as 1e-6.
+/// [Bowden & Tabor 1950; Archard 1957]
 EffectEntry PressureDependentFriction() {
   ParameterInfo exponent;
   exponent.name = "exponent";

@@ -6,11 +6,13 @@
 
 namespace calib::dem {
 
-/// What the dashpots of all contacts have in common.
+/// What the dashpots of `viscous_damping` have in common at all contacts of grains of one material.
 struct Dashpot {
-  double twice_ratio = 0;  ///< 2 beta
-  GrainMass grains{};
+  double twice_ratio = 0;  ///< twice the damping ratio beta [-] >= 0
+  GrainMass grains{};      ///< masses of the grains
 };
+
+/// The dashpots by the parameters of the effect. Pure. Precondition: the model has one material.
 Dashpot DashpotFrom(const KernelContext& context);
 
 }  // namespace calib::dem

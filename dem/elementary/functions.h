@@ -25,9 +25,9 @@ double Pow(double x, double y);
 /// The cube root within 1 ulp, of negative numbers too.
 double CubeRoot(double x);
 
-/// sin x and cos x within 1 ulp, tan x within 2, while |x| < 1e6 (next to their zeros the error is
-/// below 1e-28 instead where that is more); beyond that the period is 2 pi as a double, and from
-/// 1e15 on or so they say nothing. Infinite x gives NaN.
+/// sin x and cos x (Cosine) within 1 ulp, tan x (Tangent) within 2 ulp, while |x| < 1e6 (next to
+/// their zeros the error is below 1e-28 instead where that is more); beyond that the period is 2 pi
+/// as a double, and from 1e15 on or so they say nothing. Infinite x gives NaN.
 double Sine(double x);
 double Cosine(double x);
 double Tangent(double x);
@@ -45,7 +45,7 @@ double Direction(double y, double x);
 /// The error function within 1e-15 for |x| <= 3; beyond it saturates at +-erf(3).
 double ErrorFunction(double x);
 
-/// sqrt(x^2 + y^2 (+ z^2)) within 2 ulp where the squares neither overflow nor vanish.
+/// sqrt(x^2 + y^2 + z^2) within 2 ulp where the squares neither overflow nor vanish.
 double Hypotenuse(double x, double y, double z = 0);
 
 }  // namespace calib::dem

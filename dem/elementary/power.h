@@ -23,7 +23,7 @@ inline double Power(double x, double y) {
   for (int n = 19; n >= 1; n -= 2) {
     series = series * t2 + 1.0 / n;
   }
-  constexpr double kTwoOverLn2 = 2.8853900817779268;
+  constexpr double kTwoOverLn2 = 2.8853900817779268;  // 2/ln 2
   double power = y * (exponent + kTwoOverLn2 * t * series);
   power = power > 1000.0 ? 1000.0 : power;
   power = power < -1000.0 ? -1000.0 : power;

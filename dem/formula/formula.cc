@@ -23,7 +23,7 @@ double Root(double x) { return std::sqrt(x); }
 double Size(double x) { return std::abs(x); }
 
 /// muParser's own power is libm's, which has other bits on other processors, and cannot be
-/// redefined: formulas are given to it with this operator for theirs.
+/// redefined: formulas are given to it with this operator in place of ^.
 constexpr char kPower = '#';
 
 std::string ForParser(std::string text) {

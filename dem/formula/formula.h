@@ -7,21 +7,23 @@
 
 namespace calib::dem {
 
-/// What is wrong with an expression.
+/// What is wrong with the text of an expression.
 struct FormulaProblem {
   std::string message;  ///< a sentence without the position; empty: nothing is wrong
-  int position = 0;     ///< 1-based character
+  int position = 0;     ///< 1-based character of the text at which it shows
 };
 
-/// Functions that an expression may call.
+/// Names of the functions that an expression may call. Thread-safe.
 const std::vector<std::string>& FormulaFunctions();
 
-/// + - * / ^, comparisons, && ||, condition ? a : b, numbers, names and FormulaFunctions(). Thread
-/// safe: as many evaluators as threads ask at once, each compiled from the same text, so that all
-/// give the same bits. Transcendental functions and powers come from the C library of the machine.
+/// An expression of + - * / ^, comparisons, && ||, condition ? a : b, numbers, names and
+/// FormulaFunctions(). Immutable; thread-safe: there are as many evaluators as threads ask at once,
+/// each compiled from the same text, so that all give the same bits. Functions and powers are those
+/// of dem/elementary.
 class Formula {
  public:
-  /// Syntax and names. `names`: letters, digits and _, not beginning with a digit.
+  /// Checks syntax and names of an expression. `names`: letters, digits and _, not beginning with a
+  /// digit.
   static FormulaProblem Check(const std::string& text, const std::vector<std::string>& names);
 
   /// Precondition: Check() finds nothing wrong. Copies share their evaluators.
@@ -31,7 +33,7 @@ class Formula {
   [[nodiscard]] const std::vector<int>& used() const { return used_; }
 
   /// results[k] = value at row k, for `count` rows of used().size() numbers each, in the order of
-  /// used(). What is not defined there comes out as NaN or infinite. Never fails.
+  /// used(). Where the expression is not defined the value is NaN or infinite. Never fails.
   void Evaluate(const double* rows, int count, double* results) const;
 
  private:

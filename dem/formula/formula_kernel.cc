@@ -10,9 +10,14 @@
 namespace calib::dem {
 namespace {
 
+/// Names that a formula may mention [-]. Chosen: all quantities and UserEffect's parameters are
+/// fewer.
 constexpr int kMostNames = 32;
-/// Steps of the difference quotients: of the overlap, relative; of velocities, and at least [m/s].
+/// Step of the difference quotient in the overlap, over the overlap [-]. Chosen: slopes only bound
+/// the time step.
 constexpr double kOverlapStep = 1e-3;
+/// Step of the difference quotient in a velocity, over the velocity [-], and the least one [m/s].
+/// Chosen as kOverlapStep.
 constexpr double kVelocityStep = 0.1;
 constexpr double kLeastVelocity = 1e-6;
 

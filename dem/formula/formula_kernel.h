@@ -14,37 +14,39 @@
 
 namespace calib::dem {
 
-/// Values of StageQuantities(), in their order. Written between steps by whoever drives the
-/// specimen.
+/// Values of StageQuantities(), in their order. Not thread-safe: whoever drives the specimen writes
+/// them between steps, when no kernel runs.
 struct StageState {
   double mean_stress = 0, deviatoric_stress = 0;   ///< [Pa]
   double axial_strain = 0, volumetric_strain = 0;  ///< [-]
   double porosity = 0;                             ///< [-]
 };
 
-/// Where a formula gave no finite number.
+/// A contact at which a formula gave no finite number.
 struct ContactFault {
-  bool wall = false;
-  int pair = 0;      ///< ContactBlock::pair
-  std::string what;  ///< effect, formula and the values it had
+  bool wall = false;  ///< it is a contact with a wall
+  int pair = 0;       ///< ContactBlock::pair
+  std::string what;   ///< effect, formula and the values it had
 };
 
-/// Stage at which a contact formula acts.
+/// Stage of the chain at which an effect of a user that is of kind "contact" acts.
 ContactStage StageOf(const UserEffect& effect);
 
-/// A value that is not finite is never used: the contact goes on as without the effect, and the
-/// first such contact (of the smallest pair) is kept until somebody asks for it. So is the time
-/// step kept stable: with block.dt = 0 the slopes of the formula with overlap and velocity join
-/// stiffness and damping. Thread-safe.
+/// Kernel of a user's formula. A value that is not finite is never used: the contact goes on as
+/// without the effect, and the first such contact (of the smallest pair) is what Fault() tells.
+/// With block.dt = 0 the slopes of the formula with overlap and velocity join stiffness and
+/// damping, so that the time step stays stable. Thread-safe, but for the StageState that it reads.
 class FormulaKernel final : public ContactKernel {
  public:
-  /// Precondition: UserEffectProblems() finds nothing. stage: may be null where !NeedsStage().
+  /// Precondition: UserEffectProblems() finds nothing. stage: null where
+  /// NeedsStage() is false.
   FormulaKernel(const UserEffect& effect, const ParameterSet& parameters, const GrainMass& grains,
                 std::shared_ptr<const StageState> stage);
 
   [[nodiscard]] int HistorySize() const override { return remembers_ ? 1 : 0; }
   void Apply(ContactBlock& block, int first) const override;
 
+  /// The first contact, of the smallest pair, at which the formula gave no finite number, if any.
   [[nodiscard]] std::optional<ContactFault> Fault() const;
 
  private:
@@ -62,7 +64,7 @@ class FormulaKernel final : public ContactKernel {
   GrainMass grains_;
   std::shared_ptr<const StageState> stage_;
   bool viscous_ = false;
-  bool remembers_ = false;  ///< the sliding distance
+  bool remembers_ = false;  ///< contacts remember their sliding distance
   double neutral_ = 0;
   mutable std::mutex mutex_;
   mutable std::optional<ContactFault> fault_;

@@ -11,6 +11,7 @@
 namespace calib::dem {
 namespace {
 
+/// Parameters that an effect of a user may have [-]. Chosen: a formula is a line.
 constexpr std::size_t kMostParameters = 8;
 
 constexpr const char* kNameRule =
@@ -85,6 +86,7 @@ bool Mentions(const UserEffect& effect, std::span<const FormulaQuantity> names) 
 
 /// Values that quantities usually have, for probing a formula; `which` chooses among them.
 double Probe(const FormulaQuantity& quantity, int which) {
+  // About the usual value, either way [-]. Chosen.
   static constexpr double kFactor[] = {1, 0.2, 5};
   const double factor = kFactor[which % 3];
   if (quantity.unit == "Pa") return 1e5 * factor;
@@ -124,6 +126,7 @@ double ProbedValue(const UserEffect& effect, const Formula& formula, int which, 
   return value;
 }
 
+/// Values at which a formula is probed [-]: the factors of Probe().
 constexpr int kProbes = 3;
 
 /// Quantities that are zero in every run: before loading, at rest, where a contact begins.

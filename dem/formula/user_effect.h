@@ -10,32 +10,35 @@
 
 namespace calib::dem {
 
-/// Something that a formula may speak of, or change.
+/// A number that a formula may speak of, or change.
 struct FormulaQuantity {
   std::string name;
   std::string unit;  ///< SI
   std::string description;
 };
 
-/// What is known of one contact when the formula is evaluated: the same whichever of the two grains
-/// comes first. Not of it: StageQuantities().
+/// What a formula knows of one contact when it is evaluated, the same whichever of the two grains
+/// comes first. What it knows of the specimen is in StageQuantities(). The span lives as long as
+/// the program; thread-safe, as all functions here.
 std::span<const FormulaQuantity> ContactQuantities();
 
-/// What is known of the specimen as a whole, in tests in the periodic cell: during consolidation
-/// stresses are those it is compressed to and strains zero, then as of at most 20 time steps ago.
+/// What a formula at contacts knows of the specimen as a whole, in tests in the periodic cell.
+/// During consolidation stresses are those that the specimen is compressed to and strains are zero;
+/// later all are at most 20 time steps old.
 std::span<const FormulaQuantity> StageQuantities();
 
-/// Readings of the tests in the periodic cell.
+/// What a formula of kind "measurement" knows: the readings of tests in the periodic cell.
 std::span<const FormulaQuantity> ReadingQuantities();
 
-/// What a formula of a contact may change. `scales` only normal_force and friction_coefficient,
-/// `adds` all but the latter.
+/// Targets of formulas of kind "contact". A formula that scales may change normal_force and
+/// friction_coefficient only, one that adds all but friction_coefficient.
 std::span<const FormulaQuantity> ContactTargets();
 
-/// Readings that a formula may change: all but strains that drive tests.
+/// Targets of formulas of kind "measurement": all readings but the strains that drive tests.
 std::span<const FormulaQuantity> ReadingTargets();
 
-/// Kind of an effect with this target: "measurement" of ReadingTargets(), else "contact".
+/// Kind of an effect with this target: "measurement" where it is one of ReadingTargets(), else
+/// "contact".
 std::string KindOfTarget(const std::string& target);
 
 /// Names that the formula of an effect of this kind ("contact", "measurement") may use beside its
@@ -45,19 +48,22 @@ std::vector<FormulaQuantity> QuantitiesOf(const std::string& kind);
 /// The names of QuantitiesOf() followed by those of the parameters.
 std::vector<std::string> FormulaNames(const UserEffect& effect);
 
-/// Whether the formula speaks of a velocity: such an effect is viscous, off during consolidation.
+/// Whether the effect acts at contacts and its formula speaks of a velocity: such an effect is
+/// viscous and off during consolidation.
 bool IsViscous(const UserEffect& effect);
 
-/// Whether the formula speaks of a StageQuantity and acts at contacts.
+/// Whether the effect acts at contacts and its formula speaks of one of StageQuantities().
 bool NeedsStage(const UserEffect& effect);
 
-/// What is wrong with it, a sentence each; empty: it can run. Names of effects and parameters are
-/// letters, digits and _, begin with a letter and are nobody else's; name_taken: the build has an effect of its name.
+/// What is wrong with an effect of a user, a sentence each; empty: it can run. Names of effects and
+/// parameters are letters, digits and _, begin with a letter and are used once. name_taken: the
+/// build has an effect of the same name.
 std::vector<std::string> UserEffectProblems(const UserEffect& effect, bool name_taken);
 
-/// What the formula is where its parameters are at their null, if not exactly nothing, or that it
-/// is finite nowhere; the rest of a sentence about it, empty: neither. Precondition: it can run and
-/// parameters without a default have a default prior.
+/// What the formula gives where its parameters are at their null, if that is not exactly no effect,
+/// or that it is finite nowhere, as the rest of a sentence about the formula; empty: neither.
+/// Precondition: UserEffectProblems() finds nothing and parameters without a default have a default
+/// prior.
 std::string NullProblem(const UserEffect& effect);
 
 }  // namespace calib::dem

@@ -12,7 +12,9 @@
 namespace calib::dem {
 namespace {
 
-constexpr double kFlat = 1e-3;  // of the size
+/// Distance from a plane or line, over the mesh's size, within which a rim is flat or straight [-].
+/// Chosen: as nearly as meshes are drawn.
+constexpr double kFlat = 1e-3;
 
 using Loop = std::vector<Vec3>;
 
@@ -34,7 +36,8 @@ double LengthAround(const Loop& loop) {
   return length;
 }
 
-/// The loops that edges of one triangle form, the longest first; `problem` says where they are none.
+/// The loops that edges of one triangle form, the longest first; `problem` says where they are
+/// none.
 std::vector<Loop> OpenLoops(const TriangleMesh& mesh, std::string& problem) {
   const std::vector<int> place = PlacesOf(mesh);
   std::map<int, Vec3> where;

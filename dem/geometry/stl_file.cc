@@ -11,6 +11,7 @@
 namespace calib::dem {
 namespace {
 
+// Bytes of the header and of each triangle of a binary STL file, as the format has them.
 constexpr std::size_t kHeader = 80;
 constexpr std::size_t kPerTriangle = 50;
 

@@ -21,8 +21,8 @@ class TriangleGrid {
   void Near(const Vec3& p, double distance, std::vector<int>& near) const;
 
  private:
-  static constexpr int kMostCells =
-      16;  ///< per axis [-]. Chosen: a grid must not cost more than it saves
+  /// Cells per axis [-]. Chosen: a grid must not cost more than it saves.
+  static constexpr int kMostCells = 16;
 
   [[nodiscard]] std::array<int, 3> CellOf(const Vec3& p) const;
   [[nodiscard]] std::size_t Index(const std::array<int, 3>& cell) const;

@@ -138,7 +138,7 @@ void AddFrustum(const Frustum& frustum, TriangleMesh& mesh) { AddSides(frustum, 
 void AddFrustumAlongY(const Frustum& frustum, TriangleMesh& mesh) { AddSides(frustum, true, mesh); }
 
 std::vector<std::string> MeshProblems(const TriangleMesh& mesh, bool closed) {
-  constexpr std::size_t kMost = 10;
+  constexpr std::size_t kMost = 10;  // problems that are told [-], chosen: a screenful
   if (mesh.triangle.empty()) {
     return {"the mesh has no triangles"};
   }

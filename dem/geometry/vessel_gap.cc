@@ -15,11 +15,20 @@
 namespace calib::dem {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
-constexpr double kFoot = 1e-2;   // of the height: where the wall begins
-constexpr double kSmall = 1e-4;  // rad: seams that are not quite closed
-constexpr double kOver = 1e-3;   // of the height: what is so near the origin closes it
-constexpr double kLevel = 1e-6;  // of the height
+constexpr double kTurn = 2 * std::numbers::pi;  ///< a whole turn [rad]
+/// Height above the lowest point, over the vessel's height, at which the wall has begun [-].
+/// Chosen: rounded and slanting feet end below it.
+constexpr double kFoot = 1e-2;
+/// Widest gap that counts as closed [rad]. Chosen: seams of files in single precision are not quite
+/// closed.
+constexpr double kSmall = 1e-4;
+/// Distance from the vertical through the origin, over the vessel's height, within which a mesh
+/// closes it [-], and height within which a rim is level. Chosen: as nearly as meshes are drawn.
+constexpr double kOver = 1e-3;
+/// Difference of heights, over the vessel's height, within which two are one [-]. Chosen: single
+/// precision.
+constexpr double kLevel = 1e-6;
+/// Heights that are looked at [-]. Chosen: a bound for the time that fine meshes take.
 constexpr std::size_t kMostLevels = 500;
 
 struct Place {

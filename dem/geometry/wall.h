@@ -14,14 +14,15 @@ namespace calib::dem {
 /// that keeps grains on the side its normal points to.
 struct Wall {
   std::string name;
-  TriangleMesh mesh;               ///< vertices where they are now [m]; empty: a plane
-  Vec3 point, normal;              ///< of the plane: any point of it [m], unit vector
-  bool active = true;              ///< false: not there (an opened trapdoor)
-  Vec3 velocity;                   ///< of `centre` [m/s]; a plane moves without turning
-  Vec3 angular_velocity;           ///< about `centre` [rad/s]
-  Vec3 centre;                     ///< moves with the wall [m]
-  Vec3 surface_velocity;           ///< of a conveyor: the surface runs, the wall stays [m/s]
-  std::optional<double> friction;  ///< tan(phi) against grains; unset: the friction of the model's walls
+  TriangleMesh mesh;      ///< vertices where they are now [m]; empty: a plane
+  Vec3 point, normal;     ///< of the plane: any point of it [m], unit vector
+  bool active = true;     ///< false: not there (an opened trapdoor)
+  Vec3 velocity;          ///< of `centre` [m/s]; a plane moves without turning
+  Vec3 angular_velocity;  ///< about `centre` [rad/s]
+  Vec3 centre;            ///< moves with the wall [m]
+  Vec3 surface_velocity;  ///< of a conveyor: the surface runs, the wall stays [m/s]
+  std::optional<double>
+      friction;  ///< tan(phi) against grains; unset: the friction of the model's walls
 
   [[nodiscard]] bool IsPlane() const { return mesh.triangle.empty(); }
   [[nodiscard]] bool Moves() const {

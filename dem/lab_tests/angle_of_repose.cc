@@ -13,8 +13,10 @@ namespace calib::dem {
 
 namespace {
 
+/// Flat sides of the cylinder [-]. Chosen: its inner radius varies by 0.5 %.
 constexpr int kSides = 32;
-constexpr double kSolidFraction = 0.58;  ///< of the filling
+/// Solid fraction of the filling [-]. Chosen: that of poured grains; the radius follows from it.
+constexpr double kSolidFraction = 0.58;
 
 StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
   const double d = run.largest_diameter();

@@ -16,11 +16,19 @@ namespace calib::dem {
 
 namespace {
 
-constexpr double kHopperSlope = 1.0471975511965976;  ///< of its walls, 60 degrees [rad]
-constexpr double kPiled = 0.55;                      ///< solid fraction of a loose pile
-constexpr int kLooks = 20;                           ///< in a fall by half a mean diameter
-constexpr double kOnSlide = 0.003;  ///< share of the material below which the slide counts as empty
-constexpr double kPenalty = 10;     ///< [s] per share of the material that never leaves the slide
+/// Slope of the hopper's walls, 60 degrees [rad]. Chosen.
+constexpr double kHopperSlope = 1.0471975511965976;
+/// Solid fraction of a loose pile [-]. Chosen: sizes of the device and the longest duration follow
+/// from it.
+constexpr double kPiled = 0.55;
+/// Looks at the masses in a fall by half a mean diameter [-]. Chosen: times are read to a
+/// twentieth of that fall.
+constexpr int kLooks = 20;
+/// Share of the material below which the slide counts as empty [-]. Chosen: a few grains may stick.
+constexpr double kOnSlide = 0.003;
+/// What is added to the slide time per share of the material that never leaves the slide [s].
+/// Chosen: the observable goes on growing where nothing slides.
+constexpr double kPenalty = 10;
 
 /// Places in the plane of x and z, x = 0 below the outlet, the pile's corner at the left.
 struct Device {

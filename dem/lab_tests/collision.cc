@@ -79,17 +79,31 @@ TestInfo Info() {
           .bodies = {"partner"}};
 }
 
-/// Smallest angle that a collision is computed at [rad]: tangential restitution at normal incidence
-/// is its limit for small angles.
+/// Smallest angle that a collision is computed at [rad]. Chosen: tangential restitution at normal
+/// incidence is its limit for small angles.
 constexpr double kSmallestImpactAngle = 1e-6;
 
+/// Steps in half a period of the elastic contact [-]. Measured: errors in dem/VERIFICATION.md,
+/// collisions; fewer move friction by 2.4e-4 (dem/DECISIONS.md, a collision begins and ends between
+/// two steps).
 constexpr double kStepsPerHalfPeriod = 5000;
-constexpr double kStepsPerRelaxation = 200;  ///< of the fastest motion that a dashpot slows
-constexpr double kMostSteps = 2e6;           ///< of a block of collisions
-constexpr double kRoundedEnergy = 1e-3;      ///< that steps may seem to add
-constexpr int kLongestInHalfPeriods = 200;   ///< bodies that touch for longer stick together
-constexpr double kDeepest = 0.5;             ///< smaller radii, as between grains of a specimen
-constexpr double kLargestRatio = 1e4;        ///< of radii: beyond, overlaps drown in rounding
+/// Steps in the time constant of the fastest motion that a dashpot slows [-]. Chosen: Collision.*
+/// holds that no energy is gained (dem/DECISIONS.md, the step of a collision follows its dashpots
+/// too).
+constexpr double kStepsPerRelaxation = 200;
+/// Most steps of a block of collisions [-]. Chosen: a bound for strong dashpots.
+constexpr double kMostSteps = 2e6;
+/// Share of the energy that steps may seem to add before a collision counts as diverged [-].
+/// Chosen.
+constexpr double kRoundedEnergy = 1e-3;
+/// Half periods of the elastic contact after which bodies that still touch count as stuck [-].
+/// Chosen.
+constexpr int kLongestInHalfPeriods = 200;
+/// Largest overlap in smaller radii [-]. Chosen: as between grains of a specimen,
+/// Assembly::EstimateStiffness().
+constexpr double kDeepest = 0.5;
+/// Largest ratio of the two radii [-]. Chosen: beyond it overlaps drown in rounding.
+constexpr double kLargestRatio = 1e4;
 
 struct Body {
   double radius = 0;
@@ -252,7 +266,7 @@ class CollisionRun {
 
   /// Why bodies that have not parted are given up.
   [[nodiscard]] std::string StillTouching() const {
-    constexpr double kRounding = 0.99;
+    constexpr double kRounding = 0.99;  // [-], chosen: longest is a whole number of steps
     return followed_ > kRounding * kLongestInHalfPeriods
                ? "the bodies stick together"
                : absl::StrCat("the bodies still touch after ", followed_,
@@ -314,7 +328,7 @@ class CollisionRun {
   /// on: velocities of the leapfrog, which are those of half a step later, feel half a step of it.
   /// Without that attraction gave an energy of its force times half a step's way.
   void Touch() {
-    constexpr double kJust = 1e-12;  // of the distance, which rounds to 1e-16 of it
+    constexpr double kJust = 1e-12;  // overlap over the distance [-], chosen: that rounds to 1e-16
     block_.dt = 0;                   // memories stay empty
     LoadBlock();
     for (int k = 0; k < kBlock; ++k) {
@@ -556,8 +570,8 @@ std::vector<std::string> Problems(const Scenario& scenario) {
 /// A body of `radius` hits a body of the same material at rest, of `partner_radius` (infinite: a
 /// flat wall that does not move), free of gravity. Spheres; with a `thickness` disks that move in
 /// their plane (mass rho pi r^2 t, inertia m r^2/2) under the same law of force. Driven by
-/// impact_angle, impact_speed or impact_spin: the one that is not a setting. [Hadjidoukas et al.
-/// 2014, sec. 4]
+/// impact_angle, impact_speed or impact_spin: the one that is not a setting.
+/// [Hadjidoukas et al. 2014, sec. 4]
 TestEntry Collision() {
   return {.info = Info(), .place = 120, .procedure = &Collide, .problems = &Problems};
 }

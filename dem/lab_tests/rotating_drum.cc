@@ -16,11 +16,17 @@ namespace calib::dem {
 
 namespace {
 
+/// Flat sides of the drum [-]. Chosen: its inner radius varies by 0.2 %.
 constexpr int kSides = 48;
-constexpr double kFill = 0.33;           ///< share of the drum that a chosen diameter fills
-constexpr double kSolidFraction = 0.58;  ///< of the fill
-constexpr double kWider = 1.05;          ///< step of a chosen radius, until all grains find room
-constexpr double kMiddle = 0.6;          ///< share of the surface's width that is looked at
+/// Share of the drum that grains fill where the test chooses the diameter [-]. Chosen: about a
+/// third.
+constexpr double kFill = 0.33;
+/// Solid fraction of the fill [-]. Chosen: that of poured grains; the diameter follows from it.
+constexpr double kSolidFraction = 0.58;
+/// Factor by which a chosen radius grows until all grains find room [-]. Chosen.
+constexpr double kWider = 1.05;
+/// Share of the surface's width whose slope is read [-]. Chosen: its ends bend at the drum.
+constexpr double kMiddle = 0.6;
 
 /// Why grains cannot tumble at a speed [rad/s] in a drum of an inner diameter [m] > 0, in a
 /// sentence; empty: they can. From a Froude number omega^2 R / g of 1 on they are carried around.

@@ -16,6 +16,7 @@ namespace calib::dem {
 
 namespace {
 
+/// Flat sides of a round silo [-]. Chosen: its inner radius varies by 0.5 %.
 constexpr int kSides = 32;
 
 /// A filled silo about the vertical through (middle, middle).

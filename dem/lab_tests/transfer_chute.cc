@@ -19,22 +19,28 @@ namespace calib::dem {
 
 namespace {
 
-// Lengths in largest grain diameters.
-constexpr double kBeltWidth = 10;
-constexpr double kBeltLength = 12;
+// Sizes of the chute that the test chooses, in largest grain diameters [-]. Chosen.
+constexpr double kBeltWidth = 10;    ///< along y
+constexpr double kBeltLength = 12;   ///< along the belt
 constexpr double kPlate = 6;         ///< from the belt's end to the plate
-constexpr double kFunnelTop = 7;     ///< radius
-constexpr double kFunnelBottom = 3;  ///< radius
+constexpr double kFunnelTop = 7;     ///< radius at its top
+constexpr double kFunnelBottom = 3;  ///< radius at its bottom
 constexpr double kFunnelHeight = 7;
 constexpr double kRidge = 6;           ///< height of the ridge
 constexpr double kRidgeHalfWidth = 5;  ///< at its foot: 50 degrees steep
 constexpr double kGap = 2;             ///< between ridge and funnel
-constexpr int kFunnel = 2;             ///< among the walls
 constexpr double kWidth = 40;          ///< of the whole, along y
+constexpr int kFunnel = 2;             ///< index of the funnel among the walls
 
-constexpr double kPitch = 1.1;      ///< between the places of a row that is fed
-constexpr double kRowLength = 1.2;  ///< until a row has made room for the next, in grain lengths
-constexpr double kAskew = 5 * std::numbers::pi / 180;  ///< of elongated grains to the belt, at most
+/// Distance of the places of a row that is fed, in largest diameters [-]. Chosen: grains do not
+/// touch.
+constexpr double kPitch = 1.1;
+/// Way of the belt until a row has made room for the next, in grain lengths [-]. Chosen: grains do
+/// not touch.
+constexpr double kRowLength = 1.2;
+/// Largest angle of elongated grains to the belt [rad]. Chosen.
+constexpr double kAskew = 5 * std::numbers::pi / 180;
+/// Places of a row [-].
 constexpr auto kPlaces = static_cast<std::size_t>((kBeltWidth - 1) / kPitch);
 
 /// Turns a mesh about the line through `pivot` along x.

@@ -7,8 +7,9 @@
 
 namespace calib::dem {
 
-/// The entry of each file dem/measure/observables/some_name.cc, made by its function SomeName(); in no order that means
-/// anything. Every test in the periodic cell reads them after its own.
+/// The entry of each file dem/measure/observables/some_name.cc, made by its function SomeName(); in
+/// no order that means anything. Every test in the periodic cell reads these observables after its
+/// own.
 std::vector<ObservableEntry> FoundObservables();
 
 }  // namespace calib::dem

@@ -33,6 +33,7 @@ double SlopeOf(const std::vector<Point>& points) {
   return sh / ss;
 }
 
+/// Height of a column without grains [m].
 constexpr double kEmpty = -std::numeric_limits<double>::infinity();
 
 /// Highest points in columns of x from `from` on.
@@ -54,8 +55,8 @@ std::vector<double> Columns(const ParticleArrays& p, double from, double width, 
 }  // namespace
 
 Heap ConicalHeap(const ParticleArrays& p, const Vec3& axis, double diameter) {
-  constexpr int kSectors = 8;
-  std::vector<double> top;  // [ring * kSectors + sector]
+  constexpr int kSectors = 8;  // [-], chosen: a ring of a small heap has a grain in most of them
+  std::vector<double> top;     // [ring * kSectors + sector]
   for (std::size_t g = 0; g < p.x.size(); ++g) {
     const double x = p.x[g] - axis.x;
     const double y = p.y[g] - axis.y;
@@ -144,7 +145,7 @@ std::optional<Heap> SigmoidPile(const ParticleArrays& p, const PileBounds& bound
   double high_place = length;
   double low_width = 0.3 * diameter;
   double high_width = 0.5 * length;
-  constexpr int kPoints = 24;
+  constexpr int kPoints = 24;  // intervals of a grid [-], chosen: each level is 12 times as fine
   for (int level = 0; level < 6; ++level) {
     for (int i = 0; i <= kPoints; ++i) {
       for (int j = 0; j <= kPoints; ++j) {

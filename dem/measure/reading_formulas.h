@@ -1,5 +1,5 @@
 #pragma once
-// User's effects on the readings of a test in the periodic cell.
+// Effects of users on the readings of a test in the periodic cell.
 
 #include <vector>
 
@@ -10,16 +10,17 @@
 
 namespace calib::dem {
 
-/// Immutable; thread-safe.
+/// The effects of users that change readings, ready to be applied. Immutable; thread-safe.
 class ReadingFormulas {
  public:
-  /// Those effects of the model that change readings, in the order of their declaration.
+  /// Takes those effects of the model that change readings, in the order of their declaration.
   /// Precondition: ScenarioProblems() finds nothing wrong with the model.
   explicit ReadingFormulas(const Model& model);
 
-  /// Every formula sees the readings as they come in. Changes of stresses and porosity pass on to
-  /// what is derived from them (mean stress, ratios, void ratio, pore pressure), then those of
-  /// derived readings follow. OUT_OF_RANGE: a formula is not finite, with the values it had.
+  /// Changes the readings. Every formula sees them as they come in. Changes of stresses and
+  /// porosity pass on to what is derived from them (mean stress, ratios, void ratio, pore
+  /// pressure), then those of derived readings follow. Errors: OUT_OF_RANGE where a formula is not
+  /// finite, with the values it had.
   absl::Status Apply(Measurement& measurement) const;
 
  private:

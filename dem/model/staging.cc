@@ -6,14 +6,25 @@
 namespace calib::dem {
 namespace {
 
-/// Inertial number I = rate d sqrt(rho/p) of an unset rate: curves no longer depend on it beyond
-/// their scatter (dem/VERIFICATION.md, rate study). [GDR MiDi 2004: quasi-static below about 1e-3]
+/// Inertial number I = rate d sqrt(rho/p) of an unset rate [-]. Measured: curves no longer depend
+/// on it beyond their scatter (dem/VERIFICATION.md, rate study); quasi-static is below about 1e-3.
+/// [GDR MiDi 2004]
 constexpr double kInertialNumber = 5e-4;
+/// Axial strain between two settlings [-]. Measured: with 0.001 the stress ratio differs by 0.14 %
+/// (dem/VERIFICATION.md, step and rate in the suite).
 constexpr double kStep = 0.002;
-constexpr double kAdaptiveStep = 0.02;  ///< settled at every reading anyway
+/// Axial strain between two settlings of adaptive staging [-]. Chosen: every reading is settled
+/// anyway.
+constexpr double kAdaptiveStep = 0.02;
+/// Local damping while straining and while settling [-]. Chosen: those of the curves of YADE that
+/// the engine is compared with (dem/VERIFICATION.md, curves of YADE).
 constexpr double kDampingLoading = 0.2;
 constexpr double kDampingSettling = 0.9;
-constexpr double kAdaptiveDampingSettling = 0.7;  ///< fewest steps of 0.5, 0.7 and 0.9
+/// Local damping while settling in adaptive staging [-]. Chosen: of 0.5, 0.7 and 0.9 the one with
+/// the fewest steps.
+constexpr double kAdaptiveDampingSettling = 0.7;
+/// Mean unbalanced over mean contact force that ends a settling [-]. Chosen: that of the curves of
+/// YADE.
 constexpr double kUnbalanced = 5e-4;
 
 double PressureScale(const Scenario& scenario) {

@@ -13,8 +13,12 @@
 namespace calib::dem {
 namespace {
 
-constexpr double kLongest = 1e4;    ///< largest grain diameters
-constexpr double kRounding = 1e-6;  ///< of the mesh's height: files hold single precision
+/// Longest mesh over the largest grain diameter [-]. Chosen: beyond it the unit is taken to be
+/// wrong.
+constexpr double kLongest = 1e4;
+/// How far below the floor a mesh may reach over its height [-]. Chosen: files hold single
+/// precision.
+constexpr double kRounding = 1e-6;
 
 std::string PiecesOf(const TestInfo& test) {
   if (test.meshes.empty()) {

@@ -42,7 +42,7 @@ bool OfOneBody(const ParticleArrays& p, std::size_t i, std::size_t j) {
   return !p.body.empty() && p.body[i] >= 0 && p.body[i] == p.body[j];
 }
 
-constexpr int kImageBits = 8;
+constexpr int kImageBits = 8;  ///< bits of an ImageCode in a Neighbor
 constexpr std::uint64_t kImageMask = (std::uint64_t{1} << kImageBits) - 1;
 
 }  // namespace

@@ -8,7 +8,9 @@
 namespace calib::dem {
 namespace {
 
-constexpr double kDeepest = 0.5;  // smaller radii, as of Assembly::EstimateStiffness
+/// Overlap in smaller radii from which no run can start [-]. Chosen: that of
+/// Assembly::EstimateStiffness().
+constexpr double kDeepest = 0.5;
 
 }  // namespace
 

@@ -10,7 +10,10 @@
 namespace calib::dem {
 namespace {
 
-constexpr double kCutOff = 2;  // standard deviations
+/// Where a log-normal curve is cut off, to either side, in standard deviations [-]. Chosen: 4.6 %
+/// of the mass lies beyond.
+constexpr double kCutOff = 2;
+/// Points of a log-normal curve [-]. Chosen: a tenth of a standard deviation apart.
 constexpr int kLogNormalPoints = 41;
 
 double Cube(double r) { return r * r * r; }

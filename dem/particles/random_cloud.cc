@@ -114,6 +114,8 @@ absl::StatusOr<Packing> RandomCloud(const PackingRecipe& recipe, double solid_fr
   packing.clump.assign(static_cast<std::size_t>(n), -1);
 
   PlacedGrains placed(packing, 2 * packing.radius.front());
+  /// Places that are tried for a grain [-]. Chosen: clouds up to 1 - kCloudPorosity find one long
+  /// before.
   constexpr int kAttempts = 100'000;
   for (int i = 0; i < n; ++i) {
     bool found = false;

@@ -14,8 +14,12 @@ namespace {
 using Vector = std::array<double, 3>;
 using Tensor = std::array<Vector, 3>;
 
+/// Lines of the grid along each of its two axes [-]. Measured: relative error 1.4e-4
+/// (UnionOfSpheres.* in tests/unit/dem).
 constexpr int kLines = 160;
-constexpr double kTouching = 1e-9;  ///< overlaps below this share of the radii have no volume
+/// Overlap over the sum of the radii below which spheres count as apart [-]. Chosen: far above
+/// rounding, without volume.
+constexpr double kTouching = 1e-9;
 
 bool AnyOverlap(const std::vector<Sphere>& spheres) {
   for (std::size_t i = 0; i < spheres.size(); ++i) {

@@ -1,5 +1,6 @@
 #pragma once
-// The lists that CMake makes of the files in dem/effects, dem/contact/laws and dem/lab_tests (found_entries.cc.in).
+// The lists that CMake makes of the files in dem/effects, dem/contact/laws and dem/lab_tests
+// (found_entries.cc.in).
 
 #include <vector>
 
@@ -9,13 +10,16 @@
 
 namespace calib::dem {
 
-/// The entry of each file some_name.cc of dem/effects, made by its function SomeName(); in no order that means anything.
+/// The entry of each file some_name.cc of dem/effects, made by its function SomeName(); in no order
+/// that means anything.
 std::vector<EffectEntry> FoundEffects();
 
-/// The same for dem/contact/laws.
+/// The entry of each file some_name.cc of dem/contact/laws, made by its function SomeName(); in no
+/// order that means anything.
 std::vector<ContactEntry> FoundContacts();
 
-/// The same for dem/lab_tests.
+/// The entry of each file some_name.cc of dem/lab_tests, made by its function SomeName(); in no
+/// order that means anything.
 std::vector<TestEntry> FoundTests();
 
 }  // namespace calib::dem

@@ -1,5 +1,5 @@
 #pragma once
-// Who is made of what: checks of a scenario.
+// Checks of a scenario: which bodies and grains are of which material.
 
 #include <string>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace calib::dem {
 
-/// Bodies of a test that may be of another material than the grains: names for
+/// Bodies of a test (a name of Tests()) that may be of another material than the grains: names for
 /// MaterialUse::bodies.
 std::vector<std::string> BodiesOf(const std::string& test);
 

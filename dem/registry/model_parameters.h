@@ -1,6 +1,6 @@
 #pragma once
-// What may have a value in a model: contact law, effects, materials and pairs of them; what of it
-// cannot be together.
+// Which parameters a model has, by its contact law, its effects, its materials and pairs of
+// materials, and what of these cannot be together.
 
 #include <string>
 #include <vector>
@@ -10,8 +10,8 @@
 
 namespace calib::dem {
 
-/// Parameter of a model by its dotted campaign name, those of its effects and materials included,
-/// or nullptr when the model has none of that name.
+/// The parameter of a model by its dotted campaign name, those of its effects and materials
+/// included, or nullptr when the model has none of that name.
 const ParameterInfo* FindParameter(const Model& model, const std::string& dotted_name);
 
 /// Dotted names that the model's materials and pairs of them may give values to; pairs once, in the
@@ -22,7 +22,7 @@ std::vector<std::string> MaterialParameters(const Model& model);
 std::vector<std::string> MaterialProblems(const Model& model);
 
 /// Everything wrong with the model's effects that know single spheres only, one sentence each.
-/// clumps: whether the packing has any.
+/// clumps: whether the packing has clumps.
 std::vector<std::string> ShapeProblems(const Model& model, bool clumps);
 
 }  // namespace calib::dem

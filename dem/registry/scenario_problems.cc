@@ -21,10 +21,12 @@ namespace {
 
 using Problems = std::vector<std::string>;
 
-/// Strains beyond this would need a cell that shrinks to a third: a mistake of units.
+/// Largest strain that a path may ask for [-]. Chosen: a cell that shrinks to a third is a mistake
+/// of units.
 constexpr double kLargestStrain = 1.0;
 
-/// Each may ask a contact to remember a number.
+/// Effects of the user that may act at contacts [-]. Chosen: each may ask a contact to remember a
+/// number, and kMaxHistory is what there is.
 constexpr int kMostFormulas = 4;
 
 template <class Infos>

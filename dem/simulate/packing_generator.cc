@@ -1,5 +1,5 @@
-// Cloud -> isotropic compression -> friction lowered until the porosity holds. [Cheng 2018,
-// sec. 2.2]
+// A cloud, compressed isotropically, then friction lowered until the porosity holds.
+// [Cheng 2018, sec. 2.2]
 #include "dem/simulate/packing_generator.h"
 
 #include <cmath>
@@ -16,17 +16,19 @@
 namespace calib::dem {
 namespace {
 
-/// A cloud as dense as random sequential addition fills quickly.
+/// Solid fraction of the cloud [-]. Chosen: random sequential addition fills it quickly.
 constexpr double kCloudFraction = 0.25;
-/// Contact modulus over pressure: overlaps stay below a thousandth of a radius.
+/// Contact modulus over pressure [-]. Chosen: overlaps stay below a thousandth of a radius.
 constexpr double kModulusOverPressure = 5e3;
-/// Friction that keeps the first packing loose.
+/// Coefficient of friction during compression [-]. Chosen: it keeps the first packing loose.
 constexpr double kInitialFriction = 1.0;
-/// Local damping throughout: strong damping (0.9) would let the last rearrangements creep.
+/// Local damping throughout [-]. Chosen: strong damping (0.9) would let the last rearrangements
+/// creep.
 constexpr double kDamping = 0.3;
+/// Density of the grains [kg/m^3]. Chosen: that of quartz; it sets the time scale only.
 constexpr double kDensity = 2650;
-/// Inertial number of the compression; the cloud needs no quasi-static path, only a quasi-static
-/// end.
+/// Inertial number of the compression [-]. Chosen: the cloud needs no quasi-static path, only a
+/// quasi-static end.
 constexpr double kInertialNumber = 1e-2;
 
 bool IsCloud(const PackingRecipe& r) { return r.porosity >= kCloudPorosity && r.porosity < 1; }

@@ -14,7 +14,7 @@ namespace calib::dem {
 /// How a run is recorded; nothing here changes its states.
 struct Recording {
   std::string vtk_directory{};  ///< for a series of grains, contacts and walls after each load step
-                                ///< (simulate/vtk_series.h); empty: none. Not of `collision`.
+                                ///< (simulate/vtk_series.h); empty: none. `collision` writes none.
   CheckpointSink checkpoint{};  ///< called after each point of the path, when its state has been
                                 ///< given to the sink; empty: no checkpoints. `collision` has none.
   std::string resume_from{};    ///< a checkpoint of this scenario: its states are given to the sink
@@ -35,11 +35,12 @@ absl::StatusOr<Summary> Simulate(const Scenario& scenario, const StateSink& sink
 
 class Assembly;  // dynamics/assembly.h
 
-/// Takes a state and the grains that made it. An error ends the run with that error.
+/// Takes the state of a load step and the grains that made it. An error ends the run with that
+/// error.
 using GrainSink = std::function<absl::Status(const State& state, const Assembly& assembly)>;
 
-/// Simulate() with the grains of every load step, without checkpoints; nothing is given to the sink by `collision`, which has
-/// no grains. Thread-safe.
+/// Simulate() with the grains of every load step, without checkpoints. `collision`, which has no
+/// grains, gives nothing to the sink. Thread-safe.
 absl::StatusOr<Summary> SimulateGrains(const Scenario& scenario, const GrainSink& sink,
                                        std::stop_token stop);
 

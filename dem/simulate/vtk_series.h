@@ -20,15 +20,17 @@ namespace calib::dem {
 ///                                    normal_force (compression positive), tangential_force [N]
 ///   walls.pvd     walls_NNNN.vtp     the triangles of walls that are meshes; only with such walls
 /// Centres are wrapped into the periodic cell. Every file appears as a whole, and a PVD names only
-/// files that are there, so that a run can be looked at while it goes on.
+/// files that are there, so that a run can be looked at while it goes on. Not thread-safe.
 class VtkSeries {
  public:
+  /// directory: made by the first Add().
   explicit VtkSeries(std::string directory) : directory_(std::move(directory)) {}
 
-  /// Writes the files of a load step; makes the folder. Errors: UNAVAILABLE naming the file.
+  /// Writes the files of a load step >= 0. Errors: UNAVAILABLE naming the file.
   absl::Status Add(const Assembly& assembly, int load_step);
 
-  /// A load step of before an interruption: belongs to the series where its files are there.
+  /// Adds a load step that was written before an interruption to the series, where its files are
+  /// there.
   void AddExisting(int load_step);
 
  private:

@@ -6,7 +6,8 @@
 namespace calib::dem {
 namespace {
 
-constexpr std::uint8_t kVertexCell = 1;  // VTK_VERTEX
+/// Type of a cell that is a vertex: VTK_VERTEX of the VTK file formats.
+constexpr std::uint8_t kVertexCell = 1;
 
 /// Length in bytes in front, then the values as they lie in memory, base64 as one.
 template <class T>

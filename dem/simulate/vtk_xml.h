@@ -10,12 +10,13 @@
 
 namespace calib::dem {
 
-/// One <DataArray>; the type follows from the values.
+/// One <DataArray> of the values; its type follows from theirs. All functions here are pure and
+/// never fail.
 std::string VtkArray(const std::string& name, const std::vector<double>& values);
 std::string VtkArray(const std::string& name, const std::vector<std::int32_t>& values);
 std::string VtkArray(const std::string& name, const std::vector<std::int64_t>& values);
 std::string VtkArray(const std::string& name, const std::vector<std::uint8_t>& values);
-/// Three components per value.
+/// One <DataArray> with three components per value.
 std::string VtkArray(const std::string& name, const std::vector<Vec3>& values);
 
 /// A document of one piece. Cells are those of `connectivity` and `offsets` (ends), of one type.
@@ -32,13 +33,15 @@ struct VtkPiece {
   std::string point_data{};  ///< arrays with a value per point
   std::string cell_data{};   ///< arrays with a value per cell
 };
+/// The document of a piece as text.
 std::string VtkDocument(const VtkPiece& piece);
 
-/// A PVD: the files of a series with the time at which ParaView shows each.
+/// One file of a series and the time at which ParaView shows it.
 struct VtkSeriesEntry {
-  int load_step = 0;
-  std::string file;  ///< relative to the PVD
+  int load_step = 0;  ///< the time
+  std::string file;   ///< relative to the PVD
 };
+/// A PVD document, which names the files of a series, as text.
 std::string VtkCollection(const std::vector<VtkSeriesEntry>& entries);
 
 }  // namespace calib::dem

@@ -9,7 +9,8 @@
 
 namespace calib::dem {
 
-/// k = constant + ratio r1 r2 ks, limit = friction Fn l with l = mean radius or smaller radius.
+/// Law of a moment at a contact: stiffness k = constant + ratio r1 r2 ks, limit = friction Fn l
+/// with l the mean radius or the smaller radius.
 struct MomentLaw {
   double constant = 0;                                        ///< [N m/rad]
   double ratio = 0;                                           ///< [-]
@@ -17,16 +18,17 @@ struct MomentLaw {
   bool limit_by_smaller = false;  ///< l = min(r1, r2) instead of (r1 + r2)/2
 };
 
-/// Law from the parameters stiffness or stiffness_ratio, and friction, under a contact law. [Cheng
-/// 2018, Table 1]
+/// The law from the parameters stiffness or stiffness_ratio, and friction, under the contact law of
+/// the context. Pure. [Cheng 2018, Table 1]
 MomentLaw MomentLawFrom(const KernelContext& context);
 
-/// One per pair of materials, Materials::Pair() its index; of a model with one material that one. A
-/// pair that has a stiffness or a stiffness_ratio of its own has it instead of either.
+/// The laws of all pairs of materials, by Materials::Pair(); for a model with one material one law.
+/// A pair that has a stiffness or a stiffness_ratio of its own has it instead of either of the
+/// effect's.
 std::vector<MomentLaw> MomentLawsFrom(const KernelContext& context);
 
-/// stiffness, stiffness_ratio, friction; `motion` ("rolling", "twisting") completes the
-/// descriptions.
+/// Catalogue entries of stiffness, stiffness_ratio and friction; `motion` ("rolling", "twisting")
+/// completes their descriptions.
 std::vector<ParameterInfo> MomentParameters(const std::string& motion);
 
 /// Two ways to turn a moment on: its limit with a stiffness like that of sliding, and its stiffness
@@ -39,8 +41,8 @@ struct MomentResponse {
   ContactBlock::Lane limit;
 };
 
-/// Evaluates the laws of MomentLawsFrom() on a block whose normal force and tangential stiffness are
-/// known.
+/// Evaluates the laws of MomentLawsFrom() on a block whose normal force and tangential stiffness
+/// are known.
 void EvaluateMoment(const std::vector<MomentLaw>& laws, const ContactBlock& block,
                     MomentResponse& response);
 

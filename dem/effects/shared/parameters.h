@@ -7,10 +7,12 @@
 
 namespace calib::dem {
 
-/// reference_pressure p_ref [Pa], default 100 kPa; the description says what holds at it.
+/// Catalogue entry of reference_pressure p_ref [Pa], default 100 kPa; `description` says what holds
+/// at it.
 ParameterInfo ReferencePressure(const std::string& description);
 
-/// work_of_adhesion W [J/m^2], scaled by p d, so that the pull-off force over p d^2 is about one.
+/// Catalogue entry of work_of_adhesion W [J/m^2], scaled by p d, so that the pull-off force over p
+/// d^2 is about one.
 ParameterInfo WorkOfAdhesion();
 
 }  // namespace calib::dem

@@ -9,15 +9,17 @@
 
 namespace calib::dem {
 
+/// What the effects of a model make of apparatus and specimen.
 struct Alterations {
-  Apparatus apparatus;  ///< as it is made where the test has no rig
+  Apparatus apparatus;  ///< without errors where the test has no rig
   Preparation preparation;
 };
 
-/// entries: of the model.
+/// What the effects of the model ask in this test. entries: EntriesOf(model). Pure.
 Alterations AlterationsOf(const Model& model, const ModelEntries& entries, const TestInfo& test);
 
-/// What the effects of the model ask of the initial state alone; of any test.
+/// What the effects of the model ask of the initial state, whatever the test. entries:
+/// EntriesOf(model). Pure.
 Preparation PreparationOf(const Model& model, const ModelEntries& entries);
 
 }  // namespace calib::dem

@@ -14,7 +14,8 @@
 namespace calib::dem {
 namespace {
 
-/// A grain pack without friction is still a solid; below this coefficient nothing changes any more.
+/// Coefficient of friction below which it counts as 0 [-]. Chosen: a pack without friction is still
+/// a solid, and below this nothing changes any more.
 constexpr double kSmallestFriction = 1e-3;
 
 CellTarget Isotropic(double pressure) {
@@ -87,7 +88,8 @@ class Compaction {
   }
 
  private:
-  /// Between two reductions a rough balance is enough.
+  /// Unbalanced force that ends a settling between two reductions, over StageOptions::unbalanced
+  /// [-]. Chosen: there a rough balance is enough.
   static constexpr double kIntermediate = 10;
 
   CellTarget target_;
@@ -100,7 +102,7 @@ class Compaction {
 
 absl::Status LowerFrictionToPorosity(double porosity, double pressure, QuasiStatic& stages,
                                      StageEnd& end) {
-  constexpr int kAttempts = 60;
+  constexpr int kAttempts = 60;  // [-], chosen: a bound; it ends where a small packing jumps
   Assembly& assembly = stages.assembly();
   const double highest = Porosity(assembly);
   Compaction compaction(pressure, stages);
@@ -190,7 +192,7 @@ StageEnd MoveToStart(const ConsolidationPlan& plan, double own_friction, QuasiSt
 /// first guess is that one itself, each further one corrected by what the last came out wrong.
 absl::Status ReachPorosityAtStart(const ConsolidationPlan& plan, double porosity,
                                   double own_friction, QuasiStatic& stages, StageEnd& end) {
-  constexpr int kAttempts = 10;
+  constexpr int kAttempts = 10;  // [-], chosen: a bound for a search by secants
   Assembly& assembly = stages.assembly();
   const Assembly compressed = assembly;
   const double loosest = Porosity(compressed);

@@ -10,7 +10,7 @@
 
 namespace calib::dem {
 
-/// What to prepare, in SI units.
+/// What a specimen is to be when its test begins. SI units.
 struct ConsolidationPlan {
   double pressure = 0;          ///< isotropic, > 0 [Pa]
   Consolidation consolidation;  ///< friction while compressing, or the porosity to reach
@@ -18,15 +18,17 @@ struct ConsolidationPlan {
   Preparation preparation;  ///< by effects of kind "initial_state"
 };
 
-/// Porosity counts as reached within this.
+/// Difference within which a porosity counts as reached [-]. Chosen;
+/// GeneratePacking.HitsPorosityAndPressure holds specimens to it.
 inline constexpr double kPorosityTolerance = 1e-4;
 
 /// Compresses isotropically through the pressures 1-2-5 x 10^k between a twentieth of the target
 /// and the target (each settled, so that results do not hang on one long stage), lowers friction
 /// until the porosity holds if one is asked for, restores the model's friction, and moves to the
-/// initial stress. With both, the porosity is that after the move: the way there is repeated from
-/// the compressed state until it holds within kPorosityTolerance. `end` says how it ended. Errors:
-/// OUT_OF_RANGE with the attainable range when lowering friction cannot reach the porosity.
+/// initial stress. Where both a porosity and an initial stress are asked for, the porosity is that
+/// after the move: the way there is repeated from the compressed state until it holds within
+/// kPorosityTolerance. `end` says how it ended. Errors: OUT_OF_RANGE with the attainable range when
+/// lowering friction cannot reach the porosity.
 absl::Status Consolidate(const ConsolidationPlan& plan, QuasiStatic& stages, StageEnd& end);
 
 /// Lowers friction step by step at constant isotropic pressure, settling in between, until the

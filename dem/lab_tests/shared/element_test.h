@@ -21,29 +21,32 @@ struct AxisGoal {
                      ///< compression positive
 };
 
-/// x, y lateral; z axial; and the displacement of the top along x over the height at the end of
-/// consolidation [-].
+/// Goals of the axes x and y, lateral, and z, axial.
 struct CellGoal : std::array<AxisGoal, 3> {
-  double shear_strain = 0;
+  double shear_strain = 0;  ///< displacement of the top along x over the height at the end of
+                            ///< consolidation [-]
 };
 
 /// What a plan may know beside the control target.
 struct ElementTestContext {
   std::map<std::string, double> settings;  ///< of the test, defaults filled in
   double lateral_stress = 0;               ///< at the end of consolidation [Pa]
-  double axial_stress = 0;                 ///< the same [Pa]
+  double axial_stress = 0;                 ///< at the end of consolidation [Pa]
 };
 
 /// Goal of the cell for one value of the control observable. Pure.
 using PlanElementTest = CellGoal (*)(const ElementTestContext& context, double target);
 
-/// Walks the specimen through the path of its control by a plan.
+/// The procedure of an element test that walks the specimen through the path of its control by a
+/// plan.
 std::function<absl::StatusOr<Summary>(const TestRun&)> CellProcedure(PlanElementTest plan);
 
-/// Observables that every element test produces, in the order of their states; those of measure/observables come last.
+/// Names of the observables that every element test gives, in the order in which its states hold
+/// them; those of dem/measure/observables come last.
 std::vector<std::string> ElementObservables();
 
-/// confining_pressure [Pa], the isotropic stress at which consolidation ends.
+/// Catalogue entry of the setting confining_pressure [Pa] > 0, the isotropic stress at which
+/// consolidation ends.
 ParameterInfo ConfiningPressure();
 
 }  // namespace calib::dem

@@ -24,8 +24,11 @@
 namespace calib::dem {
 namespace {
 
-/// Share of the strain to a reading that one step may take, and how near a reading must come.
+/// Share of the strain that is missing to a reading that one step may take [-]. Chosen: the reading
+/// is approached from one side (dem/DECISIONS.md, the reading drives the test).
 constexpr double kFollowGain = 0.3;
+/// Strain within which a reading counts as met [-]. Chosen; what comes of it is in
+/// dem/VERIFICATION.md, effects on readings and initial state.
 constexpr double kReadingTolerance = 1e-6;
 
 class ElementTestRun {

@@ -7,7 +7,8 @@
 
 namespace calib::dem {
 
-/// plan: the test's goals of the cell. Errors as Simulate(), and those of the record.
+/// Runs an element test to its end. plan: goals of the cell for each value of the control. Errors:
+/// those of Simulate(), and those of the record.
 absl::StatusOr<Summary> RunElementTest(const TestRun& run, PlanElementTest plan);
 
 }  // namespace calib::dem

@@ -18,20 +18,24 @@
 
 namespace calib::dem {
 
-/// What the procedure of a test has at hand.
+/// One run of a test under gravity: what its procedure asks of the scenario, and whom it reports
+/// to. Not thread-safe.
 class GravityRun {
  public:
+  /// What `run` refers to has to outlive it.
   explicit GravityRun(const TestRun& run);
 
+  /// The scenario's path.
   [[nodiscard]] const std::vector<ControlPoint>& path() const { return scenario_.path; }
 
   /// Calls `visit` for the points of the path in order, from where the run begins, until one does
-  /// not end well. After each the run can go on from what `state` gives: members for Recall(),
-  /// archived; empty where every point starts anew.
+  /// not end well. After each point a checkpoint is written from which the run can go on: it holds
+  /// the bytes that `state` gives, an archive of the members that RestoreState() takes back. state
+  /// is empty where every point starts anew.
   StageEnd Walk(const std::function<StageEnd(const ControlPoint& point)>& visit,
                 const std::function<std::string()>& state = {});
 
-  /// The same for tests whose points all start from one filling: lets `assembly` come to rest for
+  /// Walk() for tests whose points all start from one filling: lets `assembly` come to rest for
   /// at most `longest` [s], or takes the filling from the checkpoint, then walks.
   StageEnd WalkFrom(Assembly& assembly, const FlowOptions& options, double longest,
                     const std::function<StageEnd(const ControlPoint& point)>& visit);
@@ -39,7 +43,8 @@ class GravityRun {
   /// Whether the run goes on from a checkpoint.
   [[nodiscard]] bool resumed() const { return record_.resumed(); }
 
-  /// Takes members back from what Walk's `state` gave before the interruption.
+  /// Reads members from the bytes that Walk's `state` gave before the interruption. kDiverged, with
+  /// an error for Finish(), where they do not fit.
   template <class... T>
   StageEnd RestoreState(T&... members) {
     LoadArchive archive(state_);
@@ -47,57 +52,68 @@ class GravityRun {
     return archive.complete() ? StageEnd::kDone : Abandon(DoesNotFit());
   }
 
-  /// Ends the run with an error.
+  /// Lets Finish() return an error; returns kDiverged.
   StageEnd Abandon(absl::Status status);
 
+  /// A setting of the test by name, or its default [the setting's SI unit]. Precondition: the test
+  /// has it.
   [[nodiscard]] double Setting(const std::string& name) const;
-  /// The setting, or `chosen` where it is 0.
+  /// A setting of the test by name, or `chosen` where the setting is 0 [the setting's SI unit].
   [[nodiscard]] double SettingOr(const std::string& name, double chosen) const;
 
   /// The mesh that replaces a piece of the test's boundary, or nullptr.
   [[nodiscard]] const TriangleMesh* Mesh(const std::string& name) const;
 
+  /// Radii of the grains to pour [m].
   [[nodiscard]] const std::vector<double>& radii() const { return scenario_.packing.radius; }
+  /// Mean diameter of the grains [m].
   [[nodiscard]] double mean_diameter() const { return mean_diameter_; }
+  /// Largest diameter of the grains [m].
   [[nodiscard]] double largest_diameter() const { return largest_diameter_; }
+  /// Acceleration of free fall [m/s^2].
   [[nodiscard]] double gravity() const { return Setting("gravity"); }
+  /// Density of the model's own material [kg/m^3].
   [[nodiscard]] double density() const { return scenario_.model.density; }
-  /// Length over width of the grains (nonspherical_shape); 1: spheres. What the test chooses of its
-  /// device does not depend on it.
+  /// Length over width of the grains [-]; 1: spheres. What the test chooses of its device does not
+  /// depend on it.
   [[nodiscard]] double aspect() const { return aspect_; }
-  /// Of a grain whose radius is 1; of disks where the test's thickness makes them.
+  /// Shape of a grain whose radius is 1; a pair of disks where the test's thickness makes disks.
   [[nodiscard]] const ClumpTemplate& shape() const { return shape_; }
-  /// Spheres that a grain is made of.
+  /// Number of spheres that a grain is made of.
   [[nodiscard]] int spheres_per_grain() const { return static_cast<int>(shape_.spheres.size()); }
   /// Longest way through a grain [m].
   [[nodiscard]] double largest_length() const { return ReachOf(shape_) * largest_diameter_; }
   /// Volume of all grains [m^3].
   [[nodiscard]] double solid_volume() const;
+  /// Seed of the scenario.
   [[nodiscard]] std::uint64_t seed() const { return scenario_.seed; }
   /// sqrt(d/g), the time of a fall by half a mean diameter [s].
   [[nodiscard]] double fall_time() const;
 
-  /// Material of a body of the test, "": the model's own.
+  /// Name of the material of a body of the test (TestInfo::bodies); "": the model's own.
   [[nodiscard]] std::string MaterialOf(const std::string& body) const;
 
   /// Draws the materials of grains where the scenario mixes some.
   void MixMaterials(Packing& grains) const;
 
-  /// The grains in a region: LooseFill of spheres, RandomFill of others.
+  /// The grains set into a region, by LooseFill() where they are spheres, by RandomFill() where
+  /// not.
   [[nodiscard]] Packing Fill(const FillRegion& region, std::uint64_t seed) const;
-  /// How many of the grains a filling has.
+  /// Number of grains that a filling has.
   [[nodiscard]] std::size_t CountOf(const Packing& filling) const {
     return filling.x.size() / static_cast<std::size_t>(spheres_per_grain());
   }
 
-  /// Grains between walls; surroundings get the test's gravity and the walls' material. Grains
-  /// without materials are mixed first.
+  /// An assembly of grains between walls; the surroundings get the test's gravity and the walls'
+  /// material. Grains without materials get them by MixMaterials() first.
   [[nodiscard]] Assembly MakeAssembly(const Packing& grains, Surroundings surroundings) const;
 
-  /// drop_height and the box of the options are the procedure's; damping and drag the settings'.
+  /// A flow of the assembly. The procedure gives drop_height and the box of the options; damping
+  /// and drag are set here from the settings.
   [[nodiscard]] Flow MakeFlow(Assembly& assembly, FlowOptions options) const;
 
-  /// Local damping while poured grains come to rest.
+  /// Local damping while poured grains come to rest [-]. Chosen: stronger damping would let the
+  /// last rearrangements creep.
   static constexpr double kSettling = 0.3;
 
   /// Gives a state to the sink where the point wants one. kDiverged where a value is not finite or
@@ -105,19 +121,22 @@ class GravityRun {
   StageEnd Report(const ControlPoint& point, const std::vector<double>& values,
                   const Assembly& assembly);
 
+  /// Gives the reason for which the run has failed; returns kDiverged.
   StageEnd Fail(std::string reason);
 
-  /// Adds a flow's steps to the summary and keeps why it ended. `first`: the steps and updates that
-  /// its assembly came with.
+  /// Numbers of steps and contact updates that an assembly has made.
   struct Mark {
     std::int64_t steps = 0, updates = 0;
   };
   static Mark MarkOf(const Assembly& assembly) {
     return {assembly.steps(), assembly.contact_updates()};
   }
+  /// Adds to the summary what a flow has done since its assembly had made `first`, and, where `end`
+  /// is kDiverged, why, after the words `where`. Returns `end`.
   StageEnd AddToSummary(StageEnd end, const Flow& flow, const Mark& first,
                         const std::string& where);
 
+  /// The summary of a run that ended so, or the error that ended it.
   [[nodiscard]] absl::StatusOr<Summary> Finish(StageEnd end) const;
 
  private:
@@ -135,12 +154,12 @@ class GravityRun {
   double largest_diameter_ = 0;
   std::string reason_;
   absl::Status status_;
-  Summary summary_;    ///< what it counts so far
-  std::string state_;  ///< of the procedure, at the interruption
+  Summary summary_;    ///< steps and updates so far
+  std::string state_;  ///< bytes for RestoreState(); empty: not resumed
 };
 
-/// The procedure of a test that pours its grains. Errors: those of the record, and INVALID_ARGUMENT
-/// for a checkpoint that does not fit.
+/// The procedure of a test that pours its grains and is walked by `walk`. Errors: those of the
+/// record, and INVALID_ARGUMENT for a checkpoint that does not fit.
 std::function<absl::StatusOr<Summary>(const TestRun&)> GravityProcedure(
     StageEnd (*walk)(GravityRun&));
 

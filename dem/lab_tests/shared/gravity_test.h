@@ -8,33 +8,35 @@
 
 namespace calib::dem {
 
-/// Acceleration of free fall where a test does not set it [m/s^2].
+/// Acceleration of free fall where a test does not set it [m/s^2]: standard gravity.
+/// [3rd General Conference on Weights and Measures, 1901]
 inline constexpr double kGravity = 9.80665;
 
-/// A length, time or speed of the test's geometry in `unit`, >= 0; 0, its default, lets the test
-/// choose it from the grains, as the description says.
+/// Catalogue entry of a length, time or speed of the test's geometry in `unit`, >= 0; 0, its
+/// default, lets the test choose it from the grains, as the description says.
 ParameterInfo Chosen(const std::string& name, const std::string& unit,
                      const std::string& description);
 
-/// `thickness` of tests in a plane: 0 leaves spheres, more makes disks of their radii,
-/// m = pi r^2 t rho, I = m r^2/2.
+/// Catalogue entry of the setting `thickness` t [m] of tests in a plane: 0 leaves spheres, more
+/// makes disks of their radii, m = pi r^2 t rho, I = m r^2/2.
 ParameterInfo ThicknessOfDisks();
 
-/// A setting with a default of its own, in [min, max].
+/// Default and range of a setting, in its SI unit.
 struct SettingRange {
   double value = 0;
   double min = 0;
   double max = 0;
 };
+/// Catalogue entry of a setting in `unit`.
 ParameterInfo Setting(const std::string& name, const std::string& unit, const SettingRange& range,
                       const std::string& description);
 
-/// A switch or a number of things.
+/// Catalogue entry of a setting that is a whole number: a switch or a number of things.
 ParameterInfo Whole(const std::string& name, const SettingRange& range,
                     const std::string& description);
 
-/// The settings given, after gravity [m/s^2], local_damping [-] and drag [1/s], which every test
-/// has.
+/// The settings that every test under gravity has, gravity [m/s^2], local_damping [-] and drag
+/// [1/s], followed by `own`.
 std::vector<ParameterInfo> WithCommonSettings(std::vector<ParameterInfo> own);
 
 }  // namespace calib::dem

@@ -7,7 +7,7 @@
 
 namespace calib::dem {
 
-/// In the order of their places; one line of the table for each. Thread-safe.
+/// All of them, in the order of their places. They live as long as the program; thread-safe.
 std::span<const ObservableEntry> ProcedureObservables();
 
 }  // namespace calib::dem

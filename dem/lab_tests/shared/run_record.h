@@ -15,28 +15,32 @@ namespace calib::dem {
 /// An error ends the run with that error.
 using LoadStepSink = std::function<absl::Status(const State& state, const Assembly* assembly)>;
 
-/// Between the procedure of a test and whoever wants its states and checkpoints.
+/// Stands between the procedure of a test and whoever wants its states and checkpoints. Not
+/// thread-safe.
 class RunRecord {
  public:
-  /// Without checkpoints.
+  /// A record without checkpoints. sink: takes states.
   explicit RunRecord(LoadStepSink sink) : sink_(std::move(sink)) {}
 
-  /// With checkpoints for `keep` after each point.
-  RunRecord(LoadStepSink sink, const Scenario& scenario, CheckpointSink keep)
+  /// A record whose checkpoints go to checkpoint_sink. sink: takes states.
+  RunRecord(LoadStepSink sink, const Scenario& scenario, CheckpointSink checkpoint_sink)
       : sink_(std::move(sink)),
-        checkpoint_sink_(std::move(keep)),
+        checkpoint_sink_(std::move(checkpoint_sink)),
         head_(CheckpointHead(scenario)) {}
 
-  /// The run begins behind what a checkpoint of it holds.
+  /// Lets the run begin behind what a checkpoint of it holds.
   void ResumeFrom(RunCheckpoint checkpoint) { so_far_ = std::move(checkpoint); }
 
+  /// Whether the run goes on from a checkpoint.
   [[nodiscard]] bool resumed() const { return so_far_.next > 0; }
-  /// Where on the path to begin.
+  /// Index of the point of the path at which to begin.
   [[nodiscard]] std::size_t next_point() const { return so_far_.next; }
-  /// What the procedure gave to Keep() when it was interrupted.
+  /// The bytes that the procedure gave to WriteCheckpoint() last before the interruption; empty:
+  /// the run is not resumed.
   [[nodiscard]] const std::string& procedure_state() const { return so_far_.procedure; }
 
-  /// A load step has been reached. Errors: those of the sink.
+  /// Tells the sink that a load step has been reached; assembly: null where the test has none.
+  /// Errors: those of the sink.
   absl::Status ReportLoadStep(const State& state, const Assembly* assembly) {
     if (wants_checkpoints()) {
       so_far_.states.push_back(state);
@@ -44,10 +48,12 @@ class RunRecord {
     return sink_(state, assembly);
   }
 
+  /// Whether WriteCheckpoint() may be called.
   [[nodiscard]] bool wants_checkpoints() const { return static_cast<bool>(checkpoint_sink_); }
 
-  /// From here the run could go on at point `next` of the path with these bytes. Precondition:
-  /// keeps(). Errors: those of the checkpoint sink.
+  /// Writes a checkpoint from which the run can go on at point `next` of the path, where the
+  /// procedure gets `procedure` back. Precondition: wants_checkpoints(). Errors: those of the
+  /// checkpoint sink.
   absl::Status WriteCheckpoint(std::size_t next, std::string procedure) {
     so_far_.next = next;
     so_far_.procedure = std::move(procedure);

@@ -16,15 +16,25 @@
 namespace calib::dem {
 namespace {
 
+/// Largest growth of the aspect at a time [-]. Chosen: grains overlap little before they give way.
 constexpr double kAspectStep = 0.02;
-constexpr double kGrowth = 0.02;    ///< of a surface at a time, in radii
-constexpr int kStepsBetween = 200;  ///< to give way after a small growth
+/// Largest growth of a surface at a time, in radii [-]. Chosen as kAspectStep.
+constexpr double kGrowth = 0.02;
+/// Time steps in which grains give way after a growth, and after the last one [-]. Chosen; overlaps
+/// left at the end are in dem/VERIFICATION.md, clumps and crushing.
+constexpr int kStepsBetween = 200;
 constexpr int kStepsAtTheEnd = 3000;
+/// Time steps between two looks at stiffness [-]. Chosen as in dynamics/quasi_static.cc.
 constexpr int kInspection = 20;
+/// Local damping [-]. Chosen: grains come to rest within the steps above.
 constexpr double kDamping = 0.5;
-constexpr double kFriction = 0.5;  ///< without it the fabric of the spheres would fall apart
+/// Coefficient of friction of growing dumbbells [-]. Chosen: without it the fabric of the spheres
+/// would fall apart.
+constexpr double kFriction = 0.5;
+/// Density of the grains [kg/m^3]. Chosen: that of quartz; it sets the time scale only.
 constexpr double kDensity = 2650;
-constexpr double kSafety = 0.5;  ///< of the critical step
+/// Time step over the critical one [-]. Chosen: contacts stiffen between two looks.
+constexpr double kSafety = 0.5;
 
 ContactModel SoftGrains(double friction) {
   Model model;

@@ -10,11 +10,11 @@
 
 namespace calib::dem {
 
-/// Turns spheres into dumbbells of equal volume at constant cell: they grow from aspect 1 in steps
-/// of at most 0.02, and after each the clumps, damped, give way to each other (friction 0.5).
-/// Depends on packing and aspect only, never on the model, so that all samples of one aspect start
-/// alike. Errors: CANCELLED on stop; OUT_OF_RANGE when grains are lost or the cell becomes too
-/// short. Preconditions: single spheres; aspect in (1, 2].
+/// Turns spheres into dumbbells of equal volume, length over width `aspect`, at constant cell: they
+/// grow from aspect 1 in steps of at most 0.02, and after each the clumps, damped, give way to each
+/// other (friction 0.5). Depends on packing and aspect only, never on the model, so that all
+/// samples of one aspect start alike. Errors: CANCELLED on stop; OUT_OF_RANGE when grains are lost
+/// or the cell becomes too short. Preconditions: single spheres; aspect in (1, 2].
 absl::StatusOr<Packing> Elongate(const Packing& spheres, double aspect, int threads,
                                  std::stop_token stop);
 
@@ -25,10 +25,12 @@ struct ClumpPacking {
   double largest_overlap = 0;  ///< of two clumps that touch, in radii of the smaller sphere
 };
 
-/// The same for any shape, in orientations drawn from the seed: spheres grow into the shape
-/// (Between) by at most 0.02 radii at a time, without friction, so that long ones find room. Materials stay with their grains. Errors: INVALID_ARGUMENT
-/// when a grain is part of a clump already, two overlap by more than half a radius, or the cell is not longer than two clumps; others as
-/// Elongate.
+/// Turns spheres into clumps of a shape of equal volume at constant cell, in orientations drawn
+/// from the seed: spheres grow into the shape (Between) by at most 0.02 radii at a time, without
+/// friction, so that long ones find room. Materials stay with their grains. Errors:
+/// INVALID_ARGUMENT when a grain is part of a clump already, two overlap by more than half a
+/// radius, or the cell is not longer than two clumps; CANCELLED on stop; OUT_OF_RANGE when grains
+/// are lost or the cell becomes too short.
 absl::StatusOr<ClumpPacking> MakeClumps(const Packing& spheres, const ClumpTemplate& shape,
                                         std::uint64_t seed, int threads, std::stop_token stop);
 

@@ -13,8 +13,8 @@ namespace calib::dem {
 /// One run of one scenario; what it refers to outlives the procedure.
 struct TestRun {
   const Scenario& scenario;     ///< ScenarioProblems() finds nothing wrong with it
-  const ModelEntries& entries;  ///< of scenario.model
-  const TestInfo& test;         ///< of scenario.test
+  const ModelEntries& entries;  ///< EntriesOf(scenario.model)
+  const TestInfo& test;         ///< the catalogue entry of scenario.test
   RunRecord& record;            ///< takes states and checkpoints
   std::stop_token stop;         ///< looked at every time step
 };
