@@ -7,6 +7,7 @@
 
 #include "dem/dynamics/contact_model.h"
 #include "dem/model/scenario.h"
+#include "dem/model/state.h"
 
 namespace calib::dem::test {
 
