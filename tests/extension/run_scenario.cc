@@ -17,7 +17,8 @@ int Run(const Scenario& scenario) {
   State last;
   const auto summary = Simulate(scenario, [&last](const State& state) { last = state; }, {});
   if (!summary.ok() || summary->outcome != Outcome::kCompleted) {
-    std::fprintf(stderr, "%s\n", summary.ok() ? summary->reason.c_str() : summary.status().ToString().c_str());
+    std::fprintf(stderr, "%s\n",
+                 summary.ok() ? summary->reason.c_str() : summary.status().ToString().c_str());
     return 1;
   }
   const TestInfo& test = *FindTest(scenario.test);
@@ -55,7 +56,9 @@ int main(int argc, char** argv) {
     const ParameterInfo& info = contact->parameters[p];
     if (info.alternative_to.empty() && !info.default_value && info.name != "friction_coefficient" &&
         info.name != "friction_angle") {
-      scenario.model.parameters[info.name] = info.name == "poisson_ratio" ? 0.2 : info.unit == "Pa" ? 1e8 : 1e5;
+      scenario.model.parameters[info.name] = info.name == "poisson_ratio" ? 0.2
+                                             : info.unit == "Pa"          ? 1e8
+                                                                          : 1e5;
     }
   }
   if (argc > 3) scenario.model.effects = {argv[3]};

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "dem/dynamics/contact_model.h"
+#include "dem/registry/registry.h"
 
 namespace calib::dem {
 namespace {
@@ -104,7 +105,7 @@ Motion SomeMotion() {
 
 Loads Follow(const Model& model, const Motion& motion, const Matrix& frame) {
   constexpr double kDt = 1e-6;
-  const ContactModel contact(model);
+  const ContactModel contact = ContactModelOf(model);
   ContactBlock b{};
   b.sliding_friction = contact.sliding_friction();
   b.dt = kDt;

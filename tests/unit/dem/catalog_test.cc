@@ -7,9 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "dem/lab_tests/shared/element_test.h"
-#include "dem/lab_tests/shared/gravity_test.h"
-
 namespace calib::dem {
 namespace {
 
@@ -110,17 +107,31 @@ TEST(Catalog, ParametersBelongToTheModelThatHasThem) {
   EXPECT_EQ(FindParameter("nothing", {}, "friction_angle"), nullptr);
 }
 
-// The two lists by which effects say where they act.
-TEST(Catalog, NamesOfTestsByKindAreComplete) {
-  std::set<std::string> element;
-  std::set<std::string> gravity;
+// Effects ask for traits; the registry finds the tests that have them.
+TEST(Catalog, EffectsAreShownByTheTestsThatHaveTheirTraits) {
+  const auto shown = [](const std::string& effect) {
+    const std::vector<std::string>& names = FindEffect(effect)->excited_by;
+    return std::set<std::string>(names.begin(), names.end());
+  };
+  std::set<std::string> cell;
+  std::set<std::string> walls;
   for (const TestInfo& test : Tests()) {
-    if (test.needs_packing) (test.poured ? gravity : element).insert(test.name);
+    if (InPeriodicCell(test)) cell.insert(test.name);
+    if (test.has_walls) walls.insert(test.name);
   }
-  const std::vector<std::string> elements = ElementTestNames();
-  const std::vector<std::string> gravities = GravityTestNames();
-  EXPECT_EQ(std::set<std::string>(elements.begin(), elements.end()), element);
-  EXPECT_EQ(std::set<std::string>(gravities.begin(), gravities.end()), gravity);
+  EXPECT_EQ(shown("initial_density"), cell);
+  EXPECT_EQ(shown("wall_friction"), walls);
+  EXPECT_EQ(cell, (std::set<std::string>{"triaxial_drained", "triaxial_undrained", "oedometric",
+                                         "isotropic", "simple_shear"}));
+  EXPECT_EQ(walls, (std::set<std::string>{"angle_of_repose", "silo_discharge", "rotating_drum",
+                                          "calibration_device", "transfer_chute", "shaken_box",
+                                          "collision"}));
+  EXPECT_EQ(shown("membrane_stiffness"),
+            (std::set<std::string>{"triaxial_drained", "triaxial_undrained"}));
+  EXPECT_EQ(shown("load_cell_error"),
+            (std::set<std::string>{"triaxial_drained", "triaxial_undrained", "oedometric"}));
+  EXPECT_EQ(shown("twisting_resistance").count("shaken_box"), 0U);
+  EXPECT_TRUE(shown("rolling_resistance").empty());  // of every test
 }
 
 TEST(Catalog, TextNamesEveryEntryOnce) {

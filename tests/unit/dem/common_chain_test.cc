@@ -9,6 +9,7 @@
 #include "dem/dynamics/contact_model.h"
 #include "dem/dynamics/pair_blocks.h"
 #include "dem/geometry/vector3.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -75,7 +76,7 @@ TEST(CommonChain, HasTheBitsOfItsKernels) {
       for (const bool ratio : {false, true}) {
         for (unsigned seed = 1; seed <= 30; ++seed) {
           SCOPED_TRACE(law.contact + " " + std::to_string(names.size()));
-          const ContactModel model(With(law, names, ratio));
+          const ContactModel model = ContactModelOf(With(law, names, ratio));
           ASSERT_TRUE(model.common().has_value());
           const int count = seed % 3 == 0 ? 19 : kBlock;
           Case one(seed, count, model.history_size());
@@ -112,7 +113,7 @@ TEST(CommonChain, StiffnessesHaveTheBitsOfItsKernels) {
                                                   {"rolling_resistance", "twisting_resistance"}}) {
       for (unsigned seed = 1; seed <= 20; ++seed) {
         SCOPED_TRACE(law.contact + " " + std::to_string(names.size()));
-        const ContactModel model(With(law, names, seed % 2 == 0));
+        const ContactModel model = ContactModelOf(With(law, names, seed % 2 == 0));
         Case one(seed, kBlock, model.history_size());
         Case other(seed, kBlock, model.history_size());
         model.Evaluate(one.block);
@@ -135,14 +136,15 @@ TEST(CommonChain, StiffnessesHaveTheBitsOfItsKernels) {
 }
 
 TEST(CommonChain, OtherModelsHaveNone) {
-  EXPECT_FALSE(CommonChainOf(With(test::LinearModel(), {"twisting_resistance"}, false)));
+  const Model twists = With(test::LinearModel(), {"twisting_resistance"}, false);
+  EXPECT_FALSE(CommonChainOf(twists, EntriesOf(twists)));
   Model sticky = test::HertzModel();
   sticky.effects = {"linear_cohesion"};
   sticky.parameters["linear_cohesion.energy_density"] = 1e4;
-  EXPECT_FALSE(CommonChainOf(sticky));
+  EXPECT_FALSE(CommonChainOf(sticky, EntriesOf(sticky)));
   Model tsuji = test::HertzModel();
   tsuji.contact = "tsuji";
-  EXPECT_FALSE(CommonChainOf(tsuji));
+  EXPECT_FALSE(CommonChainOf(tsuji, EntriesOf(tsuji)));
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ ContactBlock Block(double vy = 0) {
 }
 
 TEST(HertzMindlin, NormalForceFollowsHertz) {
-  const ContactModel model(test::HertzModel());
+  const ContactModel model = ContactModelOf(test::HertzModel());
   ContactBlock b = Block();
   model.Evaluate(b);
   const double modulus = 8e8 / (2 * (1 - 0.2 * 0.2));
@@ -44,7 +44,7 @@ TEST(HertzMindlin, NormalForceFollowsHertz) {
 }
 
 TEST(HertzMindlin, TangentialStiffnessFollowsMindlin) {
-  const ContactModel model(test::HertzModel());
+  const ContactModel model = ContactModelOf(test::HertzModel());
   ContactBlock b = Block(1e-3);
   model.Evaluate(b);
   const double shear_modulus = 8e8 / (2 * 1.2);
@@ -57,7 +57,7 @@ TEST(HertzMindlin, TangentialStiffnessFollowsMindlin) {
 }
 
 TEST(Linear, StiffnessesGrowWithTheRadii) {
-  const ContactModel model(test::LinearModel());
+  const ContactModel model = ContactModelOf(test::LinearModel());
   ContactBlock b = Block();
   model.Evaluate(b);
   const double kn = 2 * 1.2e8 * kRadiusI * kRadiusJ / (kRadiusI + kRadiusJ);
@@ -71,7 +71,7 @@ TEST(Linear, NothingActsAcrossAGap) {
   damped.effects = {"viscous_damping"};
   damped.parameters["viscous_damping.ratio"] = 1;
   for (const Model& m : {damped, test::LinearModel(), test::HertzModel()}) {
-    const ContactModel model(m);
+    const ContactModel model = ContactModelOf(m);
     ContactBlock b = Block(1e-3);
     for (int k = 0; k < kBlock; ++k) {
       b.dx[k] = kRadiusI + kRadiusJ + kOverlap;
@@ -87,7 +87,7 @@ TEST(Linear, NothingActsAcrossAGap) {
 
 TEST(Sliding, ForceStaysOnCoulombLimit) {
   for (const Model& m : {test::HertzModel(), test::LinearModel()}) {
-    const ContactModel model(m);
+    const ContactModel model = ContactModelOf(m);
     ContactBlock b = Block(1e3);
     for (int step = 0; step < 5; ++step) {
       model.Evaluate(b);
@@ -97,7 +97,7 @@ TEST(Sliding, ForceStaysOnCoulombLimit) {
 }
 
 TEST(Sliding, ShearForceIsNotRescaledWhenTheOverlapShrinks) {
-  const ContactModel model(test::HertzModel());
+  const ContactModel model = ContactModelOf(test::HertzModel());
   ContactBlock b = Block(1e-3);
   model.Evaluate(b);
   const double before = b.fy[0];
@@ -188,7 +188,7 @@ TEST(RollingResistance, MomentGrowsElasticallyToItsLimit) {
   m.effects = {"rolling_resistance"};
   m.parameters["rolling_resistance.stiffness"] = 0.6;
   m.parameters["rolling_resistance.friction"] = 0.08;
-  const ContactModel model(m);
+  const ContactModel model = ContactModelOf(m);
   ContactBlock b = Block();
   for (int k = 0; k < kBlock; ++k) {
     b.wjz[k] = 1;
@@ -205,7 +205,7 @@ TEST(RollingResistance, LinearLawScalesWithRadiiAndSmallerGrain) {
   m.effects = {"rolling_resistance"};
   m.parameters["rolling_resistance.stiffness"] = 0.13;
   m.parameters["rolling_resistance.friction"] = 0.2;
-  const ContactModel model(m);
+  const ContactModel model = ContactModelOf(m);
   ContactBlock b = Block();
   for (int k = 0; k < kBlock; ++k) {
     b.wjz[k] = 1;
@@ -223,7 +223,7 @@ TEST(TwistingResistance, ActsAboutTheNormalOnly) {
   m.effects = {"twisting_resistance"};
   m.parameters["twisting_resistance.stiffness_ratio"] = 0.5;
   m.parameters["twisting_resistance.friction"] = std::numeric_limits<double>::infinity();
-  const ContactModel model(m);
+  const ContactModel model = ContactModelOf(m);
   ContactBlock b = Block();
   for (int k = 0; k < kBlock; ++k) {
     b.wjx[k] = 1;
@@ -260,7 +260,7 @@ TEST(ContactModel, OrderOfEffectsDoesNotMatter) {
 }
 
 TEST(ContactModel, EvaluationWithoutTimeKeepsTheHistory) {
-  const ContactModel model(test::HertzModel());
+  const ContactModel model = ContactModelOf(test::HertzModel());
   ContactBlock b = Block(1e-3);
   model.Evaluate(b);
   const double before = b.history[1][0];

@@ -13,6 +13,7 @@
 #include "dem/elementary/functions.h"
 #include "dem/formula/user_effect.h"
 #include "dem/registry/declared_effects.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 #include "tests/support/dem/user_effects.h"
 
@@ -152,8 +153,8 @@ ContactBlock Pair(double dt = 1e-6) {
 }
 
 double Added(const std::string& formula, double c = 1) {
-  const ContactModel plain(test::LinearModel());
-  const ContactModel joined(
+  const ContactModel plain = ContactModelOf(test::LinearModel());
+  const ContactModel joined = ContactModelOf(
       test::Joined(test::LinearModel(), test::Formula("normal_force", formula), {c}));
   ContactBlock without = Pair();
   ContactBlock with = Pair();
@@ -164,7 +165,7 @@ double Added(const std::string& formula, double c = 1) {
 }
 
 TEST(FormulaKernel, SeesEveryQuantityOfTheContact) {
-  const ContactModel plain(test::LinearModel());
+  const ContactModel plain = ContactModelOf(test::LinearModel());
   ContactBlock b = Pair();
   plain.Evaluate(b);
   const double mass = 4.0 / 3.0 * std::acos(-1.0) * test::LinearModel().density;
@@ -196,14 +197,14 @@ TEST(FormulaKernel, SeesTheStage) {
       "normal_force",
       "c * (mean_stress + 10 * deviatoric_stress + 100 * axial_strain + 1000 * volumetric_strain + "
       "1e4 * porosity)");
-  const ContactModel model(test::Joined(test::LinearModel(), effect, {1}));
+  const ContactModel model = ContactModelOf(test::Joined(test::LinearModel(), effect, {1}));
   ASSERT_NE(model.stage(), nullptr);
   *model.stage() = {.mean_stress = 1,
                     .deviatoric_stress = 2,
                     .axial_strain = 3,
                     .volumetric_strain = 4,
                     .porosity = 5};
-  const ContactModel plain(test::LinearModel());
+  const ContactModel plain = ContactModelOf(test::LinearModel());
   EXPECT_EQ(plain.stage(), nullptr);
   ContactBlock with = Pair();
   ContactBlock without = Pair();
@@ -213,9 +214,9 @@ TEST(FormulaKernel, SeesTheStage) {
 }
 
 TEST(FormulaKernel, AttractionLeavesTheSlidingLimit) {
-  const ContactModel plain(test::LinearModel());
-  const ContactModel joined(
-      test::Joined(test::LinearModel(), test::Formula("attraction", "c"), {0.3}));
+  const ContactModel plain = ContactModelOf(test::LinearModel());
+  const ContactModel joined =
+      ContactModelOf(test::Joined(test::LinearModel(), test::Formula("attraction", "c"), {0.3}));
   ContactBlock without = Pair();
   ContactBlock with = Pair();
   plain.Evaluate(without);
@@ -225,11 +226,11 @@ TEST(FormulaKernel, AttractionLeavesTheSlidingLimit) {
 }
 
 TEST(FormulaKernel, FrictionIsScaledAndNeverNegative) {
-  const ContactModel plain(test::LinearModel());
+  const ContactModel plain = ContactModelOf(test::LinearModel());
   ContactBlock without = Pair();
   plain.Evaluate(without);
   for (const auto& [c, factor] : std::vector<std::pair<double, double>>{{0.5, 1.5}, {-3, 0}}) {
-    const ContactModel joined(
+    const ContactModel joined = ContactModelOf(
         test::Joined(test::LinearModel(),
                      test::Formula("friction_coefficient", "1 + c", FormulaAction::kScales), {c}));
     ContactBlock with = Pair();
@@ -239,13 +240,13 @@ TEST(FormulaKernel, FrictionIsScaledAndNeverNegative) {
 }
 
 TEST(FormulaKernel, ShearForceOpposesTheSlidingUpToTheLimit) {
-  const ContactModel plain(test::LinearModel());
+  const ContactModel plain = ContactModelOf(test::LinearModel());
   ContactBlock without = Pair();
   plain.Evaluate(without);
   ASSERT_LT(without.fy[0], 0);
   const double limit = without.sliding_limit[0];
   for (const double c : {0.1, 100.0}) {
-    const ContactModel joined(test::Joined(
+    const ContactModel joined = ContactModelOf(test::Joined(
         test::LinearModel(), test::Formula("shear_force", "c * sliding_velocity"), {c}));
     ContactBlock with = Pair();
     joined.Evaluate(with);
@@ -254,8 +255,8 @@ TEST(FormulaKernel, ShearForceOpposesTheSlidingUpToTheLimit) {
 }
 
 TEST(FormulaKernel, VelocitiesDoNothingDuringConsolidation) {
-  const ContactModel plain(test::LinearModel());
-  const ContactModel joined(test::Joined(
+  const ContactModel plain = ContactModelOf(test::LinearModel());
+  const ContactModel joined = ContactModelOf(test::Joined(
       test::LinearModel(), test::Formula("normal_force", "c * closing_velocity"), {1}));
   ContactBlock without = Pair();
   ContactBlock with = Pair();
@@ -268,7 +269,7 @@ TEST(FormulaKernel, VelocitiesDoNothingDuringConsolidation) {
 // The step of an explicit scheme has to know what a formula stiffens and damps.
 TEST(FormulaKernel, SlopesJoinStiffnessAndDamping) {
   const auto evaluated = [](const UserEffect& effect, double c) {
-    const ContactModel model(test::Joined(test::LinearModel(), effect, {c}));
+    const ContactModel model = ContactModelOf(test::Joined(test::LinearModel(), effect, {c}));
     ContactBlock b = Pair(0);
     model.Evaluate(b);
     return std::array<double, 3>{b.normal_stiffness[0], b.normal_damping[0],
@@ -286,8 +287,8 @@ TEST(FormulaKernel, SlopesJoinStiffnessAndDamping) {
 }
 
 TEST(FormulaKernel, KeepsWhatIsNotFiniteToItself) {
-  const ContactModel plain(test::LinearModel());
-  const ContactModel joined(test::Joined(
+  const ContactModel plain = ContactModelOf(test::LinearModel());
+  const ContactModel joined = ContactModelOf(test::Joined(
       test::LinearModel(), test::Formula("normal_force", "c * sqrt(0.000015 - overlap)"), {2}));
   ContactBlock without = Pair();
   ContactBlock with = Pair();

@@ -170,7 +170,7 @@ TEST(MaterialPair, StiffnessesOfEveryLawAreInSeries) {
   const double r = 0.01;
   const double u = 1e-6;
   const auto evaluate = [&](const Model& model, ContactBlock& block) {
-    const ContactModel contact(model);
+    const ContactModel contact = ContactModelOf(model);
     block.mixed = true;
     for (int k = 0; k < kBlock; ++k) {
       block.radius_i[k] = block.radius_j[k] = r;

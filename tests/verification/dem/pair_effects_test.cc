@@ -9,10 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "dem/registry/catalog.h"
-#include "dem/dynamics/contact_model.h"
 #include "dem/contact/materials.h"
+#include "dem/dynamics/contact_model.h"
+#include "dem/registry/catalog.h"
 #include "dem/registry/model_parameters.h"
+#include "dem/registry/registry.h"
 #include "tests/support/dem/scenarios.h"
 
 namespace calib::dem {
@@ -46,7 +47,7 @@ struct Pairs {
   ContactBlock block{};
 
   explicit Pairs(const Model& model, double overlap = kOverlap) {
-    const ContactModel contact(model);
+    const ContactModel contact = ContactModelOf(model);
     block.mixed = true;
     block.count = kBlock;
     block.dt = 1e-3;
@@ -229,7 +230,7 @@ TEST(PairEffects, PlasticityIsThatOfThePair) {
       Three({"contact_plasticity"}, {{"contact_plasticity.stiffness_ratio", 1},
                                      {"rubber-steel.contact_plasticity.stiffness_ratio", 1.2},
                                      {"grains-grains.contact_plasticity.stiffness_ratio", 50}});
-  const ContactModel contact(model);
+  const ContactModel contact = ContactModelOf(model);
   Pairs pairs(model, 2 * kOverlap);
   for (double& dx : pairs.block.dx) dx = 2 * kRadius - kOverlap;
   contact.Evaluate(pairs.block);
