@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "dem/registry/catalog.h"
+#include "dem/registry/declared_effects.h"
 
 namespace calib::diagnosis {
 namespace {
