@@ -10,53 +10,60 @@
 
 namespace calib::inference {
 
-/// Density of readings z, in units of their noise sd, under the emulator:
+/// Density of T readings z, in units of their noise sd about the measured ones, under an emulator
+/// of q components (StateEmulator):
 ///   N(z; mean + B m, F (R + diag(remainder)) + B D C D B^T),
 ///   D^2 = diag(sd^2 + share * scatter_sd^2)
 /// with mean, basis B, remainder and error correlation C of the emulator, its prediction m, sd at a
-/// point, the noise's correlation R (identity, or exponential along the control), and one variance
-/// factor per (experiment, observable) group in F. `share` is the part of a run's scatter that the
+/// point, the noise's correlation R (identity, exponential along the control, or as given in full),
+/// and one variance factor per noise group in F. `share` is the part of a run's scatter that the
 /// measurement has as well. All that involves T is done once; a point then costs O(q^3).
+/// Immutable after Create; thread safety: const.
 class EmulatedLikelihood {
  public:
+  /// How Create takes the data.
   struct Options {
-    bool correlated_noise = true;  ///< use data.correlations
-    double scatter_share = 1;
-    bool reversed = false;  ///< data are Reversed() ones of those the emulator learned from
+    bool correlated_noise = true;  ///< false: as if the readings' errors were independent
+    double scatter_share = 1;      ///< `share`, [0, 1]
+    bool reversed = false;  ///< the data are Reversed() ones of those the emulator learned from
   };
+  /// The likelihood of the data under the emulator; keeps no reference.
   /// in: data that ValidateData accepts for kGiven; emulator of the same T readings
-  /// Keeps no reference. Errors: INVALID_ARGUMENT when correlated readings lie so close that their
-  /// covariance is singular.
+  /// Errors: INVALID_ARGUMENT when correlated readings lie so close that their covariance is
+  /// singular.
   static absl::StatusOr<EmulatedLikelihood> Create(const DataSet& data,
                                                    const StateEmulator& emulator,
                                                    const Options& options);
 
-  /// The likelihood of the first `readings` of the processing order alone, [0, T]; noise groups keep
-  /// their places.
+  /// The likelihood of the first `readings` of the processing order alone, [0, T]; noise groups
+  /// keep their places.
   EmulatedLikelihood First(Eigen::Index readings) const;
 
   /// The likelihood of these readings alone, ascending indices; noise groups keep their places.
   EmulatedLikelihood Of(const std::vector<Eigen::Index>& readings) const;
 
-  /// Noise groups (NoiseGroupsOf), one variance factor each.
+  /// Number of noise groups (NoiseGroupsOf), one variance factor each.
   int groups() const { return groups_; }
 
-  /// ln p(readings | point) in the readings' own units, m entries; readings as measured (z = 0).
-  /// factors: m x groups, > 0; 0 columns for all one.
+  /// ln p(readings | point) of the measured readings (z = 0) at m points, in the readings' own
+  /// units, m entries. prediction: of the emulator at the points; factors: m x groups, > 0, of the
+  /// noise variance; 0 columns: all one.
   Eigen::VectorXd LogLikelihood(const ScorePrediction& prediction,
                                 const Eigen::MatrixXd& factors) const;
 
-  /// chi^2 of the measured readings about the emulator's prediction, in the same covariance, m
-  /// entries; chi-squared distributed with T degrees of freedom over readings replicated from it.
+  /// chi^2 of the measured readings about the emulator's prediction at m points, by the covariance
+  /// of the likelihood with all factors one, m entries; chi-squared distributed with T degrees of
+  /// freedom over readings replicated from it.
   Eigen::VectorXd Misfit(const ScorePrediction& prediction) const;
 
-  /// ln p(z | point) for one point with readings z (T, noise units about the measured ones), all
-  /// factors one.
+  /// ln p(z | point) at the point `row` of a prediction for readings z (T, in units of their noise
+  /// sd about the measured ones), all factors one.
   double LogDensity(const ScorePrediction& prediction, Eigen::Index row,
                     const Eigen::VectorXd& z) const;
 
  private:
-  // Of one group, whitened by W = chol(R + diag(remainder))^-1.
+  // What is known of the readings of one (experiment, observable), whitened by
+  // W = chol(R + diag(remainder))^-1.
   struct Form {
     std::vector<Eigen::Index> readings;
     int noise_group = 0;

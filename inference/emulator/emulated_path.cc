@@ -17,6 +17,9 @@ namespace {
 using Eigen::Index;
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();
+constexpr int kMostBatches = 50;  // of prior draws, to find those where the model is known; chosen
+constexpr Index kFewest = 50;     // draws that a path is worth making of; chosen
+constexpr double kAcceptance = 0.3;  // wanted of a Metropolis step, TmcmcOptions::acceptance
 
 // prior x L_before^(1 - exponent) L_next^exponent, on the way from one load step to the next.
 struct Bridge {
@@ -114,7 +117,6 @@ class PathSampler {
   // Draws of the prior where the emulator knows the model, as many as are wanted or as a bounded
   // number of tries gives; the share of the prior that is known begins the evidence.
   void DrawKnown() {
-    constexpr int kMostBatches = 50;
     const Index wanted = options_.draws;
     Index taken = 0;
     Index known = 0;
@@ -190,8 +192,7 @@ class PathSampler {
       cloud_.TakeRow(i, proposed, i);
       ++accepted;
     }
-    constexpr double kWanted = 0.3;
-    scale_ = NextScale(scale_, prior.size(), accepted / static_cast<double>(n), kWanted);
+    scale_ = NextScale(scale_, prior.size(), accepted / static_cast<double>(n), kAcceptance);
   }
 
   const EmulatedTarget& target_;
@@ -209,7 +210,6 @@ absl::StatusOr<PosteriorPath> EmulatedPath(const EmulatedTarget& target,
                                            const DataSet& data, const EmulatedPathOptions& options,
                                            const std::stop_token& stop) {
   PathSampler sampler(target, options);
-  constexpr Index kFewest = 50;
   if (sampler.cloud().size() < kFewest) {
     return absl::FailedPreconditionError(
         "Almost nowhere in the prior does the emulator know the mean history of the model.");

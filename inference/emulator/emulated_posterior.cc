@@ -26,6 +26,9 @@ namespace {
 
 using Eigen::Index;
 
+// Draws for a predictive p-value of some readings; chosen: one of a few per cent is known to 1 %.
+constexpr Index kStageDraws = 500;
+
 absl::StatusOr<Runs> CollectRuns(const JointPrior& priors, const DataSet& data,
                                  std::span<const Iteration> iterations) {
   const auto t = static_cast<Index>(data.readings.size());
@@ -123,7 +126,7 @@ void AddScatter(const DataSet& data, const StateEmulator& emulator, EmulatedResu
   result.scatter_white = sd.array().square() * emulator.components().remainder.array();
 }
 
-// Draws of the posterior under errors whose scatter is that of refits [refit_spread.h]. prediction:
+// Draws of the posterior under errors whose scatter is that of refits (refit_spread.h). prediction:
 // at the draws.
 void Widen(const JointPrior& priors, const DataSet& data, const EmulatorOptions& options,
            const StateEmulator& emulator, const ScorePrediction& prediction,
@@ -148,11 +151,10 @@ double PredictiveP(const EmulatedLikelihood& likelihood, const ScorePrediction& 
   return sum / static_cast<double>(misfit.size());
 }
 
-// Of as many draws as a probability of a few per cent is known well from, evenly thinned.
+// EmulatedResult::stage_p, by some of the draws, evenly spread.
 std::vector<double> StageP(const EmulatedLikelihood& likelihood, const ScorePrediction& prediction,
                            const std::vector<JudgedReadings>& stages) {
-  constexpr Index kDraws = 500;
-  const Index stride = std::max<Index>(1, prediction.mean.rows() / kDraws);
+  const Index stride = std::max<Index>(1, prediction.mean.rows() / kStageDraws);
   const auto thinned = Eigen::seq(0, prediction.mean.rows() - 1, stride);
   const ScorePrediction some{.mean = prediction.mean(thinned, Eigen::all),
                              .sd = prediction.sd(thinned, Eigen::all)};
@@ -205,7 +207,8 @@ absl::Status AddPaths(const EmulatedTarget& target, const EmulatedLikelihood& li
   return absl::OkStatus();
 }
 
-// Of no use anywhere: not one prior draw lies where the emulator knows the model's history.
+// The result of an emulator that is of no use anywhere: not one prior draw lies where it knows the
+// model's history.
 EmulatedResult KnowsNothing(const EmulatorOptions& options, const TrainedEmulator& trained) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   EmulatedResult result;

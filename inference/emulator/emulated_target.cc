@@ -13,6 +13,11 @@ namespace {
 
 using Eigen::Index;
 
+// Ends of z, in its standard deviations, beyond which its distribution function is 0 or 1 in
+// double.
+constexpr double kFarthest = 8;
+constexpr double kLeastSquare = 1e-12;  // of z, where its inverse would leave all scales; chosen
+
 // An inverse gamma of shape and rate 1/2 is the law of 1 / z^2, z standard normal.
 bool IsDefault(const VarianceFactorPrior& prior) { return prior.shape == 0.5 && prior.rate == 0.5; }
 
@@ -107,10 +112,9 @@ Eigen::MatrixXd EmulatedTarget::Factors(const Eigen::MatrixXd& points) const {
     const VarianceFactorPrior& prior = groups_[static_cast<std::size_t>(g)].prior;
     for (Index i = 0; i < factors.rows(); ++i) {
       double& z = factors(i, g);
-      constexpr double kFarthest = 8;  // sd of z
       const double u =
           IsDefault(prior) ? 0 : std::exp(LogNormalCdf(std::clamp(z, -kFarthest, kFarthest)));
-      z = IsDefault(prior) ? 1 / std::max(z * z, 1e-12)
+      z = IsDefault(prior) ? 1 / std::max(z * z, kLeastSquare)
                            : prior.rate / GammaQInverse(prior.shape, u);
     }
   }

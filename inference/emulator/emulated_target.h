@@ -1,6 +1,7 @@
 #pragma once
-// What is sampled on an emulator: the parameters that are not held and, where the noise is inferred,
-// one coordinate per noise group, over the part of the prior where the emulator knows the model.
+// What is sampled on an emulator: the parameters that are not held and, where the noise is
+// inferred, one coordinate per noise group, over the part of the prior where the emulator knows the
+// model.
 
 #include <Eigen/Core>
 #include <optional>
@@ -14,43 +15,53 @@
 
 namespace calib::inference {
 
-/// Standardised coordinates of each row of parameters, N x d.
+/// Standardised coordinates (Prior::ToStandard) of each row of parameters, N x d. Pure.
 Eigen::MatrixXd ToStandard(const JointPrior& priors, const Eigen::MatrixXd& parameters);
 
-/// Some points, their emulated histories and the variance factors they stand for.
+/// What an emulator says of m points.
 struct EmulatedPoints {
-  ScorePrediction prediction;
-  Eigen::MatrixXd factors;  ///< of the noise variance, m x groups; 0 columns: as stated
-  /// Sum over the readings of the variance of what the emulator does not know of the mean history
-  /// there, in units of the noise variance; m.
+  ScorePrediction prediction;  ///< of the emulated histories
+  Eigen::MatrixXd factors;     ///< m x groups, of the noise variance; 0 columns: noise as stated
+  /// m: sum over the readings of the variance of what the emulator does not know of the mean
+  /// history, in units of the noise variance.
   Eigen::VectorXd unknown;
 };
 
-/// Keeps references to priors and emulator.
+/// The space that is sampled, of points: the free ones of d parameters in their units, then one
+/// number z for each noise group with kInferred. Keeps references to priors and emulator, which
+/// outlive it. Immutable; thread safety: const.
 class EmulatedTarget {
  public:
-  /// noise: kGiven or kInferred. max_error: largest root mean square of what is not known that a
-  /// point may have, in noise sd. Parameters that the last iteration holds (Proposal::frozen) are
-  /// held.
+  /// noise: kGiven or kInferred. max_error: largest root mean square over the readings of what is
+  /// not known that a point may have, in noise sd. Parameters that the last iteration holds
+  /// (Proposal::frozen) are held.
   EmulatedTarget(const JointPrior& priors, const DataSet& data, NoiseMode noise, double max_error,
                  const StateEmulator& emulator, std::span<const Iteration> iterations);
 
-  /// The free parameters, then z of each noise group: f = 1 / z^2, z half normal, or the quantile
-  /// of the factor's prior at Phi(z) where that is not inverse gamma of 1/2 and 1/2.
+  /// Prior of points: of the free parameters, and of z of each noise group, whose factor is
+  /// f = 1 / z^2, z half normal, or the quantile of the factor's prior at Phi(z), z normal, where
+  /// that is not inverse gamma of 1/2 and 1/2.
   const JointPrior& prior() const { return prior_; }
-  /// All d parameters of sampled points; held ones at their values.
+  /// All d parameters of m points, m x d; held ones at their values.
   Eigen::MatrixXd Complete(const Eigen::MatrixXd& points) const;
+  /// What the emulator says of m points.
   EmulatedPoints At(const Eigen::MatrixXd& points) const;
+  /// The emulated histories of m rows of all d parameters.
   ScorePrediction Predict(const Eigen::MatrixXd& parameters) const;
+  /// Variance factors of m points, m x groups; 0 columns with kGiven.
   Eigen::MatrixXd Factors(const Eigen::MatrixXd& points) const;
+  /// EmulatedPoints::unknown of m points with the emulator's sd (m x q) and variance factors.
   Eigen::VectorXd Unknown(const Eigen::MatrixXd& sd, const Eigen::MatrixXd& factors) const;
-  /// False where no run has been: nothing can be said there, and a model that fits nowhere would
-  /// otherwise prefer the corner of which the emulator knows least.
+  /// Whether the emulator knows the model at a point with this EmulatedPoints::unknown. False where
+  /// no run has been: nothing can be said there, and a model that fits nowhere would otherwise
+  /// prefer the corner of which the emulator knows least.
   bool IsKnown(double unknown) const { return unknown <= most_unknown_; }
 
+  /// Indices of the parameters that are not held, ascending.
   const std::vector<Eigen::Index>& free() const { return free_; }
+  /// The value that parameter j is held at; nullopt: it is free.
   std::optional<double> Held(Eigen::Index j) const;
-  /// Noise group of each reading; empty with kGiven.
+  /// Noise group of each of the T readings; empty with kGiven.
   const std::vector<Eigen::Index>& group() const { return group_; }
 
  private:

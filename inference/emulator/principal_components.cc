@@ -6,6 +6,13 @@
 #include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
+namespace {
+
+// Eigenvalue over the largest, the square of a singular value's, below which a component is
+// rounding.
+constexpr double kRounding = 1e-14;
+
+}  // namespace
 
 using Eigen::Index;
 
@@ -35,7 +42,7 @@ PrincipalComponents FitPrincipalComponents(const Eigen::MatrixXd& rows,
   Index q = 0;
   while (q < rank) {
     const Index k = gram.rows() - 1 - q;
-    if (!(eigen.eigenvalues()[k] > 1e-14 * eigen.eigenvalues()[gram.rows() - 1])) break;
+    if (!(eigen.eigenvalues()[k] > kRounding * eigen.eigenvalues()[gram.rows() - 1])) break;
     const Eigen::VectorXd vector = eigen.eigenvectors().col(k);
     result.basis.col(q) =
         by_rows ? Eigen::VectorXd((weighted.transpose() * vector).normalized()) : vector;

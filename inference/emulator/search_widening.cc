@@ -9,8 +9,10 @@
 namespace calib::inference {
 namespace {
 
+// Measured by SearchWidening.* of inference_emulator_verification_test: after three iterations the
+// closest run misses by 1.01 to 1.09 of the least that there is, by 1.12 to 1.63 without widening.
 constexpr double kShareOfMisfit = 0.5;
-constexpr std::ptrdiff_t kDrawsPerClosest = 10;
+constexpr std::ptrdiff_t kDrawsPerClosest = 10;  // one draw in ten is among the closest
 
 }  // namespace
 

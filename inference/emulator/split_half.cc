@@ -13,7 +13,7 @@ using Eigen::Index;
 
 constexpr int kDraws = 500;  // the mean of so many is known to 0.05 sd
 
-// Of the undiverged runs one half, all iterations counted through.
+// One half of the undiverged runs, all iterations counted through.
 std::vector<Iteration> HalfOf(std::span<const Iteration> iterations, int which) {
   Index runs = 0;
   for (const Iteration& iteration : iterations) runs += iteration.predictions.rows();

@@ -8,6 +8,11 @@
 #include "inference/numerics/decompositions.h"
 
 namespace calib::inference {
+namespace {
+
+constexpr double kTiny = 1e-300;  // in the place of a zero that is divided by
+
+}  // namespace
 
 using Eigen::Index;
 
@@ -69,7 +74,7 @@ void StateEmulator::CrossValidate(const Eigen::MatrixXd& histories,
   // Shrunk towards independence with the weight of q runs, so that the matrix is definite for any
   // number of runs.
   correlation_ = standardised.transpose() * standardised;
-  const Eigen::VectorXd norm = correlation_.diagonal().cwiseSqrt().cwiseMax(1e-300);
+  const Eigen::VectorXd norm = correlation_.diagonal().cwiseSqrt().cwiseMax(kTiny);
   correlation_ = norm.cwiseInverse().asDiagonal() * correlation_ * norm.cwiseInverse().asDiagonal();
   correlation_ *= static_cast<double>(m) / static_cast<double>(m + q);
   correlation_.diagonal().setOnes();
@@ -83,7 +88,7 @@ void StateEmulator::CrossValidate(const Eigen::MatrixXd& histories,
     const Eigen::MatrixXd spread = components_.basis * claimed.asDiagonal() * lower;
     const Eigen::VectorXd variance = spread.rowwise().squaredNorm() + components_.remainder;
     cross_validation_.standardised.row(i) =
-        cross_validation_.error.row(i).array() / variance.transpose().array().max(1e-300).sqrt();
+        cross_validation_.error.row(i).array() / variance.transpose().array().max(kTiny).sqrt();
   }
   const auto count = static_cast<double>(cross_validation_.error.size());
   cross_validation_.rms = std::sqrt(cross_validation_.error.squaredNorm() / count);

@@ -15,6 +15,10 @@ namespace {
 
 using Eigen::Index;
 
+constexpr Index kFewestRuns = 10;      // and d + 4: a process has d + 2 hyper-parameters; chosen
+constexpr Index kFewestRelevant = 40;  // TrainingOptions::relevant_runs
+constexpr Index kRelevantPerParameter = 10;
+
 // Rows from the best score down; equal scores in index order.
 std::vector<Index> Ranking(const Eigen::VectorXd& scores) {
   std::vector<Index> order(static_cast<std::size_t>(scores.size()));
@@ -122,13 +126,14 @@ absl::StatusOr<TrainedEmulator> TrainEmulator(const Runs& runs, const DataSet& d
                                               const TrainingOptions& options) {
   const Index n = runs.inputs.rows();
   const Index d = runs.inputs.cols();
-  if (n < std::max<Index>(10, d + 4)) {
+  if (n < std::max<Index>(kFewestRuns, d + 4)) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "an emulator of ", d, " parameters needs at least ", std::max<Index>(10, d + 4),
+        "an emulator of ", d, " parameters needs at least ", std::max<Index>(kFewestRuns, d + 4),
         " runs; there are ", n, " that came to their ends: run more samples."));
   }
   const auto wanted = static_cast<std::size_t>(
-      options.relevant_runs > 0 ? options.relevant_runs : std::max<Index>(40, 10 * d));
+      options.relevant_runs > 0 ? options.relevant_runs
+                                : std::max<Index>(kFewestRelevant, kRelevantPerParameter * d));
   const std::size_t count = std::min(wanted, static_cast<std::size_t>(n));
   const auto limit = std::max(static_cast<std::size_t>(options.max_runs), count);
   const auto first = [](const std::vector<Index>& order, std::size_t size) {

@@ -14,6 +14,12 @@ namespace {
 
 using Eigen::Index;
 
+// Points that cannot be told apart, relative; chosen: the interpolant of what is closer would be
+// rounding.
+constexpr double kCoincides = 1e-9;   // distance, over 1 + the point's size
+constexpr double kFlat = 1e-8;        // pivot of a hyperplane's points, over the largest
+constexpr double kVanishing = 1e-15;  // pivot of the Cholesky factor's row, over its diagonal
+
 double Cubic(double r) { return r * r * r; }
 
 }  // namespace
@@ -24,7 +30,7 @@ absl::Status CubicRbf::Add(const Eigen::VectorXd& point, double value) {
     return absl::InvalidArgumentError("a point of the surrogate or its value is not finite.");
   }
   for (int i = 0; i < size(); ++i) {
-    if ((point - points_[static_cast<std::size_t>(i)]).norm() <= 1e-9 * (1 + point.norm())) {
+    if ((point - points_[static_cast<std::size_t>(i)]).norm() <= kCoincides * (1 + point.norm())) {
       return absl::InvalidArgumentError(
           absl::StrCat("a point of the surrogate coincides with its point ", i, "."));
     }
@@ -63,7 +69,7 @@ bool CubicRbf::ChooseTailPoints() {
   Eigen::MatrixXd tail(m, size());
   for (int i = 0; i < size(); ++i) tail.col(i) << 1, points_[static_cast<std::size_t>(i)];
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted(tail);
-  pivoted.setThreshold(1e-8);
+  pivoted.setThreshold(kFlat);
   if (pivoted.rank() < m) return false;
   for (Index k = 0; k < m; ++k) tail_points_.push_back(pivoted.colsPermutation().indices()[k]);
   std::sort(tail_points_.begin(), tail_points_.end());
@@ -107,7 +113,7 @@ bool CubicRbf::AppendRow(int i) {
   const auto last = static_cast<Index>(n);
   const double diagonal = -border.dot(solved);
   const double pivot = diagonal - row.head(last).squaredNorm();
-  if (!(pivot > 1e-15 * std::abs(diagonal))) return false;
+  if (!(pivot > kVanishing * std::abs(diagonal))) return false;
   row[last] = std::sqrt(pivot);
   others_.push_back(i);
   borders_.push_back(border);

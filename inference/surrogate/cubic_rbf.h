@@ -1,5 +1,6 @@
 #pragma once
-// Cubic radial basis function interpolant with a linear tail [Powell 1992; Regis & Shoemaker 2007].
+// Cubic radial basis function interpolant with a linear tail
+// [Powell 1992; Regis & Shoemaker 2007].
 
 #include <Eigen/Core>
 #include <memory>
@@ -9,39 +10,44 @@
 
 namespace calib::inference {
 
-/// s(x) = sum_i lambda_i |x - x_i|^3 + c_0 + c . x  through all (x_i, f_i), with sum_i lambda_i = 0
-/// and sum_i lambda_i x_i = 0, no regularisation.
+/// The interpolant s(x) = sum_i lambda_i |x - x_i|^3 + c_0 + c . x in d dimensions through all n
+/// points (x_i, f_i), with sum_i lambda_i = 0 and sum_i lambda_i x_i = 0, no regularisation.
 ///
 /// d + 1 points in general position and the tail form a small block A, factorised once; what the
 /// other points leave,
 ///   S = Phi_22 - B^T A^-1 B,
 /// is positive definite because the cubic kernel is so on the functions that vanish on linear
 /// polynomials. A further point therefore adds one row to a Cholesky factor: O(n^2) instead of
-/// O(n^3). Points that arrive before d + 1 of them are in general position wait. A value type;
-/// thread safety: const.
+/// O(n^3). Points that arrive before d + 1 of them are in general position wait. A value; thread
+/// safety: const.
 class CubicRbf {
  public:
+  /// dimensions: d >= 1
   explicit CubicRbf(int dimensions) : dimensions_(dimensions) {}
 
-  /// Adds a point with its value. Errors: INVALID_ARGUMENT when it (nearly) coincides with an
+  /// Adds a point (d) with its value. Errors: INVALID_ARGUMENT when it (nearly) coincides with an
   /// earlier one, or anything is not finite; the interpolant is unchanged then.
   absl::Status Add(const Eigen::VectorXd& point, double value);
 
-  int dimensions() const { return dimensions_; }
-  int size() const { return static_cast<int>(points_.size()); }
+  int dimensions() const { return dimensions_; }                 ///< d
+  int size() const { return static_cast<int>(points_.size()); }  ///< n
   /// True once d + 1 points are in general position; evaluate only then.
   bool ready() const { return tail_points_.size() == static_cast<std::size_t>(dimensions_) + 1; }
 
+  /// s(x). Precondition: ready().
   double Value(const Eigen::VectorXd& x) const;
+  /// The d derivatives of s at x. Precondition: ready().
   Eigen::VectorXd Gradient(const Eigen::VectorXd& x) const;
-  /// From distances |x - x_i| already at hand (n, in the order of Add).
+  /// s(x) from distances |x - x_i| already at hand (n, in the order of Add). Precondition: ready().
   double Value(const Eigen::VectorXd& x, const Eigen::VectorXd& distances) const;
 
+  /// x_i, in the order of Add.
   const Eigen::VectorXd& point(int i) const { return points_[static_cast<std::size_t>(i)]; }
+  /// f_i, in the order of Add.
   double value(int i) const { return values_[static_cast<std::size_t>(i)]; }
-  /// lambda in the order of Add, n.
+  /// lambda in the order of Add, n entries.
   const Eigen::VectorXd& coefficients() const { return coefficients_; }
-  /// c_0, c_1 ... c_d.
+  /// c_0, c_1 ... c_d, d + 1 entries.
   const Eigen::VectorXd& tail() const { return tail_; }
 
  private:

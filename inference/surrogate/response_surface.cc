@@ -16,6 +16,11 @@ namespace {
 
 using Eigen::Index;
 
+constexpr int kCandidatesPerDimension = 100;  // [Samuelsson 2023, Table 4.2]
+constexpr int kTries = 1'000'000;  // of a point that is admissible; chosen: below a second
+// How a perturbation that is not admissible comes closer; chosen.
+constexpr int kPerStep = 20;          // draws before the step is halved
+constexpr double kLeastStep = 1e-12;  // of the cube's edge: the point itself is taken
 
 int InitialPoints(const ResponseSurfaceOptions& options) {
   return options.initial_points > 0 ? options.initial_points
@@ -30,7 +35,8 @@ bool IsAdmissible(const ResponseSurfaceOptions& options, const Eigen::VectorXd& 
 // can be met exactly.
 Eigen::MatrixXd Candidates(const ResponseSurfaceOptions& options,
                            const ResponseSurfaceState& state) {
-  const int count = options.candidates > 0 ? options.candidates : 100 * options.dimensions;
+  const int count =
+      options.candidates > 0 ? options.candidates : kCandidatesPerDimension * options.dimensions;
   const Eigen::VectorXd& best = state.evaluations[static_cast<std::size_t>(state.best)].point;
   Eigen::MatrixXd candidates(options.dimensions, count);
   for (Index k = 0; k < count; ++k) {
@@ -53,7 +59,6 @@ Eigen::MatrixXd Joined(const Eigen::MatrixXd& first, const Eigen::MatrixXd& hype
 
 // Uniform draws in the place of design points that are not admissible.
 absl::Status ReplaceInadmissible(const ResponseSurfaceOptions& options, Eigen::MatrixXd& design) {
-  constexpr int kTries = 1'000'000;
   constexpr std::uint64_t kDesign = ~std::uint64_t{0};  // no count of evaluations
   for (Index i = 0; i < design.rows(); ++i) {
     Eigen::VectorXd point = design.row(i);
@@ -111,8 +116,6 @@ Eigen::VectorXd ChoosePoint(const ResponseSurfaceOptions& options, const CubicRb
 
 Eigen::VectorXd Perturbed(const ResponseSurfaceOptions& options, const Eigen::VectorXd& center,
                           double step, PhiloxStream& stream) {
-  constexpr int kPerStep = 20;
-  constexpr double kLeastStep = 1e-12;
   Eigen::VectorXd point(options.dimensions);
   for (int draw = 1; step >= kLeastStep; ++draw) {
     for (Index j = 0; j < options.dimensions; ++j) {

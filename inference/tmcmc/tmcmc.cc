@@ -16,7 +16,7 @@ namespace {
 using Eigen::Index;
 
 // Metropolis steps of a stage; chosen: with 15 in ten dimensions the stated error of the evidence
-// is 30 % too small (inference_tmcmc_verification_test, fifty seeds).
+// is 30 % too small over fifty seeds of a linear model.
 constexpr int kFewestSteps = 10;
 constexpr int kStepsPerParameter = 3;
 
