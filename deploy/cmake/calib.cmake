@@ -1,5 +1,6 @@
 # Build conventions shared by every folder: calib_library(), calib_program(), calib_test(), calib_bench(), and how everything
-# is compiled. There is one way of compiling: users (deploy/quickstart) and developers (deploy/test) make the same objects.
+# is compiled. There is one way of compiling (CMakePresets.json): users (deploy/quickstart) and developers (deploy/test) make the
+# same objects, asserts among them, so that what is tested is what is run and nothing is compiled twice.
 include(CTest)
 
 set(CMAKE_CXX_STANDARD 20)
