@@ -10,21 +10,21 @@
 namespace calib::inference {
 namespace {
 
-constexpr int kDraws = 2000;         // of a factor; chosen: its 5 % quantile is known to 0.5 %
-constexpr double kNoWeight = 1e-12;  // of a sample, that no digit of a probability shows; chosen
+constexpr int kDrawsOfFactor = 2000;  // of a factor; chosen: its 5 % quantile is known to 0.5 %
+constexpr double kNoWeight = 1e-12;   // of a sample, that no digit of a probability shows; chosen
 
 }  // namespace
 
 Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
                            const Eigen::VectorXd& log_weights) {
   Eigen::MatrixXd scale(factors.shapes.size(), 3);
-  std::vector<double> draws(kDraws);
+  std::vector<double> draws(kDrawsOfFactor);
   for (Eigen::Index g = 0; g < scale.rows(); ++g) {
     Eigen::Index i = 0;  // the last sample of positive weight passed
     Eigen::Index next = 0;
     double passed = 0;
-    for (int m = 0; m < kDraws; ++m) {
-      for (; passed < (m + 0.5) / kDraws && next < log_weights.size(); ++next) {
+    for (int m = 0; m < kDrawsOfFactor; ++m) {
+      for (; passed < (m + 0.5) / kDrawsOfFactor && next < log_weights.size(); ++next) {
         const double weight = std::exp(log_weights[next]);
         if (weight > 0) i = next;
         passed += weight;
@@ -34,7 +34,8 @@ Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
           std::sqrt(factors.rates(i, g) / GammaQInverse(factors.shapes[g], u));
     }
     std::sort(draws.begin(), draws.end());
-    scale.row(g) << draws[kDraws / 20], draws[kDraws / 2], draws[kDraws - 1 - kDraws / 20];
+    scale.row(g) << draws[kDrawsOfFactor / 20], draws[kDrawsOfFactor / 2],
+        draws[kDrawsOfFactor - 1 - kDrawsOfFactor / 20];
   }
   return scale;
 }

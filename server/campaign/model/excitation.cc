@@ -7,6 +7,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "dem/registry/catalog.h"
 #include "dem/registry/declared_effects.h"
 
 namespace calib::campaign {
