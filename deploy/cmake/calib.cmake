@@ -1,5 +1,6 @@
 # Build conventions shared by every folder: calib_library(), calib_program(), calib_test(), calib_bench(), and how everything
-# is compiled. There is one way of compiling: users (deploy/quickstart) and developers (deploy/test) make the same objects.
+# is compiled. There is one way of compiling (CMakePresets.json): users (deploy/quickstart) and developers (deploy/test) make the
+# same objects, asserts among them, so that what is tested is what is run and nothing is compiled twice.
 include(CTest)
 
 set(CMAKE_CXX_STANDARD 20)
@@ -53,37 +54,29 @@ function(calib_use_precompiled target name)
   target_precompile_headers(${target} REUSE_FROM ${name})
 endfunction()
 
-# Groups the sources of a target by folder, TOGETHER of them a unit; names in anonymous namespaces then meet. Generated files
-# and the files and folders after APART stay alone: folders of one file per name, whose files have the same names inside.
-function(calib_group_sources target together apart)
-  set(count_of "")
+# Compiles the sources of a target TOGETHER at a time, in the order in which they stand; names in anonymous namespaces then meet.
+# Generated files and the files and folders after APART stay alone: folders of one file per name, whose files have the same names
+# inside.
+function(calib_compile_together target together apart)
   get_target_property(sources ${target} SOURCES)
   foreach(source IN LISTS sources)
     get_filename_component(folder ${source} DIRECTORY)
-    if(IS_ABSOLUTE ${source} OR source IN_LIST apart OR folder IN_LIST apart)
+    if(IS_ABSOLUTE ${source} OR source IN_LIST apart OR (NOT folder STREQUAL "" AND folder IN_LIST apart))
       set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-      continue()
     endif()
-    string(MAKE_C_IDENTIFIER "files_${folder}" folder)
-    if(NOT DEFINED number_${folder})
-      set(number_${folder} 0)
-    endif()
-    math(EXPR unit "${number_${folder}} / ${together} + 1")
-    math(EXPR number_${folder} "${number_${folder}} + 1")
-    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${folder}_${unit})
   endforeach()
-  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE ${together})
 endfunction()
 
 # calib_library(NAME SOURCES a.cc ... LINKS x ... [PRECOMPILED headers] [TOGETHER n] [APART a.cc ...]): a static library of this
-# tree; sources by name, no globs (but effects: dem/CMakeLists.txt). n files of a folder are one unit (8).
+# tree; sources by name, no globs (but effects: dem/CMakeLists.txt). n files are one unit (8).
 function(calib_library name)
   cmake_parse_arguments(ARG "" "PRECOMPILED;TOGETHER" "SOURCES;LINKS;APART" ${ARGN})
   if(NOT ARG_TOGETHER)
     set(ARG_TOGETHER 8)
   endif()
   add_library(${name} STATIC ${ARG_SOURCES})
-  calib_group_sources(${name} ${ARG_TOGETHER} "${ARG_APART}")
+  calib_compile_together(${name} ${ARG_TOGETHER} "${ARG_APART}")
   target_link_libraries(${name} PUBLIC ${ARG_LINKS} PRIVATE calib_flags)
   target_include_directories(${name} PUBLIC ${CMAKE_SOURCE_DIR})
   if(ARG_PRECOMPILED)
@@ -114,7 +107,7 @@ function(calib_test name)
     set(ARG_TOGETHER 8)
   endif()
   add_executable(${name} ${ARG_SOURCES})
-  calib_group_sources(${name} ${ARG_TOGETHER} "${ARG_APART}")
+  calib_compile_together(${name} ${ARG_TOGETHER} "${ARG_APART}")
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_test_main calib_flags)
   calib_use_precompiled(${name} calib_precompiled_tests)
   add_test(NAME ${name} COMMAND ${name})

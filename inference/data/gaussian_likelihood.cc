@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "inference/numerics/infinity.h"
 #include "calib/return_if_error.h"
+#include "inference/numerics/infinity.h"
 #include "inference/numerics/special_functions.h"
 #include "inference/numerics/wide_exponential.h"
 
@@ -18,7 +18,7 @@ namespace calib::inference {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-const double kLogSqrtTwoPi = 0.5 * std::log(2 * std::numbers::pi);
+const double kHalfLogTwoPi = 0.5 * std::log(2 * std::numbers::pi);
 
 // No early exit, so that it is vectorised: 0 x is NaN for what is not finite.
 bool AllFinite(const Eigen::Ref<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>& values) {
@@ -315,7 +315,7 @@ void GaussianLikelihood::IntegrateFactor(const FactorGroup& group, MutableRows z
   std::vector<double> square(static_cast<std::size_t>(n), 0.0);
   std::vector<double> log_rate(static_cast<std::size_t>(n), std::log(group.prior.rate));
   for (const int t : group.readings) {
-    const double constant = -kLogSqrtTwoPi - log_diagonal_[t];
+    const double constant = -kHalfLogTwoPi - log_diagonal_[t];
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto row = static_cast<std::size_t>(i);
       double& value = z(i, t);
@@ -338,7 +338,7 @@ Eigen::MatrixXd GaussianLikelihood::Fill(const Eigen::MatrixXd& predictions,
     for (int t = 0; t < readings_; ++t) {
       auto column = increments.col(t).array();
       WhitenLink(predictions, t, column);
-      column = (-kLogSqrtTwoPi - log_diagonal_[t]) - 0.5 * column.square();
+      column = (-kHalfLogTwoPi - log_diagonal_[t]) - 0.5 * column.square();
     }
     return increments;
   }
@@ -355,7 +355,7 @@ Eigen::MatrixXd GaussianLikelihood::Fill(const Eigen::MatrixXd& predictions,
       continue;
     }
     for (int t = 0; t < readings_; ++t) {
-      to.col(t).array() = (-kLogSqrtTwoPi - log_diagonal_[t]) - 0.5 * block.col(t).array().square();
+      to.col(t).array() = (-kHalfLogTwoPi - log_diagonal_[t]) - 0.5 * block.col(t).array().square();
     }
   }
   return increments;

@@ -13,15 +13,15 @@ namespace {
 using Eigen::Index;
 
 constexpr int kOrders[] = {3, 4};
-constexpr Index kShortest = 5;  // readings of a run: they have one fourth difference
+constexpr Index kShortestRun = 5;  // readings of a run: they have one fourth difference
 // The verdict's limits are chosen to say something only beyond doubt: the tests ReadingNoise.* of
 // inference_unit_test see no word on 9000 simulated curves whose noise is as stated, nor on
 // corners, waves and steep rises.
-constexpr double kFewest = 6;         // effective differences
-constexpr double kSure = 1e-3;        // chance beyond a limit
-constexpr double kLarger = 1.3;       // times the stated error
-constexpr double kSmaller = 1 / 1.5;  // times the stated error
-constexpr double kStays = 0.6;        // share of a scale that the next order keeps of noise
+constexpr double kFewestDifferences = 6;  // effective differences
+constexpr double kSure = 1e-3;            // chance beyond a limit
+constexpr double kLarger = 1.3;           // times the stated error
+constexpr double kSmaller = 1 / 1.5;      // times the stated error
+constexpr double kStays = 0.6;            // share of a scale that the next order keeps of noise
 // Median of the size of a standard normal number, and the efficiency of an estimate of scale by it.
 //                                                  [Hampel, J. Am. Stat. Assoc. 69 (1974) 383]
 constexpr double kNormalMedian = 0.6745;
@@ -57,7 +57,7 @@ absl::StatusOr<OfOrder> Differences(const std::vector<ReadingRun>& runs, int ord
         !run.covariance.allFinite()) {
       return absl::InvalidArgumentError("reading noise: a covariance does not fit its readings");
     }
-    if (n < kShortest) continue;
+    if (n < kShortestRun) continue;
     const Eigen::VectorXd differences = Differenced(run.values, order);
     Eigen::MatrixXd stated = Differenced(Differenced(run.covariance, order).transpose(), order);
     if (!(stated.diagonal().minCoeff() > 0)) {
@@ -100,7 +100,7 @@ absl::StatusOr<ReadingNoise> CompareReadingNoise(const std::vector<ReadingRun>& 
   noise.effective = count * count / less.correlation;
   noise.scale = less.scale;
   noise.robust = std::min(third.robust, fourth.robust);
-  if (noise.effective < kFewest) return noise;
+  if (noise.effective < kFewestDifferences) return noise;
   noise.surely_larger =
       noise.robust * LimitFactor(kMedianEfficiency * noise.effective, false) > kLarger &&
       fourth.robust > kStays * third.robust;

@@ -10,8 +10,8 @@
 namespace calib::inference {
 namespace {
 
-constexpr int kDrawsOfFactor = 2000;         // of a factor; chosen: its 5 % quantile is known to 0.5 %
-constexpr double kNoWeight = 1e-12;  // of a sample, that no digit of a probability shows; chosen
+constexpr int kDrawsOfFactor = 2000;  // of a factor; chosen: its 5 % quantile is known to 0.5 %
+constexpr double kNoWeight = 1e-12;   // of a sample, that no digit of a probability shows; chosen
 
 }  // namespace
 
@@ -34,7 +34,8 @@ Eigen::MatrixXd NoiseScale(const GaussianLikelihood::FactorPosterior& factors,
           std::sqrt(factors.rates(i, g) / GammaQInverse(factors.shapes[g], u));
     }
     std::sort(draws.begin(), draws.end());
-    scale.row(g) << draws[kDrawsOfFactor / 20], draws[kDrawsOfFactor / 2], draws[kDrawsOfFactor - 1 - kDrawsOfFactor / 20];
+    scale.row(g) << draws[kDrawsOfFactor / 20], draws[kDrawsOfFactor / 2],
+        draws[kDrawsOfFactor - 1 - kDrawsOfFactor / 20];
   }
   return scale;
 }

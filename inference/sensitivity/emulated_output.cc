@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoIndex = std::numeric_limits<double>::quiet_NaN();
 
 Eigen::VectorXd Ranks(const Eigen::VectorXd& values) {
   std::vector<Index> order(static_cast<std::size_t>(values.size()));
@@ -39,7 +39,7 @@ double Correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   const Eigen::ArrayXd x = a.array() - a.mean();
   const Eigen::ArrayXd y = b.array() - b.mean();
   const double scale = std::sqrt(x.square().sum() * y.square().sum());
-  return scale > 0 ? (x * y).sum() / scale : kNone;
+  return scale > 0 ? (x * y).sum() / scale : kNoIndex;
 }
 
 // Of rows that were drawn with replacement from weighted ones: m^2 over the sum of squares of how
@@ -56,7 +56,7 @@ double EffectiveNumber(const Eigen::MatrixXd& points) {
   return m * m / squares;
 }
 
-Eigen::MatrixXd ToStandard(const JointPrior& priors, const Eigen::MatrixXd& parameters) {
+Eigen::MatrixXd RowsToStandard(const JointPrior& priors, const Eigen::MatrixXd& parameters) {
   Eigen::MatrixXd standard(parameters.rows(), parameters.cols());
   for (Index i = 0; i < parameters.rows(); ++i)
     standard.row(i) = priors.ToStandard(parameters.row(i));
@@ -120,8 +120,9 @@ bool MayHaveIndices(const JointPrior& priors) {
 bool OutputSensitivity::Explains() const { return explained >= kLeastExplained; }
 
 RankedPoints Ranked(const JointPrior& priors, const Eigen::MatrixXd& points) {
-  RankedPoints ranked{
-      .standard = ToStandard(priors, points), .ranks = {}, .effective = EffectiveNumber(points)};
+  RankedPoints ranked{.standard = RowsToStandard(priors, points),
+                      .ranks = {},
+                      .effective = EffectiveNumber(points)};
   for (Index j = 0; j < points.cols(); ++j) ranked.ranks.push_back(Ranks(points.col(j)));
   return ranked;
 }
@@ -148,7 +149,7 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
                                                 .iteration = 0,
                                                 .sample = 0}));
   rows.resize(static_cast<std::size_t>(used));
-  const Eigen::MatrixXd inputs = ToStandard(priors, parameters(rows, Eigen::all));
+  const Eigen::MatrixXd inputs = RowsToStandard(priors, parameters(rows, Eigen::all));
   const Eigen::VectorXd values = outputs(rows);
   ASSIGN_OR_RETURN(auto whole, GaussianProcess::Fit(inputs, values));
   EmulatedOutput emulated(std::move(whole));
@@ -158,7 +159,7 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
   emulated.missed_ =
       emulated.whole_.leave_one_out().error.squaredNorm() / static_cast<double>(used);
   emulated.explained_ =
-      IsRounding(variance, std::abs(average)) ? kNone : 1 - emulated.missed_ / variance;
+      IsRounding(variance, std::abs(average)) ? kNoIndex : 1 - emulated.missed_ / variance;
   if (emulated.whole_.constant() || !(emulated.explained_ >= kLeastExplained)) return emulated;
   for (int fold = 0; fold < options.folds; ++fold) {
     std::vector<Index> kept;

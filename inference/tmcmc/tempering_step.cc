@@ -19,8 +19,8 @@ constexpr double kOptimal = 2.38;      // [Roberts, Gelman & Gilks 1997]
 // How the scale follows the acceptance; chosen: a step that accepts 0.1 too little makes it 18 %
 // smaller, and it stays within what any acceptance can ask for.
 constexpr double kGain = 2;
-constexpr double kLeastScale = 1e-3;  // over the first one
-constexpr double kMostScale = 2;      // over the first one
+constexpr double kLeastOfFirst = 1e-3;  // over the first one
+constexpr double kMostScale = 2;        // over the first one
 
 // Coefficient of variation of exp(increment * relative), over the finite entries.
 double Variation(const Eigen::VectorXd& relative, double increment) {
@@ -94,7 +94,7 @@ double FirstScale(std::size_t d) { return kOptimal / std::sqrt(static_cast<doubl
 
 double NextScale(double scale, std::size_t d, double accepted, double wanted) {
   const double first = FirstScale(d);
-  return std::clamp(scale * std::exp(kGain * (accepted - wanted)), kLeastScale * first,
+  return std::clamp(scale * std::exp(kGain * (accepted - wanted)), kLeastOfFirst * first,
                     kMostScale * first);
 }
 

@@ -264,7 +264,8 @@ TEST(Realizations, TheCampaignOfTheGuideIsGood) {
   const std::string note = NoteOnTheGuides(ReaderOf({
       {kGuidesPacking, TwentyGrains(kDense)},
       {kGuidesReadings,
-       "# e_v e_x e_y e_z s33_over_s11\n0 0 0 0 1\n0.12 -0.09 -0.09 0.37 2.1\n-0.6 -1.2 -1.2 1.8 3.9\n"},
+       "# e_v e_x e_y e_z s33_over_s11\n0 0 0 0 1\n0.12 -0.09 -0.09 0.37 2.1\n-0.6 -1.2 -1.2 1.8 "
+       "3.9\n"},
   }));
   EXPECT_THAT(note, HasSubstr("realizations 2 to 4 are other packings of the 20 grains of"));
   EXPECT_THAT(note, HasSubstr("porosity of 0.4"));
