@@ -126,15 +126,12 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
         campaign::ToString({problem.file(), problem.line(), problem.key(), problem.message()})));
   }
   const std::string& campaign = reply.campaign();
-  auto status = session_.client().Show(campaign);
-  if (!status.ok()) return status.status();
-  if (messages::StateOf(*status) == CampaignState::kPaused) {
-    std::cerr << "campaign " << campaign << " was paused (" << status->reason()
-              << "); it goes on\n";
-    status = session_.client().Resume(campaign);
-    if (!status.ok()) return status.status();
+  ASSIGN_OR_RETURN(auto status, session_.client().Show(campaign));
+  if (messages::StateOf(status) == CampaignState::kPaused) {
+    std::cerr << "campaign " << campaign << " was paused (" << status.reason() << "); it goes on\n";
+    ASSIGN_OR_RETURN(status, session_.client().Resume(campaign));
   }
-  if (!messages::IsOver(*status)) {
+  if (!messages::IsOver(status)) {
     if (!workers_started_ && !choice_.workers && !choice_.state.empty()) {
       RETURN_IF_ERROR(session_.UseWorkers(std::nullopt));
     }

@@ -182,21 +182,21 @@ absl::Status AddExperiment(const report::CampaignView& view, const campaign::Exp
     }
     const Eigen::VectorXd stated = StatedError(observable, runs.values);
     const Eigen::VectorXd error = stated.size() > 0 ? stated : Eigen::VectorXd::Zero(t);
-    auto quantity = inference::PredictQuantity(runs.parameters, runs.values, error,
-                                               !campaign::MakesItsBodies(experiment));
-    if (!quantity.ok()) return quantity.status();
+    ASSIGN_OR_RETURN(auto quantity,
+                     inference::PredictQuantity(runs.parameters, runs.values, error,
+                                                !campaign::MakesItsBodies(experiment)));
     inference::DiscrepancyBand discrepancy = report::DiscrepancyAt(
-        *misfit.parent, misfit.discrepancies, experiment, observable.name, quantity->mean);
+        *misfit.parent, misfit.discrepancies, experiment, observable.name, quantity.mean);
     Eigen::VectorXd missed = Eigen::VectorXd::Zero(t);
     if (discrepancy.mean.size() > 0) {
       missed = discrepancy.rms;
-      quantity = inference::WithModelError(*std::move(quantity), missed);
+      quantity = inference::WithModelError(std::move(quantity), missed);
     }
     PredictedObservable out{.experiment = experiment.name,
                             .observable = observable.name,
                             .control_name = experiment.control_name,
                             .control = experiment.control,
-                            .quantity = *std::move(quantity),
+                            .quantity = std::move(quantity),
                             .sd_noise = stated,
                             .measured = observable.values,
                             .discrepancy = std::move(discrepancy),

@@ -26,7 +26,8 @@ struct ParameterDrift {
   /// Probability of fits at least as far apart if one value served all experiments; empty with
   /// fewer than two experiments that say something about the parameter.
   std::optional<double> p_experiments;
-  /// Chi-squared test of the fits to single stages, over all experiments.
+  /// Probability of fits at least as far apart if one value served all stages; empty with fewer than
+  /// two stages that say something about the parameter.
   std::optional<double> p_segments;
   /// Setting with which the fits of the experiments go up or down, and the change of the parameter
   /// per factor ten in it [SI] with its sd; empty: no setting takes two values, or no drift.
