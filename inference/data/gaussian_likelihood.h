@@ -13,7 +13,7 @@ namespace calib::inference {
 /// What the earlier readings leave open of a reading: the share of its error's variance that they
 /// do not explain, the squared pivot of the correlation matrix in the order of readings.
 struct OpenShare {
-  Eigen::Index reading = 0;  ///< its index
+  Eigen::Index reading = 0;  ///< index of the reading
   double share = 1;          ///< (0, 1], or less where rounding leaves nothing
 };
 
@@ -22,8 +22,8 @@ struct OpenShare {
 inline constexpr double kLeastOpenShare = 1e-13;
 
 /// The first reading of which the earlier ones leave no more than kLeastOpenShare open, else the
-/// one of which they leave the least. Pure. in: covariance T x T of the readings' errors,
-/// symmetric, its diagonal positive, T >= 1
+/// one of which they leave the least. Pure.
+/// in: covariance T x T of the readings' errors, symmetric, its diagonal positive, T >= 1
 OpenShare LeastOpenShare(const Eigen::MatrixXd& covariance);
 
 /// ln p(y | x) of T readings y given predictions x, one independent block per (experiment,

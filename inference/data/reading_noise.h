@@ -38,10 +38,11 @@ struct ReadingNoise {
 /// Limits are those of chi-squared over its degrees, the degrees m^2 / |R|_F^2 for m differences
 /// with stated correlation R [Satterthwaite, Biometrics Bull. 2 (1946) 110]; of the median 0.37 of
 /// them, its efficiency. Errors that are correlated over many readings but stated as independent
-/// show as smaller, too. Pure. in:  runs, any number; shorter than 5 readings are passed over out:
-/// no verdict from less than 6 effective differences (about 17 readings in one run) Errors:
-/// INVALID_ARGUMENT when a covariance does not fit its values, is not finite or gives a difference
-/// no variance.
+/// show as smaller, too. Pure.
+/// in: runs, any number; shorter than 5 readings are passed over
+/// out: no verdict from less than 6 effective differences (about 17 readings in one run)
+/// Errors: INVALID_ARGUMENT when a covariance does not fit its values, is not finite or gives a
+/// difference no variance.
 absl::StatusOr<ReadingNoise> CompareReadingNoise(const std::vector<ReadingRun>& runs);
 
 }  // namespace calib::inference

@@ -14,18 +14,20 @@ namespace {
 using Eigen::Index;
 
 // Nodes of the integral over Student's law: ten per decade of either tail, of the upper one down to
-// 1e-9, beyond which no p value means anything (DrawnTail.OfGroupsFarApartIsStudents).
+// 1e-9, beyond which no p value means anything; the test DrawnTail.OfGroupsFarApartIsStudents of
+// inference_diagnosis_unit_test holds the law so integrated against Student's own.
 constexpr int kPerDecade = 10;
 constexpr int kDecadesBelow = 2;
 constexpr int kDecadesAbove = 9;
+// Where the gamma law's tail is 0 or 1 without being evaluated: beyond e^-740 by Chernoff's bound
+// of either tail, which is less than a double holds; and by so large a shape that it is a step,
+// whose series would not end.
+constexpr double kNothing = 740;
+constexpr double kNarrow = 1e9;
 
 double GammaTail(double mean, double variance, double square) {
   const double shape = mean * mean / variance;
   const double ratio = square / mean;
-  // Chernoff's bound of either tail, before the function leaves the range of a double; and a law so
-  // narrow that its series does not end.
-  constexpr double kNothing = 740;
-  constexpr double kNarrow = 1e9;
   if (shape > kNarrow || !(shape * (ratio - 1 - std::log(ratio)) < kNothing)) {
     return ratio > 1 ? 0 : 1;
   }

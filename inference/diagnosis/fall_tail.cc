@@ -11,7 +11,9 @@
 namespace calib::inference {
 namespace {
 
-constexpr std::size_t kCounted = 10;  // largest simulations that a chance is counted from
+// Simulations at least that a chance is counted from; chosen: it is then known to a third of
+// itself.
+constexpr std::size_t kCounted = 10;
 
 }  // namespace
 

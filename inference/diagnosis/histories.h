@@ -7,31 +7,33 @@
 namespace calib::inference {
 
 /// G histories over T readings, each a sum of q shapes. An emulator predicts thousands of points
-/// from a dozen components: what is done to all points costs q per point and not T, or T^2.
+/// from a dozen components: what is done to all points costs q per point and not T, or T^2. A
+/// value; thread safety: const.
 class Histories {
  public:
   Histories() = default;
-  /// values: G x T, as they are. Not explicit: a matrix of histories is one.
+  /// Histories of these values, G x T. Not explicit: a matrix of histories is one.
   template <typename Values>
   Histories(const Eigen::MatrixBase<Values>& values) {  // NOLINT(google-explicit-constructor)
     SetValues(values);
   }
-  /// shapes: T x q; coefficients: q x G.
+  /// Histories of shapes (T x q) times coefficients (q x G).
   Histories(Eigen::MatrixXd shapes, Eigen::MatrixXd coefficients);
 
-  Eigen::Index points() const { return coefficients_.cols(); }
-  Eigen::Index readings() const { return shapes_.rows(); }
-  const Eigen::MatrixXd& shapes() const { return shapes_; }
-  const Eigen::MatrixXd& coefficients() const { return coefficients_; }
+  Eigen::Index points() const { return coefficients_.cols(); }           ///< G
+  Eigen::Index readings() const { return shapes_.rows(); }               ///< T
+  const Eigen::MatrixXd& shapes() const { return shapes_; }              ///< T x q
+  const Eigen::MatrixXd& coefficients() const { return coefficients_; }  ///< q x G
 
-  /// History of one point, T.
+  /// History of a point, T entries.
   Eigen::VectorXd operator[](Eigen::Index point) const;
-  /// Root mean square over the readings.
+  /// Root mean square of a point's history over the readings.
   double Rms(Eigen::Index point) const;
-  /// G x T.
+  /// All histories, G x T.
   Eigen::MatrixXd Values() const;
-  /// The same points at some of the readings.
+  /// The histories of all points at some of the readings.
   Histories At(const std::vector<Eigen::Index>& readings) const;
+  /// Whether shapes and coefficients are finite.
   bool AllFinite() const;
 
  private:

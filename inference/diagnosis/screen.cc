@@ -21,7 +21,15 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kPower = 0.9;  // chance that an effect of the detectable amplitude is found
+// The verdicts' limits; chosen.
+constexpr double kPower = 0.9;         // chance that an effect of Score::detectable is found
+constexpr double kNotExcluded = 0.95;  // probability inside which points are not excluded
+constexpr double kSmall = 0.1;         // p value whose frequency tells judgements' independence
+constexpr double kClose = 25;          // degrees between signatures that may be confused
+// Times the chi-squared of a right model: what a rival at an angle to the truth leaves is beyond
+// doubt when it is more.
+constexpr double kToldApart = 4;
+constexpr Index kFewestBlocks = 8;  // that an advantage is resampled by
 
 // A difference seen from every point.
 struct Direction {
@@ -127,7 +135,6 @@ Eigen::MatrixXd SpanOf(const Eigen::MatrixXd& shapes, const Whitened& model) {
 // How many independent judgements the columns of `squares` (draws in rows) amount to: by how much
 // oftener than one of them their smallest p value is below a tenth.
 double IndependentJudgements(const Eigen::MatrixXd& squares, const std::vector<DrawnTail>& tails) {
-  constexpr double kSmall = 0.1;
   double below = 0;
   for (Index s = 0; s < squares.rows(); ++s) {
     double smallest = 1;
@@ -159,7 +166,8 @@ absl::StatusOr<Adequacy> TestAdequacy(const FittedModel& model) {
     }
   }
   ASSIGN_OR_RETURN(const auto groups, DrawsOf(model));
-  // Of each draw: chi-squared, and that of the residual's part in the span of each set of shapes.
+  // For each draw its chi-squared, and that of the residual's part in the span of each set of
+  // shapes.
   Eigen::MatrixXd squares(model.draws.rows(), static_cast<Index>(1 + model.shapes.size()));
   for (const DrawnGroup& group : groups) {
     const Eigen::MatrixXd offsets = group.draws.colwise() - group.model.Point(adequacy.best);
@@ -201,7 +209,7 @@ absl::StatusOr<std::vector<Index>> PointsNotExcluded(const FittedModel& model, i
   std::vector<Index> near(static_cast<std::size_t>(squares.size()));
   std::iota(near.begin(), near.end(), Index{0});
   const double most =
-      squares.minCoeff() + 2 * GammaPInverse(0.5 * std::max(1, model.parameters), 0.95);
+      squares.minCoeff() + 2 * GammaPInverse(0.5 * std::max(1, model.parameters), kNotExcluded);
   std::erase_if(near, [&](Index i) { return squares[i] > most; });
   std::stable_sort(near.begin(), near.end(),
                    [&](Index a, Index b) { return squares[a] < squares[b]; });
@@ -307,10 +315,6 @@ absl::StatusOr<std::vector<Score>> Screen(const FittedModel& model,
         on_one_ray ? rests.size() - 1 : static_cast<std::size_t>(longest - rests.begin()));
     scores.push_back(std::move(score));
   }
-  constexpr double kClose = 25;  // degrees
-  // Times the chi-squared of a right model: what a rival at an angle to the truth leaves is beyond
-  // doubt when it is more.
-  constexpr double kToldApart = 4;
   for (std::size_t a = 0; a < scores.size(); ++a) {
     for (std::size_t b = 0; b < scores.size(); ++b) {
       if (a == b) continue;
@@ -379,7 +383,6 @@ absl::StatusOr<Advantage> Compare(const FittedModel& a, const FittedModel& b, in
     return absl::InvalidArgumentError("diagnosis: the models describe different readings");
   }
   const Eigen::VectorXd difference = terms[1] - terms[0];
-  constexpr Index kFewestBlocks = 8;
   const Index length =
       std::min<Index>(block, std::max<Index>(1, difference.size() / kFewestBlocks));
   std::vector<double> sums;

@@ -11,7 +11,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Index kFewestDraws = 50;
+constexpr Index kFewestDraws = 50;  // chosen: the variance of squares is then known to a fifth
+constexpr Index kAtOnce = 32;       // offsets whose products stay in the cache
 
 absl::StatusOr<Whitened> WhitenByCovariance(const Eigen::MatrixXd& covariance,
                                             const Histories& histories) {
@@ -98,7 +99,6 @@ Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& o
 }
 
 Nearest NearestTo(const Whitened& whitened, const Eigen::MatrixXd& offsets) {
-  constexpr Index kAtOnce = 32;  // the products stay in the cache
   Nearest nearest{.squares = Eigen::VectorXd(offsets.cols()),
                   .points = std::vector<Index>(static_cast<std::size_t>(offsets.cols()))};
   for (Index s = 0; s < offsets.cols(); s += kAtOnce) {

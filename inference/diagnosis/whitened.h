@@ -1,5 +1,6 @@
 #pragma once
-// Models and draws in coordinates in which distances are Mahalanobis distances.
+// Models and draws in coordinates in which distances are Mahalanobis distances: whitened by the
+// Cholesky factor of a T x T covariance. Plain values and pure functions.
 
 #include <Eigen/Core>
 #include <memory>
@@ -10,7 +11,8 @@
 
 namespace calib::inference {
 
-/// Cholesky factor of a T x T covariance, shared by all that is whitened by it; never null, immutable.
+/// Cholesky factor of a T x T covariance, shared by all that is whitened by it; never null,
+/// immutable.
 using CovarianceFactor = std::shared_ptr<const Eigen::LLT<Eigen::MatrixXd>>;
 
 /// The model in coordinates in which a measurement scatters as a standard normal: its points lie in
@@ -24,35 +26,38 @@ struct Whitened {
   Eigen::VectorXd Point(Eigen::Index g) const { return axes * points.col(g); }  ///< T
 };
 
-/// Draws and the coordinates they are judged in.
+/// Draws of a measurement and the coordinates they are judged in.
 struct DrawnGroup {
-  Whitened model;
-  std::vector<Eigen::Index> number;  ///< of the draws, ascending
-  Eigen::MatrixXd draws;             ///< T x number of them, whitened
+  Whitened model;                    ///< the model in these coordinates
+  std::vector<Eigen::Index> number;  ///< rows of FittedModel::draws, ascending
+  Eigen::MatrixXd draws;             ///< T x number.size(), whitened
 };
 
+/// The histories whitened by a factor of a T x T covariance.
 Whitened WhitenBy(CovarianceFactor factor, const Histories& histories);
 
-/// Errors: INVALID_ARGUMENT for shapes that do not fit, a covariance that is not positive definite.
+/// The model whitened by its covariance. Errors: INVALID_ARGUMENT for histories and covariance that
+/// do not fit together or are not finite, or a covariance that is not positive definite.
 absl::StatusOr<Whitened> Whiten(const FittedModel& model);
 
-/// All draws of the model, in the order of their groups; none where the model has none. Errors as
-/// above, and for fewer than 50 draws.
+/// All draws of the model, in the order of their groups, each group by its own covariance
+/// (FittedModel::without); none where the model has none. Errors: INVALID_ARGUMENT for fewer than
+/// 50 draws, draws or groups that do not fit, or a covariance that is not positive definite.
 absl::StatusOr<std::vector<DrawnGroup>> DrawsOf(const FittedModel& model);
 
-/// Inner products of every point and each column of directions (T x S, whitened): G x S.
+/// Inner products of each of the G points and each column of directions (T x S, whitened), G x S.
 Eigen::MatrixXd Along(const Whitened& whitened, const Eigen::MatrixXd& directions);
 
-/// |point + offset|^2 of every point, G; offset: T, whitened.
+/// |point + offset|^2 of each of the G points; offset: T, whitened.
 Eigen::VectorXd DistancesFrom(const Whitened& whitened, const Eigen::VectorXd& offset);
 
-/// Of each column of offsets the point with the smallest |point + offset|^2.
+/// For each of S offsets the point with the smallest |point + offset|^2.
 struct Nearest {
-  Eigen::VectorXd squares;           ///< S
-  std::vector<Eigen::Index> points;  ///< S
+  Eigen::VectorXd squares;           ///< S: that square
+  std::vector<Eigen::Index> points;  ///< S: index of the point
 };
 
-/// offsets: T x S, whitened.
+/// The nearest point for each column of offsets (T x S, whitened).
 Nearest NearestTo(const Whitened& whitened, const Eigen::MatrixXd& offsets);
 
 }  // namespace calib::inference

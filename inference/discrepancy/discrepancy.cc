@@ -14,6 +14,9 @@ namespace {
 
 using Eigen::Index;
 
+// Posterior mass of a grid node below which its part of the mean is rounding of a report; chosen.
+constexpr double kNegligible = 1e-6;
+
 double Matern52(double r) {
   const double s = std::sqrt(5.0) * r;
   return (1 + s + s * s / 3) * std::exp(-s);
@@ -180,7 +183,6 @@ absl::StatusOr<Discrepancy> Discrepancy::Fit(std::vector<DiscrepancyCurve> curve
 }
 
 DiscrepancyBand Discrepancy::At(int curve, const Eigen::VectorXd& path, double scale) const {
-  constexpr double kNegligible = 1e-6;
   const Index m = path.size();
   Eigen::ArrayXd first = Eigen::ArrayXd::Zero(m);
   Eigen::ArrayXd second = Eigen::ArrayXd::Zero(m);

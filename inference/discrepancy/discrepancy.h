@@ -1,6 +1,6 @@
 #pragma once
-// A Gaussian process over the loading path for what a model leaves unexplained [Kennedy & O'Hagan
-// 2001]; see README.md for the model and its priors.
+// A Gaussian process over the loading path for what a model leaves unexplained
+// [Kennedy & O'Hagan, J. R. Stat. Soc. B 63 (2001) 425].
 
 #include <Eigen/Core>
 #include <vector>
@@ -9,57 +9,72 @@
 
 namespace calib::inference {
 
-/// Residual of one observable in one experiment.
+/// Residual r_e of one observable in one experiment e, at n readings.
 struct DiscrepancyCurve {
   Eigen::VectorXd path;        ///< n >= 1: distance travelled along the loading path
   Eigen::VectorXd residual;    ///< n, model - measurement
-  Eigen::MatrixXd covariance;  ///< n x n, positive definite: what is known of the errors
-  double scale = 1;            ///< S > 0, size of the curve in the residual's unit
+  Eigen::MatrixXd covariance;  ///< n x n, positive definite: of the errors, as known otherwise
+  double scale = 1;            ///< S_e > 0, size of the curve (its rms) in the residual's unit
 };
 
+/// Priors of a Discrepancy and the grid they are integrated on. Chosen: more than 30 % of a curve
+/// is another model, not a discrepancy, and what poor data cannot exclude would swamp predictions.
 struct DiscrepancyOptions {
   double none = 0.5;       ///< prior probability of no discrepancy, in (0, 1)
-  double least = 1e-3;     ///< smallest amplitude over S, > 0
-  double most = 0.3;       ///< largest
+  double least = 1e-3;     ///< smallest amplitude a, relative to the curves' sizes, > 0
+  double most = 0.3;       ///< largest amplitude, >= least
   int amplitudes = 25;     ///< of the grid, even in ln a, >= 1
-  double shortest = 0.05;  ///< length over the longest path, > 0
-  double longest = 2;
-  int lengths = 10;                            ///< even in ln l, >= 1
-  std::vector<double> alike = {0, 0.5, 0.95};  ///< rho in [0, 1); of several curves only
-  /// Readings of a curve that are used, evenly spread: leaving readings out loses information, but
-  /// makes nothing wrong.
+  double shortest = 0.05;  ///< shortest length l over the longest path, > 0
+  double longest = 2;      ///< longest length over the longest path, >= shortest
+  int lengths = 10;        ///< of the grid, even in ln l, >= 1
+  /// Values of rho in [0, 1), how alike the discrepancies of two experiments are; of several
+  /// curves.
+  std::vector<double> alike = {0, 0.5, 0.95};
+  /// Readings of a curve that are used, evenly spread, >= 1: leaving readings out loses
+  /// information, but makes nothing wrong.
   int most_readings = 40;
 };
 
-/// Of the discrepancy at m places.
+/// Posterior of the discrepancy at m places, in the residual's unit.
 struct DiscrepancyBand {
-  Eigen::VectorXd mean;
-  Eigen::VectorXd sd;   ///< about the mean
-  Eigen::VectorXd rms;  ///< sqrt(mean^2 + sd^2)
+  Eigen::VectorXd mean;  ///< m
+  Eigen::VectorXd sd;    ///< m, about the mean
+  Eigen::VectorXd rms;   ///< m, sqrt(mean^2 + sd^2)
 };
 
+/// What a model leaves unexplained of one observable over several experiments:
+///   r_e(s) = delta_e(s) + error,  error ~ N(0, C_e) with the curves' covariances,
+///   delta_e(s) ~ GP(0, a^2 S_e S_e' (rho + (1 - rho) [e = e']) M_5/2(|s - s'| / l))
+/// with M_5/2 the Matern 5/2 function and s the path. With probability `none` there is no
+/// discrepancy, a = 0; else a and l are log-uniform, rho uniform, each on its grid. All is
+/// integrated, nothing maximised: an amplitude that the noise hides stays small and uncertain
+/// instead of zero and certain. A value; immutable after Fit. Thread safety: const.
 class Discrepancy {
  public:
-  /// Curves of one observable. Deterministic. Errors: INVALID_ARGUMENT naming what does not fit.
+  /// The posterior given the curves of one observable. Deterministic. Errors: INVALID_ARGUMENT
+  /// naming what does not fit.
   static absl::StatusOr<Discrepancy> Fit(std::vector<DiscrepancyCurve> curves,
                                          const DiscrepancyOptions& options = {});
 
-  /// Posterior probability that there is one.
+  /// Posterior probability that there is a discrepancy.
   [[nodiscard]] double probability() const { return probability_; }
 
-  /// ln of the evidence of a discrepancy over that of none.
+  /// ln of the evidence of a discrepancy over the evidence of none.
   [[nodiscard]] double log_bayes_factor() const { return log_bayes_factor_; }
 
-  /// Posterior of ln a and ln l given that there is one: mean and standard deviation.
+  /// Mean and standard deviation of a posterior.
   struct Moments {
     double mean = 0, sd = 0;
   };
-  [[nodiscard]] Moments log_amplitude() const { return log_amplitude_; }  ///< relative to S
-  [[nodiscard]] Moments log_length() const { return log_length_; }        ///< in units of the path
+  /// Posterior of ln a given that there is a discrepancy; a is relative to the curves' sizes.
+  [[nodiscard]] Moments log_amplitude() const { return log_amplitude_; }
+  /// Posterior of ln l given that there is a discrepancy; l in units of the path.
+  [[nodiscard]] Moments log_length() const { return log_length_; }
+  /// Posterior of rho given that there is a discrepancy.
   [[nodiscard]] Moments alike() const { return alike_; }
 
-  /// Posterior of delta, "none" included. curve: one of the fitted, or -1 for a further experiment;
-  /// scale: S of that one.
+  /// Posterior of delta_e at m places of the path, "no discrepancy" included. curve: index of e
+  /// among the fitted ones, or -1 for a further experiment; scale: S_e.
   [[nodiscard]] DiscrepancyBand At(int curve, const Eigen::VectorXd& path, double scale) const;
 
  private:

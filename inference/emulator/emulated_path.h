@@ -28,9 +28,10 @@ struct EmulatedPathOptions {
 /// but for chance (before refits widen it). Means and cov of sampled parameters are off by about
 /// 1.5 / sqrt(draws) of the sd; held parameters keep their value, cov 0. ess: share of the draws
 /// that is effective. log_evidence is by the prior of EmulatedResult::log_evidence. Deterministic
-/// in options.seed. in: likelihood of `data`, in whose order the readings are taken in Errors:
-/// FAILED_PRECONDITION where of 50 options.draws draws of the prior fewer than 50 lie where the
-/// emulator knows the model; CANCELLED once `stop` is requested, looked at each load step.
+/// in options.seed.
+/// in: likelihood of `data`, in whose order the readings are taken in
+/// Errors: FAILED_PRECONDITION where of 50 options.draws draws of the prior fewer than 50 lie where
+/// the emulator knows the model; CANCELLED once `stop` is requested, looked at each load step.
 absl::StatusOr<PosteriorPath> EmulatedPath(const EmulatedTarget& target,
                                            const EmulatedLikelihood& likelihood,
                                            const DataSet& data, const EmulatedPathOptions& options,

@@ -32,9 +32,9 @@ struct EmulatedPoints {
 /// outlive it. Immutable; thread safety: const.
 class EmulatedTarget {
  public:
-  /// noise: kGiven or kInferred. max_error: largest root mean square over the readings of what is
-  /// not known that a point may have, in noise sd. Parameters that the last iteration holds
-  /// (Proposal::frozen) are held.
+  /// The space given an emulator of the data. noise: kGiven or kInferred. max_error: largest root
+  /// mean square over the readings of what is not known that a point may have, in noise sd.
+  /// Parameters that the last iteration holds (Proposal::frozen) are held.
   EmulatedTarget(const JointPrior& priors, const DataSet& data, NoiseMode noise, double max_error,
                  const StateEmulator& emulator, std::span<const Iteration> iterations);
 

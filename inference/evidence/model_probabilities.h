@@ -20,7 +20,8 @@ struct ModelProbability {
 
 /// Compares models by the evidence of the same data, in the order given. Errors of ln Z are taken
 /// as independent and normal; averages and quantiles are over 10 000 fixed draws of them, so that
-/// equal input gives equal bits. Pure. in: finite values, standard errors >= 0; none: no models
+/// equal input gives equal bits. Pure.
+/// in: finite values, standard errors >= 0; none: no models
 std::vector<ModelProbability> ModelProbabilities(std::span<const EvidenceEstimate> evidence);
 
 }  // namespace calib::inference

@@ -16,7 +16,7 @@ double GeneralizedParetoShape(const std::vector<double>& ascending_excesses);
 /// the M = ceil(min(N/5, 3 sqrt(N))) largest weights over the next one. Moments of order below 1/k
 /// exist: with k > 1/2 the variance is infinite, with k > 0.7 estimates cannot be trusted at
 /// practical N.                                    [Vehtari, Simpson, Gelman, Yao & Gabry 2024]
-/// in:  log_weights: N, -infinity for a weight of zero; not normalised
+/// in: log_weights: N, -infinity for a weight of zero; not normalised
 /// out: k; +infinity when the tail holds fewer than 5 weights or when fewer samples than the tail
 ///      have weight; 0 when the tail weights are all equal
 double ParetoTailIndex(const Eigen::VectorXd& log_weights);

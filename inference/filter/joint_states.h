@@ -16,9 +16,9 @@ namespace calib::inference {
 /// to (theta, x) and to (theta, x - A theta): what is linear in the parameters adds nothing but a
 /// singular covariance. Fewer coordinates, down to none, where the states are linear in the
 /// parameters to within that 1 % or there are too few points for a regression (n <= d + 2). Pure,
-/// deterministic. in:  parameters, d x n with counts n; states, n x T, finite, in units of their
-/// readings' errors out: points (d + k) x n, 0 <= k <= 3, the first d rows and the counts those of
-/// `parameters`
+/// deterministic.
+/// in: parameters, d x n with counts n; states, n x T, finite, in units of their readings' errors
+/// out: points (d + k) x n, 0 <= k <= 3, the first d rows and the counts those of `parameters`
 WeightedPoints JoinStates(const WeightedPoints& parameters, const Eigen::MatrixXd& states);
 
 }  // namespace calib::inference

@@ -26,15 +26,10 @@ struct SequentialResult {
 
 /// Takes the readings into the weights: ln w_t = ln w_{t-1} + ln p(y_t | x_t), normalised after
 /// each load step. Pure.
-///                                                                          [Cheng 2019, Eq. 14]
-///                                                                          in: log_start N, not
-///                                                                          necessarily normalised
-///                                                                          (-infinity: sample does
-///                                                                          not count), at least
-///                                                                          one
-/// finite;
-///     increments N x T, ln p(y_t | earlier, x) of each reading, finite for samples that count;
-///     parameters N x d
+///                                                                             [Cheng 2019, Eq. 14]
+/// in: log_start N, not necessarily normalised (-infinity: sample does not count), at least one
+///     finite; increments N x T, ln p(y_t | earlier, x) of each reading, finite for samples that
+///     count; steps, of these T readings; parameters N x d
 SequentialResult SequentialFilter(const Eigen::VectorXd& log_start,
                                   const Eigen::MatrixXd& increments, const StepOffsets& steps,
                                   const Eigen::MatrixXd& parameters);

@@ -11,9 +11,9 @@ namespace calib::inference {
 /// multiplied, over 4096 points of the Halton sequence. Pure; exact for diagonal L, else with a
 /// relative error of 5e-5, 2e-4 and 1e-3 in 2, 3 and 6 dimensions: root mean squares over 135
 /// boxes, the largest is four times as much (measured by box_probability_test of
-/// inference_verification_test). in:  cholesky L, d x d, lower triangular with positive diagonal;
-/// low, high: d, relative to the
-///      mean, +-infinity allowed, low <= high
+/// inference_verification_test).
+/// in: cholesky L, d x d, lower triangular with positive diagonal; low, high: d, relative to the
+///     mean, +-infinity allowed, low <= high
 /// out: in [0, 1]
 double BoxProbability(const Eigen::MatrixXd& cholesky, const Eigen::VectorXd& low,
                       const Eigen::VectorXd& high);

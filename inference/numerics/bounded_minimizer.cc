@@ -9,8 +9,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kArmijo =
-    1e-4;                      // share of the slope that a step must go down by [Nocedal & Wright]
+// Share of the slope that a step must go down by [Nocedal & Wright 2006, sec. 3.1].
+constexpr double kArmijo = 1e-4;
 constexpr double kCut = 0.4;   // chosen: factor on a step that goes down by less
 constexpr int kMostCuts = 20;  // chosen: to 1e-8 of the first step
 // Cosine between step and change of the gradient below which the curvature along the step is

@@ -22,15 +22,21 @@ extern template class ColPivHouseholderQR<MatrixXd>;
 
 namespace calib::inference {
 
-/// X with A X = B, for the factorised A = L L^T, n x n. right: B, n x m. out: n x m
+/// X with A X = B, for the factorised A = L L^T, n x n.
+/// in: right, B, n x m
+/// out: X, n x m
 Eigen::MatrixXd Solved(const Eigen::LLT<Eigen::MatrixXd>& factor, const Eigen::MatrixXd& right);
 
-/// X with L X = B, for the factorised A = L L^T, n x n. right: B, n x m. out: n x m
+/// X with L X = B, for the factorised A = L L^T, n x n.
+/// in: right, B, n x m
+/// out: X, n x m
 Eigen::MatrixXd LowerSolved(const Eigen::LLT<Eigen::MatrixXd>& factor,
                             const Eigen::MatrixXd& right);
 
 /// The X of least |A X - B| for the decomposed A, n x d; of several, the one of its pivoted columns
-/// alone. right: B, n x m. out: d x m
+/// alone.
+/// in: right, B, n x m
+/// out: X, d x m
 Eigen::MatrixXd Solved(const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& factor,
                        const Eigen::MatrixXd& right);
 

@@ -33,7 +33,7 @@ Eigen::MatrixXd KernelMatrix(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
 /// Keeps a reference to the outputs. Thread safety: const after construction.
 class KernelObjective {
  public:
-  /// inputs: n x d; outputs: n, which outlives this object
+  /// The objective given n runs. inputs: n x d; outputs: n, which outlives this object
   KernelObjective(const Eigen::MatrixXd& inputs, const Eigen::VectorXd& outputs);
   /// The value at x; writes its d + 2 derivatives to `gradient`, which has the size of x.
   double operator()(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) const;

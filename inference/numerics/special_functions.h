@@ -17,21 +17,24 @@ double GammaQ(double shape, double x);
 /// in: shape a > 0, x >= 0
 double GammaQInDouble(double shape, double x);
 
-/// x with GammaQ(shape, x) = q. in: shape > 0, q in (0, 1]
+/// x with GammaQ(shape, x) = q.
+/// in: shape > 0, q in (0, 1]
 double GammaQInverse(double shape, double q);
 
-/// x with 1 - GammaQ(shape, x) = p, p kept with its digits where it is tiny. in: shape > 0, p in
-/// [0, 1)
+/// x with 1 - GammaQ(shape, x) = p, p kept with its digits where it is tiny.
+/// in: shape > 0, p in [0, 1)
 double GammaPInverse(double shape, double p);
 
 /// Gamma(a) / Gamma(a + delta), without the cancellation of a difference of two logarithms.
 /// in: a > 0, a + delta > 0
 double GammaRatio(double a, double delta);
 
-/// ln Gamma(x), computed in double alone. in: x > 0
+/// ln Gamma(x), computed in double alone.
+/// in: x > 0
 double LogGamma(double x);
 
-/// The derivative psi(x) of ln Gamma(x), computed in double alone. in: x > 0
+/// The derivative psi(x) of ln Gamma(x), computed in double alone.
+/// in: x > 0
 double Digamma(double x);
 
 /// z that a standard normal variable exceeds with this chance, in (0, 1). It computes in long

@@ -16,6 +16,12 @@ namespace {
 using Eigen::Index;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr Index kMoreThanParameters = 4;  // runs to tell the parts apart; chosen: 3 are for scatter
+constexpr double kReach = 8;              // sd of a component beyond which it has no mass in double
+constexpr int kQuantileSteps = 100;       // of the bisection: to the last bit
+constexpr int kPlaceSteps = 40;           // of the bisection: to 1e-12 of the distance
+constexpr int kShares = 200;              // equally probable shared errors; chosen
+constexpr double kTiny = 1e-300;          // in the place of a zero that is divided by
 
 // Pr(Q_t >= level), the mean over draws of the normal tails.
 double Exceeds(const QuantityPrediction& prediction, Index t, double level) {
@@ -30,11 +36,10 @@ double Exceeds(const QuantityPrediction& prediction, Index t, double level) {
 
 // Quantile of the mixture by bisection between all that its components reach.
 double Quantile(const QuantityPrediction& prediction, Index t, double p) {
-  constexpr double kReach = 8;  // sd
   const double sd = prediction.conditional_sd[t];
   double low = prediction.conditional_mean.col(t).minCoeff() - kReach * sd;
   double high = prediction.conditional_mean.col(t).maxCoeff() + kReach * sd;
-  for (int step = 0; step < 100 && low < high; ++step) {
+  for (int step = 0; step < kQuantileSteps && low < high; ++step) {
     const double middle = low + 0.5 * (high - low);
     if (middle <= low || middle >= high) break;
     (Exceeds(prediction, t, middle) > 1 - p ? low : high) = middle;
@@ -61,14 +66,14 @@ void SetQuantiles(QuantityPrediction& result) {
 }
 
 // Pr(Q_t >= level) of the stretched law, whose quantile of probability p lies from the median by
-// sqrt(1 + 1/N) t_p / z_p times that of the mixture: the place in the mixture that the stretch takes
-// to the level is found by bisection between the median and the level.
+// sqrt(1 + 1/N) t_p / z_p times that of the mixture: the place in the mixture that the stretch
+// takes to the level is found by bisection between the median and the level.
 double StretchedExceeds(const QuantityPrediction& prediction, Index t, double level) {
   const double middle = prediction.q50[t];
   const double mean_stretch = MeanStretch(prediction);
   double near = middle;
   double far = level;
-  for (int step = 0; step < 40; ++step) {  // to 1e-12 of the distance
+  for (int step = 0; step < kPlaceSteps; ++step) {
     const double place = near + 0.5 * (far - near);
     if (place == near || place == far) break;
     const double above = Exceeds(prediction, t, place);
@@ -105,7 +110,7 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
   const Eigen::MatrixXd departure = runs.rowwise() - result.mean.transpose();
   const Eigen::ArrayXd variance =
       departure.colwise().squaredNorm().transpose().array() / static_cast<double>(n - 1);
-  result.separated = !scatters || n >= d + 4;
+  result.separated = !scatters || n >= d + kMoreThanParameters;
   result.sd = (variance + error_sd.array().square()).sqrt();
   result.sd_parameters = result.sd_model = Eigen::VectorXd::Constant(t, kNone);
   // Too few to tell the parts apart: one normal law about their mean.
@@ -133,7 +138,7 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
     result.sd_model = scatter.sqrt();
     result.sd = (own + scatter + error_sd.array().square()).sqrt();
     result.conditional_sd = (scatter + error_sd.array().square()).sqrt();
-    const Eigen::VectorXd shrink = (raw > 0).select(own / raw.max(1e-300), 0.0).sqrt();
+    const Eigen::VectorXd shrink = (raw > 0).select(own / raw.max(kTiny), 0.0).sqrt();
     result.conditional_mean = (fitted * shrink.asDiagonal()).rowwise() + result.mean.transpose();
   }
   SetQuantiles(result);
@@ -159,7 +164,6 @@ Eigen::VectorXd ExceedanceProbability(const QuantityPrediction& prediction, doub
 double ExceedanceAnywhere(const QuantityPrediction& prediction, const Eigen::MatrixXd& runs,
                           const Eigen::VectorXd& shared_sd, const Eigen::VectorXd& error_sd,
                           double level) {
-  constexpr int kShares = 200;  // equally probable shared errors
   const double stretch = StudentRatio(prediction.freedom) * MeanStretch(prediction);
   std::vector<double> shared(kShares);
   for (int k = 0; k < kShares; ++k)

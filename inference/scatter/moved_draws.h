@@ -20,8 +20,8 @@ struct MovedDraws {
 /// Moves each of n equally weighted draws of a posterior by a normal number of covariance
 /// SpreadOfRefits (refit_spread.h), in standardised coordinates; drawn again where it leaves the
 /// prior's support (a hundred times, then the draw stays: it lies in a corner). Deterministic in
-/// seed and row. in: data, with errors about a run; draws n x d, in the parameters' units;
-/// histories n x T, the
+/// seed and row.
+/// in: data, with errors about a run; draws n x d, in the parameters' units; histories n x T, the
 ///     model's mean predictions of the readings there, in their units; free, indices of the
 ///     parameters that are not held at a value, ascending
 MovedDraws MoveByRefits(const JointPrior& priors, const DataSet& data, const Replicates& replicates,

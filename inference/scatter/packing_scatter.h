@@ -22,11 +22,12 @@ struct PackingScatter {
 /// Scatter as the runs show it, as far as their number supports it (ShrinkCovariance towards a
 /// closed form), plus `rest`. A packing leaves traces in what the runs on others depart by (their
 /// mean holds it) and in the closed form: without it both are taken anew. Pure where closed_form
-/// is. in:  departures n x T of runs from the mean over all packings, scaled to the variance that a
-///      measurement has about it; packing, n numbers of any value, three different ones or more;
-///      closed_form, gives a T x T covariance of such departures, of runs on all packings or on all
-///      but the one left out; rest, T x T, positive definite: covariance of what a measurement
-///      departs by beside scatter
+/// is.
+/// in: departures n x T of runs from the mean over all packings, scaled to the variance that a
+///     measurement has about it; packing, n numbers of any value, three different ones or more;
+///     closed_form, gives a T x T covariance of such departures, of runs on all packings or on all
+///     but the one left out; rest, T x T, positive definite: covariance of what a measurement
+///     departs by beside scatter
 PackingScatter ScatterBetweenPackings(
     const Eigen::MatrixXd& departures, const std::vector<int>& packing,
     const std::function<Eigen::MatrixXd(std::optional<int> left_out)>& closed_form,

@@ -19,9 +19,9 @@ struct Replicates {
 
 /// What R runs depart by from their mean, times sqrt(share + 1/R): the variance that a measurement
 /// has about the mean of R runs where it shares that part of a run's scatter. Pure.
-/// in:  runs R x T, units of the readings; rows that are not finite are left out
-///      share, T, GroupScatter::share of each reading; negative: the packing of its experiment was
-///      not varied, no departure
+/// in: runs R x T, units of the readings; rows that are not finite are left out; share, T,
+///     GroupScatter::share of each reading; negative: the packing of its experiment was not varied,
+///     no departure
 /// out: (finite rows) x T; 0 x T with fewer than two
 Eigen::MatrixXd ScaledDepartures(const Eigen::MatrixXd& runs, const Eigen::VectorXd& share);
 
@@ -33,10 +33,10 @@ Eigen::MatrixXd ScaledDepartures(const Eigen::MatrixXd& runs, const Eigen::Vecto
 /// degrees of freedom; their variance is taken times the square of Student's over the normal 95 %
 /// quantile (R = 4: 2.0, 10: 1.2). With four packings intervals are then too long for some
 /// measurements and too short for others, right on average (measured by deploy/bench/coverage).
-/// Pure. in:  draws S x d of the posterior, in any unit of the parameters; histories S x T, the
-/// model's
-///      mean predictions of the readings there; covariance T x T of the readings' errors,
-///      replicates.scatter included; at least two replicates
+/// Pure.
+/// in: draws S x d of the posterior, in any unit of the parameters; histories S x T, the model's
+///     mean predictions of the readings there; covariance T x T of the readings' errors,
+///     replicates.scatter included; at least two replicates
 /// out: d x d, positive semi-definite; zero, so that nothing is widened, where the covariance of
 ///      the errors or that of the draws cannot be factorised
 Eigen::MatrixXd SpreadOfRefits(const Eigen::MatrixXd& draws, const Eigen::MatrixXd& histories,

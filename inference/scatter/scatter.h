@@ -46,8 +46,8 @@ struct GroupScatter {
 /// and p are of largest likelihood on a grid (100 lengths between a tenth of the closest readings'
 /// distance and a hundred times the whole path, f from 1e-4 to 1, p 1 to 3). The likelihood of a
 /// zero-mean Markov chain needs no more than neighbours. The sd is known to 1/sqrt(2 (R - 1)) of
-/// itself at worst: readings of a stage are no independent witnesses. in: stage, n numbers, equal
-/// for readings of one loading stage; control, n, ascending path length
+/// itself at worst: readings of a stage are no independent witnesses.
+/// in: stage, n numbers, equal for readings of one loading stage; control, n, ascending path length
 ///     since the start
 GroupScatter FitScatter(const ScatterMoments& moments, const std::vector<int>& stage,
                         const Eigen::VectorXd& control);

@@ -18,6 +18,11 @@ namespace {
 using Eigen::Index;
 
 constexpr double kNoIndex = std::numeric_limits<double>::quiet_NaN();
+constexpr Index kFewestRuns = 20;  // and three per parameter, for a process worth asking; chosen
+constexpr Index kRunsPerParameter = 3;
+constexpr int kTail = 20;     // one point in so many is left out at each end of the middle range
+constexpr double kReach = 2;  // ranges of the runs that the points may spread over; chosen
+constexpr std::size_t kCoarseSets = 2;  // of the jackknife: differences need fewer; chosen
 
 Eigen::VectorXd Ranks(const Eigen::VectorXd& values) {
   std::vector<Index> order(static_cast<std::size_t>(values.size()));
@@ -42,8 +47,8 @@ double Correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return scale > 0 ? (x * y).sum() / scale : kNoIndex;
 }
 
-// Of rows that were drawn with replacement from weighted ones: m^2 over the sum of squares of how
-// often each stands there.
+// Effective number of rows that were drawn with replacement from weighted ones: m^2 over the sum of
+// squares of how often each stands there.
 double EffectiveNumber(const Eigen::MatrixXd& points) {
   std::map<std::vector<double>, double> times;
   for (Index i = 0; i < points.rows(); ++i) {
@@ -99,10 +104,10 @@ Said Ask(const GaussianProcess& process, const JointPrior& priors, const RankedP
   return result;
 }
 
-// Of nine tenths of each column's entries.
+// Range of nine tenths of each column's entries.
 Eigen::RowVectorXd MiddleRange(const Eigen::MatrixXd& points) {
   Eigen::RowVectorXd range(points.cols());
-  const auto tail = static_cast<std::ptrdiff_t>(points.rows() / 20);
+  const auto tail = static_cast<std::ptrdiff_t>(points.rows() / kTail);
   for (Index j = 0; j < points.cols(); ++j) {
     Eigen::VectorXd column = points.col(j);
     std::sort(column.begin(), column.end());
@@ -135,7 +140,7 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
   if (parameters.cols() != d || outputs.size() != parameters.rows() || options.folds < 2) {
     return absl::InvalidArgumentError("sensitivity: parameters and outputs do not fit.");
   }
-  const Index least = std::max<Index>(20, 3 * d);
+  const Index least = std::max<Index>(kFewestRuns, kRunsPerParameter * d);
   if (parameters.rows() < least) {
     return absl::FailedPreconditionError(absl::StrCat("sensitivity: an emulator needs at least ",
                                                       least, " finished runs; there are ",
@@ -175,7 +180,6 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
 
 OutputSensitivity EmulatedOutput::Over(const JointPrior& priors, const RankedPoints& points,
                                        std::span<const Eigen::MatrixXd> sets) const {
-  constexpr double kReach = 2;
   const bool out_of_reach = (MiddleRange(points.standard).array() > kReach * range_.array()).any();
   if (!MayHaveIndices(priors) || out_of_reach) sets = {};
   Said whole =
@@ -198,7 +202,7 @@ OutputSensitivity EmulatedOutput::Over(const JointPrior& priors, const RankedPoi
   Eigen::MatrixXd total(folds, d);
   Eigen::MatrixXd correlation(folds, d);
   // The jackknife needs differences between emulators alone, at the same points.
-  const auto coarse = sets.first(std::min<std::size_t>(sets.size(), 2));
+  const auto coarse = sets.first(std::min(sets.size(), kCoarseSets));
   for (Index fold = 0; fold < folds; ++fold) {
     const Said left_out = Ask(parts_[static_cast<std::size_t>(fold)], priors, points, coarse);
     if (!sets.empty()) {
@@ -207,7 +211,7 @@ OutputSensitivity EmulatedOutput::Over(const JointPrior& priors, const RankedPoi
     }
     correlation.row(fold) = left_out.correlation.unaryExpr(none_is_zero);
   }
-  // Of ErrorOfMean to the delete-a-group jackknife.
+  // From ErrorOfMean to the delete-a-group jackknife.
   const auto inflation = static_cast<double>(folds - 1);
   const auto join = [&](const Eigen::MatrixXd& parts, const Eigen::VectorXd& sampling) {
     const Eigen::VectorXd jackknife = inflation * ErrorOfMean(parts).transpose();

@@ -27,7 +27,7 @@ std::vector<SobolIndices> EstimateSobolIndices(std::span<const Eigen::MatrixXd> 
   std::vector<Eigen::MatrixXd> first;  // [output]: replicates x d
   std::vector<Eigen::MatrixXd> total;
   Eigen::MatrixXd means;      // replicates x outputs
-  Eigen::MatrixXd variances;  // likewise
+  Eigen::MatrixXd variances;  // replicates x outputs
   for (Index r = 0; r < replicates; ++r) {
     const Eigen::MatrixXd& both = sets[static_cast<std::size_t>(r)];
     const Eigen::MatrixXd a = both.leftCols(d);

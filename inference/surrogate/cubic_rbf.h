@@ -22,7 +22,7 @@ namespace calib::inference {
 /// safety: const.
 class CubicRbf {
  public:
-  /// dimensions: d >= 1
+  /// An interpolant without points. dimensions: d >= 1
   explicit CubicRbf(int dimensions) : dimensions_(dimensions) {}
 
   /// Adds a point (d) with its value. Errors: INVALID_ARGUMENT when it (nearly) coincides with an
@@ -34,20 +34,21 @@ class CubicRbf {
   /// True once d + 1 points are in general position; evaluate only then.
   bool ready() const { return tail_points_.size() == static_cast<std::size_t>(dimensions_) + 1; }
 
-  /// s(x). Precondition: ready().
+  /// The interpolant s at x (d). Precondition: ready().
   double Value(const Eigen::VectorXd& x) const;
   /// The d derivatives of s at x. Precondition: ready().
   Eigen::VectorXd Gradient(const Eigen::VectorXd& x) const;
-  /// s(x) from distances |x - x_i| already at hand (n, in the order of Add). Precondition: ready().
+  /// The interpolant s at x from distances |x - x_i| already at hand (n, in the order of Add).
+  /// Precondition: ready().
   double Value(const Eigen::VectorXd& x, const Eigen::VectorXd& distances) const;
 
-  /// x_i, in the order of Add.
+  /// Point x_i, counted in the order of Add.
   const Eigen::VectorXd& point(int i) const { return points_[static_cast<std::size_t>(i)]; }
-  /// f_i, in the order of Add.
+  /// Value f_i, counted in the order of Add.
   double value(int i) const { return values_[static_cast<std::size_t>(i)]; }
-  /// lambda in the order of Add, n entries.
+  /// Coefficients lambda of the points in the order of Add, n entries.
   const Eigen::VectorXd& coefficients() const { return coefficients_; }
-  /// c_0, c_1 ... c_d, d + 1 entries.
+  /// Coefficients c_0, c_1 ... c_d of the linear tail, d + 1 entries.
   const Eigen::VectorXd& tail() const { return tail_; }
 
  private:

@@ -17,6 +17,9 @@ namespace {
 using Eigen::Index;
 
 constexpr int kCandidatesPerDimension = 100;  // [Samuelsson 2023, Table 4.2]
+constexpr int kDesigns = 1000;  // drawn for the best of them [Samuelsson 2023, sec. 3.2]
+// Designs tried; chosen: one that does not span the tail is rare, its points would lie in a plane.
+constexpr int kMostDesigns = 100;
 constexpr int kTries = 1'000'000;  // of a point that is admissible; chosen: below a second
 // How a perturbation that is not admissible comes closer; chosen.
 constexpr int kPerStep = 20;          // draws before the step is halved
@@ -177,13 +180,11 @@ absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceO
   LatinHypercubeOptions design{.points = InitialPoints(options) - first,
                                .dimensions = options.dimensions,
                                .symmetric = true,
-                               .candidates = 1000,
+                               .candidates = kDesigns,
                                .seed = options.seed};
   ResponseSurfaceState state;
   state.step = options.max_step;
-  constexpr int kTries =
-      100;  // a design that does not span the tail is rare: its points would lie in a plane
-  for (int i = 0; i < kTries; ++i) {
+  for (int i = 0; i < kMostDesigns; ++i) {
     ASSIGN_OR_RETURN(auto points, LatinHypercube(design));
     state.design = Joined(options.first_points, points);
     RETURN_IF_ERROR(ReplaceInadmissible(options, state.design));
@@ -251,7 +252,10 @@ double TerminationBound(const ResponseSurfaceOptions& options, int id,
   if (id < initial || state.best < 0) return kInfinity;
   const double progress =
       static_cast<double>(id - initial) / std::max(1, options.max_evaluations - initial);
-  const double factor = progress < 0.5 ? 1 : progress < 0.75 ? 0.5 : 0.25;
+  const double factor =  // [Samuelsson 2023, Eq. 3.4]
+      progress < 0.5    ? 1
+      : progress < 0.75 ? 0.5
+                        : 0.25;
   return factor * options.termination *
          state.evaluations[static_cast<std::size_t>(state.best)].value;
 }
