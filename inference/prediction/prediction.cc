@@ -21,7 +21,7 @@ constexpr double kReach = 8;              // sd of a component beyond which it h
 constexpr int kQuantileSteps = 100;       // of the bisection: to the last bit
 constexpr int kPlaceSteps = 40;           // of the bisection: to 1e-12 of the distance
 constexpr int kShares = 200;              // equally probable shared errors; chosen
-constexpr double kTiny = 1e-300;          // in the place of a zero that is divided by
+constexpr double kTinySpread = 1e-300;  // in the place of a zero that is divided by
 
 // Pr(Q_t >= level), the mean over draws of the normal tails.
 double Exceeds(const QuantityPrediction& prediction, Index t, double level) {
@@ -138,7 +138,7 @@ absl::StatusOr<QuantityPrediction> PredictQuantity(const Eigen::MatrixXd& parame
     result.sd_model = scatter.sqrt();
     result.sd = (own + scatter + error_sd.array().square()).sqrt();
     result.conditional_sd = (scatter + error_sd.array().square()).sqrt();
-    const Eigen::VectorXd shrink = (raw > 0).select(own / raw.max(kTiny), 0.0).sqrt();
+    const Eigen::VectorXd shrink = (raw > 0).select(own / raw.max(kTinySpread), 0.0).sqrt();
     result.conditional_mean = (fitted * shrink.asDiagonal()).rowwise() + result.mean.transpose();
   }
   SetQuantiles(result);

@@ -18,10 +18,11 @@ namespace {
 using Eigen::Index;
 
 constexpr double kNoIndex = std::numeric_limits<double>::quiet_NaN();
-constexpr Index kFewestRuns = 20;  // and three per parameter, for a process worth asking; chosen
+constexpr Index kFewestRunsForIndices =
+    20;  // and three per parameter, for a process worth asking; chosen
 constexpr Index kRunsPerParameter = 3;
-constexpr int kTail = 20;     // one point in so many is left out at each end of the middle range
-constexpr double kReach = 2;  // ranges of the runs that the points may spread over; chosen
+constexpr int kTail = 20;  // one point in so many is left out at each end of the middle range
+constexpr double kReachOfRuns = 2;  // ranges of the runs that the points may spread over; chosen
 constexpr std::size_t kCoarseSets = 2;  // of the jackknife: differences need fewer; chosen
 
 Eigen::VectorXd Ranks(const Eigen::VectorXd& values) {
@@ -140,7 +141,7 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
   if (parameters.cols() != d || outputs.size() != parameters.rows() || options.folds < 2) {
     return absl::InvalidArgumentError("sensitivity: parameters and outputs do not fit.");
   }
-  const Index least = std::max<Index>(kFewestRuns, kRunsPerParameter * d);
+  const Index least = std::max<Index>(kFewestRunsForIndices, kRunsPerParameter * d);
   if (parameters.rows() < least) {
     return absl::FailedPreconditionError(absl::StrCat("sensitivity: an emulator needs at least ",
                                                       least, " finished runs; there are ",
@@ -180,7 +181,8 @@ absl::StatusOr<EmulatedOutput> EmulatedOutput::Fit(const JointPrior& priors,
 
 OutputSensitivity EmulatedOutput::Over(const JointPrior& priors, const RankedPoints& points,
                                        std::span<const Eigen::MatrixXd> sets) const {
-  const bool out_of_reach = (MiddleRange(points.standard).array() > kReach * range_.array()).any();
+  const bool out_of_reach =
+      (MiddleRange(points.standard).array() > kReachOfRuns * range_.array()).any();
   if (!MayHaveIndices(priors) || out_of_reach) sets = {};
   Said whole =
       Ask(whole_, priors, points, parts_.empty() ? std::span<const Eigen::MatrixXd>() : sets);

@@ -17,7 +17,7 @@ using Eigen::Index;
 // Points that cannot be told apart, relative; chosen: the interpolant of what is closer would be
 // rounding.
 constexpr double kCoincides = 1e-9;   // distance, over 1 + the point's size
-constexpr double kFlat = 1e-8;        // pivot of a hyperplane's points, over the largest
+constexpr double kFlatSpan = 1e-8;    // pivot of a hyperplane's points, over the largest
 constexpr double kVanishing = 1e-15;  // pivot of the Cholesky factor's row, over its diagonal
 
 double Cubic(double r) { return r * r * r; }
@@ -69,7 +69,7 @@ bool CubicRbf::ChooseTailPoints() {
   Eigen::MatrixXd tail(m, size());
   for (int i = 0; i < size(); ++i) tail.col(i) << 1, points_[static_cast<std::size_t>(i)];
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivoted(tail);
-  pivoted.setThreshold(kFlat);
+  pivoted.setThreshold(kFlatSpan);
   if (pivoted.rank() < m) return false;
   for (Index k = 0; k < m; ++k) tail_points_.push_back(pivoted.colsPermutation().indices()[k]);
   std::sort(tail_points_.begin(), tail_points_.end());

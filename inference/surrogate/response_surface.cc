@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "inference/numerics/infinity.h"
 #include "calib/return_if_error.h"
+#include "inference/numerics/infinity.h"
 #include "inference/sampling/latin_hypercube.h"
 #include "inference/sampling/philox.h"
 #include "inference/surrogate/merit.h"
@@ -17,7 +17,7 @@ namespace {
 using Eigen::Index;
 
 constexpr int kCandidatesPerDimension = 100;  // [Samuelsson 2023, Table 4.2]
-constexpr int kDesigns = 1000;  // drawn for the best of them [Samuelsson 2023, sec. 3.2]
+constexpr int kStartDesigns = 1000;  // drawn for the best of them [Samuelsson 2023, sec. 3.2]
 // Designs tried; chosen: one that does not span the tail is rare, its points would lie in a plane.
 constexpr int kMostDesigns = 100;
 constexpr int kTries = 1'000'000;  // of a point that is admissible; chosen: below a second
@@ -180,7 +180,7 @@ absl::StatusOr<ResponseSurfaceState> StartResponseSurface(const ResponseSurfaceO
   LatinHypercubeOptions design{.points = InitialPoints(options) - first,
                                .dimensions = options.dimensions,
                                .symmetric = true,
-                               .candidates = kDesigns,
+                               .candidates = kStartDesigns,
                                .seed = options.seed};
   ResponseSurfaceState state;
   state.step = options.max_step;

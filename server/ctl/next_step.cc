@@ -5,7 +5,7 @@
 namespace calib::ctl {
 namespace {
 
-std::string Quoted(const std::string& word) {
+std::string ShellWord(const std::string& word) {
   const bool plain = !word.empty() && word.find_first_not_of(
                                           "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
                                           "0123456789_-./:,+=@%") == std::string::npos;
@@ -20,9 +20,9 @@ std::string Quoted(const std::string& word) {
 std::string CommandOf(const client::ServerChoice& server, const std::string& words) {
   std::string command = absl::StrCat("calibctl ", words);
   if (!server.state.empty()) {
-    absl::StrAppend(&command, " --state ", Quoted(server.state));
+    absl::StrAppend(&command, " --state ", ShellWord(server.state));
   } else if (server.given) {
-    absl::StrAppend(&command, " --server ", Quoted(server.address));
+    absl::StrAppend(&command, " --server ", ShellWord(server.address));
   }
   return command;
 }
