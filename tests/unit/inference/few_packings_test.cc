@@ -145,11 +145,11 @@ TEST(ChiSquaredLaw, NoiseBesideScatterMakesItBetterKnown) {
 
 // What a packing departs by is not in the covariance that it is judged by.
 TEST(PackingScatter, LeavesAPackingOutWholly) {
-  constexpr Index kReadings = 3;
+  constexpr Index kFewReadings = 3;
   const std::vector<int> packing{7, 2, 9, 4, 7, 2, 9, 4};
-  const Eigen::MatrixXd rest = 0.1 * Eigen::MatrixXd::Identity(kReadings, kReadings);
+  const Eigen::MatrixXd rest = 0.1 * Eigen::MatrixXd::Identity(kFewReadings, kFewReadings);
   const auto judged = [&](double of_nine) {
-    Eigen::MatrixXd runs(8, kReadings);
+    Eigen::MatrixXd runs(8, kFewReadings);
     PhiloxStream stream = FewStream(2);
     for (double& value : runs.reshaped()) value = stream.Normal();
     for (const Index row : {2, 6}) runs(row, 1) += of_nine;
@@ -158,7 +158,7 @@ TEST(PackingScatter, LeavesAPackingOutWholly) {
     return ScatterBetweenPackings(
         departures, packing,
         [&](std::optional<int> left_out) {
-          Eigen::VectorXd variance = Eigen::VectorXd::Constant(kReadings, 1);
+          Eigen::VectorXd variance = Eigen::VectorXd::Constant(kFewReadings, 1);
           if (left_out != 9) variance[1] += of_nine * of_nine;
           return Eigen::MatrixXd(variance.asDiagonal());
         },

@@ -18,7 +18,7 @@ constexpr double kRadius = 1e-3;
 /// j.
 class ShearedPair {
  public:
-  ShearedPair(const Model& model, double overlap) : model_(model) {
+  ShearedPair(const Model& model, double overlap) : model_(ContactModelOf(model)) {
     for (int k = 0; k < kBlock; ++k) {
       block_.radius_i[k] = block_.radius_j[k] = kRadius;
       block_.dx[k] = 2 * kRadius - overlap;

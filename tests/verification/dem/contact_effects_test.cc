@@ -30,7 +30,7 @@ Model With(Model model, const std::string& effect, const std::map<std::string, d
 /// One pair along x, kept from call to call.
 class Pair {
  public:
-  explicit Pair(const Model& m) : model_(m) {
+  explicit Pair(const Model& m) : model_(ContactModelOf(m)) {
     block_.count = kBlock;
     block_.dt = 1e-6;
     block_.sliding_friction = model_.sliding_friction();

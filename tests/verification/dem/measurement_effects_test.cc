@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "dem/dynamics/assembly.h"
 #include "dem/particles/packing.h"
 #include "dem/registry/catalog.h"
 #include "dem/simulate/packing_generator.h"

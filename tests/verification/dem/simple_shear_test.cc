@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "dem/dynamics/assembly.h"
 #include "dem/registry/catalog.h"
 #include "dem/registry/registry.h"
 #include "dem/registry/scenario_problems.h"
