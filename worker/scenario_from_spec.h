@@ -9,7 +9,8 @@ namespace calib::worker {
 /// The scenario of a spec, its packing still empty (specimens.h supplies it).
 dem::Scenario ScenarioFromSpec(const v1::AttemptSpec& spec);
 
-/// The recipe of a message; its radii are empty where the message names a packing file that has them (specimens.h reads it).
+/// The recipe of a message; its radii are empty where the message names a packing file that has
+/// them (specimens.h reads it).
 dem::PackingRecipe RecipeFromMessage(const v1::PackingRecipe& message);
 
 }  // namespace calib::worker

@@ -73,9 +73,9 @@ double OwnRate(const OwnStiffness& k, double inverse_mass, double inverse_inerti
       std::sqrt((c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) * inverse_mass * inverse_inertia));
 }
 
-// A contact at a + r n from the centre of mass moves by v - (a + r n) x w and has the stiffness k, of
-// which k (n x) = c_s (n x). So with A, D and c of the sphere itself, and [a] for (a x), the couple is
-// A [a] + [c], and rotation is held by [a]' A [a] + [a]' [c] + [c]' [a] + D.
+// A contact at a + r n from the centre of mass moves by v - (a + r n) x w and has the stiffness k,
+// of which k (n x) = c_s (n x). So with A, D and c of the sphere itself, and [a] for (a x), the
+// couple is A [a] + [c], and rotation is held by [a]' A [a] + [a]' [c] + [c]' [a] + D.
 double OwnRate(std::span<const MemberStiffness> members, double inverse_mass,
                double inverse_inertia) {
   Symmetric translation{};

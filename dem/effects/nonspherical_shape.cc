@@ -14,9 +14,9 @@ void Prepare(const ParameterSet& parameters, Preparation& preparation) {
 /// Every sphere becomes a rigid clump of two equal overlapping spheres of the same volume (of the
 /// union), length over width `aspect`, directions at random; the specimen is brought to the new
 /// shape at constant porosity before consolidation (simulation/shape_change.h). Poured grains are
-/// set loosely with their shape and fall into place, or are fed in along the belt; in a plane they turn
-/// about its normal only, and where a thickness makes disks they are two equal overlapping disks of
-/// the same area. Null by definition at aspect 1: spheres.
+/// set loosely with their shape and fall into place, or are fed in along the belt; in a plane they
+/// turn about its normal only, and where a thickness makes disks they are two equal overlapping
+/// disks of the same area. Null by definition at aspect 1: spheres.
 /// One-sided. [Favier et al. 1999; Ng 2004, J. Eng. Mech. 130, 193]
 EffectEntry NonsphericalShape() {
   ParameterInfo aspect;

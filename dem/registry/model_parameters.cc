@@ -88,8 +88,8 @@ std::vector<std::string> PairNames(const Model& model) {
   return names;
 }
 
-/// What is wrong with the values of two materials, or of one among its equals, whatever the order in
-/// which each of them names the pair.
+/// What is wrong with the values of two materials, or of one among its equals, whatever the order
+/// in which each of them names the pair.
 std::vector<std::string> PairProblems(const Model& model, const std::string& a,
                                       const std::string& b) {
   const auto given = [&](const std::string& name) {

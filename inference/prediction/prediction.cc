@@ -21,7 +21,7 @@ constexpr double kReach = 8;              // sd of a component beyond which it h
 constexpr int kQuantileSteps = 100;       // of the bisection: to the last bit
 constexpr int kPlaceSteps = 40;           // of the bisection: to 1e-12 of the distance
 constexpr int kShares = 200;              // equally probable shared errors; chosen
-constexpr double kTinySpread = 1e-300;  // in the place of a zero that is divided by
+constexpr double kTinySpread = 1e-300;    // in the place of a zero that is divided by
 
 // Pr(Q_t >= level), the mean over draws of the normal tails.
 double Exceeds(const QuantityPrediction& prediction, Index t, double level) {

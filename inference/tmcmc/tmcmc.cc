@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "inference/numerics/infinity.h"
 #include "calib/return_if_error.h"
+#include "inference/numerics/infinity.h"
 #include "inference/sampling/philox.h"
 #include "inference/tmcmc/tempering_step.h"
 

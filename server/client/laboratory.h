@@ -15,8 +15,8 @@ namespace calib::client {
 /// Not thread-safe.
 class Laboratory {
  public:
-  /// Session and choice must outlive it. Starts local workers when there is something to run and the state
-  /// folder is this process's own.
+  /// Session and choice must outlive it. Starts local workers when there is something to run and
+  /// the state folder is this process's own.
   Laboratory(Session& session, const ServerChoice& choice) : session_(session), choice_(choice) {}
 
   /// A finished calibration. FAILED_PRECONDITION with a sentence when it is not finished, or a

@@ -9,7 +9,8 @@
 namespace calib::ctl {
 
 /// Ancestors of the campaign by extension, or the models of the improvement that it took part in;
-/// all that was tried on any of them, and their errors. Drift of the parameters where it can be told.
+/// all that was tried on any of them, and their errors. Drift of the parameters where it can be
+/// told.
 absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::CampaignView& view);
 
 }  // namespace calib::ctl

@@ -22,16 +22,15 @@ struct PredictedTests {
 };
 
 /// Gives an experiment without `packing` that of another one, with its `realizations` and, where it
-/// has no `materials`, the mixture of its grains; not the materials of walls and other bodies, which
-/// are of the other test. Nothing where the test makes its bodies from its settings.
+/// has no `materials`, the mixture of its grains; not the materials of walls and other bodies,
+/// which are of the other test. Nothing where the test makes its bodies from its settings.
 void TakeSpecimen(const campaign::YamlNode& from, campaign::YamlNode& experiment);
 
 /// Reads a file that holds `experiments:` (the rest of it is passed over) or is one experiment;
 /// one without a name is called predicted, of several predicted_1, ... A
 /// test without data is given by `control: {column: NAME, to: VALUE, readings: N}`: that many
-/// readings, evenly spaced. Without `packing` a test takes the specimen of the parent's first experiment
-/// (TakeSpecimen).
-/// Errors: INVALID_ARGUMENT, a line per problem.
+/// readings, evenly spaced. Without `packing` a test takes the specimen of the parent's first
+/// experiment (TakeSpecimen). Errors: INVALID_ARGUMENT, a line per problem.
 absl::StatusOr<PredictedTests> ReadTests(client::Client& client, const std::string& path,
                                          const report::CampaignView& parent);
 

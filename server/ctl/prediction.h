@@ -22,12 +22,12 @@ struct PredictedObservable {
   std::string experiment, observable, control_name;
   std::vector<double> control;             ///< at each reading, SI
   inference::QuantityPrediction quantity;  ///< at each reading, SI
-  /// Standard deviation of the error of the measurement that is predicted, at each reading; part of quantity.sd, of its quantiles
-  /// and of the exceedance. Empty: the test states none.
+  /// Standard deviation of the error of the measurement that is predicted, at each reading; part of
+  /// quantity.sd, of its quantiles and of the exceedance. Empty: the test states none.
   Eigen::VectorXd sd_noise{};
   std::vector<double> measured;  ///< SI; empty: not measured
-  /// Discrepancy of the model, learnt where it was calibrated (model - measurement); part of quantity.sd_model.
-  /// Empty: nothing is known of it.
+  /// Discrepancy of the model, learnt where it was calibrated (model - measurement); part of
+  /// quantity.sd_model. Empty: nothing is known of it.
   inference::DiscrepancyBand discrepancy{};
   struct Exceedance {
     double level = 0;             ///< SI

@@ -7,10 +7,10 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "inference/numerics/decompositions.h"
-#include "server/campaign/model/noise_check.h"
 #include "calib/return_if_error.h"
 #include "dem/registry/declared_effects.h"
+#include "inference/numerics/decompositions.h"
+#include "server/campaign/model/noise_check.h"
 #include "server/diagnosis/diagnosis_support.h"
 #include "server/diagnosis/effect_screen.h"
 #include "server/diagnosis/extension.h"

@@ -11,8 +11,8 @@
 namespace calib::diagnosis {
 namespace {
 
-// That a diagnosis is content with: what eight did not show, or not clearly, sixteen showed in three of
-// four cases (deploy/bench/hidden-effects.d, engine 13).
+// That a diagnosis is content with: what eight did not show, or not clearly, sixteen showed in
+// three of four cases (deploy/bench/hidden-effects.d, engine 13).
 constexpr int kMorePackings = 16;
 
 }  // namespace

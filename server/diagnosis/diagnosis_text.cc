@@ -24,8 +24,8 @@ Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : 
 
 bool ComesCloser(const CandidateEffect& c) { return c.refit_p_value >= 0 && c.over_base.nats > 0; }
 
-// Without the effect it is the base model: a refit that is further off has merely not been found. One
-// that is calculated has been looked for at every strength.
+// Without the effect it is the base model: a refit that is further off has merely not been found.
+// One that is calculated has been looked for at every strength.
 bool NotFound(const CandidateEffect& c) {
   return !c.campaign.empty() && c.refit_p_value >= 0 && !ComesCloser(c);
 }

@@ -38,8 +38,8 @@ class EffectScreen {
   /// Model evaluations that MeasureNuisance() and MeasureSignatures() take together.
   std::int64_t Planned(const std::vector<std::string>& without) const;
 
-  /// The readings that signatures are about, ascending: all, or where SharesOfScreen() says so those
-  /// of ScreenedPart().
+  /// The readings that signatures are about, ascending: all, or where SharesOfScreen() says so
+  /// those of ScreenedPart().
   std::vector<Eigen::Index> Readings(const std::vector<std::string>& without) const;
 
   /// What is left out to keep within the cap, in a sentence; empty: nothing.

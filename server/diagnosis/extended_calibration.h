@@ -33,8 +33,8 @@ double ErrorOf(const report::CampaignView& view);
 
 class ExtendedCalibration {
  public:
-  /// times: as often as the parent's iterations are made at most, >= 1. budget: model evaluations of
-  /// the fitted tests; none: as many as it takes. laboratory must outlive it.
+  /// times: as often as the parent's iterations are made at most, >= 1. budget: model evaluations
+  /// of the fitted tests; none: as many as it takes. laboratory must outlive it.
   ExtendedCalibration(client::Laboratory& laboratory, int times, std::optional<std::int64_t> budget)
       : laboratory_(laboratory), times_(times), budget_(budget) {}
 

@@ -18,8 +18,8 @@ namespace calib::diagnosis {
 /// calibrated experiments.
 dem::ReferenceState ReferenceOf(const report::CampaignView& view);
 
-/// The priors with which an effect would join the model: of its parameters that are calibrated then,
-/// by dotted name.
+/// The priors with which an effect would join the model: of its parameters that are calibrated
+/// then, by dotted name.
 std::map<std::string, dem::DefaultPrior> PriorsOfExtension(const report::CampaignView& parent,
                                                            const dem::EffectInfo& effect);
 

@@ -18,8 +18,8 @@ std::vector<std::string> EffectsToTry(const Diagnosis& diagnosis);
 /// Why the effect is added, a sentence.
 std::string WhyNext(const Diagnosis& diagnosis, const std::string& effect);
 
-/// Effects that may do better in the place of `added`, which this diagnosis had made be added and with
-/// which the fitted readings are missed by rms_error still: at most two, in the order of the
+/// Effects that may do better in the place of `added`, which this diagnosis had made be added and
+/// with which the fitted readings are missed by rms_error still: at most two, in the order of the
 /// diagnosis, whose refits came within twice that.
 std::vector<std::string> OthersToTry(const Diagnosis& diagnosis, const std::string& added,
                                      double rms_error);

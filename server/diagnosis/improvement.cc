@@ -50,7 +50,8 @@ absl::Status Improvement::From(report::CampaignView view) {
   return Open();
 }
 
-// Adds effects to a model until it is adequate, nothing helps, or no more are allowed: the last one.
+// Adds effects to a model until it is adequate, nothing helps, or no more are allowed: the last
+// one.
 absl::Status Improvement::Climb(report::CampaignView view, std::vector<std::string>& added) {
   for (;;) {
     const bool last = static_cast<int>(added.size()) >= limits_.effects || Spent();
@@ -127,7 +128,8 @@ std::string Improvement::WhyNot(const report::CampaignView& without, double with
   return WhyNoStep(before, after);
 }
 
-// A diagnosis that cannot be paid for is no more than the adequacy of the model; the reason says so.
+// A diagnosis that cannot be paid for is no more than the adequacy of the model; the reason says
+// so.
 absl::StatusOr<Diagnosis> Improvement::Ask(const report::CampaignView& view, bool only_adequacy,
                                            std::string& reason) {
   DiagnosisOptions options{.only_adequacy = only_adequacy,

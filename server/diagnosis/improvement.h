@@ -51,8 +51,8 @@ class Improvement {
   const std::vector<ImproveStep>& steps() const { return steps_; }
   /// Of the verdict, stored before held-out data were looked at.
   const std::string& digest() const { return digest_; }
-  /// Digests of other verdicts on the first campaign for which its held-out data were opened before:
-  /// they have been seen by whoever asks again.
+  /// Digests of other verdicts on the first campaign for which its held-out data were opened
+  /// before: they have been seen by whoever asks again.
   const std::vector<std::string>& opened_before() const { return opened_before_; }
   std::int64_t evaluations() const { return evaluations_; }
   /// One JSON document.

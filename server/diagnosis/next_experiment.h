@@ -49,10 +49,12 @@ void Weigh(const std::vector<RivalPair>& pairs, PlannedExperiment& planned);
 /// Share of the pairs that is expected to be told apart.
 double ShareToldApart(const std::vector<RivalPair>& pairs);
 
-/// "None of these": the campaign's own model with a smooth misfit as large as the one that is there.
+/// "None of these": the campaign's own model with a smooth misfit as large as the one that is
+/// there.
 struct NoneOfThese {
   Rival base{};
-  /// By observable: rms of what it misses of the fitted readings beyond their noise, in units of it.
+  /// By observable: rms of what it misses of the fitted readings beyond their noise, in units of
+  /// it.
   std::map<std::string, double> missed{};
 };
 
@@ -78,10 +80,10 @@ struct NextPlan {
 /// Errors of a measurement: the noise that the campaign states for the observables at values of
 /// their size, and `scatter` (of a single run, in units of that noise) for
 /// the measurement and both runs: see SeparationOf(). None for fewer than two rivals, without a
-/// known size of the errors, where no plan is a campaign that this build accepts, is finished by all
-/// rivals, or tells any two of them apart. Errors: those of the runs. The best is that which tells
-/// the most pairs apart, and of equals the closest of them best; their distance from none of them is
-/// told beside it.
+/// known size of the errors, where no plan is a campaign that this build accepts, is finished by
+/// all rivals, or tells any two of them apart. Errors: those of the runs. The best is that which
+/// tells the most pairs apart, and of equals the closest of them best; their distance from none of
+/// them is told beside it.
 absl::StatusOr<NextPlan> PlanNextExperiment(client::Laboratory& laboratory,
                                             const std::vector<Rival>& rivals,
                                             const std::optional<NoneOfThese>& none, int like,

@@ -22,10 +22,10 @@ struct ScreenShares {
 };
 
 /// In a campaign of so many samples and fitted experiments, with a number of numerical choices to
-/// vary, at most the larger of a quarter of the campaign's evaluations and four for each effect. One
-/// run of each effect in as many experiments as that allows, at least one; a second goes first to
-/// effects with another ray of strength, last to what instruments do. Numerical choices are given up
-/// last.
+/// vary, at most the larger of a quarter of the campaign's evaluations and four for each effect.
+/// One run of each effect in as many experiments as that allows, at least one; a second goes first
+/// to effects with another ray of strength, last to what instruments do. Numerical choices are
+/// given up last.
 ScreenShares SharesOfScreen(const std::vector<const dem::EffectInfo*>& effects,
                             const std::vector<bool>& calculated, std::size_t samples,
                             int experiments, std::size_t numerical);

@@ -10,10 +10,10 @@
 
 namespace calib::diagnosis {
 
-/// Sets of shapes over the T readings of `data`: a constant in each stage of each observable of each
-/// experiment; and a constant and, in stages of at least four readings, a trend [Neyman's smooth
-/// test, Skandinavisk Aktuarietidskrift 20 (1937) 149, by stage]. T x q each; sets with q above T / 2
-/// are left out.
+/// Sets of shapes over the T readings of `data`: a constant in each stage of each observable of
+/// each experiment; and a constant and, in stages of at least four readings, a trend [Neyman's
+/// smooth test, Skandinavisk Aktuarietidskrift 20 (1937) 149, by stage]. T x q each; sets with q
+/// above T / 2 are left out.
 std::vector<Eigen::MatrixXd> StageShapes(const campaign::Campaign& campaign,
                                          const inference::DataSet& data);
 

@@ -32,9 +32,9 @@ class WarmFits {
            double level)
       : base_(base), screen_(screen), response_(response), level_(level) {}
 
-  /// kLeastBatches of each of `first`, as far as they go; then batches go where NextRefit says, until
-  /// there is nothing left that goes on, or as many evaluations have been made as the campaign has,
-  /// or as `most` allows; Least() in any case. Errors: those of the runs.
+  /// kLeastBatches of each of `first`, as far as they go; then batches go where NextRefit says,
+  /// until there is nothing left that goes on, or as many evaluations have been made as the
+  /// campaign has, or as `most` allows; Least() in any case. Errors: those of the runs.
   absl::Status Fit(const RefitOrder& order, std::optional<std::int64_t> most = {});
   /// Model evaluations of two batches of one effect.
   std::int64_t Least() const;

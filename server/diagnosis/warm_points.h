@@ -45,10 +45,10 @@ absl::StatusOr<inference::EmulatedResult> Emulate(const campaign::Campaign& camp
 /// `count` points, SI, where an emulator of the runs knows the model's history somewhere in the
 /// prior: half of them about the draws of its posterior that it expects closest, half about all of
 /// them, by errors wider while the model is far from the readings (inference/emulator:
-/// search_widening.h); else from the prior. diverged: points, SI, of runs that came to no end, m x d:
-/// twice as near to one of them as to any run, in standardised coordinates, a point is drawn again, as
-/// long as others come in eight times as many draws. batch: number of batches so far, decides the
-/// random numbers. Errors: those of inference::FitProposalToDraws and DrawSamples.
+/// search_widening.h); else from the prior. diverged: points, SI, of runs that came to no end, m x
+/// d: twice as near to one of them as to any run, in standardised coordinates, a point is drawn
+/// again, as long as others come in eight times as many draws. batch: number of batches so far,
+/// decides the random numbers. Errors: those of inference::FitProposalToDraws and DrawSamples.
 absl::StatusOr<Eigen::MatrixXd> NextPoints(const campaign::Campaign& campaign,
                                            const report::ScatteredReadings& readings,
                                            const report::RunTable& runs,

@@ -144,7 +144,8 @@ std::string ConditionedOn(const Definition& definition,
                                      "this, and leave its uncertainty out.");
 }
 
-// How well the runs that the weights rest on fit each stage: of a large table only these are copied.
+// How well the runs that the weights rest on fit each stage: of a large table only these are
+// copied.
 std::vector<double> StagePOfWeights(const Definition& definition,
                                     std::span<const inference::Iteration> iterations,
                                     const Eigen::VectorXd& log_weights) {

@@ -15,8 +15,8 @@ bool DecidesWhileRunning(const Definition& definition);
 /// the same campaign may decide otherwise.
 bool DecidesAtOnce(const Definition& definition);
 
-/// Whether every run goes to its end, whatever has arrived first: one that another campaign makes may
-/// then take the place of one of these at any time.
+/// Whether every run goes to its end, whatever has arrived first: one that another campaign makes
+/// may then take the place of one of these at any time.
 bool RunsToItsEnds(const Definition& definition);
 
 }  // namespace calib::scheduler

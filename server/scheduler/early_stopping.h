@@ -73,13 +73,13 @@ struct Audit {
   double measured = 0;  ///< what they hold
 };
 
-/// Of the audited samples that have finished. definition: with the errors by which they were chosen,
-/// those stated, so that bound and measured share can be held against each other: scatter that joins
-/// the errors later changes both.
+/// Of the audited samples that have finished. definition: with the errors by which they were
+/// chosen, those stated, so that bound and measured share can be held against each other: scatter
+/// that joins the errors later changes both.
 absl::StatusOr<Audit> AuditOf(const Definition& definition, const History& history);
 
-/// The largest log likelihood that a sample can still reach: `predictions` holds its readings so far,
-/// NaN everywhere else.
+/// The largest log likelihood that a sample can still reach: `predictions` holds its readings so
+/// far, NaN everywhere else.
 double BestPossible(const inference::GaussianLikelihood& likelihood,
                     const Eigen::RowVectorXd& predictions);
 

@@ -43,8 +43,8 @@ inline constexpr const char* kHeldOutDraws = "\"draws from the posterior\"";
 inline constexpr const char* kReplicates = "\"best estimate on every packing\"";
 
 /// Reads every record in the order of its natural key; of tmcmc the samples and states alone that
-/// definition.memory has not kept. iterations: the first ones alone, as if nothing had followed (the
-/// core seconds are those of all); empty: all.
+/// definition.memory has not kept. iterations: the first ones alone, as if nothing had followed
+/// (the core seconds are those of all); empty: all.
 absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t campaign,
                                     store::Reader& reader, std::optional<int> iterations = {});
 

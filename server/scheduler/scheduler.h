@@ -166,8 +166,8 @@ class Scheduler {
   Ports& ports_;
   SchedulerOptions options_;
   LeaseTable leases_;
-  /// Attempts whose end is on its way to the disk: neither held nor refused. With the digest of what
-  /// others may take then; empty: nothing.
+  /// Attempts whose end is on its way to the disk: neither held nor refused. With the digest of
+  /// what others may take then; empty: nothing.
   std::map<std::int64_t, std::string> ending_;
   WorkerTable workers_;
   std::vector<v1::RefusedWorker> refused_;                     // oldest first

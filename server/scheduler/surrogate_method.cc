@@ -15,8 +15,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "inference/numerics/decompositions.h"
 #include "calib/return_if_error.h"
+#include "inference/numerics/decompositions.h"
 #include "inference/numerics/standard_normal.h"
 #include "inference/surrogate/expected_improvement.h"
 #include "inference/surrogate/response_surface.h"
@@ -173,8 +173,8 @@ class SurrogateMethod final : public Method {
     std::optional<double> at_least{};  ///< what it would have been at least, of one stopped early
   };
 
-  /// An emulator of few runs may be adequate by its own account where half of them give no posterior
-  /// at all: nothing then says how far the other half has settled it.
+  /// An emulator of few runs may be adequate by its own account where half of them give no
+  /// posterior at all: nothing then says how far the other half has settled it.
   static bool HalvesGiveOne(const Answer& answer) {
     return answer.emulated->split_half.array().isFinite().any();
   }

@@ -8,8 +8,8 @@
 
 namespace calib::service {
 
-/// Not thread-safe. Holds DIR/lock (an open file description lock) while it lives and says in DIR/server.json who
-/// serves the folder.
+/// Not thread-safe. Holds DIR/lock (an open file description lock) while it lives and says in
+/// DIR/server.json who serves the folder.
 class StateFolder {
  public:
   /// Creates the folder if need be. Errors: ALREADY_EXISTS when another process serves it; the

@@ -56,9 +56,9 @@ class Reader {
   absl::StatusOr<std::int64_t> LastAttempt();
   /// Attempts made so far, by sample.
   absl::StatusOr<std::map<int, int>> AttemptsBySample(std::int64_t campaign);
-  /// Core time of all attempts that ended [s], by evaluation; for an evaluation that was reused that
-  /// of the equal one that ran, where it is still there. Evaluations of which nothing is known are
-  /// left out.
+  /// Core time of all attempts that ended [s], by evaluation; for an evaluation that was reused
+  /// that of the equal one that ran, where it is still there. Evaluations of which nothing is known
+  /// are left out.
   absl::StatusOr<std::map<EvaluationKey, double>> CoreSeconds(std::int64_t campaign);
   absl::StatusOr<Effort> EffortOf(std::int64_t campaign);
   absl::StatusOr<std::vector<EventRecord>> Events(std::int64_t campaign);

@@ -62,11 +62,11 @@ struct SampleRecord {
   std::vector<double> parameters{};
   double log_weight = kUnknown;
   double log_likelihood = kUnknown;
-  /// The sample is stopped when the largest log likelihood that it can still reach falls below this;
-  /// unknown: it is never stopped.
+  /// The sample is stopped when the largest log likelihood that it can still reach falls below
+  /// this; unknown: it is never stopped.
   double stop_below = kUnknown;
-  /// For a sample that was stopped and is run to its end to see what that would have lost: the share
-  /// of the finished mass that its bound left it. Unknown: not audited.
+  /// For a sample that was stopped and is run to its end to see what that would have lost: the
+  /// share of the finished mass that its bound left it. Unknown: not audited.
   double audited = kUnknown;
 };
 

@@ -73,7 +73,8 @@ class Store::Writer {
     }
   }
 
-  /// While somebody else holds the file's lock (a backup, a shell), waits; nothing is begun by then.
+  /// While somebody else holds the file's lock (a backup, a shell), waits; nothing is begun by
+  /// then.
   std::unique_ptr<SQLite::Transaction> Begin() {
     for (int i = 1;; ++i) {
       try {

@@ -1,7 +1,7 @@
-// Runs a small compression in the periodic cell on what the build offers and prints the catalogue's names and the last state,
-// so that an extension that a script adds can be seen to act.
-// usage: run_scenario CONTACT TEST [EFFECT]
-// prints: `contact NAME`, `effect NAME: TESTS`, `test NAME`, then `OBSERVABLE VALUE` of the last load step
+// Runs a small compression in the periodic cell on what the build offers and prints the catalogue's
+// names and the last state, so that an extension that a script adds can be seen to act. usage:
+// run_scenario CONTACT TEST [EFFECT] prints: `contact NAME`, `effect NAME: TESTS`, `test NAME`,
+// then `OBSERVABLE VALUE` of the last load step
 #include <cstdio>
 #include <string>
 

@@ -18,7 +18,8 @@ void ReadStart(MapReader& campaign_map, Campaign& campaign);
 
 /// Adds a problem for a single replicate, which measures no scatter.
 void CheckReplicates(const MapReader& campaign_map, const Campaign& campaign);
-/// Adds a problem where the budget does not allow one iteration. To be called once the experiments are known.
+/// Adds a problem where the budget does not allow one iteration. To be called once the experiments
+/// are known.
 void CheckBudget(const MapReader& campaign_map, const Campaign& campaign);
 
 }  // namespace calib::campaign

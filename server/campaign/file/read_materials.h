@@ -17,8 +17,8 @@ dem::MaterialUse ReadMaterialUse(MapReader& experiment_map, const dem::TestInfo&
                                  const dem::Model& model);
 
 /// A material that nothing is made of, in no experiment, is a mistake; not in a table or a campaign
-/// derived from another, which may have some of its experiments only. Call when the experiments have
-/// been read.
+/// derived from another, which may have some of its experiments only. Call when the experiments
+/// have been read.
 void CheckMaterialsUsed(const MapReader& campaign_map, const Campaign& campaign);
 
 }  // namespace calib::campaign

@@ -218,11 +218,11 @@ struct Campaign {
   std::vector<SharedNoise> shared_noise;
   inference::FilterOptions filter;
   SurrogateModel surrogate = SurrogateModel::kCubicRbf;
-  /// With surrogate_msrs a run ends when its misfit so far exceeds this times the best run's (a half
-  /// and a quarter of it later, inference::TerminationBound); empty: never.
+  /// With surrogate_msrs a run ends when its misfit so far exceeds this times the best run's (a
+  /// half and a quarter of it later, inference::TerminationBound); empty: never.
   std::optional<double> termination = 10;
-  /// With surrogate_msrs the points under way at most, >= 1. With kReproducible point k is chosen once
-  /// all up to k - in_flight have ended, and by their results alone.
+  /// With surrogate_msrs the points under way at most, >= 1. With kReproducible point k is chosen
+  /// once all up to k - in_flight have ended, and by their results alone.
   int in_flight = 8;
   Decisions decisions = Decisions::kReproducible;
   inference::TmcmcOptions tmcmc;  ///< steps and target_cv; the rest is set where it is used

@@ -18,8 +18,8 @@ bool ReadAtRest(const Experiment& experiment);
 
 /// Whether a reading of the experiment can depend on the effect: it is one of the effect's tests, a
 /// collision has the wall that an effect of kind "boundary" is about, one that needs motion is
-/// not read at rest, one that needs space is not held in a plane. Whether the effect is in the model
-/// is not asked.
+/// not read at rest, one that needs space is not held in a plane. Whether the effect is in the
+/// model is not asked.
 bool CanShow(const Experiment& experiment, const dem::EffectInfo& effect);
 
 /// Where an effect acts, to follow "it acts in": its tests, and what they need.
@@ -27,8 +27,8 @@ std::string WhereItActs(const dem::EffectInfo& effect);
 
 /// One sentence for each effect of the model that none of the experiments (calibrating or held
 /// out) can show though one of its parameters is calibrated, or though it is one of the grains'
-/// shape or strength or of the specimen's preparation, fixed or not. None for runs of a table, which
-/// infer nothing, and for a campaign derived from another, which was asked itself.
+/// shape or strength or of the specimen's preparation, fixed or not. None for runs of a table,
+/// which infer nothing, and for a campaign derived from another, which was asked itself.
 std::vector<std::string> EffectsWithoutPart(const Campaign& campaign);
 
 }  // namespace calib::campaign

@@ -9,8 +9,8 @@
 
 namespace calib::campaign {
 
-/// "realizations 2 to 4 are other packings of the 1000 grains of sand.txt, generated at its porosity
-/// of 0.405"; empty where each realization was given or has a recipe.
+/// "realizations 2 to 4 are other packings of the 1000 grains of sand.txt, generated at its
+/// porosity of 0.405"; empty where each realization was given or has a recipe.
 std::string GeneratedFromFile(const Experiment& experiment);
 
 /// One sentence where calibrated runs are on several packings, or repeats of one are asked for, and

@@ -1,5 +1,6 @@
 #pragma once
-// Posterior, samples, states and fit as tables for spreadsheets and scripts; SI units, 17 significant digits.
+// Posterior, samples, states and fit as tables for spreadsheets and scripts; SI units, 17
+// significant digits.
 
 #include <string>
 

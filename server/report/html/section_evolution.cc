@@ -50,8 +50,9 @@ std::string OverIterations(const CampaignView& view, int k) {
          "</figure>\n";
 }
 
-// The first steps are as wide as the prior: the axis covers the band from a fifth of the path on with
-// a quarter of its height beyond, and what lies beyond is drawn at its edge. The range of the axis.
+// The first steps are as wide as the prior: the axis covers the band from a fifth of the path on
+// with a quarter of its height beyond, and what lies beyond is drawn at its edge. The range of the
+// axis.
 std::vector<double> ShowLaterSteps(std::vector<double>& mean, std::vector<double>& low,
                                    std::vector<double>& high) {
   std::vector<double> shown = low;

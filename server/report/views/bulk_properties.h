@@ -14,8 +14,8 @@ struct BulkProperty {
   double value = 0;  ///< NaN: the curve does not tell
 };
 
-/// The bulk properties of a drained triaxial run, from states that hold axial_strain (or are controlled by it),
-/// volumetric_strain, and deviatoric_stress, stress_ratio or q_over_p:
+/// The bulk properties of a drained triaxial run, from states that hold axial_strain (or are
+/// controlled by it), volumetric_strain, and deviatoric_stress, stress_ratio or q_over_p:
 ///   secant_modulus       q / e_a at deviatoric strain e_d = e_a - e_v / 3 = 1 %, interpolated [Pa]
 ///   secant_poisson_ratio -e_r / e_a there, e_r = (e_v - e_a) / 2     [Cheng 2018, sec. 5.3]
 ///   peak_friction_angle  asin((R - 1) / (R + 1)) at the largest stress ratio R [rad]

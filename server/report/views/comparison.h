@@ -85,8 +85,8 @@ struct Comparison {
   double rms_error = 0;  ///< over all calibrated readings; NaN: nothing to compare yet
   std::optional<double> reduced_chi2;  ///< chi-squared / (readings - parameters)
   std::optional<double> p_value;
-  /// Probability of a larger chi-squared in a replicate at draws from the posterior, over all fitted
-  /// data, as the posterior's record has it.
+  /// Probability of a larger chi-squared in a replicate at draws from the posterior, over all
+  /// fitted data, as the posterior's record has it.
   std::optional<double> predictive_p{};
   std::optional<double> heldout_rms_error;  ///< over all validation readings
   std::vector<ObservableMisfit> by_observable;

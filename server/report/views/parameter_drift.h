@@ -26,8 +26,8 @@ struct ParameterDrift {
   /// Probability of fits at least as far apart if one value served all experiments; empty with
   /// fewer than two experiments that say something about the parameter.
   std::optional<double> p_experiments;
-  /// Probability of fits at least as far apart if one value served all stages; empty with fewer than
-  /// two stages that say something about the parameter.
+  /// Probability of fits at least as far apart if one value served all stages; empty with fewer
+  /// than two stages that say something about the parameter.
   std::optional<double> p_segments;
   /// Setting with which the fits of the experiments go up or down, and the change of the parameter
   /// per factor ten in it [SI] with its sd; empty: no setting takes two values, or no drift.
@@ -40,9 +40,9 @@ struct ParameterDrift {
 /// scatter and the emulator's error are in the widths: the scatter of packings and what refits of
 /// them show where it was measured, that of single runs otherwise. Parts by which a
 /// parameter stays as wide as its prior (sd above 0.8 of it) say nothing and are left out, and so
-/// are parts with fewer than `kLeastReadings` readings and those that no emulator can be made of. Deterministic. About a second for each
-/// part. Errors: FAILED_PRECONDITION without a known size of the errors or with too few runs to
-/// emulate any part.
+/// are parts with fewer than `kLeastReadings` readings and those that no emulator can be made of.
+/// Deterministic. About a second for each part. Errors: FAILED_PRECONDITION without a known size of
+/// the errors or with too few runs to emulate any part.
 absl::StatusOr<std::vector<ParameterDrift>> ParameterDrifts(const CampaignView& view);
 
 /// Readings of a stage or experiment below which it is not fitted alone.

@@ -1,6 +1,7 @@
 #pragma once
-// What a model leaves unexplained, in sentences: readings beyond the prior, which observable, which stage, sign,
-// shape, discrepancy along the path, dependence on pressure or rate, parameters that are bent.
+// What a model leaves unexplained, in sentences: readings beyond the prior, which observable, which
+// stage, sign, shape, discrepancy along the path, dependence on pressure or rate, parameters that
+// are bent.
 
 #include <string>
 #include <vector>

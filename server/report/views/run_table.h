@@ -20,7 +20,8 @@ struct RunTable {
 /// Samples that did not get to the last reading of every calibrated experiment are left out.
 RunTable RunsOf(const CampaignView& view);
 /// RunsOf() with histories in the sd of `units`, which are the same readings in the same order with
-/// errors of their own. Their numbers of experiments may differ, as they do where a derived campaign leaves held-out ones out.
+/// errors of their own. Their numbers of experiments may differ, as they do where a derived
+/// campaign leaves held-out ones out.
 RunTable RunsOf(const CampaignView& view, const inference::DataSet& units);
 
 /// The readings of the calibrated experiments with the scatter in their errors that the campaign
@@ -30,7 +31,8 @@ struct ScatteredReadings {
                                ///< mean history, which R packings know no better (repeats do)
   inference::DataSet of_run;   ///< scatter of the specimen and of one run of the model
   /// Departures of the runs of the best estimate on every packing from their mean, for fits to some
-  /// of the readings: R x T, see inference::Replicates; none where fewer than two runs came to their ends.
+  /// of the readings: R x T, see inference::Replicates; none where fewer than two runs came to
+  /// their ends.
   Eigen::MatrixXd departures{};
   std::vector<int> departure_stream{};  ///< R, campaign::StreamOf of each
   /// False where packings were not varied and no repeats made: both are MakeDataSet, and the

@@ -16,11 +16,11 @@ struct Quantity {
   std::string experiment;
   std::string
       name;  ///< a bulk property, or "final_" and an observable: its value at the last reading
-  std::string unit;                    ///< SI
-  int runs = 0;                        ///< finished runs that have it
-  inference::OutputSensitivity prior;  ///< over the prior
-  inference::OutputSensitivity
-      posterior;  ///< correlations, mean and sd over the posterior; empty: none, or nothing explained
+  std::string unit;                        ///< SI
+  int runs = 0;                            ///< finished runs that have it
+  inference::OutputSensitivity prior;      ///< over the prior
+  inference::OutputSensitivity posterior;  ///< correlations, mean and sd over the posterior; empty:
+                                           ///< none, or nothing explained
 };
 
 struct Sensitivity {

@@ -55,8 +55,9 @@ struct StoredDiagnosis {
 /// INVALID_ARGUMENT when the text is no such document; fields of other versions are left out.
 absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& json);
 
-/// The diagnosis of a campaign to show among several: the latest that tried effects, else the latest; of equal verdicts
-/// the one that planned the next experiment. nullptr: there is none of the campaign.
+/// The diagnosis of a campaign to show among several: the latest that tried effects, else the
+/// latest; of equal verdicts the one that planned the next experiment. nullptr: there is none of
+/// the campaign.
 const StoredDiagnosis* LatestOf(const std::vector<StoredDiagnosis>& diagnoses,
                                 const std::string& campaign);
 

@@ -212,8 +212,8 @@ TEST_P(GlassBeadFilter, GrainLearningAtItsSigma) {
 }
 
 // What `deploy/examples/glass_beads/independent.py --digits 13` prints: numpy alone. Two sigmas for
-// each ensemble, that of 20 effective samples and that of the authors' program. Theirs is the former
-// in the first two iterations and leaves 11 and 8 effective in the last two.
+// each ensemble, that of 20 effective samples and that of the authors' program. Theirs is the
+// former in the first two iterations and leaves 11 and 8 effective in the last two.
 struct OfNumpy {
   int iteration;
   double sigma, ess;

@@ -81,9 +81,9 @@ TEST_F(Diagnosis, AnswersOnceKilledAndRepeatsNoRun) {
   EXPECT_EQ(Evaluations(), evaluations);
 }
 
-// Collisions do not scatter: a refit has to come within the noise by itself. A dashpot of 0.1, which
-// the model does not know, measured to 1 %.
-// A sphere that hits a wall: no packing, no scatter, milliseconds a run.
+// Collisions do not scatter: a refit has to come within the noise by itself. A dashpot of 0.1,
+// which the model does not know, measured to 1 %. A sphere that hits a wall: no packing, no
+// scatter, milliseconds a run.
 class Impacts : public Diagnosis {
  protected:
   // What is found from a measurement that an effect takes part in, of a model without it.
@@ -266,8 +266,8 @@ TEST_F(Diagnosis, DeletesACampaignWithAllThatComesFromIt) {
   EXPECT_TRUE(Call("list --state s --json").json().empty());
 }
 
-// Errors so small that the model misses, at a porosity that cannot be 0.02 higher (this packing comes to
-// rest at 0.438 at most).
+// Errors so small that the model misses, at a porosity that cannot be 0.02 higher (this packing
+// comes to rest at 0.438 at most).
 class Misfit : public Diagnosis {
  protected:
   Misfit() {

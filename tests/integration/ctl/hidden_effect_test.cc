@@ -96,8 +96,9 @@ TEST_F(HiddenEffect, IsNamedAddedAndTheErrorFallsOnHeldOutData) {
   }
 }
 
-// A measurement of the model itself on another packing of another number of grains. Eight packings: four
-// know their scatter to 40 % only, and controls fail with them (deploy/bench/hidden-effects.d).
+// A measurement of the model itself on another packing of another number of grains. Eight packings:
+// four know their scatter to 40 % only, and controls fail with them
+// (deploy/bench/hidden-effects.d).
 TEST_F(HiddenEffect, IsNotFoundWhereNothingIsHidden) {
   const std::string campaign = Read("campaign.yaml");
   Write("other.yaml",

@@ -38,8 +38,8 @@ Run RunAll(const Scenario& scenario);
 /// r.
 Packing TwoSpheres(double r, double distance, const double n[3]);
 
-/// Mean acceleration down a slope of a grain of 5 mm that starts at rest on a plane of the material,
-/// over 0.05 s [m/s^2]; gravity 9.81, angle [rad]. NaN: the flow failed.
+/// Mean acceleration down a slope of a grain of 5 mm that starts at rest on a plane of the
+/// material, over 0.05 s [m/s^2]; gravity 9.81, angle [rad]. NaN: the flow failed.
 double AccelerationDownASlope(const Model& model, const std::string& material, double angle);
 
 /// File as text; empty when it cannot be read.

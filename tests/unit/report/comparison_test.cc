@@ -131,8 +131,8 @@ TEST(Comparison, HeldOutReadingsOfARightModelAreAsUnlikelyAsTheySay) {
     below += *c.by_observable[0].p_value < 0.05 ? 1 : 0;
     segments_below += *c.by_segment[1].p_value < 0.05 ? 1 : 0;
   }
-  // Five in a hundred, +- 3 sd and what twenty runs do not know of a variance. Without the errors of
-  // the prediction: more than half.
+  // Five in a hundred, +- 3 sd and what twenty runs do not know of a variance. Without the errors
+  // of the prediction: more than half.
   EXPECT_GT(below, 0.02 * kTimes);
   EXPECT_LT(below, 0.10 * kTimes);
   EXPECT_LT(segments_below, 0.10 * kTimes);

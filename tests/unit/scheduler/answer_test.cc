@@ -105,8 +105,8 @@ TEST(Answer, WithTooFewRunsToEmulateNoIntervalIsGiven) {
   EXPECT_EQ(HeldOutDraws(service, 4), 0);
 }
 
-// The first reading is predicted as 1 + a - 0.3, the second as 1 + b - 0.7, or as 2.6 whatever b is:
-// that one is missed by 16 sd, so that a is looked for by errors of 0.57 instead of 0.1.
+// The first reading is predicted as 1 + a - 0.3, the second as 1 + b - 0.7, or as 2.6 whatever b
+// is: that one is missed by 16 sd, so that a is looked for by errors of 0.57 instead of 0.1.
 TEST(Answer, FarFromTheReadingsTheNextSamplesAreLookedForWidely) {
   const auto definition = MakeDefinition(testing::SquareCampaign());
   inference::Iteration iteration;

@@ -23,7 +23,8 @@ struct Place {
 };
 constexpr double kSd = 0.02;  // of both, relative
 
-// E in [50, 500] MPa, friction angle in [0.17, 0.70] rad. place: half of the first samples about it.
+// E in [50, 500] MPa, friction angle in [0.17, 0.70] rad. place: half of the first samples about
+// it.
 testing::SmallCampaign Derived(const std::string& method, const std::optional<Place>& place,
                                const std::string& extra = "", int stages = 50) {
   const bool tmcmc = method == "tmcmc";

@@ -85,8 +85,8 @@ Assembly Heavy(const Packing& packing, double friction, Surroundings surrounding
   return {packing, kDensity, ContactModelOf(model), std::move(surroundings), 1};
 }
 
-// An L of three spheres weighs what it weighs, once, at its centre of mass: it falls with g and does
-// not turn; under drag it comes to g/drag.
+// An L of three spheres weighs what it weighs, once, at its centre of mass: it falls with g and
+// does not turn; under drag it comes to g/drag.
 TEST(Clump, FallsWithGravityAndDoesNotTurn) {
   const Packing packing =
       Spheres({{0.47, 0.5, 0.5}, {0.47, 0.515, 0.5}, {0.458, 0.5, 0.503}}, {3, 3, 3});

@@ -1,5 +1,6 @@
-// Energy with losses: what straining a cell of grains costs is found again as motion, in springs, and
-// in what friction or dashpots take, each computed here from places, velocities and forces alone.
+// Energy with losses: what straining a cell of grains costs is found again as motion, in springs,
+// and in what friction or dashpots take, each computed here from places, velocities and forces
+// alone.
 #include <gtest/gtest.h>
 
 #include <algorithm>

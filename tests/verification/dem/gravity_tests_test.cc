@@ -199,8 +199,8 @@ TEST(CalibrationDevice, SlipperySlideIsLeftSooner) {
   EXPECT_GT(value(fast, "angle_of_repose"), 0);
 }
 
-// 520 grains in a slice of three diameters make a pile higher than ten diameters, where the slide of
-// a few grains ends; a slide that ends at five is buried by 300.
+// 520 grains in a slice of three diameters make a pile higher than ten diameters, where the slide
+// of a few grains ends; a slide that ends at five is buried by 300.
 TEST(CalibrationDevice, ALargeFillingDoesNotBuryTheSlide) {
   Scenario device = Pour("calibration_device", 520, {1});
   device.settings = {{"duration", 2}, {"depth", 3 * kDiameter}};
@@ -221,7 +221,8 @@ TEST(CalibrationDevice, ALargeFillingDoesNotBuryTheSlide) {
                              testing::HasSubstr("raise slide_height")));
 }
 
-// Slides a little longer each keep their grains a little longer: no steps of the time between looks.
+// Slides a little longer each keep their grains a little longer: no steps of the time between
+// looks.
 TEST(CalibrationDevice, SlideTimeIsFinelyResolved) {
   const double fall = std::sqrt(kDiameter / 9.81);
   std::set<long> remainders;

@@ -194,8 +194,8 @@ double FabricAnisotropy(const Scenario& scenario) {
   return fabric;
 }
 
-// Packings of 800 grains differ: axial less lateral is 0.047 on average with a standard deviation of
-// 0.017 (sixteen, by hand), so three are taken.
+// Packings of 800 grains differ: axial less lateral is 0.047 on average with a standard deviation
+// of 0.017 (sixteen, by hand), so three are taken.
 TEST(InitialFabric, ContactsRememberTheDirectionOfConsolidation) {
   Scenario s = test::SmallTriaxial(test::HertzModel());
   s.path = {{.target = 0, .load_step = 0}};

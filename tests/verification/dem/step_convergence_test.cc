@@ -31,7 +31,8 @@ struct Curve {
   double steps = 0;
 };
 
-/// One repeat to `strain`: consolidates, then strains the axis in stages at constant lateral stress.
+/// One repeat to `strain`: consolidates, then strains the axis in stages at constant lateral
+/// stress.
 Curve Run(const Packing& packing, const Model& model, const Walk& walk, double strain) {
   Assembly assembly(packing, model.density, ContactModelOf(model), 1);
   QuasiStatic stages(assembly, {.rate = walk.rate, .step_share = walk.share}, {});

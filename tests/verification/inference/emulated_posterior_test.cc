@@ -141,8 +141,8 @@ TEST(EmulatedPosterior, InfersTheNoise) {
   }
 }
 
-// Noise that is stated 20 times too small for one of two curves: errors of the emulator are in units
-// of the noise as inferred for each, and where it is good enough is judged by that too.
+// Noise that is stated 20 times too small for one of two curves: errors of the emulator are in
+// units of the noise as inferred for each, and where it is good enough is judged by that too.
 TEST(EmulatedPosterior, EachCurveHasTheUnitsOfItsOwnNoise) {
   LinearModel model(60, 3, 0.3, 5);
   Iteration runs = PriorRuns(model, 80);

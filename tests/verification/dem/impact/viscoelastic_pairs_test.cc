@@ -1,5 +1,6 @@
-// Restitution of the viscoelastic laws between two grains, between disks and at walls: it depends on
-// the reduced mass m* and radius r* only. By the test `collision` and by the engine of the specimens.
+// Restitution of the viscoelastic laws between two grains, between disks and at walls: it depends
+// on the reduced mass m* and radius r* only. By the test `collision` and by the engine of the
+// specimens.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -92,8 +93,8 @@ double Peak(const Pair& pair, double speed) {
   return std::pow(1.25 * ReducedMass(pair) * speed * speed / Stiffness(pair), 0.4);
 }
 
-/// Restitution by the engine, in the plane of x and z; partners fly at each other, the body falls on
-/// a wall. 10 000 steps in the contact.
+/// Restitution by the engine, in the plane of x and z; partners fly at each other, the body falls
+/// on a wall. 10 000 steps in the contact.
 double ByEngine(const Model& model, const Pair& pair, double speed) {
   Packing packing;
   packing.length[0] = packing.length[1] = packing.length[2] = 20 * kRadius;
