@@ -317,9 +317,9 @@ TEST(EarlyStopping, WhatWasStoppedTooSoonIsResumedUntilTheLossIsAllowed) {
   SimulatedService service("too_soon");
   service.Submit(campaign("early_stopping: {discard_at_most: 1e-3, exponent: 1}\n"));
   const auto worker = service.Connect("w0", 1);  // the one that RunToEnd goes on with
-  using Kind = v1::ServerMessage;
+  using Message = v1::ServerMessage;
   for (int i = 0; i < kSamples; ++i) {
-    const v1::Lease lease = service.Next(worker, Kind::kLease).lease();
+    const v1::Lease lease = service.Next(worker, Message::kLease).lease();
     service.SendStates(worker, lease, 0, 12);
     service.SendEnd(worker, lease.attempt(), v1::Finished::OUTCOME_COMPLETED);
   }

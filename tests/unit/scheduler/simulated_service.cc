@@ -119,7 +119,7 @@ std::string SimulatedService::Submit(const testing::SmallCampaign& campaign) {
   scheduler_->Submit({.name = "small",
                       .yaml = campaign.yaml,
                       .file_name = "small.yaml",
-                      .method = "iterative_bayesian_filter",
+                      .method = campaign::Method::kIterativeBayesianFilter,
                       .samples = outcome.campaign.samples,
                       .max_iterations = outcome.campaign.max_iterations},
                      digests, "", {},

@@ -143,7 +143,7 @@ TEST_F(StoreTest, AttemptNumbersAreNeverUsedAgain) {
   });
   EXPECT_EQ(Read().ActiveAttempts()->size(), 1U);
   Write([](Transaction& t) {
-    t.EndAttempt({.id = 5, .outcome = "completed", .core_seconds = 2.5});
+    t.EndAttempt({.id = 5, .outcome = AttemptOutcome::kCompleted, .core_seconds = 2.5});
     t.SetEvaluation(kKey, EvaluationStatus::kFinished, "", 0);
   });
   EXPECT_TRUE(Read().ActiveAttempts()->empty());
@@ -183,7 +183,9 @@ TEST_F(StoreTest, WhatAnEvaluationCostIsThatOfItsAttemptsOrOfTheRunThatItReuses)
     PutEvaluation(t);
     for (const int id : {5, 6}) {
       t.InsertAttempt({.id = id, .key = kKey, .worker = "w"});
-      t.EndAttempt({.id = id, .outcome = id == 5 ? "lost" : "completed", .core_seconds = 1.5});
+      t.EndAttempt({.id = id,
+                    .outcome = id == 5 ? AttemptOutcome::kLost : AttemptOutcome::kCompleted,
+                    .core_seconds = 1.5});
     }
     t.SetEvaluation(kKey, EvaluationStatus::kFinished, "", 0);
     t.InsertSample(1, {.sample = 1, .iteration = 0, .parameters = {1e9, 0.1}});
