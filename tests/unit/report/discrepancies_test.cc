@@ -17,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr int kReadings = 30;
+constexpr int kReadingsOfCurve = 30;
 constexpr double kNoise = 0.02;
 
 campaign::Experiment Empty(const std::string& name, double pressure) {
@@ -26,7 +26,7 @@ campaign::Experiment Empty(const std::string& name, double pressure) {
   e.test = "triaxial_drained";
   e.settings = {{"confining_pressure", pressure}};
   e.control_name = "axial_strain";
-  for (int i = 0; i < kReadings; ++i) {
+  for (int i = 0; i < kReadingsOfCurve; ++i) {
     const double strain = 0.002 * (i + 1);
     e.control.push_back(strain);
     e.path.push_back({.target = strain, .load_step = i});
@@ -47,7 +47,7 @@ CampaignView View(double height) {
     campaign::MeasuredObservable o;
     o.name = "q_over_p";
     StateHistory history{.observables = {"q_over_p"}, .states = {}};
-    for (int i = 0; i < kReadings; ++i) {
+    for (int i = 0; i < kReadingsOfCurve; ++i) {
       const double away = (e.control[static_cast<std::size_t>(i)] - 0.04) / 0.015;
       o.values.push_back(1 - height * std::exp(-away * away) + noise(random));
       o.sd.push_back(kNoise);
@@ -90,7 +90,7 @@ TEST(Discrepancies, ASmoothMisfitIsFoundWhereItIs) {
                              HasSubstr("much the same in all experiments"))));
   const auto json = nlohmann::json::parse(ComparisonJson("c1", c));
   ASSERT_EQ(json["discrepancy"].size(), 2U);
-  EXPECT_EQ(json["discrepancy"][0]["mean"].size(), static_cast<std::size_t>(kReadings));
+  EXPECT_EQ(json["discrepancy"][0]["mean"].size(), static_cast<std::size_t>(kReadingsOfCurve));
 }
 
 TEST(Discrepancies, NoiseAloneIsNotSpokenOf) {
@@ -107,13 +107,13 @@ TEST(Discrepancies, OtherTestsInheritThem) {
   const CampaignView view = View(0.15);
   const auto fitted = FitDiscrepancies(view, PredictReadings(view));
   ASSERT_EQ(fitted.size(), 1U);
-  const Eigen::VectorXd model = Eigen::VectorXd::Ones(kReadings);
+  const Eigen::VectorXd model = Eigen::VectorXd::Ones(kReadingsOfCurve);
   const auto at = [&](const campaign::Experiment& e, const std::string& observable) {
     return DiscrepancyAt(view, fitted, e, observable, model);
   };
   const auto again = at(Empty("again", 1e5), "q_over_p");
   const auto further = at(Empty("further", 2e5), "q_over_p");
-  ASSERT_EQ(again.mean.size(), kReadings);
+  ASSERT_EQ(again.mean.size(), kReadingsOfCurve);
   EXPECT_NEAR(again.rms[19], 0.15, 0.03);
   EXPECT_NEAR(further.rms[19], 0.15, 0.05);
   EXPECT_LT(again.sd[19], further.sd[19]) << "a new experiment is known less well";

@@ -6,7 +6,7 @@
 namespace calib::report::testing {
 namespace {
 
-constexpr int kReadings = 40;
+constexpr int kExampleReadings = 40;
 constexpr int kSamples = 120;
 constexpr double kTruth[3] = {2e9, 0.5, 0.3};
 
@@ -32,8 +32,8 @@ campaign::Experiment MakeExperiment(const std::string& name, campaign::Role role
   e.observables = {
       {.name = "q_over_p", .values = {}, .sd = {}},
       {.name = "volumetric_strain", .values = {}, .sd = {}, .correlation_length = 0.005}};
-  for (int i = 0; i < kReadings; ++i) {
-    const double strain = 0.12 * (i + 1) / kReadings;
+  for (int i = 0; i < kExampleReadings; ++i) {
+    const double strain = 0.12 * (i + 1) / kExampleReadings;
     e.control.push_back(strain);
     e.path.push_back({.target = strain, .load_step = i});
     e.segment.emplace_back(strain < 0.02 ? "initial_loading"
@@ -50,8 +50,8 @@ campaign::Experiment MakeExperiment(const std::string& name, campaign::Role role
 StateHistory MakeStates(const double* p, double scale) {
   StateHistory history{.observables = {"axial_strain", "volumetric_strain", "q_over_p"},
                        .states = {}};
-  for (int i = 0; i < kReadings; ++i) {
-    const double strain = 0.12 * (i + 1) / kReadings;
+  for (int i = 0; i < kExampleReadings; ++i) {
+    const double strain = 0.12 * (i + 1) / kExampleReadings;
     v1::State state;
     state.set_load_step(i);
     for (const double value : {strain, Volume(p, strain), scale * Strength(p, strain)}) {
@@ -147,7 +147,7 @@ CampaignView ExampleView(const std::string& name) {
   view.posterior.set_model_evaluations(kSamples);
   view.posterior.set_core_hours(3.2);
   for (int i = 0; i < 9; ++i) view.posterior.add_correlation(i % 4 == 0 ? 1 : 0.2);
-  for (int i = 0; i < kReadings; ++i) {
+  for (int i = 0; i < kExampleReadings; ++i) {
     auto* point = view.posterior.add_path();
     point->set_experiment("tx02");
     point->set_load_step(i);

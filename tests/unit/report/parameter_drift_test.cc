@@ -13,7 +13,7 @@ namespace {
 // Two tests at different pressures; strength = friction x shape, volume = -friction x strain. The
 // measurement of the second one was made with `other` as friction.
 CampaignView TwoPressures(double other) {
-  constexpr int kReadings = 24;
+  constexpr int kDriftReadings = 24;
   constexpr int kRuns = 40;
   constexpr double kTruth = 0.5;
   inference::PhiloxStream random({.seed = 11,
@@ -33,11 +33,11 @@ CampaignView TwoPressures(double other) {
     e.settings = {{"confining_pressure", pressure}};
     e.control_name = "axial_strain";
     campaign::MeasuredObservable o{.name = "q_over_p", .values = {}, .sd = {}};
-    for (int i = 0; i < kReadings; ++i) {
-      const double strain = 0.1 * (i + 1) / kReadings;
+    for (int i = 0; i < kDriftReadings; ++i) {
+      const double strain = 0.1 * (i + 1) / kDriftReadings;
       e.control.push_back(strain);
       e.path.push_back({.target = strain, .load_step = i});
-      e.segment.emplace_back(i < kReadings / 2 ? "initial_loading" : "steady_state");
+      e.segment.emplace_back(i < kDriftReadings / 2 ? "initial_loading" : "steady_state");
       o.sd.push_back(0.02);
       o.values.push_back(strength(pressure < 5e5 ? kTruth : other, 1, strain) +
                          0.02 * random.Normal());
@@ -55,7 +55,7 @@ CampaignView TwoPressures(double other) {
     for (const campaign::Experiment& e : view.campaign.experiments) {
       StateHistory& history = view.states[{e.name, s}];
       history.observables = {"q_over_p"};
-      for (int i = 0; i < kReadings; ++i) {
+      for (int i = 0; i < kDriftReadings; ++i) {
         v1::State state;
         state.set_load_step(i);
         state.add_values(strength(friction, stiffness, e.control[static_cast<std::size_t>(i)]));

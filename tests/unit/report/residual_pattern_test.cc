@@ -12,11 +12,11 @@ namespace {
 
 // 40 readings of a curve that rises and saturates; errors of 1 % of its height.
 ResidualCurve Curve() {
-  constexpr int kReadings = 40;
-  ResidualCurve curve{.residual = Eigen::VectorXd::Zero(kReadings),
-                      .sd = Eigen::VectorXd::Constant(kReadings, 0.01),
-                      .correlation = Eigen::VectorXd::Zero(kReadings),
-                      .control = Eigen::VectorXd::LinSpaced(kReadings, 0.0025, 0.1),
+  constexpr int kPatternReadings = 40;
+  ResidualCurve curve{.residual = Eigen::VectorXd::Zero(kPatternReadings),
+                      .sd = Eigen::VectorXd::Constant(kPatternReadings, 0.01),
+                      .correlation = Eigen::VectorXd::Zero(kPatternReadings),
+                      .control = Eigen::VectorXd::LinSpaced(kPatternReadings, 0.0025, 0.1),
                       .model = {}};
   curve.model = 1 - (-30 * curve.control.array()).exp();
   std::mt19937 random(4);
