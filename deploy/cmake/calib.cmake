@@ -29,7 +29,9 @@ target_compile_options(calib_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror -ffp-contract=off
   # g++ 12 sees overlaps and overruns in the standard library that are not there (GCC bugs 105651, 105329), and forgets in a
   # precompiled header that the library's insides are not ours.
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overread;-Wno-stringop-overflow;-Wno-array-bounds>)
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overread;-Wno-stringop-overflow;-Wno-array-bounds>
+  # g++ looks for memory to free again and again; from half a GB on is soon enough (9 % of the time of a large unit, 0.2 GB more).
+  $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>)
 target_link_libraries(calib_flags INTERFACE Threads::Threads)
 target_include_directories(calib_flags INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_SOURCE_DIR}/deploy/cmake)  # calib/return_if_error.h
 
