@@ -108,8 +108,8 @@ TEST(PouredCampaign, AnEffectThatNoTestHasIsRefused) {
                         std::string(effect) + ": {prior: uniform, min: -0.01, max: 0.01}"}});
     EXPECT_THAT(ProblemsOf(yaml, Files()),
                 HasSubstr("c.yaml:2: model: effect " + name +
-                          " has no part in any of the experiments: it acts in triaxial_drained, "
-                          "triaxial_undrained, oedometric, isotropic, simple_shear\n"));
+                          " has no part in any of the experiments: it acts in isotropic, oedometric, "
+                          "triaxial_drained, triaxial_undrained, simple_shear\n"));
   }
   const std::string impacts = absl::StrReplaceAll(
       PouredYaml(),
