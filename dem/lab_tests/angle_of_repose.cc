@@ -57,7 +57,7 @@ StageEnd Repeat(GravityRun& run, const ControlPoint& point) {
   const double far = 100 * radius + 10 * top;
   Flow flow = run.MakeFlow(
       assembly, {.drop_height = top, .low = {-far, -far, -d}, .high = {far, far, top + far}});
-  const double longest = 40 * std::sqrt(top / run.gravity());
+  const double longest = run.LongestSettling(top);
   StageEnd end = flow.Settle(longest, GravityRun::kSettling);
   if (end == StageEnd::kDone) {
     double heap = 0;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "dem/geometry/mesh_rims.h"
 #include "dem/lab_tests/shared/gravity_run.h"
 #include "dem/lab_tests/shared/gravity_test.h"
+#include "dem/lab_tests/shared/mass_flow.h"
 #include "dem/measure/free_surface.h"
 
 namespace calib::dem {
@@ -29,6 +31,14 @@ constexpr double kOnSlide = 0.003;
 /// What is added to the slide time per share of the material that never leaves the slide [s].
 /// Chosen: the observable goes on growing where nothing slides.
 constexpr double kPenalty = 10;
+/// Shares of the first mass between which the flow counts as steady [-]. Chosen: start and end left
+/// out.
+constexpr double kFlowing[] = {0.1, 0.9};
+/// The device is at rest where over kQuietFalls falls by half a mean diameter, one after the other,
+/// the mean square speed is below kQuiet g d [-]. Chosen: less than 1 % of the speed of such a
+/// fall.
+constexpr double kQuiet = 1e-4;
+constexpr int kQuietFalls = 5;
 
 /// Places in the plane of x and z, x = 0 below the outlet, the pile's corner at the left.
 struct Device {
@@ -70,27 +80,11 @@ void AddPlate(double x1, double z1, double x2, double z2, double depth, double o
           {x1, depth + overhang, z1}, mesh);
 }
 
-/// Share of a moving total: least-squares slope of mass over time where mass is between 90 and 10 %
-/// of the first, with the sign of a loss [kg/s].
+/// Mass that leaves the hopper per time, over the looks in kFlowing of the first mass [kg/s].
 double LossRate(const std::vector<double>& time, const std::vector<double>& mass) {
-  double n = 0;
-  double t = 0;
-  double m = 0;
-  double tt = 0;
-  double tm = 0;
-  for (std::size_t k = 0; k < time.size(); ++k) {
-    if (mass[k] > 0.9 * mass.front() || mass[k] < 0.1 * mass.front()) {
-      continue;
-    }
-    n += 1;
-    t += time[k];
-    m += mass[k];
-    tt += time[k] * time[k];
-    tm += time[k] * mass[k];
-  }
-  const double spread = n * tt - t * t;
-  return n >= 2 && spread > 0 ? -(n * tm - t * m) / spread
-                              : (mass.front() - mass.back()) / (time.back() - time.front());
+  const std::optional<double> slope =
+      SlopeBetween(time, mass, kFlowing[0] * mass.front(), kFlowing[1] * mass.front(), 2);
+  return slope ? -*slope : (mass.front() - mass.back()) / (time.back() - time.front());
 }
 
 struct Masses {
@@ -145,9 +139,9 @@ StageEnd Measure(GravityRun& run, const Device& device, const ControlPoint& poin
       last_on_slide = masses.slide >= kOnSlide * masses.total ? time.back() : last_on_slide;
     }
   });
-  while (end == StageEnd::kDone && time.back() < longest && still < 5) {
+  while (end == StageEnd::kDone && time.back() < longest && still < kQuietFalls) {
     end = flow.Advance(run.fall_time());
-    const double quiet = 1e-4 * run.gravity() * run.mean_diameter();
+    const double quiet = kQuiet * run.gravity() * run.mean_diameter();
     still = flow.MeanSquareSpeed() < quiet ? still + 1 : 0;
   }
   if (end != StageEnd::kDone) {
@@ -234,7 +228,7 @@ StageEnd Repeat(GravityRun& run, const Device& device, const ControlPoint& point
   Flow flow = run.MakeFlow(
       assembly,
       {.drop_height = top, .low = {-d, -1e300, -d}, .high = {100 * width, 1e300, 2 * top}});
-  StageEnd end = flow.Settle(40 * std::sqrt(top / run.gravity()), GravityRun::kSettling);
+  StageEnd end = flow.Settle(run.LongestSettling(top), GravityRun::kSettling);
   if (end == StageEnd::kDone) {
     assembly.mutable_walls().back().active = false;
     assembly.SearchAgain();

@@ -102,6 +102,9 @@ constexpr int kLongestInHalfPeriods = 200;
 /// Largest overlap in smaller radii [-]. Chosen: as between grains of a specimen,
 /// Assembly::EstimateStiffness().
 constexpr double kDeepest = 0.5;
+/// Overlap over the radius [-] beyond which no deeper one is tried for the step. Chosen: half of
+/// kDeepest.
+constexpr double kDeepestGuess = 0.25;
 /// Largest ratio of the two radii [-]. Chosen: beyond it overlaps drown in rounding.
 constexpr double kLargestRatio = 1e4;
 
@@ -448,7 +451,7 @@ class CollisionRun {
       for (int k = 0; k < kBlock; ++k) {
         work += block_.normal_force[k] * span / kBlock;
       }
-      if (!(work < energy) || span > 0.25 * body_.radius) {
+      if (!(work < energy) || span > kDeepestGuess * body_.radius) {
         break;
       }
     }

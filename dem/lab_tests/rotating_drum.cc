@@ -136,7 +136,7 @@ StageEnd Walk(GravityRun& run) {
   const FlowOptions options{
       .drop_height = 2 * radius, .low = {-d, -1e300, -d}, .high = {far, 1e300, far}};
   return run.WalkFrom(
-      assembly, options, 40 * std::sqrt(2 * radius / run.gravity()),
+      assembly, options, run.LongestSettling(2 * radius),
       [&](const ControlPoint& point) { return Turn(run, assembly, options, point); });
 }
 

@@ -102,7 +102,7 @@ StageEnd Walk(GravityRun& run) {
       end = run.Abandon(std::move(s));
     }
   } else {
-    end = flow.Settle(40 * std::sqrt(top / run.gravity()), GravityRun::kSettling);
+    end = flow.Settle(run.LongestSettling(top), GravityRun::kSettling);
     begun = flow.time();
   }
 

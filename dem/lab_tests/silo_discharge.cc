@@ -10,6 +10,7 @@
 #include "dem/geometry/mesh_interior.h"
 #include "dem/lab_tests/shared/gravity_run.h"
 #include "dem/lab_tests/shared/gravity_test.h"
+#include "dem/lab_tests/shared/mass_flow.h"
 #include "dem/measure/avalanches.h"
 
 namespace calib::dem {
@@ -18,6 +19,14 @@ namespace {
 
 /// Flat sides of a round silo [-]. Chosen: its inner radius varies by 0.5 %.
 constexpr int kSides = 32;
+/// Shares of the drained mass between which the flow counts as steady [-]. Chosen: at the end the
+/// surface comes down to the outlet.
+constexpr double kFlowing[] = {0.1, 0.7};
+/// How far above the others the grain of a broken arch is set down, in its radii [-]. Chosen: clear
+/// of them.
+constexpr double kDropped = 0.1;
+/// Part of jam_time after which one looks whether the flow still goes [-]. Chosen.
+constexpr double kLook = 0.25;
 
 /// A filled silo about the vertical through (middle, middle).
 struct Silo {
@@ -85,17 +94,17 @@ void BreakArch(const std::vector<int>& arch, Assembly& assembly) {
       const auto m = static_cast<std::size_t>(member);
       lowest = std::min(lowest, p.z[m] - p.radius[m]);
     }
-    assembly.Relocate(clump, {0, 0, top + 0.1 * p.radius[q] - lowest});
+    assembly.Relocate(clump, {0, 0, top + kDropped * p.radius[q] - lowest});
     return;
   }
-  const NewGrain grain{.centre = {p.x[q], p.y[q], top + 1.1 * p.radius[q]},
+  const NewGrain grain{.centre = {p.x[q], p.y[q], top + (1 + kDropped) * p.radius[q]},
                        .radius = p.radius[q],
                        .material = p.material.empty() ? 0 : p.material[q]};
   assembly.Remove({arch.front()});
   assembly.Insert({grain});
 }
 
-/// Slope of mass over the time of flow, waits left out, between 10 and 70 % of the mass [kg/s].
+/// Slope of mass over the time of flow, waits left out, over kFlowing of the mass [kg/s].
 double FlowRate(const std::vector<Drained>& drained, double jam_time) {
   if (drained.size() < 2) {
     return 0;
@@ -111,24 +120,8 @@ double FlowRate(const std::vector<Drained>& drained, double jam_time) {
     time.push_back(drained[k].time - waited);
     mass.push_back(total);
   }
-  double n = 0;
-  double t = 0;
-  double m = 0;
-  double tt = 0;
-  double tm = 0;
-  for (std::size_t k = 0; k < time.size(); ++k) {
-    if (mass[k] < 0.1 * total || mass[k] > 0.7 * total) {
-      continue;
-    }
-    n += 1;
-    t += time[k];
-    m += mass[k];
-    tt += time[k] * time[k];
-    tm += time[k] * mass[k];
-  }
-  const double spread = n * tt - t * t;
-  return n >= 3 && spread > 0 ? (n * tm - t * m) / spread
-                              : total / std::max(time.back() - time.front(), jam_time);
+  return SlopeBetween(time, mass, kFlowing[0] * total, kFlowing[1] * total, 3)
+      .value_or(total / std::max(time.back() - time.front(), jam_time));
 }
 
 StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
@@ -154,7 +147,7 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
   Avalanches avalanches;
   std::size_t seen = 0;
   double since = 0;  // time at which something last happened
-  const double slice = 0.25 * jam_time;
+  const double slice = kLook * jam_time;
   const auto most = static_cast<int>(run.Setting("avalanches"));
   while (end == StageEnd::kDone && flow.time() < duration && assembly.particles().size() > 0) {
     end = flow.Advance(slice);
@@ -260,9 +253,9 @@ StageEnd Walk(GravityRun& run) {
   const double far = silo.width + top;
   const FlowOptions options{
       .drop_height = top, .low = {-far, -far, -far}, .high = {2 * far, 2 * far, 3 * far}};
-  return run.WalkFrom(
-      assembly, options, 40 * std::sqrt(top / run.gravity()),
-      [&](const ControlPoint& point) { return Discharge(run, silo, assembly, options, point); });
+  return run.WalkFrom(assembly, options, run.LongestSettling(top), [&](const ControlPoint& point) {
+    return Discharge(run, silo, assembly, options, point);
+  });
 }
 
 std::vector<std::string> Problems(const Scenario& scenario) {

@@ -17,7 +17,7 @@ if(CALIB_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CALIB_CCACHE})
 endif()
 
-# Short files of one folder are compiled together, large headers of others once. Preset `tidy` turns both off, so that each
+# Short files of one folder are compiled together, large headers of others once. Preset `alone` turns both off, so that each
 # file is also seen alone.
 if(NOT DEFINED CMAKE_UNITY_BUILD)
   set(CMAKE_UNITY_BUILD ON)
@@ -28,10 +28,12 @@ add_library(calib_flags INTERFACE)
 target_compile_options(calib_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror -ffp-contract=off
   # g++ 12 sees overlaps and overruns in the standard library that are not there (GCC bugs 105651, 105329), and forgets in a
-  # precompiled header that the library's insides are not ours.
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overread;-Wno-stringop-overflow;-Wno-array-bounds>
+  # precompiled header that the library's insides are not ours. clang-tidy does not know these options.
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overread;-Wno-stringop-overflow;-Wno-array-bounds;-Wno-unknown-warning-option>)
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND NOT CMAKE_CXX_CLANG_TIDY)
   # g++ looks for memory to free again and again; from half a GB on is soon enough (9 % of the time of a large unit, 0.2 GB more).
-  $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=524288>)
+  target_compile_options(calib_flags INTERFACE --param=ggc-min-heapsize=524288)
+endif()
 target_link_libraries(calib_flags INTERFACE Threads::Threads)
 target_include_directories(calib_flags INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_SOURCE_DIR}/deploy/cmake)  # calib/return_if_error.h
 

@@ -5,7 +5,7 @@ set(CALIB_STANDARD_HEADERS
   <algorithm> <array> <cmath> <cstdint> <functional> <limits> <map> <memory> <numeric> <optional> <set> <span> <string> <utility>
   <vector>)
 set(CALIB_NUMBERS_HEADERS ${CALIB_STANDARD_HEADERS} <Eigen/Dense> <boost/math/special_functions/gamma.hpp>)
-set(CALIB_MESSAGES_HEADERS ${CALIB_NUMBERS_HEADERS} <fmt/format.h> <nlohmann/json.hpp> <calib/v1/campaign.pb.h> <calib/v1/worker.pb.h>)
+set(CALIB_MESSAGES_HEADERS ${CALIB_NUMBERS_HEADERS} <fmt/format.h> <nlohmann/json.hpp> <calib/v1/campaign.grpc.pb.h> <calib/v1/worker.grpc.pb.h>)
 
 find_package(absl CONFIG REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)

@@ -88,8 +88,8 @@ SoftmaxMoments::SoftmaxMoments(const Eigen::MatrixXd& features, const Eigen::Vec
       partial_(static_cast<std::size_t>(components) * static_cast<std::size_t>(features_)),
       moments_(features_, components) {
   assert(features.rows() == counts.size() && features.size() > 0 && components >= 1);
-  const auto padded =
-      static_cast<std::size_t>((components + kTogether - 1) / kTogether * kTogether);
+  const std::size_t padded =
+      (static_cast<std::size_t>(components) + kTogether - 1) / kTogether * kTogether;
   coefficients_.assign(padded * static_cast<std::size_t>(features_), 0.0);
   rho_.resize(padded);
   for (Eigen::Index i = 0; i < features.rows(); ++i) {
@@ -105,10 +105,11 @@ SoftmaxMoments::SoftmaxMoments(const Eigen::MatrixXd& features, const Eigen::Vec
 
 void SoftmaxMoments::Pass(const Eigen::MatrixXd& coefficients) {
   assert(coefficients.rows() == features_ && coefficients.cols() == components_);
-  const auto padded = static_cast<int>(rho_.size());
+  const std::size_t padded = rho_.size();
   for (int j = 0; j < features_; ++j) {
     for (int k = 0; k < components_; ++k)
-      coefficients_[static_cast<std::size_t>(j * padded + k)] = coefficients(j, k);
+      coefficients_[static_cast<std::size_t>(j) * padded + static_cast<std::size_t>(k)] =
+          coefficients(j, k);
   }
   std::fill(partial_.begin(), partial_.end(), Group{});
   Group weighted{};
@@ -118,14 +119,17 @@ void SoftmaxMoments::Pass(const Eigen::MatrixXd& coefficients) {
        .groups = groups_,
        .features = features_,
        .components = components_,
-       .padded = padded,
+       .padded = static_cast<int>(padded),
        .rho = rho_.data(),
        .sums = sums_.data(),
        .partial = partial_.data(),
        .weighted = &weighted});
   for (int k = 0; k < components_; ++k) {
-    for (int j = 0; j < features_; ++j)
-      moments_(j, k) = SumOfLanes(partial_[static_cast<std::size_t>(k * features_ + j)]);
+    for (int j = 0; j < features_; ++j) {
+      moments_(j, k) =
+          SumOfLanes(partial_[static_cast<std::size_t>(k) * static_cast<std::size_t>(features_) +
+                              static_cast<std::size_t>(j)]);
+    }
   }
   entropy_ = -SumOfLanes(weighted);
   for (std::size_t g = 0; g < counts_.size(); ++g) {

@@ -2,6 +2,7 @@
 // Walks a test of grains under gravity: settings, pouring, reporting; the tests' own procedures are
 // in the files of lab_tests.
 
+#include <cmath>
 #include <functional>
 #include <stop_token>
 #include <string>
@@ -115,6 +116,13 @@ class GravityRun {
   /// Local damping while poured grains come to rest [-]. Chosen: stronger damping would let the
   /// last rearrangements creep.
   static constexpr double kSettling = 0.3;
+  /// The longest time that poured grains get to come to rest, over sqrt(height / gravity) [-].
+  /// Chosen: 28 free falls through the height.
+  static constexpr double kLongestSettling = 40;
+  /// That time, for grains that fill up to `height` [m] [s].
+  [[nodiscard]] double LongestSettling(double height) const {
+    return kLongestSettling * std::sqrt(height / gravity());
+  }
 
   /// Gives a state to the sink where the point wants one. kDiverged where a value is not finite or
   /// the sink fails.

@@ -149,7 +149,7 @@ class Formulas : public CalibctlFixture {
 
 // Two things hidden in the volume of 64 grains, `first` and `second`, and a third that is much like
 // both together, so that it is taken before either.
-class MistakenAtFirst : public Formulas {
+class MistakenAtFirstSlow : public Formulas {
  protected:
   static std::string Campaign(const std::string& effects, const std::string& parameters) {
     std::string formulas;
@@ -175,7 +175,7 @@ seed: 3
   }
 };
 
-TEST_F(MistakenAtFirst, AnEffectGivesWayToTheOneItWasTakenFor) {
+TEST_F(MistakenAtFirstSlow, AnEffectGivesWayToTheOneItWasTakenFor) {
   Measure(Campaign("first, second", "  first.a: default\n  second.a: default\n"),
           "--set first.a=0.0015 --set second.a=0.0015");
   Write("base.yaml", Campaign("", ""));
@@ -217,7 +217,7 @@ TEST_F(MistakenAtFirst, AnEffectGivesWayToTheOneItWasTakenFor) {
 
 // A wave in the volume of 64 grains whose number a refit of few runs does not find, so that another
 // wave nearby is added first.
-class MistakenAtLast : public Formulas {
+class MistakenAtLastSlow : public Formulas {
  protected:
   static std::string Campaign(const std::string& effects, const std::string& parameters) {
     return "name: a wave\nmodel:\n  contact: hertz_mindlin\n  effects: [" + effects +
@@ -248,7 +248,7 @@ seed: 3
   }
 };
 
-TEST_F(MistakenAtLast, AnotherEffectIsCalibratedInThePlaceOfOneThatDoesNotExplain) {
+TEST_F(MistakenAtLastSlow, AnotherEffectIsCalibratedInThePlaceOfOneThatDoesNotExplain) {
   Measure(Campaign("wave", "  wave.a: default\n  wave.k: default\n"),
           "--set wave.a=0.0015 --set wave.k=1.6");
   Write("base.yaml", Campaign("", ""));
