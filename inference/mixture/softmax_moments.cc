@@ -107,9 +107,10 @@ void SoftmaxMoments::Pass(const Eigen::MatrixXd& coefficients) {
   assert(coefficients.rows() == features_ && coefficients.cols() == components_);
   const std::size_t padded = rho_.size();
   for (int j = 0; j < features_; ++j) {
-    for (int k = 0; k < components_; ++k)
+    for (int k = 0; k < components_; ++k) {
       coefficients_[static_cast<std::size_t>(j) * padded + static_cast<std::size_t>(k)] =
           coefficients(j, k);
+    }
   }
   std::fill(partial_.begin(), partial_.end(), Group{});
   Group weighted{};

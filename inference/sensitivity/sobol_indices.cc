@@ -12,6 +12,7 @@ using Eigen::Index;
 
 std::vector<Eigen::MatrixXd> SobolSets(int dimensions, const SobolOptions& options) {
   std::vector<Eigen::MatrixXd> sets;
+  sets.reserve(static_cast<std::size_t>(options.replicates));
   for (int r = 0; r < options.replicates; ++r) {
     sets.push_back(ScrambledSobol(options.points, 2 * dimensions,
                                   options.seed * 1000 + static_cast<std::uint64_t>(r)));

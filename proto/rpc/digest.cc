@@ -31,7 +31,7 @@ std::string Sha256::Finish() {
   EVP_DigestFinal_ex(context_->evp, bytes.data(), &size);
   constexpr std::string_view kHex = "0123456789abcdef";
   std::string hex;
-  hex.reserve(2 * size);
+  hex.reserve(2 * std::size_t{size});
   for (unsigned int i = 0; i < size; ++i) {
     hex.push_back(kHex[bytes[i] >> 4]);
     hex.push_back(kHex[bytes[i] & 0xF]);
