@@ -102,9 +102,8 @@ constexpr int kLongestInHalfPeriods = 200;
 /// Largest overlap in smaller radii [-]. Chosen: as between grains of a specimen,
 /// Assembly::EstimateStiffness().
 constexpr double kDeepest = 0.5;
-/// Overlap over the radius [-] beyond which no deeper one is tried for the step. Chosen: half of
-/// kDeepest.
-constexpr double kDeepestGuess = 0.25;
+/// Overlap over the radius [-] beyond which no deeper one is tried for the step. Chosen.
+constexpr double kDeepestGuess = 0.5 * kDeepest;
 /// Largest ratio of the two radii [-]. Chosen: beyond it overlaps drown in rounding.
 constexpr double kLargestRatio = 1e4;
 
