@@ -46,6 +46,23 @@ CALIB_DEM_CLONES void IntegrateShear(ContactBlock& b, int first) {
   }
 }
 
+/// At a contact that forms the memory is zero, and nothing is rescaled.
+CALIB_DEM_CLONES void RescaleShear(ContactBlock& b, int first) {
+  double* const sx = b.history[first];
+  double* const sy = b.history[first + 1];
+  double* const sz = b.history[first + 2];
+  double* const last = b.history[first + 3];
+#pragma GCC ivdep
+  for (int k = 0; k < kBlock; ++k) {
+    const double ks = b.tangential_stiffness[k];
+    const double share = ks < last[k] ? ks / last[k] : 1.0;
+    last[k] = ks;
+    sx[k] *= share;
+    sy[k] *= share;
+    sz[k] *= share;
+  }
+}
+
 class CoulombLimit final : public ContactKernel {
  public:
   void Apply(ContactBlock& block, int /*first*/) const override {
@@ -63,11 +80,23 @@ class TangentialSpring final : public ContactKernel {
   void Apply(ContactBlock& block, int first) const override { IntegrateShear(block, first); }
 };
 
+class RescaledSpring final : public ContactKernel {
+ public:
+  [[nodiscard]] int HistorySize() const override { return 4; }
+  void Apply(ContactBlock& block, int first) const override {
+    RescaleShear(block, first);
+    IntegrateShear(block, first);
+  }
+};
+
 }  // namespace
 
 std::unique_ptr<ContactKernel> MakeCoulombLimit() { return std::make_unique<CoulombLimit>(); }
 
-std::unique_ptr<ContactKernel> MakeTangentialSpring() {
+std::unique_ptr<ContactKernel> MakeTangentialSpring(ShearUnloading unloading) {
+  if (unloading == ShearUnloading::kRescaled) {
+    return std::make_unique<RescaledSpring>();
+  }
   return std::make_unique<TangentialSpring>();
 }
 

@@ -350,7 +350,8 @@ std::optional<CommonChain> CommonChainOf(const Model& model, const ModelEntries&
                                          double thickness) {
   CommonChain chain;
   chain.hertz = model.contact == "hertz_mindlin";
-  if ((!chain.hertz && model.contact != "linear") || !model.materials.empty()) {
+  if ((!chain.hertz && model.contact != "linear") || !model.materials.empty() ||
+      model.shear_unloading != ShearUnloading::kAsPublished) {
     return std::nullopt;
   }
   const ParameterSet parameters =

@@ -2,7 +2,7 @@
 // The commonest chains of kernels in one pass over the lanes of a block, so that what one kernel
 // leaves for the next stays in registers: `hertz_mindlin` or `linear` with Coulomb's limit and the
 // shear spring, alone, with rolling_resistance, or with rolling_resistance and twisting_resistance;
-// any of them with viscous_damping. Grains of one material.
+// any of them with viscous_damping. Grains of one material, shear as published.
 
 #include <cstdint>
 #include <optional>

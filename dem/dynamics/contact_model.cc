@@ -43,7 +43,8 @@ ContactModel::ContactModel(const Model& model, const ModelEntries& entries, doub
                                   .materials = materials_.get()};
   kernels.emplace_back(ContactStage::kNormal, law.make(law_context));
   kernels.emplace_back(ContactStage::kSlidingLimit, MakeCoulombLimit());
-  kernels.emplace_back(ContactStage::kTangential, MakeTangentialSpring());
+  kernels.emplace_back(ContactStage::kTangential, MakeTangentialSpring(model.shear_unloading));
+  const ContactKernel* const spring = kernels.back().second.get();
   WallProperties walls;
   for (const EffectEntry* effect : entries.effects) {
     const std::string& name = effect->info.name;
@@ -84,6 +85,9 @@ ContactModel::ContactModel(const Model& model, const ModelEntries& entries, doub
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   for (auto& [stage, kernel] : kernels) {
     const int size = kernel->HistorySize();
+    if (kernel.get() == spring) {
+      shear_history_ = history_size_;
+    }
     chain_.push_back({.kernel = std::move(kernel), .first_history = history_size_});
     history_size_ += size;
   }

@@ -26,6 +26,10 @@ class ContactModel {
   /// Number of doubles that each contact remembers between steps, <= kMaxHistory.
   [[nodiscard]] int history_size() const { return history_size_; }
 
+  /// First of the three doubles of a contact's memory that are the force of its shear spring on j
+  /// [N], dashpots aside.
+  [[nodiscard]] int shear_history() const { return shear_history_; }
+
   /// Largest gap at which a contact of grains up to this radius may still act [m].
   [[nodiscard]] double Reach(double largest_radius) const;
 
@@ -69,6 +73,7 @@ class ContactModel {
   std::shared_ptr<StageState> stage_;
   std::shared_ptr<const Materials> materials_;
   int history_size_ = 0;
+  int shear_history_ = 0;
   double sliding_friction_ = 0;
   double wall_friction_ = 0;
 };

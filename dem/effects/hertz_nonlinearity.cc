@@ -23,9 +23,10 @@ CALIB_DEM_INLINE void BendLane(const Exponent& law, double reference_pressure, i
   const double size = 4.0 * b.effective_radius[k];
   const double load = b.normal_force[k] / (reference_pressure * size * size);
   const double factor = Power(load > law.least ? load : law.least, law.force);
+  const double tangent = load > law.least ? law.stiffness * factor : factor;
   b.normal_force[k] *= factor;
-  b.normal_stiffness[k] *= law.stiffness * factor;
-  b.tangential_stiffness[k] *= law.stiffness * factor;
+  b.normal_stiffness[k] *= tangent;
+  b.tangential_stiffness[k] *= tangent;
 }
 
 CALIB_DEM_CLONES void Bend(const Exponent law, double reference_pressure, ContactBlock& b) {
@@ -81,7 +82,8 @@ std::unique_ptr<ContactKernel> Make(const KernelContext& context) {
 /// profile their ratio is that of Mindlin, 2(1-nu)/(2-nu).
 /// [Jaeger, Arch. Appl. Mech. 65 (1995) 478]
 /// Two-sided, vanishes at n = m. Below a thousandth of the reference force (n < m) the factor
-/// is held, since stiffness would grow without bound as u -> 0.
+/// is held, since stiffness would grow without bound as u -> 0: force and tangent are there those
+/// of the law times the factor.
 /// [Walton 1987; Agnolin & Roux 2007, sec. II, the exponent in moduli of packings]
 EffectEntry HertzNonlinearity() {
   ParameterInfo exponent;

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -256,6 +257,19 @@ StageEnd Walk(GravityRun& run) {
   return run.Walk([&](const ControlPoint& point) { return Repeat(run, device, point); });
 }
 
+GrainRemarks Remarks(const Scenario& scenario, const GrainSizes& grains) {
+  GrainRemarks remarks;
+  if (std::string problem =
+          NarrowProblem(scenario, {.setting = "opening",
+                                   .grains = "the smallest grain",
+                                   .least = grains.thickness * grains.smallest_diameter(),
+                                   .why = "nothing flows out"});
+      !problem.empty()) {
+    remarks.refused.push_back(std::move(problem));
+  }
+  return remarks;
+}
+
 }  // namespace
 
 TestEntry CalibrationDevice() {
@@ -308,7 +322,8 @@ TestEntry CalibrationDevice() {
            .has_walls = true,
            .bodies = {"walls"}},
       .place = 90,
-      .procedure = GravityProcedure(&Walk)};
+      .procedure = GravityProcedure(&Walk),
+      .grain_remarks = &Remarks};
 }
 
 }  // namespace calib::dem

@@ -142,12 +142,8 @@ StageEnd Walk(GravityRun& run) {
 
 /// Of a drum whose diameter is given; one that is chosen is looked at by the run.
 std::vector<std::string> Problems(const Scenario& scenario) {
-  const auto given = [&scenario](const char* setting, double otherwise) {
-    const auto it = scenario.settings.find(setting);
-    return it == scenario.settings.end() ? otherwise : it->second;
-  };
-  const double diameter = given("drum_diameter", 0);
-  const double gravity = given("gravity", kGravity);
+  const double diameter = GivenSetting(scenario, "drum_diameter");
+  const double gravity = GivenSetting(scenario, "gravity", kGravity);
   if (!(diameter > 0) || !(gravity > 0) || scenario.path.empty()) {
     return {};
   }
@@ -156,6 +152,32 @@ std::vector<std::string> Problems(const Scenario& scenario) {
                        [](const auto& a, const auto& b) { return a.target < b.target; });
   std::string problem = CentrifugeProblem(fastest->target, diameter, gravity);
   return problem.empty() ? std::vector<std::string>{} : std::vector<std::string>{problem};
+}
+
+GrainRemarks Remarks(const Scenario& scenario, const GrainSizes& grains) {
+  const double d = grains.largest_diameter();
+  const double diameter = GivenSetting(scenario, "drum_diameter");
+  const double length = GivenSetting(scenario, "drum_length", 6 * d);
+  GrainRemarks remarks;
+  if (std::string problem = NarrowProblem(scenario, {.setting = "drum_diameter",
+                                                     .grains = "the largest grain",
+                                                     .least = d,
+                                                     .why = "it does not fit into the drum"});
+      !problem.empty()) {
+    remarks.refused.push_back(std::move(problem));
+    return remarks;
+  }
+  double solid = 0;
+  for (const double r : grains.radii) {
+    solid += 4.0 / 3.0 * std::numbers::pi * r * r * r;
+  }
+  const double room = 0.25 * std::numbers::pi * diameter * diameter * length;
+  if (diameter > 0 && solid > room) {
+    remarks.refused.push_back(absl::StrCat("the drum, drum_diameter ", diameter, " m, holds ", room,
+                                           " m^3, the ", grains.radii.size(), " grains have ",
+                                           solid, " m^3"));
+  }
+  return remarks;
 }
 
 }  // namespace
@@ -192,7 +214,8 @@ TestEntry RotatingDrum() {
                .bodies = {"walls"}},
       .place = 80,
       .procedure = GravityProcedure(&Walk),
-      .problems = &Problems};
+      .problems = &Problems,
+      .grain_remarks = &Remarks};
 }
 
 }  // namespace calib::dem

@@ -1,6 +1,8 @@
 // `shaken_box`: a plane of grains and a large one in a box that is moved and tilted.
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "dem/elementary/functions.h"
@@ -10,6 +12,11 @@
 namespace calib::dem {
 
 namespace {
+
+/// Width of the box over the largest grain's diameter, and diameter of the intruder over the same,
+/// where none is given [-]. [Hadjidoukas 2014, sec. 5.2]
+constexpr double kBoxWidth = 8.05;
+constexpr double kIntruderRatio = 2;
 
 /// Where the box is at a time, from its place at rest. [Hadjidoukas 2014, Eq. 16]
 struct Shaking {
@@ -30,7 +37,7 @@ struct Watch {
 
 StageEnd Walk(GravityRun& run) {
   const double d = run.largest_diameter();
-  const double width = run.SettingOr("box_width", 8.05 * d);
+  const double width = run.SettingOr("box_width", kBoxWidth * d);
   const double big = 0.5 * d * run.Setting("intruder_ratio");
   const double start = std::max(big, run.Setting("intruder_start"));
   const double rate = std::sqrt(run.gravity() / d);  // scales the published box of 20 mm disks
@@ -148,6 +155,24 @@ StageEnd Walk(GravityRun& run) {
   return run.AddToSummary(end, flow, {}, "shaking");
 }
 
+GrainRemarks Remarks(const Scenario& scenario, const GrainSizes& grains) {
+  const double d = grains.largest_diameter();
+  const double ratio = GivenSetting(scenario, "intruder_ratio", kIntruderRatio);
+  GrainRemarks remarks;
+  if (std::string problem = NarrowProblem(scenario, {.setting = "box_width",
+                                                     .grains = "the intruder",
+                                                     .least = ratio * d,
+                                                     .why = "it does not fit into the box"});
+      !problem.empty()) {
+    remarks.refused.push_back(std::move(problem));
+  }
+  if (!(GivenSetting(scenario, "box_width") > 0) && ratio >= kBoxWidth) {
+    remarks.refused.push_back(absl::StrCat("intruder_ratio is ", ratio, ", the box ", kBoxWidth,
+                                           " largest grain diameters wide: give a box_width"));
+  }
+  return remarks;
+}
+
 }  // namespace
 
 TestEntry ShakenBox() {
@@ -162,7 +187,7 @@ TestEntry ShakenBox() {
                    "Control: time. Heights are in the frame of the box. Fails when a grain escapes",
                .settings = WithCommonSettings(
                    {ThicknessOfDisks(),
-                    Setting("intruder_ratio", "1", {.value = 2, .min = 1, .max = 20},
+                    Setting("intruder_ratio", "1", {.value = kIntruderRatio, .min = 1, .max = 20},
                             "diameter of the intruder over the largest grain's"),
                     Chosen("intruder_start", "m",
                            "height of its centre before the others fall about it; 0: on the floor"),
@@ -188,7 +213,8 @@ TestEntry ShakenBox() {
                .planar = true,
                .bodies = {"walls", "intruder"}},
       .place = 110,
-      .procedure = GravityProcedure(&Walk)};
+      .procedure = GravityProcedure(&Walk),
+      .grain_remarks = &Remarks};
 }
 
 }  // namespace calib::dem

@@ -27,6 +27,24 @@ constexpr double kFlowing[] = {0.1, 0.7};
 constexpr double kDropped = 0.1;
 /// Part of jam_time after which one looks whether the flow still goes [-]. Chosen.
 constexpr double kLook = 0.25;
+/// Width of a silo, or of a flat one, over the mean diameter of its grains, where none is given
+/// [-]. Chosen: some hundred grains then stand about as high as wide.
+constexpr double kWidth = 12;
+constexpr double kFlatWidth = 40;
+
+double ChosenWidth(bool flat, double mean_diameter) {
+  return (flat ? kFlatWidth : kWidth) * mean_diameter;
+}
+
+/// Width about the outlet that a mesh of the user's leaves [m].
+double WidthOf(const TriangleMesh& vessel) {
+  const Bounds bounds = BoundsOf(vessel);
+  return 2 * std::max({-bounds.low.x, bounds.high.x, -bounds.low.y, bounds.high.y});
+}
+
+std::string WideOutlet(double opening, double width) {
+  return absl::StrCat("opening ", opening, " m is not smaller than silo_width, ", width, " m");
+}
 
 /// A filled silo about the vertical through (middle, middle).
 struct Silo {
@@ -189,18 +207,16 @@ StageEnd Discharge(GravityRun& run, const Silo& silo, const Assembly& filled,
 StageEnd Walk(GravityRun& run) {
   const double d = run.largest_diameter();
   Silo silo{.flat = run.Setting("flat") >= 0.5};
-  silo.width = run.SettingOr("silo_width", (silo.flat ? 40 : 12) * run.mean_diameter());
+  silo.width = run.SettingOr("silo_width", ChosenWidth(silo.flat, run.mean_diameter()));
   TriangleMesh vessel;  // the user's, about the outlet
   if (run.Mesh("silo") != nullptr) {
     vessel = *run.Mesh("silo");
-    const Bounds bounds = BoundsOf(vessel);
-    silo.width = 2 * std::max({-bounds.low.x, bounds.high.x, -bounds.low.y, bounds.high.y});
+    silo.width = WidthOf(vessel);
   }
   silo.middle = 0.5 * silo.width + d;
   for (const ControlPoint& point : run.path()) {
     if (!(point.target < silo.width)) {
-      return run.Fail(absl::StrCat("opening ", point.target, " m is not smaller than silo_width, ",
-                                   silo.width, " m"));
+      return run.Fail(WideOutlet(point.target, silo.width));
     }
   }
   const double m = silo.middle;
@@ -259,14 +275,44 @@ StageEnd Walk(GravityRun& run) {
 }
 
 std::vector<std::string> Problems(const Scenario& scenario) {
-  const auto given = [&scenario](const char* setting) {
-    const auto it = scenario.settings.find(setting);
-    return it == scenario.settings.end() ? 0.0 : it->second;
-  };
-  if (given("thickness") > 0 && given("flat") < 0.5) {
+  if (GivenSetting(scenario, "thickness") > 0 && GivenSetting(scenario, "flat") < 0.5) {
     return {"thickness makes disks, which need a plane: set flat: 1, or leave thickness out"};
   }
   return {};
+}
+
+/// Of outlets only the first that is too large, and the first that is too small.
+GrainRemarks Remarks(const Scenario& scenario, const GrainSizes& grains) {
+  const bool flat = GivenSetting(scenario, "flat") >= 0.5;
+  const auto vessel = scenario.meshes.find("silo");
+  const double width =
+      vessel != scenario.meshes.end()
+          ? WidthOf(vessel->second)
+          : GivenSetting(scenario, "silo_width", ChosenWidth(flat, grains.mean_diameter()));
+  const double thinnest = grains.thickness * grains.smallest_diameter();
+  GrainRemarks remarks;
+  const auto first = [&scenario](const auto& is) {
+    return std::find_if(scenario.path.begin(), scenario.path.end(),
+                        [&is](const ControlPoint& point) { return is(point.target); });
+  };
+  if (const auto wide = first([&](double opening) { return opening >= width; });
+      wide != scenario.path.end()) {
+    remarks.refused.push_back(WideOutlet(wide->target, width));
+  }
+  if (const auto narrow = first([&](double opening) { return opening <= thinnest; });
+      narrow != scenario.path.end()) {
+    remarks.refused.push_back(absl::StrCat("opening ", narrow->target,
+                                           " m is not wider than the smallest grain, ", thinnest,
+                                           " m: nothing flows out"));
+  }
+  if (std::string problem = NarrowProblem(scenario, {.setting = "silo_width",
+                                                     .grains = "the largest grain",
+                                                     .least = grains.largest_diameter(),
+                                                     .why = "it does not fit into the silo"});
+      !problem.empty()) {
+    remarks.refused.push_back(std::move(problem));
+  }
+  return remarks;
 }
 
 }  // namespace
@@ -323,7 +369,8 @@ TestEntry SiloDischarge() {
            .bodies = {"walls"}},
       .place = 70,
       .procedure = GravityProcedure(&Walk),
-      .problems = &Problems};
+      .problems = &Problems,
+      .grain_remarks = &Remarks};
 }
 
 }  // namespace calib::dem

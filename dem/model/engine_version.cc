@@ -2,6 +2,6 @@
 
 namespace calib::dem {
 
-std::string EngineVersion() { return "14"; }
+std::string EngineVersion() { return "15"; }
 
 }  // namespace calib::dem

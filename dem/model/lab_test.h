@@ -58,13 +58,22 @@ struct TestInfo {
   std::vector<std::string> bodies =
       {};  ///< that may be of another material than the grains: names for MaterialUse::bodies
   bool stress_driven = false;  ///< the control is the mean stress [Pa] > 0, which all axes follow
+  std::string stress_control = {};  ///< a stress [Pa] > 0 that may drive it in place of its
+                                    ///< control, where kStressDriven is 1; empty: none may
 };
+
+/// Setting of a scenario, 0 or 1: the test is driven by its stress_control. It follows from the
+/// control that a campaign names, and is none of TestInfo::settings.
+inline constexpr const char* kStressDriven = "stress_driven";
+
+/// Whether the control is a stress, with these settings.
+bool IsStressDriven(const TestInfo& test, const std::map<std::string, double>& settings);
 
 /// Whether the test strains one specimen in its periodic cell, consolidated before it is loaded.
 inline bool InPeriodicCell(const TestInfo& test) { return test.needs_packing && !test.poured; }
 
-/// The control of a test with these settings: the first of its controls that is not among them,
-/// else the last.
+/// The control of a test with these settings: its stress_control where they say so; the first of
+/// its controls that is not among them, else the last.
 std::string ControlOf(const TestInfo& test, const std::map<std::string, double>& settings);
 
 }  // namespace calib::dem

@@ -10,6 +10,12 @@
 
 namespace calib::dem {
 
+/// What becomes of an elastic shear force where its stiffness falls, as the normal force does.
+enum class ShearUnloading {
+  kAsPublished,  ///< it stays: closed cycles can give work [Cheng 2018, Eq. 2; YADE]
+  kRescaled      ///< it falls along: no cycle gives work [Thornton et al. 2013; LIGGGHTS]
+};
+
 /// Contact law, effects and their parameters by dotted name ("young_modulus",
 /// "rolling_resistance.stiffness").
 struct Model {
@@ -20,6 +26,7 @@ struct Model {
   std::vector<UserEffect> user_effects{};    ///< declared; those that `effects` names act
   std::vector<std::string> materials{};      ///< besides the model's own, which is called `grains`;
                                              ///< their values are parameters (contact/materials.h)
+  ShearUnloading shear_unloading = ShearUnloading::kAsPublished;
 };
 
 /// Name of the model's own material: whatever is not said to be of another material is of this one.

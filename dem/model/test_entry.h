@@ -1,7 +1,9 @@
 #pragma once
 // A lab test as the engine runs it: its catalogue entry, what it alone refuses, its procedure.
 
+#include <algorithm>
 #include <functional>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,28 @@ namespace calib::dem {
 
 struct TestRun;  // lab_tests/shared/test_run.h
 
+/// Sizes of grains, wherever they lie.
+struct GrainSizes {
+  std::vector<double> radii{};  ///< of spheres of their volume [m], at least one
+  double thickness = 1;         ///< of a grain over the diameter of that sphere [-]; 1: spheres
+
+  [[nodiscard]] double mean_diameter() const {  // [m]
+    return 2 * std::accumulate(radii.begin(), radii.end(), 0.0) / static_cast<double>(radii.size());
+  }
+  [[nodiscard]] double smallest_diameter() const {  // [m]
+    return 2 * *std::min_element(radii.begin(), radii.end());
+  }
+  [[nodiscard]] double largest_diameter() const {  // [m]
+    return 2 * *std::max_element(radii.begin(), radii.end());
+  }
+};
+
+/// What such sizes make of a scenario.
+struct GrainRemarks {
+  std::vector<std::string> refused{};  ///< why every run fails or shows nothing, a sentence each
+  std::string few{};  ///< why so few grains mislead, the end of a sentence; empty: they are enough
+};
+
 /// A lab test as the registry holds it: catalogue entry, procedure, checks.
 struct TestEntry {
   TestInfo info;
@@ -24,6 +48,8 @@ struct TestEntry {
   /// What is wrong with a scenario of this test beyond ranges of settings and control, a sentence
   /// each; null: nothing can be.
   std::vector<std::string> (*problems)(const Scenario& scenario) = nullptr;
+  /// What grains of these sizes make of a scenario of this test; null: nothing.
+  GrainRemarks (*grain_remarks)(const Scenario& scenario, const GrainSizes& grains) = nullptr;
 };
 
 }  // namespace calib::dem

@@ -81,6 +81,8 @@ class PlacedGrains {
   std::vector<std::vector<int>> cells_;
 };
 
+}  // namespace
+
 std::vector<double> RadiiOf(const PackingRecipe& recipe) {
   if (!recipe.radii.empty()) {
     return recipe.radii;
@@ -95,8 +97,6 @@ std::vector<double> RadiiOf(const PackingRecipe& recipe) {
   }
   return radii;
 }
-
-}  // namespace
 
 absl::StatusOr<Packing> RandomCloud(const PackingRecipe& recipe, double solid_fraction) {
   Packing packing;

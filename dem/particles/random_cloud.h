@@ -1,6 +1,8 @@
 #pragma once
 // Spheres thrown at random into a periodic cell without touching: where packings begin.
 
+#include <vector>
+
 #include "absl/status/statusor.h"
 #include "dem/particles/packing.h"
 
@@ -10,8 +12,11 @@ namespace calib::dem {
 /// place quickly.
 inline constexpr double kCloudPorosity = 0.7;
 
-/// The recipe's radii (given one by one, by a grading curve, or uniform in mean_radius (1 -/+
-/// radius_spread)), placed by random sequential addition, largest first, in a cell of the recipe's
+/// Radii [m] of the recipe's grains: given one by one, by a grading curve, largest first, or drawn
+/// uniformly in mean_radius (1 -/+ radius_spread). Pure.
+std::vector<double> RadiiOf(const PackingRecipe& recipe);
+
+/// RadiiOf(recipe), placed by random sequential addition, largest first, in a cell of the recipe's
 /// shape with the given solid fraction (0 < fraction <= 1 - kCloudPorosity).
 /// Deterministic: Philox with key = seed, counter = draw.
 /// [Salmon et al. 2011]

@@ -129,6 +129,7 @@ std::string CatalogText() {
   }
   for (const TestInfo& t : Tests()) {
     absl::StrAppend(&text, "test ", t.name, " control ", t.control,
+                    t.stress_control.empty() ? "" : " or ", t.stress_control,
                     t.may_reverse ? " reversible" : "", ": ", t.description, " {", t.reference,
                     "} ", absl::StrJoin(t.observables, " "), "\n");
     for (const ParameterInfo& p : t.settings) {

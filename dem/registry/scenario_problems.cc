@@ -9,6 +9,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/formula/user_effect.h"
+#include "dem/lab_tests/shared/alterations.h"
+#include "dem/lab_tests/shared/gravity_run.h"
 #include "dem/model/test_meshes.h"
 #include "dem/registry/catalog.h"
 #include "dem/registry/declared_effects.h"
@@ -159,7 +161,8 @@ void CheckFormulas(const Scenario& scenario, Problems& problems) {
                                       test->name, " does not have"));
     }
     const bool stress = effect.target == "axial_stress" || effect.target == "lateral_stress";
-    if (effect.target == test->control || (stress && test->stress_driven)) {
+    if (effect.target == ControlOf(*test, scenario.settings) ||
+        (stress && IsStressDriven(*test, scenario.settings))) {
       problems.push_back(absl::StrCat("effect ", name, " changes ", effect.target,
                                       ", by which test ", test->name, " is driven"));
     }
@@ -262,7 +265,9 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
   }
   for (const auto& setting : scenario.settings) {
     const std::string& name = setting.first;
-    if (std::none_of(test->settings.begin(), test->settings.end(),
+    const bool says_control = name == kStressDriven && !test->stress_control.empty();
+    if (!says_control &&
+        std::none_of(test->settings.begin(), test->settings.end(),
                      [&](const ParameterInfo& info) { return info.name == name; })) {
       problems.push_back(absl::StrCat("test ", scenario.test, " has no setting \"", name, "\""));
     }
@@ -272,7 +277,7 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
       problems.push_back(std::move(problem));
     }
   }
-  const bool stress_driven = test->stress_driven;
+  const bool stress_driven = IsStressDriven(*test, scenario.settings);
   const auto& range = test->control_range;
   const std::string control = ControlOf(*test, scenario.settings);
   const auto driven = std::find_if(test->settings.begin(), test->settings.end(),
@@ -297,7 +302,7 @@ void CheckTest(const Scenario& scenario, Problems& problems) {
                                       ", allowed is [", range->min, ", ", range->max, "]"));
     } else if (!sensible && driven == test->settings.end()) {
       problems.push_back(
-          absl::StrCat("path point ", k, ": ", test->control, " is ", point.target,
+          absl::StrCat("path point ", k, ": ", control, " is ", point.target,
                        stress_driven ? ", it must be positive" : ", allowed is (-1, 1)"));
     }
     if (point.load_step >= 0 && !steps.insert(point.load_step).second) {
@@ -363,6 +368,26 @@ std::vector<std::string> ScenarioProblems(const Scenario& scenario) {
   CheckFormulas(scenario, problems);
   CheckPreparation(scenario, problems);
   return problems;
+}
+
+GrainRemarks GrainRemarksOf(const Scenario& scenario, const std::vector<double>& radii) {
+  GrainRemarks remarks;
+  const TestEntry* entry = FindTestEntry(scenario.test);
+  if (entry != nullptr && entry->grain_remarks != nullptr) {
+    const auto thickness = scenario.settings.find("thickness");
+    const bool disks = thickness != scenario.settings.end() && thickness->second > 0;
+    const double aspect = PreparationOf(scenario.model, EntriesOf(scenario.model)).aspect;
+    double widest = 0;  // sphere of a grain of radius 1
+    for (const Sphere& sphere : GrainShape(aspect, disks).spheres) {
+      widest = std::max(widest, sphere.radius);
+    }
+    remarks = entry->grain_remarks(scenario, {.radii = radii, .thickness = widest});
+  }
+  const double largest = 2 * *std::max_element(radii.begin(), radii.end());
+  if (std::string problem = MeshSizeProblem(scenario, largest); !problem.empty()) {
+    remarks.refused.push_back(std::move(problem));
+  }
+  return remarks;
 }
 
 }  // namespace calib::dem

@@ -21,7 +21,9 @@ struct Falls {
 /// Chance of a fall at least as large as `fall`, (0, 1]: counted where the simulations reach,
 /// beyond the tenth largest of them the tail of a chi-squared that meets them there, or of Fisher's
 /// law where scatter is known from few packings. Where the covariance knows the simulations' own
-/// packings: Fisher's law about their mean.
+/// packings: Fisher's law about their mean. These are laws of the falls above zero; those that are
+/// zero, half of them where the one thing added has one sign, are a point mass beside.
+/// [Chernoff, Ann. Math. Stat. 25 (1954) 573; Self & Liang, J. Am. Stat. Assoc. 82 (1987) 605]
 double ChanceOfFall(double fall, Falls falls);
 
 /// How many standard deviations a measurement must lie off along one direction, to either side, for

@@ -14,6 +14,7 @@
 #include "inference/emulator/emulated_likelihood.h"
 #include "inference/emulator/emulated_path.h"
 #include "inference/emulator/emulated_target.h"
+#include "inference/emulator/stopped_runs.h"
 #include "inference/filter/parameter_summary.h"
 #include "inference/numerics/decompositions.h"
 #include "inference/numerics/weighted_moments.h"
@@ -29,8 +30,21 @@ using Eigen::Index;
 // Draws for a predictive p-value of some readings; chosen: one of a few per cent is known to 1 %.
 constexpr Index kStageDraws = 500;
 
-absl::StatusOr<Runs> CollectRuns(const JointPrior& priors, const DataSet& data,
-                                 std::span<const Iteration> iterations) {
+struct CollectedRuns {
+  Runs finished;
+  Runs stopped;  // NaN where they have no reading
+};
+
+// One below the other.
+void Append(const Eigen::RowVectorXd& input, const Eigen::RowVectorXd& history, Index& used,
+            Runs& runs) {
+  runs.inputs.row(used) = input;
+  runs.histories.row(used) = history;
+  ++used;
+}
+
+absl::StatusOr<CollectedRuns> CollectRuns(const JointPrior& priors, const DataSet& data,
+                                          std::span<const Iteration> iterations) {
   const auto t = static_cast<Index>(data.readings.size());
   const auto d = static_cast<Index>(priors.size());
   Eigen::RowVectorXd value(t);
@@ -41,8 +55,10 @@ absl::StatusOr<Runs> CollectRuns(const JointPrior& priors, const DataSet& data,
   }
   Index total = 0;
   for (const Iteration& iteration : iterations) total += iteration.parameters.rows();
-  Runs runs{.inputs = Eigen::MatrixXd(total, d), .histories = Eigen::MatrixXd(total, t)};
-  Index used = 0;
+  const Runs none{.inputs = Eigen::MatrixXd(total, d), .histories = Eigen::MatrixXd(total, t)};
+  CollectedRuns runs{.finished = none, .stopped = none};
+  Index finished = 0;
+  Index stopped = 0;
   for (const Iteration& iteration : iterations) {
     if (iteration.parameters.cols() != d || iteration.predictions.cols() != t ||
         iteration.parameters.rows() != iteration.predictions.rows()) {
@@ -52,15 +68,24 @@ absl::StatusOr<Runs> CollectRuns(const JointPrior& priors, const DataSet& data,
           " predictions; there are ", d, " priors and ", t, " readings."));
     }
     const Eigen::MatrixXd standard = ToStandard(priors, iteration.parameters);
+    const bool partial = iteration.stopped.rows() == standard.rows();
     for (Index i = 0; i < standard.rows(); ++i) {
-      if (!iteration.predictions.row(i).allFinite() || !standard.row(i).allFinite()) continue;
-      runs.inputs.row(used) = standard.row(i);
-      runs.histories.row(used) = (iteration.predictions.row(i) - value).cwiseQuotient(sd);
-      ++used;
+      if (!standard.row(i).allFinite()) continue;
+      const auto history = [&](const Eigen::MatrixXd& rows) -> Eigen::RowVectorXd {
+        return (rows.row(i) - value).cwiseQuotient(sd);
+      };
+      if (iteration.predictions.row(i).allFinite()) {
+        Append(standard.row(i), history(iteration.predictions), finished, runs.finished);
+      } else if (partial && iteration.stopped.row(i).array().isFinite().any()) {
+        Append(standard.row(i), history(iteration.stopped), stopped, runs.stopped);
+      }
     }
   }
-  runs.inputs.conservativeResize(used, d);
-  runs.histories.conservativeResize(used, t);
+  for (const auto& [used, some] :
+       {std::pair(finished, &runs.finished), std::pair(stopped, &runs.stopped)}) {
+    some->inputs.conservativeResize(used, d);
+    some->histories.conservativeResize(used, t);
+  }
   return runs;
 }
 
@@ -300,7 +325,9 @@ absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const
   RETURN_IF_ERROR(ValidateData(data, options.noise));
   RETURN_IF_ERROR(priors.Validate());
   ASSIGN_OR_RETURN(const auto runs, CollectRuns(priors, data, iterations));
-  ASSIGN_OR_RETURN(const auto trained, TrainEmulator(runs, data, options.training));
+  ASSIGN_OR_RETURN(const auto trained,
+                   TrainWithStopped(runs.finished, runs.stopped, data, options.training,
+                                    {.max_unknown = options.max_error, .seed = options.seed}));
   ASSIGN_OR_RETURN(const auto likelihood,
                    EmulatedLikelihood::Create(data, trained.emulator,
                                               {.scatter_share = options.training.scatter_share}));

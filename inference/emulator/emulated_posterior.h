@@ -124,15 +124,16 @@ struct EmulatedResult {
   std::string reason;
 };
 
-/// Emulates the runs of all iterations (rows with NaN left out; how they were proposed does not
-/// matter, which is what makes an emulated posterior independent of weights) and samples prior x
-/// likelihood by TMCMC (tmcmc.h). Deterministic in options.seed. About a second or two at 400 runs,
-/// 5 parameters and 300 readings. With kInferred a variance factor f multiplies the noise of each
-/// noise group, inverse gamma prior (VarianceFactorPrior), sampled along as f = 1 / z^2, z half
-/// normal, where shape and rate are 1/2, else as its quantile at Phi(z), z normal. Parameters that
-/// the last iteration holds (Proposal::frozen) are held: the runs of all iterations teach the
-/// emulator, only the others are sampled. Errors: INVALID_ARGUMENT for options, priors, data or
-/// shapes; FAILED_PRECONDITION with too few undiverged runs; CANCELLED once `stop` is requested.
+/// Emulates the runs of all iterations (diverged ones left out, stopped ones completed as
+/// CompletedRuns says; how they were proposed does not matter, which is what makes an emulated
+/// posterior independent of weights) and samples prior x likelihood by TMCMC (tmcmc.h).
+/// Deterministic in options.seed. About a second or two at 400 runs, 5 parameters and 300 readings.
+/// With kInferred a variance factor f multiplies the noise of each noise group, inverse gamma prior
+/// (VarianceFactorPrior), sampled along as f = 1 / z^2, z half normal, where shape and rate are
+/// 1/2, else as its quantile at Phi(z), z normal. Parameters that the last iteration holds
+/// (Proposal::frozen) are held: the runs of all iterations teach the emulator, only the others are
+/// sampled. Errors: INVALID_ARGUMENT for options, priors, data or shapes; FAILED_PRECONDITION with
+/// too few undiverged runs; CANCELLED once `stop` is requested.
 absl::StatusOr<EmulatedResult> EmulatedPosterior(const JointPrior& priors, const DataSet& data,
                                                  const EmulatorOptions& options,
                                                  std::span<const Iteration> iterations,

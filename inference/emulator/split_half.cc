@@ -13,7 +13,7 @@ using Eigen::Index;
 
 constexpr int kDraws = 500;  // the mean of so many is known to 0.05 sd
 
-// One half of the undiverged runs, all iterations counted through.
+// One half of the runs that finished or were stopped, all iterations counted through.
 std::vector<Iteration> HalfOf(std::span<const Iteration> iterations, int which) {
   Index runs = 0;
   for (const Iteration& iteration : iterations) runs += iteration.predictions.rows();
@@ -23,14 +23,18 @@ std::vector<Iteration> HalfOf(std::span<const Iteration> iterations, int which) 
   for (const Iteration& iteration : iterations) {
     std::vector<Index> rows;
     for (Index i = 0; i < iteration.predictions.rows(); ++i) {
-      if (iteration.predictions.row(i).allFinite() && half_of_run[run++] == which) {
+      const bool stopped =
+          iteration.stopped.rows() > i && iteration.stopped.row(i).array().isFinite().any();
+      if ((stopped || iteration.predictions.row(i).allFinite()) && half_of_run[run++] == which) {
         rows.push_back(i);
       }
     }
     half.push_back({.proposal = iteration.proposal,
                     .parameters = iteration.parameters(rows, Eigen::all),
                     .predictions = iteration.predictions(rows, Eigen::all),
-                    .log_proposal = {}});
+                    .log_proposal = {},
+                    .stopped = iteration.stopped.rows() > 0 ? iteration.stopped(rows, Eigen::all)
+                                                            : Eigen::MatrixXd()});
   }
   return half;
 }

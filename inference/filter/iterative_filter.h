@@ -74,6 +74,9 @@ struct Iteration {
   /// N: ln of the density from which each sample was really drawn, for runs made elsewhere; it
   /// replaces the proposal's.
   std::optional<Eigen::VectorXd> log_proposal;
+  /// N x T or empty: runs stopped early as far as they came, NaN beyond and in the rows of others.
+  /// To the weights they are diverged; an emulator learns from them (emulator/stopped_runs.h).
+  Eigen::MatrixXd stopped = {};
 };
 
 /// ln of the mass that a mixture, in standardised coordinates, has inside the support of the
@@ -125,7 +128,9 @@ struct Posterior {
   std::vector<ParameterSummary> parameters;  ///< d
   Eigen::MatrixXd correlation;               ///< d x d
   double log_evidence = 0;                   ///< ln p(data), proper Gaussian normalisation
-  double log_evidence_se = 0;   ///< standard error of log_evidence (ImportanceEvidence)
+  /// Error of log_evidence: standard error (ImportanceEvidence) and what seems lost
+  /// (FindLostModes).
+  double log_evidence_se = 0;
   double ess = 0;               ///< effective number of samples, [1, N]
   double pareto_k = 0;          ///< ParetoTailIndex of the weights; > 0.7: they cannot be trusted
   std::optional<double> sigma;  ///< kEssTarget alone: the sigma found
@@ -148,9 +153,10 @@ struct Posterior {
   std::optional<double> predictive_p;
   std::vector<std::string> warnings;  ///< whole sentences: diverged samples, tempering, ...
   /// Empty: the weights carry the posterior. Otherwise a sentence saying why not: fewer than 50
-  /// effective samples or a Pareto index above 0.7; sd, quantiles and evidence are then fiction and
-  /// the posterior should be sampled on an emulator (emulator/emulated_posterior.h).
-  /// With kEssTarget, whose weights are tempered until they suffice: fewer than two effective ones.
+  /// effective samples, a Pareto index above 0.7, or a mode that iterations have seen and left
+  /// (evidence/lost_modes.h); sd, quantiles and evidence are then fiction and the posterior should
+  /// be sampled on an emulator (emulator/emulated_posterior.h). With kEssTarget, whose weights are
+  /// tempered until they suffice: fewer than two effective ones.
   std::string degeneracy;
 };
 

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "inference/evidence/importance_evidence.h"
+#include "inference/evidence/lost_modes.h"
 #include "inference/evidence/pareto_tail.h"
 #include "inference/filter/ensemble.h"
 #include "inference/filter/iterative_filter.h"
@@ -26,6 +27,11 @@ namespace {
 constexpr double kLeastEss = 50;             // chosen: a mean is then known to 0.14 sd
 constexpr double kLeastTempered = 2;         // chosen: of one sample there is no spread
 constexpr double kLargestParetoIndex = 0.7;  // [Vehtari et al. 2024]
+constexpr double kLeastLost = 0.05;          // of ln Z; chosen: less moves no interval that matters
+
+bool WeightsSuffice(const Posterior& posterior) {
+  return posterior.ess >= kLeastEss && !(posterior.pareto_k > kLargestParetoIndex);
+}
 
 PosteriorPath MakePath(const DataSet& data, const Ensemble& ensemble,
                        const Eigen::MatrixXd& increments) {
@@ -121,9 +127,62 @@ std::vector<std::string> Warnings(const FilterOptions& options, const Ensemble& 
   return warnings;
 }
 
+// What the runs may say of a lost mode, in coordinates of the parameters that are not held. Nothing
+// where the weights fall short anyway: then it is an emulator's to answer.
+absl::StatusOr<LostModes> LostModesOf(const JointPrior& priors, const DataSet& data,
+                                      const FilterOptions& options, const Ensemble& ensemble,
+                                      const Posterior& posterior) {
+  if (options.noise == NoiseMode::kEssTarget || !WeightsSuffice(posterior)) return LostModes{};
+  std::vector<Eigen::Index> free;
+  for (std::size_t j = 0; j < priors.size(); ++j) {
+    if (ensemble.frozen.empty() || !ensemble.frozen[j]) {
+      free.push_back(static_cast<Eigen::Index>(j));
+    }
+  }
+  const JointPrior of_free = free.size() < priors.size() ? priors.Of(free) : priors;
+  ASSIGN_OR_RETURN(const auto likelihood, LikelihoodOf(ensemble, data, options));
+  SampledModel model{.points = ensemble.parameters(Eigen::all, free),
+                     .predictions = {},
+                     .log_start = ensemble.log_start,
+                     .log_likelihood = ensemble.log_likelihood,
+                     .log_prior =
+                         [&of_free](const Eigen::MatrixXd& points) {
+                           Eigen::VectorXd density(points.rows());
+                           for (Eigen::Index i = 0; i < points.rows(); ++i) {
+                             density[i] = of_free.LogStandardDensity(
+                                 of_free.FromStandard(points.row(i).transpose()));
+                           }
+                           return density;
+                         },
+                     .likelihood =
+                         [&likelihood](const Eigen::MatrixXd& predictions) {
+                           return likelihood.LogLikelihood(predictions);
+                         }};
+  for (Eigen::Index i = 0; i < model.points.rows(); ++i) {
+    model.points.row(i) = of_free.ToStandard(model.points.row(i).transpose()).transpose();
+  }
+  model.predictions.resize(model.points.rows(), likelihood.readings());
+  Eigen::Index row = 0;
+  for (const Iteration& iteration : ensemble.used) {
+    model.predictions.middleRows(row, iteration.predictions.rows()) = iteration.predictions;
+    row += iteration.predictions.rows();
+  }
+  return FindLostModes(model);
+}
+
+// Empty where no mode seems lost.
+std::string LostModeSentence(const Ensemble& ensemble, const LostModes& lost) {
+  if (lost.log_evidence <= kLeastLost) return "";
+  return absl::StrCat("A mode may be lost: the runs about sample ",
+                      ensemble.first + lost.modes.front().best,
+                      " point to a fit near them that no sample has met, and leave at least ",
+                      std::round(100 * -std::expm1(-lost.log_evidence)),
+                      " % of the posterior there. More samples in each iteration would show it.");
+}
+
 // Empty where the weights are enough.
 std::string Degeneracy(const FilterOptions& options, const Ensemble& ensemble,
-                       const Posterior& posterior) {
+                       const Posterior& posterior, const LostModes& lost) {
   if (options.noise == NoiseMode::kEssTarget) {  // the weights are what sigma makes of them
     if (posterior.ess >= kLeastTempered) return "";
     return absl::StrCat(
@@ -131,8 +190,7 @@ std::string Degeneracy(const FilterOptions& options, const Ensemble& ensemble,
         " samples are effective, so that nothing can be said about the parameters' spread: see why "
         "others did not come to their ends, run more samples, or raise ess_target.");
   }
-  const bool heavy = posterior.pareto_k > kLargestParetoIndex;
-  if (posterior.ess >= kLeastEss && !heavy) return "";
+  if (WeightsSuffice(posterior)) return LostModeSentence(ensemble, lost);
   return absl::StrCat(
       "The weighted samples alone do not make a posterior: ", std::floor(posterior.ess * 10) / 10,
       " of ", ensemble.log_start.size(), " are effective and the Pareto index of their weights ",
@@ -179,9 +237,10 @@ absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataS
   posterior.correlation = CorrelationOf(covariance);
   const EvidenceEstimate evidence = ImportanceEvidence(WithoutStrangers(ensemble, unnormalized));
   posterior.log_evidence = evidence.log_evidence;
-  posterior.log_evidence_se = evidence.standard_error;
   posterior.ess = EffectiveSampleSize(log_weights);
   posterior.pareto_k = ParetoTailIndex(log_weights);
+  ASSIGN_OR_RETURN(const LostModes lost, LostModesOf(priors, data, options, ensemble, posterior));
+  posterior.log_evidence_se = std::hypot(evidence.standard_error, lost.log_evidence);
   posterior.sigma = ensemble.sigma;
   posterior.path = MakePath(data, ensemble, ensemble.increments);
   if (options.reversed_path) {
@@ -198,7 +257,7 @@ absl::StatusOr<Posterior> ComputePosterior(const JointPrior& priors, const DataS
   posterior.frozen = ensemble.frozen;
   MarkFrozen(ensemble, posterior);
   posterior.warnings = Warnings(options, ensemble, posterior);
-  posterior.degeneracy = Degeneracy(options, ensemble, posterior);
+  posterior.degeneracy = Degeneracy(options, ensemble, posterior, lost);
   return posterior;
 }
 

@@ -4,6 +4,8 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "inference/numerics/bounded_minimizer.h"
@@ -84,6 +86,7 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
                                                      const GaussianProcessOptions& options) {
   assert(inputs.rows() == outputs.size() && inputs.rows() >= 4);
   assert(options.max_scatter >= kLeastScatter && options.max_scatter <= kMostScatter);
+  assert(options.like == nullptr || !options.like->constant());
   const Index n = inputs.rows();
   const Index d = inputs.cols();
   GaussianProcess process;
@@ -93,15 +96,17 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
     process.input_sd_[j] = Spread(inputs.col(j), process.input_mean_[j]);
   process.output_mean_ = outputs.mean();
   process.output_sd_ = Spread(outputs, process.output_mean_);
-  process.train_ =
-      (inputs.rowwise() - process.input_mean_).array().rowwise() / process.input_sd_.array();
+  process.used_.resize(static_cast<std::size_t>(d));
+  std::iota(process.used_.begin(), process.used_.end(), Index{0});
+  const Eigen::MatrixXd all = process.Scaled(inputs);
   const Eigen::VectorXd scaled = (outputs.array() - process.output_mean_) / process.output_sd_;
 
-  assert(options.like == nullptr || !options.like->constant());
-  const Minimum hyper = MostProbable(
-      process.train_, scaled, options.max_scatter,
-      options.like == nullptr ? FixedStarts(d)
-                              : std::vector<Eigen::VectorXd>{options.like->HyperParameters()});
+  std::vector<Eigen::VectorXd> starts = FixedStarts(d);
+  if (options.like != nullptr) {
+    process.used_ = options.like->used_;
+    starts = {options.like->HyperParameters()};
+  }
+  Minimum hyper = MostProbable(all(Eigen::all, process.used_), scaled, options.max_scatter, starts);
   if (!std::isfinite(hyper.value)) {
     return absl::FailedPreconditionError(
         "the emulator's covariance matrix cannot be factorised: are the runs' parameters all the "
@@ -110,14 +115,36 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   // Against the density of the best constant, whose scatter has the outputs' variance, one;
   // Gaussian normalisers and the prior of the scatter, which both have, left out.
   const auto count = static_cast<double>(n);
-  if (options.may_be_constant &&
-      hyper.value > 0.5 * count + 0.5 * std::log1p(count * kTrendVariance)) {
-    process.SetConstant(outputs);
-    return process;
+  const double of_constant = 0.5 * count + 0.5 * std::log1p(count * kTrendVariance);
+  if (options.may_be_constant && hyper.value > of_constant) {
+    // A vague slope along every input costs more than one weak input can repay: inputs one by one.
+    hyper.value = of_constant;
+    process.used_.clear();
+    for (bool better = true; better;) {
+      better = false;
+      const std::vector<Index> kept = process.used_;
+      for (Index j = 0; j < d; ++j) {
+        if (std::find(kept.begin(), kept.end(), j) != kept.end()) continue;
+        std::vector<Index> used = kept;
+        used.push_back(j);
+        const Minimum tried = MostProbable(all(Eigen::all, used), scaled, options.max_scatter,
+                                           FixedStarts(static_cast<Index>(used.size())));
+        if (!(tried.value < hyper.value)) continue;
+        hyper = tried;
+        process.used_ = std::move(used);
+        better = true;
+      }
+    }
+    if (process.used_.empty()) {
+      process.SetConstant(outputs);
+      return process;
+    }
   }
-  process.lengths_ = hyper.x.head(d).array().exp().transpose();
-  process.signal_ = std::exp(hyper.x[d]);
-  const double scatter = std::exp(hyper.x[d + 1]);
+  const auto of = static_cast<Index>(process.used_.size());
+  process.train_ = all(Eigen::all, process.used_);
+  process.lengths_ = hyper.x.head(of).array().exp().transpose();
+  process.signal_ = std::exp(hyper.x[of]);
+  const double scatter = std::exp(hyper.x[of + 1]);
   const double output_variance = process.output_sd_ * process.output_sd_;
   process.scatter_variance_ = scatter * output_variance;
 
@@ -133,6 +160,14 @@ absl::StatusOr<GaussianProcess> GaussianProcess::Fit(const Eigen::MatrixXd& inpu
   return process;
 }
 
+Eigen::VectorXd GaussianProcess::lengths() const {
+  Eigen::VectorXd lengths =
+      Eigen::VectorXd::Constant(input_sd_.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t k = 0; k < used_.size(); ++k)
+    lengths[used_[k]] = lengths_[static_cast<Index>(k)] * input_sd_[used_[k]];
+  return lengths;
+}
+
 Eigen::VectorXd GaussianProcess::HyperParameters() const {
   Eigen::VectorXd x(lengths_.size() + 2);
   x << lengths_.transpose().array().log().matrix(), std::log(signal_),
@@ -143,8 +178,6 @@ Eigen::VectorXd GaussianProcess::HyperParameters() const {
 void GaussianProcess::SetConstant(const Eigen::VectorXd& outputs) {
   const auto n = static_cast<double>(outputs.size());
   constant_ = true;
-  lengths_ =
-      Eigen::RowVectorXd::Constant(input_sd_.size(), std::numeric_limits<double>::infinity());
   const Eigen::ArrayXd deviation = outputs.array() - output_mean_;
   scatter_variance_ = deviation.square().sum() / (n - 1);
   leave_one_out_.error = deviation * (n / (n - 1));
@@ -173,13 +206,17 @@ Eigen::VectorXd GaussianProcess::PredictMean(const Eigen::MatrixXd& inputs) cons
   Eigen::VectorXd mean = Eigen::VectorXd::Constant(m, output_mean_);
   for (Index first = 0; !constant_ && first < m; first += kBlock) {
     const Index size = std::min(kBlock, m - first);
-    mean.segment(first, size) = MeanFrom(CrossCovariances(Scaled(inputs.middleRows(first, size))));
+    mean.segment(first, size) = MeanFrom(CrossCovariances(Used(inputs.middleRows(first, size))));
   }
   return mean;
 }
 
 Eigen::MatrixXd GaussianProcess::Scaled(const Eigen::MatrixXd& inputs) const {
   return (inputs.rowwise() - input_mean_).array().rowwise() / input_sd_.array();
+}
+
+Eigen::MatrixXd GaussianProcess::Used(const Eigen::MatrixXd& inputs) const {
+  return Scaled(inputs)(Eigen::all, used_);
 }
 
 Eigen::MatrixXd GaussianProcess::CrossCovariances(const Eigen::MatrixXd& points) const {
@@ -191,7 +228,7 @@ Eigen::VectorXd GaussianProcess::MeanFrom(const Eigen::MatrixXd& cross) const {
 }
 
 GaussianProcessPrediction GaussianProcess::PredictBlock(const Eigen::MatrixXd& inputs) const {
-  const Eigen::MatrixXd points = Scaled(inputs);
+  const Eigen::MatrixXd points = Used(inputs);
   Eigen::MatrixXd cross = CrossCovariances(points);
   GaussianProcessPrediction prediction;
   prediction.mean = MeanFrom(cross);

@@ -2,6 +2,7 @@
 // Gaussian-process regression of one scalar output [Rasmussen & Williams 2006, ch. 2, 4, 5].
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "absl/status/statusor.h"
 
@@ -41,7 +42,10 @@ struct GaussianProcessOptions {
 /// squared exponential, which takes every function for analytic, then claims too small a variance
 /// between the runs. Inputs are shifted and scaled to zero mean and unit standard deviation over
 /// the training set, outputs likewise, so that hyper-parameters have order one. l_j, s and the
-/// scatter are those of highest posterior density (KernelObjective).
+/// scatter are those of highest posterior density (KernelObjective). The function is of all inputs
+/// where that is more probable than a constant; else of the inputs that one after the other raise
+/// the posterior density most, the constant's first: a slope of variance b^2 along each of many
+/// inputs costs (1/2) ln(1 + n b^2) nats, more than one weak input repays.
 /// A value; immutable after Fit. Thread safety: const.
 class GaussianProcess {
  public:
@@ -64,15 +68,17 @@ class GaussianProcess {
   const LeaveOneOut& leave_one_out() const { return leave_one_out_; }
   /// Variance of the scatter of a single run, in the square of the output's unit.
   double scatter_variance() const { return scatter_variance_; }
-  /// True where the process is a constant: no function explains the outputs better.
+  /// True where the process is a constant: no function of the inputs explains the outputs better.
   bool constant() const { return constant_; }
-  /// d correlation lengths in units of the inputs; infinite where constant().
-  Eigen::VectorXd lengths() const { return lengths_.cwiseProduct(input_sd_); }
+  /// d correlation lengths in units of the inputs; infinite along inputs that the function is not
+  /// of.
+  Eigen::VectorXd lengths() const;
 
  private:
   Eigen::VectorXd HyperParameters() const;  // logarithms: lengths, signal, scatter; scaled
   void SetConstant(const Eigen::VectorXd& outputs);
   Eigen::MatrixXd Scaled(const Eigen::MatrixXd& inputs) const;
+  Eigen::MatrixXd Used(const Eigen::MatrixXd& inputs) const;  // scaled, of the inputs used alone
   Eigen::MatrixXd CrossCovariances(const Eigen::MatrixXd& points) const;  // scaled; n x m
   Eigen::VectorXd MeanFrom(const Eigen::MatrixXd& cross) const;
   GaussianProcessPrediction PredictBlock(const Eigen::MatrixXd& inputs) const;
@@ -82,13 +88,14 @@ class GaussianProcess {
   Eigen::RowVectorXd input_sd_;
   double output_mean_ = 0;
   double output_sd_ = 1;
-  Eigen::MatrixXd train_;         // n x d, scaled
-  Eigen::RowVectorXd lengths_;    // scaled
-  double signal_ = 1;             // s, in units of the output's variance
-  double constant_variance_ = 0;  // of the mean, where constant
-  double scatter_variance_ = 0;   // in units of the output
-  Eigen::MatrixXd cholesky_;      // of K, lower
-  Eigen::VectorXd alpha_;         // K^-1 outputs
+  std::vector<Eigen::Index> used_;  // the u inputs that the function is of
+  Eigen::MatrixXd train_;           // n x u, scaled
+  Eigen::RowVectorXd lengths_;      // u, scaled
+  double signal_ = 1;               // s, in units of the output's variance
+  double constant_variance_ = 0;    // of the mean, where constant
+  double scatter_variance_ = 0;     // in units of the output
+  Eigen::MatrixXd cholesky_;        // of K, lower
+  Eigen::VectorXd alpha_;           // K^-1 outputs
   LeaveOneOut leave_one_out_;
 };
 

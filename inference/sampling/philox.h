@@ -28,6 +28,7 @@ enum class StreamPurpose : std::uint64_t {
   kDesignOrder = 27,
   kHalves = 28,
   kEmulatedPath = 29,
+  kStoppedRuns = 30,
 };
 
 /// Random numbers of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration,

@@ -32,6 +32,7 @@ struct ElementTestContext {
   std::map<std::string, double> settings;  ///< of the test, defaults filled in
   double lateral_stress = 0;               ///< at the end of consolidation [Pa]
   double axial_stress = 0;                 ///< at the end of consolidation [Pa]
+  bool stress_driven = false;              ///< IsStressDriven()
 };
 
 /// Goal of the cell for one value of the control observable. Pure.

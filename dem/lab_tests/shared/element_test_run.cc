@@ -52,6 +52,7 @@ class ElementTestRun {
         context_.settings.emplace(setting.name, *setting.default_value);
       }
     }
+    context_.stress_driven = IsStressDriven(test_, scenario.settings);
     const double pressure = scenario.settings.at("confining_pressure");
     context_.lateral_stress = scenario.initial_stress ? scenario.initial_stress->lateral : pressure;
     context_.axial_stress = scenario.initial_stress ? scenario.initial_stress->axial : pressure;
@@ -88,8 +89,8 @@ class ElementTestRun {
     }
     for (std::size_t k = record.next_point(); k < scenario_.path.size(); ++k) {
       const ControlPoint& point = scenario_.path[k];
-      const std::string where =
-          absl::StrCat("path point ", k, " (", test_.control, " ", point.target, ")");
+      const std::string where = absl::StrCat(
+          "path point ", k, " (", ControlOf(test_, scenario_.settings), " ", point.target, ")");
       if (const StageEnd end = MoveToPoint(point.target); end != StageEnd::kDone) {
         return Finish(end, where);
       }
@@ -246,7 +247,8 @@ class ElementTestRun {
 
   /// Lets the stages be driven by readings where the apparatus alters them.
   void FollowReadings() {
-    if (apparatus_.AltersStrain() || apparatus_.membrane != 0) {
+    const bool strain = apparatus_.AltersStrain() && !context_.stress_driven;
+    if (strain || apparatus_.membrane != 0) {
       stages_.SetFollow([this](const std::array<double, 3>& modulus, CellTarget& target) {
         return FollowReading(modulus, target);
       });
@@ -259,7 +261,7 @@ class ElementTestRun {
   FollowGap FollowReading(const std::array<double, 3>& modulus, CellTarget& target) const {
     const double strain = Log(reference_[2] / assembly_.cell().length[2]);
     FollowGap gap{.tolerances = 0, .strain = std::abs(control_ - strain)};
-    if (apparatus_.AltersStrain()) {
+    if (apparatus_.AltersStrain() && !context_.stress_driven) {
       const double x = RigStress() - rig_start_;
       const double error = control_ - strain - apparatus_.RigStrain(x);
       const double change = error / (1.0 + modulus[2] * apparatus_.RigSlope(x));
@@ -275,17 +277,26 @@ class ElementTestRun {
     return gap;
   }
 
+  /// Stress of the specimen at which the load cell reads this one [Pa].
+  [[nodiscard]] double StressReadAs(double reading) const {
+    return (reading + apparatus_.load_gain * rig_start_ - apparatus_.load_offset) /
+           (1.0 + apparatus_.load_gain);
+  }
+
   /// From the present control value to the next: at once when loading at a real rate or by stress,
   /// in settled steps of at most staging.step otherwise.
   StageEnd MoveToPoint(double target) {
+    if (context_.stress_driven) {
+      control_ = target;
+      return stages_.MoveTo(TargetFor(StressReadAs(target)));
+    }
     if (scenario_.loading_rate) {
       control_ = target;
       return stages_.MoveThrough(TargetFor(target));
     }
     const double from = control_;
     const double exact = std::abs(target - from) / *staging_.step;
-    const int steps =
-        test_.stress_driven ? 1 : std::max(1, static_cast<int>(std::ceil(exact - 1e-6)));
+    const int steps = std::max(1, static_cast<int>(std::ceil(exact - 1e-6)));
     for (int k = 1; k <= steps; ++k) {
       control_ = k == steps ? target : from + (target - from) * k / steps;
       if (const StageEnd end = stages_.MoveTo(TargetFor(control_)); end != StageEnd::kDone) {

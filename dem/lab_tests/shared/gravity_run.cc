@@ -14,16 +14,13 @@
 #include "dem/particles/material_shares.h"
 
 namespace calib::dem {
-namespace {
 
-ClumpTemplate ShapeOf(double aspect, bool disks) {
+ClumpTemplate GrainShape(double aspect, bool disks) {
   if (!(aspect > 1)) {
     return {{{{0, 0, 0}, 1}}};
   }
   return disks ? DiskPairTemplate(aspect) : DumbbellTemplate(aspect);
 }
-
-}  // namespace
 
 GravityRun::GravityRun(const TestRun& run)
     : scenario_(run.scenario),
@@ -32,8 +29,8 @@ GravityRun::GravityRun(const TestRun& run)
       test_(run.test),
       entries_(run.entries),
       aspect_(PreparationOf(run.scenario.model, run.entries).aspect),
-      shape_(ShapeOf(aspect_, run.scenario.settings.contains("thickness") &&
-                                  run.scenario.settings.at("thickness") > 0)) {
+      shape_(GrainShape(aspect_, run.scenario.settings.contains("thickness") &&
+                                     run.scenario.settings.at("thickness") > 0)) {
   double sum = 0;
   for (const double r : radii()) {
     sum += 2 * r;

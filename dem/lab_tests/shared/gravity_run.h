@@ -19,6 +19,10 @@
 
 namespace calib::dem {
 
+/// Shape of a poured grain whose radius is 1 and whose length over width is `aspect`; disks: a pair
+/// of disks in place of two spheres.
+ClumpTemplate GrainShape(double aspect, bool disks);
+
 /// One run of a test under gravity: what its procedure asks of the scenario, and whom it reports
 /// to. Not thread-safe.
 class GravityRun {

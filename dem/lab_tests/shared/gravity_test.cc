@@ -1,5 +1,7 @@
 #include "dem/lab_tests/shared/gravity_test.h"
 
+#include "absl/strings/str_cat.h"
+
 namespace calib::dem {
 
 ParameterInfo Setting(const std::string& name, const std::string& unit, const SettingRange& range,
@@ -30,6 +32,20 @@ ParameterInfo Chosen(const std::string& name, const std::string& unit,
 ParameterInfo ThicknessOfDisks() {
   return Setting("thickness", "m", {.value = 0, .min = 0, .max = 10},
                  "of disks whose axes stand on the plane; 0: the grains are spheres");
+}
+
+double GivenSetting(const Scenario& scenario, const std::string& name, double otherwise) {
+  const auto it = scenario.settings.find(name);
+  return it != scenario.settings.end() && it->second > 0 ? it->second : otherwise;
+}
+
+std::string NarrowProblem(const Scenario& scenario, const Passage& passage) {
+  const double given = GivenSetting(scenario, passage.setting);
+  if (!(given > 0) || given > passage.least) {
+    return "";
+  }
+  return absl::StrCat(passage.setting, " is ", given, " m, ", passage.grains, " ", passage.least,
+                      " m: ", passage.why);
 }
 
 std::vector<ParameterInfo> WithCommonSettings(std::vector<ParameterInfo> own) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dem/model/lab_test.h"
+#include "dem/model/scenario.h"
 
 namespace calib::dem {
 
@@ -34,6 +35,21 @@ ParameterInfo Setting(const std::string& name, const std::string& unit, const Se
 /// Catalogue entry of a setting that is a whole number: a switch or a number of things.
 ParameterInfo Whole(const std::string& name, const SettingRange& range,
                     const std::string& description);
+
+/// A setting of a test under gravity that the scenario gives, or `otherwise` where it gives none
+/// or 0, which lets the test choose [SI].
+double GivenSetting(const Scenario& scenario, const std::string& name, double otherwise = 0);
+
+/// A length that the user may give, and what has to pass it.
+struct Passage {
+  std::string setting{};  ///< its name
+  std::string grains{};   ///< what has to pass, "the largest grain"
+  double least = 0;       ///< size of that [m]
+  std::string why{};      ///< what follows where it does not, "it does not fit into the box"
+};
+/// "SETTING is 0.01 m, GRAINS 0.02 m: WHY" where the length that the scenario gives is no more than
+/// what has to pass; empty otherwise, and where it gives none.
+std::string NarrowProblem(const Scenario& scenario, const Passage& passage);
 
 /// The settings that every test under gravity has, gravity [m/s^2], local_damping [-] and drag
 /// [1/s], followed by `own`.

@@ -164,6 +164,9 @@ std::vector<Part> PartsOf(const Scenario& s) {
   if (!s.model.materials.empty()) {
     parts.push_back({"materials", MaterialBytes(s)});
   }
+  if (s.model.shear_unloading != ShearUnloading::kAsPublished) {
+    parts.push_back({"shear at unloading", Bytes(s.model.shear_unloading)});
+  }
   return parts;
 }
 

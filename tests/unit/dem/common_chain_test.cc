@@ -145,6 +145,9 @@ TEST(CommonChain, OtherModelsHaveNone) {
   Model tsuji = test::HertzModel();
   tsuji.contact = "tsuji";
   EXPECT_FALSE(CommonChainOf(tsuji, EntriesOf(tsuji)));
+  Model rescaled = test::HertzModel();
+  rescaled.shear_unloading = ShearUnloading::kRescaled;
+  EXPECT_FALSE(CommonChainOf(rescaled, EntriesOf(rescaled)));
 }
 
 }  // namespace

@@ -116,5 +116,93 @@ TEST(ScenarioProblems, CollectsEverythingAtOnce) {
   EXPECT_EQ(summary.status().code(), absl::StatusCode::kInvalidArgument);
 }
 
+TEST(ScenarioProblems, AStressDrivesWhereTheTestHasOne) {
+  Scenario s = Good();
+  s.test = "oedometric";
+  s.settings[kStressDriven] = 1;
+  s.path = {{.target = 5e5, .load_step = 0}};
+  EXPECT_THAT(ScenarioProblems(s), IsEmpty());
+  s.path[0].target = -5e5;
+  EXPECT_THAT(ScenarioProblems(s),
+              ElementsAre(HasSubstr("axial_stress is -500000, it must be positive")));
+  s.path[0].target = 5e5;
+  s.loading_rate = 0.1;
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("is driven by stress")));
+  s = Good();
+  s.settings[kStressDriven] = 1;
+  EXPECT_THAT(ScenarioProblems(s), ElementsAre(HasSubstr("has no setting \"stress_driven\"")));
+}
+
+// Grains of 1.6 to 2.4 mm, mean 2 mm.
+std::vector<double> SpreadRadii(std::size_t count) {
+  std::vector<double> radii;
+  for (std::size_t i = 0; i < count; ++i) {
+    radii.push_back(0.8e-3 + 0.4e-3 * static_cast<double>(i) / static_cast<double>(count - 1));
+  }
+  return radii;
+}
+
+Scenario Poured(const std::string& test, const std::map<std::string, double>& settings,
+                double control) {
+  Scenario s = Good();
+  s.test = test;
+  s.settings = settings;
+  s.path = {{.target = control, .load_step = 0}};
+  return s;
+}
+
+TEST(GrainRemarks, LengthsThatTheGrainsDoNotPassAreRefused) {
+  struct Case {
+    const char* test;
+    std::map<std::string, double> settings;
+    double control;
+    const char* refused;  // "": nothing
+  };
+  for (const Case& c : {
+           Case{"silo_discharge", {}, 0.05, "opening 0.05 m is not smaller than silo_width, 0.024"},
+           Case{"silo_discharge", {}, 0.001, "not wider than the smallest grain, 0.0016"},
+           Case{"silo_discharge", {}, 12, "is not smaller than silo_width, 0.024"},
+           Case{"silo_discharge", {}, 0.01, ""},
+           Case{"silo_discharge", {{"flat", 1}}, 0.05, ""},
+           Case{"silo_discharge", {{"silo_width", 0.06}}, 0.05, ""},
+           Case{"silo_discharge", {{"silo_width", 0.002}}, 0.0018, "the largest grain 0.0024"},
+           Case{"angle_of_repose", {{"cylinder_diameter", 0.002}}, 1, "cylinder_diameter is 0.002"},
+           Case{"angle_of_repose", {{"cylinder_diameter", 0.02}}, 1, ""},
+           Case{"calibration_device", {{"opening", 0.0015}}, 1, "opening is 0.0015"},
+           Case{"calibration_device", {{"opening", 0.012}}, 1, ""},
+           Case{"shaken_box", {{"box_width", 0.004}}, 1, "the intruder 0.0048"},
+           Case{"shaken_box", {{"intruder_ratio", 9}}, 1, "intruder_ratio is 9"},
+           Case{"shaken_box", {{"box_width", 0.03}}, 1, ""},
+           Case{"rotating_drum", {{"drum_diameter", 0.002}}, 1, "drum_diameter is 0.002"},
+           Case{"rotating_drum", {{"drum_diameter", 0.01}}, 1, "grains have"},
+           Case{"rotating_drum", {{"drum_diameter", 0.1}}, 1, ""},
+       }) {
+    const Scenario scenario = Poured(c.test, c.settings, c.control);
+    ASSERT_THAT(ScenarioProblems(scenario), IsEmpty()) << c.test;
+    const auto refused = GrainRemarksOf(scenario, SpreadRadii(1500)).refused;
+    if (*c.refused == '\0') {
+      EXPECT_THAT(refused, IsEmpty()) << c.test << " " << c.control;
+    } else {
+      EXPECT_THAT(refused, ElementsAre(HasSubstr(c.refused))) << c.test << " " << c.control;
+    }
+  }
+}
+
+// Elongated grains pass an outlet lengthwise.
+TEST(GrainRemarks, ElongatedGrainsAreThinner) {
+  Scenario scenario = Poured("silo_discharge", {}, 1.5e-3);
+  EXPECT_THAT(GrainRemarksOf(scenario, SpreadRadii(100)).refused, testing::SizeIs(1));
+  scenario.model.effects = {"nonspherical_shape"};
+  scenario.model.parameters["nonspherical_shape.aspect"] = 2;
+  EXPECT_THAT(GrainRemarksOf(scenario, SpreadRadii(100)).refused, IsEmpty());
+}
+
+TEST(GrainRemarks, AHeapOfFewGrainsIsRemarkedOn) {
+  const Scenario heap = Poured("angle_of_repose", {}, 1);
+  EXPECT_THAT(GrainRemarksOf(heap, SpreadRadii(64)).few, HasSubstr("fewer than about 1000"));
+  EXPECT_EQ(GrainRemarksOf(heap, SpreadRadii(1000)).few, "");
+  EXPECT_EQ(GrainRemarksOf(Good(), SpreadRadii(64)).few, "");
+}
+
 }  // namespace
 }  // namespace calib::dem

@@ -217,6 +217,9 @@ TEST(RunCheckpoint, OfAnotherRunIsRefusedNamingWhatDiffers) {
   EXPECT_THAT(CheckpointProblem(adaptive, bytes), HasSubstr("what differs: staging"));
   Scenario effect = With(scenario, "rolling_resistance", {{"stiffness", 0}, {"friction", 0}});
   EXPECT_THAT(CheckpointProblem(effect, bytes), HasSubstr("what differs: effects"));
+  Scenario rescaled = scenario;
+  rescaled.model.shear_unloading = ShearUnloading::kRescaled;
+  EXPECT_THAT(CheckpointProblem(rescaled, bytes), HasSubstr("what differs: shear at unloading"));
   Scenario mixed = scenario;  // whose checkpoint has a part more
   mixed.model.materials = {"twin"};
   mixed.materials = {.grains = {{"twin", 0.4}}, .seed = 3};

@@ -113,6 +113,9 @@ int PrintAll() {
     Scenario scenario = test::SmallTriaxial(base);
     scenario.path = {{.target = 0, .load_step = 0}, {.target = 0.002, .load_step = 1}};
     good = Print(base.contact, scenario) && good;
+    Scenario rescaled = scenario;
+    rescaled.model.shear_unloading = ShearUnloading::kRescaled;
+    good = Print(base.contact + ", shear rescaled", rescaled) && good;
     for (const EffectInfo& effect : Effects()) {
       const auto& laws = effect.contacts;
       const bool joins = laws.empty() || std::ranges::count(laws, base.contact) > 0;

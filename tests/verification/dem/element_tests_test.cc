@@ -69,6 +69,43 @@ TEST(Oedometric, HasNoLateralStrainAndDissipatesInACycle) {
               0.15 * Value(run.states[0], "axial_stress"));
 }
 
+// A laboratory puts weights on: at the stresses of a strain-driven run the strains are that run's,
+// and no axis but the loaded one moves.
+TEST(Oedometric, DrivenByStressReachesTheStrainsOfTheStrainDrivenTest) {
+  Scenario by_strain = test::SmallTriaxial(test::HertzModel());
+  by_strain.test = "oedometric";
+  by_strain.packing = test::SmallPacking(200);
+  by_strain.path = {{.target = 0.006, .load_step = 0},
+                    {.target = 0.012, .load_step = 1},
+                    {.target = 0.009, .load_step = 2}};
+  const test::Run strained = test::RunAll(by_strain);
+  Scenario by_stress = by_strain;
+  by_stress.settings[kStressDriven] = 1;
+  for (std::size_t k = 0; k < 3; ++k) {
+    by_stress.path[k].target = Value(strained.states[k], "axial_stress");
+  }
+  const test::Run stressed = test::RunAll(by_stress);
+  ASSERT_EQ(stressed.summary.outcome, Outcome::kCompleted) << stressed.summary.reason;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const State& state = stressed.states[k];
+    EXPECT_NEAR(Value(state, "axial_stress") / by_stress.path[k].target, 1, 2e-3) << k;
+    EXPECT_EQ(Value(state, "lateral_strain"), 0) << k;
+    EXPECT_NEAR(Value(state, "axial_strain"), by_strain.path[k].target, 6e-4) << k;
+  }
+  EXPECT_LT(Value(stressed.states[2], "axial_strain"), Value(stressed.states[1], "axial_strain"));
+}
+
+TEST(Oedometric, DrivenByStressThroughALoadCellReadsTheStressAskedFor) {
+  Scenario s = test::With(test::SmallTriaxial(test::HertzModel()), "load_cell_error",
+                          {{"gain", 0.05}, {"offset", 4e3}});
+  s.test = "oedometric";
+  s.settings[kStressDriven] = 1;
+  s.path = {{.target = 6e5, .load_step = 0}};
+  const test::Run run = test::RunAll(s);
+  ASSERT_EQ(run.summary.outcome, Outcome::kCompleted) << run.summary.reason;
+  EXPECT_NEAR(Value(run.states[0], "axial_stress") / 6e5, 1, 2e-3);
+}
+
 TEST(Isotropic, ReachesEachMeanStressWithEqualAxes) {
   Scenario s = test::SmallTriaxial(test::HertzModel());
   s.test = "isotropic";
