@@ -11,6 +11,7 @@
 #include "calib/return_if_error.h"
 #include "calib/v1/campaign.grpc.pb.h"
 #include "proto/rpc/address.h"
+#include "proto/rpc/check_message.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/client_options.h"
 #include "proto/rpc/digest.h"
@@ -100,6 +101,14 @@ absl::Status Insist(Connection& connection, std::optional<std::chrono::milliseco
   }
 }
 
+// What came in keeps the rules of its fields, as what goes out does at the other end.
+absl::Status Checked(const google::protobuf::Message& message) {
+  const absl::Status status = rpc::CheckMessage(message);
+  return status.ok() ? status
+                     : absl::DataLossError(absl::StrCat("the server has sent what it must not: ",
+                                                        status.message()));
+}
+
 template <typename Reply, typename Request>
 absl::StatusOr<Reply> Call(Connection& connection,
                            grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
@@ -111,7 +120,8 @@ absl::StatusOr<Reply> Call(Connection& connection,
         reply.Clear();
         return (stub.*method)(&context, request, &reply);
       });
-  if (!answered.ok()) return answered;
+  RETURN_IF_ERROR(answered);
+  RETURN_IF_ERROR(Checked(reply));
   return reply;
 }
 
@@ -130,7 +140,8 @@ absl::StatusOr<std::vector<Message>> Collect(
     while (reader->Read(&message)) messages.push_back(message);
     return reader->Finish();
   });
-  if (!answered.ok()) return answered;
+  RETURN_IF_ERROR(answered);
+  for (const Message& message : messages) RETURN_IF_ERROR(Checked(message));
   return messages;
 }
 
@@ -215,12 +226,23 @@ absl::StatusOr<v1::CampaignStatus> Client::Show(const std::string& campaign) {
 
 absl::Status Client::Watch(const std::string& campaign,
                            const std::function<void(const v1::CampaignStatus&)>& seen) {
-  return Insist(impl_->connection, std::nullopt, [&](Stub& stub, grpc::ClientContext& context) {
-    const auto reader = stub.Watch(&context, Of(campaign));
-    v1::CampaignStatus status;
-    while (reader->Read(&status)) seen(status);
-    return reader->Finish();
-  });
+  absl::Status checked;
+  absl::Status watched =
+      Insist(impl_->connection, std::nullopt, [&](Stub& stub, grpc::ClientContext& context) {
+        const auto reader = stub.Watch(&context, Of(campaign));
+        v1::CampaignStatus status;
+        while (reader->Read(&status)) {
+          checked = Checked(status);
+          if (!checked.ok()) {
+            context.TryCancel();
+            reader->Finish();
+            return grpc::Status::OK;
+          }
+          seen(status);
+        }
+        return reader->Finish();
+      });
+  return checked.ok() ? watched : checked;
 }
 
 absl::StatusOr<v1::Posterior> Client::GetPosterior(const std::string& campaign,

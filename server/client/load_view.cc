@@ -17,8 +17,9 @@ absl::StatusOr<campaign::Campaign> LoadCampaign(Client& client, const v1::Campai
   };
   std::optional<std::uint64_t> seed;
   if (source.has_seed()) seed = source.seed();
-  campaign::ReadOutcome outcome = campaign::ReadCampaign(
-      source.campaign_file(), source.file_name(), blobs, seed, campaign::CampaignIs::kStored);
+  campaign::ReadOutcome outcome =
+      campaign::ReadCampaign(source.campaign_file(), source.file_name(), blobs, seed,
+                             campaign::StoredUnder(source.reading_rules()));
   if (!outcome.problems.empty()) {
     return absl::FailedPreconditionError(
         absl::StrCat("this build cannot read the campaign as it was submitted: ",

@@ -243,7 +243,8 @@ std::string SensitivityText(const report::Sensitivity& sensitivity) {
 std::string StatusText(const v1::CampaignStatus& s) {
   return fmt::format("{}  {}\n{}\n{} model evaluations so far, {} core hours, method {}.\n",
                      s.campaign(), s.name(), client::ProgressText(s), s.model_evaluations(),
-                     Number(s.core_hours(), 3), s.method());
+                     Number(s.core_hours(), 3), s.method()) +
+         (s.problem().empty() ? "" : report::Wrapped(s.problem(), "! ", "  "));
 }
 
 }  // namespace calib::ctl

@@ -88,7 +88,7 @@ std::string PredictionText(const Prediction& prediction) {
                     shown(o.quantity.mean[k]), shown(o.quantity.q05[k]), shown(o.quantity.q95[k]),
                     shown(o.quantity.sd_parameters[k]), shown(o.quantity.sd_model[k]),
                     i < static_cast<std::size_t>(o.sd_noise.size()) ? shown(o.sd_noise[k]) : "–",
-                    o.measured.empty() ? "–" : shown(o.measured[i])});
+                    o.measured.empty() || std::isnan(o.measured[i]) ? "–" : shown(o.measured[i])});
     }
     text += fmt::format("\n{}, {}\n{}", o.experiment, o.observable, table.ToString());
     for (const auto& e : o.exceedance) {

@@ -10,7 +10,7 @@
 #include "calib/return_if_error.h"
 #include "dem/registry/declared_effects.h"
 #include "inference/numerics/decompositions.h"
-#include "server/campaign/model/noise_check.h"
+#include "server/campaign/checks/noise_check.h"
 #include "server/diagnosis/diagnosis_support.h"
 #include "server/diagnosis/effect_screen.h"
 #include "server/diagnosis/extension.h"
@@ -60,7 +60,7 @@ class Inquiry {
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = base_.id();
     diagnosis_.only_adequacy = options_.only_adequacy;
-    diagnosis_.warnings = campaign::NoiseWarnings(base_.view().campaign);
+    diagnosis_.warnings = campaign::Sentences(campaign::NoiseWarnings(base_.view().campaign));
     diagnosis_.in_doubt = !diagnosis_.warnings.empty();
     for (const report::PriorConflict& conflict : report::PriorConflicts(base_.view())) {
       diagnosis_.warnings.push_back(report::InWords(conflict));

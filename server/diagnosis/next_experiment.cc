@@ -28,13 +28,14 @@ constexpr double kLevel = 0.01;
 
 // Error stated for a reading of this size: that of the nearest one measured.
 double ErrorAt(const campaign::MeasuredObservable& observable, double value) {
-  std::size_t nearest = 0;
-  for (std::size_t i = 1; i < observable.values.size(); ++i) {
-    if (std::abs(observable.values[i] - value) < std::abs(observable.values[nearest] - value)) {
-      nearest = i;
-    }
+  Index nearest = -1;
+  const auto apart = [&](Index i) {
+    return std::abs(observable.values[static_cast<std::size_t>(i)] - value);
+  };
+  for (const Index i : campaign::RowsRead(observable)) {
+    if (nearest < 0 || apart(i) < apart(nearest)) nearest = i;
   }
-  return observable.sd[nearest];
+  return observable.sd[static_cast<std::size_t>(nearest)];
 }
 
 // Curves of one run, [observable][reading]; empty: it did not finish.

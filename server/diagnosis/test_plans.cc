@@ -31,12 +31,15 @@ double CorrelationLength(const std::vector<double>& control,
   if (c.rows() == 0) return observable.correlation_length;
   double decay = 0;
   double way = 0;
-  for (Eigen::Index i = 1; i < c.rows(); ++i) {
-    const double correlation = c(i, i - 1) / std::sqrt(c(i, i) * c(i - 1, i - 1));
+  const std::vector<Eigen::Index> rows = campaign::RowsRead(observable);
+  for (std::size_t k = 1; k < rows.size(); ++k) {
+    const Eigen::Index i = rows[k];
+    const Eigen::Index before = rows[k - 1];
+    const double correlation = c(i, before) / std::sqrt(c(i, i) * c(before, before));
     if (!(correlation > 0)) return 0;
     decay -= std::log(std::min(1.0, correlation));
     way +=
-        std::abs(control[static_cast<std::size_t>(i)] - control[static_cast<std::size_t>(i - 1)]);
+        std::abs(control[static_cast<std::size_t>(i)] - control[static_cast<std::size_t>(before)]);
   }
   return decay > 0 ? way / decay : 0;
 }
@@ -224,7 +227,10 @@ YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,
       continue;
     }
     double sum = 0;
-    for (const double sd : o.sd) sum += sd / static_cast<double>(o.sd.size());
+    const std::vector<Eigen::Index> rows = campaign::RowsRead(o);
+    for (const Eigen::Index row : rows) {
+      sum += o.sd[static_cast<std::size_t>(row)] / static_cast<double>(rows.size());
+    }
     YamlNode& mean = campaign::YamlAt(campaign::YamlAt(observables, o.name), "noise");
     campaign::YamlErase(mean, "column");
     campaign::YamlErase(mean, "covariance");

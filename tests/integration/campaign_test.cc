@@ -147,6 +147,7 @@ TEST(Campaign, SubmissionIsIdempotentAndBadOnesAreRefused) {
   EXPECT_EQ(client.SubmitCampaign("name: x\n", {}, "t").status().code(),
             absl::StatusCode::kInvalidArgument);
   v1::SubmitRequest request;
+  request.set_request_id("u");
   request.set_campaign_file(campaign.yaml);
   (*request.mutable_files())["data.txt"] = std::string(64, '0');
   EXPECT_EQ(client.Submit(request).status().code(), absl::StatusCode::kFailedPrecondition);

@@ -10,8 +10,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
-#include "dem/model/test_meshes.h"
 #include "dem/registry/scenario_problems.h"
+#include "server/campaign/checks/campaign_warnings.h"
+#include "server/campaign/checks/grain_check.h"
 #include "server/campaign/file/map_reader.h"
 #include "server/campaign/file/read_context.h"
 #include "server/campaign/file/read_experiment.h"
@@ -60,36 +61,21 @@ void ReadName(MapReader& map, Campaign& campaign) {
   }
 }
 
-// Of the grains in all specimens [m]; 0 where there are none.
-double LargestDiameter(const Experiment& experiment) {
-  double largest = 0;
-  for (const Specimen& specimen : experiment.specimens) {
-    if (const auto* recipe = std::get_if<dem::PackingRecipe>(&specimen)) {
-      largest = std::max(largest, 2 * dem::LargestRadius(*recipe));
-    } else if (const auto* file = std::get_if<PackingFile>(&specimen)) {
-      for (const double radius : file->packing.radius) largest = std::max(largest, 2 * radius);
-    }
-  }
-  return largest;
-}
-
 // What the engine itself would refuse. Asked last, at the middle of the priors, where only rare
 // things are left.
 void AskEngine(const MapReader& map, const Campaign& campaign) {
-  std::vector<double> middle;
-  for (const CalibratedParameter& parameter : campaign.parameters) {
-    middle.push_back(parameter.prior.Quantile(0.5));
-  }
   for (const Experiment& experiment : campaign.experiments) {
-    dem::Scenario scenario = MakeScenario(campaign, experiment, middle, 0);
+    dem::Scenario scenario = MiddleScenario(campaign, experiment);
     std::set<std::string> said;
+    const auto say = [&](const std::string& path, const std::string& problem) {
+      if (!said.insert(problem).second) return;
+      map.Problem("experiments",
+                  absl::StrCat(experiment.name, ": ", path, path.empty() ? "" : ": ", problem),
+                  "impossible");
+    };
     const auto ask = [&](const dem::Packing& packing, const std::string& path) {
       scenario.packing = packing;
-      for (const std::string& problem : dem::ScenarioProblems(scenario)) {
-        if (!said.insert(problem).second) continue;
-        map.Problem("experiments",
-                    absl::StrCat(experiment.name, ": ", path, path.empty() ? "" : ": ", problem));
-      }
+      for (const std::string& problem : dem::ScenarioProblems(scenario)) say(path, problem);
     };
     // Without a file first, in place of a recipe's packing, which does not exist yet: what is wrong
     // with any packing is not said of a file.
@@ -103,10 +89,9 @@ void AskEngine(const MapReader& map, const Campaign& campaign) {
     for (const Specimen& specimen : experiment.specimens) {
       if (const auto* file = std::get_if<PackingFile>(&specimen)) ask(file->packing, file->path);
     }
-    if (const double grain = LargestDiameter(experiment); grain > 0) {
-      if (const std::string problem = dem::MeshSizeProblem(scenario, grain); !problem.empty()) {
-        map.Problem("experiments", experiment.name + ": " + problem);
-      }
+    if (!said.empty()) continue;
+    for (const SpecimenRemarks& grains : GrainRemarksOf(experiment, scenario)) {
+      for (const std::string& problem : grains.remarks.refused) say(grains.path, problem);
     }
   }
 }
@@ -140,7 +125,7 @@ FileReader DiskReader(const std::string& campaign_file_path) {
 
 ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_name,
                          const FileReader& reader, std::optional<std::uint64_t> seed_override,
-                         CampaignIs is) {
+                         CampaignIs is, const ReadLimits& limits) {
   ReadOutcome outcome;
   ProblemList problems(file_name);
   const YamlParse parse = ParseYaml(yaml_text);
@@ -151,7 +136,7 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
   }
   Campaign& campaign = outcome.campaign;
   const bool is_new = is == CampaignIs::kNew;
-  ReadContext context(reader, problems, is_new);
+  ReadContext context(reader, problems, is, limits);
   MapReader map(*parse.root, "", problems);
   if (parse.root->kind == YamlNode::Kind::kMap) {
     ReadName(map, campaign);
@@ -187,6 +172,10 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
   }
   if (seed_override) campaign.seed = campaign.filter.seed = *seed_override;
   outcome.problems = problems.Sorted();
+  if (is_new && outcome.problems.empty()) {
+    outcome.warnings = context.warnings();
+    for (Warning& warning : WarningsOf(campaign)) outcome.warnings.push_back(std::move(warning));
+  }
   outcome.files = context.files();
   return outcome;
 }

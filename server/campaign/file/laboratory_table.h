@@ -1,37 +1,42 @@
 #pragma once
-// The key `data` of an experiment: the laboratory's table, seen through our names, units and strain
-// measure.
+// The key `data` of an experiment: the laboratory's table, seen through our names, units, signs,
+// zeros and strain measure.
 
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "server/campaign/file/derived_columns.h"
 #include "server/campaign/file/read_context.h"
 
 namespace calib::campaign {
 
 class LaboratoryTable {
  public:
-  /// Reads {file, columns, units, strain}. wanted: our names of the columns that will be asked for.
-  /// free_names: names that no catalogue knows are allowed (precomputed runs). Empty after a
-  /// problem that leaves nothing to read.
+  /// Reads {file, columns, units, strain, sign, zero, offset, formulas} and the keys of
+  /// read_table_format.h. wanted: our names of the columns that will be asked for. free_names:
+  /// names that no catalogue knows are allowed (precomputed runs). Empty after a problem that
+  /// leaves nothing to read.
   static std::optional<LaboratoryTable> Read(MapReader& experiment,
                                              const std::vector<std::string>& wanted,
                                              bool free_names, ReadContext& context);
 
   const std::string& path() const { return path_; }
-  std::size_t rows() const { return table_->rows(); }
+  /// Leaves out the rows in which this column of ours has no number, and says how many there are.
+  std::size_t KeepRowsWith(const std::string& name, ReadContext& context);
+  std::size_t rows() const { return kept_.size(); }
   /// True when the file has a column for one of our names.
-  bool Has(const std::string& name) const { return table_->Has(ColumnOf(name)); }
-  int LineOf(std::size_t row) const { return table_->LineOf(row); }
+  bool Has(const std::string& name) const;
+  int LineOf(std::size_t row) const { return table_->LineOf(kept_[row]); }
   /// The file's column behind one of our names.
   std::string ColumnOf(const std::string& name) const;
 
-  /// A column under our name in SI, as the laboratory computed it. Problems are added to the
-  /// context.
+  /// A column under our name in SI, its sign turned and its zero taken off as the file asks, as the
+  /// laboratory computed it; NaN where a reading is missing. Empty after a problem.
   std::vector<double> Raw(const std::string& name, ReadContext& context) const;
-  /// A column by its name in the file, in the unit of our name `like`.
+  /// A column by its name in the file, in the unit of our name `like`, NaN where a number is
+  /// missing. Empty after a problem.
   std::vector<double> RawColumn(const std::string& column, const std::string& like,
                                 ReadContext& context) const;
   /// What turns a number of the file's column behind one of our names into SI.
@@ -46,12 +51,22 @@ class LaboratoryTable {
 
  private:
   LaboratoryTable() = default;
+  void ReadZeros(MapReader& data, bool free_names);
+  bool Open(MapReader& data, const std::vector<std::string>& wanted, ReadContext& context);
   bool IsEngineering(const std::string& name) const;
+  double ZeroOf(const std::string& name, const std::vector<double>& values) const;
+  void CompareUnits(const std::vector<std::string>& wanted, const std::string& experiment,
+                    ReadContext& context) const;
 
   std::string path_;
   std::shared_ptr<const DataTable> table_;
+  DerivedColumns derived_;
+  std::vector<std::size_t> kept_;                             // rows of the table
   std::vector<std::pair<std::string, std::string>> columns_;  // our name, the file's
   std::vector<std::pair<std::string, double>> factors_;       // our name, to SI
+  std::vector<std::pair<std::string, double>> signs_;         // our name, 1 or -1
+  std::vector<std::pair<std::string, double>> offsets_;       // our name, SI
+  std::vector<std::string> from_first_;  // our names, whose first reading is their zero
   enum class Strain { kEngineering, kLogarithmic };
   Strain strain_ = Strain::kEngineering;
 };

@@ -55,8 +55,9 @@ int MapReader::LineOf(const std::string& key) const {
   return entry != nullptr ? entry->line : line_;
 }
 
-void MapReader::Problem(const std::string& key, const std::string& message) const {
-  problems_->Add(LineOf(key), PathOf(key), message);
+void MapReader::Problem(const std::string& key, const std::string& message,
+                        const std::string& kind) const {
+  problems_->Add(LineOf(key), PathOf(key), message, kind);
 }
 
 bool MapReader::Has(const std::string& key) const { return FindEntry(key) != nullptr; }

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/campaign/file/problem_list.h"
+#include "server/campaign/file/text/problem_list.h"
 #include "server/campaign/file/text/yaml_tree.h"
 #include "server/campaign/model/range.h"
 #include "server/campaign/model/word_table.h"
@@ -29,7 +29,8 @@ class MapReader {
   /// Line of the key, or of the map when it is absent.
   int LineOf(const std::string& key) const;
   /// Adds a problem at a key (present or missing).
-  void Problem(const std::string& key, const std::string& message) const;
+  void Problem(const std::string& key, const std::string& message,
+               const std::string& kind = "") const;
 
   bool Has(const std::string& key) const;
   std::vector<std::string> Keys() const;

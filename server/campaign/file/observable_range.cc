@@ -89,27 +89,4 @@ void CheckRangeOf(const MeasuredObservable& observable, const LaboratoryTable& t
                    "; it has to be ", range->allowed, "; ", WithName(range->usual_mistake, name)));
 }
 
-void CheckStressesOf(const Experiment& experiment, const LaboratoryTable& table,
-                     ReadContext& context) {
-  constexpr double kLeast = 1e-3;  // of the confining pressure
-  const auto pressure = experiment.settings.find("confining_pressure");
-  if (pressure == experiment.settings.end()) return;
-  for (const MeasuredObservable& observable : experiment.observables) {
-    if (observable.values.empty() ||
-        (observable.name != "axial_stress" && observable.name != "mean_stress")) {
-      continue;
-    }
-    double largest = 0;
-    for (const double value : observable.values) {
-      if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
-    }
-    if (!(largest > 0 && largest < kLeast * pressure->second)) continue;
-    context.problems().AddIn(
-        table.path(), table.LineOf(0), table.ColumnOf(observable.name),
-        absl::StrCat("is at most ", largest, " Pa beside a confining pressure of ",
-                     pressure->second, " Pa; if the column is in another unit, say so, e.g. ",
-                     "units: {", observable.name, ": kPa}"));
-  }
-}
-
 }  // namespace calib::campaign

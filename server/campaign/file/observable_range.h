@@ -17,10 +17,4 @@ namespace calib::campaign {
 void CheckRangeOf(const MeasuredObservable& observable, const LaboratoryTable& table,
                   ReadContext& context);
 
-/// Adds one problem for each column of axial or mean stresses that stay below a thousandth of the
-/// confining pressure, from which they start: their unit is not the one that was read.
-/// in: experiment.settings and its observables, SI
-void CheckStressesOf(const Experiment& experiment, const LaboratoryTable& table,
-                     ReadContext& context);
-
 }  // namespace calib::campaign

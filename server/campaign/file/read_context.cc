@@ -25,7 +25,7 @@ const std::string* ReadContext::ReadNamedFile(const MapReader& map, const std::s
 void ReadContext::AddTableProblems(const std::string& path,
                                    const std::vector<TableProblem>& found) {
   for (const TableProblem& problem : found) {
-    problems_.AddIn(path, problem.line, problem.column, problem.message);
+    problems_.AddIn(path, problem.line, problem.column, problem.message, problem.kind);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/campaign/checks/warning.h"
 #include "server/campaign/file/campaign_file.h"
 #include "server/campaign/file/map_reader.h"
 #include "server/campaign/file/text/data_file.h"
@@ -15,13 +16,20 @@ namespace calib::campaign {
 
 class ReadContext {
  public:
-  /// is_new: not accepted before, see CampaignIs.
-  ReadContext(const FileReader& reader, ProblemList& problems, bool is_new)
-      : reader_(reader), problems_(problems), is_new_(is_new) {}
+  ReadContext(const FileReader& reader, ProblemList& problems, CampaignIs is,
+              const ReadLimits& limits)
+      : reader_(reader), problems_(problems), is_(is), limits_(limits) {}
 
-  bool is_new() const { return is_new_; }
+  /// Not accepted before.
+  bool is_new() const { return is_ == CampaignIs::kNew; }
+  /// By which its measurements are read.
+  bool by_first_rules() const { return is_ == CampaignIs::kStoredByFirstRules; }
+  const ReadLimits& limits() const { return limits_; }
 
   ProblemList& problems() { return problems_; }
+
+  /// What is odd about the files themselves; a finished campaign does not show it any more.
+  std::vector<Warning>& warnings() { return warnings_; }
 
   /// Content of the file named at `key` of `map`, or nullptr after a problem. Each file is read
   /// once.
@@ -37,7 +45,9 @@ class ReadContext {
  private:
   const FileReader& reader_;
   ProblemList& problems_;
-  bool is_new_;
+  CampaignIs is_;
+  const ReadLimits limits_;
+  std::vector<Warning> warnings_;
   std::map<std::string, std::optional<std::string>> contents_;  // empty: could not be read
   std::vector<std::string> files_;
 };

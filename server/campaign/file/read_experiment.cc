@@ -73,9 +73,21 @@ void CheckUnitOf(MapReader& map, const dem::ParameterInfo& setting, double value
   }
 }
 
+// The control says by what a test is driven that strain or stress may drive.
+void ReadStressDriven(MapReader& map, const dem::TestInfo& test, Experiment& experiment) {
+  if (test.stress_control.empty()) return;
+  map.Ignore({dem::kStressDriven});
+  if (map.Has(dem::kStressDriven)) {
+    map.Problem(dem::kStressDriven,
+                absl::StrCat("follows from the control: write control: ", test.stress_control));
+  }
+  if (ControlNameOf(map) == test.stress_control) experiment.settings[dem::kStressDriven] = 1;
+}
+
 // Runs made elsewhere need no settings; what is given is read. What the test is driven along is
 // none.
 void ReadSettings(MapReader& map, const dem::TestInfo& test, bool needed, Experiment& experiment) {
+  ReadStressDriven(map, test, experiment);
   const std::string control = ControlNameOf(map);
   for (const dem::ParameterInfo& setting : test.settings) {
     if (setting.name == control) {

@@ -6,6 +6,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/registry/catalog.h"
+#include "server/campaign/checks/in_words.h"
+#include "server/campaign/checks/test_ties.h"
 #include "server/campaign/file/laboratory_table.h"
 #include "server/campaign/file/observable_range.h"
 #include "server/campaign/file/read_noise.h"
@@ -43,15 +45,15 @@ ControlSpec ReadControl(MapReader& map, const MeasurementRules& rules, const dem
   } else {
     control.name = map.Text("control").value_or("");
   }
-  if (!rules.precomputed && test != nullptr && !control.name.empty() &&
-      control.name != test->control &&
-      std::find(test->other_controls.begin(), test->other_controls.end(), control.name) ==
-          test->other_controls.end()) {
-    map.Problem("control", absl::StrCat(Quoted(control.name), " cannot drive ", test->name,
-                                        "; it is driven by ", test->control,
-                                        test->other_controls.empty() ? "" : " or ",
-                                        absl::StrJoin(test->other_controls, " or ")));
-    control.name.clear();
+  if (!rules.precomputed && test != nullptr && !control.name.empty()) {
+    std::vector<std::string> controls = {test->control};
+    controls.insert(controls.end(), test->other_controls.begin(), test->other_controls.end());
+    if (!test->stress_control.empty()) controls.push_back(test->stress_control);
+    if (std::find(controls.begin(), controls.end(), control.name) == controls.end()) {
+      map.Problem("control", absl::StrCat(Quoted(control.name), " cannot drive ", test->name,
+                                          "; it is driven by ", absl::StrJoin(controls, " or ")));
+      control.name.clear();
+    }
   }
   return control;
 }
@@ -103,6 +105,36 @@ bool Comparable(const MapReader& map, const std::string& name, const ControlSpec
   if (message.empty()) return true;
   map.problems().Add(map.LineOf("observables"), map.PathOf(key), message);
   return false;
+}
+
+// What the test holds says nothing of any parameter.
+void CheckFree(const MapReader& map, const std::string& name, const ControlSpec& control,
+               const Experiment& experiment) {
+  if (!IsHeld(experiment.test, experiment.settings, control.name, name)) return;
+  map.problems().Add(map.LineOf("observables"), map.PathOf("observables." + name),
+                     absl::StrCat("is held by ", experiment.test,
+                                  ", or given by its control: it says nothing of any parameter; "
+                                  "remove it"),
+                     "held");
+}
+
+// Excursions of less than four noise are no loading.
+void CheckNoiseOf(const MapReader& map, const ControlSpec& control, const Experiment& experiment) {
+  if (!control.noise || experiment.control.empty()) return;
+  const auto [low, high] =
+      std::minmax_element(experiment.control.begin(), experiment.control.end());
+  const double range =
+      std::max(*high, experiment.control_start) - std::min(*low, experiment.control_start);
+  if (kNoiseThatTurns * *control.noise < range) return;
+  map.Problem("control",
+              absl::StrCat("noise of ", InWords(control.name, *control.noise),
+                           " swallows the path: "
+                           "what is below ",
+                           kNoiseThatTurns,
+                           " times that is taken for noise, and "
+                           "the readings go over ",
+                           InWords(control.name, range), " in all; see to its unit"),
+              "control_noise");
 }
 
 void CheckPath(const MapReader& map, const LaboratoryTable& table, const dem::TestInfo* test,
@@ -160,6 +192,9 @@ void CheckRange(const LaboratoryTable& table, const dem::TestInfo& test, const C
 // Loading starts where consolidation ends: strains count from there, stresses from the start
 // pressure.
 double StartOf(const std::string& control, const Experiment& experiment) {
+  if (control == "axial_stress" && experiment.initial_stress) {
+    return experiment.initial_stress->axial;
+  }
   const dem::ObservableInfo* info = dem::FindObservable(control);
   const auto pressure = experiment.settings.find("confining_pressure");
   const bool stress = info != nullptr && info->unit == "Pa";
@@ -167,12 +202,21 @@ double StartOf(const std::string& control, const Experiment& experiment) {
   return 0;
 }
 
+// Missing readings as the last one before, to divide the loading by.
+std::vector<double> Filled(std::vector<double> values) {
+  const auto known = [](double v) { return std::isfinite(v); };
+  const auto first = std::find_if(values.begin(), values.end(), known);
+  double last = first != values.end() ? *first : 0;
+  for (double& value : values) last = value = known(value) ? value : last;
+  return values;
+}
+
 // The observable whose peak divides the loading, if it was measured.
 std::vector<double> Strength(const Experiment& experiment) {
   for (const char* name :
        {"q_over_p", "stress_ratio", "deviatoric_stress", "shear_stress_ratio", "shear_stress"}) {
     for (const MeasuredObservable& observable : experiment.observables) {
-      if (observable.name == name && !observable.values.empty()) return observable.values;
+      if (observable.name == name && !observable.values.empty()) return Filled(observable.values);
     }
   }
   return {};
@@ -180,7 +224,7 @@ std::vector<double> Strength(const Experiment& experiment) {
 
 std::vector<double> Volume(const Experiment& experiment) {
   for (const MeasuredObservable& observable : experiment.observables) {
-    if (observable.name == "volumetric_strain") return observable.values;
+    if (observable.name == "volumetric_strain") return Filled(observable.values);
   }
   return {};
 }
@@ -197,15 +241,25 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
   for (const ObservableSpec& spec : specs) {
     if (rules.measured) wanted.push_back(spec.name);
   }
-  const auto table = LaboratoryTable::Read(experiment_map, wanted, rules.precomputed, context);
+  auto table = LaboratoryTable::Read(experiment_map, wanted, rules.precomputed, context);
+  if (table && !control.name.empty()) {
+    experiment.rows_without_control = static_cast<int>(table->KeepRowsWith(control.name, context));
+  }
 
   for (const ObservableSpec& spec : specs) {
     if (!Comparable(experiment_map, spec.name, control, rules, test)) continue;
+    if (context.is_new() && !rules.precomputed)
+      CheckFree(experiment_map, spec.name, control, experiment);
     MeasuredObservable observable{.name = spec.name, .values = {}, .sd = {}};
     const bool given = table && (rules.measured || table->Has(spec.name));
     const std::vector<double> raw = given ? table->Raw(spec.name, context) : std::vector<double>();
     if (given) {
       observable.values = table->ToModel(spec.name, raw, context);
+      if (!raw.empty() &&
+          std::all_of(raw.begin(), raw.end(), [](double v) { return std::isnan(v); })) {
+        context.problems().AddIn(table->path(), 0, table->ColumnOf(spec.name),
+                                 "holds no reading in any of its rows");
+      }
     }
     ReadNoise(experiment_map, spec.name, spec.node,
               {control.name, rules.noise_needed && rules.measured, rules.measured},
@@ -214,7 +268,6 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
     experiment.observables.push_back(std::move(observable));
   }
   if (!table) return;
-  CheckStressesOf(experiment, *table, context);
 
   const std::size_t readings = table->rows();
   const std::size_t before = context.problems().size();
@@ -229,10 +282,11 @@ void ReadMeasurements(MapReader& experiment_map, const MeasurementRules& rules,
   if (test != nullptr && !rules.precomputed) {
     CheckRange(*table, *test, control, experiment.control, context);
   }
-  const ControlPath path =
-      test != nullptr && test->separate_points
-          ? AsRead(experiment.control)
-          : CleanControl(experiment.control, experiment.control_start, control.noise);
+  if (context.is_new()) CheckNoiseOf(experiment_map, control, experiment);
+  const ControlPath path = test != nullptr && test->separate_points
+                               ? AsRead(experiment.control)
+                               : CleanControl(experiment.control, experiment.control_start,
+                                              control.noise, context.by_first_rules());
   if (!control.name.empty()) CheckPath(experiment_map, *table, test, control, path);
   experiment.path = path.points;
   experiment.segment =

@@ -14,6 +14,7 @@
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/model/range.h"
+#include "server/campaign/model/words.h"
 
 namespace calib::campaign {
 namespace {
@@ -276,7 +277,7 @@ void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& ca
   MapReader map(*node, campaign_map.PathOf("model"), campaign_map.problems());
   if (map.Has("precomputed")) {
     map.Ignore({"precomputed", "contact", "effects", "user_effects", "density", "materials",
-                "pairs", "fixed"});  // read with the experiments
+                "pairs", "fixed", "shear_unloading"});  // read with the experiments
     if (map.Has("user_effects")) {
       map.Problem("user_effects",
                   "acts on runs of this program's DEM; runs made elsewhere (precomputed) cannot be "
@@ -292,6 +293,8 @@ void ReadModel(MapReader& campaign_map, const ReadContext& context, Campaign& ca
   if (map.Require("contact", "one of " + Listed(contacts)) != nullptr) {
     model.contact = map.Choice("contact", contacts).value_or("");
   }
+  model.shear_unloading =
+      map.Choice("shear_unloading", kShearUnloadingWords).value_or(model.shear_unloading);
   ReadUserEffects(map, context, model);
   ReadEffects(map, context, model);
   model.density =

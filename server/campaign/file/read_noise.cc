@@ -33,11 +33,19 @@ std::string UnitOf(const std::string& name) {
   return info != nullptr ? info->unit : "1";
 }
 
+double LargestReading(const std::vector<double>& readings) {
+  double largest = 0;
+  for (const double reading : readings) {
+    if (!std::isnan(reading)) largest = std::max(largest, std::abs(reading));
+  }
+  return largest;
+}
+
 // First reading that has no size to scale an error with; nullopt when all keep clear of zero.
 std::optional<std::size_t> ReadingAtZero(const std::vector<double>& raw) {
-  double largest = 0;
-  for (const double value : raw) largest = std::max(largest, std::abs(value));
+  const double largest = LargestReading(raw);
   for (std::size_t i = 0; i < raw.size(); ++i) {
+    if (std::isnan(raw[i])) continue;
     const bool crosses = i > 0 && raw[i] * raw[i - 1] < 0;
     if (std::abs(raw[i]) <= kNextToNothing * largest || crosses) return i;
   }
@@ -67,12 +75,16 @@ std::optional<NoiseSpec> ReadSpec(MapReader& noise, const std::string& name) {
 }
 
 std::vector<double> FromColumn(const NoiseSpec& spec, const std::string& name,
-                               const LaboratoryTable& table, ReadContext& context) {
+                               const LaboratoryTable& table, const std::vector<double>& raw,
+                               ReadContext& context) {
   std::vector<double> sd = table.RawColumn(spec.column, name, context);
   for (std::size_t i = 0; i < sd.size(); ++i) {
-    if (sd[i] <= 0) {
+    if (std::isnan(raw[i])) {
+      sd[i] = std::nan("");
+    } else if (!(sd[i] > 0)) {
       context.problems().AddIn(table.path(), table.LineOf(i), spec.column,
-                               "a standard deviation has to be greater than 0");
+                               std::isnan(sd[i]) ? "is missing beside a reading"
+                                                 : "a standard deviation has to be greater than 0");
     }
   }
   return sd;
@@ -104,6 +116,12 @@ std::string WhyNoCovariance(const Eigen::MatrixXd& matrix) {
 // Numbers of a square table without a header, row by row; one problem for what is wrong first.
 Eigen::MatrixXd ReadCovariance(const MapReader& noise, const std::string& path,
                                std::size_t readings, double factor, ReadContext& context) {
+  if (const std::size_t most = context.limits().covariance; readings > most) {
+    noise.Problem("covariance",
+                  absl::StrCat("is of ", readings, " readings, and this server factorises at most ",
+                               most, " (calibd --max-covariance): correlation_length costs less"));
+    return {};
+  }
   const std::string* text = context.ReadNamedFile(noise, "covariance", path);
   if (text == nullptr) return {};
   const auto n = static_cast<Eigen::Index>(readings);
@@ -156,7 +174,7 @@ Eigen::MatrixXd ReadCovariance(const MapReader& noise, const std::string& path,
 std::vector<double> StandardDeviations(const NoiseSpec& spec, const MapReader& noise,
                                        const std::string& name, const LaboratoryTable& table,
                                        const std::vector<double>& raw, ReadContext& context) {
-  if (!spec.column.empty()) return FromColumn(spec, name, table, context);
+  if (!spec.column.empty()) return FromColumn(spec, name, table, raw, context);
   const NoiseLaw law = LawOf(spec);
   if (const auto zero = ReadingAtZero(raw); !law.absolute && law.floor == 0 && zero) {
     noise.Problem(
@@ -174,10 +192,9 @@ std::vector<double> StandardDeviations(const NoiseSpec& spec, const MapReader& n
 
 void RefuseZeroReadings(const MapReader& experiment, const std::string& name,
                         const LaboratoryTable& table, const std::vector<double>& raw) {
-  double largest = 0;
-  for (const double value : raw) largest = std::max(largest, std::abs(value));
+  const double largest = LargestReading(raw);
   for (std::size_t i = 0; i < raw.size(); ++i) {
-    if (std::abs(raw[i]) > kNextToNothing * largest) continue;
+    if (std::isnan(raw[i]) || std::abs(raw[i]) > kNextToNothing * largest) continue;
     experiment.problems().Add(experiment.LineOf("observables"),
                               experiment.PathOf("observables." + name),
                               absl::StrCat("is zero in ", table.path(), ":", table.LineOf(i),
@@ -189,10 +206,30 @@ void RefuseZeroReadings(const MapReader& experiment, const std::string& name,
 
 bool BelowRounding(const std::vector<double>& sd, const std::vector<double>& readings) {
   constexpr double kRounding = 1e-14;
-  double largest = 0;
-  for (const double reading : readings) largest = std::max(largest, std::abs(reading));
+  const double largest = LargestReading(readings);
   return std::any_of(sd.begin(), sd.end(),
                      [largest](double s) { return s > 0 && s < kRounding * largest; });
+}
+
+// The covariance of the readings that there are, as one of all rows.
+void TakeCovariance(const MapReader& noise, const NoiseSpec& spec, const std::string& name,
+                    const LaboratoryTable& table, const std::vector<double>& raw,
+                    ReadContext& context, MeasuredObservable& observable) {
+  const std::vector<Eigen::Index> rows = RowsRead(observable);
+  const Eigen::MatrixXd read =
+      ReadCovariance(noise, spec.covariance, rows.size(), table.Factor(name), context);
+  if (read.size() == 0) return;
+  const auto n = static_cast<Eigen::Index>(raw.size());
+  observable.covariance.setConstant(n, n, std::nan(""));
+  observable.covariance(rows, rows) = read;
+  for (const Eigen::Index i : rows) {
+    const double slope = table.Slope(name, raw[static_cast<std::size_t>(i)]);
+    observable.covariance.row(i) *= slope;
+    observable.covariance.col(i) *= slope;
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    observable.sd.push_back(std::sqrt(observable.covariance(i, i)));
+  }
 }
 
 }  // namespace
@@ -201,8 +238,7 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
                const NoiseRules& rules, const LaboratoryTable* table,
                const std::vector<double>& raw, ReadContext& context,
                MeasuredObservable& observable) {
-  const bool readable = table != nullptr && std::none_of(raw.begin(), raw.end(),
-                                                         [](double v) { return std::isnan(v); });
+  const bool readable = table != nullptr && !raw.empty();
   if (!rules.noise_needed && rules.measured && readable)
     RefuseZeroReadings(experiment, name, *table, raw);
   const std::string path = experiment.PathOf("observables." + name);
@@ -222,17 +258,7 @@ void ReadNoise(const MapReader& experiment, const std::string& name, const YamlN
         noise->Problem("correlation_length", "is part of the covariance already; remove it");
       }
       if (spec && readable && !spec->covariance.empty()) {
-        observable.covariance =
-            ReadCovariance(*noise, spec->covariance, raw.size(), table->Factor(name), context);
-        const auto n = observable.covariance.rows();
-        for (Eigen::Index i = 0; i < n; ++i) {
-          const double slope = table->Slope(name, raw[static_cast<std::size_t>(i)]);
-          observable.covariance.row(i) *= slope;
-          observable.covariance.col(i) *= slope;
-        }
-        for (Eigen::Index i = 0; i < n; ++i) {
-          observable.sd.push_back(std::sqrt(observable.covariance(i, i)));
-        }
+        TakeCovariance(*noise, *spec, name, *table, raw, context, observable);
       } else if (spec && readable) {
         observable.sd = StandardDeviations(*spec, *noise, name, *table, raw, context);
         if (BelowRounding(observable.sd, raw)) {

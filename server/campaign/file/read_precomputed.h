@@ -9,8 +9,4 @@ namespace calib::campaign {
 /// are incomplete keep NaN and so count as diverged.
 void ReadPrecomputed(MapReader& campaign_map, ReadContext& context, Campaign& campaign);
 
-/// A sentence where rows of the parameter table hold exactly what another one does; empty
-/// otherwise. Pure.
-std::vector<std::string> RepeatedRunWarnings(const Campaign& campaign);
-
 }  // namespace calib::campaign

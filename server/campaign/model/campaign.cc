@@ -57,6 +57,14 @@ std::vector<double> TravelledControl(const Experiment& experiment, double correl
   return travelled;
 }
 
+std::vector<Eigen::Index> RowsRead(const MeasuredObservable& observable) {
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0; i < observable.values.size(); ++i) {
+    if (!std::isnan(observable.values[i])) rows.push_back(static_cast<Eigen::Index>(i));
+  }
+  return rows;
+}
+
 double ErrorOf(const NoiseLaw& law, double value) {
   return law.absolute ? *law.absolute : std::hypot(law.relative * value, law.floor);
 }
@@ -109,7 +117,8 @@ inference::DataSet MakeDataSet(const Campaign& campaign, Role role) {
     for (std::size_t i = 0; i < experiment.control.size(); ++i) {
       for (std::size_t j = 0; j < experiment.observables.size(); ++j) {
         const MeasuredObservable& observable = experiment.observables[j];
-        if (observable.values.empty()) continue;  // to be predicted
+        if (observable.values.empty()) continue;         // to be predicted
+        if (std::isnan(observable.values[i])) continue;  // missing
         data.readings.push_back({.experiment = static_cast<int>(e),
                                  .observable = static_cast<int>(j),
                                  .load_step = static_cast<int>(i),
@@ -125,7 +134,9 @@ inference::DataSet MakeDataSet(const Campaign& campaign, Role role) {
       }
       const Eigen::MatrixXd& covariance = experiment.observables[j].covariance;
       if (covariance.size() > 0) {
-        data.covariances.push_back({static_cast<int>(e), static_cast<int>(j), covariance});
+        const std::vector<Eigen::Index> rows = RowsRead(experiment.observables[j]);
+        data.covariances.push_back(
+            {static_cast<int>(e), static_cast<int>(j), Eigen::MatrixXd(covariance(rows, rows))});
       }
     }
   }

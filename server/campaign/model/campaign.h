@@ -38,19 +38,27 @@ double ErrorOf(const NoiseLaw& law, double value);
 
 struct MeasuredObservable {
   std::string name;
-  /// One per reading, SI, compression positive, strains logarithmic; none where the observable is
-  /// only predicted (method table).
+  /// One per row of the file, SI, compression positive, strains logarithmic, NaN where a reading is
+  /// missing; none where the observable is only predicted (method table).
   std::vector<double> values;
-  std::vector<double> sd;         ///< one per reading, > 0 (may be empty with ess_target)
+  /// One per row, > 0, NaN where a reading is missing (may be empty with ess_target).
+  std::vector<double> sd;
   double correlation_length = 0;  ///< in the control; 0: independent
-  /// Covariance of the errors of all readings, in the square of their SI unit, sd^2 its diagonal;
-  /// empty: sd and correlation_length say it all.
+  /// Covariance of the errors of all rows, in the square of their SI unit, sd^2 its diagonal, NaN
+  /// where a reading is missing; empty: sd and correlation_length say it all.
   Eigen::MatrixXd covariance = {};
   double ess_weight = 1;  ///< w_j of ess_target
   /// What sd follows from, and would where nothing is measured yet; empty: the file states no such
   /// law (a column, a covariance, nothing).
   std::optional<NoiseLaw> noise = {};
 };
+
+/// Indices of the rows in which it was measured.
+std::vector<Eigen::Index> RowsRead(const MeasuredObservable& observable);
+/// How many these are.
+inline std::size_t ReadingsOf(const MeasuredObservable& observable) {
+  return RowsRead(observable).size();
+}
 
 /// A specimen: the packing file's content (path as written, parsed), or a recipe.
 struct PackingFile {
@@ -101,7 +109,8 @@ struct Experiment {
   /// Where loading starts: 0 for strains, the start pressure for stresses.
   double control_start = 0;
   std::vector<dem::ControlPoint> path;  ///< load_step = index of the reading
-  std::vector<double> control;  ///< measured control at each reading (as compared, logarithmic)
+  std::vector<double> control;   ///< measured control at each reading (as compared, logarithmic)
+  int rows_without_control = 0;  ///< of the file, left out
   /// Loading stage of each reading: "initial_loading", "unload_1", "reload_1", ...
   std::vector<std::string> segment;
   std::vector<MeasuredObservable> observables;

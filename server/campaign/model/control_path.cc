@@ -13,8 +13,10 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
+constexpr double kMostNoise = 2e-2;  // of the range of the control, as the header says
+
 double Threshold(const std::vector<double>& readings, double start, std::optional<double> noise) {
-  if (noise) return 4 * *noise;
+  if (noise) return kNoiseThatTurns * *noise;
   const auto [low, high] = std::minmax_element(readings.begin(), readings.end());
   const double range = std::max(*high, start) - std::min(*low, start);
   std::vector<double> second;
@@ -24,7 +26,19 @@ double Threshold(const std::vector<double>& readings, double start, std::optiona
   // A second difference of independent errors has the variance 6 sd^2; 1.4826 median|.| is the sd
   // of a Gaussian.
   const double sd = 1.4826 * Median(second) / std::sqrt(6.0);
-  return std::clamp(6 * sd, 1e-3 * range, 2e-2 * range);
+  return std::clamp(6 * sd, 1e-3 * range, kMostNoise * range);
+}
+
+// Whether the first turning point is a first reading that is merely off.
+bool BeginsWithOffset(const std::vector<double>& readings, double start,
+                      const std::vector<std::size_t>& turning) {
+  if (turning.empty() || turning.front() != 0) return false;
+  const auto [low, high] = std::minmax_element(readings.begin(), readings.end());
+  const double range = std::max(*high, start) - std::min(*low, start);
+  const double sign = readings.front() >= start ? 1 : -1;
+  const bool alone = std::none_of(readings.begin() + 1, readings.end(),
+                                  [&](double value) { return sign * (value - start) > 0; });
+  return alone && std::abs(readings.front() - start) <= kMostNoise * range;
 }
 
 // Zigzag: an extreme becomes a turning point once the control has come back from it by more than
@@ -188,11 +202,14 @@ std::size_t SteadyFrom(const PrimaryLoading& primary, std::size_t first) {
 }  // namespace
 
 ControlPath CleanControl(const std::vector<double>& readings, double start,
-                         std::optional<double> noise) {
+                         std::optional<double> noise, bool offset_is_loading) {
   ControlPath path;
   if (readings.empty()) return path;
   path.reversal = Threshold(readings, start, noise);
   path.turning = TurningPoints(readings, start, path.reversal);
+  if (!offset_is_loading && BeginsWithOffset(readings, start, path.turning)) {
+    path.turning.erase(path.turning.begin());
+  }
   std::vector<double> values = {start};  // the start of loading in front
   values.insert(values.end(), readings.begin(), readings.end());
   std::size_t first = 0;

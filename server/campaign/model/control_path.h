@@ -19,14 +19,19 @@ struct ControlPath {
   double reversal = 0;               ///< smallest excursion that counted as a turning point
 };
 
+/// Excursions of the control below this many sd of its stated noise are noise [-].
+inline constexpr double kNoiseThatTurns = 4;
+
 /// Cleans a measured control; loading starts at `start` (0 for strains, the start pressure for
 /// stresses). Excursions smaller than the reversal threshold are noise; between turning points the
 /// readings are made monotone by isotonic regression, so that readings may come to stand at the
 /// same control and still each be a state. The threshold is 4 noise when noise (standard deviation)
 /// is given; otherwise six robust standard deviations of the second differences, held between 0.1 %
-/// and 2 % of the range. Pure; readings finite.
+/// and 2 % of the range. A first reading on the other side of the start than all that follow, by at
+/// most 2 % of the range, is an offset of the gauge and no loading, unless offset_is_loading. Pure;
+/// readings finite.
 ControlPath CleanControl(const std::vector<double>& readings, double start,
-                         std::optional<double> noise);
+                         std::optional<double> noise, bool offset_is_loading = false);
 
 /// The readings as they are, each a run of its own: for controls that are no path. Readings count
 /// as equally far apart.

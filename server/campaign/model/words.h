@@ -6,6 +6,7 @@
 #include <optional>
 #include <string_view>
 
+#include "dem/model/model.h"
 #include "server/campaign/model/word_table.h"
 
 namespace calib::campaign {
@@ -22,6 +23,12 @@ inline constexpr std::array kMethodWords = {
 const char* ToString(Method method);
 /// True for the two filters, whose posterior is that of weighted samples.
 bool IsFilter(Method method);
+
+/// Of a campaign's model: what becomes of a shear force where its stiffness falls.
+inline constexpr std::array kShearUnloadingWords = {
+    Word{dem::ShearUnloading::kAsPublished, "as_published"},
+    Word{dem::ShearUnloading::kRescaled, "rescaled"},
+};
 
 /// What the data of an experiment are for: the fit, or judging it.
 enum class Role { kCalibrate, kValidate };

@@ -53,6 +53,10 @@ absl::StatusOr<int> List(const CommonOptions& common) {
   std::cout << (campaigns.empty()
                     ? "There are no campaigns yet; `calibctl submit FILE` makes one.\n"
                     : table.ToString());
+  for (const v1::CampaignStatus& s : campaigns) {
+    if (!s.problem().empty())
+      std::cout << report::Wrapped(s.campaign() + ": " + s.problem(), "! ", "  ");
+  }
   return kDone;
 }
 

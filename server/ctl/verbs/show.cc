@@ -14,6 +14,7 @@
 #include "server/ctl/verb.h"
 #include "server/messages/read_words.h"
 #include "server/report/documents/json_documents.h"
+#include "server/report/text/text_table.h"
 
 namespace calib::ctl {
 namespace {
@@ -70,6 +71,15 @@ std::string Concluded(const std::vector<v1::Finding>& findings) {
   return text;
 }
 
+// Of the last complete iteration; none before there is one.
+absl::StatusOr<std::vector<std::string>> WarningsOf(client::Client& client,
+                                                    const std::string& campaign) {
+  const auto posterior = client.GetPosterior(campaign, std::nullopt);
+  if (absl::IsFailedPrecondition(posterior.status())) return std::vector<std::string>();
+  RETURN_IF_ERROR(posterior.status());
+  return std::vector<std::string>(posterior->warnings().begin(), posterior->warnings().end());
+}
+
 void Declare(OptionList& list, ShowOptions& options) { list.Campaign(options.campaign); }
 
 absl::StatusOr<int> Show(const CommonOptions& common, const ShowOptions& options) {
@@ -78,11 +88,15 @@ absl::StatusOr<int> Show(const CommonOptions& common, const ShowOptions& options
   ASSIGN_OR_RETURN(const auto status, client.Show(options.campaign));
   ASSIGN_OR_RETURN(const auto campaigns, client.List());
   ASSIGN_OR_RETURN(const auto findings, client.Findings(options.campaign));
+  ASSIGN_OR_RETURN(const auto warnings, WarningsOf(client, options.campaign));
   if (common.json) {
-    std::cout << report::ShownJson(status, ChildrenOf(campaigns, options.campaign), findings);
+    std::cout << report::ShownJson(status, ChildrenOf(campaigns, options.campaign), findings,
+                                   warnings);
     return kDone;
   }
-  std::cout << StatusText(status) << Family(status, campaigns) << Concluded(findings);
+  std::cout << StatusText(status);
+  for (const std::string& warning : warnings) std::cout << report::Wrapped(warning, "! ", "  ");
+  std::cout << Family(status, campaigns) << Concluded(findings);
   ASSIGN_OR_RETURN(const auto log, client.GetLog(options.campaign));
   constexpr std::size_t kShown = 10;
   const std::size_t first = log.size() > kShown ? log.size() - kShown : 0;

@@ -1,14 +1,17 @@
 #include <iostream>
 #include <string>
 
-#include "server/campaign/file/read_precomputed.h"
-#include "server/campaign/model/noise_check.h"
+#include "absl/strings/str_cat.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/checks/experiment_summary.h"
+#include "server/campaign/checks/warning.h"
 #include "server/campaign/model/specimen_notes.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/source_files.h"
 #include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
+#include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
 
 namespace calib::ctl {
@@ -18,6 +21,33 @@ struct ValidateOptions {
   std::string file;
 };
 
+std::string Value(const std::string& name, double value) {
+  const dem::ObservableInfo* info = dem::FindObservable(name);
+  return report::NumberWithUnit(value, name, info != nullptr ? info->unit : "1");
+}
+
+// What was read: the first look at a new file.
+std::string Shown(const campaign::ExperimentSummary& summary) {
+  std::string text = absl::StrCat("\n", summary.name);
+  if (!summary.control.empty()) {
+    absl::StrAppend(&text, ": ", summary.control, " from ", Value(summary.control, summary.from),
+                    " to ", Value(summary.control, summary.to), ", ", summary.turning_points,
+                    " turning points");
+  }
+  if (summary.grains > 0) {
+    absl::StrAppend(&text, "; ", summary.grains, " grains, d50 ",
+                    report::NumberWithUnit(summary.d50, "d50", "m"), ", porosity ",
+                    report::Number(summary.porosity, 3));
+  }
+  report::TextTable table(
+      {"<observable", "readings", "missing", "first", "last", "sd from", "sd to"});
+  for (const campaign::ObservableSummary& o : summary.observables) {
+    table.AddRow({o.name, absl::StrCat(o.readings), absl::StrCat(o.missing), Value(o.name, o.first),
+                  Value(o.name, o.last), Value(o.name, o.sd_min), Value(o.name, o.sd_max)});
+  }
+  return text + "\n" + table.ToString();
+}
+
 void Declare(OptionList& list, ValidateOptions& options) { list.CampaignFile(options.file); }
 
 absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions& options) {
@@ -25,24 +55,29 @@ absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions&
   if (!source) return kBadInput;
   const campaign::Campaign& campaign = source->outcome.campaign;
   const std::vector<std::string> notes = campaign::SpecimenNotes(campaign);
-  std::vector<std::string> warnings = campaign::NoiseWarnings(campaign);
-  for (std::string& warning : campaign::RepeatedRunWarnings(campaign)) {
-    warnings.push_back(std::move(warning));
+  std::vector<campaign::ExperimentSummary> summaries;
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    summaries.push_back(campaign::SummaryOf(experiment));
   }
   if (common.json) {
-    std::cout << report::ProblemsJson({}, warnings, notes);
+    std::cout << report::ProblemsJson({}, source->outcome.warnings, notes, summaries);
     return kDone;
   }
   std::size_t readings = 0;
-  for (const campaign::Experiment& experiment : campaign.experiments) {
-    readings += experiment.control.size() * experiment.observables.size();
+  for (const campaign::ExperimentSummary& summary : summaries) {
+    for (const auto& observable : summary.observables) {
+      readings += static_cast<std::size_t>(observable.readings);
+    }
   }
   std::cout << options.file << " is good: " << campaign.parameters.size() << " parameters, "
             << campaign.experiments.size() << " experiment(s), " << readings
             << " measured numbers, " << campaign.samples << " samples in each of at most "
             << campaign.max_iterations << " iteration(s).\n";
   for (const std::string& note : notes) std::cout << report::Wrapped(note, "  ", "  ");
-  for (const std::string& warning : warnings) std::cout << report::Wrapped(warning, "! ", "  ");
+  for (const campaign::Warning& warning : source->outcome.warnings) {
+    std::cout << report::Wrapped(campaign::Sentence(warning), "! ", "  ");
+  }
+  for (const campaign::ExperimentSummary& summary : summaries) std::cout << Shown(summary);
   return kDone;
 }
 

@@ -113,6 +113,8 @@ std::string TestsJson() {
     for (const dem::MeshInfo& m : t.meshes) {
       meshes.push_back({{"name", m.name}, {"description", m.description}});
     }
+    std::vector<std::string> other_controls = t.other_controls;
+    if (!t.stress_control.empty()) other_controls.push_back(t.stress_control);
     list.push_back({{"name", t.name},
                     {"description", t.description},
                     {"parameters", Parameters(t.settings)},
@@ -120,6 +122,7 @@ std::string TestsJson() {
                     {"observables", t.observables},
                     {"observable_details", ObservableDetails(t.observables)},
                     {"control", t.control},
+                    {"other_controls", other_controls},
                     {"may_reverse", t.may_reverse},
                     {"reference", t.reference}});
   }

@@ -53,7 +53,8 @@ Json Status(const v1::CampaignStatus& s) {
           {"created_unix_ms", s.created_unix_ms()},
           {"parent", s.parent().empty() ? Json(nullptr) : Json(s.parent())},
           {"purpose", s.purpose().empty() ? Json(nullptr) : Json(s.purpose())},
-          {"effects", std::vector<std::string>(s.effects().begin(), s.effects().end())}};
+          {"effects", std::vector<std::string>(s.effects().begin(), s.effects().end())},
+          {"problem", s.problem().empty() ? Json(nullptr) : Json(s.problem())}};
 }
 
 Json Emulator(const v1::Posterior& p) {
@@ -351,8 +352,10 @@ std::string StatusJson(const v1::CampaignStatus& status) { return Dump(Status(st
 
 std::string ShownJson(const v1::CampaignStatus& status,
                       const std::vector<v1::CampaignStatus>& children,
-                      const std::vector<v1::Finding>& findings) {
+                      const std::vector<v1::Finding>& findings,
+                      const std::vector<std::string>& warnings) {
   Json json = Status(status);
+  json["warnings"] = warnings;
   json["children"] = Json::array();
   for (const v1::CampaignStatus& child : children) {
     json["children"].push_back({{"campaign", child.campaign()},
@@ -455,17 +458,6 @@ std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers) {
                     {"engine_version", w.engine_version()}});
   }
   return Dump(list);
-}
-
-std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
-                         const std::vector<std::string>& warnings,
-                         const std::vector<std::string>& notes) {
-  Json list = Json::array();
-  for (const campaign::Problem& p : problems) {
-    list.push_back({{"file", p.file}, {"line", p.line}, {"key", p.key}, {"message", p.message}});
-  }
-  return Dump(
-      {{"valid", problems.empty()}, {"problems", list}, {"warnings", warnings}, {"notes", notes}});
 }
 
 std::string DataJson(const campaign::Campaign& campaign) {

@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "dem/formula/user_effect.h"
-#include "server/campaign/file/problem_list.h"
+#include "server/campaign/checks/experiment_summary.h"
+#include "server/campaign/checks/warning.h"
+#include "server/campaign/file/text/problem_list.h"
 #include "server/campaign/model/campaign.h"
 #include "server/report/views/campaign_view.h"
 #include "server/report/views/comparison.h"
@@ -25,10 +27,11 @@ std::string ComparisonJson(const std::string& campaign, const Comparison& compar
 std::string SensitivityJson(const std::string& campaign, const Sensitivity& sensitivity);
 std::string ModelsJson(const ModelComparison& comparison);
 std::string StatusJson(const v1::CampaignStatus& status);
-/// With what comes from it directly and what was concluded about it.
+/// With what comes from it directly, what was concluded about it and the warnings of its posterior.
 std::string ShownJson(const v1::CampaignStatus& status,
                       const std::vector<v1::CampaignStatus>& children,
-                      const std::vector<v1::Finding>& findings);
+                      const std::vector<v1::Finding>& findings,
+                      const std::vector<std::string>& warnings);
 std::string StatusListJson(const std::vector<v1::CampaignStatus>& statuses);
 /// parameters: names in the order of each sample's values.
 std::string SamplesJson(const std::string& campaign, const std::vector<std::string>& parameters,
@@ -38,10 +41,12 @@ std::string StatesJson(const std::string& campaign, int sample,
 /// A table of states (experiment,load_step,...) row by row.
 std::string StateTableJson(const std::string& csv);
 std::string WorkersJson(const std::vector<v1::WorkerInfo>& workers);
-/// warnings, and notes on what follows without being said: of a campaign that is valid.
+/// What `validate` answers: problems, or of a campaign that is valid warnings, notes on what
+/// follows without being said, and what was read of each experiment, in people's units.
 std::string ProblemsJson(const std::vector<campaign::Problem>& problems,
-                         const std::vector<std::string>& warnings = {},
-                         const std::vector<std::string>& notes = {});
+                         const std::vector<campaign::Warning>& warnings = {},
+                         const std::vector<std::string>& notes = {},
+                         const std::vector<campaign::ExperimentSummary>& experiments = {});
 /// The measurements as compared: SI, logarithmic strains, standard deviations.
 std::string DataJson(const campaign::Campaign& campaign);
 

@@ -180,8 +180,8 @@ double RmsNoise(const CampaignView& view, const std::string& experiment,
   for (const campaign::Experiment& e : view.campaign.experiments) {
     for (const campaign::MeasuredObservable& o : e.observables) {
       if (e.name != experiment || o.name != observable) continue;
-      for (std::size_t i = 0; i < o.values.size(); ++i) {
-        squares += std::pow(ErrorOf(view, o, i), 2);
+      for (const Eigen::Index i : campaign::RowsRead(o)) {
+        squares += std::pow(ErrorOf(view, o, static_cast<std::size_t>(i)), 2);
         ++readings;
       }
     }

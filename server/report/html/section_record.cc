@@ -2,6 +2,7 @@
 
 #include "dem/registry/catalog.h"
 #include "server/campaign/model/specimen_notes.h"
+#include "server/campaign/model/words.h"
 #include "server/report/html/sections.h"
 #include "server/report/text/html.h"
 #include "server/report/text/people_units.h"
@@ -69,6 +70,10 @@ std::string RecordSection(const ReportData& data) {
       "<h2>Record</h2>\n<dl>\n" + Entry("campaign", view.status.campaign()) +
       Entry("submitted", DateForPeople(view.status.created_unix_ms())) +
       Entry("model", campaign.precomputed ? "runs made elsewhere" : campaign.model.contact) +
+      Entry("shear at unloading", campaign.precomputed
+                                      ? "–"
+                                      : campaign::WordOf(campaign::kShearUnloadingWords,
+                                                         campaign.model.shear_unloading)) +
       Entry("effects", campaign.precomputed ? "–" : Listed(campaign.model.effects)) +
       Entry("engine", dem::EngineVersion()) + Entry("seed", std::to_string(campaign.seed)) +
       Entry("noise", NoiseSentence(campaign)) +

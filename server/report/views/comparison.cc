@@ -7,7 +7,7 @@
 
 #include "inference/numerics/decompositions.h"
 #include "inference/scatter/chi_squared_law.h"
-#include "server/campaign/model/noise_check.h"
+#include "server/campaign/checks/noise_check.h"
 #include "server/messages/read_words.h"
 #include "server/report/views/residual_group.h"
 #include "server/report/views/setting_trend.h"
@@ -251,7 +251,7 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
   if (judged && view.posterior.has_predictive_p()) {
     comparison.predictive_p = view.posterior.predictive_p();
   }
-  comparison.warnings = campaign::NoiseWarnings(view.campaign);
+  comparison.warnings = campaign::Sentences(campaign::NoiseWarnings(view.campaign));
   ToShares(comparison.by_segment);
   comparison.trends = TrendsOf(view.campaign, comparison.by_segment);
   for (const auto& parameter : view.posterior.parameters()) {

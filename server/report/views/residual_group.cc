@@ -57,11 +57,13 @@ Eigen::MatrixXd AddScatter(const CampaignView& view, const std::vector<double>& 
 // Runs at draws of the posterior differ by their parameters and by their packings; the mean has the
 // first as a whole, and of both what so many runs leave.
 Eigen::MatrixXd OfPrediction(const ObservablePrediction& prediction,
+                             const std::vector<Eigen::Index>& rows,
                              const Eigen::MatrixXd& by_packings) {
-  const double all = prediction.of_runs.trace();
+  const Eigen::MatrixXd of_runs = prediction.of_runs(rows, rows);
+  const double all = of_runs.trace();
   const double packings = by_packings.size() > 0 ? by_packings.trace() : 0;
   const double by_parameters = all > 0 ? std::max(0.0, all - packings) / all : 0;
-  return (by_parameters + 1 / prediction.runs) * prediction.of_runs;
+  return (by_parameters + 1 / prediction.runs) * of_runs;
 }
 
 }  // namespace
@@ -82,7 +84,7 @@ ResidualGroup MakeResidualGroup(const CampaignView& view, const campaign::Experi
   const std::vector<double> distance =
       campaign::TravelledControl(experiment, group.observable->correlation_length);
   for (std::size_t i = 0; i < experiment.control.size(); ++i) {
-    if (!std::isfinite(prediction.mean[i])) continue;
+    if (!std::isfinite(prediction.mean[i]) || std::isnan(group.observable->values[i])) continue;
     group.readings.push_back(i);
     residual.push_back(prediction.mean[i] - group.observable->values[i]);
     sd.push_back(ErrorOf(view, *group.observable, i));
@@ -104,8 +106,9 @@ ResidualGroup MakeResidualGroup(const CampaignView& view, const campaign::Experi
   const Eigen::MatrixXd of_specimen =
       size > 0 ? AddScatter(view, distance, group) : Eigen::MatrixXd();
   if (experiment.role == campaign::Role::kValidate && prediction.of_runs.size() > 0 &&
-      group.readings.size() == experiment.control.size()) {
-    group.of_prediction = OfPrediction(prediction, of_specimen);
+      group.readings.size() == campaign::ReadingsOf(*group.observable)) {
+    group.of_prediction =
+        OfPrediction(prediction, campaign::RowsRead(*group.observable), of_specimen);
   }
   group.model = Eigen::Map<const Eigen::VectorXd>(model.data(), size);
   return group;

@@ -28,12 +28,12 @@ std::string ShapeInWords(const SegmentMisfit& m) {
     const bool grows = (p.size > 0) == (m.to > m.from);
     return fmt::format("model minus measurement {} along the stage", grows ? "grows" : "falls");
   }
-  if (p.shape == ResidualShape::kAmplitude && p.size <= -1) {
-    return "the model goes the other way than the measurement throughout";
-  }
   if (p.shape == ResidualShape::kAmplitude) {
+    // residual = model - measurement = size * model, so that model / measurement = 1 / (1 - size).
+    const double factor = 1 / (1 - p.size);
+    if (factor < 0) return "the model goes the other way than the measurement throughout";
     return fmt::format("the model is {} by the factor {} throughout",
-                       p.size > 0 ? "too large" : "too small", Number(1 + p.size, 3));
+                       factor > 1 ? "too large" : "too small", Number(factor, 3));
   }
   if (p.shape == ResidualShape::kLag)
     return fmt::format("the model answers too {}", p.size > 0 ? "late" : "early");

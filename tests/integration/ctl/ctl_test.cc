@@ -36,6 +36,23 @@ TEST_F(Calibctl, BadInputIsTwoWithOneLinePerProblem) {
   EXPECT_EQ(Call("show c1 --state nowhere").code, 2);
 }
 
+TEST_F(Calibctl, ValidateShowsWhatWasRead) {
+  const Answer words = Call("validate good.yaml");
+  EXPECT_THAT(words.out, HasSubstr("\ntx: axial_strain from "));
+  EXPECT_THAT(words.out, HasSubstr(" turning points; "));
+  const Json json = Call("validate good.yaml --json").json();
+  EXPECT_EQ(json["valid"], true);
+  ASSERT_EQ(json["experiments"].size(), 1U) << json;
+  const Json& experiment = json["experiments"][0];
+  EXPECT_EQ(experiment["name"], "tx");
+  EXPECT_GT(experiment["path"]["to"].get<double>(), experiment["path"]["from"].get<double>());
+  EXPECT_EQ(experiment["path"]["turning_points"], 0);
+  EXPECT_EQ(experiment["observables"][0]["missing"], 0);
+  EXPECT_GT(experiment["observables"][0]["readings"].get<int>(), 1);
+  EXPECT_GT(experiment["grains"].get<int>(), 0);
+  EXPECT_GT(experiment["d50"].get<double>(), 0);
+}
+
 TEST_F(Calibctl, NoServerIsThreeWithinSeconds) {
   const auto begin = std::chrono::steady_clock::now();
   const Answer answer = Call("--server 127.0.0.1:9 list");

@@ -67,7 +67,8 @@ TEST_F(Improve, SaysThatNoiseIsStatedTooSmallAndWhatToTypeNext) {
   Write("small.yaml", Campaign("", "0.002"));
   const Json bold = Call("validate small.yaml --json").json();
   ASSERT_EQ(bold["warnings"].size(), 1U) << bold;
-  EXPECT_NE(bold["warnings"][0].get<std::string>().find("stated too small"), std::string::npos);
+  EXPECT_NE(bold["warnings"][0]["message"].get<std::string>().find("stated too small"),
+            std::string::npos);
   EXPECT_NE(Call("validate small.yaml").out.find("! tx, q_over_p: the readings scatter"),
             std::string::npos)
       << Read("out");

@@ -12,6 +12,7 @@ using testing::GoodFiles;
 using testing::GoodYaml;
 using ::testing::HasSubstr;
 using testing::ProblemsOf;
+using testing::ReaderOf;
 using testing::Spoiled;
 using ::testing::StartsWith;
 
@@ -115,6 +116,9 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{
             "NoSuchContact", "hertz_mindlin\n", "hertz_mindln\n",
             "c.yaml:3: model.contact: 'hertz_mindln' is unknown; did you mean 'hertz_mindlin'?"},
+        Mistake{"ShearUnloadingIsNoWord", "  density: 2650 kg/m^3",
+                "  density: 2650 kg/m^3\n  shear_unloading: rescale",
+                "c.yaml:6: model.shear_unloading: 'rescale' is unknown; did you mean 'rescaled'?"},
         Mistake{"MistypedEffectIsOneProblem", "[rolling_resistance]", "[roling_resistance]",
                 "c.yaml:4: model.effects: 'roling_resistance' is not an effect of this build; did "
                 "you mean "
@@ -458,10 +462,10 @@ TEST(BadCampaigns, ObservableOfAnotherTest) {
 
 TEST(BadCampaigns, ProblemsInDataAndPackingCarryTheirOwnFileAndLine) {
   auto files = GoodFiles();
-  files["data.txt"].replace(files["data.txt"].find("3.7"), 3, "n/a");
+  files["data.txt"].replace(files["data.txt"].find("3.7"), 3, "x.7");
   files["packing.txt"] += "0.001 0.001 0.001 -0.0005 -1\n";
   const std::string problems = ProblemsOf(GoodYaml(), files);
-  EXPECT_THAT(problems, HasSubstr("data.txt:7: ratio: 'n/a' is not a number"));
+  EXPECT_THAT(problems, HasSubstr("data.txt:7: ratio: 'x.7' is not a number"));
   EXPECT_THAT(problems, HasSubstr("packing.txt:22: "));
 }
 
@@ -483,15 +487,17 @@ TEST(BadCampaigns, OverlappingOrFewGrainsInAFileAreRefused) {
             "packing.txt: holds 19 grains, at least 20 are needed\n");
 }
 
-TEST(BadCampaigns, StressesFarBelowTheConfiningPressureAreInAnotherUnit) {
+TEST(BadCampaigns, StressesFarBelowTheConfiningPressureAreWarnedOf) {
   auto files = GoodFiles();
   files["validation.csv"] = "axial_strain,axial_stress\n0.01,0.6\n0.02,0.8\n0.05,0.7\n";
   const std::string yaml =
       Spoiled("{q_over_p: {noise: {relative: 0.05}}}", "{axial_stress: {noise: {relative: 0.05}}}");
-  EXPECT_EQ(ProblemsOf(yaml, files),
-            "validation.csv:2: axial_stress: is at most 0.8 Pa beside a confining pressure of "
-            "500000 Pa; if the column is in another unit, say so, e.g. units: {axial_stress: "
-            "kPa}\n");
+  EXPECT_EQ(ProblemsOf(yaml, files), "");
+  const auto odd = ReadCampaign(yaml, "c.yaml", ReaderOf(files)).warnings;
+  ASSERT_EQ(odd.size(), 1U);
+  EXPECT_EQ(odd[0].kind, WarningKind::kUnit);
+  EXPECT_THAT(Sentence(odd[0]), HasSubstr("tx05, axial_stress: begins at 0.6 Pa, where the test "
+                                          "begins at 500 kPa, the factor 8.333e+05"));
   files["validation.csv"] = "axial_strain,axial_stress\n0.01,6e5\n0.02,8e5\n0.05,7e5\n";
   EXPECT_EQ(ProblemsOf(yaml, files), "");
 }

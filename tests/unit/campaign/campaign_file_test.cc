@@ -52,6 +52,17 @@ TEST(CampaignFile, ReadsEverySection) {
   EXPECT_THAT(outcome.files, ElementsAre("packing.txt", "data.txt", "validation.csv"));
 }
 
+TEST(CampaignFile, TheShearForceAtUnloadingIsChosen) {
+  EXPECT_EQ(Read(GoodYaml()).campaign.model.shear_unloading, dem::ShearUnloading::kAsPublished);
+  const Campaign rescaled =
+      Read(Spoiled("  density: 2650 kg/m^3", "  density: 2650 kg/m^3\n  shear_unloading: rescaled"))
+          .campaign;
+  EXPECT_EQ(rescaled.model.shear_unloading, dem::ShearUnloading::kRescaled);
+  const std::vector<double> values(rescaled.parameters.size(), 0.3);
+  EXPECT_EQ(MakeScenario(rescaled, rescaled.experiments[0], values, 0).model.shear_unloading,
+            dem::ShearUnloading::kRescaled);
+}
+
 // Collisions with what `settings` says of them, measured in impact.csv along `control`.
 std::string Impact(const std::string& settings, const std::string& control) {
   return R"(name: impact

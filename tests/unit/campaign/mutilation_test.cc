@@ -92,5 +92,20 @@ TEST(Mutilation, SmallTextsThatExplode) {
   EXPECT_FALSE(ReadCampaign("", "c.yaml", ReaderOf({})).problems.empty());
 }
 
+TEST(Mutilation, WhatIsNestedTooDeeplyIsSaidAndARuledCommentIsNot) {
+  const auto problem = [](const std::string& text) {
+    const auto problems = ReadCampaign(text, "c.yaml", ReaderOf({})).problems;
+    return problems.empty() ? "" : problems.front().message;
+  };
+  const std::string deep = "is nested too deeply or too large for a campaign file";
+  std::string lists;
+  for (int k = 0; k < 60; ++k) lists += "- ";
+  EXPECT_EQ(problem("name: x\n" + lists + "x\n"), deep);
+  EXPECT_EQ(problem(std::string(60, '{') + "\n"), deep);
+  EXPECT_EQ(problem(std::string(300'000, '\n')), deep);
+  const std::string ruled = "# " + std::string(100, '-') + " priors " + lists + "\n";
+  EXPECT_TRUE(ReadCampaign(ruled + GoodYaml(), "c.yaml", ReaderOf(GoodFiles())).problems.empty());
+}
+
 }  // namespace
 }  // namespace calib::campaign

@@ -106,10 +106,11 @@ TEST(PouredCampaign, AnEffectThatNoTestHasIsRefused) {
         PouredYaml(), {{"effects: [wall_friction]", "effects: [" + name + "]"},
                        {"wall_friction.coefficient: {prior: uniform, min: 0.2, max: 0.9}",
                         std::string(effect) + ": {prior: uniform, min: -0.01, max: 0.01}"}});
-    EXPECT_THAT(ProblemsOf(yaml, Files()),
-                HasSubstr("c.yaml:2: model: effect " + name +
-                          " has no part in any of the experiments: it acts in isotropic, oedometric, "
-                          "triaxial_drained, triaxial_undrained, simple_shear\n"));
+    EXPECT_THAT(
+        ProblemsOf(yaml, Files()),
+        HasSubstr("c.yaml:2: model: effect " + name +
+                  " has no part in any of the experiments: it acts in isotropic, oedometric, "
+                  "triaxial_drained, triaxial_undrained, simple_shear\n"));
   }
   const std::string impacts = absl::StrReplaceAll(
       PouredYaml(),
@@ -157,9 +158,9 @@ TEST(PouredCampaign, AMeshThatDoesNotFitTheGrainsIsRefused) {
   files["silo.stl"] = calib::testing::TextStl(sides);
   EXPECT_THAT(ProblemsOf(WithMesh("{silo: {file: silo.stl, unit: m}}"), files),
               HasSubstr("c.yaml:10: experiments: outlet: mesh silo is 300 m long, the largest "
-                        "grain 0.0044 m: is the mesh's unit right?"));
+                        "grain 0.00439354 m: is the mesh's unit right?"));
   EXPECT_THAT(ProblemsOf(WithMesh("{silo: {file: silo.stl, unit: um}}"), files),
-              HasSubstr("mesh silo is 0.0003 m long, the largest grain 0.0044 m"));
+              HasSubstr("mesh silo is 0.0003 m long, the largest grain 0.00439354 m"));
   const std::string graded =
       absl::StrReplaceAll(WithMesh("{silo: {file: silo.stl, unit: m}}"),
                           {{"{mean: 2 mm, spread: 0.1}", "{cumulative: [[1 mm, 0], [3 mm, 1]]}"}});

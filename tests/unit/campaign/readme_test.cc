@@ -27,8 +27,11 @@ TEST(CampaignReadme, EveryExampleIsAGoodCampaign) {
   files["parameters.csv"] = "sample,E_GPa,km\n0,100,8000\n";
   files["states.csv"] = "sample,step,p_MPa,porosity\n0,0,1,0.4\n0,1,2,0.39\n";
   files["beads.dat"] = "#\te_a\tp\tn\n0.001\t1\t0.4\n0.002\t2\t0.39\n";
+  files["database.csv"] =
+      "# == TESTS ==\ntest_id,kind\nT1,drained\n# == DATA ==\n"
+      "test_id,eps_a[%],eps_v[%],s3[kPa],s1[kPa]\nT1,0,0,50,50\nT1,0.1,,50,66\nT2,0,0,100,100\n";
   const auto blocks = YamlBlocks(CALIB_CAMPAIGN_FILE_REFERENCE);
-  EXPECT_EQ(blocks.size(), 6U);
+  EXPECT_EQ(blocks.size(), 7U);
   for (std::string block : blocks) {
     if (block.rfind("name:", 0) != 0) {  // a part, to be joined to the whole file
       std::string whole = blocks.front();

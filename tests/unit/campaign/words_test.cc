@@ -24,6 +24,7 @@ void ExpectOneWordEach(const WordTable<Enum, N>& table) {
 
 TEST(Words, EachIsItsOwnInverse) {
   ExpectOneWordEach(kMethodWords);
+  ExpectOneWordEach(kShearUnloadingWords);
   ExpectOneWordEach(kRoleWords);
   ExpectOneWordEach(kCampaignStateWords);
   ExpectOneWordEach(kPhaseWords);

@@ -76,6 +76,71 @@ TEST(Json, ComparisonHasTheFieldsOfTheInterface) {
   }
 }
 
+// Numbers in people's units, null where there is none.
+TEST(Json, ValidationSaysWhatWasReadOfEachExperiment) {
+  campaign::ExperimentSummary summary{.name = "tx",
+                                      .control = "axial_strain",
+                                      .from = 0,
+                                      .to = 0.08,
+                                      .turning_points = 2,
+                                      .observables = {},
+                                      .grains = 1000,
+                                      .d50 = 2e-3,
+                                      .porosity = 0.4};
+  summary.observables.push_back({.name = "axial_stress",
+                                 .readings = 24,
+                                 .missing = 1,
+                                 .first = 200e3,
+                                 .last = 450e3,
+                                 .min = 200e3,
+                                 .max = 450e3,
+                                 .sd_min = 6e3,
+                                 .sd_max = 13.5e3});
+  const campaign::ExperimentSummary counted{
+      .name = "heap", .control = "", .observables = {{.name = "mass"}}};
+  const Json json = Json::parse(ProblemsJson(
+      {}, {{campaign::WarningKind::kFewGrains, "tx", "axial_stress", "is read from 64 grains"}},
+      {"a note"}, {summary, counted}));
+  EXPECT_EQ(json["valid"], true);
+  EXPECT_EQ(json["notes"], Json({"a note"}));
+  EXPECT_EQ(json["warnings"], Json::array({{{"kind", "few_grains"},
+                                            {"experiment", "tx"},
+                                            {"name", "axial_stress"},
+                                            {"message", "is read from 64 grains"}}}));
+  const Json& tx = json["experiments"][0];
+  EXPECT_EQ(tx["name"], "tx");
+  EXPECT_EQ(tx["path"]["from"], 0);
+  EXPECT_NEAR(tx["path"]["to"].get<double>(), 8, 1e-12);
+  EXPECT_EQ(tx["path"]["unit"], "%");
+  EXPECT_EQ(tx["path"]["turning_points"], 2);
+  EXPECT_EQ(tx["grains"], 1000);
+  EXPECT_NEAR(tx["d50"].get<double>(), 2, 1e-12);
+  EXPECT_EQ(tx["d50_unit"], "mm");
+  EXPECT_EQ(tx["porosity"], 0.4);
+  const Json& stress = tx["observables"][0];
+  EXPECT_EQ(stress["name"], "axial_stress");
+  EXPECT_EQ(stress["readings"], 24);
+  EXPECT_EQ(stress["missing"], 1);
+  EXPECT_NEAR(stress["first"].get<double>(), 200, 1e-9);
+  EXPECT_NEAR(stress["last"].get<double>(), 450, 1e-9);
+  EXPECT_EQ(stress["unit"], "kPa");
+  EXPECT_NEAR(stress["sd_min"].get<double>(), 6, 1e-9);
+  EXPECT_NEAR(stress["sd_max"].get<double>(), 13.5, 1e-9);
+  const Json& heap = json["experiments"][1];
+  EXPECT_TRUE(heap["grains"].is_null() && heap["d50"].is_null() && heap["porosity"].is_null());
+  EXPECT_TRUE(heap["path"]["from"].is_null() && heap["path"]["control"].is_null());
+  EXPECT_TRUE(heap["observables"][0]["first"].is_null());
+}
+
+TEST(Json, AProblemHasItsKind) {
+  const Json json = Json::parse(ProblemsJson(
+      {{"c.yaml", 14, "observables.x", "is held", "held"}, {"c.yaml", 1, "name", "is missing"}}));
+  EXPECT_EQ(json["valid"], false);
+  EXPECT_EQ(json["problems"][0]["kind"], "held");
+  EXPECT_TRUE(json["problems"][1]["kind"].is_null());
+  EXPECT_TRUE(json["experiments"].empty());
+}
+
 TEST(Json, CataloguesHaveNamesAndParameters) {
   for (const std::string& text : {EffectsJson(), ContactsJson(), TestsJson()}) {
     const Json list = Json::parse(text);

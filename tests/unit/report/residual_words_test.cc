@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include "server/report/views/residual_pattern.h"
+
 namespace calib::report {
 namespace {
 
@@ -26,9 +28,32 @@ std::vector<std::string> Said(double amplitude) {
 }
 
 TEST(ResidualWords, AFactorIsNeverNegative) {
-  EXPECT_THAT(Said(0.5), ElementsAre(HasSubstr("too large by the factor 1.5 throughout")));
-  EXPECT_THAT(Said(-0.4), ElementsAre(HasSubstr("too small by the factor 0.6 throughout")));
-  EXPECT_THAT(Said(-1.42), ElementsAre(HasSubstr("goes the other way than the measurement")));
+  // The residual is size times the model: measurements of 1/2, 2, 1.25 and -1 times it.
+  EXPECT_THAT(Said(0.5), ElementsAre(HasSubstr("too large by the factor 2 throughout")));
+  EXPECT_THAT(Said(-1), ElementsAre(HasSubstr("too small by the factor 0.5 throughout")));
+  EXPECT_THAT(Said(-0.25), ElementsAre(HasSubstr("too small by the factor 0.8 throughout")));
+  EXPECT_THAT(Said(2), ElementsAre(HasSubstr("the other way")));
+}
+
+// Deviatoric stress [kPa] of a drained test of 64 grains, measured as a multiple of it.
+TEST(ResidualWords, AMultipleOfTheModelIsNamedByItsFactor) {
+  Eigen::VectorXd model(6);
+  model << 0.004, 117.2045, 210.2715, 259.8875, 283.914, 302.227;
+  const auto said = [&model](double measured) {
+    ResidualCurve curve;
+    curve.control = Eigen::VectorXd::LinSpaced(6, 0, 0.02);
+    curve.model = model;
+    curve.residual = (1 - measured) * model;
+    curve.sd = Eigen::VectorXd::Constant(6, 2);
+    curve.correlation = Eigen::VectorXd::Zero(6);
+    const ResidualPattern pattern = PatternOf(curve);
+    EXPECT_EQ(pattern.shape, ResidualShape::kAmplitude) << measured;
+    return Said(pattern.size);
+  };
+  EXPECT_THAT(said(2), ElementsAre(HasSubstr("too small by the factor 0.5 throughout")));
+  EXPECT_THAT(said(0.5), ElementsAre(HasSubstr("too large by the factor 2 throughout")));
+  EXPECT_THAT(said(1.25), ElementsAre(HasSubstr("too small by the factor 0.8 throughout")));
+  EXPECT_THAT(said(-1), ElementsAre(HasSubstr("goes the other way than the measurement")));
 }
 
 }  // namespace

@@ -1,58 +1,52 @@
 #pragma once
-// Tables of numbers as laboratories and other codes write them: whitespace- or comma-separated, `#`
-// comments, one header line (which may itself begin with `#`), blank trailing fields tolerated.
+// Tables of numbers as laboratories, spreadsheets and other codes write them. What their form may
+// be, and how it is found, stands in table_layout.h; in which bytes, in encoding.h.
 
 #include <string>
-#include <string_view>
 #include <vector>
+
+#include "server/campaign/file/text/table_layout.h"
 
 namespace calib::campaign {
 
-/// One thing wrong in a table. line is 1-based; 0: the file as a whole. column may be empty.
-struct TableProblem {
-  int line = 0;
-  std::string column;
-  std::string message;
-};
-
-/// A parsed table; owns its text.
+/// A parsed table.
 class DataTable {
  public:
-  /// Splits text into header and rows. `wanted` decides between several comment lines that might be
-  /// the header. Appends what is wrong (no rows, no header, more fields than columns); the table is
+  /// Finds header and rows. `wanted` decides between several lines that might be the header.
+  /// Appends what is wrong (no text, no rows, no header, lengths that do not fit); the table is
   /// usable only if nothing was added.
-  DataTable(std::string text, const std::vector<std::string>& wanted,
-            std::vector<TableProblem>& problems);
+  DataTable(const std::string& bytes, const TableFormat& format,
+            const std::vector<std::string>& wanted, std::vector<TableProblem>& problems);
+  DataTable(const std::string& bytes, const std::vector<std::string>& wanted,
+            std::vector<TableProblem>& problems)
+      : DataTable(bytes, TableFormat{}, wanted, problems) {}
 
-  const std::vector<std::string>& columns() const { return columns_; }
-  std::size_t rows() const { return rows_.size(); }
-  int LineOf(std::size_t row) const { return rows_[row].line; }
+  const std::vector<std::string>& columns() const { return layout_.columns; }
+  std::size_t rows() const { return layout_.rows.size(); }
+  int LineOf(std::size_t row) const { return layout_.rows[row].line; }
+  /// A column is asked for by its name, or by that without its unit in brackets.
   bool Has(const std::string& column) const;
+  /// What stands in brackets behind the column's name; empty: nothing, or no such column.
+  std::string UnitOf(const std::string& column) const;
 
   /// The numbers of a column, one per row. Appends one problem per bad field (not a number, NaN or
   /// infinite, missing), at most five per column; no such column: one problem with the nearest
   /// name. Meaningful only if nothing was added.
   std::vector<double> Column(const std::string& name, std::vector<TableProblem>& problems) const;
 
+  /// The same where readings may be missing: NaN for those.
+  std::vector<double> ColumnWithGaps(const std::string& name,
+                                     std::vector<TableProblem>& problems) const;
+
   /// The fields of a column as written ("" where missing); empty when there is no such column.
   std::vector<std::string> Texts(const std::string& name) const;
 
  private:
-  struct Row {
-    int line = 0;
-    std::vector<std::string_view> fields;  // into text_
-  };
+  std::vector<double> Read(const std::string& name, bool gaps,
+                           std::vector<TableProblem>& problems) const;
 
-  std::ptrdiff_t IndexOf(const std::string& column) const;
-
-  std::string text_;
-  std::vector<std::string> columns_;
-  int header_line_ = 0;
-  std::vector<Row> rows_;
-
- public:
-  DataTable(const DataTable&) = delete;  // rows point into the text
-  DataTable& operator=(const DataTable&) = delete;
+  TableLayout layout_;
+  std::vector<std::string> missing_;
 };
 
 }  // namespace calib::campaign

@@ -42,6 +42,10 @@ const std::vector<NamedUnit>& NamedUnits() {
       {"percent", {1e-2, {}}},
       {"%", {1e-2, {}}},
       {"bar", {1e5, {1, -1, -2, 0}}, true},
+      {"psi", {6894.757293168361, {1, -1, -2, 0}}},  // pound-force per square inch [NIST SP 811]
+      {"ksf", {47880.25898033584, {1, -1, -2, 0}}},  // 1000 pound-force per square foot, same
+      {"kgf", {9.80665, {1, 1, -2, 0}}},
+      {"l", {1e-3, {0, 3, 0, 0}}, true},
       {"t", {1e3, {1, 0, 0, 0}}},
       {"min", {60, {0, 0, 1, 0}}},
       {"h", {3600, {0, 0, 1, 0}}},

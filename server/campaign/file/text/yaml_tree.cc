@@ -88,6 +88,29 @@ bool IsIndentedByTab(const std::string& text, int line) {
   return text.substr(at, end == std::string::npos ? end : end - at).find('\t') != std::string::npos;
 }
 
+// What yaml-cpp would spend hundreds of bytes on each, before it finds that there are too many:
+// entries, brackets within brackets, lists that begin within lists on one line.
+std::optional<YamlError> TooLarge(const std::string& text) {
+  int line = 1;
+  int entries = 0;
+  int brackets = 0;
+  int lists = 0;  // begun on this line
+  bool only_lists = true;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const char c = text[at];
+    const bool begins_list = only_lists && c == '-' && at + 1 < text.size() && text[at + 1] == ' ';
+    brackets += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
+    lists = c == '\n' ? 0 : lists + (begins_list ? 1 : 0);
+    only_lists = c == '\n' || (only_lists && (begins_list || c == ' '));
+    entries += c == ',' || c == '\n' || begins_list ? 1 : 0;
+    line += c == '\n' ? 1 : 0;
+    if (brackets > kDeepest || lists > kDeepest || entries > kMostNodes) {
+      return YamlError{line, "is nested too deeply or too large for a campaign file"};
+    }
+  }
+  return std::nullopt;
+}
+
 // What makes a text no YAML before its grammar is asked.
 std::optional<YamlError> NotText(const std::string& text) {
   const auto line_of = [&text](std::size_t at) {
@@ -108,6 +131,7 @@ std::optional<YamlError> NotText(const std::string& text) {
 YamlParse ParseYaml(const std::string& text) {
   YamlParse parse;
   parse.error = NotText(text);
+  if (!parse.error) parse.error = TooLarge(text);
   if (parse.error) return parse;
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);

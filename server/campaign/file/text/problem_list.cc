@@ -1,4 +1,4 @@
-#include "server/campaign/file/problem_list.h"
+#include "server/campaign/file/text/problem_list.h"
 
 #include <algorithm>
 #include <cctype>
@@ -16,8 +16,8 @@ std::string OneLine(std::string text) {
 }  // namespace
 
 void ProblemList::AddIn(const std::string& file, int line, const std::string& key,
-                        const std::string& message) {
-  problems_.push_back({OneLine(file), line, OneLine(key), OneLine(message)});
+                        const std::string& message, const std::string& kind) {
+  problems_.push_back({OneLine(file), line, OneLine(key), OneLine(message), kind});
 }
 
 std::vector<Problem> ProblemList::Sorted() const {

@@ -1,4 +1,4 @@
-#include "server/campaign/file/origin.h"
+#include "server/campaign/file/text/origin.h"
 
 #include "server/campaign/file/text/yaml_text.h"
 

@@ -13,6 +13,9 @@ struct Problem {
   int line = 0;         ///< 1-based; 0: the file as a whole
   std::string key;      ///< dotted path ("parameters.young_modulus.min") or column
   std::string message;  ///< what is wrong, what is allowed
+  /// What is wrong in a word, where programs ask: columns, encoding, control_noise, held,
+  /// impossible, control_mismatch; empty: none of these.
+  std::string kind = {};
 };
 /// "campaign.yaml:12: parameters.young_modulus.min: ..."
 std::string ToString(const Problem& problem);
@@ -23,12 +26,14 @@ class ProblemList {
   explicit ProblemList(std::string file) : file_(std::move(file)) {}
 
   /// A problem in the campaign file itself.
-  void Add(int line, const std::string& key, const std::string& message) {
-    AddIn(file_, line, key, message);
+  void Add(int line, const std::string& key, const std::string& message,
+           const std::string& kind = "") {
+    AddIn(file_, line, key, message, kind);
   }
   /// A problem in a file that the campaign names. Control characters become spaces: a problem is
   /// one line.
-  void AddIn(const std::string& file, int line, const std::string& key, const std::string& message);
+  void AddIn(const std::string& file, int line, const std::string& key, const std::string& message,
+             const std::string& kind = "");
 
   std::size_t size() const { return problems_.size(); }
 
