@@ -12,6 +12,30 @@ namespace {
 
 constexpr std::chrono::seconds kShutdown{5};
 
+/// Options for how much the server takes.
+void AddLimits(CLI::App& app, calib::service::Limits& limits) {
+  const auto add = [&app](const char* name, auto& limit, const char* help) {
+    app.add_option(name, limit, help)
+        ->check(CLI::Range(1, 1'000'000'000))
+        ->capture_default_str()
+        ->group("How much the server takes");
+  };
+  add("--max-connections", limits.connections, "connections, fewer where the system allows fewer");
+  add("--max-streams-per-peer", limits.streams_per_peer, "calls that one connection has open");
+  add("--max-blobs-per-peer", limits.blobs_per_peer, "files on their way over one connection");
+  add("--max-blobs", limits.blobs, "files on their way, of all");
+  add("--max-blob-mib", limits.blob_mib, "of one file");
+  add("--max-slots", limits.slots, "slots of one worker");
+  add("--max-campaigns", limits.campaigns, "campaigns that are not over");
+  add("--max-campaign-mib", limits.campaign_mib, "of the files of one campaign");
+  add("--max-samples", limits.samples, "samples of one iteration");
+  add("--max-readings", limits.readings, "readings of one campaign");
+  add("--max-predictions", limits.predictions, "samples times readings");
+  add("--max-covariance", limits.covariance, "readings of one covariance matrix");
+  add("--max-packings", limits.packings, "packings of one campaign");
+  add("--max-grains", limits.grains, "grains in the packing files of one campaign");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -36,6 +60,7 @@ int main(int argc, char** argv) {
   app.add_option("--heartbeat-ms", heartbeat_ms, "workers speak at least this often")
       ->check(CLI::Range(10, 3'600'000))
       ->capture_default_str();
+  AddLimits(app, options.limits);
   app.add_option("--log", options.log_file, "log file [standard error]");
   try {
     app.parse(argc, argv);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dem/model/state.h"
+#include "proto/rpc/fit_message.h"
 #include "worker/evaluate.h"
 
 namespace calib::worker {
@@ -41,7 +42,10 @@ void HeldAttempt::AddState(const dem::State& state) {
   message.mutable_values()->Add(state.values.begin(), state.values.end());
 }
 
-void HeldAttempt::AddEnd(v1::Finished finished) { end_ = std::move(finished); }
+void HeldAttempt::AddEnd(v1::Finished finished) {
+  rpc::FitTexts(finished);  // a reason may be what a model has printed
+  end_ = std::move(finished);
+}
 
 std::vector<v1::WorkerMessage> HeldAttempt::TakeUnsent() {
   std::vector<v1::WorkerMessage> messages;

@@ -60,6 +60,8 @@ dem::Scenario ScenarioFromSpec(const v1::AttemptSpec& spec) {
   }
   scenario.model.density = spec.density();
   scenario.model.parameters.insert(spec.parameters().begin(), spec.parameters().end());
+  scenario.model.shear_unloading =
+      spec.shear_rescaled() ? dem::ShearUnloading::kRescaled : dem::ShearUnloading::kAsPublished;
   scenario.model.materials.assign(spec.materials().begin(), spec.materials().end());
   scenario.materials.bodies.insert(spec.body_materials().begin(), spec.body_materials().end());
   scenario.materials.grains.insert(spec.grain_materials().begin(), spec.grain_materials().end());

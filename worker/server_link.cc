@@ -13,6 +13,7 @@
 #include "absl/synchronization/mutex.h"
 #include "calib/v1/worker.grpc.pb.h"
 #include "proto/rpc/backoff.h"
+#include "proto/rpc/check_message.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/client_options.h"
 #include "proto/rpc/status.h"
@@ -171,7 +172,8 @@ absl::StatusOr<std::string> ServerLink::GetBlob(const std::string& digest, std::
     v1::BlobChunk chunk;
     absl::Status assembled;
     while (assembled.ok() && reader->Read(&chunk)) {
-      assembled = assembler.Add(chunk);
+      assembled = rpc::CheckMessage(chunk);
+      if (assembled.ok()) assembled = assembler.Add(chunk);
     }
     if (!assembled.ok()) {
       context.TryCancel();

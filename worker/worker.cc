@@ -14,8 +14,10 @@
 #include "dem/model/state.h"
 #include "dem/registry/catalog.h"
 #include "proto/rpc/backoff.h"
+#include "proto/rpc/check_message.h"
 #include "proto/rpc/digest.h"
 #include "proto/rpc/random_id.h"
+#include "proto/rpc/text_kinds.h"
 #include "worker/checkpoints.h"
 #include "worker/held_attempt.h"
 #include "worker/server_link.h"
@@ -88,7 +90,7 @@ class Worker::Impl {
     hello.set_contact_updates_per_second(options_.contact_updates_per_second);
     hello.set_engine_version(dem::EngineVersion());
     hello.set_catalog_digest(rpc::Sha256Hex(dem::CatalogText()));
-    hello.set_cpu(options_.cpu);
+    hello.set_cpu(rpc::Fitted(v1::NAME, options_.cpu));
     hello.set_checkpoints(checkpoints_.has_value() ? checkpoints_->identity() : "");
     for (auto& [id, attempt] : held_) {
       hello.add_attempts(id);
@@ -126,6 +128,10 @@ class Worker::Impl {
   }
 
   void Receive(const v1::ServerMessage& message) {
+    if (const absl::Status broken = rpc::CheckMessage(message); !broken.ok()) {
+      Refuse(message, broken);
+      return;
+    }
     switch (message.message_case()) {
       case v1::ServerMessage::kWelcome:
         Welcome(message.welcome());
@@ -148,6 +154,33 @@ class Worker::Impl {
       case v1::ServerMessage::MESSAGE_NOT_SET:
         break;
     }
+  }
+
+  /// What breaks a rule is not done. A lease that does has failed, so that it is told why; the rest
+  /// is said in the log, once.
+  void Refuse(const v1::ServerMessage& message, const absl::Status& broken) {
+    if (!std::exchange(said_refusal_, true)) {
+      spdlog::error("message_refused reason=\"{}\"", std::string(broken.message()));
+    }
+    const std::int64_t id = message.lease().attempt();
+    if (id < 1) {
+      return;
+    }
+    auto [it, added] = held_.try_emplace(id, message.lease());
+    if (added) {
+      EndWithout(it->second, id, v1::Finished::OUTCOME_FAILED, std::string(broken.message()));
+    }
+  }
+
+  /// The end of an attempt that was never begun.
+  void EndWithout(HeldAttempt& attempt, std::int64_t id, v1::Finished::Outcome outcome,
+                  const std::string& reason) {
+    v1::Finished finished;
+    finished.set_attempt(id);
+    finished.set_outcome(outcome);
+    finished.set_reason(reason);
+    attempt.AddEnd(std::move(finished));
+    Send(attempt);
   }
 
   void Welcome(const v1::Welcome& welcome) {
@@ -193,12 +226,7 @@ class Worker::Impl {
       return;
     }
     if (stopping_ || draining_) {
-      v1::Finished finished;
-      finished.set_attempt(id);
-      finished.set_outcome(v1::Finished::OUTCOME_STOPPED);
-      finished.set_reason("the worker is leaving");
-      it->second.AddEnd(std::move(finished));
-      Send(it->second);
+      EndWithout(it->second, id, v1::Finished::OUTCOME_STOPPED, "the worker is leaving");
       return;
     }
     StartWaiting();
@@ -356,6 +384,7 @@ class Worker::Impl {
   bool draining_ = false;  // takes nothing new
   bool leaving_ = false;   // everything is sent, the stream is being closed
   bool stopping_ = false;  // a signal was caught
+  bool said_refusal_ = false;
   absl::Status result_;
   // Destroyed from the last to the first: simulations end before what they use.
   ServerLink link_;

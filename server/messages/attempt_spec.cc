@@ -126,6 +126,7 @@ v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& 
   spec.mutable_grain_materials()->insert(scenario.materials.grains.begin(),
                                          scenario.materials.grains.end());
   if (!scenario.materials.grains.empty()) spec.set_mixture_seed(scenario.materials.seed);
+  spec.set_shear_rescaled(scenario.model.shear_unloading == dem::ShearUnloading::kRescaled);
   return spec;
 }
 

@@ -17,6 +17,15 @@ using store::EvaluationStatus;
 
 CampaignRun::CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition)
     : id_(id), definition_(std::move(definition)) {
+  for (std::size_t e = 0; e < definition_->campaign.experiments.size(); ++e) {
+    auto& positions = positions_.emplace_back();
+    for (const int step : definition_->LoadSteps(static_cast<int>(e))) {
+      positions.emplace(step, positions.size());
+    }
+  }
+}
+
+void CampaignRun::FactoriseErrors() {
   const inference::NoiseMode noise = definition_->campaign.filter.noise;
   if (noise == inference::NoiseMode::kEssTarget) {
     return;
@@ -31,6 +40,7 @@ absl::StatusOr<std::unique_ptr<CampaignRun>> CampaignRun::Load(store::Reader& re
   ASSIGN_OR_RETURN(const auto record, reader.Campaign(id));
   ASSIGN_OR_RETURN(auto definition, LoadDefinition(reader, record.submitted));
   std::unique_ptr<CampaignRun> run(new CampaignRun(id, std::move(definition)));
+  run->FactoriseErrors();
   run->record_ = record;
   run->state_ = record.progress.state;
   RETURN_IF_ERROR(run->Reload(reader));
@@ -46,6 +56,22 @@ absl::Status CampaignRun::Reload(store::Reader& reader) {
   return Extend(reader);
 }
 
+std::unique_ptr<CampaignRun> CampaignRun::Unfilled() const {
+  std::unique_ptr<CampaignRun> run(new CampaignRun(id_, definition_));
+  run->record_ = record_;
+  run->state_ = state_;
+  return run;
+}
+
+void CampaignRun::Fill(CampaignRun&& reloaded) {
+  ++changes_;
+  evaluations_ = std::move(reloaded.evaluations_);
+  by_status_ = std::move(reloaded.by_status_);
+  parameters_ = std::move(reloaded.parameters_);
+  stop_below_ = std::move(reloaded.stop_below_);
+  arrived_ = std::move(reloaded.arrived_);
+}
+
 absl::Status CampaignRun::Extend(store::Reader& reader) {
   ASSIGN_OR_RETURN(const auto samples, reader.Samples(id_));
   ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(id_));
@@ -58,7 +84,9 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
       continue;
     }
     added.push_back(evaluation);
-    of_samples.insert(evaluation.key.sample);
+    if (evaluation.status != EvaluationStatus::kWaiting) {  // else nobody has been leased it yet
+      of_samples.insert(evaluation.key.sample);
+    }
     if (!campaign::IsTerminal(evaluation.status)) {
       open.insert(evaluation.key.sample);
     }
@@ -66,6 +94,7 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
   const Eigen::RowVectorXd nothing =
       Eigen::RowVectorXd::Constant(static_cast<Eigen::Index>(definition_->data.readings.size()),
                                    std::numeric_limits<double>::quiet_NaN());
+  ++changes_;
   std::erase_if(arrived_, [this, &open](const auto& entry) {
     return !IsOfRunningIteration(entry.first) && open.count(entry.first) == 0;
   });
@@ -220,13 +249,14 @@ void CampaignRun::Planned(bool again) {
 
 std::string CampaignRun::Refusal(const EvaluationKey& key, int load_step,
                                  std::span<const double> observables) const {
-  const auto steps = definition_->LoadSteps(key.experiment);
-  const auto found = std::find(steps.begin(), steps.end(), load_step);
-  if (found == steps.end()) {
+  const auto& positions = positions_[static_cast<std::size_t>(key.experiment)];
+  const auto found = positions.find(load_step);
+  if (found == positions.end()) {
     return absl::StrCat("load step ", load_step, " is not on the path");
   }
-  if (const auto& rest = evaluations_.at(key).rest_after;
-      rest.has_value() && found > std::find(steps.begin(), steps.end(), *rest)) {
+  const auto& rest = evaluations_.at(key).rest_after;
+  const auto rests_at = rest.has_value() ? positions.find(*rest) : positions.end();
+  if (rests_at != positions.end() && found->second > rests_at->second) {
     return absl::StrCat("load step ", load_step, " is behind load step ", *rest,
                         ", where the run was to rest");
   }
@@ -263,6 +293,7 @@ bool CampaignRun::IsOfRunningIteration(int sample) const {
 
 void CampaignRun::AddState(const EvaluationKey& key, int load_step,
                            std::span<const double> observables) {
+  ++changes_;
   evaluations_[key].missing.erase(load_step);
   if (const auto found = arrived_.find(key.sample); found != arrived_.end()) {
     definition_->readings.Place(key.experiment, load_step, observables, found->second.predictions);
@@ -270,6 +301,7 @@ void CampaignRun::AddState(const EvaluationKey& key, int load_step,
 }
 
 void CampaignRun::SetStatus(const EvaluationKey& key, EvaluationStatus status, int failures) {
+  ++changes_;
   Evaluation& evaluation = evaluations_[key];
   by_status_[evaluation.status].erase(key);
   by_status_[status].insert(key);
@@ -362,23 +394,30 @@ int CampaignRun::Diverged() const {
 
 int CampaignRun::Done() const { return static_cast<int>(EndedForPause().size()); }
 
-LiveView CampaignRun::View() const {
-  Eigen::MatrixXd predictions(static_cast<Eigen::Index>(arrived_.size()),
-                              static_cast<Eigen::Index>(definition_->data.readings.size()));
-  std::vector<char> out;
+std::function<LiveView()> CampaignRun::Look() {
+  looked_at_ = changes_;
+  struct Seen {
+    Eigen::MatrixXd predictions;
+    std::vector<char> out;
+  };
+  const auto seen = std::make_shared<Seen>();
+  seen->predictions.resize(static_cast<Eigen::Index>(arrived_.size()),
+                           static_cast<Eigen::Index>(definition_->data.readings.size()));
   for (const auto& [sample, arrived] : arrived_) {
     if (IsOfRunningIteration(sample)) {
-      predictions.row(static_cast<Eigen::Index>(out.size())) = arrived.predictions;
-      out.push_back(arrived.out ? 1 : 0);
+      seen->predictions.row(static_cast<Eigen::Index>(seen->out.size())) = arrived.predictions;
+      seen->out.push_back(arrived.out ? 1 : 0);
     }
   }
-  if (out.empty()) {
-    return {};
-  }
-  predictions.conservativeResize(static_cast<Eigen::Index>(out.size()), Eigen::NoChange);
-  const auto view =
-      inference::ViewOnline(definition_->data, definition_->campaign.filter, predictions, out);
-  return {.effective_samples = view.ess, .best_misfit = view.best_rms};
+  return [definition = definition_, seen]() -> LiveView {
+    if (seen->out.empty()) {
+      return {};
+    }
+    const auto rows = static_cast<Eigen::Index>(seen->out.size());
+    const auto view = inference::ViewOnline(definition->data, definition->campaign.filter,
+                                            seen->predictions.topRows(rows), seen->out);
+    return {.effective_samples = view.ess, .best_misfit = view.best_rms};
+  };
 }
 
 }  // namespace calib::scheduler

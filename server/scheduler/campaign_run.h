@@ -4,6 +4,7 @@
 // ended, it is read again from there. What a plan adds is read beside what is known.
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -43,6 +44,10 @@ class CampaignRun {
   /// Reads samples, evaluations and states again. Progress is kept: memory may be ahead of the disk
   /// in it.
   absl::Status Reload(store::Reader& reader);
+  /// The same campaign without samples, evaluations and states: to be reloaded on any thread, and
+  /// given back to Fill().
+  std::unique_ptr<CampaignRun> Unfilled() const;
+  void Fill(CampaignRun&& reloaded);
   /// Reads samples and evaluations that are new, and leaves the others as memory has them.
   absl::Status Extend(store::Reader& reader);
 
@@ -74,6 +79,10 @@ class CampaignRun {
   void Planned(bool again);
   const std::vector<double>& Parameters(int sample) const { return parameters_.at(sample); }
 
+  /// Load steps of an experiment's path.
+  std::size_t PathLength(int experiment) const {
+    return positions_.at(static_cast<std::size_t>(experiment)).size();
+  }
   /// Everything wrong with a state that a worker sent, in a sentence; empty: acceptable.
   std::string Refusal(const store::EvaluationKey& key, int load_step,
                       std::span<const double> observables) const;
@@ -98,10 +107,19 @@ class CampaignRun {
   /// to run; of surrogate_msrs the last that have ended, as many as its first iteration has.
   int Diverged() const;
   int Done() const;
-  LiveView View() const;
+
+  /// How the running iteration did when that was last computed; nothing at first.
+  const LiveView& view() const { return view_; }
+  void SetView(const LiveView& view) { view_ = view; }
+  /// Whether something has happened since Look() was last called.
+  bool ViewIsOld() const { return looked_at_ != changes_; }
+  /// Computes the view of what is known now, on any thread: with errors that go together it may
+  /// take seconds.
+  std::function<LiveView()> Look();
 
  private:
   CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition);
+  void FactoriseErrors();
   /// Readings of a sample of the running iteration, or of one before it that had not ended.
   struct Arrived {
     Eigen::RowVectorXd predictions;  ///< NaN where they have not
@@ -130,7 +148,11 @@ class CampaignRun {
   std::map<int, std::vector<double>> parameters_;  // by sample
   std::map<int, double> stop_below_;               // samples that may be stopped early
   ArrivedBySample arrived_;
-  std::optional<std::size_t> planned_;  // Results() when a plan was made last
+  std::optional<std::size_t> planned_;                 // Results() when a plan was made last
+  std::vector<std::map<int, std::size_t>> positions_;  // in the path, by experiment and load step
+  LiveView view_;
+  std::uint64_t changes_ = 1;  // of what the view is of
+  std::uint64_t looked_at_ = 0;
 };
 
 }  // namespace calib::scheduler

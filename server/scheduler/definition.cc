@@ -116,7 +116,7 @@ absl::StatusOr<std::shared_ptr<const Definition>> LoadDefinition(
   ASSIGN_OR_RETURN(const auto files, reader.Files(submitted.id));
   campaign::ReadOutcome outcome =
       campaign::ReadCampaign(submitted.yaml, submitted.file_name, StoredFiles(reader, files),
-                             submitted.seed, campaign::CampaignIs::kStored);
+                             submitted.seed, campaign::StoredUnder(submitted.reading_rules));
   if (!outcome.problems.empty()) {
     return absl::FailedPreconditionError(
         absl::StrCat("this program refuses the campaign as submitted: ",

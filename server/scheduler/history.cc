@@ -193,6 +193,9 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
       diverged.push_back(predictions.row(i).allFinite() ? 0 : 1);
     }
   }
+  for (std::size_t k = known; k < history.iterations.size(); ++k) {
+    history.iterations[k].stopped = history.stopped[k];  // for the emulator
+  }
   if (keeps && history.open == 0) {
     definition.memory->history = history;
   }

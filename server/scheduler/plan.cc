@@ -8,7 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "inference/data/gaussian_likelihood.h"
-#include "server/campaign/file/read_precomputed.h"
+#include "server/campaign/checks/run_table_check.h"
 #include "server/campaign/model/specimen_notes.h"
 #include "server/scheduler/answer.h"
 #include "server/scheduler/decisions.h"
@@ -20,6 +20,7 @@
 #include "server/scheduler/requests.h"
 #include "server/scheduler/rungs.h"
 #include "server/scheduler/scatter.h"
+#include "server/scheduler/unmoved.h"
 
 namespace calib::scheduler {
 namespace {
@@ -238,8 +239,17 @@ class Planner {
     if (DecidesAtOnce(definition_)) {
       conclusion.posterior.add_warnings(kDecidedAtOnce);
     }
-    for (std::string& warning : campaign::RepeatedRunWarnings(campaign_)) {
-      conclusion.posterior.add_warnings(std::move(warning));
+    for (const campaign::Warning& warning : campaign::RunTableWarnings(campaign_)) {
+      conclusion.posterior.add_warnings(campaign::Sentence(warning));
+    }
+    if (!campaign_.precomputed) {  // of tables of runs the sentences above say it
+      for (const std::string& unmoved : UnmovedReadings(definition_, history_.iterations)) {
+        conclusion.posterior.add_warnings(unmoved);
+      }
+    }
+    if (const std::string unmoved = UnmovedParameters(definition_, outcome.answer);
+        !unmoved.empty()) {
+      conclusion.posterior.add_warnings(unmoved);
     }
     const bool judged = outcome.answer.HasIntervals() || !campaign::IsFilter(campaign_.method);
     if (const std::string left_out = campaign::ScatterLeftOut(campaign_);

@@ -51,7 +51,7 @@ absl::Status Scheduler::Load() {
   last_campaign_ = last_campaign;
   for (const store::CampaignRecord& record : campaigns) {
     if (!IsOver(record.progress.state)) {
-      TakeUp(record.submitted.id, reader);
+      TakeUp(record.submitted.id, CampaignRun::Load(reader, record.submitted.id));
     }
   }
   for (const store::ActiveAttempt& attempt : attempts) {
@@ -100,7 +100,7 @@ void Scheduler::PauseIfOfOtherMechanics(CampaignRun& run) {
     return;
   }
   if (!run.HasBegun()) {  // there is nothing that could be mixed
-    ports_.Write(BeginAnew(run, others), [](const absl::Status&) {});
+    Write(run.id(), BeginAnew(run, others), [](const absl::Status&) {});
     return;
   }
   SetState(run, CampaignEvent::kPause,
@@ -111,8 +111,7 @@ void Scheduler::PauseIfOfOtherMechanics(CampaignRun& run) {
            nullptr, [](const absl::Status&) {});
 }
 
-void Scheduler::TakeUp(std::int64_t campaign, store::Reader& reader) {
-  auto run = CampaignRun::Load(reader, campaign);
+void Scheduler::TakeUp(std::int64_t campaign, absl::StatusOr<std::unique_ptr<CampaignRun>> run) {
   if (run.ok()) {
     runs_[campaign] = *std::move(run);
     return;
@@ -136,20 +135,85 @@ void Scheduler::TakeUp(std::int64_t campaign, store::Reader& reader) {
 }
 
 void Scheduler::TakeUpNow(std::int64_t campaign) {
-  auto reader = ports_.Read();
-  if (!reader.ok()) {
-    again_[campaign] = [this, campaign] { TakeUpNow(campaign); };
+  if (loading_.try_emplace(campaign).second) {
+    LoadAside(campaign);
+  }
+}
+
+void Scheduler::LoadAside(std::int64_t campaign) {
+  ports_.Load([this, campaign]() -> std::function<void()> {
+    auto reader = ports_.Read();
+    auto loaded = std::make_shared<absl::StatusOr<std::unique_ptr<CampaignRun>>>(
+        reader.ok() ? CampaignRun::Load(*reader, campaign) : reader.status());
+    return [this, campaign, loaded] {
+      TakeUp(campaign, std::move(*loaded));
+      if (CampaignRun* run = FindRun(campaign); run != nullptr) {
+        ReturnUnleased(*run);
+        PauseIfOfOtherMechanics(*run);
+        Enqueue(*run);
+        Advance(campaign);
+        Dispatch();
+      }
+      ++version_;
+      DoneLoading(campaign);
+    };
+  });
+}
+
+void Scheduler::DoneLoading(std::int64_t campaign) {
+  const auto waiting = loading_.extract(campaign);
+  if (waiting.empty()) {
     return;
   }
-  TakeUp(campaign, *reader);
-  if (CampaignRun* run = FindRun(campaign); run != nullptr) {
-    ReturnUnleased(*run);
-    PauseIfOfOtherMechanics(*run);
-    Enqueue(*run);
-    Advance(campaign);
-    Dispatch();
+  for (const auto& then : waiting.mapped()) {
+    then();
   }
-  ++version_;
+}
+
+bool Scheduler::IsLoading(std::int64_t campaign, std::function<void()> then) {
+  const auto found = loading_.find(campaign);
+  if (found == loading_.end()) {
+    return false;
+  }
+  found->second.push_back(std::move(then));
+  return true;
+}
+
+void Scheduler::Write(std::int64_t campaign, store::Store::Job job, Reply then) {
+  ports_.Write(std::move(job),
+               [this, campaign, then = std::move(then)](const absl::Status& status) {
+                 then(status);
+                 if (absl::IsInvalidArgument(status)) {
+                   ReadAgain(campaign, status);
+                 }
+               });
+}
+
+void Scheduler::ReadAgain(std::int64_t campaign, const absl::Status& why) {
+  if (FindRun(campaign) == nullptr) {
+    return;
+  }
+  for (const LeaseEntry& lease : leases_.OfCampaign(campaign)) {
+    leases_.Release(lease.attempt);
+    if (const WorkerEntry* worker = workers_.Find(lease.worker); worker != nullptr) {
+      Refuse(worker->session, lease.attempt);
+    }
+  }
+  std::erase_if(queue_, [campaign](const EvaluationKey& key) { return key.campaign == campaign; });
+  runs_.erase(campaign);
+  loading_.try_emplace(campaign);
+  const std::string reason =
+      absl::StrCat("the store refuses what follows from the last results: ", why.message(),
+                   "; resume to go on from what it holds");
+  ports_.Write(
+      [campaign, reason, now = ports_.UnixMs()](Transaction& transaction) {
+        transaction.EndOpenAttempts(campaign, {.outcome = AttemptOutcome::kStopped,
+                                               .reason = "the campaign was read again",
+                                               .ended_unix_ms = now});
+        transaction.Pause(campaign, reason);
+        transaction.Log(campaign, now, absl::StrCat("paused: ", reason));
+      },
+      [this, campaign](const absl::Status& /*status*/) { LoadAside(campaign); });
 }
 
 void Scheduler::ReturnUnleased(CampaignRun& run) {
@@ -162,7 +226,8 @@ void Scheduler::ReturnUnleased(CampaignRun& run) {
   for (const EvaluationKey& key : unleased) {
     const int failures = run.Find(key)->failures;
     run.SetStatus(key, EvaluationStatus::kWaiting, failures);
-    ports_.Write(
+    Write(
+        run.id(),
         [key, failures](Transaction& transaction) {
           transaction.SetEvaluation(key, EvaluationStatus::kWaiting, "", failures);
         },
@@ -175,16 +240,47 @@ void Scheduler::TakeIn(std::int64_t campaign, bool resumed) {
   if (run == nullptr) {
     return;
   }
+  // What workers send of a campaign while it is read would be lost.
+  if (resumed && leases_.OfCampaign(campaign).empty()) {
+    ReloadAside(*run);
+    return;
+  }
   auto reader = ports_.Read();
   if (!reader.ok() || !(resumed ? run->Reload(*reader) : run->Extend(*reader)).ok()) {
     again_[campaign] = [this, campaign, resumed] { TakeIn(campaign, resumed); };
     return;
   }
-  if (runs_.size() > 1) {  // something may have ended since the plan was made
-    TakeFromOthers(*run);
+  GoOn(*run);
+}
+
+void Scheduler::ReloadAside(const CampaignRun& run) {
+  const std::int64_t campaign = run.id();
+  if (!loading_.try_emplace(campaign).second) {
+    return;
   }
-  Enqueue(*run);
-  Advance(campaign);
+  ports_.Load([this, campaign,
+               unfilled = std::shared_ptr<CampaignRun>(run.Unfilled())]() -> std::function<void()> {
+    auto reader = ports_.Read();
+    const absl::Status status = reader.ok() ? unfilled->Reload(*reader) : reader.status();
+    return [this, campaign, unfilled, status] {
+      CampaignRun* reloaded = FindRun(campaign);
+      if (reloaded != nullptr && status.ok()) {
+        reloaded->Fill(std::move(*unfilled));
+        GoOn(*reloaded);
+      } else if (reloaded != nullptr) {
+        again_[campaign] = [this, campaign] { TakeIn(campaign, true); };
+      }
+      DoneLoading(campaign);
+    };
+  });
+}
+
+void Scheduler::GoOn(CampaignRun& run) {
+  if (runs_.size() > 1) {  // something may have ended since the plan was made
+    TakeFromOthers(run);
+  }
+  Enqueue(run);
+  Advance(run.id());
   Dispatch();
 }
 
@@ -218,6 +314,13 @@ void Scheduler::Enqueue(CampaignRun& run) {
 void Scheduler::Submit(store::NewCampaign submitted, std::map<std::string, std::string> files,
                        const std::string& request_id, const store::RequestRecord& request,
                        std::function<void(absl::StatusOr<std::string>)> reply) {
+  if (runs_.size() + loading_.size() >= static_cast<std::size_t>(options_.most_campaigns)) {
+    reply(absl::ResourceExhaustedError(
+        absl::StrCat(options_.most_campaigns,
+                     " campaigns are not over, and the server takes no more (calibd "
+                     "--max-campaigns): wait for one to finish, or cancel one")));
+    return;
+  }
   submitted.id = ++last_campaign_;
   const std::int64_t id = submitted.id;
   const std::string answer = absl::StrCat("c", id);
@@ -248,7 +351,8 @@ void Scheduler::SetState(CampaignRun& run, CampaignEvent event, const std::strin
   }
   ++version_;
   Enqueue(run);
-  ports_.Write(
+  Write(
+      run.id(),
       [id = run.id(), progress = run.progress(), now = ports_.UnixMs(), also,
        line = reason.empty() ? absl::StrCat(ToString(event))
                              : absl::StrCat(ToString(event), ": ", reason)](Transaction& t) {
@@ -268,6 +372,9 @@ void Scheduler::SetState(CampaignRun& run, CampaignEvent event, const std::strin
 }
 
 void Scheduler::Pause(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
+  if (IsLoading(campaign, [=, this] { Pause(campaign, also, reply); })) {
+    return;
+  }
   CampaignRun* run = LiveRun(campaign, reply);
   if (run == nullptr) {
     return;
@@ -276,6 +383,9 @@ void Scheduler::Pause(std::int64_t campaign, const store::Store::Job& also, cons
 }
 
 void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
+  if (IsLoading(campaign, [=, this] { Resume(campaign, also, reply); })) {
+    return;
+  }
   CampaignRun* run = LiveRun(campaign, reply);
   if (run == nullptr) {
     return;
@@ -315,6 +425,9 @@ void Scheduler::Resume(std::int64_t campaign, const store::Store::Job& also, con
 }
 
 void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
+  if (IsLoading(campaign, [=, this] { Cancel(campaign, also, reply); })) {
+    return;
+  }
   CampaignRun* run = LiveRun(campaign, reply);
   if (run == nullptr) {
     return;
@@ -351,6 +464,9 @@ void Scheduler::Cancel(std::int64_t campaign, const store::Store::Job& also, con
 }
 
 void Scheduler::Delete(std::int64_t campaign, const store::Store::Job& also, const Reply& reply) {
+  if (IsLoading(campaign, [=, this] { Delete(campaign, also, reply); })) {
+    return;
+  }
   if (const CampaignRun* run = FindRun(campaign); run != nullptr) {
     reply(absl::FailedPreconditionError(absl::StrCat("cannot delete a campaign that is ",
                                                      ToString(run->state()), "; cancel it first")));
@@ -369,12 +485,28 @@ void Scheduler::Delete(std::int64_t campaign, const store::Store::Job& also, con
   ++version_;
 }
 
+void Scheduler::RefreshView(CampaignRun& run) {
+  if (!run.ViewIsOld() || !viewing_.insert(run.id()).second) {
+    return;
+  }
+  ports_.Load([this, id = run.id(), look = run.Look()]() -> std::function<void()> {
+    return [this, id, view = look()] {
+      viewing_.erase(id);
+      if (CampaignRun* looked_at = FindRun(id); looked_at != nullptr) {
+        looked_at->SetView(view);
+        ++version_;
+      }
+    };
+  });
+}
+
 std::optional<LiveStatus> Scheduler::Live(std::int64_t campaign) {
-  const CampaignRun* run = FindRun(campaign);
+  CampaignRun* run = FindRun(campaign);
   if (run == nullptr) {
     return std::nullopt;
   }
-  LiveStatus live{.view = run->View()};
+  RefreshView(*run);
+  LiveStatus live{.view = run->view()};
   const auto& [seconds, ended] = durations_[campaign];
   const int slots = workers_.Slots();
   if (ended > 0 && slots > 0) {
@@ -489,29 +621,32 @@ void Scheduler::Adopt(std::int64_t campaign, const absl::StatusOr<Plan>& compute
   }
   // Where runs are under way memory may be ahead of the disk in them.
   const bool at_rest = run->AllTerminal();
-  ports_.Write([plan, campaign, progress, now = ports_.UnixMs()](
-                   Transaction& t) { scheduler::Write(plan, campaign, progress, now, t); },
-               [this, campaign, over, at_rest, begins, resumed = !plan.resumed.empty(),
-                stop_below = plan.stop_below](const absl::Status& status) {
-                 computing_.erase(campaign);
-                 ++version_;
-                 CampaignRun* planned = FindRun(campaign);
-                 if (!status.ok() || planned == nullptr) {
-                   return;
-                 }
-                 if (over) {
-                   runs_.erase(campaign);
-                   Dispatch();
-                   return;
-                 }
-                 if (at_rest || begins) {
-                   durations_.erase(campaign);
-                 }
-                 for (const auto& [sample, threshold] : stop_below) {
-                   planned->SetStopBelow(sample, threshold);
-                 }
-                 TakeIn(campaign, resumed);
-               });
+  Write(
+      campaign,
+      [plan, campaign, progress, now = ports_.UnixMs()](Transaction& t) {
+        scheduler::Write(plan, campaign, progress, now, t);
+      },
+      [this, campaign, over, at_rest, begins, resumed = !plan.resumed.empty(),
+       stop_below = plan.stop_below](const absl::Status& status) {
+        computing_.erase(campaign);
+        ++version_;
+        CampaignRun* planned = FindRun(campaign);
+        if (!status.ok() || planned == nullptr) {
+          return;
+        }
+        if (over) {
+          runs_.erase(campaign);
+          Dispatch();
+          return;
+        }
+        if (at_rest || begins) {
+          durations_.erase(campaign);
+        }
+        for (const auto& [sample, threshold] : stop_below) {
+          planned->SetStopBelow(sample, threshold);
+        }
+        TakeIn(campaign, resumed);
+      });
 }
 
 }  // namespace calib::scheduler

@@ -26,11 +26,13 @@ struct SchedulerOptions {
   std::chrono::milliseconds lease{
       15'000};  ///< an attempt is lost when nothing was heard for this long
   std::chrono::milliseconds heartbeat{2'000};  ///< workers are told to speak at least this often
+  int most_slots = 1024;                       ///< of one worker, >= 1
+  int most_campaigns = 1000;                   ///< that are not over, >= 1
 };
 
 /// What is known of a live campaign beyond the store.
 struct LiveStatus {
-  LiveView view{};
+  LiveView view{};          ///< as it was computed last, aside
   double eta_seconds = -1;  ///< of what is planned; negative: unknown
 };
 
@@ -49,15 +51,19 @@ class Scheduler {
   absl::Status Load();
 
   // ---- workers (scheduler_workers.cc) ----
-  /// FAILED_PRECONDITION when the worker's mechanics or catalogue are not the server's;
-  /// INVALID_ARGUMENT for a Hello without name or slots; ALREADY_EXISTS when another process is
-  /// connected under its name (WorkerTable::IsAnother).
+  /// FAILED_PRECONDITION when the worker's mechanics or catalogue are not the server's, or it has
+  /// more slots than the server takes; INVALID_ARGUMENT for more attempts than its slots can hold;
+  /// ALREADY_EXISTS when another process is connected under its name (WorkerTable::IsAnother).
+  /// hello keeps its rules.
   absl::Status Connected(std::int64_t session, const v1::Hello& hello);
   void Disconnected(std::int64_t session);
   void Receive(std::int64_t session, const v1::StateBatch& batch);
   void Receive(std::int64_t session, const v1::Finished& finished);
-  void Receive(std::int64_t session, const v1::Heartbeat& heartbeat);
+  /// INVALID_ARGUMENT for more attempts than its slots can hold.
+  absl::Status Receive(std::int64_t session, const v1::Heartbeat& heartbeat);
   void Receive(std::int64_t session, const v1::Leaving& leaving);
+  /// A message about an attempt broke a rule: the attempt has failed for this reason.
+  void Reject(std::int64_t session, std::int64_t attempt, const std::string& why);
   /// NOT_FOUND: no such worker.
   absl::StatusOr<v1::WorkerInfo> Drain(const std::string& worker);
   std::vector<v1::WorkerInfo> Workers() const;
@@ -70,7 +76,8 @@ class Scheduler {
   // ---- campaigns (scheduler.cc) ----
   /// Stores and starts a campaign that was read without problems. Its id is chosen here ("c1"),
   /// given to `reply` and remembered as the answer to the request (request.answer is ignored; an
-  /// empty request_id is not remembered).
+  /// empty request_id is not remembered). RESOURCE_EXHAUSTED: as many campaigns are not over as the
+  /// server takes.
   void Submit(store::NewCampaign submitted, std::map<std::string, std::string> files,
               const std::string& request_id, const store::RequestRecord& request,
               std::function<void(absl::StatusOr<std::string>)> reply);
@@ -92,6 +99,10 @@ class Scheduler {
   std::size_t live() const { return runs_.size(); }
 
  private:
+  /// Writes what follows for a campaign. Where the store refuses it, memory is ahead of what is on
+  /// disk and will stay so: the campaign is paused and read again, the others go on.
+  void Write(std::int64_t campaign, store::Store::Job job, Reply then);
+  void ReadAgain(std::int64_t campaign, const absl::Status& why);
   CampaignRun* FindRun(std::int64_t campaign);
   /// FindRun(), or replies that the campaign is over.
   CampaignRun* LiveRun(std::int64_t campaign, const Reply& reply);
@@ -137,7 +148,7 @@ class Scheduler {
   void Taken(std::int64_t campaign, const std::vector<store::EvaluationKey>& keys);
 
   // Campaigns (scheduler.cc)
-  void TakeUp(std::int64_t campaign, store::Reader& reader);
+  void TakeUp(std::int64_t campaign, absl::StatusOr<std::unique_ptr<CampaignRun>> loaded);
   /// Forgets what other mechanics have begun, leases included; the job does so in the store.
   store::Store::Job BeginAnew(CampaignRun& run,
                               const std::map<store::EvaluationKey, std::string>& others);
@@ -145,11 +156,24 @@ class Scheduler {
   void PauseIfOfOtherMechanics(CampaignRun& run);
   /// What runs by the store, but by no lease, waits again.
   void ReturnUnleased(CampaignRun& run);
-  /// TakeUp, then what follows from it; again with the next Tick when the store cannot be read now.
+  /// Loads it aside, then TakeUp and what follows from it; again with the next Tick when the store
+  /// cannot be read now.
   void TakeUpNow(std::int64_t campaign);
+  /// The same of one that is among those that are loading.
+  void LoadAside(std::int64_t campaign);
+  /// Whether the campaign is being loaded; `then` is done once that has ended.
+  bool IsLoading(std::int64_t campaign, std::function<void()> then);
+  /// Has the view of what has arrived since computed aside.
+  void RefreshView(CampaignRun& run);
   /// What a plan has added to the store, then what follows from it; again with the next Tick when
   /// the store cannot be read now. resumed: something that had ended goes on.
   void TakeIn(std::int64_t campaign, bool resumed);
+  /// Reads aside what is stored of a campaign that nobody works on, then what follows from it.
+  void ReloadAside(const CampaignRun& run);
+  /// Hands out what memory has learnt of the store.
+  void GoOn(CampaignRun& run);
+  /// What waits for a campaign to be loaded.
+  void DoneLoading(std::int64_t campaign);
   /// Puts waiting evaluations into the queue, or takes them out, as the campaign's state demands.
   void Enqueue(CampaignRun& run);
   /// Why a campaign must pause that has too many diverged samples; empty: it need not. last: why
@@ -173,7 +197,9 @@ class Scheduler {
   std::vector<v1::RefusedWorker> refused_;                     // oldest first
   std::map<std::int64_t, std::unique_ptr<CampaignRun>> runs_;  // those that are not over
   std::set<store::EvaluationKey> queue_;                       // waiting, of leasable campaigns
-  std::set<std::int64_t> computing_;                     // campaigns with a plan in the making
+  std::set<std::int64_t> computing_;  // campaigns with a plan in the making
+  std::set<std::int64_t> viewing_;    // and with a view in the making
+  std::map<std::int64_t, std::vector<std::function<void()>>> loading_;  // with what waits for that
   std::map<std::int64_t, std::function<void()>> again_;  // by campaign: what the next Tick retries
   std::map<std::int64_t, std::pair<double, int>>
       durations_;  // seconds and number of ended attempts

@@ -52,7 +52,8 @@ void Scheduler::TakeFromOthers(CampaignRun& run, const std::string& digest) {
     from_to.emplace_back(**equal, key);
   }
   if (taken.empty()) return;
-  ports_.Write(
+  Write(
+      run.id(),
       [from_to = std::move(from_to)](Transaction& transaction) {
         for (const auto& [from, to] : from_to) {
           transaction.ReuseEvaluation(from, to);

@@ -18,6 +18,20 @@ namespace {
 
 /// A worker that left is still shown this long.
 constexpr std::chrono::minutes kRemembered{10};
+/// Attempts that a worker may name, by slot: those leased, and those of a lease that has expired
+/// while it was frozen, twice over.
+constexpr int kAttemptsPerSlot = 4;
+/// Attempts that one heartbeat gets refused; the next gets the rest. Chosen: some times those of a
+/// node with many slots, and few enough that a flood of heartbeats is no flood of answers.
+constexpr int kRefusedAtOnce = 64;
+
+absl::Status TooManyAttempts(const v1::Hello& hello, int attempts) {
+  return attempts <= static_cast<std::int64_t>(kAttemptsPerSlot) * hello.slots()
+             ? absl::OkStatus()
+             : absl::InvalidArgumentError(absl::StrCat("worker ", hello.name(), " names ", attempts,
+                                                       " attempts, more than its ", hello.slots(),
+                                                       " slots can hold"));
+}
 
 v1::Finished Because(std::int64_t attempt, const std::string& reason) {
   v1::Finished finished;
@@ -35,8 +49,13 @@ std::string NameOf(const CampaignRun& run, const EvaluationKey& key) {
 }  // namespace
 
 absl::Status Scheduler::Admit(const v1::Hello& hello) const {
-  if (hello.name().empty() || hello.slots() < 1) {
-    return absl::InvalidArgumentError("a worker must have a name and at least one slot");
+  if (hello.slots() > options_.most_slots) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "worker ", hello.name(), " has ", hello.slots(), " slots, the server takes at most ",
+        options_.most_slots, " of one (calibd --max-slots): start it with fewer --slots"));
+  }
+  if (absl::Status status = TooManyAttempts(hello, hello.attempts_size()); !status.ok()) {
+    return status;
   }
   if (hello.engine_version() != dem::EngineVersion()) {
     return absl::FailedPreconditionError(
@@ -125,22 +144,42 @@ void Scheduler::Refuse(std::int64_t session, std::int64_t attempt) {
   ports_.Send(session, std::move(message));
 }
 
-void Scheduler::Receive(std::int64_t session, const v1::Heartbeat& heartbeat) {
+void Scheduler::Reject(std::int64_t session, std::int64_t attempt, const std::string& why) {
   WorkerEntry* worker = workers_.OfSession(session);
   if (worker == nullptr) {
     return;
   }
+  worker->heard = ports_.Now();
+  if (leases_.Find(attempt, worker->hello.name()) != nullptr) {
+    GiveBack(*leases_.Release(attempt), Because(attempt, why), AttemptOutcome::kFailed, true);
+  }
+  Refuse(session, attempt);
+  Dispatch();
+}
+
+absl::Status Scheduler::Receive(std::int64_t session, const v1::Heartbeat& heartbeat) {
+  WorkerEntry* worker = workers_.OfSession(session);
+  if (worker == nullptr) {
+    return absl::OkStatus();
+  }
+  if (absl::Status status = TooManyAttempts(worker->hello, heartbeat.attempts_size());
+      !status.ok()) {
+    return status;
+  }
   const Clock::time_point now = ports_.Now();
   const bool was_silent = worker->heard < now - options_.lease;
   worker->heard = now;
+  int refused = 0;
   for (const std::int64_t attempt : heartbeat.attempts()) {
-    if (!leases_.Renew(attempt, worker->hello.name(), now)) {
+    if (!leases_.Renew(attempt, worker->hello.name(), now) && refused < kRefusedAtOnce) {
       Refuse(session, attempt);
+      ++refused;
     }
   }
   if (was_silent) {
     Dispatch();
   }
+  return absl::OkStatus();
 }
 
 void Scheduler::Receive(std::int64_t session, const v1::Leaving& /*leaving*/) {
@@ -168,6 +207,16 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
   }
   const EvaluationKey key = leases_.Find(batch.attempt(), worker->hello.name())->key;
   CampaignRun& run = *FindRun(key.campaign);  // leases end with their campaign
+  const auto fail = [&](const std::string& why) {
+    GiveBack(*leases_.Release(batch.attempt()), Because(batch.attempt(), why),
+             AttemptOutcome::kFailed, true);
+    Refuse(session, batch.attempt());
+  };
+  if (const auto most = run.PathLength(key.experiment);
+      static_cast<std::size_t>(batch.states_size()) > most) {
+    fail(absl::StrCat(batch.states_size(), " states at once of a path of ", most, " load steps"));
+    return;
+  }
   std::vector<store::StateRecord> records;
   for (const v1::State& state : batch.states()) {
     store::StateRecord record{.key = key,
@@ -175,9 +224,7 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
                               .observables = {state.values().begin(), state.values().end()}};
     if (const std::string refusal = run.Refusal(key, record.load_step, record.observables);
         !refusal.empty()) {
-      GiveBack(*leases_.Release(batch.attempt()), Because(batch.attempt(), refusal),
-               AttemptOutcome::kFailed, true);
-      Refuse(session, batch.attempt());
+      fail(refusal);
       return;
     }
     records.push_back(std::move(record));
@@ -198,7 +245,8 @@ void Scheduler::Receive(std::int64_t session, const v1::StateBatch& batch) {
   v1::ServerMessage ack;
   ack.mutable_ack()->set_attempt(batch.attempt());
   ack.mutable_ack()->set_up_to(batch.first() + batch.states_size());
-  ports_.Write(
+  Write(
+      key.campaign,
       [records = std::move(records), now = ports_.UnixMs()](Transaction& transaction) {
         for (const store::StateRecord& record : records) {
           transaction.PutState(record, now);
@@ -281,7 +329,8 @@ void Scheduler::StopEarly(std::int64_t session, const LeaseEntry& lease,
   }
   v1::ServerMessage message;
   message.mutable_stop()->set_attempt(lease.attempt);
-  ports_.Write(
+  Write(
+      lease.key.campaign,
       [key = lease.key, failures, reason, records = std::move(records), now = ports_.UnixMs(),
        spared, beside_reason,
        end = ToRecord(finished, AttemptOutcome::kStoppedEarly)](Transaction& transaction) {
@@ -370,7 +419,7 @@ void Scheduler::End(std::int64_t session, const LeaseEntry& lease, EvaluationSta
   };
   const std::string too_many = diverged ? TooManyDiverged(run, finished.reason()) : "";
   if (too_many.empty()) {
-    ports_.Write(end, then);
+    Write(lease.key.campaign, end, then);
   } else {  // with its cause or not at all
     SetState(run, CampaignEvent::kPause, too_many, end, then);
   }
@@ -406,7 +455,7 @@ void Scheduler::GiveBack(const LeaseEntry& lease, const v1::Finished& how, Attem
              end, [](const absl::Status&) {});
     return;
   }
-  ports_.Write(end, [](const absl::Status&) {});
+  Write(lease.key.campaign, end, [](const absl::Status&) {});
   Enqueue(*run);
 }
 
@@ -467,7 +516,8 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
   if (evaluation.rest_after.has_value()) {
     message.mutable_lease()->set_rest_after(*evaluation.rest_after);
   }
-  ports_.Write(
+  Write(
+      key.campaign,
       [key, failures,
        record = store::NewAttempt{.id = attempt,
                                   .key = key,

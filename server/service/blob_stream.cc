@@ -6,6 +6,8 @@
 #include "calib/return_if_error.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/status.h"
+#include "server/service/calls.h"
+#include "server/service/spool.h"
 #include "server/service/stream_reactor.h"
 
 namespace calib::service {
@@ -13,7 +15,13 @@ namespace {
 
 class BlobReceiver final : public grpc::ServerReadReactor<v1::BlobChunk> {
  public:
-  BlobReceiver(Core& core, v1::BlobReceipt* receipt) : core_(core), receipt_(receipt) {
+  BlobReceiver(Core& core, std::string peer, Door::Pass pass, std::unique_ptr<Spool> spool,
+               v1::BlobReceipt* receipt)
+      : core_(core),
+        peer_(std::move(peer)),
+        pass_(std::move(pass)),
+        spool_(std::move(spool)),
+        receipt_(receipt) {
     StartRead(&chunk_);
   }
 
@@ -22,7 +30,11 @@ class BlobReceiver final : public grpc::ServerReadReactor<v1::BlobChunk> {
       Store();
       return;
     }
-    if (const absl::Status status = assembler_.Add(chunk_); !status.ok()) {
+    absl::Status status = core_.door().Check(peer_, chunk_);
+    if (status.ok()) {
+      status = spool_->Add(chunk_);
+    }
+    if (!status.ok()) {
       Finish(rpc::ToGrpc(status));
       return;
     }
@@ -33,43 +45,78 @@ class BlobReceiver final : public grpc::ServerReadReactor<v1::BlobChunk> {
 
  private:
   void Store() {
-    auto content = assembler_.Finish();
-    if (!content.ok()) {
-      Finish(rpc::ToGrpc(content.status()));
+    if (const absl::Status status = spool_->Finish(); !status.ok()) {
+      Finish(rpc::ToGrpc(status));
       return;
     }
-    receipt_->set_digest(assembler_.digest());
-    receipt_->set_size(static_cast<std::int64_t>(content->size()));
-    core_.Post([this, shared = std::make_shared<std::string>(*std::move(content))] {
+    receipt_->set_digest(spool_->digest());
+    receipt_->set_size(spool_->bytes());
+    core_.Post([this] {
       if (!core_.health().ok()) {
         Finish(rpc::ToGrpc(core_.health()));
         return;
       }
-      core_.Write([digest = assembler_.digest(), shared](
-                      store::Transaction& transaction) { transaction.PutBlob(digest, *shared); },
-                  [this](const absl::Status& status) { Finish(rpc::ToGrpc(status)); });
+      core_.Write(
+          [spool = spool_](store::Transaction& transaction) {
+            transaction.PutBlob(
+                spool->digest(), spool->bytes(),
+                [&spool](std::int64_t from, std::span<char> to) { return spool->Read(from, to); });
+          },
+          [this](const absl::Status& status) { Finish(rpc::ToGrpc(status)); });
     });
   }
 
   Core& core_;
+  const std::string peer_;
+  const Door::Pass pass_;
+  const std::shared_ptr<Spool> spool_;
   v1::BlobReceipt* receipt_;
   v1::BlobChunk chunk_;
-  rpc::BlobAssembler assembler_;
 };
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core, const std::string& digest) {
+grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core, const std::string& peer,
+                                                  const google::protobuf::Message& request,
+                                                  const std::string& digest) {
+  using Reactor = grpc::ServerWriteReactor<v1::BlobChunk>;
+  if (const absl::Status status = core.door().Check(peer, request); !status.ok()) {
+    return new EndedCall<Reactor>(status);
+  }
+  auto pass = core.door().EnterWithBlob(peer);
+  if (!pass.ok()) {
+    return new EndedCall<Reactor>(pass.status());
+  }
   return new StreamReactor<v1::BlobChunk>(
-      core, [&core, digest]() -> absl::StatusOr<std::vector<v1::BlobChunk>> {
+      core, *std::move(pass), &Core::Query,
+      [&core, digest,
+       sent = std::int64_t{0}]() mutable -> absl::StatusOr<std::vector<v1::BlobChunk>> {
         ASSIGN_OR_RETURN(auto reader, core.Read());
-        ASSIGN_OR_RETURN(const auto content, reader.Blob(digest));
-        return rpc::ToChunks(content);
+        ASSIGN_OR_RETURN(auto piece, reader.BlobPiece(digest, sent, rpc::kChunkBytes));
+        if (piece.empty() && sent > 0) {
+          return std::vector<v1::BlobChunk>();
+        }
+        std::vector<v1::BlobChunk> chunks(1);
+        if (sent == 0) chunks.front().set_digest(digest);
+        sent += piece.empty() ? 1 : static_cast<std::int64_t>(piece.size());
+        chunks.front().set_data(std::move(piece));
+        return chunks;
       });
 }
 
-grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core, v1::BlobReceipt* receipt) {
-  return new BlobReceiver(core, receipt);
+grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core, const std::string& peer,
+                                                    const std::string& folder,
+                                                    v1::BlobReceipt* receipt) {
+  using Reactor = grpc::ServerReadReactor<v1::BlobChunk>;
+  auto pass = core.door().EnterWithBlob(peer);
+  if (!pass.ok()) {
+    return new EndedCall<Reactor>(pass.status());
+  }
+  auto spool = Spool::Open(folder, core.door().limits().blob_mib << 20);
+  if (!spool.ok()) {
+    return new EndedCall<Reactor>(spool.status());
+  }
+  return new BlobReceiver(core, peer, *std::move(pass), *std::move(spool), receipt);
 }
 
 }  // namespace calib::service

@@ -1,5 +1,5 @@
 #pragma once
-// Contents by digest, in and out.
+// Contents by digest, in and out, a piece at a time.
 
 #include <grpcpp/support/server_callback.h>
 
@@ -10,10 +10,14 @@
 
 namespace calib::service {
 
-/// Streams stored content; NOT_FOUND when there is none.
-grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core, const std::string& digest);
+/// Streams stored content; NOT_FOUND when there is none. `request` names it by `digest`.
+grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core, const std::string& peer,
+                                                  const google::protobuf::Message& request,
+                                                  const std::string& digest);
 
-/// Stores what arrives under its digest, which is checked.
-grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core, v1::BlobReceipt* receipt);
+/// Stores what arrives under its digest, which is checked. It waits in `folder` until it is whole.
+grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core, const std::string& peer,
+                                                    const std::string& folder,
+                                                    v1::BlobReceipt* receipt);
 
 }  // namespace calib::service

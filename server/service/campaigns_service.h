@@ -2,6 +2,7 @@
 // The Campaigns rpcs. Questions are answered on the pool from a Reader; changes go through the
 // strand.
 
+#include <atomic>
 #include <functional>
 #include <string>
 #include <utility>
@@ -51,9 +52,22 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   using Act = std::function<void(std::int64_t campaign, const store::Store::Job& also,
                                  const scheduler::Scheduler::Reply& reply)>;
 
+  /// A call that goes on where the door lets it in (door.h), and else ends there.
+  Unary* Enter(Context* context, const google::protobuf::Message& request,
+               const std::function<void(Unary*)>& go_on);
+  /// The same of a call that is answered with a stream, made by `go_on` from its pass.
+  template <typename Message>
+  grpc::ServerWriteReactor<Message>* EnterStream(
+      Context* context, const google::protobuf::Message& request,
+      const std::function<grpc::ServerWriteReactor<Message>*(Door::Pass)>& go_on);
+  /// Streams what `load` reads of a campaign.
+  template <typename Message>
+  grpc::ServerWriteReactor<Message>* Stream(
+      Context* context, const v1::CampaignRequest& request,
+      absl::StatusOr<std::vector<Message>> (*load)(store::Reader&, std::int64_t));
   /// A question that the store alone answers.
-  template <typename Reply>
-  Unary* Ask(Context* context, Reply* reply,
+  template <typename Request, typename Reply>
+  Unary* Ask(Context* context, const Request* request, Reply* reply,
              std::function<absl::StatusOr<Reply>(store::Reader&)> answer);
   /// Status of a campaign, live parts included, then the end of the call.
   void FinishWithStatus(Unary* reactor, std::int64_t campaign, v1::CampaignStatus* reply);
@@ -66,7 +80,8 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
 
   Core& core_;
   const Site site_;
-  Requests requests_;  // the strand's
+  Requests requests_;              // the strand's
+  std::atomic<int> read_now_ = 0;  // submissions that are read, or wait to be
 };
 
 }  // namespace calib::service

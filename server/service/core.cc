@@ -14,8 +14,10 @@
 namespace calib::service {
 namespace {
 
-constexpr int kPlanThreads = 2;  // the long computations between iterations
-constexpr int kPoolThreads = 2;  // so that questions are answered meanwhile
+constexpr int kPlanThreads = 2;   // the long computations between iterations
+constexpr int kParseThreads = 2;  // campaigns that are parsed, factorised and loaded
+constexpr int kTellThreads = 2;   // lists and streams
+constexpr int kQueryThreads = 2;  // so that a status is told meanwhile
 
 }  // namespace
 
@@ -25,13 +27,16 @@ struct Core::Threads {
       strand.get_executor()};
   boost::asio::steady_timer tick{strand};
   boost::asio::thread_pool plans{kPlanThreads};
-  boost::asio::thread_pool pool{kPoolThreads};
+  boost::asio::thread_pool parse{kParseThreads};
+  boost::asio::thread_pool tell{kTellThreads};
+  boost::asio::thread_pool query{kQueryThreads};
 };
 
 Core::Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions options,
-           std::function<void(const absl::Status&)> on_failure)
+           const Limits& limits, std::function<void(const absl::Status&)> on_failure)
     : options_(options),
       on_failure_(std::move(on_failure)),
+      door_(limits),
       threads_(std::make_unique<Threads>()),
       store_(std::move(store)),
       scheduler_(*this, options),
@@ -40,7 +45,9 @@ Core::Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions opti
 Core::~Core() {
   BeginShutdown();
   threads_->plans.join();
-  threads_->pool.join();
+  threads_->parse.join();
+  threads_->tell.join();
+  threads_->query.join();
   threads_->keep_running.reset();
   thread_.join();
   // The store then finishes what it was given; nobody waits for those answers any more.
@@ -72,7 +79,15 @@ void Core::Post(std::function<void()> task) {
   boost::asio::post(threads_->strand, std::move(task));
 }
 
-void Core::Query(std::function<void()> task) { boost::asio::post(threads_->pool, std::move(task)); }
+void Core::Query(std::function<void()> task) {
+  boost::asio::post(threads_->query, std::move(task));
+}
+
+void Core::Tell(std::function<void()> task) { boost::asio::post(threads_->tell, std::move(task)); }
+
+void Core::Parse(std::function<void()> task) {
+  boost::asio::post(threads_->parse, std::move(task));
+}
 
 std::int64_t Core::AddSession(Session* session) {
   sessions_[++last_session_] = session;
@@ -87,7 +102,9 @@ void Core::RemoveSession(std::int64_t session) {
 void Core::Write(store::Store::Job job, std::function<void(const absl::Status&)> then) {
   store_->Write(std::move(job), [this, then = std::move(then)](const absl::Status& status) {
     Post([this, status, then] {
-      if (!status.ok()) {
+      if (absl::IsInvalidArgument(status)) {  // its own rows: nothing else is the worse for it
+        spdlog::error("write_refused reason=\"{}\"", std::string(status.message()));
+      } else if (!status.ok()) {
         Fail(status);
       }
       then(status);
@@ -109,6 +126,10 @@ void Core::Fail(const absl::Status& status) {
 
 void Core::Compute(std::function<std::function<void()>()> work) {
   boost::asio::post(threads_->plans, [this, work = std::move(work)] { Post(work()); });
+}
+
+void Core::Load(std::function<std::function<void()>()> work) {
+  Parse([this, work = std::move(work)] { Post(work()); });
 }
 
 void Core::Send(std::int64_t session, v1::ServerMessage message) {

@@ -1,6 +1,9 @@
 #pragma once
-// The threads of the service and what they own: the strand with the scheduler, the store, and the
-// pool for reading and computing. The gRPC reactors only move data between the wire and here.
+// The threads of the service and what they own: the strand with the scheduler, the store, and pools
+// for what takes moments (the status of a campaign), as long as it is large (lists, streams),
+// seconds (campaigns are parsed, factorised, loaded) and minutes (plans). The gRPC reactors only
+// move data between the wire and here. A queue of these threads holds one task of each call that is
+// open, of which the door lets in so many.
 
 #include <functional>
 #include <map>
@@ -9,6 +12,7 @@
 
 #include "server/scheduler/ports.h"
 #include "server/scheduler/scheduler.h"
+#include "server/service/door.h"
 #include "server/store/store.h"
 
 namespace boost::asio {
@@ -26,12 +30,13 @@ class Session {
   virtual void Close(const absl::Status& status) = 0;
 };
 
-/// Post(), Query() and Read() may be called on any thread; everything else as said beside it.
+/// Post(), the pools, Read() and door() may be called on any thread; everything else as said beside
+/// it.
 class Core final : public scheduler::Ports {
  public:
   /// on_failure is called once, on the strand, when the store can no longer be written.
   Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions options,
-       std::function<void(const absl::Status&)> on_failure);
+       const Limits& limits, std::function<void(const absl::Status&)> on_failure);
   ~Core() override;
 
   /// Takes up what the store holds and starts the clock.
@@ -42,8 +47,13 @@ class Core final : public scheduler::Ports {
 
   /// Runs on the strand, in order.
   void Post(std::function<void()> task);
-  /// Runs on the pool.
+  /// Runs on the pool for what takes moments.
   void Query(std::function<void()> task);
+  /// Runs on the pool for answers that may be large: no status waits behind them.
+  void Tell(std::function<void()> task);
+  /// Runs on the pool for campaigns that are read, which may take seconds: no answer waits for it.
+  void Parse(std::function<void()> task);
+  Door& door() { return door_; }
 
   // ---- on the strand only ----
   scheduler::Scheduler& scheduler() { return scheduler_; }
@@ -58,6 +68,7 @@ class Core final : public scheduler::Ports {
   void Write(store::Store::Job job, std::function<void(const absl::Status&)> then) override;
   absl::StatusOr<store::Reader> Read() override { return store_->Read(); }  // on any thread
   void Compute(std::function<std::function<void()>()> work) override;
+  void Load(std::function<std::function<void()>()> work) override;
   void Send(std::int64_t session, v1::ServerMessage message) override;
   void Close(std::int64_t session, const absl::Status& status) override;
   std::chrono::steady_clock::time_point Now() override;
@@ -69,6 +80,7 @@ class Core final : public scheduler::Ports {
 
   const scheduler::SchedulerOptions options_;
   const std::function<void(const absl::Status&)> on_failure_;
+  Door door_;
   struct Threads;
   // Goes after the store, which posts to the strand to its end.
   const std::unique_ptr<Threads> threads_;

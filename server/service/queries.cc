@@ -7,11 +7,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
-#include "dem/registry/catalog.h"
-#include "server/campaign/file/origin.h"
+#include "server/campaign/file/text/origin.h"
 #include "server/scheduler/definition.h"
 #include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
+#include "server/service/calls.h"
 
 namespace calib::service {
 
@@ -101,6 +101,7 @@ void CountSamples(const store::CampaignRecord& record,
 struct Concluded {
   std::optional<v1::Posterior> last;  ///< nothing before the first
   double best_misfit = 0;             ///< the smallest of all iterations, 0: none has one
+  std::string problem;                ///< of a posterior that cannot be read
 };
 
 absl::StatusOr<Concluded> ConcludedIterations(store::Reader& reader, std::int64_t campaign) {
@@ -110,14 +111,30 @@ absl::StatusOr<Concluded> ConcludedIterations(store::Reader& reader, std::int64_
     if (!iteration.posterior.has_value()) {
       continue;
     }
-    ASSIGN_OR_RETURN(auto posterior, scheduler::PosteriorFromJson(*iteration.posterior));
-    const double misfit = posterior.best_misfit();
+    auto posterior = scheduler::PosteriorFromJson(*iteration.posterior);
+    if (!posterior.ok()) {
+      concluded.problem = absl::StrCat("the posterior of iteration ", iteration.number,
+                                       " cannot be read: ", posterior.status().message());
+      continue;
+    }
+    const double misfit = posterior->best_misfit();
     if (misfit > 0 && (concluded.best_misfit == 0 || misfit < concluded.best_misfit)) {
       concluded.best_misfit = misfit;
     }
-    concluded.last = std::move(posterior);
+    concluded.last = *std::move(posterior);
   }
   return concluded;
+}
+
+/// What is known of a campaign without looking at what it has computed.
+v1::CampaignStatus StatusWithout(const store::CampaignRecord& record, std::string problem) {
+  v1::CampaignStatus status;
+  status.set_campaign(absl::StrCat("c", record.submitted.id));
+  status.set_name(record.submitted.name);
+  status.set_state(ToString(record.progress.state));
+  status.set_eta_seconds(-1);
+  status.set_problem(std::move(problem));
+  return status;
 }
 
 }  // namespace
@@ -141,16 +158,12 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(campaign));
   ASSIGN_OR_RETURN(const auto effort, reader.EffortOf(campaign));
   ASSIGN_OR_RETURN(const auto concluded, ConcludedIterations(reader, campaign));
-  v1::CampaignStatus status;
-  status.set_campaign(absl::StrCat("c", campaign));
-  status.set_name(record.submitted.name);
-  status.set_state(ToString(record.progress.state));
+  v1::CampaignStatus status = StatusWithout(record, concluded.problem);
   status.set_reason(record.progress.reason);
   status.set_iteration(record.progress.iteration);
   status.set_max_iterations(record.submitted.max_iterations);
   status.set_samples(record.submitted.samples);
   CountSamples(record, evaluations, status);
-  status.set_eta_seconds(-1);
   if (concluded.last.has_value()) {
     status.set_effective_sample_size(concluded.last->ess());
     status.set_best_misfit(concluded.best_misfit);
@@ -186,11 +199,11 @@ absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
   for (const store::CampaignRecord& record : campaigns) {
     const std::int64_t id = record.submitted.id;
     const auto known = live.find(id);
-    ASSIGN_OR_RETURN(
-        auto status,
-        StatusOf(reader, id,
-                 known == live.end() ? std::nullopt : std::make_optional(known->second)));
-    *list.add_campaigns() = std::move(status);
+    auto status = Outgoing(StatusOf(
+        reader, id, known == live.end() ? std::nullopt : std::make_optional(known->second)));
+    *list.add_campaigns() = status.ok()
+                                ? *std::move(status)
+                                : StatusWithout(record, std::string(status.status().message()));
   }
   return list;
 }
@@ -266,48 +279,6 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
   return messages;
 }
 
-absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, std::int64_t campaign,
-                                                       std::optional<int> sample) {
-  ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
-  ASSIGN_OR_RETURN(const auto definition, scheduler::LoadDefinition(reader, record.submitted));
-  ASSIGN_OR_RETURN(const auto states, reader.States(campaign, sample));
-  ASSIGN_OR_RETURN(const auto seconds, reader.CoreSeconds(campaign));
-  if (sample.has_value()) {
-    ASSIGN_OR_RETURN(const auto samples, reader.Samples(campaign));
-    if (std::none_of(samples.begin(), samples.end(),
-                     [&](const auto& one) { return one.sample == *sample; })) {
-      return absl::NotFoundError(absl::StrCat("campaign c", campaign, " has no sample ", *sample,
-                                              "; see samples for the numbers there are"));
-    }
-  }
-  const campaign::Campaign& read = definition->campaign;
-  std::vector<v1::SampleStates> messages;
-  const store::EvaluationKey* last = nullptr;
-  for (const store::StateRecord& state : states) {
-    if (last == nullptr || *last != state.key) {
-      const auto& experiment = read.experiments[static_cast<std::size_t>(state.key.experiment)];
-      v1::SampleStates& message = messages.emplace_back();
-      message.set_sample(state.key.sample);
-      message.set_experiment(experiment.name);
-      const auto spent = seconds.find(state.key);
-      message.set_core_seconds(spent == seconds.end() ? 0 : spent->second);
-      if (read.precomputed.has_value()) {
-        for (const campaign::MeasuredObservable& observable : experiment.observables) {
-          message.add_observables(observable.name);
-        }
-      } else {
-        const auto& names = dem::FindTest(experiment.test)->observables;
-        message.mutable_observables()->Add(names.begin(), names.end());
-      }
-    }
-    last = &state.key;
-    v1::State& message = *messages.back().add_states();
-    message.set_load_step(state.load_step);
-    message.mutable_values()->Add(state.observables.begin(), state.observables.end());
-  }
-  return messages;
-}
-
 absl::StatusOr<v1::CampaignSource> SourceOf(store::Reader& reader, std::int64_t campaign) {
   ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
   ASSIGN_OR_RETURN(const auto files, reader.Files(campaign));
@@ -315,6 +286,7 @@ absl::StatusOr<v1::CampaignSource> SourceOf(store::Reader& reader, std::int64_t 
   source.set_campaign_file(record.submitted.yaml);
   source.set_file_name(record.submitted.file_name);
   source.mutable_files()->insert(files.begin(), files.end());
+  source.set_reading_rules(record.submitted.reading_rules);
   if (record.submitted.seed.has_value()) {
     source.set_seed(*record.submitted.seed);
   }

@@ -17,17 +17,17 @@ namespace calib::service {
 /// "c12" -> 12; NOT_FOUND for anything else.
 absl::StatusOr<std::int64_t> ParseCampaign(const std::string& id);
 
-/// live: what the scheduler knows beyond the store; empty: nothing, the campaign is over.
+/// live: what the scheduler knows beyond the store; empty: nothing, the campaign is over. A stored
+/// posterior that cannot be read is said in `problem`.
 absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t campaign,
                                             const std::optional<scheduler::LiveStatus>& live);
-/// The status of every campaign, in the order of their ids.
+/// The status of every campaign, in the order of their ids. One that cannot be told says so in
+/// `problem`.
 absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
                                      const std::map<std::int64_t, scheduler::LiveStatus>& live);
 absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t campaign,
                                           std::optional<int> iteration);
 absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::int64_t campaign);
-absl::StatusOr<std::vector<v1::SampleStates>> StatesOf(store::Reader& reader, std::int64_t campaign,
-                                                       std::optional<int> sample);
 absl::StatusOr<v1::CampaignSource> SourceOf(store::Reader& reader, std::int64_t campaign);
 absl::StatusOr<v1::FindingList> FindingsOf(store::Reader& reader, std::int64_t campaign);
 absl::StatusOr<std::vector<v1::LogEntry>> LogOf(store::Reader& reader, std::int64_t campaign);

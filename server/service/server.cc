@@ -7,6 +7,7 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <future>
 #include <utility>
 
@@ -15,6 +16,7 @@
 #include "proto/rpc/address.h"
 #include "server/service/campaigns_service.h"
 #include "server/service/core.h"
+#include "server/service/listener.h"
 #include "server/service/state_folder.h"
 #include "server/service/worker_link_service.h"
 
@@ -23,6 +25,16 @@ namespace {
 
 constexpr int kKeepaliveMs = 20'000;
 constexpr int kFastestPingMs = 5'000;
+/// Until a connection has said that it speaks HTTP/2.
+constexpr int kHandshakeMs = 20'000;
+/// A campaign file of a MiB and the names of its files; everything else is smaller
+/// (proto/README.md).
+constexpr int kLargestMessage = 2 * 1024 * 1024;
+/// Of a stream that has come in and was not taken yet [bytes]: without a bound of its own gRPC
+/// holds some 16 MB of each, as the network would have it.
+constexpr int kUnreadBytes = 512 * 1024;
+/// Files that are no connections: the database, its readers, uploads, the log.
+constexpr std::int64_t kOtherFiles = 200;
 constexpr std::chrono::seconds kDefaultShutdown{5};
 
 absl::Status StartLog(const std::string& file) {
@@ -47,26 +59,42 @@ struct Server::Impl {
   std::unique_ptr<CampaignsService> campaigns;
   std::unique_ptr<WorkerLinkService> workers;
   std::unique_ptr<grpc::Server> grpc;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
+  std::unique_ptr<Listener> listener;  // goes first: it hands connections to the acceptor
   std::string address;
-  int port = 0;
 
-  absl::Status Listen(const std::string& listen) {
+  absl::Status Listen(const std::string& listen, const Limits& limits) {
+    const std::int64_t files = RaiseFileLimit();
+    const std::int64_t most =
+        std::max<std::int64_t>(1, std::min<std::int64_t>(limits.connections, files - kOtherFiles));
+    ASSIGN_OR_RETURN(listener, Listener::Open(listen, static_cast<int>(most)));
     grpc::ServerBuilder builder;
-    builder.AddListeningPort(listen, grpc::InsecureServerCredentials(), &port);
+    using Type = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
+    acceptor = builder.experimental().AddExternalConnectionAcceptor(
+        Type::FROM_FD, grpc::InsecureServerCredentials());
     builder.RegisterService(campaigns.get());
     builder.RegisterService(workers.get());
-    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+    builder.SetMaxReceiveMessageSize(kLargestMessage);
+    // More wait on the other side; those that come are refused by the door, in a sentence.
+    builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 2 * limits.streams_per_peer);
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+    builder.AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kUnreadBytes);
+    builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
     builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
     builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
     builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
     builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
                                kFastestPingMs);
     grpc = builder.BuildAndStart();
-    if (grpc == nullptr || port == 0) {
-      return absl::UnavailableError(
-          absl::StrCat("cannot listen on ", listen, ": in use, or not an address of this machine"));
+    if (grpc == nullptr) {
+      return absl::InternalError("gRPC does not start");
     }
-    address = absl::StrCat(rpc::HostOf(listen), ":", port);
+    listener->Start([this](int connection) {
+      grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+      parameters.fd = connection;
+      acceptor->HandleNewConnection(&parameters);
+    });
+    address = absl::StrCat(rpc::HostOf(listen), ":", listener->port());
     return absl::OkStatus();
   }
 };
@@ -84,8 +112,11 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   impl->folder = std::move(folder);
   impl->core = std::make_unique<Core>(
       std::move(store),
-      scheduler::SchedulerOptions{.lease = options.lease, .heartbeat = options.heartbeat},
-      [on_failure = std::move(options.on_failure)](const absl::Status& status) {
+      scheduler::SchedulerOptions{.lease = options.lease,
+                                  .heartbeat = options.heartbeat,
+                                  .most_slots = options.limits.slots,
+                                  .most_campaigns = options.limits.campaigns},
+      options.limits, [on_failure = std::move(options.on_failure)](const absl::Status& status) {
         if (on_failure) {
           on_failure(status);
         }
@@ -97,13 +128,13 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   std::promise<absl::Status> loaded;
   impl->core->Post([&] { loaded.set_value(impl->core->Start()); });
   RETURN_IF_ERROR(loaded.get_future().get());
-  RETURN_IF_ERROR(impl->Listen(options.listen));
+  RETURN_IF_ERROR(impl->Listen(options.listen, options.limits));
   RETURN_IF_ERROR(impl->folder->Announce(impl->address, options.stays));
   spdlog::info("serving address={} state={}", impl->address, options.state_dir);
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
 
-int Server::port() const { return impl_->port; }
+int Server::port() const { return impl_->listener->port(); }
 
 std::string Server::address() const { return impl_->address; }
 
@@ -112,6 +143,7 @@ void Server::Shutdown(std::chrono::milliseconds deadline) {
     return;
   }
   spdlog::info("shutdown address={}", impl_->address);
+  impl_->listener.reset();
   impl_->core->BeginShutdown();
   impl_->grpc->Shutdown(std::chrono::system_clock::now() + deadline);
   impl_->grpc->Wait();

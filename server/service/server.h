@@ -8,6 +8,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "server/service/limits.h"
 #include "server/store/store.h"
 
 namespace calib::service {
@@ -21,7 +22,8 @@ struct ServerOptions {
   std::chrono::milliseconds lease{
       15'000};  ///< a worker is lost when nothing was heard from it for this long
   std::chrono::milliseconds heartbeat{2'000};  ///< workers speak at least this often
-  std::string log_file{};                      ///< appended to; empty: standard error
+  Limits limits{};
+  std::string log_file{};  ///< appended to; empty: standard error
   /// Called once, on another thread, when the state can no longer be written (full disk): the
   /// server has stopped taking work and is to be shut down.
   std::function<void(const absl::Status&)> on_failure{};

@@ -5,14 +5,16 @@
 
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
+#include "server/service/limits.h"
 #include "server/store/reader.h"
 
 namespace calib::service {
 
-/// The campaign ready to be stored, or the problems found in it. FAILED_PRECONDITION: a file's
-/// content was not put.
+/// The campaign ready to be stored, or the problems found in it, what is beyond the limits among
+/// them. FAILED_PRECONDITION: a file's content was not put. RESOURCE_EXHAUSTED: its files are
+/// larger together than the server takes.
 absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmission(
-    const v1::SubmitRequest& request, store::Reader& reader);
+    const v1::SubmitRequest& request, const Limits& limits, store::Reader& reader);
 
 /// A conclusion ready to be stored. An equal one that is there already keeps its time. Errors:
 /// those of the rpc AddFinding.

@@ -5,6 +5,7 @@
 
 #include "proto/rpc/status.h"
 #include "server/messages/read_words.h"
+#include "server/service/calls.h"
 #include "server/service/queries.h"
 
 namespace calib::service {
@@ -15,7 +16,8 @@ constexpr std::chrono::milliseconds kPeriod{500};
 /// Goes round: look on the strand, read on the pool, write, wait. Deletes itself.
 class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
  public:
-  Watcher(Core& core, const std::string& campaign) : core_(core), timer_(core.strand()) {
+  Watcher(Core& core, Door::Pass pass, const std::string& campaign)
+      : core_(core), pass_(std::move(pass)), timer_(core.strand()) {
     const auto id = ParseCampaign(campaign);
     if (!id.ok()) {
       Finish(rpc::ToGrpc(id.status()));
@@ -71,10 +73,10 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
       return;
     }
     seen_ = core_.scheduler().version();
-    core_.Query([this, live = core_.scheduler().Live(campaign_)] {
+    core_.Tell([this, live = core_.scheduler().Live(campaign_)] {
       auto reader = core_.Read();
-      auto status = reader.ok() ? StatusOf(*reader, campaign_, live)
-                                : absl::StatusOr<v1::CampaignStatus>(reader.status());
+      auto status = Outgoing(reader.ok() ? StatusOf(*reader, campaign_, live)
+                                         : absl::StatusOr<v1::CampaignStatus>(reader.status()));
       if (!status.ok()) {
         Finish(rpc::ToGrpc(status.status()));
         return;
@@ -85,6 +87,7 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
   }
 
   Core& core_;
+  const Door::Pass pass_;
   boost::asio::steady_timer timer_;  // the strand's, like everything below but status_
   std::int64_t campaign_ = 0;
   std::uint64_t seen_ = 0;
@@ -94,9 +97,9 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core,
+grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core, Door::Pass pass,
                                                             const std::string& campaign) {
-  return new Watcher(core, campaign);
+  return new Watcher(core, std::move(pass), campaign);
 }
 
 }  // namespace calib::service

@@ -12,7 +12,7 @@ namespace calib::service {
 
 /// One status at once, then one whenever something changed, at most two a second, until the
 /// campaign is over.
-grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core,
+grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core, Door::Pass pass,
                                                             const std::string& campaign);
 
 }  // namespace calib::service

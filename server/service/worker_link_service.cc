@@ -5,6 +5,7 @@
 
 #include <deque>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
@@ -13,17 +14,35 @@
 #include "calib/return_if_error.h"
 #include "proto/rpc/status.h"
 #include "server/service/blob_stream.h"
+#include "server/service/calls.h"
 
 namespace calib::service {
 namespace {
 
-/// One worker's stream. The next message is read when the strand has taken the one before, so that
-/// a fast worker cannot fill the server's memory. Known to the strand (Core's sessions) from its
-/// first message until OnDone.
+/// What a stream may have said and not yet on disk [bytes, messages], so that a fast worker cannot
+/// fill the queue of the store; and what it may be sent and not yet have taken [messages], before
+/// nothing more is read from it, and before the stream ends. Chosen: some seconds of a node with
+/// hundreds of slots, and a few MB of a server with hundreds of nodes.
+constexpr std::size_t kUnwrittenBytes = std::size_t{256} * 1024;
+constexpr int kUnwrittenMessages = 64;
+constexpr std::size_t kUntaken = 256;
+constexpr std::size_t kMostUntaken = 8192;
+
+/// The run that a message is about; 0: of none.
+std::int64_t AttemptOf(const v1::WorkerMessage& message) {
+  return message.has_states()     ? message.states().attempt()
+         : message.has_finished() ? message.finished().attempt()
+                                  : 0;
+}
+
+/// One worker's stream. The next message is read when the strand has taken the one before, what
+/// they led to is on its way to the disk and not much of it, and the worker has taken what it was
+/// sent. Known to the strand (Core's sessions) from its first message until OnDone.
 class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1::ServerMessage>,
                            public Session {
  public:
-  explicit WorkerStream(Core& core) : core_(core) {
+  WorkerStream(Core& core, std::string peer, Door::Pass pass)
+      : core_(core), peer_(std::move(peer)), pass_(std::move(pass)) {
     core_.Post([this] { session_ = core_.AddSession(this); });
     StartRead(&incoming_);
   }
@@ -35,20 +54,14 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
       Close(absl::OkStatus());  // the worker has said all it had to say, or is gone
       return;
     }
-    core_.Post([this] {
-      const absl::Status status = core_.health().ok() ? Take() : Down();
-      if (!status.ok()) {
-        spdlog::warn("worker_refused session={} reason=\"{}\"", session_,
-                     std::string(status.message()));
-        Close(status);
+    core_.Post([this, broken = core_.door().Check(peer_, incoming_)] {
+      const absl::Status status = core_.health().ok() ? Take(broken) : Down();
+      if (status.ok()) {
+        ReadOn();
         return;
       }
-      // Once the end is decided Finish may have been called, and after it OnDone: the call is then
-      // no longer gRPC's to read from.
-      absl::MutexLock lock(&mutex_);
-      if (!end_.has_value()) {
-        StartRead(&incoming_);
-      }
+      core_.door().LogRefusal(peer_, status);
+      Close(status);
     });
   }
 
@@ -61,6 +74,7 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
       end_ = end_.value_or(absl::OkStatus());
     }
     Proceed();
+    Read();
   }
 
   void OnCancel() override { Close(absl::CancelledError("the stream was cut")); }
@@ -71,7 +85,10 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
         spdlog::info("worker_disconnected name={} session={}", name_, session_);
       }
       core_.RemoveSession(session_);
-      delete this;
+      is_done_ = true;
+      if (!awaits_disk_) {
+        delete this;
+      }
     });
   }
 
@@ -81,6 +98,9 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
     absl::MutexLock lock(&mutex_);
     if (!end_.has_value()) {
       outgoing_.push_back(std::move(message));
+      if (outgoing_.size() > kMostUntaken) {
+        End(absl::ResourceExhaustedError("the worker does not read what it is sent"));
+      }
       Proceed();
     }
   }
@@ -88,12 +108,7 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
   void Close(const absl::Status& status) override {
     absl::MutexLock lock(&mutex_);
     if (!end_.has_value()) {
-      end_ = status;
-      if (!status.ok() && !outgoing_.empty()) {
-        // A peer that has stopped reading must not keep the stream open: what is not on its way is
-        // dropped.
-        outgoing_.resize(writing_ ? 1 : 0);
-      }
+      End(status);
       Proceed();
     }
   }
@@ -102,10 +117,21 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
   /// On the strand: why no work is taken.
   absl::Status Down() const { return absl::UnavailableError(core_.health().message()); }
 
-  /// On the strand: what a message means.
-  absl::Status Take() {
+  /// On the strand: what a message means. broken: the rule that it breaks. One about a run fails
+  /// that attempt, not the worker: the next that is leased it would say the same.
+  absl::Status Take(const absl::Status& broken) {
     scheduler::Scheduler& scheduler = core_.scheduler();
     const v1::WorkerMessage message = std::exchange(incoming_, {});
+    unwritten_bytes_ += message.ByteSizeLong();
+    ++unwritten_messages_;
+    if (!broken.ok()) {
+      const std::int64_t attempt = AttemptOf(message);
+      if (name_.empty() || attempt < 1) {
+        return broken;
+      }
+      scheduler.Reject(session_, attempt, std::string(broken.message()));
+      return absl::OkStatus();
+    }
     if (name_.empty()) {
       if (!message.has_hello()) {
         return absl::InvalidArgumentError("the first message must be Hello");
@@ -124,8 +150,7 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
         scheduler.Receive(session_, message.finished());
         break;
       case v1::WorkerMessage::kHeartbeat:
-        scheduler.Receive(session_, message.heartbeat());
-        break;
+        return scheduler.Receive(session_, message.heartbeat());
       case v1::WorkerMessage::kLeaving:
         scheduler.Receive(session_, message.leaving());
         break;
@@ -135,6 +160,51 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
         return absl::InvalidArgumentError("an empty message");
     }
     return absl::OkStatus();
+  }
+
+  /// On the strand, after a message was taken: the next one, once what they led to is on disk where
+  /// that is much.
+  void ReadOn() {
+    if (unwritten_bytes_ <= kUnwrittenBytes && unwritten_messages_ < kUnwrittenMessages) {
+      MayRead();
+      return;
+    }
+    unwritten_bytes_ = 0;
+    unwritten_messages_ = 0;
+    awaits_disk_ = true;
+    core_.Write([](store::Transaction&) {},
+                [this](const absl::Status& /*written*/) {
+                  awaits_disk_ = false;
+                  if (is_done_) {
+                    delete this;
+                  } else {
+                    MayRead();
+                  }
+                });
+  }
+
+  void MayRead() {
+    absl::MutexLock lock(&mutex_);
+    may_read_ = true;
+    Read();
+  }
+
+  // Once the end is decided Finish may have been called, and after it OnDone: the call is then no
+  // longer gRPC's to read from.
+  void Read() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    if (may_read_ && !end_.has_value() && outgoing_.size() <= kUntaken) {
+      may_read_ = false;
+      StartRead(&incoming_);
+    }
+  }
+
+  void End(const absl::Status& status) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    end_ = status;
+    if (!status.ok() && !outgoing_.empty()) {
+      // A peer that has stopped reading must not keep the stream open: what is not on its way is
+      // dropped.
+      outgoing_.resize(writing_ ? 1 : 0);
+    }
   }
 
   void Proceed() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
@@ -151,11 +221,19 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
   }
 
   Core& core_;
+  const std::string peer_;
+  const Door::Pass pass_;
   v1::WorkerMessage incoming_;  // gRPC's while a read is in flight, else the strand's
-  std::int64_t session_ = 0;    // the strand's
-  std::string name_;            // the strand's; empty before Hello
+  // The strand's.
+  std::int64_t session_ = 0;
+  std::string name_;                 // empty before Hello
+  std::size_t unwritten_bytes_ = 0;  // since the disk was last awaited
+  int unwritten_messages_ = 0;
+  bool awaits_disk_ = false;
+  bool is_done_ = false;
   absl::Mutex mutex_;
   std::deque<v1::ServerMessage> outgoing_ ABSL_GUARDED_BY(mutex_);  // front: being written
+  bool may_read_ ABSL_GUARDED_BY(mutex_) = false;  // no read is in flight, one may begin
   bool writing_ ABSL_GUARDED_BY(mutex_) = false;
   bool finished_ ABSL_GUARDED_BY(mutex_) = false;
   std::optional<absl::Status> end_ ABSL_GUARDED_BY(mutex_);
@@ -164,13 +242,18 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
 }  // namespace
 
 grpc::ServerBidiReactor<v1::WorkerMessage, v1::ServerMessage>* WorkerLinkService::Connect(
-    grpc::CallbackServerContext* /*context*/) {
-  return new WorkerStream(core_);
+    grpc::CallbackServerContext* context) {
+  auto pass = core_.door().Enter(context->peer());
+  if (!pass.ok()) {
+    return new EndedCall<grpc::ServerBidiReactor<v1::WorkerMessage, v1::ServerMessage>>(
+        pass.status());
+  }
+  return new WorkerStream(core_, context->peer(), *std::move(pass));
 }
 
 grpc::ServerWriteReactor<v1::BlobChunk>* WorkerLinkService::GetBlob(
-    grpc::CallbackServerContext* /*context*/, const v1::BlobRequest* request) {
-  return SendBlob(core_, request->digest());
+    grpc::CallbackServerContext* context, const v1::BlobRequest* request) {
+  return SendBlob(core_, context->peer(), *request, request->digest());
 }
 
 }  // namespace calib::service

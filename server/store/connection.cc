@@ -31,6 +31,11 @@ absl::Status ToStatus(const SQLite::Exception& error) {
     case SQLITE_CANTOPEN:
       return absl::ResourceExhaustedError(
           absl::StrCat(text, "; the folder must be writable and its disk not full"));
+    case SQLITE_CONSTRAINT:
+    case SQLITE_MISMATCH:
+    case SQLITE_TOOBIG:
+    case SQLITE_RANGE:
+      return absl::InvalidArgumentError(text);
     default:
       return absl::InternalError(text);
   }
@@ -52,7 +57,7 @@ SQLite::Statement& Connection::Prepare(std::string_view sql) {
   if (statement == nullptr) {
     statement = std::make_unique<SQLite::Statement>(database_, std::string(sql));
   } else {
-    statement->reset();
+    statement->tryReset();  // an error of its last run has been told
     statement->clearBindings();
   }
   return *statement;

@@ -23,7 +23,7 @@ struct DoubleBlob {
 };
 
 /// RESOURCE_EXHAUSTED for a full disk, UNAVAILABLE for a busy file, DATA_LOSS for a corrupt one,
-/// INTERNAL otherwise.
+/// INVALID_ARGUMENT for rows that break a constraint, INTERNAL otherwise.
 absl::Status ToStatus(const SQLite::Exception& error);
 
 /// Not thread-safe: one thread at a time.

@@ -2,6 +2,7 @@
 
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <bit>
 #include <condition_variable>
 #include <mutex>
@@ -9,6 +10,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
+#include "server/store/blob_file.h"
 #include "server/store/connection.h"
 
 namespace calib::store {
@@ -58,6 +61,7 @@ CampaignRecord ToCampaign(SQLite::Statement& row) {
   progress.iteration = row.getColumn(12).getInt();
   progress.converged = row.getColumn(13).getInt() != 0;
   progress.pause_waived = row.getColumn(14).getInt() != 0;
+  submitted.reading_rules = row.getColumn(15).getInt();
   return record;
 }
 
@@ -75,10 +79,12 @@ std::vector<StateRecord> ToStates(std::int64_t campaign, SQLite::Statement& row)
 
 constexpr std::string_view kAllCampaigns =
     "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
-    "state, reason, phase, iteration, converged, pause_waived FROM campaign ORDER BY id";
+    "state, reason, phase, iteration, converged, pause_waived, reading_rules FROM campaign ORDER "
+    "BY id";
 constexpr std::string_view kOneCampaign =
     "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
-    "state, reason, phase, iteration, converged, pause_waived FROM campaign WHERE id = ?";
+    "state, reason, phase, iteration, converged, pause_waived, reading_rules FROM campaign WHERE "
+    "id = ?";
 
 }  // namespace
 
@@ -170,6 +176,41 @@ absl::StatusOr<bool> Reader::HasBlob(const std::string& digest) {
   return Guard([&] {
     return connection_->Bind("SELECT 1 FROM blob WHERE digest = ?", digest).executeStep();
   });
+}
+
+absl::StatusOr<std::int64_t> Reader::BlobBytes(const std::string& digest) {
+  ASSIGN_OR_RETURN(const auto place, FindBlob(digest));
+  return place.bytes;
+}
+
+absl::StatusOr<std::string> Reader::BlobPiece(const std::string& digest, std::int64_t from,
+                                              std::int64_t bytes) {
+  ASSIGN_OR_RETURN(const auto place, FindBlob(digest));
+  return Guard([&] {
+    std::string piece(
+        static_cast<std::size_t>(std::clamp(place.bytes - from, std::int64_t{0}, bytes)), '\0');
+    if (!piece.empty()) {
+      BlobFile(connection_->database(), place.row, /*writable=*/false).Read(from, piece);
+    }
+    return piece;
+  });
+}
+
+absl::StatusOr<Reader::BlobPlace> Reader::FindBlob(const std::string& digest) {
+  ASSIGN_OR_RETURN(const auto found, Guard([&] {
+                     std::optional<BlobPlace> place;
+                     SQLite::Statement& row = connection_->Bind(
+                         "SELECT rowid, length(content) FROM blob WHERE digest = ?", digest);
+                     if (row.executeStep()) {
+                       place = BlobPlace{.row = row.getColumn(0).getInt64(),
+                                         .bytes = row.getColumn(1).getInt64()};
+                     }
+                     return place;
+                   }));
+  if (!found.has_value()) {
+    return absl::NotFoundError(absl::StrCat("there is no content with SHA-256 ", digest));
+  }
+  return *found;
 }
 
 absl::StatusOr<std::optional<RequestRecord>> Reader::Request(const std::string& id) {
@@ -331,7 +372,8 @@ absl::StatusOr<std::map<EvaluationKey, double>> Reader::CoreSeconds(std::int64_t
   return Guard([&] {
     std::map<EvaluationKey, double> seconds;
     SQLite::Statement& row = connection_->Bind(
-        "SELECT wanted.sample, wanted.experiment, sum(attempt.core_seconds) AS spent "
+        "SELECT wanted.sample, wanted.experiment, sum(CASE WHEN attempt.core_seconds "
+        "BETWEEN 0 AND 1e12 THEN attempt.core_seconds ELSE 0.0 END) AS spent "
         "FROM evaluation AS wanted JOIN evaluation AS ran "
         "ON ran.digest = wanted.digest AND NOT ran.reused AND (wanted.reused OR "
         "(ran.campaign, ran.sample, ran.experiment) = "
@@ -363,7 +405,9 @@ absl::StatusOr<Effort> Reader::EffortOf(std::int64_t campaign) {
       effort.model_evaluations = evaluations.getColumn(0).getInt64();
     }
     SQLite::Statement& seconds = connection_->Bind(
-        "SELECT coalesce(sum(core_seconds), 0.0) FROM attempt WHERE campaign = ?", campaign);
+        "SELECT coalesce(sum(core_seconds), 0.0) FROM attempt "
+        "WHERE campaign = ? AND core_seconds BETWEEN 0 AND 1e12",
+        campaign);
     if (seconds.executeStep()) {
       effort.core_seconds = seconds.getColumn(0).getDouble();
     }

@@ -36,6 +36,12 @@ class Reader {
   /// NOT_FOUND when there is none.
   absl::StatusOr<std::string> Blob(const std::string& digest);
   absl::StatusOr<bool> HasBlob(const std::string& digest);
+  /// Bytes of a content; NOT_FOUND when there is none.
+  absl::StatusOr<std::int64_t> BlobBytes(const std::string& digest);
+  /// At most so many bytes of a content, from this byte on; fewer at its end. NOT_FOUND when there
+  /// is none.
+  absl::StatusOr<std::string> BlobPiece(const std::string& digest, std::int64_t from,
+                                        std::int64_t bytes);
   absl::StatusOr<std::optional<RequestRecord>> Request(const std::string& id);
 
   absl::StatusOr<std::vector<IterationRecord>> Iterations(std::int64_t campaign);
@@ -76,6 +82,12 @@ class Reader {
   /// Runs `read`; SQLite's exceptions end here.
   template <typename F>
   auto Guard(F read) -> absl::StatusOr<decltype(read())>;
+
+  struct BlobPlace {
+    std::int64_t row = 0;
+    std::int64_t bytes = 0;
+  };
+  absl::StatusOr<BlobPlace> FindBlob(const std::string& digest);
 
   std::unique_ptr<Connection> connection_;
 };

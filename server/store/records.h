@@ -31,6 +31,7 @@ struct NewCampaign {
   int samples = 0;
   int max_iterations = 1;
   std::int64_t created_unix_ms = 0;
+  int reading_rules = 1;  ///< number of those by which its measurements are read
 };
 
 /// What changes while a campaign lives.

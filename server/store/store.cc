@@ -39,13 +39,14 @@ class Store::Writer {
 
   void Enqueue(Job job, Done done) {
     absl::MutexLock lock(&mutex_);
-    queue_.push_back({std::move(job), std::move(done)});
+    queue_.push_back({.job = std::move(job), .done = std::move(done)});
   }
 
  private:
   struct Entry {
     Job job;
     Done done;
+    absl::Status refused{};  ///< its own rows break a constraint; the others of its group stay
   };
 
   bool HasWork() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closing_ || !queue_.empty(); }
@@ -68,7 +69,7 @@ class Store::Writer {
         failure_ = Commit(group);
       }
       for (Entry& entry : group) {
-        entry.done(failure_);
+        entry.done(failure_.ok() ? entry.refused : failure_);
       }
     }
   }
@@ -89,12 +90,17 @@ class Store::Writer {
   absl::Status Commit(std::vector<Entry>& group) {
     try {
       const std::unique_ptr<SQLite::Transaction> scope = Begin();
-      Transaction transaction(*connection_);
       for (Entry& entry : group) {
+        connection_->Run("SAVEPOINT job");
+        Transaction transaction(*connection_);
         entry.job(transaction);
-      }
-      if (!transaction.status().ok()) {
-        return transaction.status();  // rolls back
+        if (absl::IsInvalidArgument(transaction.status())) {
+          connection_->Run("ROLLBACK TO job");
+          entry.refused = transaction.status();
+        } else if (!transaction.status().ok()) {
+          return transaction.status();  // rolls back
+        }
+        connection_->Run("RELEASE job");
       }
       if (hooks_.before_commit) {
         RETURN_IF_ERROR(hooks_.before_commit());

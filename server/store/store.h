@@ -18,9 +18,10 @@ struct StoreHooks {
 };
 
 /// Thread-safe. Writes are executed in the order of Write(); those that wait while a commit reaches
-/// the disk go together into the next one (group commit). After the first failed commit (full disk,
-/// I/O error) nothing is written any more and every Write() reports that failure: what was
-/// acknowledged stays readable, the program must start again.
+/// the disk go together into the next one (group commit). A job whose rows break a constraint is
+/// rolled back alone and gets INVALID_ARGUMENT. After the first failed commit (full disk, I/O
+/// error) nothing is written any more and every Write() reports that failure: what was acknowledged
+/// stays readable, the program must start again.
 class Store {
  public:
   using Job = std::function<void(Transaction&)>;

@@ -1,12 +1,21 @@
 #include "server/store/transaction.h"
 
+#include <algorithm>
 #include <bit>
 #include <optional>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "server/store/blob_file.h"
 #include "server/store/connection.h"
 
 namespace calib::store {
+namespace {
+
+/// Of a content in memory at a time [bytes]; chosen: some hundred pages of the file.
+constexpr std::int64_t kPieceBytes = std::int64_t{512} * 1024;
+
+}  // namespace
 
 template <typename F>
 void Transaction::Guard(F write) {
@@ -33,6 +42,29 @@ void Transaction::PutBlob(const std::string& digest, const std::string& content)
   });
 }
 
+void Transaction::PutBlob(const std::string& digest, std::int64_t bytes, const Piece& piece) {
+  Guard([&] {
+    if (connection_.Run("INSERT INTO blob(digest, content) VALUES(?, zeroblob(?)) "
+                        "ON CONFLICT DO NOTHING",
+                        digest, bytes) == 0) {
+      return;
+    }
+    BlobFile blob(connection_.database(), connection_.database().getLastInsertRowid(),
+                  /*writable=*/true);
+    std::vector<char> buffer(static_cast<std::size_t>(std::min(bytes, kPieceBytes)));
+    for (std::int64_t at = 0; at < bytes; at += kPieceBytes) {
+      const std::span<char> part(buffer.data(),
+                                 static_cast<std::size_t>(std::min(bytes - at, kPieceBytes)));
+      if (!piece(at, part)) {
+        status_ = absl::InvalidArgumentError(
+            absl::StrCat("the content of ", digest, " was cut short at byte ", at));
+        return;
+      }
+      blob.Write(at, part);
+    }
+  });
+}
+
 void Transaction::PutRequest(const std::string& id, const RequestRecord& request) {
   Guard([&] {
     connection_.Run("INSERT INTO request(id, digest, answer) VALUES(?, ?, ?)", id, request.digest,
@@ -53,10 +85,10 @@ void Transaction::InsertCampaign(const NewCampaign& campaign,
     }
     connection_.Run(
         "INSERT INTO campaign(id, name, yaml, file_name, seed, method, samples, max_iterations, "
-        "created_unix_ms, state) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
+        "created_unix_ms, reading_rules, state) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
         campaign.id, campaign.name, campaign.yaml, campaign.file_name, seed,
         ToString(campaign.method), campaign.samples, campaign.max_iterations,
-        campaign.created_unix_ms);
+        campaign.created_unix_ms, campaign.reading_rules);
     for (const auto& [path, digest] : files) {
       connection_.Run("INSERT INTO campaign_file(campaign, path, digest) VALUES(?, ?, ?)",
                       campaign.id, path, digest);
@@ -71,6 +103,13 @@ void Transaction::SetProgress(std::int64_t campaign, const CampaignProgress& pro
         "pause_waived = ? WHERE id = ?",
         ToString(progress.state), progress.reason, ToString(progress.phase), progress.iteration,
         progress.converged, progress.pause_waived, campaign);
+  });
+}
+
+void Transaction::Pause(std::int64_t campaign, const std::string& reason) {
+  Guard([&] {
+    connection_.Run("UPDATE campaign SET state = ?, reason = ? WHERE id = ?",
+                    ToString(CampaignState::kPaused), reason, campaign);
   });
 }
 
@@ -226,6 +265,15 @@ void Transaction::EndAttempt(const AttemptEnd& end) {
         "contact_updates = ?, core_seconds = ?, staging = ? WHERE id = ?",
         end.ended_unix_ms, ToString(end.outcome), end.reason, end.steps, end.contact_updates,
         end.core_seconds, end.staging, end.id);
+  });
+}
+
+void Transaction::EndOpenAttempts(std::int64_t campaign, const AttemptEnd& end) {
+  Guard([&] {
+    connection_.Run(
+        "UPDATE attempt SET ended_unix_ms = ?, outcome = ?, reason = ? "
+        "WHERE campaign = ? AND outcome IS NULL",
+        end.ended_unix_ms, ToString(end.outcome), end.reason, campaign);
   });
 }
 

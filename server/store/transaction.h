@@ -3,8 +3,10 @@
 // (store.h).
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,7 +18,8 @@ namespace calib::store {
 class Connection;
 
 /// Handed to the function given to Store::Write, on the store's thread. Errors stick: after the
-/// first one nothing more is written, and everything that shares the commit is rolled back.
+/// first one nothing more is written, and the whole of this Write is rolled back (store.h: what
+/// else is).
 class Transaction {
  public:
   explicit Transaction(Connection& connection) : connection_(connection) {}
@@ -27,11 +30,18 @@ class Transaction {
 
   /// Content under its digest; a second copy changes nothing.
   void PutBlob(const std::string& digest, const std::string& content);
+  /// Fills a piece of a content, from this byte on; false: it cannot be had any more, and the write
+  /// is refused.
+  using Piece = std::function<bool(std::int64_t from, std::span<char> to)>;
+  /// The same of a content of this many bytes, piece by piece, so that it is never whole in memory.
+  void PutBlob(const std::string& digest, std::int64_t bytes, const Piece& piece);
   /// Remembers the answer to a request so that its repetition gets the same one.
   void PutRequest(const std::string& id, const RequestRecord& request);
   /// files: path -> digest of a stored blob.
   void InsertCampaign(const NewCampaign& campaign, const std::map<std::string, std::string>& files);
   void SetProgress(std::int64_t campaign, const CampaignProgress& progress);
+  /// Whatever else is stored of its progress stays.
+  void Pause(std::int64_t campaign, const std::string& reason);
   /// Requests that were given this answer are new again.
   void ForgetRequests(const std::string& answer);
   /// Deletes the campaign with everything that belongs to it; blobs stay.
@@ -64,6 +74,8 @@ class Transaction {
 
   void InsertAttempt(const NewAttempt& attempt);
   void EndAttempt(const AttemptEnd& end);
+  /// Ends those of a campaign that have not ended, as `end` says but for its id.
+  void EndOpenAttempts(std::int64_t campaign, const AttemptEnd& end);
   /// A state that is there already is left alone; if its bits differ, that is logged as
   /// nondeterminism.
   void PutState(const StateRecord& state, std::int64_t unix_ms);

@@ -253,6 +253,7 @@ void FakeWorker::Cut() { impl_->context.TryCancel(); }
 v1::Hello MatchingHello(const std::string& name, int slots) {
   v1::Hello hello;
   hello.set_name(name);
+  hello.set_instance("of " + name);
   hello.set_slots(slots);
   hello.set_threads_per_slot(1);
   hello.set_engine_version(dem::EngineVersion());

@@ -73,7 +73,7 @@ class FakeWorker {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Hello of a worker that fits this build.
+/// Hello of a worker that fits this build; all of one name are one process.
 v1::Hello MatchingHello(const std::string& name, int slots);
 
 }  // namespace calib::testing

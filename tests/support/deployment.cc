@@ -17,11 +17,22 @@ Deployment::Deployment(DeploymentOptions options)
     : options_(std::move(options)), folder_(FreshFolder(options_.name)) {}
 
 bool Deployment::StartServer() {
-  server_ = std::make_unique<Process>(
-      std::vector<std::string>{Program("calibd"), "--state", state(), "--listen", address_,
-                               "--lease-ms", std::to_string(options_.lease_ms), "--heartbeat-ms",
-                               std::to_string(options_.heartbeat_ms)},
-      folder_ + "/server.log");
+  std::vector<std::string> command{Program("calibd"),
+                                   "--state",
+                                   state(),
+                                   "--listen",
+                                   address_,
+                                   "--lease-ms",
+                                   std::to_string(options_.lease_ms),
+                                   "--heartbeat-ms",
+                                   std::to_string(options_.heartbeat_ms)};
+  command.insert(command.end(), options_.server_options.begin(), options_.server_options.end());
+  if (options_.open_files > 0) {
+    command.insert(command.begin(),
+                   {"/bin/sh", "-c",
+                    "ulimit -n " + std::to_string(options_.open_files) + " && exec \"$0\" \"$@\""});
+  }
+  server_ = std::make_unique<Process>(command, folder_ + "/server.log");
   return Eventually(kStart, [this] {
     const auto address = service::ServingAddress(state());
     if (!address.ok() || !server_->Running()) {

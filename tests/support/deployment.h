@@ -14,6 +14,8 @@ struct DeploymentOptions {
   std::string name = "deployment";
   int lease_ms = 3000;
   int heartbeat_ms = 100;
+  std::vector<std::string> server_options{};  ///< further ones of calibd
+  int open_files = 0;                         ///< that the server may have; 0: as many as the test
 };
 
 /// Everything in one fresh folder: state, logs. Children are killed with it.

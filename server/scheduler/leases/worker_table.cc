@@ -6,6 +6,10 @@
 namespace calib::scheduler {
 namespace {
 
+/// Workers, those that are gone among them. Chosen: some times those of a large cluster; the number
+/// of those that are there is that of connections.
+constexpr std::size_t kMostRemembered = 4000;
+
 bool TakesWork(const WorkerEntry& entry, Clock::time_point heard_since) {
   return entry.session != 0 && !entry.draining && !entry.leaving && entry.heard >= heard_since;
 }
@@ -20,20 +24,36 @@ std::int64_t WorkerTable::Connect(const v1::Hello& hello, std::int64_t session,
       entry.draining && !entry.leaving;  // a drained worker that is started again works
   entry.leaving = false;
   entry.hello = hello;
+  entry.hello.clear_attempts();
   entry.session = session;
   entry.heard = now;
+  if (workers_.size() > kMostRemembered) {
+    ForgetOldest();
+  }
   return before;
+}
+
+void WorkerTable::ForgetOldest() {
+  auto oldest = workers_.end();
+  for (auto it = workers_.begin(); it != workers_.end(); ++it) {
+    if (it->second.session == 0 &&
+        (oldest == workers_.end() || it->second.heard < oldest->second.heard)) {
+      oldest = it;
+    }
+  }
+  if (oldest != workers_.end()) {
+    workers_.erase(oldest);
+  }
 }
 
 bool WorkerTable::IsAnother(const v1::Hello& hello, Clock::time_point heard_since) const {
   const auto found = workers_.find(hello.name());
-  if (found == workers_.end() || hello.instance().empty()) {
+  if (found == workers_.end()) {
     return false;
   }
   const WorkerEntry& entry = found->second;
-  const std::string& instance = entry.hello.instance();
-  return !instance.empty() && instance != hello.instance() && entry.session != 0 &&
-         !entry.leaving && entry.heard >= heard_since;
+  return entry.hello.instance() != hello.instance() && entry.session != 0 && !entry.leaving &&
+         entry.heard >= heard_since;
 }
 
 void WorkerTable::Disconnect(std::int64_t session) {

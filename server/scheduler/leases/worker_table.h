@@ -13,7 +13,7 @@
 namespace calib::scheduler {
 
 struct WorkerEntry {
-  v1::Hello hello{};
+  v1::Hello hello{};         ///< without the attempts that it named
   std::int64_t session = 0;  ///< of its stream; 0: not connected
   bool draining = false;     ///< takes nothing new, by a user's wish
   bool leaving = false;      ///< takes nothing new, by its own; until it comes back
@@ -23,10 +23,11 @@ struct WorkerEntry {
 /// Not thread-safe.
 class WorkerTable {
  public:
-  /// Enters a worker with its new stream; returns the session of the stream it had before, or 0.
+  /// Enters a worker with its new stream; returns the session of the stream it had before, or 0. Of
+  /// very many workers the one that is gone and was heard least lately is forgotten.
   std::int64_t Connect(const v1::Hello& hello, std::int64_t session, Clock::time_point now);
   /// Whether another process is connected under this name, was heard since then and has not said
-  /// that it leaves. False where one of the two does not tell its instance.
+  /// that it leaves.
   bool IsAnother(const v1::Hello& hello, Clock::time_point heard_since) const;
   void Disconnect(std::int64_t session);
   /// Forgets those that are gone and were not heard since then.
@@ -45,6 +46,8 @@ class WorkerTable {
   int Slots() const;  ///< of all that are connected
 
  private:
+  void ForgetOldest();
+
   std::map<std::string, WorkerEntry> workers_;
 };
 

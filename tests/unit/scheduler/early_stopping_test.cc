@@ -71,6 +71,29 @@ TEST(EarlyStopping, SavesStatesAndLosesNoMoreThanItStates) {
   }
 }
 
+// What the emulator learns from (inference/emulator/stopped_runs.h).
+TEST(EarlyStopping, WhatStoppedRunsCameToReachesTheEmulator) {
+  SimulatedService service("came_to");
+  service.Submit(Campaign(kStopping, 0.02));
+  service.RunToEnd(1, true);
+  store::Reader reader = service.Read();
+  const auto definition = *LoadDefinition(reader, Value(reader.Campaign(1)).submitted);
+  const History history = *LoadHistory(*definition, 1, reader);
+  int stopped = 0;
+  for (const inference::Iteration& iteration : history.iterations) {
+    ASSERT_EQ(iteration.stopped.rows(), iteration.predictions.rows());
+    for (Eigen::Index i = 0; i < iteration.stopped.rows(); ++i) {
+      const Eigen::Index seen = iteration.stopped.row(i).array().isFinite().count();
+      if (iteration.predictions.row(i).allFinite()) {
+        EXPECT_EQ(seen, 0) << "a run at its end counts once";
+        continue;
+      }
+      stopped += seen > 0 && seen < iteration.stopped.cols() ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(stopped, LastPosterior(service).stopped_early());
+}
+
 Eigen::VectorXd GuidingWeights(const Definition& definition, const History& history,
                                double exponent) {
   const Eigen::VectorXd importance =

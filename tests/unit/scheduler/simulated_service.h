@@ -38,6 +38,7 @@ class SimulatedPorts final : public Ports {
   void Write(store::Store::Job job, std::function<void(const absl::Status&)> then) override;
   absl::StatusOr<store::Reader> Read() override;
   void Compute(std::function<std::function<void()>()> work) override;
+  void Load(std::function<std::function<void()>()> work) override { Compute(std::move(work)); }
   void Send(std::int64_t session, v1::ServerMessage message) override;
   void Close(std::int64_t session, const absl::Status& status) override;
   std::chrono::steady_clock::time_point Now() override { return now; }
@@ -47,11 +48,15 @@ class SimulatedPorts final : public Ports {
   std::map<std::int64_t, std::deque<v1::ServerMessage>> inbox;  ///< by session
   std::vector<std::int64_t> closed;
   int unreadable = 0;  ///< so many reads fail, as when no file can be opened
+  int refused = 0;     ///< writes whose rows the store has refused
 
  private:
   store::Store& store_;
   std::deque<std::function<void()>> tasks_;
 };
+
+/// Campaigns that the simulated server takes at a time.
+inline constexpr int kMostCampaigns = 12;
 
 /// A store in a fresh file, a scheduler over it and as many workers as wanted; the model is a
 /// closed formula, so that a whole campaign takes milliseconds.

@@ -13,6 +13,7 @@ v1::Hello Hello(const std::string& name, int slots) {
   v1::Hello hello;
   hello.set_name(name);
   hello.set_slots(slots);
+  hello.set_instance("1");
   return hello;
 }
 
@@ -63,15 +64,32 @@ TEST(WorkerTable, AnotherProcessOfTheNameOfOneThatIsConnectedIsAnother) {
   workers.Connect(of("1"), 1, kStart);
   EXPECT_FALSE(workers.IsAnother(of("1"), kStart)) << "its own reconnect";
   EXPECT_TRUE(workers.IsAnother(of("2"), kStart));
-  EXPECT_FALSE(workers.IsAnother(of(""), kStart)) << "an older build does not tell";
+  EXPECT_TRUE(workers.IsAnother(of(""), kStart)) << "who does not tell takes over no name";
   EXPECT_FALSE(workers.IsAnother(of("2"), kStart + seconds(1))) << "it is silent for too long";
   workers.Find("a")->leaving = true;
   EXPECT_FALSE(workers.IsAnother(of("2"), kStart)) << "it has said that it leaves";
   workers.Find("a")->leaving = false;
   workers.Disconnect(1);
   EXPECT_FALSE(workers.IsAnother(of("2"), kStart)) << "killed, its stream is closed";
-  workers.Connect(Hello("a", 1), 3, kStart);
-  EXPECT_FALSE(workers.IsAnother(of("2"), kStart)) << "the one there is of an older build";
+}
+
+TEST(WorkerTable, OfVeryManyTheOneLongestGoneIsForgotten) {
+  constexpr int kMany = 5000;
+  WorkerTable workers;
+  workers.Connect(Hello("there", 1), 1, kStart);
+  for (int k = 0; k < kMany; ++k) {
+    const std::int64_t session = k + 2;
+    v1::Hello hello = Hello(std::to_string(k), 1);
+    hello.add_attempts(1);
+    workers.Connect(hello, session, kStart + seconds(k));
+    workers.Disconnect(session);
+  }
+  EXPECT_LT(workers.all().size(), static_cast<std::size_t>(kMany));
+  EXPECT_NE(workers.Find("there"), nullptr);
+  EXPECT_EQ(workers.Find("0"), nullptr);
+  ASSERT_NE(workers.Find(std::to_string(kMany - 1)), nullptr);
+  EXPECT_EQ(workers.Find(std::to_string(kMany - 1))->hello.attempts_size(), 0)
+      << "what it held is looked at once";
 }
 
 TEST(WorkerTable, DrainedWorkerThatIsStartedAgainWorks) {

@@ -2,11 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <span>
+
+#include "absl/synchronization/notification.h"
 
 namespace calib::store {
 namespace {
@@ -63,7 +68,8 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
                              .method = Method::kSqmc,
                              .samples = 10,
                              .max_iterations = 3,
-                             .created_unix_ms = 1234};
+                             .created_unix_ms = 1234,
+                             .reading_rules = 5};
   Write([&](Transaction& t) {
     t.PutBlob("abc", std::string("\0grains\n", 8));
     t.InsertCampaign(campaign, {{"packing.txt", "abc"}});
@@ -77,6 +83,7 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
   ASSERT_TRUE(record.ok());
   EXPECT_EQ(record->submitted.seed, campaign.seed);
   EXPECT_EQ(record->submitted.yaml, campaign.yaml);
+  EXPECT_EQ(record->submitted.reading_rules, 5);
   EXPECT_EQ(record->progress.state, CampaignState::kPaused);
   EXPECT_TRUE(record->progress.pause_waived);
   EXPECT_EQ(reader.Files(7)->at("packing.txt"), "abc");
@@ -215,18 +222,92 @@ TEST_F(StoreTest, FailedCommitIsReportedToEveryoneAndNothingMoreIsTaken) {
   EXPECT_EQ(Read().Evaluations(1)->size(), 1U) << "what was acknowledged is there";
 }
 
-TEST_F(StoreTest, WriteThatBreaksAConstraintRollsBackItsWholeCommit) {
+TEST_F(StoreTest, WriteThatBreaksAConstraintIsRolledBackAlone) {
   Write([](Transaction& t) { PutEvaluation(t); });
-  EXPECT_FALSE(store_
-                   ->WriteNow([](Transaction& t) {
-                     t.Log(1, 0, "before");
-                     t.InsertEvaluation(
-                         {.key = {.campaign = 99, .sample = 0, .experiment = 0}, .digest = "x"});
-                   })
-                   .ok());
+  // All three wait while the first commit is held up, and go into one.
+  absl::Notification held;
+  Open({.before_commit = [&held] {
+    held.WaitForNotification();
+    return absl::OkStatus();
+  }});
+  std::array<absl::Status, 4> statuses;
+  const auto write = [&](std::size_t k, const Store::Job& job) {
+    store_->Write(job, [&statuses, k](const absl::Status& status) { statuses[k] = status; });
+  };
+  write(0, [](Transaction& t) { t.Log(1, 0, "holds the group together"); });
+  write(1, [](Transaction& t) { t.Log(1, 0, "before"); });
+  write(2, [](Transaction& t) {
+    t.Log(1, 0, "with the bad row");
+    t.InsertEvaluation({.key = {.campaign = 99, .sample = 0, .experiment = 0}, .digest = "x"});
+  });
+  write(3, [](Transaction& t) { t.Log(1, 0, "after"); });
+  held.Notify();
   Open({});
-  EXPECT_TRUE(Read().Events(1)->empty());
+  EXPECT_TRUE(statuses[1].ok()) << statuses[1];
+  EXPECT_EQ(statuses[2].code(), absl::StatusCode::kInvalidArgument) << statuses[2];
+  EXPECT_TRUE(statuses[3].ok()) << statuses[3];
+  const auto events = *Read().Events(1);
+  ASSERT_EQ(events.size(), 3U);
+  EXPECT_EQ(events[1].what, "before");
+  EXPECT_EQ(events[2].what, "after");
   EXPECT_EQ(Read().Evaluations(1)->size(), 1U);
+}
+
+TEST_F(StoreTest, ACoreTimeThatIsNoNumberIsRefusedAndOneThatIsNoTimeIsNotCounted) {
+  Write([](Transaction& t) {
+    PutEvaluation(t);
+    for (const int id : {5, 6}) t.InsertAttempt({.id = id, .key = kKey, .worker = "w"});
+    t.EndAttempt({.id = 6, .core_seconds = std::numeric_limits<double>::infinity()});
+  });
+  const auto end = [](Transaction& t) {
+    t.EndAttempt({.id = 5, .core_seconds = std::numeric_limits<double>::quiet_NaN()});
+  };
+  EXPECT_EQ(store_->WriteNow(end).code(), absl::StatusCode::kInvalidArgument);
+  Write([](Transaction& t) { t.EndAttempt({.id = 5, .core_seconds = 2}); });
+  EXPECT_EQ(Read().EffortOf(1)->core_seconds, 2);
+}
+
+TEST_F(StoreTest, OpenAttemptsOfACampaignEndTogetherAndThoseThatHaveEndedStay) {
+  Write([](Transaction& t) {
+    PutEvaluation(t);
+    for (const int id : {5, 6}) t.InsertAttempt({.id = id, .key = kKey, .worker = "w"});
+    t.EndAttempt({.id = 5, .outcome = AttemptOutcome::kCompleted, .core_seconds = 1});
+    t.EndOpenAttempts(1, {.outcome = AttemptOutcome::kStopped, .reason = "again"});
+  });
+  EXPECT_TRUE(Read().ActiveAttempts()->empty());
+  EXPECT_EQ(Read().EffortOf(1)->core_seconds, 1);
+}
+
+TEST_F(StoreTest, ContentsAreWrittenAndReadInPieces) {
+  std::string content(1'300'001, '\0');
+  for (std::size_t k = 0; k < content.size(); ++k) content[k] = static_cast<char>(k * k % 251);
+  std::size_t largest = 0;
+  const auto bytes = static_cast<std::int64_t>(content.size());
+  const auto piece = [&](std::int64_t from, std::span<char> to) {
+    largest = std::max(largest, to.size());
+    content.copy(to.data(), to.size(), static_cast<std::size_t>(from));
+    return true;
+  };
+  Write([&](Transaction& t) {
+    t.PutBlob("large", bytes, piece);
+    t.PutBlob("empty", 0, piece);
+  });
+  Write([&](Transaction& t) { t.PutBlob("large", bytes, piece); });
+  EXPECT_LT(largest, content.size() / 2) << "it is never whole in memory";
+  Reader reader = Read();
+  EXPECT_EQ(*reader.Blob("large"), content);
+  EXPECT_EQ(*reader.Blob("empty"), "");
+  EXPECT_EQ(*reader.BlobBytes("large"), bytes);
+  EXPECT_EQ(*reader.BlobPiece("large", 1'000'000, 100), content.substr(1'000'000, 100));
+  EXPECT_EQ(*reader.BlobPiece("large", 1'300'000, 100), content.substr(1'300'000));
+  EXPECT_EQ(*reader.BlobPiece("large", bytes, 100), "");
+  EXPECT_EQ(reader.BlobPiece("other", 0, 1).status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(reader.BlobBytes("other").status().code(), absl::StatusCode::kNotFound);
+  const auto torn = [&](Transaction& t) {
+    t.PutBlob("torn", bytes, [](std::int64_t from, std::span<char>) { return from == 0; });
+  };
+  EXPECT_EQ(store_->WriteNow(torn).code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_FALSE(*Read().HasBlob("torn"));
 }
 
 TEST_F(StoreTest, AReaderSeesOneMomentOnly) {

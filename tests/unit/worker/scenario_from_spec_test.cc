@@ -16,7 +16,8 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
                     .effects = {"rolling_resistance", "twisting_resistance"},
                     .density = 2600.5,
                     .parameters = {{"young_modulus", 0.1 + 0.2}, {"friction_angle", 0.5}},
-                    .materials = {"steel", "glass"}};
+                    .materials = {"steel", "glass"},
+                    .shear_unloading = dem::ShearUnloading::kRescaled};
   scenario.materials = {.bodies = {{"walls", "steel"}}, .grains = {{"glass", 0.3}}, .seed = 77};
   scenario.test = "oedometric";
   scenario.settings = {{"start_pressure", 1e5}};
@@ -44,6 +45,7 @@ TEST(ScenarioFromSpec, IsTheInverseOfToSpec) {
   EXPECT_EQ(back.model.density, scenario.model.density);
   EXPECT_EQ(back.model.parameters, scenario.model.parameters);
   EXPECT_EQ(back.model.materials, scenario.model.materials);
+  EXPECT_EQ(back.model.shear_unloading, dem::ShearUnloading::kRescaled);
   EXPECT_EQ(back.materials.bodies, scenario.materials.bodies);
   EXPECT_EQ(back.materials.grains, scenario.materials.grains);
   EXPECT_EQ(back.materials.seed, 77U);
@@ -115,6 +117,7 @@ TEST(ScenarioFromSpec, WhatIsNotSetStaysUnset) {
   EXPECT_FALSE(scenario.loading_rate.has_value());
   EXPECT_FALSE(scenario.initial_stress.has_value());
   EXPECT_EQ(scenario.threads, 1);
+  EXPECT_EQ(scenario.model.shear_unloading, dem::ShearUnloading::kAsPublished);
 }
 
 }  // namespace

@@ -1,0 +1,78 @@
+#include "server/service/state_pieces.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
+#include "dem/registry/catalog.h"
+#include "server/scheduler/definition.h"
+#include "server/service/queries.h"
+
+namespace calib::service {
+namespace {
+
+/// States that are read together at least, where there are as many. Chosen: some hundred KB.
+constexpr std::size_t kStates = 2000;
+
+}  // namespace
+
+absl::Status StatePieces::Begin(store::Reader& reader) {
+  ASSIGN_OR_RETURN(id_, ParseCampaign(campaign_));
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(id_));
+  ASSIGN_OR_RETURN(const auto definition, scheduler::LoadDefinition(reader, record.submitted));
+  ASSIGN_OR_RETURN(core_seconds_, reader.CoreSeconds(id_));
+  ASSIGN_OR_RETURN(const auto samples, reader.Samples(id_));
+  for (const store::SampleRecord& one : samples) {
+    if (!sample_.has_value() || *sample_ == one.sample) {
+      samples_.push_back(one.sample);
+    }
+  }
+  if (sample_.has_value() && samples_.empty()) {
+    return absl::NotFoundError(absl::StrCat("campaign c", id_, " has no sample ", *sample_,
+                                            "; see samples for the numbers there are"));
+  }
+  const campaign::Campaign& read = definition->campaign;
+  for (const campaign::Experiment& experiment : read.experiments) {
+    Told& told = experiments_.emplace_back();
+    told.experiment = experiment.name;
+    if (read.precomputed.has_value()) {
+      for (const campaign::MeasuredObservable& observable : experiment.observables) {
+        told.observables.push_back(observable.name);
+      }
+    } else {
+      told.observables = dem::FindTest(experiment.test)->observables;
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<v1::SampleStates>> StatePieces::Next(store::Reader& reader) {
+  if (!std::exchange(begun_, true)) {
+    RETURN_IF_ERROR(Begin(reader));
+  }
+  std::vector<v1::SampleStates> messages;
+  for (std::size_t read = 0; read < kStates && next_ < samples_.size(); ++next_) {
+    ASSIGN_OR_RETURN(const auto states, reader.States(id_, samples_[next_]));
+    read += states.size();
+    const store::EvaluationKey* last = nullptr;
+    for (const store::StateRecord& state : states) {
+      if (last == nullptr || *last != state.key) {
+        const Told& told = experiments_[static_cast<std::size_t>(state.key.experiment)];
+        v1::SampleStates& message = messages.emplace_back();
+        message.set_sample(state.key.sample);
+        message.set_experiment(told.experiment);
+        message.mutable_observables()->Add(told.observables.begin(), told.observables.end());
+        const auto spent = core_seconds_.find(state.key);
+        message.set_core_seconds(spent == core_seconds_.end() ? 0 : spent->second);
+      }
+      last = &state.key;
+      v1::State& message = *messages.back().add_states();
+      message.set_load_step(state.load_step);
+      message.mutable_values()->Add(state.observables.begin(), state.observables.end());
+    }
+  }
+  return messages;
+}
+
+}  // namespace calib::service
