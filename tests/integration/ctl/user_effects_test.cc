@@ -109,9 +109,9 @@ TEST_F(UserEffects, AreCandidatesAndJoinTheModel) {
 
 // A friction that falls with the strain, hidden in a measurement at two pressures; a third is held
 // out.
-class HiddenFormula : public CalibctlFixture {
+class HiddenFormulaSlow : public CalibctlFixture {
  protected:
-  HiddenFormula() {
+  HiddenFormulaSlow() {
     std::vector<double> strains;
     for (int k = 1; k <= 20; ++k) strains.push_back(0.002 * k);
     for (const char* name : {"low", "high", "held"})
@@ -168,7 +168,7 @@ seed: 3
   }
 };
 
-TEST_F(HiddenFormula, IsNamedAddedAndHeldOutDataAreOpenedAfterTheVerdict) {
+TEST_F(HiddenFormulaSlow, IsNamedAddedAndHeldOutDataAreOpenedAfterTheVerdict) {
   ASSERT_EQ(Call("run base.yaml --state s --workers 2 --json").code, 0) << Read("err");
 
   // A budget that no screen can be paid from: the base model alone, and why.

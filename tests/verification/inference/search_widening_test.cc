@@ -158,7 +158,7 @@ double GeometricMean(const std::vector<double>& values) {
 }
 
 // CALIB_SEARCH sets the number of campaigns of each case.
-TEST(SearchWidening, ComesCloserThanOtherWays) {
+TEST(SearchWideningSlow, ComesCloserThanOtherWays) {
   const char* text = std::getenv("CALIB_SEARCH");
   const int campaigns = text != nullptr ? std::max(2, std::atoi(text)) : 2;
   struct Setting {
