@@ -1,0 +1,95 @@
+#include "server/access/certificate.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include "calib/return_if_error.h"
+#include "server/access/files.h"
+#include "server/access/x509.h"
+
+namespace calib::access {
+namespace {
+
+// Between the two renames of a renewal lie microseconds.
+constexpr int kReadings = 20;
+constexpr absl::Duration kBetweenReadings = absl::Milliseconds(5);
+
+/// The key of `certificate`. A renewal that was killed between its two renames has left the key
+/// where it was written.
+absl::StatusOr<std::string> ReadKeyOf(X509* certificate, const std::string& folder) {
+  const std::string path = folder + "/key.pem";
+  absl::Status problem;
+  for (const std::string& place : {path, DraftOf(path)}) {
+    const auto pem = ReadSecret(place);
+    const KeyPtr key = pem.ok() ? ParseKey(*pem) : nullptr;
+    if (key && IsKeyOf(key.get(), certificate)) return *pem;
+    if (place != path) continue;
+    if (!pem.ok()) {
+      problem = pem.status();
+    } else if (!key) {
+      problem = absl::InvalidArgumentError(
+          absl::StrCat(path, " holds no key in PEM without a password: `calibctl certs issue` ",
+                       "into this folder writes one"));
+    } else {
+      problem = absl::AbortedError(
+          absl::StrCat(path, " is not the key of ", folder, "/cert.pem: copy both from one folder ",
+                       "of `calibctl certs issue`, or issue again into this one"));
+    }
+  }
+  return problem;
+}
+
+/// ABORTED where key and certificate do not belong together.
+absl::StatusOr<Credentials> ReadOnce(const std::string& folder) {
+  const std::string path = folder + "/cert.pem";
+  ASSIGN_OR_RETURN(Trust trust, ReadTrust(folder));
+  Credentials result;
+  result.ca_pem = std::move(trust.ca_pem);
+  result.crl_pem = std::move(trust.crl_pem);
+  ASSIGN_OR_RETURN(result.cert_pem, ReadFile(path));
+  const X509Ptr certificate = ParseCertificate(result.cert_pem);
+  if (!certificate) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        path, " holds no certificate in PEM: `calibctl certs issue` into this folder writes one"));
+  }
+  if (!IsIssuedBy(certificate.get(), trust.ca.get())) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, " was not issued by the authority of ", folder,
+                     "/ca.pem: copy both from one folder of `calibctl certs issue`"));
+  }
+  auto holder = HolderOf(certificate.get());
+  if (!holder.ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, ": ", std::string(holder.status().message())));
+  }
+  result.holder = *std::move(holder);
+  ASSIGN_OR_RETURN(result.key_pem, ReadKeyOf(certificate.get(), folder));
+  return result;
+}
+
+}  // namespace
+
+std::string DateOf(std::int64_t unix_s) {
+  return absl::FormatTime("%Y-%m-%d", absl::FromUnixSeconds(unix_s), absl::UTCTimeZone());
+}
+
+absl::StatusOr<Credentials> ReadCredentials(const std::string& folder) {
+  absl::StatusOr<Credentials> result = ReadOnce(folder);
+  for (int i = 1; i < kReadings && absl::IsAborted(result.status()); ++i) {
+    absl::SleepFor(kBetweenReadings);
+    result = ReadOnce(folder);
+  }
+  if (absl::IsAborted(result.status())) {
+    return absl::InvalidArgumentError(std::string(result.status().message()));
+  }
+  if (absl::IsNotFound(result.status())) {
+    return absl::NotFoundError(absl::StrCat(std::string(result.status().message()),
+                                            ": `calibctl certs issue CA --role ", "ROLE NAME -o ",
+                                            folder, "` writes it"));
+  }
+  return result;
+}
+
+}  // namespace calib::access
