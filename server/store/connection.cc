@@ -1,6 +1,12 @@
 #include "server/store/connection.h"
 
+#include <fcntl.h>
 #include <sqlite3.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
 
 #include "absl/strings/str_cat.h"
 
@@ -8,15 +14,34 @@ namespace calib::store {
 namespace {
 
 constexpr int kBusyTimeoutMs = 5000;
+constexpr mode_t kOwnersAlone = 0600;
+constexpr const char* kNeedsRoom = "; its disk needs room";
+
+/// Whether the disk takes nothing now, though the file is as it should be.
+bool IsNoRoom(int system_errno) {
+  return system_errno == ENOSPC || system_errno == EDQUOT || system_errno == EROFS;
+}
+
+/// The path, once the files of its database are their owner's alone; SQLite gives those that it
+/// makes beside it the same mode. Files of another owner stay as they are.
+const std::string& Closed(const std::string& path) {
+  if (const int made = open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, kOwnersAlone);
+      made >= 0) {
+    close(made);
+  }
+  for (const char* suffix : {"", "-wal", "-shm"}) {
+    chmod((path + suffix).c_str(), kOwnersAlone);
+  }
+  return path;
+}
 
 }  // namespace
 
-absl::Status ToStatus(const SQLite::Exception& error) {
+absl::Status ToStatus(const SQLite::Exception& error, int system_errno) {
   const std::string text = absl::StrCat("state file: ", error.what());
   switch (error.getErrorCode() & 0xFF) {
     case SQLITE_FULL:
-      return absl::ResourceExhaustedError(
-          absl::StrCat(text, "; free some space on the disk and start again"));
+      return absl::ResourceExhaustedError(absl::StrCat(text, kNeedsRoom));
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return absl::UnavailableError(text);
@@ -29,8 +54,11 @@ absl::Status ToStatus(const SQLite::Exception& error) {
     case SQLITE_IOERR:
     case SQLITE_READONLY:
     case SQLITE_CANTOPEN:
-      return absl::ResourceExhaustedError(
-          absl::StrCat(text, "; the folder must be writable and its disk not full"));
+      return IsNoRoom(system_errno)
+                 ? absl::ResourceExhaustedError(absl::StrCat(
+                       text, " (", std::generic_category().message(system_errno), ")", kNeedsRoom))
+                 : absl::PermissionDeniedError(
+                       absl::StrCat(text, "; the folder must be writable and its disk sound"));
     case SQLITE_CONSTRAINT:
     case SQLITE_MISMATCH:
     case SQLITE_TOOBIG:
@@ -41,15 +69,42 @@ absl::Status ToStatus(const SQLite::Exception& error) {
   }
 }
 
-Connection::Connection(const std::string& path, bool writable)
-    : database_(path,
+Connection::Connection(const std::string& path, bool writable, Bare /*not set up*/)
+    : database_(writable ? Closed(path) : path,
                 writable ? SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE : SQLite::OPEN_READONLY,
-                kBusyTimeoutMs) {
-  if (writable) {
+                kBusyTimeoutMs),
+      writable_(writable) {}
+
+Connection::Connection(const std::string& path, bool writable)
+    : Connection(path, writable, Bare{}) {
+  SetUp();
+}
+
+absl::StatusOr<std::unique_ptr<Connection>> Connection::Open(const std::string& path,
+                                                             bool writable) {
+  try {
+    std::unique_ptr<Connection> connection(new Connection(path, writable, Bare{}));
+    try {
+      connection->SetUp();
+    } catch (const SQLite::Exception& error) {
+      return connection->StatusOf(error);
+    }
+    return connection;
+  } catch (const SQLite::Exception& error) {
+    return ToStatus(error);
+  }
+}
+
+void Connection::SetUp() {
+  if (writable_) {
     database_.exec("PRAGMA journal_mode=WAL");
     database_.exec("PRAGMA synchronous=FULL");
     database_.exec("PRAGMA foreign_keys=ON");
   }
+}
+
+absl::Status Connection::StatusOf(const SQLite::Exception& error) const {
+  return ToStatus(error, sqlite3_system_errno(database_.getHandle()));
 }
 
 SQLite::Statement& Connection::Prepare(std::string_view sql) {

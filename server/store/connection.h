@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 
 namespace calib::store {
 
@@ -22,18 +23,25 @@ struct DoubleBlob {
   std::span<const double> values;
 };
 
-/// RESOURCE_EXHAUSTED for a full disk, UNAVAILABLE for a busy file, DATA_LOSS for a corrupt one,
-/// INVALID_ARGUMENT for rows that break a constraint, INTERNAL otherwise.
-absl::Status ToStatus(const SQLite::Exception& error);
+/// RESOURCE_EXHAUSTED for a disk that takes nothing (full, over its quota, read-only), which may
+/// pass; UNAVAILABLE for a busy file, DATA_LOSS for a corrupt one, PERMISSION_DENIED for one that
+/// cannot be opened, read or written, INVALID_ARGUMENT for rows that break a constraint, INTERNAL
+/// otherwise. system_errno: what the system said to the call that failed (sqlite3_system_errno);
+/// 0: not known.
+absl::Status ToStatus(const SQLite::Exception& error, int system_errno = 0);
 
 /// Not thread-safe: one thread at a time.
 class Connection {
  public:
   /// Throws SQLite::Exception. Sets WAL, FULL synchronisation and foreign keys on a writable
-  /// connection.
+  /// connection, whose files are this user's alone (mode 0600).
   Connection(const std::string& path, bool writable);
+  /// The same, with what the system said where it fails (StatusOf).
+  static absl::StatusOr<std::unique_ptr<Connection>> Open(const std::string& path, bool writable);
 
   SQLite::Database& database() { return database_; }
+  /// What an error of this connection means, with what the system said to its last call.
+  absl::Status StatusOf(const SQLite::Exception& error) const;
 
   /// The statement for `sql`, prepared once, reset and bound to the arguments in order. Throws
   /// SQLite::Exception.
@@ -55,6 +63,9 @@ class Connection {
   }
 
  private:
+  struct Bare {};  // not set up yet
+  Connection(const std::string& path, bool writable, Bare);
+  void SetUp();
   SQLite::Statement& Prepare(std::string_view sql);
 
   template <typename T>
@@ -76,6 +87,7 @@ class Connection {
   }
 
   SQLite::Database database_;
+  const bool writable_;
   std::map<std::string_view, std::unique_ptr<SQLite::Statement>> statements_;  // keys: literals
 };
 

@@ -23,7 +23,7 @@ absl::Status Migrate(Connection& connection) {
     }
     return absl::OkStatus();
   } catch (const SQLite::Exception& error) {
-    return ToStatus(error);
+    return connection.StatusOf(error);
   }
 }
 

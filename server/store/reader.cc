@@ -62,6 +62,7 @@ CampaignRecord ToCampaign(SQLite::Statement& row) {
   progress.converged = row.getColumn(13).getInt() != 0;
   progress.pause_waived = row.getColumn(14).getInt() != 0;
   submitted.reading_rules = row.getColumn(15).getInt();
+  submitted.owner = row.getColumn(16).getString();
   return record;
 }
 
@@ -79,12 +80,12 @@ std::vector<StateRecord> ToStates(std::int64_t campaign, SQLite::Statement& row)
 
 constexpr std::string_view kAllCampaigns =
     "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
-    "state, reason, phase, iteration, converged, pause_waived, reading_rules FROM campaign ORDER "
-    "BY id";
+    "state, reason, phase, iteration, converged, pause_waived, reading_rules, owner FROM campaign "
+    "ORDER BY id";
 constexpr std::string_view kOneCampaign =
     "SELECT id, name, yaml, file_name, seed, method, samples, max_iterations, created_unix_ms, "
-    "state, reason, phase, iteration, converged, pause_waived, reading_rules FROM campaign WHERE "
-    "id = ?";
+    "state, reason, phase, iteration, converged, pause_waived, reading_rules, owner FROM campaign "
+    "WHERE id = ?";
 
 }  // namespace
 
@@ -98,7 +99,7 @@ auto Reader::Guard(F read) -> absl::StatusOr<decltype(read())> {
   try {
     return read();
   } catch (const SQLite::Exception& error) {
-    return ToStatus(error);
+    return connection_->StatusOf(error);
   }
 }
 

@@ -32,6 +32,7 @@ struct NewCampaign {
   int max_iterations = 1;
   std::int64_t created_unix_ms = 0;
   int reading_rules = 1;  ///< number of those by which its measurements are read
+  std::string owner{};    ///< who submitted it; empty: nobody knows
 };
 
 /// What changes while a campaign lives.

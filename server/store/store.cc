@@ -9,8 +9,10 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
 #include "calib/return_if_error.h"
 #include "server/store/connection.h"
+#include "server/store/migration_backup.h"
 #include "server/store/migrations.h"
 
 namespace calib::store {
@@ -37,19 +39,29 @@ class Store::Writer {
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
 
-  void Enqueue(Job job, Done done) {
-    absl::MutexLock lock(&mutex_);
-    queue_.push_back({.job = std::move(job), .done = std::move(done)});
-  }
-
- private:
   struct Entry {
     Job job;
     Done done;
-    absl::Status refused{};  ///< its own rows break a constraint; the others of its group stay
+    bool waits_for_room = true;
+    absl::Status refused{};  ///< it is not written, for a reason of its own; the others are
   };
 
+  void Enqueue(Entry entry) {
+    absl::MutexLock lock(&mutex_);
+    queue_.push_back(std::move(entry));
+  }
+  void Watch(OnRoom on_room) {
+    absl::MutexLock lock(&mutex_);
+    on_room_ = std::move(on_room);
+  }
+  void StopWaiting() {
+    absl::MutexLock lock(&mutex_);
+    waits_no_more_ = true;
+  }
+
+ private:
   bool HasWork() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closing_ || !queue_.empty(); }
+  bool IsEnding() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closing_ || waits_no_more_; }
 
   /// What waits, up to a full group; empty: closing and all done.
   std::vector<Entry> NextGroup() {
@@ -66,11 +78,62 @@ class Store::Writer {
   void Loop() {
     for (auto group = NextGroup(); !group.empty(); group = NextGroup()) {
       if (failure_.ok()) {
-        failure_ = Commit(group);
+        failure_ = CommitOnceThereIsRoom(group);
       }
       for (Entry& entry : group) {
         entry.done(failure_.ok() ? entry.refused : failure_);
       }
+      group.clear();  // what the jobs hold, as the files of uploads, goes now
+    }
+  }
+
+  /// Tries again for as long as the disk has no room; CANCELLED: that was not to be waited for.
+  absl::Status CommitOnceThereIsRoom(std::vector<Entry>& group) {
+    absl::Status status = Commit(group);
+    if (absl::IsResourceExhausted(status) && RefuseThoseThatDoNotWait(group, status)) {
+      status = Commit(group);
+    }
+    if (!absl::IsResourceExhausted(status)) {
+      return status;
+    }
+    Tell(status);
+    while (absl::IsResourceExhausted(status)) {
+      {
+        absl::MutexLock lock(&mutex_);
+        if (mutex_.AwaitWithTimeout(absl::Condition(this, &Writer::IsEnding),
+                                    absl::FromChrono(hooks_.between_tries))) {
+          return absl::CancelledError(
+              absl::StrCat("not written, for the server ends: ", status.message()));
+        }
+      }
+      status = Commit(group);
+    }
+    if (status.ok()) {
+      Tell(status);
+    }
+    return status;
+  }
+
+  /// Whether there are any that had not been refused before.
+  static bool RefuseThoseThatDoNotWait(std::vector<Entry>& group, const absl::Status& why) {
+    bool any = false;
+    for (Entry& entry : group) {
+      if (!entry.waits_for_room && !absl::IsInvalidArgument(entry.refused)) {
+        entry.refused = why;
+        any = true;
+      }
+    }
+    return any;
+  }
+
+  void Tell(const absl::Status& room) {
+    OnRoom on_room;
+    {
+      absl::MutexLock lock(&mutex_);
+      on_room = on_room_;
+    }
+    if (on_room) {
+      on_room(room);
     }
   }
 
@@ -87,27 +150,42 @@ class Store::Writer {
     }
   }
 
+  /// A savepoint around each job costs up to half as much again, and a row that is refused is rare:
+  /// a group is written as one, and job by job where that does not go.
   absl::Status Commit(std::vector<Entry>& group) {
+    const absl::Status status = CommitAs(group, Refusing::kAll);
+    return absl::IsInvalidArgument(status) ? CommitAs(group, Refusing::kOne) : status;
+  }
+
+  /// What is undone where rows of a job are refused: the whole group (INVALID_ARGUMENT), or that
+  /// job alone.
+  enum class Refusing { kAll, kOne };
+  absl::Status CommitAs(std::vector<Entry>& group, Refusing refusing) {
+    const bool alone = refusing == Refusing::kOne;
     try {
       const std::unique_ptr<SQLite::Transaction> scope = Begin();
       for (Entry& entry : group) {
-        connection_->Run("SAVEPOINT job");
+        if (absl::IsResourceExhausted(entry.refused)) {
+          continue;
+        }
+        if (alone) connection_->Run("SAVEPOINT job");
         Transaction transaction(*connection_);
         entry.job(transaction);
-        if (absl::IsInvalidArgument(transaction.status())) {
+        entry.refused = absl::OkStatus();  // of a try before this one
+        if (alone && absl::IsInvalidArgument(transaction.status())) {
           connection_->Run("ROLLBACK TO job");
           entry.refused = transaction.status();
         } else if (!transaction.status().ok()) {
           return transaction.status();  // rolls back
         }
-        connection_->Run("RELEASE job");
+        if (alone) connection_->Run("RELEASE job");
       }
       if (hooks_.before_commit) {
         RETURN_IF_ERROR(hooks_.before_commit());
       }
       scope->commit();
     } catch (const SQLite::Exception& error) {
-      return ToStatus(error);
+      return connection_->StatusOf(error);
     }
     if (hooks_.after_commit) {
       hooks_.after_commit();
@@ -121,6 +199,8 @@ class Store::Writer {
   absl::Mutex mutex_;
   std::deque<Entry> queue_ ABSL_GUARDED_BY(mutex_);
   bool closing_ ABSL_GUARDED_BY(mutex_) = false;
+  bool waits_no_more_ ABSL_GUARDED_BY(mutex_) = false;
+  OnRoom on_room_ ABSL_GUARDED_BY(mutex_);
   std::thread thread_;  // last: starts when everything above is there
 };
 
@@ -133,17 +213,19 @@ absl::Status At(const std::string& path, const absl::Status& status) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Store>> Store::Open(const std::string& path, StoreHooks hooks) {
-  std::unique_ptr<Connection> connection;
-  try {
-    connection = std::make_unique<Connection>(path, /*writable=*/true);
-  } catch (const SQLite::Exception& error) {
-    return At(path, ToStatus(error));
+  auto connection = Connection::Open(path, /*writable=*/true);
+  absl::Status status = connection.status();
+  if (status.ok()) {
+    status = BackUpBeforeMigration(**connection, path);
   }
-  if (absl::Status status = Migrate(*connection); !status.ok()) {
+  if (status.ok()) {
+    status = Migrate(**connection);
+  }
+  if (!status.ok()) {
     return At(path, status);
   }
   return std::unique_ptr<Store>(
-      new Store(path, std::make_unique<Writer>(std::move(connection), std::move(hooks))));
+      new Store(path, std::make_unique<Writer>(*std::move(connection), std::move(hooks))));
 }
 
 Store::Store(std::string path, std::unique_ptr<Writer> writer)
@@ -151,7 +233,17 @@ Store::Store(std::string path, std::unique_ptr<Writer> writer)
 
 Store::~Store() = default;
 
-void Store::Write(Job job, Done done) { writer_->Enqueue(std::move(job), std::move(done)); }
+void Store::Write(Job job, Done done) {
+  writer_->Enqueue({.job = std::move(job), .done = std::move(done)});
+}
+
+void Store::WriteIfRoom(Job job, Done done) {
+  writer_->Enqueue({.job = std::move(job), .done = std::move(done), .waits_for_room = false});
+}
+
+void Store::Watch(OnRoom on_room) { writer_->Watch(std::move(on_room)); }
+
+void Store::StopWaiting() { writer_->StopWaiting(); }
 
 absl::Status Store::WriteNow(Job job) {
   std::promise<absl::Status> result;

@@ -25,7 +25,7 @@ void Transaction::Guard(F write) {
   try {
     write();
   } catch (const SQLite::Exception& error) {
-    status_ = ToStatus(error);
+    status_ = connection_.StatusOf(error);
   }
 }
 
@@ -85,10 +85,11 @@ void Transaction::InsertCampaign(const NewCampaign& campaign,
     }
     connection_.Run(
         "INSERT INTO campaign(id, name, yaml, file_name, seed, method, samples, max_iterations, "
-        "created_unix_ms, reading_rules, state) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
+        "created_unix_ms, reading_rules, owner, state) VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
+        "'queued')",
         campaign.id, campaign.name, campaign.yaml, campaign.file_name, seed,
         ToString(campaign.method), campaign.samples, campaign.max_iterations,
-        campaign.created_unix_ms, campaign.reading_rules);
+        campaign.created_unix_ms, campaign.reading_rules, campaign.owner);
     for (const auto& [path, digest] : files) {
       connection_.Run("INSERT INTO campaign_file(campaign, path, digest) VALUES(?, ?, ?)",
                       campaign.id, path, digest);

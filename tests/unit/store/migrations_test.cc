@@ -1,8 +1,10 @@
 #include "server/store/migrations.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "server/store/connection.h"
 #include "server/store/store.h"
@@ -15,12 +17,33 @@ std::string FreshFile(const std::string& name) {
   for (const char* suffix : {"", "-wal", "-shm"}) {
     std::filesystem::remove(path + suffix);
   }
+  std::filesystem::remove_all(path + ".before-" + std::to_string(Migrations().size()));
   return path;
+}
+
+/// Of a file of an earlier schema, named after it and this program's.
+std::string CopyOf(const std::string& path) {
+  return path + ".before-" + std::to_string(Migrations().size());
+}
+
+/// Names and states of the campaigns that a file of an earlier schema holds.
+std::string CampaignsOf(const std::string& path) {
+  SQLite::Database database(path, SQLite::OPEN_READONLY);
+  return database.execAndGet("SELECT group_concat(name || ' ' || state) FROM campaign").getString();
+}
+
+int SchemaOf(const std::string& path) {
+  SQLite::Database database(path, SQLite::OPEN_READONLY);
+  return database.execAndGet("PRAGMA user_version").getInt();
+}
+
+std::string FileNameOf(int version) {
+  return testing::TempDir() + "/version_" + std::to_string(version) + ".db";
 }
 
 /// A file as the program of schema `version` left it, with one campaign in it where there were any.
 std::string FileOfVersion(int version) {
-  const std::string path = FreshFile("version_" + std::to_string(version) + ".db");
+  const std::string path = FreshFile(std::filesystem::path(FileNameOf(version)).filename());
   Connection connection(path, true);
   for (const Migration& migration : Migrations().first(static_cast<std::size_t>(version))) {
     connection.database().exec(migration.sql);
@@ -51,11 +74,70 @@ TEST(Migrations, FileOfEveryEarlierVersionOpensWithItsContent) {
     const auto campaigns = reader->Campaigns();
     ASSERT_TRUE(campaigns.ok()) << campaigns.status();
     ASSERT_EQ(campaigns->size(), version >= 1 ? 1U : 0U);
+    const std::string copy = CopyOf(FileNameOf(version));
+    const bool is_earlier = version >= 1 && version < static_cast<int>(Migrations().size());
+    ASSERT_EQ(std::filesystem::exists(copy), is_earlier) << copy;
+    if (is_earlier) {
+      EXPECT_EQ(SchemaOf(copy), version);
+      EXPECT_EQ(CampaignsOf(copy), "sand finished");
+      EXPECT_FALSE(std::filesystem::exists(copy + "-wal")) << "it is one file";
+      struct stat file = {};
+      ASSERT_EQ(stat(copy.c_str(), &file), 0);
+      EXPECT_EQ(file.st_mode & 0777U, 0600U);
+    }
     // Measurements of campaigns from before rules had a number are read by the first ones.
     if (version >= 1) {
       EXPECT_EQ(campaigns->front().submitted.reading_rules, 1);
+      EXPECT_EQ(campaigns->front().submitted.owner, "");
     }
   }
+}
+
+TEST(Migrations, TheCopyOfAnInterruptedMigrationIsKept) {
+  const std::string path = FileOfVersion(3);
+  { ASSERT_TRUE(Store::Open(path).ok()); }
+  const std::string copy = CopyOf(path);
+  ASSERT_EQ(SchemaOf(copy), 3);
+  // As a process that was killed between two steps has left the file.
+  std::filesystem::copy_file(copy, path, std::filesystem::copy_options::overwrite_existing);
+  {
+    Connection half(path, true);
+    half.database().exec(Migrations()[3].sql);
+    half.database().exec("PRAGMA user_version=4");
+  }
+  ASSERT_TRUE(Store::Open(path).ok());
+  EXPECT_EQ(SchemaOf(copy), 3) << "the state before its first step, not between two";
+  // Put back and worked on by the program that wrote it, the file is another one.
+  std::filesystem::copy_file(copy, path, std::filesystem::copy_options::overwrite_existing);
+  Connection(path, true)
+      .database()
+      .exec(
+          "INSERT INTO campaign(name, yaml, file_name, method, samples, max_iterations, "
+          "created_unix_ms, state) VALUES('clay', 'name: clay', 'clay.yaml', 'sqmc', 4, 1, 0, "
+          "'finished')");
+  ASSERT_TRUE(Store::Open(path).ok());
+  EXPECT_EQ(CampaignsOf(copy), "sand finished,clay finished");
+}
+
+TEST(Migrations, ADamagedCopyIsMadeAnewAndOneHalfWrittenIsNone) {
+  const std::string path = FileOfVersion(2);
+  std::ofstream(CopyOf(path)) << "no database";
+  std::ofstream(CopyOf(path) + ".new") << "left by a process that was killed";
+  ASSERT_TRUE(Store::Open(path).ok());
+  EXPECT_EQ(SchemaOf(CopyOf(path)), 2);
+  EXPECT_EQ(CampaignsOf(CopyOf(path)), "sand finished");
+  EXPECT_FALSE(std::filesystem::exists(CopyOf(path) + ".new"));
+}
+
+TEST(Migrations, WithoutACopyNothingIsChanged) {
+  const std::string path = FileOfVersion(2);
+  std::filesystem::create_directories(CopyOf(path) + "/in the way");
+  const absl::Status refused = Store::Open(path).status();
+  EXPECT_FALSE(refused.ok());
+  EXPECT_NE(std::string(refused.message()).find("nothing has been changed"), std::string::npos)
+      << refused;
+  EXPECT_EQ(SchemaOf(path), 2);
+  EXPECT_EQ(CampaignsOf(path), "sand finished");
 }
 
 TEST(Migrations, FileOfANewerProgramIsRefused) {

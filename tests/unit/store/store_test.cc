@@ -69,7 +69,8 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
                              .samples = 10,
                              .max_iterations = 3,
                              .created_unix_ms = 1234,
-                             .reading_rules = 5};
+                             .reading_rules = 5,
+                             .owner = "ann"};
   Write([&](Transaction& t) {
     t.PutBlob("abc", std::string("\0grains\n", 8));
     t.InsertCampaign(campaign, {{"packing.txt", "abc"}});
@@ -84,6 +85,7 @@ TEST_F(StoreTest, CampaignComesBackAsSubmitted) {
   EXPECT_EQ(record->submitted.seed, campaign.seed);
   EXPECT_EQ(record->submitted.yaml, campaign.yaml);
   EXPECT_EQ(record->submitted.reading_rules, 5);
+  EXPECT_EQ(record->submitted.owner, "ann");
   EXPECT_EQ(record->progress.state, CampaignState::kPaused);
   EXPECT_TRUE(record->progress.pause_waived);
   EXPECT_EQ(reader.Files(7)->at("packing.txt"), "abc");
@@ -206,17 +208,17 @@ TEST_F(StoreTest, WhatAnEvaluationCostIsThatOfItsAttemptsOrOfTheRunThatItReuses)
 }
 
 TEST_F(StoreTest, FailedCommitIsReportedToEveryoneAndNothingMoreIsTaken) {
-  bool full = false;
+  bool broken = false;
   Open({.before_commit = [&] {
-    return full ? absl::ResourceExhaustedError("database or disk is full") : absl::OkStatus();
+    return broken ? absl::PermissionDeniedError("disk I/O error") : absl::OkStatus();
   }});
   Write([](Transaction& t) { PutEvaluation(t); });
-  full = true;
+  broken = true;
   EXPECT_EQ(store_->WriteNow([](Transaction& t) { t.Log(1, 0, "lost"); }).code(),
-            absl::StatusCode::kResourceExhausted);
-  full = false;
+            absl::StatusCode::kPermissionDenied);
+  broken = false;
   EXPECT_EQ(store_->WriteNow([](Transaction& t) { t.Log(1, 0, "also lost"); }).code(),
-            absl::StatusCode::kResourceExhausted);
+            absl::StatusCode::kPermissionDenied);
   Open({});
   EXPECT_TRUE(Read().Events(1)->empty());
   EXPECT_EQ(Read().Evaluations(1)->size(), 1U) << "what was acknowledged is there";
