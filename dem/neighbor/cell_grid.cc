@@ -5,6 +5,15 @@
 #include <cmath>
 
 namespace calib::dem {
+namespace {
+
+/// Cells along an axis, and cells altogether, for each grain or of a few grains, at most [-].
+/// Chosen: what is empty then costs less than the grains do.
+constexpr double kCellsAlong = 1024;
+constexpr std::size_t kCellsPerGrain = 64;
+constexpr std::size_t kCellsOfFew = std::size_t{1} << 20U;
+
+}  // namespace
 
 void CellGrid::Sort(const PeriodicCell& cell, const ParticleArrays& particles, double range) {
   assert(range > 0);
@@ -12,10 +21,16 @@ void CellGrid::Sort(const PeriodicCell& cell, const ParticleArrays& particles, d
   // Two grains within range differ by up to range sqrt(1 + slope^2) in x - slope z.
   const double ranges[3] = {range * std::sqrt(1.0 + slope * slope), range, range};
   for (std::size_t a = 0; a < 3; ++a) {
-    count_[a] = std::clamp(static_cast<int>(cell.length[a] / ranges[a]), 1, 1024);
+    count_[a] = static_cast<int>(std::clamp(cell.length[a] / ranges[a], 1.0, kCellsAlong));
     open_[a] = cell.open[a];
   }
   const auto n = static_cast<std::size_t>(particles.size());
+  // Small grains far apart: wider cells list the same neighbours.
+  while (static_cast<std::size_t>(count_[0]) * count_[1] * count_[2] >
+         std::max(kCellsPerGrain * n, kCellsOfFew)) {
+    int& most = *std::max_element(count_.begin(), count_.end());
+    most = (most + 1) / 2;
+  }
   const auto index = [this, &cell](double s, std::size_t a) {
     // Beyond the ends of an open axis the last cells go on for ever; neighbours stay neighbours.
     return static_cast<int>(std::clamp(s / cell.length[a] * count_[a], 0.0, count_[a] - 1.0));

@@ -26,8 +26,9 @@ class CellGrid {
   }
 
   /// Sorts wrapped centres (0 <= z < Lz, 0 <= x - z tilt/Lz < Lx; anywhere along open axes) into
-  /// grid cells of at least `range` [m] > 0 per edge; in a sheared cell the edges along x follow
-  /// its tilt and are longer. Memory of an earlier sorting is used again.
+  /// grid cells of at least `range` [m] > 0 per edge, wider ones where the grains are few; in a
+  /// sheared cell the edges along x follow its tilt and are longer. Memory of an earlier sorting is
+  /// used again.
   void Sort(const PeriodicCell& cell, const ParticleArrays& particles, double range);
 
   /// Where the grains of a grid cell begin: those of cell c are grains()[begin(c)] ..

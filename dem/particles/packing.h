@@ -27,9 +27,10 @@ struct PackingProblem {
 
 /// Reads `##PERIODIC:: Lx Ly Lz` followed by `x y z r clump` or `x y z r clump material` per line
 /// (blank lines, # comments and a byte order mark allowed) [m]. Appends everything wrong to
-/// problems (not a number, missing fields, radius <= 0 or too large for the cell, a grain outside
-/// the cell by more than half its length, fewer than two grains); centres outside by less belong to
-/// an image; the result is meaningful only if none was added.
+/// problems (not a number, missing fields, a cell's length outside 1e-9 to 1e6 m, radius below 1e-9
+/// m or too large for the cell, a grain outside the cell by more than half its length, fewer than
+/// two grains); centres outside by less belong to an image; the result is meaningful only if none
+/// was added.
 Packing ParsePacking(const std::string& text, std::vector<PackingProblem>& problems);
 
 /// The packing as text that ParsePacking() reads, with 17 digits: reading it gives the same bits

@@ -15,6 +15,10 @@ namespace calib::dem {
 namespace {
 
 constexpr const char* kHeader = "##PERIODIC::";
+/// What the lengths of a cell may be, and a radius at least [m]: far beyond any laboratory, and
+/// little enough that volumes and places counted in radii are numbers.
+constexpr double kShortest = 1e-9;
+constexpr double kLongest = 1e6;
 constexpr const char* kByteOrderMark = "\xEF\xBB\xBF";  // of editors
 
 std::vector<std::string> Fields(const std::string& line) {
@@ -30,11 +34,12 @@ bool ParseHeader(const std::string& line, int number, Packing& packing,
   const std::vector<std::string> fields = Fields(line.substr(std::string(kHeader).size()));
   bool ok = fields.size() == 3;
   for (std::size_t a = 0; ok && a < 3; ++a) {
-    ok = Number(fields[a], packing.length[a]) && packing.length[a] > 0;
+    ok = Number(fields[a], packing.length[a]) && packing.length[a] >= kShortest &&
+         packing.length[a] <= kLongest;
   }
   if (!ok) {
-    problems.push_back(
-        {number, absl::StrCat(kHeader, " needs three positive lengths Lx Ly Lz [m]")});
+    problems.push_back({number, absl::StrCat(kHeader, " needs three lengths Lx Ly Lz from ",
+                                             kShortest, " to ", kLongest, " [m]")});
   }
   return ok;
 }
@@ -65,8 +70,9 @@ void ParseGrain(const std::string& line, int number, Packing& packing,
                               "\", it must be -1 (single sphere) or the number of a clump")});
     return;
   }
-  if (!(values[3] > 0)) {
-    problems.push_back({number, absl::StrCat("radius is ", values[3], ", it must be positive")});
+  if (!(values[3] >= kShortest)) {
+    problems.push_back(
+        {number, absl::StrCat("radius is ", values[3], ", it must be ", kShortest, " m or more")});
     return;
   }
   for (std::size_t a = 0; a < 3; ++a) {

@@ -29,7 +29,9 @@ target_compile_options(calib_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Werror -ffp-contract=off
   # g++ 12 sees overlaps and overruns in the standard library that are not there (GCC bugs 105651, 105329), and forgets in a
   # precompiled header that the library's insides are not ours. clang-tidy does not know these options.
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overread;-Wno-stringop-overflow;-Wno-array-bounds;-Wno-unknown-warning-option>)
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-stringop-overread;-Wno-stringop-overflow;-Wno-array-bounds;-Wno-unknown-warning-option>
+  # Preset fuzz alone compiles with clang++: what it warns of besides is clang-tidy's to say.
+  $<$<CXX_COMPILER_ID:Clang>:-Wno-error;-Wno-unknown-pragmas>)
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND NOT CMAKE_CXX_CLANG_TIDY)
   # g++ looks for memory to free again and again; from half a GB on is soon enough (9 % of the time of a large unit, 0.2 GB more).
   target_compile_options(calib_flags INTERFACE --param=ggc-min-heapsize=524288)
@@ -115,10 +117,15 @@ function(calib_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LINKS} calib_test_main calib_flags)
   calib_use_precompiled(${name} calib_precompiled_tests)
   add_test(NAME ${name} COMMAND ${name})
+  calib_set_test(${name} "${ARG_LABEL}" ${ARG_TIMEOUT})
+endfunction()
+
+# What ctest knows of a test that runs the target of its name.
+function(calib_set_test name label timeout)
   # COST: the longest begin first, so that none is left to run alone at the end.
-  set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABEL}" TIMEOUT ${ARG_TIMEOUT} COST ${ARG_TIMEOUT})
+  set_tests_properties(${name} PROPERTIES LABELS "${label}" TIMEOUT ${timeout} COST ${timeout})
   if(CALIB_SLOWER)  # a sanitizer's preset says how many times; scheduler_test takes 1300 s under ThreadSanitizer
-    math(EXPR slow "${CALIB_SLOWER} * ${ARG_TIMEOUT}")
+    math(EXPR slow "${CALIB_SLOWER} * ${timeout}")
     set_tests_properties(${name} PROPERTIES TIMEOUT ${slow})
   endif()
   if(CALIB_THREAD_SANITIZER)
@@ -126,6 +133,22 @@ function(calib_test name)
     set_tests_properties(${name} PROPERTIES ENVIRONMENT
       "LD_PRELOAD=$<TARGET_FILE:tsan_mutex>;TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/support/tsan.supp")
   endif()
+endfunction()
+
+# calib_fuzz(NAME SOURCES ... LINKS ...): a target of tests/fuzz. In preset fuzz the libFuzzer program fuzz_NAME; else one that
+# ctest lets read every file of corpus/NAME (label fuzz).
+function(calib_fuzz name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
+  add_executable(fuzz_${name} ${ARG_SOURCES})
+  set_target_properties(fuzz_${name} PROPERTIES UNITY_BUILD OFF)
+  target_link_libraries(fuzz_${name} PRIVATE ${ARG_LINKS} calib_flags)
+  if(CALIB_FUZZ)
+    target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
+    return()
+  endif()
+  target_sources(fuzz_${name} PRIVATE replay_main.cc)
+  add_test(NAME fuzz_${name} COMMAND fuzz_${name} ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name})
+  calib_set_test(fuzz_${name} fuzz 60)
 endfunction()
 
 # calib_bench(NAME SOURCES ... LINKS ... [TINY filter]): a Google Benchmark binary; ctest runs TINY once so that it cannot rot.

@@ -1,9 +1,12 @@
 #include "dem/neighbor/neighbor_list.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <random>
 #include <set>
@@ -93,6 +96,35 @@ TEST(NeighborList, FindsWhatBruteForceFinds) {
     EXPECT_EQ(found.size(), static_cast<std::size_t>(list.size())) << "a pair is listed twice";
     EXPECT_EQ(found, expected) << "seed " << seed;
   }
+}
+
+// A grid as fine as the grains would have a thousand million cells.
+TEST(NeighborList, FewSmallGrainsInAWideCellTakeLittleMemory) {
+  Packing packing;
+  packing.length[0] = packing.length[1] = 1;
+  packing.length[2] = 1e6;
+  for (int i = 0; i < 20; ++i) {
+    packing.x.push_back(0.5 + 1.5e-9 * i);
+    packing.y.push_back(0.5);
+    packing.z.push_back(3e4 * (i / 2));
+    packing.radius.push_back(1e-9);
+    packing.clump.push_back(-1);
+  }
+  ParticleArrays p = MakeParticles(packing, 2650);
+  PeriodicCell cell{.length = {1, 1, 1e6}};
+  rlimit limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_AS, &limit), 0);
+  std::ifstream own("/proc/self/statm");
+  rlim_t pages = 0;
+  ASSERT_TRUE(own >> pages);
+  rlimit little = limit;
+  little.rlim_cur = pages * static_cast<rlim_t>(getpagesize()) + (rlim_t{256} << 20U);
+  ASSERT_EQ(setrlimit(RLIMIT_AS, &little), 0);
+  NeighborList list;
+  const absl::Status status = NeighborSearch().Build(cell, 0, p, list);
+  ASSERT_EQ(setrlimit(RLIMIT_AS, &limit), 0);
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(list.size(), 10);
 }
 
 TEST(NeighborList, NamesTheGrainThatWasLost) {

@@ -77,6 +77,17 @@ TEST(PackingFile, NeedsItsHeaderFirst) {
   EXPECT_EQ(ProblemsOf("##PERIODIC:: 1 1 1\n").at(0).line, 0);
 }
 
+// Their volumes are no numbers, and no grid can be laid over them.
+TEST(PackingFile, LengthsThatNoSpecimenHasAreRefused) {
+  const std::string cell = "##PERIODIC:: 1 1 1\n";
+  for (const char* lengths : {"1e-120 1e-120 1e-120", "1e200 1e200 1e200", "1e300 1 1"}) {
+    EXPECT_THAT(ProblemsOf(std::string("##PERIODIC:: ") + lengths + "\n").at(0).message,
+                HasSubstr("needs three lengths Lx Ly Lz from 1e-09 to 1e+06 [m]"));
+  }
+  EXPECT_EQ(ProblemsOf(cell + "0.1 0.1 0.1 1e-300 -1\n").at(0).message,
+            "radius is 1e-300, it must be 1e-09 m or more");
+}
+
 TEST(PackingFile, WritesWhatItReads) {
   Packing p;
   p.length[0] = 1.0 / 3;

@@ -1,0 +1,115 @@
+#include "tests/fuzz/campaign_checks.h"
+
+#include <cmath>
+#include <vector>
+
+#include "server/campaign/file/derive.h"
+#include "tests/fuzz/fuzz_target.h"
+#include "tests/support/stl_text.h"
+#include "tests/unit/campaign/good_campaign.h"
+
+namespace calib::fuzz {
+namespace {
+
+/// As the server has it (service/limits.h), a covariance aside: smaller ones find the same.
+constexpr campaign::ReadLimits kLimits{.covariance = 100};
+/// Grains of recipes and realizations are made one by one below this number only.
+constexpr std::size_t kMostSpecimens = 4;
+
+void CheckNumbers(const campaign::Campaign& campaign) {
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    for (const auto& [name, value] : experiment.settings) {
+      Expect(!std::isnan(value), "setting " + name + " is a number");
+    }
+    for (const dem::ControlPoint& point : experiment.path) {
+      Expect(std::isfinite(point.target), "the path of " + experiment.name + " is finite");
+    }
+    for (const double control : experiment.control) {
+      Expect(std::isfinite(control), "the control of " + experiment.name + " is finite");
+    }
+    for (const campaign::MeasuredObservable& observable : experiment.observables) {
+      for (const Eigen::Index row : campaign::RowsRead(observable)) {
+        const auto k = static_cast<std::size_t>(row);
+        Expect(std::isfinite(observable.values.at(k)), "readings are finite");
+        Expect(observable.sd.empty() ||
+                   (std::isfinite(observable.sd.at(k)) && observable.sd.at(k) > 0),
+               "errors are finite and above 0");
+      }
+    }
+  }
+}
+
+void CheckRuns(const campaign::Campaign& campaign) {
+  std::vector<double> middle;
+  for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
+    middle.push_back(parameter.prior.Quantile(0.5));
+    Expect(parameter.prior.Validate().ok() && std::isfinite(middle.back()),
+           "the prior of " + parameter.name + " has a median");
+  }
+  if (campaign.precomputed.has_value()) {
+    return;
+  }
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    for (std::size_t k = 0; k < std::min(experiment.specimens.size(), kMostSpecimens); ++k) {
+      const dem::Scenario scenario =
+          campaign::MakeScenario(campaign, experiment, middle, static_cast<int>(k));
+      for (const auto& [name, value] : scenario.model.parameters) {
+        Expect(std::isfinite(value), "parameter " + name + " of a run is finite");
+      }
+    }
+  }
+}
+
+}  // namespace
+
+const std::map<std::string, std::string>& SmallFiles() {
+  static const std::map<std::string, std::string> files = [] {
+    auto made = campaign::testing::GoodFiles();
+    made["silo.stl"] =
+        testing::TextStl(testing::FourSides({.lower = 20, .upper = 40, .height = 300}));
+    made["silo.csv"] = "opening,mass_flow_rate\n40,1.5\n20,0.4\n30.5,0.9\n20,0.41\n";
+    made["exp.dat"] =
+        "#\t\te_a\t\tp\t\tn\n0.0\t1.0\t0.40\t\n0.1\t2.0\t0.39\t\n0.05\t1.5\t0.392\t\n";
+    made["par.csv"] = "sample,E_GPa,km_nNm\n0,100,8000\n1,120,-5000\n";
+    made["sta.csv"] =
+        "sample,step,p_MPa,porosity\n0,0,1.1,0.4\n0,1,2.1,0.39\n0,2,1.4,0.393\n"
+        "1,0,0.9,0.4\n1,1,1.9,0.38\n";
+    return made;
+  }();
+  return files;
+}
+
+campaign::ReadOutcome ReadAndCheck(const std::string& yaml,
+                                   const std::map<std::string, std::string>& replaced) {
+  auto files = SmallFiles();
+  for (const auto& [path, content] : replaced) files[path] = content;
+  const campaign::FileReader reader = campaign::testing::ReaderOf(files);
+  auto outcome = campaign::ReadCampaign(yaml, "c.yaml", reader, std::nullopt,
+                                        campaign::CampaignIs::kNew, kLimits);
+  for (const campaign::Problem& problem : outcome.problems) {
+    Expect(!problem.message.empty() && problem.line >= 0, "a problem says what and where");
+    Expect(campaign::ToString(problem).find('\n') == std::string::npos, "a problem is one line");
+  }
+  if (!outcome.problems.empty()) {
+    return outcome;
+  }
+  CheckNumbers(outcome.campaign);
+  for (const inference::Reading& reading : campaign::MakeDataSet(outcome.campaign).readings) {
+    Expect(std::isfinite(reading.value), "data are finite");
+  }
+  CheckRuns(outcome.campaign);
+  if (!campaign::Priors(outcome.campaign).is_constrained()) {  // else half a million points anew
+    const auto again = campaign::ReadCampaign(yaml, "c.yaml", reader, std::nullopt,
+                                              campaign::CampaignIs::kStored, kLimits);
+    Expect(again.problems.empty(),
+           "what was accepted once is: " +
+               (again.problems.empty() ? "" : campaign::ToString(again.problems.front())));
+  }
+  Expect(campaign::Derive(yaml,
+                          {.name = "derived", .lineage = {.parent = "c1", .purpose = "extension"}})
+             .ok(),
+         "a campaign can be derived from one that was accepted");
+  return outcome;
+}
+
+}  // namespace calib::fuzz
