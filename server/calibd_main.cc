@@ -50,9 +50,16 @@ int main(int argc, char** argv) {
   app.add_option("--state", options.state_dir, "folder of the state, created if need be")
       ->required();
   app.add_option("--listen", options.listen,
-                 "HOST:PORT, port 0 for a free one (DIR/server.json tells which)")
+                 "HOST:PORT, port 0 for a free one (DIR/server.json tells which), or unix:/PATH")
       ->check([](const std::string& address) { return calib::rpc::ProblemOfAddress(address, 0); })
       ->capture_default_str();
+  app.add_option(
+         "--tls", options.tls,
+         "folder of the server's certificate, from `calibctl certs issue`; callers show one "
+         "too [none: plain text, and the token that is written to DIR/token]")
+      ->envname("CALIB_TLS");
+  app.add_flag("--insecure", options.insecure,
+               "listen in plain text where other machines reach it");
   app.add_option("--lease-ms", lease_ms,
                  "an evaluation is handed to another worker after this silence")
       ->check(CLI::Range(50, 86'400'000))
@@ -73,10 +80,6 @@ int main(int argc, char** argv) {
   }
   options.lease = std::chrono::milliseconds(lease_ms);
   options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
-  if (!calib::rpc::IsLoopback(options.listen)) {
-    std::cerr << "warning: " << options.listen
-              << " can be reached from other machines, and there is no authentication yet\n";
-  }
 
   // Blocked before any thread exists, so that all of them leave the signals to sigwait below.
   sigset_t signals;
@@ -93,7 +96,7 @@ int main(int argc, char** argv) {
   auto server = calib::service::Server::Start(options);
   if (!server.ok()) {
     std::cerr << "calibd: " << server.status().message() << '\n';
-    return 1;
+    return absl::IsInvalidArgument(server.status()) ? 2 : 1;
   }
   int signal = 0;
   sigwait(&signals, &signal);

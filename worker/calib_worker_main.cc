@@ -63,6 +63,7 @@ bool ExitWithParent(int parent) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  setenv("GRPC_VERBOSITY", "NONE", 0);  // what goes wrong is said in the log, in a sentence
   // glibc raises this threshold with every large block that is freed, and the next run's arrays
   // then fragment the heap: 21 MiB instead of 14 for the second run of 5000 grains.
   mallopt(M_MMAP_THRESHOLD, 64 * 1024);
@@ -80,8 +81,14 @@ int main(int argc, char** argv) {
                            DefaultCheckpoints(),
                        "print what determines the bits of a run and where it rests, and leave");
   auto* server =
-      app.add_option("--server", options.server, "the server, HOST:PORT")
+      app.add_option("--server", options.server, "the server, HOST:PORT or unix:/PATH")
           ->check([](const std::string& address) { return calib::rpc::ProblemOfAddress(address); });
+  app.add_option("--tls", options.access.tls,
+                 "folder of a certificate of the role worker, from `calibctl certs issue` "
+                 "[$CALIB_TLS]");
+  app.add_option("--token", options.access.token,
+                 "file with the token of a server without certificates [$CALIB_TOKEN, or where a "
+                 "server of this account leaves it]");
   app.add_option("--slots", options.slots, "evaluations at a time [cores / threads per slot]")
       ->check(CLI::Range(1, 1024));
   app.add_option("--threads-per-slot", options.threads_per_slot, "threads of one evaluation")

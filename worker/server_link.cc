@@ -11,6 +11,7 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
+#include "calib/return_if_error.h"
 #include "calib/v1/worker.grpc.pb.h"
 #include "proto/rpc/backoff.h"
 #include "proto/rpc/check_message.h"
@@ -24,9 +25,10 @@ namespace calib::worker {
 class ServerLink::Stream final
     : public grpc::ClientBidiReactor<v1::WorkerMessage, v1::ServerMessage> {
  public:
-  Stream(v1::WorkerLink::Stub& stub, const LinkEvents& events, std::function<void()> done)
-      : events_(events), done_(std::move(done)) {
-    stub.async()->Connect(&context_, this);
+  Stream(std::shared_ptr<v1::WorkerLink::Stub> stub, const LinkEvents& events,
+         std::function<void()> done)
+      : stub_(std::move(stub)), events_(events), done_(std::move(done)) {
+    stub_->async()->Connect(&context_, this);
     AddHold();  // Send() starts writes outside of reactions until the first failed read
     StartRead(&incoming_);
     StartCall();
@@ -94,6 +96,7 @@ class ServerLink::Stream final
     }
   }
 
+  const std::shared_ptr<v1::WorkerLink::Stub> stub_;
   const LinkEvents& events_;
   const std::function<void()> done_;
   grpc::ClientContext context_;
@@ -107,22 +110,43 @@ class ServerLink::Stream final
 };
 
 struct ServerLink::Impl {
-  Impl(const std::string& address, LinkEvents link_events)
-      : events(std::move(link_events)),
-        channel(rpc::OpenChannel(address)),
-        stub(v1::WorkerLink::NewStub(channel)) {}
+  Impl(std::string server, rpc::AccessChoice access_choice, LinkEvents link_events)
+      : address(std::move(server)),
+        choice(std::move(access_choice)),
+        events{
+            .received = std::move(link_events.received),
+            .closed = [this, closed = std::move(link_events.closed)](const absl::Status& status) {
+              if (absl::IsUnauthenticated(status)) {
+                absl::MutexLock lock(&mutex);
+                was_not_let_in = true;
+              }
+              closed(status);
+            }} {}
 
   bool HasNoStream() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) { return stream == nullptr; }
 
-  const LinkEvents events;
-  const std::shared_ptr<grpc::Channel> channel;
-  const std::unique_ptr<v1::WorkerLink::Stub> stub;
+  /// The connection, made where there is none.
+  absl::StatusOr<std::shared_ptr<v1::WorkerLink::Stub>> Connection()
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
+    if (stub == nullptr) {
+      ASSIGN_OR_RETURN(const rpc::Access access, rpc::FindAccess(address, choice));
+      stub = v1::WorkerLink::NewStub(rpc::OpenChannel(address, access));
+    }
+    return stub;
+  }
+
+  const std::string address;
+  const rpc::AccessChoice choice;
   absl::Mutex mutex;
+  /// With its channel, which must not go on a thread of gRPC's.
+  std::shared_ptr<v1::WorkerLink::Stub> stub ABSL_GUARDED_BY(mutex);
+  bool was_not_let_in ABSL_GUARDED_BY(mutex) = false;  // over this connection
   std::unique_ptr<Stream> stream ABSL_GUARDED_BY(mutex);
+  const LinkEvents events;
 };
 
-ServerLink::ServerLink(const std::string& address, LinkEvents events)
-    : impl_(std::make_unique<Impl>(address, std::move(events))) {}
+ServerLink::ServerLink(std::string address, rpc::AccessChoice access, LinkEvents events)
+    : impl_(std::make_unique<Impl>(std::move(address), std::move(access), std::move(events))) {}
 
 ServerLink::~ServerLink() {
   absl::MutexLock lock(&impl_->mutex);
@@ -132,17 +156,22 @@ ServerLink::~ServerLink() {
   impl_->mutex.Await(absl::Condition(impl_.get(), &Impl::HasNoStream));
 }
 
-void ServerLink::Open(const v1::Hello& hello) {
+absl::Status ServerLink::Open(const v1::Hello& hello) {
   absl::MutexLock lock(&impl_->mutex);
   // The stream before has reported its end but may still be on its way out.
   impl_->mutex.Await(absl::Condition(impl_.get(), &Impl::HasNoStream));
-  impl_->stream = std::make_unique<Stream>(*impl_->stub, impl_->events, [impl = impl_.get()] {
+  if (std::exchange(impl_->was_not_let_in, false)) {
+    impl_->stub.reset();
+  }
+  ASSIGN_OR_RETURN(const auto stub, impl_->Connection());
+  impl_->stream = std::make_unique<Stream>(stub, impl_->events, [impl = impl_.get()] {
     absl::MutexLock relock(&impl->mutex);
     impl->stream.reset();
   });
   v1::WorkerMessage message;
   *message.mutable_hello() = hello;
   impl_->stream->Send(std::move(message));
+  return absl::OkStatus();
 }
 
 void ServerLink::Send(v1::WorkerMessage message) {
@@ -167,7 +196,12 @@ absl::StatusOr<std::string> ServerLink::GetBlob(const std::string& digest, std::
     const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
     v1::BlobRequest request;
     request.set_digest(digest);
-    const auto reader = impl_->stub->GetBlob(&context, request);
+    std::shared_ptr<v1::WorkerLink::Stub> stub;
+    {
+      absl::MutexLock lock(&impl_->mutex);
+      ASSIGN_OR_RETURN(stub, impl_->Connection());
+    }
+    const auto reader = stub->GetBlob(&context, request);
     rpc::BlobAssembler assembler;
     v1::BlobChunk chunk;
     absl::Status assembled;

@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "calib/v1/worker.pb.h"
+#include "proto/rpc/access.h"
 
 namespace calib::worker {
 
@@ -22,14 +23,17 @@ struct LinkEvents {
 /// The connection to one server. Thread-safe.
 class ServerLink {
  public:
-  ServerLink(const std::string& address, LinkEvents events);
+  /// access: what is shown there (FindAccess), looked up anew for every connection.
+  ServerLink(std::string address, rpc::AccessChoice access, LinkEvents events);
   /// Cancels an open stream and waits for its end.
   ~ServerLink();
   ServerLink(const ServerLink&) = delete;
   ServerLink& operator=(const ServerLink&) = delete;
 
-  /// Starts a stream with this first message. The one before must have closed.
-  void Open(const v1::Hello& hello);
+  /// Starts a stream with this first message. The one before must have closed. After one that was
+  /// not let in, over a new connection: a certificate may have been renewed. INVALID_ARGUMENT: what
+  /// is to be shown cannot be found.
+  absl::Status Open(const v1::Hello& hello);
   /// Queues a message behind those before it; it is dropped when no stream is open.
   void Send(v1::WorkerMessage message);
   /// No more messages follow; the server then ends the stream.

@@ -28,9 +28,11 @@ namespace {
 
 namespace asio = boost::asio;
 
-/// After these the server would say the same again.
-bool IsFinal(const absl::Status& status) {
-  return status.code() == absl::StatusCode::kFailedPrecondition ||
+/// After these the server would say the same again. A worker that was welcome may have been given a
+/// new certificate since.
+bool IsFinal(const absl::Status& status, bool was_welcome) {
+  return (absl::IsUnauthenticated(status) && !was_welcome) || absl::IsPermissionDenied(status) ||
+         status.code() == absl::StatusCode::kFailedPrecondition ||
          status.code() == absl::StatusCode::kAlreadyExists ||
          status.code() == absl::StatusCode::kInvalidArgument;
 }
@@ -46,7 +48,7 @@ class Worker::Impl {
         heartbeat_(io_),
         reconnect_(io_),
         farewell_(io_),
-        link_(options_.server,
+        link_(options_.server, options_.access,
               {.received =
                    [this](v1::ServerMessage message) {
                      asio::post(io_, [this, message = std::move(message)] { Receive(message); });
@@ -97,18 +99,20 @@ class Worker::Impl {
       attempt.StreamLost();
     }
     open_ = true;
-    link_.Open(hello);
+    if (const absl::Status status = link_.Open(hello); !status.ok()) {
+      Closed(status);
+    }
   }
 
   void Closed(const absl::Status& status) {
     open_ = false;
-    welcome_ = false;
+    const bool was_welcome = std::exchange(welcome_, false);
     heartbeat_.cancel();
     if (stopping_ || leaving_) {
       Quit();
       return;
     }
-    if (IsFinal(status)) {
+    if (IsFinal(status, was_welcome)) {
       spdlog::error("refused server={} reason=\"{}\"", options_.server,
                     std::string(status.message()));
       result_ = status;

@@ -8,11 +8,13 @@
 #include <string>
 
 #include "absl/status/status.h"
+#include "proto/rpc/access.h"
 
 namespace calib::worker {
 
 struct WorkerOptions {
-  std::string server{};                   ///< HOST:PORT
+  std::string server{};                   ///< HOST:PORT or unix:/PATH
+  rpc::AccessChoice access{};             ///< what is shown there
   std::string name{};                     ///< unique among the server's workers
   int slots = 1;                          ///< attempts at a time, > 0
   int threads_per_slot = 1;               ///< > 0
@@ -35,7 +37,8 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// OK after a stop or drain; otherwise why the server refused this worker.
+  /// OK after a stop or drain; otherwise why the server refused this worker, or what is wrong with
+  /// what it is to show there.
   absl::Status Run();
 
  private:

@@ -1,11 +1,14 @@
 #include "proto/rpc/address.h"
 
 #include <charconv>
+#include <string_view>
 
 #include "absl/strings/str_cat.h"
 
 namespace calib::rpc {
 namespace {
+
+constexpr std::string_view kSocket = "unix:";
 
 bool IsHost(const std::string& host) {
   if (host.starts_with('[')) {
@@ -20,6 +23,12 @@ bool IsHost(const std::string& host) {
 
 // gRPC looks up a host that is none, and takes a port above 65535 modulo 65536.
 std::string ProblemOfAddress(const std::string& address, int least_port) {
+  if (address.starts_with(kSocket)) {
+    const std::string path = SocketPathOf(address);
+    if (path.starts_with('/') && path.size() <= kLongestSocketPath) return "";
+    return absl::StrCat("'", address, "' is not unix:/PATH with a path of at most ",
+                        kLongestSocketPath, " bytes");
+  }
   const std::size_t colon = address.rfind(':');
   int port = -1;
   if (colon != std::string::npos && IsHost(HostOf(address))) {
@@ -34,9 +43,19 @@ std::string ProblemOfAddress(const std::string& address, int least_port) {
 
 std::string HostOf(const std::string& address) { return address.substr(0, address.rfind(':')); }
 
+int PortOf(const std::string& address) {
+  int port = 0;
+  std::from_chars(address.data() + address.rfind(':') + 1, address.data() + address.size(), port);
+  return port;
+}
+
+std::string SocketPathOf(const std::string& address) {
+  return address.starts_with(kSocket) ? address.substr(kSocket.size()) : std::string();
+}
+
 bool IsLoopback(const std::string& address) {
   const std::string host = HostOf(address);
-  return host == "localhost" || host == "[::1]" || host.starts_with("127.");
+  return address.starts_with(kSocket) || host == "localhost" || host == "[::1]" || host.starts_with("127.");
 }
 
 }  // namespace calib::rpc

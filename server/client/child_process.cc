@@ -37,12 +37,12 @@ absl::StatusOr<std::string> FindWorkerProgram() {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::filesystem::path beside = self.parent_path() / kProgram;
-  if (!error && access(beside.c_str(), X_OK) == 0) return beside.string();
+  if (!error && ::access(beside.c_str(), X_OK) == 0) return beside.string();
   const char* path = std::getenv("PATH");
   std::istringstream folders(path != nullptr ? path : "");
   for (std::string folder; std::getline(folders, folder, ':');) {
     const std::filesystem::path candidate = std::filesystem::path(folder) / kProgram;
-    if (access(candidate.c_str(), X_OK) == 0) return candidate.string();
+    if (::access(candidate.c_str(), X_OK) == 0) return candidate.string();
   }
   return absl::NotFoundError(
       absl::StrCat(kProgram, " was not found, neither beside ", self.string(), " nor on PATH"));

@@ -37,14 +37,18 @@ using Stub = v1::Campaigns::Stub;
 
 struct Connection {
   std::string address;
+  rpc::AccessChoice choice;
+  rpc::Access access;
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<Stub> stub;
   Client::FindServer find_server;
 
-  void Open(const std::string& where) {
+  absl::Status Open(const std::string& where) {
+    ASSIGN_OR_RETURN(access, rpc::FindAccess(where, choice));
     address = where;
-    channel = rpc::OpenChannel(address);
+    channel = rpc::OpenChannel(address, access);
     stub = v1::Campaigns::NewStub(channel);
+    return absl::OkStatus();
   }
 
   /// After the server was lost: true once it, or who took its place, can be asked.
@@ -56,7 +60,7 @@ struct Connection {
       if (find_server) {
         const std::string found = find_server();
         if (found.empty()) return false;
-        if (found != address) Open(found);
+        if (found != address && !Open(found).ok()) return false;
       }
       if (channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) return true;
     } while (std::chrono::system_clock::now() < end);
@@ -167,17 +171,22 @@ struct Client::Impl {
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Client::~Client() = default;
 
-absl::StatusOr<std::unique_ptr<Client>> Client::Connect(const std::string& address) {
+absl::StatusOr<std::unique_ptr<Client>> Client::Connect(const std::string& address,
+                                                        const rpc::AccessChoice& access) {
   if (const std::string problem = rpc::ProblemOfAddress(address); !problem.empty()) {
     return absl::InvalidArgumentError(problem);  // of $CALIB_SERVER: options are checked before
   }
   auto impl = std::make_unique<Impl>();
-  impl->connection.Open(address);
+  impl->connection.choice = access;
+  RETURN_IF_ERROR(impl->connection.Open(address));
   if (!impl->connection.channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) {
-    return absl::UnavailableError(
-        absl::StrCat("no server answers at ", address,
-                     "; start one with `calibd --state DIR`, name another with --server HOST:PORT, "
-                     "or work on a folder with --state DIR"));
+    const absl::Status why = rpc::WhyNotConnected(address, impl->connection.access);
+    return !absl::IsUnavailable(why)
+               ? why
+               : absl::UnavailableError(
+                     absl::StrCat(why.message(),
+                                  "; start one with `calibd --state DIR`, name another with "
+                                  "--server HOST:PORT, or work on a folder with --state DIR"));
   }
   return std::unique_ptr<Client>(new Client(std::move(impl)));
 }

@@ -10,15 +10,20 @@
 
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
+#include "proto/rpc/access.h"
 
 namespace calib::client {
 
 /// Errors of all calls: UNAVAILABLE when the server is not there, DEADLINE_EXCEEDED when it is but
-/// has not answered for minutes, otherwise the codes of the service definition. Not thread-safe.
+/// has not answered for minutes, UNAUTHENTICATED and PERMISSION_DENIED when it does not let this
+/// program do that, otherwise the codes of the service definition. Not thread-safe.
 class Client {
  public:
-  /// UNAVAILABLE when nothing answers at the address within about two seconds.
-  static absl::StatusOr<std::unique_ptr<Client>> Connect(const std::string& address);
+  /// UNAVAILABLE when nothing answers at the address within about two seconds;
+  /// FAILED_PRECONDITION or PERMISSION_DENIED when what answers there cannot be talked to
+  /// (rpc::WhyNotConnected). access: what is shown there, and at every address found later.
+  static absl::StatusOr<std::unique_ptr<Client>> Connect(const std::string& address,
+                                                         const rpc::AccessChoice& access = {});
   /// How to find the server again when the connection is lost: its address, or "" when that is
   /// hopeless. Without it the same address is tried.
   using FindServer = std::function<std::string()>;

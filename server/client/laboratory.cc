@@ -14,8 +14,8 @@
 #include "server/campaign/model/sha256.h"
 #include "server/client/interrupt.h"
 #include "server/client/load_view.h"
-#include "server/client/no_worker_notice.h"
 #include "server/client/progress.h"
+#include "server/client/standstill_notice.h"
 #include "server/messages/read_words.h"
 
 namespace calib::client {
@@ -25,6 +25,7 @@ using campaign::CampaignState;
 namespace {
 
 constexpr std::chrono::milliseconds kPollServer{100};
+constexpr std::chrono::milliseconds kPollDisk{1000};
 
 // About a campaign that is not finished.
 std::string WhatToDo(const v1::CampaignStatus& status) {
@@ -48,6 +49,29 @@ std::string WhyNoCalibration(const v1::CampaignStatus& status) {
                       ") made of ", status.parent(), "; ask ", status.parent(), " instead");
 }
 
+const absl::Status& StatusIn(const absl::Status& status) { return status; }
+template <typename T>
+const absl::Status& StatusIn(const absl::StatusOr<T>& answer) {
+  return answer.status();
+}
+
+/// What `change` returns, asked again for as long as the server waits for room on its disk.
+/// campaign: any that it knows.
+template <typename Change>
+auto OnceThereIsRoom(Session& session, const std::string& campaign, const Change& change)
+    -> decltype(change()) {
+  StandstillNotice notice(session);
+  for (bool waited = true;;) {
+    auto outcome = change();
+    if (!absl::IsResourceExhausted(StatusIn(outcome)) || !waited || Interrupted()) return outcome;
+    const auto status = session.client().Show(campaign);
+    if (!status.ok()) return outcome;
+    notice.LookAtServer(*status);
+    waited = !status->server_waits().empty();  // else there may be room since: once more
+    if (waited) std::this_thread::sleep_for(kPollDisk);
+  }
+}
+
 }  // namespace
 
 absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& campaign) {
@@ -65,7 +89,7 @@ absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& cam
 
 absl::Status Laboratory::Wait(const std::string& campaign, const std::string& what) {
   std::optional<ProgressLine> line;  // nothing is said of what is done already
-  NoWorkerNotice notice(session_);
+  StandstillNotice notice(session_);
   for (;;) {
     const auto status = session_.client().Show(campaign);
     if (!status.ok()) {
@@ -108,7 +132,8 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
   if (parent.source.has_seed()) request.set_seed(parent.source.seed());
   *request.mutable_files() = parent.source.files();
   for (const auto& [path, content] : further) {
-    RETURN_IF_ERROR(session_.client().PutBlob(content));
+    RETURN_IF_ERROR(OnceThereIsRoom(session_, parent.status.campaign(),
+                                    [&] { return session_.client().PutBlob(content); }));
     (*request.mutable_files())[path] = campaign::Sha256Hex(content);
   }
   campaign::Submission submission{.campaign_file = yaml,
@@ -118,7 +143,9 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
   if (parent.source.has_seed()) submission.seed = parent.source.seed();
   submission.files.insert(request.files().begin(), request.files().end());
   request.set_request_id(campaign::IdentityDigest(submission));
-  ASSIGN_OR_RETURN(const auto reply, session_.client().Submit(request));
+  ASSIGN_OR_RETURN(const auto reply, OnceThereIsRoom(session_, parent.status.campaign(), [&] {
+                     return session_.client().Submit(request);
+                   }));
   if (!reply.problems().empty()) {
     const v1::Problem& problem = reply.problems(0);
     return absl::InvalidArgumentError(absl::StrCat(
@@ -129,7 +156,8 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
   ASSIGN_OR_RETURN(auto status, session_.client().Show(campaign));
   if (messages::StateOf(status) == CampaignState::kPaused) {
     std::cerr << "campaign " << campaign << " was paused (" << status.reason() << "); it goes on\n";
-    ASSIGN_OR_RETURN(status, session_.client().Resume(campaign));
+    ASSIGN_OR_RETURN(status, OnceThereIsRoom(session_, campaign,
+                                             [&] { return session_.client().Resume(campaign); }));
   }
   if (!messages::IsOver(status)) {
     if (!workers_started_ && !choice_.workers && !choice_.state.empty()) {

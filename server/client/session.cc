@@ -13,6 +13,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
+#include "proto/rpc/address.h"
 #include "server/messages/read_words.h"
 #include "server/service/server.h"
 #include "server/service/state_folder.h"
@@ -25,11 +26,18 @@ namespace {
 
 constexpr std::chrono::seconds kShutdown{3};
 constexpr std::chrono::milliseconds kBetweenTries{100};
-constexpr const char* kAnyPort = "127.0.0.1:0";
 
-bool HoldsState(const std::string& folder) {
+absl::Status CheckHoldsState(const std::string& folder) {
   std::error_code error;
-  return std::filesystem::exists(std::filesystem::path(folder) / "calib.db", error);
+  if (std::filesystem::exists(std::filesystem::path(folder) / "calib.db", error)) {
+    return absl::OkStatus();
+  }
+  if (error == std::errc::permission_denied) {
+    return absl::PermissionDeniedError(
+        absl::StrCat(folder, " may not be entered by this account: it is another's"));
+  }
+  return absl::InvalidArgumentError(absl::StrCat(
+      folder, " holds no state of a server; `calibctl run` and `calibctl submit` make one"));
 }
 
 // The last error that a log has; without one its last line.
@@ -51,17 +59,15 @@ Session::Session() = default;
 absl::StatusOr<std::unique_ptr<Session>> Session::Open(const ServerChoice& choice,
                                                        bool may_create) {
   std::unique_ptr<Session> session(new Session());
+  session->choice_ = choice;
   session->address_ = choice.address;
   if (!choice.state.empty()) {
-    if (!may_create && !HoldsState(choice.state)) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          choice.state,
-          " holds no state of a server; `calibctl run` and `calibctl submit` make one"));
-    }
+    if (!may_create) RETURN_IF_ERROR(CheckHoldsState(choice.state));
     session->state_ = choice.state;
     RETURN_IF_ERROR(session->ServeOrJoin());
   } else {
-    ASSIGN_OR_RETURN(auto client, Client::Connect(session->address_));
+    ASSIGN_OR_RETURN(auto client,
+                     Client::Connect(session->address_, session->AccessAt(session->address_)));
     session->client_ = std::move(client);
   }
   if (choice.workers.value_or(0) > 0) {
@@ -74,11 +80,21 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const ServerChoice& choic
   return session;
 }
 
-absl::StatusOr<std::string> Session::ServeOrFind(const std::string& listen) {
+rpc::AccessChoice Session::AccessAt(const std::string& address) const {
+  rpc::AccessChoice access{.tls = choice_.tls, .token = choice_.token};
+  const std::string own = state_ + "/token";
+  if (!state_.empty() && access.tls.empty() && access.token.empty() &&
+      rpc::SocketPathOf(address).empty() && rpc::ReadToken(own).ok()) {
+    access.token = own;
+  }
+  return access;
+}
+
+absl::StatusOr<std::string> Session::ServeOrFind() {
   constexpr int kTries = 5;
   service::ServerOptions options;
   options.state_dir = state_;
-  options.listen = listen;
+  options.listen = "";  // a socket of this account
   options.log_file = (std::filesystem::path(state_) / "server.log").string();
   options.on_failure = [failure = failure_](const absl::Status& status) {
     absl::MutexLock lock(&failure->mutex);
@@ -93,7 +109,7 @@ absl::StatusOr<std::string> Session::ServeOrFind(const std::string& listen) {
     }
     if (!absl::IsAlreadyExists(server.status())) return server.status();
     auto address = service::ServingAddress(state_);
-    if (address.ok()) return address;
+    if (address.ok() || absl::IsPermissionDenied(address.status())) return address;
     last = address.status();
     std::this_thread::sleep_for(kBetweenTries);
   }
@@ -104,9 +120,9 @@ absl::Status Session::ServeOrJoin() {
   constexpr int kTries = 3;
   absl::Status last;
   for (int i = 0; i < kTries && client_ == nullptr; ++i) {
-    ASSIGN_OR_RETURN(auto address, ServeOrFind(kAnyPort));
+    ASSIGN_OR_RETURN(auto address, ServeOrFind());
     address_ = std::move(address);
-    auto client = Client::Connect(address_);
+    auto client = Client::Connect(address_, AccessAt(address_));
     last = client.status();
     if (client.ok()) client_ = *std::move(client);
     if (server_ != nullptr) break;
@@ -126,8 +142,7 @@ std::string Session::TakeOverOrFind() {
     if (address.ok()) address_ = *address;
     return address_;
   }
-  auto address = ServeOrFind(address_);  // where its workers look for it
-  if (absl::IsUnavailable(address.status())) address = ServeOrFind(kAnyPort);
+  auto address = ServeOrFind();
   if (absl::IsUnavailable(address.status())) return address_;  // somebody is about to serve it
   if (!address.ok()) return GiveUp(address.status());
   const bool moved = *address != address_;
@@ -190,12 +205,20 @@ absl::Status Session::StartWorkers(int count) {
   for (int i = 1; i <= count; ++i) {
     const std::string log =
         (std::filesystem::path(state_) / absl::StrCat("worker-", i, ".log")).string();
-    ASSIGN_OR_RETURN(auto worker, ChildProcess::Start(
-                                      program,
-                                      {"--server", address_, "--slots", "1", "--name",
-                                       absl::StrCat("local-", getpid(), "-", i), "--checkpoints",
-                                       Checkpoints(), "--exit-with-parent", absl::StrCat(getpid())},
-                                      log));
+    std::vector<std::string> arguments{"--server",
+                                       address_,
+                                       "--slots",
+                                       "1",
+                                       "--name",
+                                       absl::StrCat("local-", getpid(), "-", i),
+                                       "--checkpoints",
+                                       Checkpoints(),
+                                       "--exit-with-parent",
+                                       absl::StrCat(getpid())};
+    const rpc::AccessChoice access = AccessAt(address_);
+    if (!access.tls.empty()) arguments.insert(arguments.end(), {"--tls", access.tls});
+    if (!access.token.empty()) arguments.insert(arguments.end(), {"--token", access.token});
+    ASSIGN_OR_RETURN(auto worker, ChildProcess::Start(program, arguments, log));
     workers_.push_back(std::move(worker));
   }
   return absl::OkStatus();

@@ -34,7 +34,7 @@ class Session {
   Session& operator=(const Session&) = delete;
 
   Client& client() { return *client_; }
-  const std::string& address() const { return address_; }  ///< HOST:PORT of the server
+  const std::string& address() const { return address_; }  ///< of the server
   /// The folder is served by another process, to which this session is connected. When that ends,
   /// this one serves the folder, unless it was calibd, which is waited for.
   bool is_guest() const { return server_ == nullptr; }
@@ -53,7 +53,9 @@ class Session {
   absl::Status ServeOrJoin();
   /// The address of who serves the folder, this process if nobody does. Whoever is starting or
   /// ending just now is tried again.
-  absl::StatusOr<std::string> ServeOrFind(const std::string& listen);
+  absl::StatusOr<std::string> ServeOrFind();
+  /// What is shown to the server at an address: of a folder that calibd serves, its token.
+  rpc::AccessChoice AccessAt(const std::string& address) const;
   /// After the process that served the folder has ended: serves it, or finds who does; the address
   /// for the client, "" when it is hopeless (Check() says why). A server that stays is waited for.
   std::string TakeOverOrFind();
@@ -73,6 +75,7 @@ class Session {
     }
   };
 
+  ServerChoice choice_;
   std::string state_;
   std::string address_;
   std::shared_ptr<Failure> failure_ = std::make_shared<Failure>();

@@ -241,10 +241,12 @@ std::string SensitivityText(const report::Sensitivity& sensitivity) {
 }
 
 std::string StatusText(const v1::CampaignStatus& s) {
-  return fmt::format("{}  {}\n{}\n{} model evaluations so far, {} core hours, method {}.\n",
-                     s.campaign(), s.name(), client::ProgressText(s), s.model_evaluations(),
-                     Number(s.core_hours(), 3), s.method()) +
-         (s.problem().empty() ? "" : report::Wrapped(s.problem(), "! ", "  "));
+  return fmt::format("{}  {}{}\n{}\n{} model evaluations so far, {} core hours, method {}.\n",
+                     s.campaign(), s.name(), s.owner().empty() ? "" : ", of " + s.owner(),
+                     client::ProgressText(s), s.model_evaluations(), Number(s.core_hours(), 3),
+                     s.method()) +
+         (s.problem().empty() ? "" : report::Wrapped(s.problem(), "! ", "  ")) +
+         (s.server_waits().empty() ? "" : report::Wrapped(s.server_waits(), "! ", "  "));
 }
 
 }  // namespace calib::ctl

@@ -41,7 +41,7 @@ constexpr const char* kErrorMeans =
 // over.
 std::optional<std::string> UnknownVerb(const std::vector<std::string>& verbs, int argc,
                                        const char* const* argv) {
-  const std::set<std::string> with_value = {"--server", "--state", "--workers"};
+  const std::set<std::string> with_value = {"--server", "--state", "--workers", "--tls", "--token"};
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (with_value.contains(word)) {
@@ -76,11 +76,16 @@ void AddCommonOptions(CLI::App& app, CommonOptions& common) {
         common.server.address = address;
         common.server.given = true;
       },
-      "HOST:PORT of calibd [$CALIB_SERVER or 127.0.0.1:7443]");
+      "HOST:PORT of calibd, or unix:/PATH [$CALIB_SERVER or 127.0.0.1:7443]");
   server->check([](const std::string& address) { return rpc::ProblemOfAddress(address); });
   app.add_option("--state", common.server.state,
                  "work on this state folder with an embedded server instead of --server")
       ->excludes(server);
+  app.add_option("--tls", common.server.tls,
+                 "folder of a certificate, from `calibctl certs issue` [$CALIB_TLS]");
+  app.add_option("--token", common.server.token,
+                 "file with the token of a calibd without certificates [$CALIB_TOKEN, or where a "
+                 "server of this account leaves it]");
   app.add_option("--workers", common.server.workers,
                  "local workers beside the embedded server (run: all cores unless given)")
       ->check(CLI::Range(0, 1024));

@@ -18,10 +18,11 @@ namespace {
 
 constexpr double kMebibyte = 1024.0 * 1024.0;
 constexpr double kGibibyte = 1024.0 * kMebibyte;
-constexpr double kSlowSync = 0.25;         // [s]
-constexpr double kLargestOffset = 1.0;     // [s]
-constexpr double kTrialTolerance = 2e-3;   // of closed forms
-constexpr double kStressTolerance = 1e-2;  // within which a stage is settled
+constexpr double kSlowSync = 0.25;                                // [s]
+constexpr double kLargestOffset = 1.0;                            // [s]
+constexpr std::int64_t kWarnedBefore = std::int64_t{30} * 86400;  // [s] the end of a certificate
+constexpr double kTrialTolerance = 2e-3;                          // of closed forms
+constexpr double kStressTolerance = 1e-2;                         // within which a stage is settled
 
 std::string Size(double bytes) {
   return bytes >= kGibibyte ? absl::StrCat(report::Number(bytes / kGibibyte, 3), " GiB")
@@ -201,20 +202,78 @@ Check JudgeDatabase(const v1::ServerReport& server) {
   return check;
 }
 
-Check JudgeConnection(const std::string& address, const std::optional<std::string>& listen) {
-  Check check{.name = "certificates", .subject = "connection"};
-  if (rpc::IsLoopback(listen.value_or(address))) {
-    check.found = absl::StrCat(listen.value_or(address),
-                               " is reached from this machine only; no certificate is needed.");
+std::optional<Check> JudgeWaiting(const v1::ServerReport& server) {
+  if (server.waits().empty()) {
+    return std::nullopt;
+  }
+  return Check{.name = "server",
+               .subject = "writing",
+               .health = Health::kProblem,
+               .found = absl::StrCat("It waits: ", server.waits(), "."),
+               .advice =
+                   "Free some space on that disk, or make it larger; nothing that was acknowledged "
+                   "is lost, and the server need not be started again."};
+}
+
+Check JudgeConnection(const std::string& address, const v1::ServerReport& server,
+                      std::int64_t now_unix_s) {
+  const std::string where = server.listen().empty() ? address : server.listen();
+  if (!server.certificate().empty()) {
+    access::Holder holder{.name = server.certificate(), .role = access::Role::kServer};
+    holder.not_after_unix_s = server.certificate_end_unix_s();
+    Check check = JudgeCertificate(holder, now_unix_s);
+    check.subject = "connection";
+    check.found = absl::StrCat("Encrypted; both sides show certificates. ", check.found);
     return check;
   }
-  check.health = Health::kWarning;
-  check.found = absl::StrCat(listen.value_or(address),
-                             " can be reached from other machines. Connections are neither "
-                             "encrypted nor authenticated: this version knows no certificates.");
-  check.advice =
-      "Keep the port inside a network that you trust, or let calibd listen on 127.0.0.1 and reach "
-      "it through `ssh -L 7443:127.0.0.1:7443 NODE`.";
+  Check check{.name = "certificates", .subject = "connection"};
+  if (!rpc::SocketPathOf(where).empty()) {
+    check.found = absl::StrCat(where, " is reached by programs of its account only.");
+  } else if (rpc::IsLoopback(where)) {
+    check.found = absl::StrCat(where,
+                               " is reached from this machine only, by who has its token; no "
+                               "certificate is needed.");
+  } else {
+    check.health = Health::kWarning;
+    check.found = absl::StrCat(where,
+                               " can be reached from other machines, and speaks plain text "
+                               "(--insecure): its token can be read on the way.");
+    check.advice = "Start calibd with --tls DIR (`calibctl certs init`, `calibctl certs issue`).";
+  }
+  return check;
+}
+
+Check JudgeCertificate(const absl::StatusOr<access::Holder>& holder, std::int64_t now_unix_s) {
+  Check check{.name = "certificates", .subject = "own certificate"};
+  if (!holder.ok()) {
+    check.health = Health::kProblem;
+    check.found = absl::StrCat(std::string(holder.status().message()), ".");
+    check.advice = "Give --tls a whole folder of `calibctl certs issue`.";
+    return check;
+  }
+  const std::string role = access::NameOf(holder->role);
+  const std::string end = access::DateOf(holder->not_after_unix_s);
+  const std::int64_t left = holder->not_after_unix_s - now_unix_s;
+  const std::string who = absl::StrCat(holder->name, " (", role, ")");
+  const std::string renews = absl::StrCat("`calibctl certs issue CA --role ", role, " ",
+                                          holder->name, " -o FOLDER` renews it.");
+  if (now_unix_s < holder->not_before_unix_s) {
+    check.health = Health::kProblem;
+    check.found = absl::StrCat("That of ", who, " is not valid before ",
+                               access::DateOf(holder->not_before_unix_s), ".");
+    check.advice = "Set this node's clock: the certificate is newer than it.";
+  } else if (left <= 0) {
+    check.health = Health::kProblem;
+    check.found = absl::StrCat("That of ", who, " has expired on ", end, ".");
+    check.advice = renews;
+  } else if (left <= kWarnedBefore) {
+    check.health = Health::kWarning;
+    check.found = absl::StrCat("That of ", who, " ends on ", end, ", in ",
+                               report::Duration(static_cast<double>(left)), ".");
+    check.advice = renews;
+  } else {
+    check.found = absl::StrCat("That of ", who, " is valid until ", end, ".");
+  }
   return check;
 }
 

@@ -2,11 +2,14 @@
 // What `calibctl doctor` concludes from what it has seen of a node and a server. Nothing here asks:
 // the judgements are functions of reports.
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
+#include "server/access/certificate.h"
 
 namespace calib::ctl {
 
@@ -44,9 +47,15 @@ Check JudgeClockOffset(double ahead, double uncertainty);
 enum class FolderUse { kState, kCheckpoints, kTemporary };
 Check JudgeFolder(const v1::FolderReport& folder, FolderUse use);
 Check JudgeDatabase(const v1::ServerReport& server);
+/// Only of a server that waits.
+std::optional<Check> JudgeWaiting(const v1::ServerReport& server);
 
-/// address: by which the server was reached; listen: what the server was told, if known.
-Check JudgeConnection(const std::string& address, const std::optional<std::string>& listen);
+/// address: by which the server was reached.
+Check JudgeConnection(const std::string& address, const v1::ServerReport& server,
+                      std::int64_t now_unix_s);
+/// A node's own certificate, which is warned of from 30 days before its end. holder: as read from
+/// its folder, or why it could not be.
+Check JudgeCertificate(const absl::StatusOr<access::Holder>& holder, std::int64_t now_unix_s);
 /// One check for each worker that is silent or was turned away, or one that all is well.
 std::vector<Check> JudgeWorkers(const std::vector<v1::WorkerInfo>& workers,
                                 const v1::ServerReport& server);

@@ -1,4 +1,5 @@
 // calibctl: submit, watch, inspect, compare, report.
+#include <cstdlib>
 #include <iostream>
 
 #include "server/ctl/command_line.h"
@@ -15,6 +16,7 @@ int Run(const calib::ctl::Command& command) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  setenv("GRPC_VERBOSITY", "NONE", 0);  // what goes wrong is said below, in a sentence
   const auto parsed = calib::ctl::ParseCommandLine(calib::ctl::AllVerbs(), argc, argv);
   const int code = parsed.command ? Run(*parsed.command) : parsed.exit_code;
   std::cout.flush();

@@ -24,6 +24,8 @@ std::string CommandOf(const client::ServerChoice& server, const std::string& wor
   } else if (server.given) {
     absl::StrAppend(&command, " --server ", ShellWord(server.address));
   }
+  if (!server.tls.empty()) absl::StrAppend(&command, " --tls ", ShellWord(server.tls));
+  if (!server.token.empty()) absl::StrAppend(&command, " --token ", ShellWord(server.token));
   return command;
 }
 

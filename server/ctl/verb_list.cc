@@ -33,7 +33,8 @@ namespace calib::ctl {
   VERB(Effects)           \
   VERB(Tests)             \
   VERB(Contacts)          \
-  VERB(Pack)
+  VERB(Pack)              \
+  VERB(Certs)
 
 #define CALIB_DECLARE_VERB(name) Verb name##Verb();
 CALIB_VERBS(CALIB_DECLARE_VERB)

@@ -36,7 +36,7 @@ absl::StatusOr<OutputFile> OutputFile::Open(const std::string& path) {
   std::error_code error;
   const bool exists = std::filesystem::exists(path, error);
   if (exists && std::filesystem::is_directory(path, error)) return CannotWrite(path, "is a folder");
-  if (exists && access(path.c_str(), W_OK) != 0) {
+  if (exists && ::access(path.c_str(), W_OK) != 0) {
     return CannotWrite(path, std::generic_category().message(errno));
   }
   // Devices, pipes and links (/dev/stdout too) are written to themselves.

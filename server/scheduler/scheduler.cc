@@ -23,7 +23,8 @@ constexpr int kFewestDoneToPause = 4;
 
 /// Of the store: out of files, a lock, a disk that is full for a while. What is stored is whole.
 bool MayPass(const absl::Status& error) {
-  return absl::IsUnavailable(error) || absl::IsResourceExhausted(error);
+  return absl::IsUnavailable(error) || absl::IsResourceExhausted(error) ||
+         absl::IsPermissionDenied(error);
 }
 
 // One campaign that asks for too much must not end the service, now and at each start.

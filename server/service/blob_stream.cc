@@ -52,11 +52,11 @@ class BlobReceiver final : public grpc::ServerReadReactor<v1::BlobChunk> {
     receipt_->set_digest(spool_->digest());
     receipt_->set_size(spool_->bytes());
     core_.Post([this] {
-      if (!core_.health().ok()) {
-        Finish(rpc::ToGrpc(core_.health()));
+      if (const absl::Status why = core_.WhyNotStore(); !why.ok()) {
+        Finish(rpc::ToGrpc(why));
         return;
       }
-      core_.Write(
+      core_.WriteIfRoom(
           [spool = spool_](store::Transaction& transaction) {
             transaction.PutBlob(
                 spool->digest(), spool->bytes(),
@@ -76,16 +76,14 @@ class BlobReceiver final : public grpc::ServerReadReactor<v1::BlobChunk> {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core, const std::string& peer,
+grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core,
+                                                  const grpc::ServerContextBase& context,
+                                                  Right right,
                                                   const google::protobuf::Message& request,
                                                   const std::string& digest) {
-  using Reactor = grpc::ServerWriteReactor<v1::BlobChunk>;
-  if (const absl::Status status = core.door().Check(peer, request); !status.ok()) {
-    return new EndedCall<Reactor>(status);
-  }
-  auto pass = core.door().EnterWithBlob(peer);
+  auto pass = AdmitWithBlob(core, context, right, &request);
   if (!pass.ok()) {
-    return new EndedCall<Reactor>(pass.status());
+    return new EndedCall<grpc::ServerWriteReactor<v1::BlobChunk>>(pass.status());
   }
   return new StreamReactor<v1::BlobChunk>(
       core, *std::move(pass), &Core::Query,
@@ -104,11 +102,12 @@ grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core, const std::string&
       });
 }
 
-grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core, const std::string& peer,
+grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core,
+                                                    const grpc::ServerContextBase& context,
                                                     const std::string& folder,
                                                     v1::BlobReceipt* receipt) {
   using Reactor = grpc::ServerReadReactor<v1::BlobChunk>;
-  auto pass = core.door().EnterWithBlob(peer);
+  auto pass = AdmitWithBlob(core, context, Right::kChange, nullptr);
   if (!pass.ok()) {
     return new EndedCall<Reactor>(pass.status());
   }
@@ -116,7 +115,7 @@ grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core, const std::strin
   if (!spool.ok()) {
     return new EndedCall<Reactor>(spool.status());
   }
-  return new BlobReceiver(core, peer, *std::move(pass), *std::move(spool), receipt);
+  return new BlobReceiver(core, context.peer(), *std::move(pass), *std::move(spool), receipt);
 }
 
 }  // namespace calib::service

@@ -10,13 +10,17 @@
 
 namespace calib::service {
 
-/// Streams stored content; NOT_FOUND when there is none. `request` names it by `digest`.
-grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core, const std::string& peer,
+/// Streams stored content to who has the right; NOT_FOUND when there is none. `request` names it by
+/// `digest`.
+grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core,
+                                                  const grpc::ServerContextBase& context,
+                                                  Right right,
                                                   const google::protobuf::Message& request,
                                                   const std::string& digest);
 
 /// Stores what arrives under its digest, which is checked. It waits in `folder` until it is whole.
-grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core, const std::string& peer,
+grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core,
+                                                    const grpc::ServerContextBase& context,
                                                     const std::string& folder,
                                                     v1::BlobReceipt* receipt);
 

@@ -1,5 +1,6 @@
 #pragma once
-// Calls as they begin and end: each holds its pass of the door (door.h) until gRPC is done with it,
+// Calls as they begin and end: each is let in by the guard (guard.h), holds its pass of the door
+// (door.h) until gRPC is done with it,
 // and one that is turned away ends at once with a status.
 
 #include <grpcpp/support/server_callback.h>
@@ -10,10 +11,11 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
 #include "proto/rpc/check_message.h"
 #include "proto/rpc/fit_message.h"
 #include "proto/rpc/status.h"
-#include "server/service/door.h"
+#include "server/service/core.h"
 
 namespace calib::service {
 
@@ -35,16 +37,35 @@ class EndedCall final : public Reactor {
   void OnDone() override { delete this; }
 };
 
-/// The pass of a call whose first message is `request`, if it may come in.
-inline absl::StatusOr<Door::Pass> Admit(Door& door, const std::string& peer,
-                                        const google::protobuf::Message& request) {
-  auto pass = door.Enter(peer);
-  if (pass.ok()) {
-    if (absl::Status status = door.Check(peer, request); !status.ok()) {
-      return status;
-    }
+/// A call that has come in: its pass, and whose it is.
+struct Entry {
+  Door::Pass pass;
+  Caller caller;
+};
+
+/// Lets a call in: its caller has the right (guard.h), the door has room for it, and its first
+/// message, if it has come with one, keeps its rules. What is turned away is logged.
+inline absl::StatusOr<Entry> Admit(Core& core, const grpc::ServerContextBase& context, Right right,
+                                   const google::protobuf::Message* request) {
+  const std::string peer = context.peer();
+  auto caller = core.guard().Admit(context, right);
+  if (!caller.ok()) {
+    core.door().LogRefusal(peer, caller.status());
+    return caller.status();
   }
-  return pass;
+  ASSIGN_OR_RETURN(auto pass, core.door().Enter(peer));
+  if (request != nullptr) {
+    RETURN_IF_ERROR(core.door().Check(peer, *request));
+  }
+  return Entry{.pass = std::move(pass), .caller = *std::move(caller)};
+}
+
+/// The same of a call that carries a content.
+inline absl::StatusOr<Door::Pass> AdmitWithBlob(Core& core, const grpc::ServerContextBase& context,
+                                                Right right,
+                                                const google::protobuf::Message* request) {
+  RETURN_IF_ERROR(Admit(core, context, right, request).status());
+  return core.door().EnterWithBlob(context.peer());
 }
 
 /// An answer as it leaves: its texts cut to what their rules allow. DATA_LOSS, and logged, where it

@@ -1,5 +1,8 @@
 #include "server/service/campaigns_service.h"
 
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <utility>
@@ -26,6 +29,12 @@ constexpr std::chrono::seconds kLookingThroughTheFile{10};
 /// Campaigns that are read, or wait to be, at a time: each with its text, which may be a MiB.
 constexpr int kMostRead = 16;
 
+/// Who did what.
+void LogChange(const char* what, const std::string& of, const Caller& caller) {
+  spdlog::info("change what={} of={} by={} role={}", what, of, caller.name,
+               access::NameOf(caller.role));
+}
+
 /// Ends a call with its answer, or with why there is none.
 template <typename Reply>
 void Answer(grpc::ServerUnaryReactor* reactor, absl::StatusOr<Reply> answer, Reply* reply) {
@@ -38,15 +47,15 @@ void Answer(grpc::ServerUnaryReactor* reactor, absl::StatusOr<Reply> answer, Rep
 
 }  // namespace
 
-grpc::ServerUnaryReactor* CampaignsService::Enter(Context* context,
-                                                  const google::protobuf::Message& request,
-                                                  const std::function<void(Unary*)>& go_on) {
-  auto pass = Admit(core_.door(), context->peer(), request);
-  if (!pass.ok()) {
-    return new EndedCall<Unary>(pass.status());
+grpc::ServerUnaryReactor* CampaignsService::Enter(
+    Context* context, Right right, const google::protobuf::Message& request,
+    const std::function<void(Unary*, const Caller&)>& go_on) {
+  auto entry = Admit(core_, *context, right, &request);
+  if (!entry.ok()) {
+    return new EndedCall<Unary>(entry.status());
   }
-  auto* call = new UnaryCall(*std::move(pass));
-  go_on(call);
+  auto* call = new UnaryCall(std::move(entry->pass));
+  go_on(call, entry->caller);
   return call;
 }
 
@@ -54,11 +63,11 @@ template <typename Message>
 grpc::ServerWriteReactor<Message>* CampaignsService::EnterStream(
     Context* context, const google::protobuf::Message& request,
     const std::function<grpc::ServerWriteReactor<Message>*(Door::Pass)>& go_on) {
-  auto pass = Admit(core_.door(), context->peer(), request);
-  if (!pass.ok()) {
-    return new EndedCall<grpc::ServerWriteReactor<Message>>(pass.status());
+  auto entry = Admit(core_, *context, Right::kRead, &request);
+  if (!entry.ok()) {
+    return new EndedCall<grpc::ServerWriteReactor<Message>>(entry.status());
   }
-  return go_on(*std::move(pass));
+  return go_on(std::move(entry->pass));
 }
 
 template <typename Message>
@@ -83,21 +92,24 @@ template <typename Request, typename Reply>
 grpc::ServerUnaryReactor* CampaignsService::Ask(
     Context* context, const Request* request, Reply* reply,
     std::function<absl::StatusOr<Reply>(store::Reader&)> answer) {
-  return Enter(context, *request, [this, reply, answer = std::move(answer)](Unary* reactor) {
-    core_.Tell([this, reactor, reply, answer] {
-      auto reader = core_.Read();
-      Answer(reactor, reader.ok() ? answer(*reader) : absl::StatusOr<Reply>(reader.status()),
-             reply);
-    });
-  });
+  return Enter(context, Right::kRead, *request,
+               [this, reply, answer = std::move(answer)](Unary* reactor, const Caller&) {
+                 core_.Tell([this, reactor, reply, answer] {
+                   auto reader = core_.Read();
+                   Answer(reactor,
+                          reader.ok() ? answer(*reader) : absl::StatusOr<Reply>(reader.status()),
+                          reply);
+                 });
+               });
 }
 
 void CampaignsService::FinishWithStatus(Unary* reactor, std::int64_t campaign,
                                         v1::CampaignStatus* reply) {
-  core_.Query([this, reactor, campaign, reply, live = core_.scheduler().Live(campaign)] {
+  core_.Query([this, reactor, campaign, reply, live = core_.scheduler().Live(campaign),
+               waits = core_.WaitsFor()] {
     auto reader = core_.Read();
     Answer(reactor,
-           reader.ok() ? StatusOf(*reader, campaign, live)
+           reader.ok() ? StatusOf(*reader, campaign, live, waits)
                        : absl::StatusOr<v1::CampaignStatus>(reader.status()),
            reply);
   });
@@ -106,26 +118,29 @@ void CampaignsService::FinishWithStatus(Unary* reactor, std::int64_t campaign,
 grpc::ServerUnaryReactor* CampaignsService::Show(Context* context,
                                                  const v1::CampaignRequest* request,
                                                  v1::CampaignStatus* reply) {
-  return Enter(context, *request, [this, request, reply](Unary* reactor) {
-    const auto id = ParseCampaign(request->campaign());
-    if (!id.ok()) {
-      reactor->Finish(rpc::ToGrpc(id.status()));
-      return;
-    }
-    core_.Post([this, reactor, reply, id = *id] { FinishWithStatus(reactor, id, reply); });
-  });
+  return Enter(
+      context, Right::kRead, *request, [this, request, reply](Unary* reactor, const Caller&) {
+        const auto id = ParseCampaign(request->campaign());
+        if (!id.ok()) {
+          reactor->Finish(rpc::ToGrpc(id.status()));
+          return;
+        }
+        core_.Post([this, reactor, reply, id = *id] { FinishWithStatus(reactor, id, reply); });
+      });
 }
 
 grpc::ServerUnaryReactor* CampaignsService::List(Context* context, const v1::ListRequest* request,
                                                  v1::ListReply* reply) {
-  return Enter(context, *request, [this, reply](Unary* reactor) {
+  return Enter(context, Right::kRead, *request, [this, reply](Unary* reactor, const Caller&) {
     core_.Post([this, reactor, reply] {
-      core_.Tell([this, reactor, reply, live = core_.scheduler().AllLive()] {
-        auto reader = core_.Read();
-        Answer(reactor,
-               reader.ok() ? ListOf(*reader, live) : absl::StatusOr<v1::ListReply>(reader.status()),
-               reply);
-      });
+      core_.Tell(
+          [this, reactor, reply, live = core_.scheduler().AllLive(), waits = core_.WaitsFor()] {
+            auto reader = core_.Read();
+            Answer(reactor,
+                   reader.ok() ? ListOf(*reader, live, waits)
+                               : absl::StatusOr<v1::ListReply>(reader.status()),
+                   reply);
+          });
     });
   });
 }
@@ -201,12 +216,12 @@ grpc::ServerUnaryReactor* CampaignsService::ListFindings(Context* context,
 
 grpc::ServerReadReactor<v1::BlobChunk>* CampaignsService::PutBlob(Context* context,
                                                                   v1::BlobReceipt* reply) {
-  return ReceiveBlob(core_, context->peer(), site_.state_folder, reply);
+  return ReceiveBlob(core_, *context, site_.state_folder, reply);
 }
 
 grpc::ServerWriteReactor<v1::BlobChunk>* CampaignsService::GetBlob(
     Context* context, const v1::BlobByDigest* request) {
-  return SendBlob(core_, context->peer(), *request, request->digest());
+  return SendBlob(core_, *context, Right::kRead, *request, request->digest());
 }
 
 // ---- changes ----
@@ -214,73 +229,78 @@ grpc::ServerWriteReactor<v1::BlobChunk>* CampaignsService::GetBlob(
 grpc::ServerUnaryReactor* CampaignsService::Submit(Context* context,
                                                    const v1::SubmitRequest* request,
                                                    v1::SubmitReply* reply) {
-  return Enter(context, *request, [this, request, reply](Unary* reactor) {
-    const auto finish = [reactor, reply](const absl::Status& status) {
-      Answer(reactor,
-             status.ok() ? absl::StatusOr<v1::SubmitReply>(*reply)
-                         : absl::StatusOr<v1::SubmitReply>(status),
-             reply);
-    };
-    if (read_now_.fetch_add(1) >= kMostRead) {
-      --read_now_;
-      finish(absl::ResourceExhaustedError(absl::StrCat(
-          kMostRead, " campaigns are being read, and the server reads no more: try again later")));
-      return;
-    }
-    core_.Parse([this, request, reply, finish] {
-      auto reader = core_.Read();
-      auto checked =
-          reader.ok() ? CheckSubmission(*request, core_.door().limits(), *reader) : reader.status();
-      --read_now_;
-      if (!checked.ok()) {
-        finish(checked.status());
-        return;
-      }
-      if (auto* problems = std::get_if<v1::SubmitReply>(&*checked); problems != nullptr) {
-        *reply = std::move(*problems);
-        finish(absl::OkStatus());
-        return;
-      }
-      core_.Post([this, request, reply, finish,
-                  accepted = std::get<store::NewCampaign>(*std::move(checked))]() mutable {
-        if (!core_.health().ok()) {
-          finish(core_.health());
+  return Enter(
+      context, Right::kChange, *request,
+      [this, request, reply](Unary* reactor, const Caller& caller) {
+        const auto finish = [reactor, reply](const absl::Status& status) {
+          Answer(reactor,
+                 status.ok() ? absl::StatusOr<v1::SubmitReply>(*reply)
+                             : absl::StatusOr<v1::SubmitReply>(status),
+                 reply);
+        };
+        if (read_now_.fetch_add(1) >= kMostRead) {
+          --read_now_;
+          finish(absl::ResourceExhaustedError(absl::StrCat(
+              kMostRead,
+              " campaigns are being read, and the server reads no more: try again later")));
           return;
         }
-        auto latest = core_.Read();
-        const store::RequestRecord record{.digest = ContentDigest(*request)};
-        const auto before = latest.ok()
-                                ? requests_.Begin(request->request_id(), record.digest, *latest)
-                                : absl::StatusOr<std::optional<std::string>>(latest.status());
-        if (!before.ok() || before->has_value()) {
-          if (before.ok()) {
-            reply->set_campaign(**before);
+        core_.Parse([this, request, reply, finish, caller] {
+          auto reader = core_.Read();
+          auto checked = reader.ok() ? CheckSubmission(*request, core_.door().limits(), *reader)
+                                     : reader.status();
+          --read_now_;
+          if (!checked.ok()) {
+            finish(checked.status());
+            return;
           }
-          finish(before.status());
-          return;
-        }
-        accepted.created_unix_ms = core_.UnixMs();
-        core_.scheduler().Submit(
-            std::move(accepted), {request->files().begin(), request->files().end()},
-            request->request_id(), record,
-            [this, reply, finish,
-             id = request->request_id()](const absl::StatusOr<std::string>& campaign) {
-              requests_.Done(id);
-              if (campaign.ok()) {
-                reply->set_campaign(*campaign);
+          if (auto* problems = std::get_if<v1::SubmitReply>(&*checked); problems != nullptr) {
+            *reply = std::move(*problems);
+            finish(absl::OkStatus());
+            return;
+          }
+          core_.Post([this, request, reply, finish, caller,
+                      accepted = std::get<store::NewCampaign>(*std::move(checked))]() mutable {
+            if (const absl::Status why = core_.WhyNotStore(); !why.ok()) {
+              finish(why);
+              return;
+            }
+            auto latest = core_.Read();
+            const store::RequestRecord record{.digest = ContentDigest(*request)};
+            const auto before = latest.ok()
+                                    ? requests_.Begin(request->request_id(), record.digest, *latest)
+                                    : absl::StatusOr<std::optional<std::string>>(latest.status());
+            if (!before.ok() || before->has_value()) {
+              if (before.ok()) {
+                reply->set_campaign(**before);
               }
-              finish(campaign.status());
-            });
+              finish(before.status());
+              return;
+            }
+            accepted.created_unix_ms = core_.UnixMs();
+            accepted.owner = caller.name;
+            core_.scheduler().Submit(
+                std::move(accepted), {request->files().begin(), request->files().end()},
+                request->request_id(), record,
+                [this, reply, finish, caller,
+                 id = request->request_id()](const absl::StatusOr<std::string>& campaign) {
+                  requests_.Done(id);
+                  if (campaign.ok()) {
+                    LogChange("submit", *campaign, caller);
+                    reply->set_campaign(*campaign);
+                  }
+                  finish(campaign.status());
+                });
+          });
+        });
       });
-    });
-  });
 }
 
-void CampaignsService::Control(const std::string& verb, const v1::ControlRequest& request,
-                               const Act& act,
+void CampaignsService::Control(const std::string& verb, const Caller& caller,
+                               const v1::ControlRequest& request, const Act& act,
                                std::function<void(const absl::StatusOr<std::int64_t>&)> done) {
-  if (!core_.health().ok()) {
-    done(core_.health());
+  if (const absl::Status why = core_.WhyNotStore(); !why.ok()) {
+    done(why);
     return;
   }
   const auto campaign = ParseCampaign(request.campaign());
@@ -297,13 +317,20 @@ void CampaignsService::Control(const std::string& verb, const v1::ControlRequest
     done(before.ok() ? campaign : absl::StatusOr<std::int64_t>(before.status()));
     return;
   }
-  const auto finish = [this, id = request.request_id(), campaign,
+  const auto finish = [this, verb, caller, id = request.request_id(), campaign,
                        done = std::move(done)](const absl::Status& status) {
     requests_.Done(id);
+    if (status.ok()) {
+      LogChange(verb.c_str(), absl::StrCat("c", *campaign), caller);
+    }
     done(status.ok() ? campaign : absl::StatusOr<std::int64_t>(status));
   };
-  if (const auto record = reader->Campaign(*campaign); !record.ok()) {
-    finish(record.status());
+  const auto record = reader->Campaign(*campaign);
+  if (const absl::Status status =
+          record.ok() ? Guard::MayChange(caller, request.campaign(), record->submitted.owner)
+                      : record.status();
+      !status.ok()) {
+    finish(status);
     return;
   }
   store::Store::Job remember;
@@ -320,9 +347,9 @@ grpc::ServerUnaryReactor* CampaignsService::ControlWithStatus(Context* context,
                                                               const v1::ControlRequest* request,
                                                               v1::CampaignStatus* reply,
                                                               const Act& act) {
-  return Enter(context, *request, [&](Unary* reactor) {
-    core_.Post([this, verb, request, reply, act, reactor] {
-      Control(verb, *request, act,
+  return Enter(context, Right::kChange, *request, [&](Unary* reactor, const Caller& caller) {
+    core_.Post([this, verb, request, reply, act, reactor, caller] {
+      Control(verb, caller, *request, act,
               [this, reactor, reply](const absl::StatusOr<std::int64_t>& campaign) {
                 if (campaign.ok()) {
                   FinishWithStatus(reactor, *campaign, reply);
@@ -364,43 +391,53 @@ grpc::ServerUnaryReactor* CampaignsService::Cancel(Context* context,
 grpc::ServerUnaryReactor* CampaignsService::Delete(Context* context,
                                                    const v1::ControlRequest* request,
                                                    v1::DeleteReply* /*reply*/) {
-  return Enter(context, *request, [this, request](Unary* reactor) {
-    core_.Post([this, request, reactor] {
-      Control(
-          "delete", *request,
-          [this](std::int64_t campaign, const auto& also, const auto& done) {
-            core_.scheduler().Delete(campaign, also, done);
-          },
-          [reactor](const absl::StatusOr<std::int64_t>& campaign) {
-            reactor->Finish(rpc::ToGrpc(campaign.status()));
-          });
-    });
-  });
+  return Enter(context, Right::kChange, *request,
+               [this, request](Unary* reactor, const Caller& caller) {
+                 core_.Post([this, request, reactor, caller] {
+                   Control(
+                       "delete", caller, *request,
+                       [this](std::int64_t campaign, const auto& also, const auto& done) {
+                         core_.scheduler().Delete(campaign, also, done);
+                       },
+                       [reactor](const absl::StatusOr<std::int64_t>& campaign) {
+                         reactor->Finish(rpc::ToGrpc(campaign.status()));
+                       });
+                 });
+               });
+}
+
+absl::StatusOr<NewFinding> CampaignsService::FindingToKeep(const v1::AddFindingRequest& request,
+                                                           const Caller& caller) {
+  RETURN_IF_ERROR(core_.WhyNotStore());
+  ASSIGN_OR_RETURN(auto reader, core_.Read());
+  ASSIGN_OR_RETURN(auto finding, CheckFinding(request, core_.UnixMs(), reader));
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(finding.campaign));
+  RETURN_IF_ERROR(Guard::MayChange(caller, request.campaign(), record.submitted.owner));
+  return finding;
 }
 
 grpc::ServerUnaryReactor* CampaignsService::AddFinding(Context* context,
                                                        const v1::AddFindingRequest* request,
                                                        v1::Finding* reply) {
-  return Enter(context, *request, [this, request, reply](Unary* reactor) {
-    core_.Post([this, request, reply, reactor] {
-      auto reader = core_.Read();
-      const auto finding = !core_.health().ok() ? core_.health()
-                           : reader.ok()        ? CheckFinding(*request, core_.UnixMs(), *reader)
-                                                : absl::StatusOr<NewFinding>(reader.status());
-      if (!finding.ok()) {
-        reactor->Finish(rpc::ToGrpc(finding.status()));
-        return;
-      }
-      reply->set_kind(finding->record.kind);
-      reply->set_digest(finding->record.digest);
-      reply->set_created_unix_ms(finding->record.created_unix_ms);
-      core_.Write(
-          [finding = *finding](store::Transaction& transaction) {
-            transaction.PutFinding(finding.campaign, finding.record);
-          },
-          [reactor](const absl::Status& status) { reactor->Finish(rpc::ToGrpc(status)); });
-    });
-  });
+  return Enter(
+      context, Right::kChange, *request,
+      [this, request, reply](Unary* reactor, const Caller& caller) {
+        core_.Post([this, request, reply, reactor, caller] {
+          const auto finding = FindingToKeep(*request, caller);
+          if (!finding.ok()) {
+            reactor->Finish(rpc::ToGrpc(finding.status()));
+            return;
+          }
+          reply->set_kind(finding->record.kind);
+          reply->set_digest(finding->record.digest);
+          reply->set_created_unix_ms(finding->record.created_unix_ms);
+          core_.WriteIfRoom(
+              [finding = *finding](store::Transaction& transaction) {
+                transaction.PutFinding(finding.campaign, finding.record);
+              },
+              [reactor](const absl::Status& status) { reactor->Finish(rpc::ToGrpc(status)); });
+        });
+      });
 }
 
 // ---- workers ----
@@ -408,7 +445,7 @@ grpc::ServerUnaryReactor* CampaignsService::AddFinding(Context* context,
 grpc::ServerUnaryReactor* CampaignsService::ListWorkers(Context* context,
                                                         const v1::ListWorkersRequest* request,
                                                         v1::WorkerList* reply) {
-  return Enter(context, *request, [this, reply](Unary* reactor) {
+  return Enter(context, Right::kRead, *request, [this, reply](Unary* reactor, const Caller&) {
     core_.Post([this, reply, reactor] {
       v1::WorkerList list;
       for (v1::WorkerInfo& worker : core_.scheduler().Workers()) {
@@ -424,20 +461,23 @@ grpc::ServerUnaryReactor* CampaignsService::ListWorkers(Context* context,
 grpc::ServerUnaryReactor* CampaignsService::DrainWorker(Context* context,
                                                         const v1::DrainRequest* request,
                                                         v1::WorkerInfo* reply) {
-  return Enter(context, *request, [this, request, reply](Unary* reactor) {
-    core_.Post([this, request, reply, reactor] {
-      Answer(reactor, core_.scheduler().Drain(request->worker()), reply);
-    });
-  });
+  return Enter(context, Right::kOperate, *request,
+               [this, request, reply](Unary* reactor, const Caller& caller) {
+                 core_.Post([this, request, reply, reactor, caller] {
+                   LogChange("drain", request->worker(), caller);
+                   Answer(reactor, core_.scheduler().Drain(request->worker()), reply);
+                 });
+               });
 }
 
 grpc::ServerUnaryReactor* CampaignsService::Examine(Context* context,
                                                     const v1::ExamineRequest* request,
                                                     v1::ServerReport* reply) {
-  return Enter(context, *request, [this, reply](Unary* reactor) {
+  return Enter(context, Right::kRead, *request, [this, reply](Unary* reactor, const Caller&) {
     v1::ServerReport report;
     report.set_unix_ms(core_.UnixMs());
     core_.Post([this, reply, reactor, report = std::move(report)]() mutable {
+      report.set_waits(core_.WaitsFor());
       for (v1::RefusedWorker& worker : core_.scheduler().Refused()) {
         *report.add_refused() = std::move(worker);
       }
@@ -445,6 +485,14 @@ grpc::ServerUnaryReactor* CampaignsService::Examine(Context* context,
         report.set_engine_version(dem::EngineVersion());
         report.set_catalog_digest(campaign::Sha256Hex(dem::CatalogText()));
         report.set_listen(site_.listen);
+        if (!site_.tls.empty()) {
+          const auto credentials = access::ReadCredentials(site_.tls);  // as it is by now
+          report.set_certificate(credentials.ok() ? credentials->holder.name
+                                                  : std::string(credentials.status().message()));
+          report.set_certificate_end_unix_s(
+              credentials.ok() ? std::max<std::int64_t>(0, credentials->holder.not_after_unix_s)
+                               : 0);
+        }
         *report.mutable_state_folder() = messages::ExamineFolder(site_.state_folder);
         auto reader = core_.Read();
         const auto check = reader.ok() ? reader->CheckFile(kLookingThroughTheFile)

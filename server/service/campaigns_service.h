@@ -9,7 +9,9 @@
 
 #include "calib/v1/campaign.grpc.pb.h"
 #include "server/service/core.h"
+#include "server/service/guard.h"
 #include "server/service/requests.h"
+#include "server/service/submission.h"
 
 namespace calib::service {
 
@@ -18,7 +20,8 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   /// Where the server is, for those who ask.
   struct Site {
     std::string state_folder;
-    std::string listen;  ///< HOST:PORT as it was told
+    std::string listen;  ///< HOST:PORT as it was told, or unix:/PATH
+    std::string tls{};   ///< folder of its certificate; empty: none
   };
   CampaignsService(Core& core, Site site) : core_(core), site_(std::move(site)) {}
 
@@ -52,9 +55,9 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   using Act = std::function<void(std::int64_t campaign, const store::Store::Job& also,
                                  const scheduler::Scheduler::Reply& reply)>;
 
-  /// A call that goes on where the door lets it in (door.h), and else ends there.
-  Unary* Enter(Context* context, const google::protobuf::Message& request,
-               const std::function<void(Unary*)>& go_on);
+  /// A call that goes on where it is let in (calls.h), and else ends there.
+  Unary* Enter(Context* context, Right right, const google::protobuf::Message& request,
+               const std::function<void(Unary*, const Caller&)>& go_on);
   /// The same of a call that is answered with a stream, made by `go_on` from its pass.
   template <typename Message>
   grpc::ServerWriteReactor<Message>* EnterStream(
@@ -72,8 +75,11 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   /// Status of a campaign, live parts included, then the end of the call.
   void FinishWithStatus(Unary* reactor, std::int64_t campaign, v1::CampaignStatus* reply);
   /// On the strand: a change of one campaign, once per request_id. done gets its outcome.
-  void Control(const std::string& verb, const v1::ControlRequest& request, const Act& act,
-               std::function<void(const absl::StatusOr<std::int64_t>&)> done);
+  void Control(const std::string& verb, const Caller& caller, const v1::ControlRequest& request,
+               const Act& act, std::function<void(const absl::StatusOr<std::int64_t>&)> done);
+  /// On the strand: what AddFinding() is to store, if it may.
+  absl::StatusOr<NewFinding> FindingToKeep(const v1::AddFindingRequest& request,
+                                           const Caller& caller);
   Unary* ControlWithStatus(Context* context, const std::string& verb,
                            const v1::ControlRequest* request, v1::CampaignStatus* reply,
                            const Act& act);

@@ -8,8 +8,14 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/thread_pool.hpp>
+#include <ctime>
+#include <filesystem>
 #include <memory>
+#include <system_error>
 #include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 
 namespace calib::service {
 namespace {
@@ -18,6 +24,15 @@ constexpr int kPlanThreads = 2;   // the long computations between iterations
 constexpr int kParseThreads = 2;  // campaigns that are parsed, factorised and loaded
 constexpr int kTellThreads = 2;   // lists and streams
 constexpr int kQueryThreads = 2;  // so that a status is told meanwhile
+
+/// A moment for people, as "2026-01-31 08:05:09 UTC".
+std::string InUtc(std::int64_t unix_ms) {
+  const std::time_t seconds = unix_ms / 1000;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  return absl::StrFormat("%04d-%02d-%02d %02d:%02d:%02d UTC", utc.tm_year + 1900, utc.tm_mon + 1,
+                         utc.tm_mday, utc.tm_hour, utc.tm_min, utc.tm_sec);
+}
 
 }  // namespace
 
@@ -32,15 +47,19 @@ struct Core::Threads {
   boost::asio::thread_pool query{kQueryThreads};
 };
 
-Core::Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions options,
-           const Limits& limits, std::function<void(const absl::Status&)> on_failure)
+Core::Core(std::unique_ptr<store::Store> store, std::unique_ptr<Guard> guard,
+           scheduler::SchedulerOptions options, const Limits& limits,
+           std::function<void(const absl::Status&)> on_failure)
     : options_(options),
       on_failure_(std::move(on_failure)),
+      guard_(std::move(guard)),
       door_(limits),
       threads_(std::make_unique<Threads>()),
       store_(std::move(store)),
       scheduler_(*this, options),
-      thread_([this] { threads_->strand.run(); }) {}
+      thread_([this] { threads_->strand.run(); }) {
+  store_->Watch([this](const absl::Status& room) { Post([this, room] { HearOfRoom(room); }); });
+}
 
 Core::~Core() {
   BeginShutdown();
@@ -70,6 +89,7 @@ void Core::BeginShutdown() {
       session->Close(absl::UnavailableError("the server is going down"));
     }
     threads_->tick.cancel();
+    store_->StopWaiting();  // else what it waits to write would keep its calls open
   });
 }
 
@@ -101,15 +121,71 @@ void Core::RemoveSession(std::int64_t session) {
 
 void Core::Write(store::Store::Job job, std::function<void(const absl::Status&)> then) {
   store_->Write(std::move(job), [this, then = std::move(then)](const absl::Status& status) {
-    Post([this, status, then] {
-      if (absl::IsInvalidArgument(status)) {  // its own rows: nothing else is the worse for it
-        spdlog::error("write_refused reason=\"{}\"", std::string(status.message()));
-      } else if (!status.ok()) {
-        Fail(status);
-      }
-      then(status);
-    });
+    Post([this, status, then] { Written(status, then); });
   });
+}
+
+void Core::WriteIfRoom(store::Store::Job job, std::function<void(const absl::Status&)> then) {
+  store_->WriteIfRoom(std::move(job), [this, then = std::move(then)](const absl::Status& status) {
+    Post([this, status, then] { Written(status, then); });
+  });
+}
+
+void Core::Written(absl::Status status, const std::function<void(const absl::Status&)>& then) {
+  if (absl::IsInvalidArgument(status)) {  // its own rows: nothing else is the worse for it
+    spdlog::error("write_refused reason=\"{}\"", std::string(status.message()));
+  } else if (absl::IsResourceExhausted(status)) {
+    spdlog::warn("write_refused reason=\"{}\"", std::string(status.message()));
+    status = absl::ResourceExhaustedError(
+        absl::StrCat("the disk of the state folder has no room for this (", FreeSpace(),
+                     "): free some space and send it again"));
+  } else if (absl::IsCancelled(status)) {  // by StopWaiting()
+    status = absl::UnavailableError(status.message());
+  } else if (!status.ok()) {
+    Fail(status);
+  }
+  then(status);
+}
+
+void Core::HearOfRoom(const absl::Status& room) {
+  ++changes_of_room_;
+  if (!room.ok()) {
+    wait_ = Wait{.reason = std::string(room.message()),
+                 .began = std::chrono::steady_clock::now(),
+                 .began_unix_ms = UnixMs()};
+    spdlog::warn("store_waits reason=\"{}\" free=\"{}\"", wait_->reason, FreeSpace());
+  } else if (wait_.has_value()) {
+    const auto took = std::chrono::steady_clock::now() - wait_->began;
+    waited_ += took;
+    spdlog::info("store_goes_on waited_s={:.1f} since=\"{}\" reason=\"{}\"",
+                 std::chrono::duration<double>(took).count(), InUtc(wait_->began_unix_ms),
+                 wait_->reason);
+    wait_.reset();
+  }
+}
+
+std::string Core::FreeSpace() const {
+  constexpr double kMebibyte = 1024.0 * 1024.0;
+  std::error_code error;
+  const auto space = std::filesystem::space(store_->path(), error);
+  return error ? "how much is free cannot be told"
+               : absl::StrFormat("%.1f MiB are free",
+                                 static_cast<double>(space.available) / kMebibyte);
+}
+
+std::string Core::WaitsFor() const {
+  if (!wait_.has_value()) {
+    return "";
+  }
+  return absl::StrCat("the disk of the state folder is full since ", InUtc(wait_->began_unix_ms),
+                      ": ", FreeSpace(), "; the server goes on by itself when there is room");
+}
+
+absl::Status Core::WhyNotStore() const {
+  if (health_.ok() && wait_.has_value()) {
+    return absl::ResourceExhaustedError(WaitsFor());
+  }
+  return health_;
 }
 
 void Core::Fail(const absl::Status& status) {
@@ -144,7 +220,9 @@ void Core::Close(std::int64_t session, const absl::Status& status) {
   }
 }
 
-std::chrono::steady_clock::time_point Core::Now() { return std::chrono::steady_clock::now(); }
+std::chrono::steady_clock::time_point Core::Now() {
+  return (wait_.has_value() ? wait_->began : std::chrono::steady_clock::now()) - waited_;
+}
 
 std::int64_t Core::UnixMs() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(

@@ -5,14 +5,18 @@
 // move data between the wire and here. A queue of these threads holds one task of each call that is
 // open, of which the door lets in so many.
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
+#include <string>
 #include <thread>
 
 #include "server/scheduler/ports.h"
 #include "server/scheduler/scheduler.h"
 #include "server/service/door.h"
+#include "server/service/guard.h"
 #include "server/store/store.h"
 
 namespace boost::asio {
@@ -30,13 +34,15 @@ class Session {
   virtual void Close(const absl::Status& status) = 0;
 };
 
-/// Post(), the pools, Read() and door() may be called on any thread; everything else as said beside
-/// it.
+/// Post(), the pools, Read(), door() and guard() may be called on any thread; everything else as
+/// said beside it.
 class Core final : public scheduler::Ports {
  public:
-  /// on_failure is called once, on the strand, when the store can no longer be written.
-  Core(std::unique_ptr<store::Store> store, scheduler::SchedulerOptions options,
-       const Limits& limits, std::function<void(const absl::Status&)> on_failure);
+  /// guard: who may call. on_failure is called once, on the strand, when the store can no longer be
+  /// written.
+  Core(std::unique_ptr<store::Store> store, std::unique_ptr<Guard> guard,
+       scheduler::SchedulerOptions options, const Limits& limits,
+       std::function<void(const absl::Status&)> on_failure);
   ~Core() override;
 
   /// Takes up what the store holds and starts the clock.
@@ -54,12 +60,22 @@ class Core final : public scheduler::Ports {
   /// Runs on the pool for campaigns that are read, which may take seconds: no answer waits for it.
   void Parse(std::function<void()> task);
   Door& door() { return door_; }
+  Guard& guard() { return *guard_; }
 
   // ---- on the strand only ----
   scheduler::Scheduler& scheduler() { return scheduler_; }
   /// OK while the service takes work; UNAVAILABLE when it is going down; else why the store cannot
   /// be written.
   const absl::Status& health() const { return health_; }
+  /// What the server waits for before it stores anything more, a sentence; empty: nothing.
+  std::string WaitsFor() const;
+  /// Why no change is taken: health(), or RESOURCE_EXHAUSTED while the disk has no room; OK: it is.
+  absl::Status WhyNotStore() const;
+  /// Grows whenever something changed that a status shows.
+  std::uint64_t version() const { return scheduler_.version() + changes_of_room_; }
+  /// Write() of what nothing else depends on: RESOURCE_EXHAUSTED, in a sentence, where the disk has
+  /// no room for it.
+  void WriteIfRoom(store::Store::Job job, std::function<void(const absl::Status&)> then);
   std::int64_t AddSession(Session* session);
   void RemoveSession(std::int64_t session);
   boost::asio::io_context& strand();
@@ -71,15 +87,24 @@ class Core final : public scheduler::Ports {
   void Load(std::function<std::function<void()>()> work) override;
   void Send(std::int64_t session, v1::ServerMessage message) override;
   void Close(std::int64_t session, const absl::Status& status) override;
+  /// Stands still while the disk has no room: workers that speak are not read then, and are not
+  /// lost for it.
   std::chrono::steady_clock::time_point Now() override;
   std::int64_t UnixMs() override;
 
  private:
   void Fail(const absl::Status& status);
+  /// What the store has said of a write, on the strand.
+  void Written(absl::Status status, const std::function<void(const absl::Status&)>& then);
+  /// On the strand: writing waits for room, or goes on.
+  void HearOfRoom(const absl::Status& room);
+  /// As "0.3 MiB are free".
+  std::string FreeSpace() const;
   void ScheduleTick();
 
   const scheduler::SchedulerOptions options_;
   const std::function<void(const absl::Status&)> on_failure_;
+  const std::unique_ptr<Guard> guard_;
   Door door_;
   struct Threads;
   // Goes after the store, which posts to the strand to its end.
@@ -88,6 +113,14 @@ class Core final : public scheduler::Ports {
   scheduler::Scheduler scheduler_;
   absl::Status health_;
   bool failed_ = false;
+  struct Wait {
+    std::string reason;
+    std::chrono::steady_clock::time_point began{};
+    std::int64_t began_unix_ms = 0;
+  };
+  std::optional<Wait> wait_;                       // the disk has no room
+  std::chrono::steady_clock::duration waited_{0};  // of waits that are over
+  std::uint64_t changes_of_room_ = 0;
   std::map<std::int64_t, Session*> sessions_;
   std::int64_t last_session_ = 0;
   std::thread thread_;

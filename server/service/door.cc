@@ -49,11 +49,13 @@ absl::StatusOr<Door::Pass> Door::Count(const std::string& peer, bool with_blob) 
   {
     absl::MutexLock lock(&mutex_);
     Open& open = open_[peer];
-    if (open.calls >= limits_.streams_per_peer) {
+    // All who come over a socket have one name; each connection keeps gRPC's own bound (server.cc).
+    const bool is_one = !peer.starts_with("unix:");
+    if (is_one && open.calls >= limits_.streams_per_peer) {
       why = absl::StrCat("this connection has ", open.calls,
                          " calls open, and the server takes no more of one (calibd "
                          "--max-streams-per-peer)");
-    } else if (with_blob && open.blobs >= limits_.blobs_per_peer) {
+    } else if (is_one && with_blob && open.blobs >= limits_.blobs_per_peer) {
       why = absl::StrCat("this connection has ", open.blobs,
                          " files on their way, and the server takes no more of one (calibd "
                          "--max-blobs-per-peer): try again when one has ended");

@@ -10,6 +10,7 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -87,6 +88,9 @@ std::int64_t RaiseFileLimit() {
 }
 
 absl::StatusOr<std::unique_ptr<Listener>> Listener::Open(const std::string& host_port, int most) {
+  if (const std::string path = rpc::SocketPathOf(host_port); !path.empty()) {
+    return OpenPath(path, most);
+  }
   const std::string host = rpc::HostOf(host_port);
   const std::string bare =
       host.starts_with("[") && host.ends_with("]") ? host.substr(1, host.size() - 2) : host;
@@ -114,12 +118,45 @@ absl::StatusOr<std::unique_ptr<Listener>> Listener::Open(const std::string& host
     return absl::UnavailableError(absl::StrCat("cannot listen on ", host_port,
                                                ": in use, or not an address of this machine"));
   }
-  return std::unique_ptr<Listener>(new Listener(std::move(sockets), port, most));
+  return std::unique_ptr<Listener>(new Listener(std::move(sockets), port, "", most));
 }
 
-Listener::Listener(std::vector<int> sockets, int port, int most)
+absl::StatusOr<std::unique_ptr<Listener>> Listener::OpenPath(const std::string& path, int most) {
+  const auto cannot = [&path](const char* what) {
+    return absl::UnavailableError(absl::StrCat("cannot listen on unix:", path, ": ", what, ": ",
+                                               std::generic_category().message(errno)));
+  };
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof(address.sun_path)) {
+    errno = ENAMETOOLONG;
+    return cannot("path");
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+  // Left by a server that was killed: whoever calls this owns the place.
+  if (unlink(path.c_str()) != 0 && errno != ENOENT) {
+    return cannot("unlink");
+  }
+  const int socket_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (socket_fd < 0) {
+    return cannot("socket");
+  }
+  constexpr mode_t kOwnerOnly = S_IRUSR | S_IWUSR;
+  if (fchmod(socket_fd, kOwnerOnly) != 0 ||
+      bind(socket_fd, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0 ||
+      chmod(path.c_str(), kOwnerOnly) != 0 || listen(socket_fd, kBacklog) != 0) {
+    const int error = errno;
+    close(socket_fd);
+    errno = error;
+    return cannot("bind");
+  }
+  return std::unique_ptr<Listener>(new Listener({socket_fd}, 0, path, most));
+}
+
+Listener::Listener(std::vector<int> sockets, int port, std::string path, int most)
     : sockets_(std::move(sockets)),
       port_(port),
+      path_(std::move(path)),
       most_(static_cast<std::size_t>(most)),
       stop_(eventfd(0, EFD_CLOEXEC)),
       spare_(OpenSpare()) {}
@@ -131,6 +168,9 @@ Listener::~Listener() {
   }
   for (const int socket_fd : sockets_) {
     close(socket_fd);
+  }
+  if (!path_.empty()) {
+    unlink(path_.c_str());
   }
   close(stop_);
   if (spare_ >= 0) {
@@ -166,6 +206,11 @@ void Listener::Loop() {
 void Listener::AcceptFrom(int socket) {
   const int connection = accept4(socket, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
   if (connection >= 0) {
+    if (!path_.empty() && !IsOfThisAccount(connection)) {
+      close(connection);
+      SayOnce("it comes from another account", 0);
+      return;
+    }
     if (!HasRoom()) {
       close(connection);
       SayOnce("as many are open as the server takes (calibd --max-connections)", 0);
@@ -191,6 +236,13 @@ void Listener::AcceptFrom(int socket) {
     std::this_thread::sleep_for(kPause);
   }
   // Anything else is the end of the connection that came.
+}
+
+bool Listener::IsOfThisAccount(int connection) {
+  ucred peer{};
+  socklen_t length = sizeof(peer);
+  return getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &peer, &length) == 0 &&
+         (peer.uid == geteuid() || peer.uid == 0);
 }
 
 bool Listener::HasRoom() {

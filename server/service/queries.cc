@@ -131,6 +131,7 @@ v1::CampaignStatus StatusWithout(const store::CampaignRecord& record, std::strin
   v1::CampaignStatus status;
   status.set_campaign(absl::StrCat("c", record.submitted.id));
   status.set_name(record.submitted.name);
+  status.set_owner(record.submitted.owner);
   status.set_state(ToString(record.progress.state));
   status.set_eta_seconds(-1);
   status.set_problem(std::move(problem));
@@ -153,13 +154,15 @@ absl::StatusOr<std::int64_t> ParseCampaign(const std::string& id) {
 }
 
 absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t campaign,
-                                            const std::optional<scheduler::LiveStatus>& live) {
+                                            const std::optional<scheduler::LiveStatus>& live,
+                                            const std::string& waits) {
   ASSIGN_OR_RETURN(const auto record, reader.Campaign(campaign));
   ASSIGN_OR_RETURN(const auto evaluations, reader.Evaluations(campaign));
   ASSIGN_OR_RETURN(const auto effort, reader.EffortOf(campaign));
   ASSIGN_OR_RETURN(const auto concluded, ConcludedIterations(reader, campaign));
   v1::CampaignStatus status = StatusWithout(record, concluded.problem);
   status.set_reason(record.progress.reason);
+  status.set_server_waits(waits);
   status.set_iteration(record.progress.iteration);
   status.set_max_iterations(record.submitted.max_iterations);
   status.set_samples(record.submitted.samples);
@@ -193,14 +196,15 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
 }
 
 absl::StatusOr<v1::ListReply> ListOf(store::Reader& reader,
-                                     const std::map<std::int64_t, scheduler::LiveStatus>& live) {
+                                     const std::map<std::int64_t, scheduler::LiveStatus>& live,
+                                     const std::string& waits) {
   ASSIGN_OR_RETURN(const auto campaigns, reader.Campaigns());
   v1::ListReply list;
   for (const store::CampaignRecord& record : campaigns) {
     const std::int64_t id = record.submitted.id;
     const auto known = live.find(id);
     auto status = Outgoing(StatusOf(
-        reader, id, known == live.end() ? std::nullopt : std::make_optional(known->second)));
+        reader, id, known == live.end() ? std::nullopt : std::make_optional(known->second), waits));
     *list.add_campaigns() = status.ok()
                                 ? *std::move(status)
                                 : StatusWithout(record, std::string(status.status().message()));

@@ -1,6 +1,8 @@
 #include "server/service/server.h"
 
 #include <grpcpp/security/server_credentials.h>
+#include <grpcpp/security/tls_certificate_provider.h>
+#include <grpcpp/security/tls_credentials_options.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 #include <spdlog/sinks/basic_file_sink.h>
@@ -14,8 +16,10 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "proto/rpc/address.h"
+#include "server/access/certificate.h"
 #include "server/service/campaigns_service.h"
 #include "server/service/core.h"
+#include "server/service/guard.h"
 #include "server/service/listener.h"
 #include "server/service/state_folder.h"
 #include "server/service/worker_link_service.h"
@@ -36,6 +40,49 @@ constexpr int kUnreadBytes = 512 * 1024;
 /// Files that are no connections: the database, its readers, uploads, the log.
 constexpr std::int64_t kOtherFiles = 200;
 constexpr std::chrono::seconds kDefaultShutdown{5};
+
+/// Between looks at the files of the certificate [s].
+constexpr unsigned kCertificateAgain = 1;
+
+/// Callers show a certificate; the guard judges it (guard.h), so that it can say in a sentence what
+/// is wrong with it, and do so for as long as a connection lasts.
+std::shared_ptr<grpc::ServerCredentials> CredentialsOf(const std::string& tls) {
+  if (tls.empty()) {
+    return grpc::InsecureServerCredentials();
+  }
+  grpc::experimental::TlsServerCredentialsOptions options(
+      std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(
+          tls + "/key.pem", tls + "/cert.pem", tls + "/ca.pem", kCertificateAgain));
+  options.watch_root_certs();
+  options.watch_identity_key_cert_pairs();
+  options.set_cert_request_type(GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_BUT_DONT_VERIFY);
+  return grpc::experimental::TlsServerCredentials(options);
+}
+
+/// What is wrong with how a server is to be reached; OK: nothing.
+absl::Status CheckReach(const ServerOptions& options) {
+  if (options.tls.empty()) {
+    if (options.listen.empty() || rpc::IsLoopback(options.listen) || options.insecure) {
+      return absl::OkStatus();
+    }
+    return absl::InvalidArgumentError(absl::StrCat(
+        options.listen,
+        " can be reached from other machines, and without a certificate all that "
+        "is sent can be read and forged there: make one (`calibctl certs init`, `calibctl certs "
+        "issue`) and name its folder with --tls, or listen on 127.0.0.1, or say --insecure"));
+  }
+  const auto credentials = access::ReadCredentials(options.tls);
+  if (!credentials.ok()) {
+    return absl::InvalidArgumentError(credentials.status().message());
+  }
+  if (credentials->holder.role != access::Role::kServer) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        options.tls, " holds a certificate of the role ", access::NameOf(credentials->holder.role),
+        ", and a server wants its own "
+        "(`calibctl certs issue CA --role server NAME --host HOST -o DIR`)"));
+  }
+  return absl::OkStatus();
+}
 
 absl::Status StartLog(const std::string& file) {
   try {
@@ -63,15 +110,15 @@ struct Server::Impl {
   std::unique_ptr<Listener> listener;  // goes first: it hands connections to the acceptor
   std::string address;
 
-  absl::Status Listen(const std::string& listen, const Limits& limits) {
+  absl::Status Listen(const std::string& listen, const std::string& tls, const Limits& limits) {
     const std::int64_t files = RaiseFileLimit();
     const std::int64_t most =
         std::max<std::int64_t>(1, std::min<std::int64_t>(limits.connections, files - kOtherFiles));
     ASSIGN_OR_RETURN(listener, Listener::Open(listen, static_cast<int>(most)));
     grpc::ServerBuilder builder;
     using Type = grpc::ServerBuilder::experimental_type::ExternalConnectionType;
-    acceptor = builder.experimental().AddExternalConnectionAcceptor(
-        Type::FROM_FD, grpc::InsecureServerCredentials());
+    acceptor =
+        builder.experimental().AddExternalConnectionAcceptor(Type::FROM_FD, CredentialsOf(tls));
     builder.RegisterService(campaigns.get());
     builder.RegisterService(workers.get());
     builder.SetMaxReceiveMessageSize(kLargestMessage);
@@ -94,7 +141,8 @@ struct Server::Impl {
       parameters.fd = connection;
       acceptor->HandleNewConnection(&parameters);
     });
-    address = absl::StrCat(rpc::HostOf(listen), ":", listener->port());
+    address =
+        listener->port() == 0 ? listen : absl::StrCat(rpc::HostOf(listen), ":", listener->port());
     return absl::OkStatus();
   }
 };
@@ -104,14 +152,20 @@ Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() { Shutdown(kDefaultShutdown); }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
+  RETURN_IF_ERROR(CheckReach(options));
   ASSIGN_OR_RETURN(auto folder, StateFolder::Open(options.state_dir));
   RETURN_IF_ERROR(StartLog(options.log_file));
+  ASSIGN_OR_RETURN(const std::string token, folder->Token());
+  ASSIGN_OR_RETURN(auto guard, Guard::Open(options.tls, token, AccountName()));
+  if (options.listen.empty()) {
+    ASSIGN_OR_RETURN(options.listen, folder->SocketAddress());
+  }
   ASSIGN_OR_RETURN(auto store,
                    store::Store::Open(folder->DatabasePath(), std::move(options.store_hooks)));
   auto impl = std::make_unique<Impl>();
   impl->folder = std::move(folder);
   impl->core = std::make_unique<Core>(
-      std::move(store),
+      std::move(store), std::move(guard),
       scheduler::SchedulerOptions{.lease = options.lease,
                                   .heartbeat = options.heartbeat,
                                   .most_slots = options.limits.slots,
@@ -123,14 +177,21 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
       });
   impl->campaigns = std::make_unique<CampaignsService>(
       *impl->core,
-      CampaignsService::Site{.state_folder = options.state_dir, .listen = options.listen});
+      CampaignsService::Site{
+          .state_folder = options.state_dir, .listen = options.listen, .tls = options.tls});
   impl->workers = std::make_unique<WorkerLinkService>(*impl->core);
   std::promise<absl::Status> loaded;
   impl->core->Post([&] { loaded.set_value(impl->core->Start()); });
   RETURN_IF_ERROR(loaded.get_future().get());
-  RETURN_IF_ERROR(impl->Listen(options.listen, options.limits));
+  RETURN_IF_ERROR(impl->Listen(options.listen, options.tls, options.limits));
+  if (options.tls.empty() && impl->listener->port() != 0) {
+    if (const auto left = impl->folder->LeaveToken(token, impl->listener->port()); !left.ok()) {
+      spdlog::warn("token_not_left reason=\"{}\"", std::string(left.message()));
+    }
+  }
   RETURN_IF_ERROR(impl->folder->Announce(impl->address, options.stays));
-  spdlog::info("serving address={} state={}", impl->address, options.state_dir);
+  spdlog::info("serving address={} state={} tls={}", impl->address, options.state_dir,
+               options.tls.empty() ? "none" : options.tls);
   return std::unique_ptr<Server>(new Server(std::move(impl)));
 }
 

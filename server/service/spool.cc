@@ -13,8 +13,9 @@ namespace calib::service {
 namespace {
 
 absl::Status CannotKeep(int error) {
-  return absl::ResourceExhaustedError(
-      absl::StrCat("the server cannot keep the file: ", std::generic_category().message(error)));
+  return absl::ResourceExhaustedError(absl::StrCat(
+      "the server cannot keep the file beside its state: ", std::generic_category().message(error),
+      "; send it again when there is room"));
 }
 
 }  // namespace

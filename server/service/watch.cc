@@ -55,7 +55,7 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
   void Wait() {
     timer_.expires_after(kPeriod);
     timer_.async_wait([this](const boost::system::error_code& /*error*/) {
-      if (!cancelled_ && core_.health().ok() && core_.scheduler().version() == seen_) {
+      if (!cancelled_ && core_.health().ok() && core_.version() == seen_) {
         Wait();
       } else {
         Look();
@@ -72,10 +72,10 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
       Finish(rpc::ToGrpc(core_.health()));
       return;
     }
-    seen_ = core_.scheduler().version();
-    core_.Tell([this, live = core_.scheduler().Live(campaign_)] {
+    seen_ = core_.version();
+    core_.Tell([this, live = core_.scheduler().Live(campaign_), waits = core_.WaitsFor()] {
       auto reader = core_.Read();
-      auto status = Outgoing(reader.ok() ? StatusOf(*reader, campaign_, live)
+      auto status = Outgoing(reader.ok() ? StatusOf(*reader, campaign_, live, waits)
                                          : absl::StatusOr<v1::CampaignStatus>(reader.status()));
       if (!status.ok()) {
         Finish(rpc::ToGrpc(status.status()));

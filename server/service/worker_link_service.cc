@@ -41,8 +41,8 @@ std::int64_t AttemptOf(const v1::WorkerMessage& message) {
 class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1::ServerMessage>,
                            public Session {
  public:
-  WorkerStream(Core& core, std::string peer, Door::Pass pass)
-      : core_(core), peer_(std::move(peer)), pass_(std::move(pass)) {
+  WorkerStream(Core& core, std::string peer, Entry entry)
+      : core_(core), peer_(std::move(peer)), entry_(std::move(entry)) {
     core_.Post([this] { session_ = core_.AddSession(this); });
     StartRead(&incoming_);
   }
@@ -54,8 +54,11 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
       Close(absl::OkStatus());  // the worker has said all it had to say, or is gone
       return;
     }
-    core_.Post([this, broken = core_.door().Check(peer_, incoming_)] {
-      const absl::Status status = core_.health().ok() ? Take(broken) : Down();
+    core_.Post([this, welcome = core_.guard().Recheck(entry_.caller),
+                broken = core_.door().Check(peer_, incoming_)] {
+      const absl::Status status = !core_.health().ok() ? Down()
+                                  : !welcome.ok()      ? welcome
+                                                       : Take(broken);
       if (status.ok()) {
         ReadOn();
         return;
@@ -138,8 +141,9 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
       }
       RETURN_IF_ERROR(scheduler.Connected(session_, message.hello()));
       name_ = message.hello().name();
-      spdlog::info("worker_connected name={} session={} slots={} held={}", name_, session_,
-                   message.hello().slots(), message.hello().attempts_size());
+      spdlog::info("worker_connected name={} session={} slots={} held={} by={} role={}", name_,
+                   session_, message.hello().slots(), message.hello().attempts_size(),
+                   entry_.caller.name, access::NameOf(entry_.caller.role));
       return absl::OkStatus();
     }
     switch (message.message_case()) {
@@ -222,7 +226,7 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
 
   Core& core_;
   const std::string peer_;
-  const Door::Pass pass_;
+  const Entry entry_;
   v1::WorkerMessage incoming_;  // gRPC's while a read is in flight, else the strand's
   // The strand's.
   std::int64_t session_ = 0;
@@ -243,17 +247,17 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
 
 grpc::ServerBidiReactor<v1::WorkerMessage, v1::ServerMessage>* WorkerLinkService::Connect(
     grpc::CallbackServerContext* context) {
-  auto pass = core_.door().Enter(context->peer());
-  if (!pass.ok()) {
+  auto entry = Admit(core_, *context, Right::kWork, nullptr);
+  if (!entry.ok()) {
     return new EndedCall<grpc::ServerBidiReactor<v1::WorkerMessage, v1::ServerMessage>>(
-        pass.status());
+        entry.status());
   }
-  return new WorkerStream(core_, context->peer(), *std::move(pass));
+  return new WorkerStream(core_, context->peer(), *std::move(entry));
 }
 
 grpc::ServerWriteReactor<v1::BlobChunk>* WorkerLinkService::GetBlob(
     grpc::CallbackServerContext* context, const v1::BlobRequest* request) {
-  return SendBlob(core_, context->peer(), *request, request->digest());
+  return SendBlob(core_, *context, Right::kWork, *request, request->digest());
 }
 
 }  // namespace calib::service

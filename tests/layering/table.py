@@ -9,7 +9,7 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
            < { diagnosis discrepancy prediction sensitivity }
 proto      calib/v1 < rpc
 worker     .
-server     { campaign/model campaign/file/text } < campaign/checks < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
+server     { campaign/model campaign/file/text access } < campaign/checks < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
            < { scheduler report/plot } < { service report/html } < report/documents < client < diagnosis < ctl < ctl/verbs < .
 """
 
@@ -21,22 +21,23 @@ KNOWS = f"""
 dem               |                                                                        |
 inference         |                                                                        |
 proto/calib/v1    |                                                                        |
-proto/rpc         | proto/calib                                                            | grpcpp chrono
+proto/rpc         | proto/calib                                                            | grpcpp chrono openssl
 worker            | dem proto                                                              | grpcpp spdlog chrono CLI
-server/campaign   | {CAMPAIGN_OF_DEM} inference                                            |
+server/campaign   | {CAMPAIGN_OF_DEM} inference                                            | openssl
+server/access     |                                                                        | openssl spdlog
 server/campaign/file/text |                                                                | yaml-cpp
 server/messages   | dem proto/calib server/campaign                                        | chrono
 server/store      | server/campaign/model                                                  | SQLiteCpp sqlite3 chrono spdlog
 server/scheduler  | dem inference proto/calib server/campaign server/messages server/store | chrono spdlog nlohmann
-server/service    | dem inference proto server/campaign server/messages server/store server/scheduler | grpcpp spdlog chrono nlohmann
+server/service    | dem inference proto server/campaign server/access server/messages server/store server/scheduler | grpcpp spdlog chrono nlohmann
 server            | proto/rpc server/store server/scheduler server/service                 | spdlog CLI chrono
 server/report     | {ASKING_OF_DEM} inference proto/calib server/campaign server/messages  | nlohmann chrono
-server/client     | inference proto server/campaign server/messages server/report          | grpcpp chrono
-server/client/session | proto server/messages server/service server/client                 | grpcpp chrono
+server/client     | inference proto server/campaign server/access server/messages server/report | grpcpp chrono
+server/client/session | proto server/access server/messages server/service server/client               | grpcpp chrono
 server/diagnosis  | {ASKING_OF_DEM} dem/simulate inference proto/calib server/campaign server/messages server/report server/client | nlohmann
-server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/messages server/report server/client server/diagnosis | CLI nlohmann chrono
+server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/access server/messages server/report server/client server/diagnosis | CLI nlohmann chrono
 """
-WATCHED = 'grpcpp SQLiteCpp sqlite3 yaml-cpp spdlog CLI nlohmann chrono'
+WATCHED = 'grpcpp openssl SQLiteCpp sqlite3 yaml-cpp spdlog CLI nlohmann chrono'
 
 # Folders with one file per name, or which another plan rebuilds, may hold more than MOST_FILES (.h and .cc of one name count one).
 MOST_FILES = 25

@@ -44,7 +44,8 @@ class CutAfter {
 }  // namespace
 
 struct Attacker::Impl {
-  explicit Impl(const std::string& address) : channel(rpc::OpenChannel(address)) {}
+  explicit Impl(const std::string& address)
+      : channel(rpc::OpenChannel(address, rpc::FindAccess(address, {}).value())) {}
   std::shared_ptr<grpc::Channel> channel;
 };
 

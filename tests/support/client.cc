@@ -65,9 +65,8 @@ v1::CampaignRequest Named(const std::string& campaign) {
 }  // namespace
 
 Client::Client(const std::string& address)
-    : impl_(
-          std::make_unique<Impl>(Impl{.stub = v1::Campaigns::NewStub(rpc::OpenChannel(address))})) {
-}
+    : impl_(std::make_unique<Impl>(Impl{.stub = v1::Campaigns::NewStub(rpc::OpenChannel(
+                                            address, rpc::FindAccess(address, {}).value()))})) {}
 Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
@@ -195,7 +194,8 @@ struct FakeWorker::Impl {
 
 FakeWorker::FakeWorker(const std::string& address, const v1::Hello& hello)
     : impl_(std::make_unique<Impl>()) {
-  impl_->stub = v1::WorkerLink::NewStub(rpc::OpenChannel(address));
+  impl_->stub =
+      v1::WorkerLink::NewStub(rpc::OpenChannel(address, rpc::FindAccess(address, {}).value()));
   impl_->context.set_wait_for_ready(true);
   impl_->stream = impl_->stub->Connect(&impl_->context);
   v1::WorkerMessage message;

@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   }
   setenv("TMPDIR", folder.c_str(), 1);               // std::filesystem, and programs started
   setenv("TEST_TMPDIR", (folder + "/").c_str(), 1);  // testing::TempDir()
+  setenv("XDG_RUNTIME_DIR", folder.c_str(), 1);      // servers leave their tokens there
   const int failed = RUN_ALL_TESTS();
   if (failed != 0) {
     std::fprintf(stderr, "files of this run: %s\n", folder.c_str());

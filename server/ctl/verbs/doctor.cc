@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -15,6 +16,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
+#include "server/access/certificate.h"
 #include "server/client/child_process.h"
 #include "server/client/session.h"
 #include "server/ctl/exit_codes.h"
@@ -109,7 +111,11 @@ absl::Status ExamineServer(client::Session& session, bool is_own, std::vector<Ch
   }
   checks.push_back(JudgeFolder(server.state_folder(), FolderUse::kState));
   checks.push_back(JudgeDatabase(server));
-  checks.push_back(JudgeConnection(session.address(), server.listen()));
+  if (auto waiting = JudgeWaiting(server); waiting.has_value()) {
+    checks.push_back(*std::move(waiting));
+  }
+  checks.push_back(
+      JudgeConnection(session.address(), server, static_cast<std::int64_t>(UnixSeconds())));
   if (!is_own) {
     for (Check& check : JudgeWorkers(workers, server)) checks.push_back(std::move(check));
   }
@@ -119,6 +125,13 @@ absl::Status ExamineServer(client::Session& session, bool is_own, std::vector<Ch
 absl::StatusOr<int> Doctor(const CommonOptions& common) {
   std::vector<Check> checks;
   ExamineNode(checks);
+  if (!common.server.tls.empty()) {
+    const auto credentials = access::ReadCredentials(common.server.tls);
+    checks.push_back(JudgeCertificate(credentials.ok()
+                                          ? absl::StatusOr<access::Holder>(credentials->holder)
+                                          : credentials.status(),
+                                      static_cast<std::int64_t>(UnixSeconds())));
+  }
   const bool named = !common.server.state.empty() || common.server.given ||
                      common.server.address != client::ServerChoice().address;
   std::error_code error;

@@ -57,6 +57,9 @@ absl::StatusOr<int> List(const CommonOptions& common) {
     if (!s.problem().empty())
       std::cout << report::Wrapped(s.campaign() + ": " + s.problem(), "! ", "  ");
   }
+  if (!campaigns.empty() && !campaigns.front().server_waits().empty()) {  // the same of all
+    std::cout << report::Wrapped(campaigns.front().server_waits(), "! ", "  ");
+  }
   return kDone;
 }
 

@@ -10,9 +10,9 @@
 #include "calib/return_if_error.h"
 #include "server/client/interrupt.h"
 #include "server/client/load_view.h"
-#include "server/client/no_worker_notice.h"
 #include "server/client/progress.h"
 #include "server/client/session.h"
+#include "server/client/standstill_notice.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
@@ -48,7 +48,7 @@ absl::Status ResumeIfPaused(client::Client& client, const std::string& campaign)
 // interrupts.
 absl::StatusOr<v1::CampaignStatus> Follow(client::Session& session, const std::string& campaign) {
   client::ProgressLine line;
-  client::NoWorkerNotice notice(session);
+  client::StandstillNotice notice(session);
   for (;;) {
     auto status = session.client().Show(campaign);
     if (!status.ok()) {

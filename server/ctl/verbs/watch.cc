@@ -3,9 +3,9 @@
 #include <string>
 
 #include "calib/return_if_error.h"
-#include "server/client/no_worker_notice.h"
 #include "server/client/progress.h"
 #include "server/client/session.h"
+#include "server/client/standstill_notice.h"
 #include "server/ctl/exit_codes.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
@@ -26,13 +26,16 @@ absl::StatusOr<int> Watch(const CommonOptions& common, const WatchOptions& optio
   std::optional<v1::CampaignStatus> last;
   absl::Status ended;
   // The server speaks only when something changes, which nothing does without workers.
-  client::NoWorkerNotice notice(*session, std::chrono::milliseconds(0));
+  client::StandstillNotice notice(*session, std::chrono::milliseconds(0));
   {
     client::ProgressLine line;
     ended = session->client().Watch(options.campaign, [&](const v1::CampaignStatus& status) {
       last = status;
-      if (common.server.workers.value_or(0) == 0)
-        notice.Look(status);  // else they are on their way
+      if (common.server.workers.value_or(0) == 0) {
+        notice.Look(status);
+      } else {  // they are on their way
+        notice.LookAtServer(status);
+      }
       line.Show(
           client::ProgressText(status),
           10 * status.iteration() + 10 * status.samples_done() / std::max(1, status.samples()));

@@ -51,10 +51,12 @@ Json Status(const v1::CampaignStatus& s) {
           {"core_hours", s.core_hours()},
           {"converged", s.converged()},
           {"created_unix_ms", s.created_unix_ms()},
+          {"owner", s.owner().empty() ? Json(nullptr) : Json(s.owner())},
           {"parent", s.parent().empty() ? Json(nullptr) : Json(s.parent())},
           {"purpose", s.purpose().empty() ? Json(nullptr) : Json(s.purpose())},
           {"effects", std::vector<std::string>(s.effects().begin(), s.effects().end())},
-          {"problem", s.problem().empty() ? Json(nullptr) : Json(s.problem())}};
+          {"problem", s.problem().empty() ? Json(nullptr) : Json(s.problem())},
+          {"server_waits", s.server_waits().empty() ? Json(nullptr) : Json(s.server_waits())}};
 }
 
 Json Emulator(const v1::Posterior& p) {

@@ -36,6 +36,9 @@ TEST(Quantity, ConvertsToSi) {
   EXPECT_DOUBLE_EQ(Si("8000 nN m/rad", "N m/rad"), 8e-6);
   EXPECT_DOUBLE_EQ(Si("8000 nN*m", "N m/rad"), 8e-6);
   EXPECT_DOUBLE_EQ(Si("120 um", "m"), 1.2e-4);
+  EXPECT_DOUBLE_EQ(Si("0.5 l", "m^3"), 5e-4);
+  EXPECT_DOUBLE_EQ(Si("2.65 kg/l", "kg/m^3"), 2650);
+  EXPECT_DOUBLE_EQ(Si("40 ml/min", "m^3/s"), 40e-6 / 60);
   EXPECT_DOUBLE_EQ(Si("120 µm", "m"), 1.2e-4);
   EXPECT_DOUBLE_EQ(Si("50 mJ/m^2", "N/m"), 0.05);
   EXPECT_DOUBLE_EQ(Si("+3", "Pa"), 3);

@@ -144,7 +144,7 @@ TEST(CommandLine, EveryVerbIsThereOnceAndShowsHelp) {
     EXPECT_NE(::testing::internal::GetCapturedStdout().find("calibctl " + verb.help.example),
               std::string::npos);
   }
-  EXPECT_EQ(names.size(), 30);
+  EXPECT_EQ(names.size(), 31);
   std::sort(names.begin(), names.end());
   EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
 }

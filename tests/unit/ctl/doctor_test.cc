@@ -73,6 +73,17 @@ TEST(Doctor, AFolderThatCannotBeWrittenIsAProblemForAnyUse) {
   }
 }
 
+TEST(Doctor, AServerThatWaitsForRoomIsAProblem) {
+  v1::ServerReport server;
+  EXPECT_FALSE(JudgeWaiting(server).has_value());
+  server.set_waits("the disk of the state folder is full since 2026-01-31 08:05:09 UTC");
+  const auto check = JudgeWaiting(server);
+  ASSERT_TRUE(check.has_value());
+  EXPECT_EQ(check->health, Health::kProblem);
+  EXPECT_THAT(check->found, HasSubstr("It waits: the disk of the state folder is full since"));
+  EXPECT_THAT(check->advice, HasSubstr("Free some space"));
+}
+
 TEST(Doctor, ClocksMayDifferByWhatIsNotKnown) {
   EXPECT_EQ(JudgeClockOffset(0.4, 0.01).health, Health::kOk);
   EXPECT_EQ(JudgeClockOffset(1.5, 1.0).health, Health::kOk);
@@ -92,13 +103,55 @@ TEST(Doctor, BuildsMustBeTheSameInMechanicsAndCatalogue) {
   EXPECT_EQ(JudgeBuild("server", own, {"7", "abd"}).health, Health::kProblem);
 }
 
+TEST(Doctor, CertificatesAreWarnedOfAMonthBeforeTheirEnd) {
+  constexpr std::int64_t kDay = 86400;
+  constexpr std::int64_t kEnd = 1793534400;  // 2026-11-01
+  const access::Holder holder = {.name = "node7",
+                                 .role = access::Role::kWorker,
+                                 .not_before_unix_s = kEnd - 365 * kDay,
+                                 .not_after_unix_s = kEnd};
+  const Check fine = JudgeCertificate(holder, kEnd - 30 * kDay - 1);
+  EXPECT_EQ(fine.health, Health::kOk);
+  EXPECT_EQ(fine.found, "That of node7 (worker) is valid until 2026-11-01.");
+  EXPECT_EQ(fine.advice, "");
+  const Check ends = JudgeCertificate(holder, kEnd - 30 * kDay);
+  EXPECT_EQ(ends.health, Health::kWarning);
+  EXPECT_THAT(ends.found, HasSubstr("ends on 2026-11-01"));
+  EXPECT_THAT(ends.advice, HasSubstr("calibctl certs issue CA --role worker node7 -o"));
+  EXPECT_EQ(JudgeCertificate(holder, kEnd - 1).health, Health::kWarning);
+  const Check over = JudgeCertificate(holder, kEnd);
+  EXPECT_EQ(over.health, Health::kProblem);
+  EXPECT_THAT(over.found, HasSubstr("has expired on 2026-11-01"));
+  EXPECT_EQ(over.advice, ends.advice);
+  EXPECT_EQ(JudgeCertificate(holder, holder.not_before_unix_s - 1).health, Health::kProblem);
+  const Check none = JudgeCertificate(absl::NotFoundError("tls/key.pem is not there"), kEnd);
+  EXPECT_EQ(none.health, Health::kProblem);
+  EXPECT_EQ(none.found, "tls/key.pem is not there.");
+}
+
 TEST(Doctor, OnlyAnOpenPortIsWarnedOf) {
-  EXPECT_EQ(JudgeConnection("127.0.0.1:7443", std::nullopt).health, Health::kOk);
-  EXPECT_EQ(JudgeConnection("[::1]:7443", std::nullopt).health, Health::kOk);
-  EXPECT_EQ(JudgeConnection("127.0.0.1:7443", "0.0.0.0:7443").health, Health::kWarning)
+  const auto judged = [](const std::string& address, const std::string& listen) {
+    v1::ServerReport server;
+    server.set_listen(listen);
+    return JudgeConnection(address, server, 0).health;
+  };
+  EXPECT_EQ(judged("127.0.0.1:7443", ""), Health::kOk);
+  EXPECT_EQ(judged("[::1]:7443", ""), Health::kOk);
+  EXPECT_EQ(judged("unix:/s/run/calib.sock", "unix:/s/run/calib.sock"), Health::kOk);
+  EXPECT_EQ(judged("127.0.0.1:7443", "0.0.0.0:7443"), Health::kWarning)
       << "reached here, but open to others";
-  EXPECT_EQ(JudgeConnection("node1:7443", "127.0.0.1:7443").health, Health::kOk)
-      << "through a tunnel";
+  EXPECT_EQ(judged("node1:7443", "127.0.0.1:7443"), Health::kOk) << "through a tunnel";
+}
+
+TEST(Doctor, CertificateOfTheServerIsJudgedByItsEnd) {
+  constexpr std::int64_t kDay = 86400;
+  v1::ServerReport server;
+  server.set_listen("0.0.0.0:7443");
+  server.set_certificate("head");
+  server.set_certificate_end_unix_s(1000 * kDay);
+  EXPECT_EQ(JudgeConnection("node1:7443", server, 900 * kDay).health, Health::kOk);
+  EXPECT_EQ(JudgeConnection("node1:7443", server, 990 * kDay).health, Health::kWarning);
+  EXPECT_EQ(JudgeConnection("node1:7443", server, 1001 * kDay).health, Health::kProblem);
 }
 
 TEST(Doctor, WorkersThatWereTurnedAwayAreNamed) {

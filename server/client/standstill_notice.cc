@@ -1,4 +1,4 @@
-#include "server/client/no_worker_notice.h"
+#include "server/client/standstill_notice.h"
 
 #include <algorithm>
 #include <iostream>
@@ -24,13 +24,14 @@ bool NeedsWorkers(Client& client, const std::string& campaign) {
 
 }  // namespace
 
-void NoWorkerNotice::Look(const v1::CampaignStatus& status) {
+void StandstillNotice::Look(const v1::CampaignStatus& status) {
+  LookAtServer(status);
   const auto now = std::chrono::steady_clock::now();
   const auto state = messages::StateOf(status);
   const bool lives = state == CampaignState::kQueued || state == CampaignState::kRunning;
   const bool computes = messages::PhaseOf(status) == campaign::Phase::kCalibrating &&
                         status.samples_done() > 0 && status.samples_done() >= status.samples();
-  if (!lives || computes || status.samples_running() > 0) {
+  if (!lives || computes || status.samples_running() > 0 || !status.server_waits().empty()) {
     idle_since_ = now;
     said_ = false;
     return;
@@ -47,6 +48,15 @@ void NoWorkerNotice::Look(const v1::CampaignStatus& status) {
   std::cerr << "\nno worker is connected to " << session_.address() << ", so nothing runs: start `"
             << "calib-worker --server " << session_.address()
             << "`, or stop this and give --state DIR --workers N (nothing is lost)\n";
+}
+
+void StandstillNotice::LookAtServer(const v1::CampaignStatus& status) {
+  const bool waits = !status.server_waits().empty();
+  if (waits == said_of_server_) return;
+  said_of_server_ = waits;
+  std::cerr << "\n"
+            << (waits ? status.server_waits() : "there is room on the disk, and the server goes on")
+            << "\n";
 }
 
 }  // namespace calib::client

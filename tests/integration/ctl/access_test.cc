@@ -1,0 +1,366 @@
+// Who is let in, as users of a server meet it: certificates, tokens, sockets, roles.
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "server/access/signing.h"
+#include "server/access/x509.h"
+#include "tests/integration/ctl/calibctl_fixture.h"
+#include "tests/support/process.h"
+
+namespace calib::ctl {
+namespace {
+
+using calib::testing::Eventually;
+using calib::testing::Process;
+using calib::testing::Program;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::chrono::seconds kPatience{20};
+
+/// A variable of the environment while this lives.
+class Variable {
+ public:
+  Variable(const char* name, const std::string& value)
+      : name_(name),
+        before_(std::getenv(name) != nullptr ? std::optional<std::string>(std::getenv(name))
+                                             : std::nullopt) {
+    setenv(name, value.c_str(), 1);
+  }
+  ~Variable() {
+    if (before_.has_value()) {
+      setenv(name_, before_->c_str(), 1);
+    } else {
+      unsetenv(name_);
+    }
+  }
+  Variable(const Variable&) = delete;
+  Variable& operator=(const Variable&) = delete;
+
+ private:
+  const char* const name_;
+  const std::optional<std::string> before_;
+};
+
+class Access : public CalibctlFixture {
+ protected:
+  Access() { Write("campaign.yaml", SmallCampaign(4, 1)); }
+
+  std::string At(const std::string& name) const { return (work_ / name).string(); }
+
+  /// calibd over the folder `state`, once it serves; `address` is then where.
+  std::unique_ptr<Process> Serve(const std::string& state, std::vector<std::string> options) {
+    std::vector<std::string> command{Program("calibd"), "--state", At(state),         "--listen",
+                                     "127.0.0.1:0",     "--log",   At(state + ".log")};
+    command.insert(command.end(), options.begin(), options.end());
+    auto server = std::make_unique<Process>(command, At(state + ".err"));
+    EXPECT_TRUE(Eventually(kPatience, [&] {
+      return std::filesystem::exists(work_ / state / "server.json") || !server->Running();
+    })) << Read(state + ".err");
+    const Json announced = Json::parse(Read(state + "/server.json"), nullptr, false);
+    address_ = announced.is_object() ? announced["address"].get<std::string>() : "";
+    return server;
+  }
+
+  /// An authority in `ca`, a server's folder `head`, and one of each role that asks.
+  void IssueAll() const {
+    ASSERT_EQ(Call("certs init ca").code, 0) << Read("err");
+    ASSERT_EQ(Call("certs issue ca --role server head -o head").code, 0) << Read("err");
+    for (const char* role : {"worker", "viewer", "submitter", "operator"}) {
+      Issue(role, role);
+    }
+  }
+  void Issue(const std::string& role, const std::string& name) const {
+    ASSERT_EQ(Call("certs issue ca --role " + role + " " + name + " -o " + name).code, 0)
+        << Read("err");
+  }
+
+  Answer Ask(const std::string& words, const std::string& with) const {
+    return Call(words + " --server " + address_ + " " + with);
+  }
+  /// Refused with exit code 1 and one sentence.
+  std::string Refused(const std::string& words, const std::string& with) const {
+    const Answer answer = Ask(words, with);
+    EXPECT_EQ(answer.code, 1) << words << " " << with << "\n" << answer.out << answer.err;
+    EXPECT_EQ(answer.out, "");
+    EXPECT_EQ(std::count(answer.err.begin(), answer.err.end(), '\n'), 1) << answer.err;
+    return answer.err;
+  }
+
+  /// A folder whose certificate ended yesterday, signed by the authority itself.
+  void IssueExpired(const std::string& name) const {
+    std::filesystem::copy(work_ / "viewer", work_ / name);
+    const auto ca = access::ParseCertificate(Read("ca/ca.pem"));
+    const auto ca_key = access::ParseKey(Read("ca/ca-key.pem"));
+    const auto key = access::ParseKey(Read(name + "/key.pem"));
+    ASSERT_TRUE(ca != nullptr && ca_key != nullptr && key != nullptr);
+    const std::int64_t now = std::time(nullptr);
+    constexpr std::int64_t kDay = 86400;
+    const auto leaf = access::SignLeaf({.name = name,
+                                        .role = access::Role::kViewer,
+                                        .hosts = {},
+                                        .validity = {now - 2 * kDay, now - kDay}},
+                                       key.get(), ca.get(), ca_key.get());
+    ASSERT_TRUE(leaf.ok()) << leaf.status();
+    const auto pem = access::PemOf(leaf->get());
+    ASSERT_TRUE(pem.ok()) << pem.status();
+    Write(name + "/cert.pem", *pem);
+  }
+
+  std::string address_;
+};
+
+TEST_F(Access, WithoutCertificatesWantsTheTokenOfTheFolder) {
+  const auto server = Serve("state", {});
+  EXPECT_EQ(Ask("list --json", "").json(), Json::array()) << "it is found by who started it";
+  // Another account finds none, since it has another home.
+  const Variable home("HOME", "/nonexistent");
+  const Variable runtime("XDG_RUNTIME_DIR", "/nonexistent");
+  EXPECT_THAT(Refused("list", ""), HasSubstr("no token was shown"));
+  EXPECT_THAT(Refused("submit campaign.yaml", ""), HasSubstr("no token was shown"));
+  Write("wrong", std::string(64, 'a'));
+  EXPECT_THAT(Refused("list", "--token wrong"), HasSubstr("the token is not this server's"));
+  const Answer none = Ask("list", "--token data.csv");
+  EXPECT_EQ(none.code, 2) << none.err;
+  EXPECT_THAT(none.err, HasSubstr("data.csv holds no token"));
+  EXPECT_EQ(Ask("list --json", "--token state/token").json(), Json::array()) << "nothing changed";
+  {
+    const Variable token("CALIB_TOKEN", Read("state/token").substr(0, 64));
+    EXPECT_EQ(Ask("list --json", "").json(), Json::array());
+  }
+
+  Process worker({Program("calib-worker"), "--server", address_, "--slots", "1"}, At("worker.err"));
+  EXPECT_EQ(worker.Wait(kPatience), 1);
+  EXPECT_THAT(Read("worker.err"), HasSubstr("no token was shown"));
+  EXPECT_THAT(Read("state.log"), AllOf(HasSubstr("refused peer=ipv4:127.0.0.1"),
+                                       Not(HasSubstr(Read("state/token").substr(0, 64)))));
+
+  for (const char* name : {"token", "lock", "server.json"}) {
+    struct stat status = {};
+    ASSERT_EQ(stat(At(std::string("state/") + name).c_str(), &status), 0) << name;
+    EXPECT_EQ(status.st_mode & 0777, 0600) << name;
+  }
+  struct stat folder = {};
+  ASSERT_EQ(stat(At("state").c_str(), &folder), 0);
+  EXPECT_EQ(folder.st_mode & 0777, 0700);
+}
+
+TEST_F(Access, PlainTextAndCertificatesTellEachOtherApart) {
+  ASSERT_NO_FATAL_FAILURE(IssueAll());
+  const auto plain = Serve("plain", {});
+  EXPECT_THAT(Refused("list", "--tls viewer"), HasSubstr("speaks plain text"));
+  const auto secure = Serve("secure", {"--tls", At("head")});
+  EXPECT_THAT(Refused("list", ""), HasSubstr("answers, and not in plain text"));
+  EXPECT_THAT(Refused("list", "--token secure/token"), HasSubstr("not in plain text"));
+  const Answer nobody = Call("list --server 127.0.0.1:9 --tls viewer");
+  EXPECT_EQ(nobody.code, 3) << nobody.err;
+}
+
+TEST_F(Access, PlainTextThatOthersReachHasToBeAskedFor) {
+  Process open({Program("calibd"), "--state", At("state"), "--listen", "0.0.0.0:0"}, At("err"));
+  EXPECT_EQ(open.Wait(kPatience), 2);
+  EXPECT_THAT(Read("err"), AllOf(HasSubstr("0.0.0.0:0 can be reached from other machines"),
+                                 HasSubstr("--insecure")));
+  EXPECT_FALSE(std::filesystem::exists(work_ / "state"));
+  ASSERT_NO_FATAL_FAILURE(IssueAll());
+  Process viewer({Program("calibd"), "--state", At("state"), "--tls", At("viewer")}, At("err2"));
+  EXPECT_EQ(viewer.Wait(kPatience), 2);
+  EXPECT_THAT(Read("err2"), HasSubstr("of the role viewer, and a server wants its own"));
+}
+
+TEST_F(Access, CertificatesOfOthersAndOfYesterdayAreRefused) {
+  ASSERT_NO_FATAL_FAILURE(IssueAll());
+  const auto server = Serve("state", {"--tls", At("head")});
+  EXPECT_EQ(Ask("list --json", "--tls viewer").json(), Json::array());
+
+  ASSERT_EQ(Call("certs init other").code, 0);
+  ASSERT_EQ(Call("certs issue other --role operator eve -o eve").code, 0);
+  EXPECT_THAT(Refused("list", "--tls eve"), HasSubstr("was not issued by the authority of eve"))
+      << "she does not trust this server";
+  std::filesystem::copy_file(work_ / "ca/ca.pem", work_ / "eve/ca.pem",
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_THAT(Refused("list", "--tls eve"),
+              HasSubstr("the certificate of eve was not issued by this server's authority"));
+  EXPECT_THAT(Refused("submit campaign.yaml", "--tls eve"), HasSubstr("was not issued by"));
+
+  ASSERT_NO_FATAL_FAILURE(IssueExpired("late"));
+  EXPECT_THAT(Refused("list", "--tls late"), HasSubstr("the certificate of late has expired on "));
+
+  EXPECT_THAT(Refused("list", "--tls head"),
+              HasSubstr("the certificate of head is not one to ask"));
+  EXPECT_EQ(Ask("list --json", "--tls viewer").json(), Json::array()) << "nothing changed";
+  const Answer empty = Ask("list", "--tls ca");
+  EXPECT_EQ(empty.code, 2) << empty.err;
+  EXPECT_THAT(empty.err, HasSubstr("ca/cert.pem cannot be read"));
+}
+
+TEST_F(Access, RolesMayWhatTheyAreFor) {
+  ASSERT_NO_FATAL_FAILURE(IssueAll());
+  ASSERT_NO_FATAL_FAILURE(Issue("submitter", "ann"));
+  const auto server = Serve("state", {"--tls", At("head")});
+  EXPECT_THAT(Refused("submit campaign.yaml", "--tls viewer"),
+              HasSubstr("viewer has the role viewer, whose holders may read; this needs the role "
+                        "submitter"));
+  EXPECT_EQ(Ask("submit campaign.yaml", "--tls ann").code, 0) << Read("err");
+  const Json listed = Ask("list --json", "--tls viewer").json();
+  ASSERT_EQ(listed.size(), 1U);
+  EXPECT_EQ(listed[0]["owner"], "ann");
+  EXPECT_EQ(listed[0]["state"], "queued");
+
+  // Somebody else's campaign; then a submitter's own, and any an operator's.
+  for (const char* verb : {"pause c1", "cancel c1", "delete c1"}) {
+    EXPECT_THAT(Refused(verb, "--tls submitter"),
+                HasSubstr("c1 belongs to ann, and submitter is a submitter"));
+    EXPECT_THAT(Refused(verb, "--tls viewer"), HasSubstr("this needs the role submitter"));
+    EXPECT_THAT(Refused(verb, "--tls worker"), HasSubstr("may only take runs and report them"));
+  }
+  EXPECT_EQ(Ask("list --json", "--tls viewer").json()[0]["state"], "queued") << "nothing changed";
+  EXPECT_EQ(Ask("pause c1", "--tls ann").code, 0) << Read("err");
+  EXPECT_EQ(Ask("resume c1", "--tls operator").code, 0) << Read("err");
+  EXPECT_THAT(Refused("drain w1", "--tls ann"), HasSubstr("this needs the role operator"));
+  EXPECT_THAT(Refused("list", "--tls worker"), HasSubstr("this needs the role viewer"));
+  for (const char* role : {"viewer", "submitter"}) {
+    Process worker(
+        {Program("calib-worker"), "--server", address_, "--slots", "1", "--tls", At(role)},
+        At(std::string(role) + ".err"));
+    EXPECT_EQ(worker.Wait(kPatience), 1);
+    EXPECT_THAT(Read(std::string(role) + ".err"), HasSubstr("this needs the role worker"));
+  }
+  EXPECT_EQ(Ask("workers --json", "--tls viewer").json(), Json::array());
+
+  Process worker({Program("calib-worker"), "--server", address_, "--slots", "1", "--tls",
+                  At("worker"), "--checkpoints", At("checkpoints")},
+                 At("worker.err"));
+  EXPECT_EQ(Ask("watch c1", "--tls viewer").code, 0) << Read("err");
+  EXPECT_EQ(Ask("list --json", "--tls viewer").json()[0]["state"], "finished");
+  EXPECT_EQ(Ask("delete c1", "--tls ann").code, 0) << Read("err");
+  const std::string log = Read("state.log");
+  EXPECT_THAT(log, AllOf(HasSubstr("change what=submit of=c1 by=ann role=submitter"),
+                         HasSubstr("change what=pause of=c1 by=ann role=submitter"),
+                         HasSubstr("change what=resume of=c1 by=operator role=operator"),
+                         HasSubstr("change what=delete of=c1 by=ann role=submitter"),
+                         HasSubstr(" by=worker role=worker")));
+}
+
+TEST_F(Access, WhatIsRevokedAndRenewedCountsAtOnce) {
+  ASSERT_NO_FATAL_FAILURE(IssueAll());
+  const auto server = Serve("state", {"--tls", At("head"), "--heartbeat-ms", "200"});
+  Process worker(
+      {Program("calib-worker"), "--server", address_, "--slots", "1", "--tls", At("worker")},
+      At("worker.err"));
+  EXPECT_TRUE(Eventually(kPatience, [&] {
+    return Ask("workers --json", "--tls viewer").json().size() == 1;
+  })) << Read("worker.err");
+  ASSERT_NO_FATAL_FAILURE(Issue("worker", "node7"));
+  Process renewed({Program("calib-worker"), "--server", address_, "--slots", "1", "--tls",
+                   At("node7"), "--name", "node7"},
+                  At("node7.err"));
+  const auto connections = [this](const std::string& name) {
+    const std::string log = Read("state.log");
+    int found = 0;
+    for (std::size_t at = 0; (at = log.find("worker_connected name=" + name, at)) != log.npos; ++at)
+      ++found;
+    return found;
+  };
+  EXPECT_TRUE(Eventually(kPatience, [&] { return connections("node7") == 1; }));
+  for (const char* name : {"viewer", "worker", "node7"}) {
+    ASSERT_EQ(Call(std::string("certs revoke ca ") + name).code, 0) << Read("err");
+  }
+  ASSERT_NO_FATAL_FAILURE(Issue("worker", "node7"));
+  std::filesystem::copy_file(work_ / "ca/crl.pem", work_ / "head/crl.pem",
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_TRUE(Eventually(kPatience, [&] { return Ask("list", "--tls viewer").code == 1; }));
+  EXPECT_THAT(Read("err"), HasSubstr("the certificate of viewer was revoked"));
+  // A stream that was open is cut off, and the worker says why.
+  EXPECT_EQ(worker.Wait(kPatience), 1);
+  EXPECT_THAT(Read("worker.err"), HasSubstr("the certificate of worker was revoked"));
+  EXPECT_EQ(Ask("list", "--tls operator").code, 0) << Read("err");
+  // One that has a new certificate by then shows that.
+  EXPECT_TRUE(Eventually(kPatience, [&] { return connections("node7") == 2; }))
+      << Read("node7.err");
+  EXPECT_TRUE(renewed.Running());
+
+  // Another authority altogether, without a restart: the server's own certificate is read again.
+  ASSERT_EQ(Call("certs init new").code, 0);
+  ASSERT_EQ(Call("certs issue new --role server head -o head2").code, 0) << Read("err");
+  ASSERT_EQ(Call("certs issue new --role viewer bob -o bob").code, 0) << Read("err");
+  EXPECT_THAT(Refused("list", "--tls bob"), HasSubstr("was not issued by the authority of bob"));
+  for (const char* name : {"ca.pem", "crl.pem", "key.pem", "cert.pem"}) {
+    std::filesystem::rename(work_ / "head2" / name, work_ / "head" / name);
+  }
+  EXPECT_TRUE(Eventually(kPatience, [&] { return Ask("list", "--tls bob").code == 0; }))
+      << Read("err");
+  EXPECT_EQ(Ask("list", "--tls operator").code, 1);
+  EXPECT_TRUE(server->Running());
+}
+
+/// Runs as another account of this machine, which has nothing to do with this test.
+constexpr const char* kAsNobody = "setpriv --reuid=65534 --regid=65534 --clear-groups";
+
+TEST_F(Access, EmbeddedServerIsReachedByItsAccountAlone) {
+  // Hours of work, so that it serves while others ask; the test ends it.
+  Write("long.yaml", SmallCampaign(2000, 3));
+  std::filesystem::permissions(work_, std::filesystem::perms(0755));
+  Process run({"/bin/sh", "-c",
+               "cd '" + work_.string() + "' && exec '" + CALIBCTL +
+                   "' run long.yaml --state s --workers 1"},
+              At("run.err"));
+  ASSERT_TRUE(Eventually(kPatience, [&] {
+    return std::filesystem::exists(work_ / "s/server.json");
+  })) << Read("run.err");
+  address_ = Json::parse(Read("s/server.json"))["address"].get<std::string>();
+  EXPECT_EQ(address_, "unix:" + At("s/run/calib.sock")) << "no port of TCP";
+  EXPECT_EQ(Call("list --state s").code, 0) << Read("err");
+  EXPECT_EQ(Ask("list", "").code, 0) << Read("err");
+
+  if (geteuid() != 0) {
+    run.Signal(SIGTERM);
+    run.Wait(kPatience);
+    GTEST_SKIP() << "only root becomes another account: what that one meets was left out";
+  }
+  if (CallWith(kAsNobody, "tests").code != 0) {
+    run.Signal(SIGTERM);
+    run.Wait(kPatience);
+    GTEST_SKIP() << "another account cannot read the program here: left out";
+  }
+  const Answer by_folder = CallWith(kAsNobody, "list --state s");
+  EXPECT_EQ(by_folder.code, 1) << by_folder.err;
+  EXPECT_THAT(by_folder.err, HasSubstr("may not be entered by this account"));
+  const Answer by_socket = CallWith(kAsNobody, "list --server " + address_);
+  EXPECT_EQ(by_socket.code, 1) << by_socket.err;
+  EXPECT_THAT(by_socket.err, HasSubstr("is the socket of a server of another account"));
+  const Answer deletes = CallWith(kAsNobody, "delete c1 --server " + address_);
+  EXPECT_EQ(deletes.code, 1) << deletes.err;
+  // Even where the folders are open, the socket asks who comes.
+  for (const char* name : {"s", "s/run", "s/run/calib.sock"}) {
+    std::filesystem::permissions(work_ / name, std::filesystem::perms(0777));
+  }
+  const Answer open = CallWith(kAsNobody, "list --server " + address_);
+  EXPECT_EQ(open.code, 1) << open.err;
+  EXPECT_EQ(Call("list --json --state s").json().size(), 1U) << "nothing changed";
+  run.Signal(SIGTERM);
+  EXPECT_EQ(run.Wait(kPatience), 1);
+}
+
+TEST_F(Access, SocketOfALongFolderHasAShortName) {
+  const std::string deep = std::string(60, 'a') + "/" + std::string(60, 'b');
+  Write("pre.yaml", SmallCampaign(4, 1));
+  const Answer run = Call("submit pre.yaml --state " + deep);
+  EXPECT_EQ(run.code, 0) << run.err;
+  const Answer listed = Call("list --json --state " + deep);
+  EXPECT_EQ(listed.code, 0) << listed.err;
+  EXPECT_EQ(listed.json().size(), 1U);
+}
+
+}  // namespace
+}  // namespace calib::ctl
