@@ -1,5 +1,6 @@
 #include "server/service/server.h"
 
+#include <fcntl.h>
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/security/tls_certificate_provider.h>
 #include <grpcpp/security/tls_credentials_options.h>
@@ -8,6 +9,8 @@
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <future>
@@ -85,6 +88,9 @@ absl::Status CheckReach(const ServerOptions& options) {
 }
 
 absl::Status StartLog(const std::string& file) {
+  if (!file.empty()) {  // made for its owner alone, which spdlog does not do
+    close(open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, S_IRUSR | S_IWUSR));
+  }
   try {
     auto logger =
         file.empty() ? spdlog::stderr_logger_mt("calibd") : spdlog::basic_logger_mt("calibd", file);

@@ -145,9 +145,10 @@ TEST_F(Access, WithoutCertificatesWantsTheTokenOfTheFolder) {
   EXPECT_THAT(Read("state.log"), AllOf(HasSubstr("refused peer=ipv4:127.0.0.1"),
                                        Not(HasSubstr(Read("state/token").substr(0, 64)))));
 
-  for (const char* name : {"token", "lock", "server.json"}) {
+  for (const char* name : {"state/token", "state/lock", "state/server.json", "state/calib.db",
+                           "state/calib.db-wal", "state.log"}) {
     struct stat status = {};
-    ASSERT_EQ(stat(At(std::string("state/") + name).c_str(), &status), 0) << name;
+    ASSERT_EQ(stat(At(name).c_str(), &status), 0) << name;
     EXPECT_EQ(status.st_mode & 0777, 0600) << name;
   }
   struct stat folder = {};
