@@ -1,11 +1,17 @@
 #include "proto/rpc/access.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdint>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
+#include <sstream>
 #include <system_error>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
@@ -23,6 +29,17 @@ std::string Variable(const char* name) {
   return value != nullptr ? value : "";
 }
 
+/// Whether a text that was to be the name of a file may be a token: it is not repeated then.
+bool MayBeSecret(const std::string& text) {
+  constexpr std::size_t kManyDigits = 32;
+  std::size_t digits = 0;
+  for (const char c : text) {
+    digits = absl::ascii_isxdigit(static_cast<unsigned char>(c)) ? digits + 1 : 0;
+    if (digits >= kManyDigits) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 bool IsToken(const std::string& text) {
@@ -31,17 +48,25 @@ bool IsToken(const std::string& text) {
 }
 
 absl::StatusOr<std::string> ReadToken(const std::string& path) {
-  errno = 0;
-  std::ifstream file(path);
-  std::string text(kLongestTokenFile, '\0');
-  if (file) {
-    file.read(text.data(), static_cast<std::streamsize>(text.size()));
-    text.resize(static_cast<std::size_t>(file.gcount()));
-  }
-  if (!file.is_open() || file.bad()) {
+  const auto cannot = [&path](int error) {
     return absl::InvalidArgumentError(
-        absl::StrCat(path, " cannot be read: ", std::generic_category().message(errno)));
+        absl::StrCat(MayBeSecret(path) ? "the file of the token" : path,
+                     " cannot be read: ", std::generic_category().message(error)));
+  };
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (file < 0) {
+    return cannot(errno);
   }
+  struct stat status = {};
+  std::string text(kLongestTokenFile, '\0');
+  const bool is_file = fstat(file, &status) == 0 && S_ISREG(status.st_mode);
+  const ssize_t bytes = is_file ? read(file, text.data(), text.size()) : 0;
+  const int error = errno;
+  close(file);
+  if (bytes < 0) {
+    return cannot(error);
+  }
+  text.resize(static_cast<std::size_t>(bytes));
   std::string token(absl::StripAsciiWhitespace(text));
   if (!IsToken(token)) {
     return absl::InvalidArgumentError(
@@ -49,6 +74,34 @@ absl::StatusOr<std::string> ReadToken(const std::string& path) {
                      " hexadecimal digits; calibd writes one to `token` of its state folder"));
   }
   return token;
+}
+
+bool IsOwnPort(int port) {
+  bool any = false;
+  for (const char* table : {"/proc/net/tcp", "/proc/net/tcp6"}) {
+    std::ifstream file(table);
+    std::string line;
+    std::getline(file, line);  // names of columns
+    while (std::getline(file, line)) {
+      // sl, local address and port, remote ones, state, queues, timer, retransmits, account
+      // [proc(5)]
+      std::istringstream columns(line);
+      std::string number, local, remote, state, queues, timer, retransmits;
+      std::int64_t account = -1;
+      columns >> number >> local >> remote >> state >> queues >> timer >> retransmits >> account;
+      const std::size_t colon = local.rfind(':');
+      constexpr const char* kListens = "0A";
+      if (colon == std::string::npos || state != kListens ||
+          std::strtol(local.c_str() + colon + 1, nullptr, 16) != port) {
+        continue;
+      }
+      if (account != static_cast<std::int64_t>(geteuid())) {
+        return false;
+      }
+      any = true;
+    }
+  }
+  return any;
 }
 
 std::vector<std::string> TokenFolders() {
@@ -82,22 +135,40 @@ absl::StatusOr<Access> FindAccess(const std::string& address, const AccessChoice
       return access;
     }
   }
-  const std::string variable = Variable("CALIB_TOKEN");
-  if (choice.token.empty() && IsToken(variable)) {
-    access.token = variable;
+  if (!choice.token.empty()) {
+    ASSIGN_OR_RETURN(access.token, ReadToken(choice.token));
+    access.own_port = choice.is_own ? PortOf(address) : 0;
     return access;
   }
-  if (const std::string& file = choice.token.empty() ? variable : choice.token; !file.empty()) {
-    ASSIGN_OR_RETURN(access.token, ReadToken(file));
+  if (const std::string variable(absl::StripAsciiWhitespace(Variable("CALIB_TOKEN")));
+      !variable.empty()) {
+    if (IsToken(variable)) {
+      access.token = variable;
+      return access;
+    }
+    auto token = ReadToken(variable);
+    if (!token.ok()) {  // without the value, which may be a token that was not copied whole
+      return absl::InvalidArgumentError(
+          absl::StrCat("$CALIB_TOKEN is neither a token (", kTokenDigits,
+                       " hexadecimal digits in lower case) nor the name of a file that holds one"));
+    }
+    access.token = *std::move(token);
     return access;
   }
   if (!IsLoopback(address)) {
     return access;
   }
+  timespec newest{};
   for (const std::string& folder : TokenFolders()) {
-    if (auto token = ReadToken(absl::StrCat(folder, "/", TokenName(PortOf(address)))); token.ok()) {
+    const std::string path = absl::StrCat(folder, "/", TokenName(PortOf(address)));
+    auto token = ReadToken(path);
+    struct stat status = {};
+    if (token.ok() && stat(path.c_str(), &status) == 0 &&
+        std::pair(status.st_mtim.tv_sec, status.st_mtim.tv_nsec) >=
+            std::pair(newest.tv_sec, newest.tv_nsec)) {
+      newest = status.st_mtim;
       access.token = *std::move(token);
-      return access;
+      access.own_port = PortOf(address);
     }
   }
   return access;

@@ -13,18 +13,27 @@ namespace calib::rpc {
 struct AccessChoice {
   std::string tls{};    ///< folder of `calibctl certs issue` [$CALIB_TLS]
   std::string token{};  ///< file that holds a token [$CALIB_TOKEN, which may be the token itself]
+  /// The token is of a server of this account, and shown to no listener of another.
+  bool is_own = false;
 };
 
 struct Access {
   std::string tls{};    ///< folder of a certificate; empty: plain text
   std::string token{};  ///< 64 hexadecimal digits; empty: none
+  /// The token is shown only while all that listens at this TCP port belongs to this account; 0: to
+  /// whoever answers.
+  int own_port = 0;
 };
 
 /// What this program has for the server at `address`: nothing where that is a socket, which asks
-/// for nothing. Without a choice and an environment variable: the token where a server of this
-/// account on this machine has left it, if there is one. Errors, INVALID_ARGUMENT: a file that is
-/// named and cannot be read or holds no token, a folder that is none.
+/// for nothing. Without a choice and an environment variable: the newest token that a server
+/// of this account on this machine has left for it, if there is one. Errors, INVALID_ARGUMENT: a
+/// file that is named and cannot be read or holds no token, a folder that is none.
 absl::StatusOr<Access> FindAccess(const std::string& address, const AccessChoice& choice);
+
+/// Whether something listens at a TCP port of this machine, and nothing there belongs to another
+/// account: not what has taken the port of a server that ended.
+bool IsOwnPort(int port);
 
 /// Whether a text is a token: 64 hexadecimal digits.
 bool IsToken(const std::string& text);

@@ -1,6 +1,9 @@
 #include "proto/rpc/address.h"
 
+#include <arpa/inet.h>
+
 #include <charconv>
+#include <cstdint>
 #include <string_view>
 
 #include "absl/strings/str_cat.h"
@@ -55,7 +58,11 @@ std::string SocketPathOf(const std::string& address) {
 
 bool IsLoopback(const std::string& address) {
   const std::string host = HostOf(address);
-  return address.starts_with(kSocket) || host == "localhost" || host == "[::1]" || host.starts_with("127.");
+  in_addr numbers{};
+  constexpr std::uint32_t kLoopbackNet = 127;
+  return address.starts_with(kSocket) || host == "localhost" || host == "[::1]" ||
+         (inet_pton(AF_INET, host.c_str(), &numbers) == 1 &&
+          ntohl(numbers.s_addr) >> 24 == kLoopbackNet);
 }
 
 }  // namespace calib::rpc

@@ -34,14 +34,15 @@ namespace {
 constexpr unsigned kFilesAgain = 1;
 constexpr std::chrono::milliseconds kHandshake{1500};
 
-/// Adds the token to every call that begins.
+/// Adds the token to every call that begins, while it is shown to whom it is meant for.
 class ShowToken final : public grpc::experimental::Interceptor {
  public:
-  explicit ShowToken(std::string value) : value_(std::move(value)) {}
+  ShowToken(std::string value, int own_port) : value_(std::move(value)), own_port_(own_port) {}
 
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(
-            grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+            grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA) &&
+        (own_port_ == 0 || IsOwnPort(own_port_))) {
       methods->GetSendInitialMetadata()->insert({"authorization", value_});
     }
     methods->Proceed();
@@ -49,18 +50,21 @@ class ShowToken final : public grpc::experimental::Interceptor {
 
  private:
   const std::string value_;
+  const int own_port_;
 };
 
 class ShowTokenFactory final : public grpc::experimental::ClientInterceptorFactoryInterface {
  public:
-  explicit ShowTokenFactory(const std::string& token) : value_("Bearer " + token) {}
+  explicit ShowTokenFactory(const Access& access)
+      : value_("Bearer " + access.token), own_port_(access.own_port) {}
   grpc::experimental::Interceptor* CreateClientInterceptor(
       grpc::experimental::ClientRpcInfo* /*info*/) override {
-    return new ShowToken(value_);  // gRPC's to delete
+    return new ShowToken(value_, own_port_);  // gRPC's to delete
   }
 
  private:
   const std::string value_;
+  const int own_port_;
 };
 
 std::shared_ptr<grpc::ChannelCredentials> CredentialsOf(const Access& access) {
@@ -87,7 +91,9 @@ absl::Status WhyNoSocket(const std::string& path) {
   close(file);
   if (is_there) {
     return absl::FailedPreconditionError(
-        absl::StrCat("unix:", path, " answers, and not as a server of calib does"));
+        absl::StrCat("unix:", path,
+                     " takes the connection and closes it: it is the socket of "
+                     "another account, or of no server of calib"));
   }
   if (error == EACCES || error == EPERM) {
     return absl::PermissionDeniedError(
@@ -152,7 +158,7 @@ std::shared_ptr<grpc::Channel> OpenChannel(const std::string& address, const Acc
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> factories;
   if (!access.token.empty()) {
-    factories.push_back(std::make_unique<ShowTokenFactory>(access.token));
+    factories.push_back(std::make_unique<ShowTokenFactory>(access));
   }
   return grpc::experimental::CreateCustomChannelWithInterceptors(address, CredentialsOf(access),
                                                                  arguments, std::move(factories));
@@ -173,13 +179,14 @@ absl::Status WhyNotConnected(const std::string& address, const Access& access) {
   };
   if (access.tls.empty()) {
     return refused(
-        "answers, and not in plain text: a server with certificates wants one of its "
-        "authority (--tls DIR, from `calibctl certs issue`)");
+        "takes connections, and does not answer as calibd does in plain text: one with "
+        "certificates wants one of its authority (--tls DIR, from `calibctl certs "
+        "issue`)");
   }
   if (absl::StrContains(plain, "wrong version number")) {
     return refused(
         "speaks plain text, and --tls asks for a server with a certificate: start "
-        "calibd with --tls DIR, or leave --tls out");
+        "calibd with --tls DIR, or leave --tls (and $CALIB_TLS) out");
   }
   if (absl::StrContains(plain, "verify failed")) {
     return refused("shows a certificate that was not issued by the authority of ", access.tls,

@@ -84,8 +84,9 @@ rpc::AccessChoice Session::AccessAt(const std::string& address) const {
   rpc::AccessChoice access{.tls = choice_.tls, .token = choice_.token};
   const std::string own = state_ + "/token";
   if (!state_.empty() && access.tls.empty() && access.token.empty() &&
-      rpc::SocketPathOf(address).empty() && rpc::ReadToken(own).ok()) {
+      rpc::SocketPathOf(address).empty() && rpc::IsLoopback(address) && rpc::ReadToken(own).ok()) {
     access.token = own;
+    access.is_own = true;
   }
   return access;
 }

@@ -133,9 +133,20 @@ absl::StatusOr<std::unique_ptr<Listener>> Listener::OpenPath(const std::string& 
     return cannot("path");
   }
   std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
-  // Left by a server that was killed: whoever calls this owns the place.
-  if (unlink(path.c_str()) != 0 && errno != ENOENT) {
-    return cannot("unlink");
+  if (struct stat there = {}; lstat(path.c_str(), &there) == 0) {
+    if (!S_ISSOCK(there.st_mode)) {
+      errno = EEXIST;
+      return cannot("a file that is no socket");
+    }
+    const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const bool is_served =
+        connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+    close(probe);
+    if (is_served) {
+      errno = EADDRINUSE;
+      return cannot("another server");
+    }
+    unlink(path.c_str());  // left by a server that was killed
   }
   const int socket_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (socket_fd < 0) {
@@ -150,7 +161,11 @@ absl::StatusOr<std::unique_ptr<Listener>> Listener::OpenPath(const std::string& 
     errno = error;
     return cannot("bind");
   }
-  return std::unique_ptr<Listener>(new Listener({socket_fd}, 0, path, most));
+  std::unique_ptr<Listener> listener(new Listener({socket_fd}, 0, path, most));
+  if (struct stat bound = {}; lstat(path.c_str(), &bound) == 0) {
+    listener->path_inode_ = bound.st_ino;
+  }
+  return listener;
 }
 
 Listener::Listener(std::vector<int> sockets, int port, std::string path, int most)
@@ -169,7 +184,8 @@ Listener::~Listener() {
   for (const int socket_fd : sockets_) {
     close(socket_fd);
   }
-  if (!path_.empty()) {
+  if (struct stat there = {};
+      !path_.empty() && lstat(path_.c_str(), &there) == 0 && there.st_ino == path_inode_) {
     unlink(path_.c_str());
   }
   close(stop_);

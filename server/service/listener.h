@@ -24,9 +24,11 @@ class Listener {
   /// Binds every address that HOST stands for and listens; port 0: a free one. Or the socket of
   /// unix:/PATH (mode 0600), in the place of one that a killed server has left; only programs of
   /// this account, or of root, are let in there. UNAVAILABLE: in use, no address of this machine,
-  /// or no place for a socket. most: connections that are open at a time.
+  /// or no place for a socket, as where a file is that is none. most: connections that are open at
+  /// a time.
   static absl::StatusOr<std::unique_ptr<Listener>> Open(const std::string& address, int most);
-  /// Stops accepting and removes the socket's file; what was accepted stays open.
+  /// Stops accepting and removes the socket's file, if it still is this one's; what was accepted
+  /// stays open.
   ~Listener();
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
@@ -51,6 +53,7 @@ class Listener {
   const std::vector<int> sockets_;
   const int port_;
   const std::string path_;  // of a Unix socket; empty: TCP
+  std::uint64_t path_inode_ = 0;
   const std::size_t most_;
   int stop_ = -1;   // an eventfd
   int spare_ = -1;  // given up to turn a connection away when no file can be opened

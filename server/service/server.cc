@@ -147,8 +147,15 @@ struct Server::Impl {
       parameters.fd = connection;
       acceptor->HandleNewConnection(&parameters);
     });
-    address =
-        listener->port() == 0 ? listen : absl::StrCat(rpc::HostOf(listen), ":", listener->port());
+    if (listener->port() == 0) {
+      address = listen;
+    } else {  // all addresses are reached here by that of this machine
+      const std::string host = rpc::HostOf(listen);
+      address = absl::StrCat(host == "0.0.0.0" ? "127.0.0.1"
+                             : host == "[::]"  ? "[::1]"
+                                               : host,
+                             ":", listener->port());
+    }
     return absl::OkStatus();
   }
 };
@@ -158,6 +165,9 @@ Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Server::~Server() { Shutdown(kDefaultShutdown); }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
+  if (options.listen.empty() || !rpc::SocketPathOf(options.listen).empty()) {
+    options.tls.clear();  // a socket is its account's: nobody else can listen in
+  }
   RETURN_IF_ERROR(CheckReach(options));
   ASSIGN_OR_RETURN(auto folder, StateFolder::Open(options.state_dir));
   RETURN_IF_ERROR(StartLog(options.log_file));
@@ -195,10 +205,12 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
       spdlog::warn("token_not_left reason=\"{}\"", std::string(left.message()));
     }
   }
-  RETURN_IF_ERROR(impl->folder->Announce(impl->address, options.stays));
-  spdlog::info("serving address={} state={} tls={}", impl->address, options.state_dir,
+  // From here on peers may be connected, which only a shutdown parts with in time.
+  std::unique_ptr<Server> server(new Server(std::move(impl)));
+  RETURN_IF_ERROR(server->impl_->folder->Announce(server->impl_->address, options.stays));
+  spdlog::info("serving address={} state={} tls={}", server->impl_->address, options.state_dir,
                options.tls.empty() ? "none" : options.tls);
-  return std::unique_ptr<Server>(new Server(std::move(impl)));
+  return server;
 }
 
 int Server::port() const { return impl_->listener->port(); }

@@ -36,12 +36,19 @@ std::string LockPath(const std::string& directory) { return directory + "/lock";
 std::optional<Announcement> ReadAnnouncement(const std::string& directory) {
   std::ifstream file(AnnouncementPath(directory));
   const auto json = nlohmann::json::parse(file, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object() || !json.contains("address") || !json.contains("pid")) {
+  if (!json.is_object()) {
     return std::nullopt;
   }
-  return Announcement{.address = json["address"].get<std::string>(),
-                      .pid = json["pid"].get<int>(),
-                      .stays = json.value("stays", false)};
+  const auto address = json.find("address");
+  const auto pid = json.find("pid");
+  const auto stays = json.find("stays");
+  if (address == json.end() || !address->is_string() || pid == json.end() ||
+      !pid->is_number_integer() || (stays != json.end() && !stays->is_boolean())) {
+    return std::nullopt;
+  }
+  return Announcement{.address = address->get<std::string>(),
+                      .pid = pid->get<int>(),
+                      .stays = stays != json.end() && stays->get<bool>()};
 }
 
 /// The whole file, for the open file description (not the process: threads of one process exclude
@@ -69,10 +76,15 @@ std::string OwnerOf(const std::string& path) {
 
 absl::Status CannotWrite(const std::string& what, int error) {
   if (error == EACCES || error == EPERM) {
-    const std::filesystem::path folder = std::filesystem::path(what).parent_path();
-    return absl::PermissionDeniedError(absl::StrCat(what, " may not be written by this account; ",
-                                                    folder.string(), " belongs to ",
-                                                    OwnerOf(folder.string())));
+    std::error_code ignored;
+    const std::string folder =
+        std::filesystem::absolute(what, ignored).parent_path().lexically_normal().string();
+    struct stat status = {};
+    const bool is_own = stat(folder.c_str(), &status) == 0 && status.st_uid == geteuid();
+    return absl::PermissionDeniedError(
+        absl::StrCat(what, " may not be written by this account; ",
+                     is_own ? absl::StrCat("chmod u+rwx ", folder, " lets its owner do so")
+                            : absl::StrCat(folder, " belongs to ", OwnerOf(folder))));
   }
   return absl::ResourceExhaustedError(
       absl::StrCat(what, " cannot be written: ", std::generic_category().message(error)));
@@ -97,7 +109,7 @@ absl::Status WritePrivate(const std::string& path, const std::string& text) {
   return rename(draft.c_str(), path.c_str()) == 0 ? absl::OkStatus() : CannotWrite(path, errno);
 }
 
-/// Makes a folder that this account alone enters, or finds it so.
+/// Makes a folder that this account alone enters, or makes its own so.
 absl::Status MakePrivateFolder(const std::string& path) {
   if (mkdir(path.c_str(), kOwnersFolder) != 0 && errno != EEXIST) {
     return CannotWrite(path, errno);
@@ -106,10 +118,32 @@ absl::Status MakePrivateFolder(const std::string& path) {
   if (lstat(path.c_str(), &status) != 0) {
     return CannotWrite(path, errno);
   }
-  if (!S_ISDIR(status.st_mode) || status.st_uid != geteuid() ||
-      (status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-    return absl::PermissionDeniedError(absl::StrCat(
-        path, " has to be a folder of this account that no other may enter (chmod 700)"));
+  if (!S_ISDIR(status.st_mode) || status.st_uid != geteuid()) {
+    return absl::PermissionDeniedError(
+        absl::StrCat(path, " has to be a folder of this account, and belongs to ", OwnerOf(path),
+                     ": set XDG_RUNTIME_DIR, or choose a shorter --state"));
+  }
+  if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0 && chmod(path.c_str(), kOwnersFolder) != 0) {
+    return CannotWrite(path, errno);
+  }
+  return absl::OkStatus();
+}
+
+/// A folder in which others may write can be given another server.json, or another database.
+absl::Status CheckIsOwn(const std::string& directory) {
+  struct stat status = {};
+  if (stat(directory.c_str(), &status) != 0) {
+    return CannotWrite(directory, errno);
+  }
+  if (status.st_uid != geteuid()) {
+    return absl::PermissionDeniedError(
+        absl::StrCat(directory, " belongs to ", OwnerOf(directory),
+                     ": a state folder is served and read by its own account only"));
+  }
+  if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+    return absl::PermissionDeniedError(
+        absl::StrCat("other accounts may write in ", directory,
+                     ", which holds the state of a server: chmod go-w ", directory));
   }
   return absl::OkStatus();
 }
@@ -124,6 +158,7 @@ absl::StatusOr<std::unique_ptr<StateFolder>> StateFolder::Open(const std::string
       return CannotWrite(directory, error ? error.value() : errno);
     }
   }
+  RETURN_IF_ERROR(CheckIsOwn(directory));
   const int lock = open(LockPath(directory).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kOwnerOnly);
   if (lock < 0) {
     return CannotWrite(LockPath(directory), errno);
@@ -171,20 +206,26 @@ absl::StatusOr<std::string> StateFolder::Token() const {
 }
 
 absl::Status StateFolder::LeaveToken(const std::string& token, int port) {
+  std::string reasons;
   for (const std::string& folder : rpc::TokenFolders()) {
     std::error_code ignored;
     std::filesystem::create_directories(std::filesystem::path(folder).parent_path(), ignored);
     const std::string path = absl::StrCat(folder, "/", rpc::TokenName(port));
-    if (MakePrivateFolder(folder).ok() && WritePrivate(path, token + "\n").ok()) {
+    absl::Status status = MakePrivateFolder(folder);
+    if (status.ok()) {
+      status = WritePrivate(path, token + "\n");
+    }
+    if (status.ok()) {
       left_token_ = path;
       token_ = token;
-      return absl::OkStatus();
+      return status;
     }
+    absl::StrAppend(&reasons, status.message(), "; ");
   }
   return absl::NotFoundError(
-      absl::StrCat("there is no folder of this account to leave the token in ($XDG_RUNTIME_DIR, "
-                   "~/.cache): name it with --token ",
-                   directory_, "/token"));
+      absl::StrCat("the token could not be left for programs of this account ($XDG_RUNTIME_DIR, "
+                   "~/.cache): ",
+                   reasons, "name it with --token ", directory_, "/token"));
 }
 
 absl::StatusOr<std::string> StateFolder::SocketAddress() const {

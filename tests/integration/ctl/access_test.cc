@@ -1,8 +1,11 @@
 // Who is let in, as users of a server meet it: certificates, tokens, sockets, roles.
+#include "proto/rpc/access.h"
+
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -60,8 +63,11 @@ class Access : public CalibctlFixture {
 
   /// calibd over the folder `state`, once it serves; `address` is then where.
   std::unique_ptr<Process> Serve(const std::string& state, std::vector<std::string> options) {
-    std::vector<std::string> command{Program("calibd"), "--state", At(state),         "--listen",
-                                     "127.0.0.1:0",     "--log",   At(state + ".log")};
+    std::vector<std::string> command{Program("calibd"), "--state", At(state), "--log",
+                                     At(state + ".log")};
+    if (std::find(options.begin(), options.end(), "--listen") == options.end()) {
+      command.insert(command.end(), {"--listen", "127.0.0.1:0"});
+    }
     command.insert(command.end(), options.begin(), options.end());
     auto server = std::make_unique<Process>(command, At(state + ".err"));
     EXPECT_TRUE(Eventually(kPatience, [&] {
@@ -161,8 +167,8 @@ TEST_F(Access, PlainTextAndCertificatesTellEachOtherApart) {
   const auto plain = Serve("plain", {});
   EXPECT_THAT(Refused("list", "--tls viewer"), HasSubstr("speaks plain text"));
   const auto secure = Serve("secure", {"--tls", At("head")});
-  EXPECT_THAT(Refused("list", ""), HasSubstr("answers, and not in plain text"));
-  EXPECT_THAT(Refused("list", "--token secure/token"), HasSubstr("not in plain text"));
+  EXPECT_THAT(Refused("list", ""), HasSubstr("does not answer as calibd does in plain text"));
+  EXPECT_THAT(Refused("list", "--token secure/token"), HasSubstr("in plain text"));
   const Answer nobody = Call("list --server 127.0.0.1:9 --tls viewer");
   EXPECT_EQ(nobody.code, 3) << nobody.err;
 }
@@ -361,6 +367,74 @@ TEST_F(Access, SocketOfALongFolderHasAShortName) {
   const Answer listed = Call("list --json --state " + deep);
   EXPECT_EQ(listed.code, 0) << listed.err;
   EXPECT_EQ(listed.json().size(), 1U);
+}
+
+// What has taken the port of a server that was killed, or listens beside it under the same name,
+// gets no token; neither does anybody read one where it was miswritten.
+TEST_F(Access, TokenIsShownToItsServerOnlyAndNotRepeated) {
+  const auto server = Serve("state", {});
+  const std::string token = Read("state/token").substr(0, 64);
+  for (const std::string& wrong : {"Bearer " + token, token.substr(0, 60), token + "0"}) {
+    const Variable variable("CALIB_TOKEN", wrong);
+    const Answer answer = Ask("list", "");
+    EXPECT_EQ(answer.code, 2) << answer.err;
+    EXPECT_THAT(answer.err, AllOf(HasSubstr("$CALIB_TOKEN is neither a token"),
+                                  Not(HasSubstr(token.substr(0, 32)))));
+  }
+  {
+    const Variable blanks("CALIB_TOKEN", " " + token + "\n");
+    EXPECT_EQ(Ask("list", "").code, 0) << Read("err");
+  }
+  const Answer option = Ask("list", "--token " + token);
+  EXPECT_EQ(option.code, 2);
+  EXPECT_THAT(option.err, Not(HasSubstr(token.substr(0, 32))));
+
+  const int port = std::stoi(address_.substr(address_.rfind(':') + 1));
+  EXPECT_TRUE(rpc::IsOwnPort(port));
+  const auto access = rpc::FindAccess(address_, {});
+  ASSERT_TRUE(access.ok()) << access.status();
+  EXPECT_EQ(access->token, token);
+  EXPECT_EQ(access->own_port, port) << "asked for again at every call";
+  if (geteuid() == 0 && std::system("setpriv --version >/dev/null 2>&1") == 0) {
+    // Another account beside it, on the other address that "localhost" stands for.
+    Process other({"setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", "python3", "-c",
+                   "import socket, sys, time\n"
+                   "s = socket.socket(socket.AF_INET6)\n"
+                   "s.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)\n"
+                   "s.bind(('::1', int(sys.argv[1])))\ns.listen()\ntime.sleep(30)\n",
+                   std::to_string(port)},
+                  At("other.err"));
+    EXPECT_TRUE(Eventually(kPatience, [&] { return !rpc::IsOwnPort(port); })) << Read("other.err");
+    EXPECT_THAT(Refused("list", ""), HasSubstr("no token was shown"));
+  }
+}
+
+TEST_F(Access, FoldersAndSocketsOfOthersAreLeftAlone) {
+  Write("thesis", "chapter one");
+  Process over({Program("calibd"), "--state", At("state"), "--listen", "unix:" + At("thesis")},
+               At("err1"));
+  EXPECT_EQ(over.Wait(kPatience), 1);
+  EXPECT_EQ(Read("thesis"), "chapter one");
+  EXPECT_THAT(Read("err1"), HasSubstr("a file that is no socket"));
+
+  const auto first = Serve("state", {"--listen", "unix:" + At("sock")});
+  EXPECT_EQ(Ask("list", "").code, 0) << Read("err");
+  Process second({Program("calibd"), "--state", At("other"), "--listen", "unix:" + At("sock")},
+                 At("err2"));
+  EXPECT_EQ(second.Wait(kPatience), 1);
+  EXPECT_THAT(Read("err2"), HasSubstr("another server"));
+  EXPECT_EQ(Ask("list", "").code, 0) << Read("err");
+
+  // A folder in which others may write could be given another server.json.
+  std::filesystem::create_directory(work_ / "open");
+  std::filesystem::permissions(work_ / "open", std::filesystem::perms(0777));
+  const Answer answer = Call("submit campaign.yaml --state open");
+  EXPECT_EQ(answer.code, 1) << answer.err;
+  EXPECT_THAT(answer.err, HasSubstr("other accounts may write in open"));
+  // One that is garbled is nobody's address.
+  std::filesystem::create_directory(work_ / "garbled");
+  Write("garbled/server.json", R"({"address": 7, "pid": "x", "stays": 3})");
+  EXPECT_EQ(Call("submit campaign.yaml --state garbled").code, 0) << Read("err");
 }
 
 }  // namespace

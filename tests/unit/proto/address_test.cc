@@ -19,6 +19,17 @@ TEST(Address, HostAndPort) {
   }
 }
 
+TEST(Address, OrTheSocketOfAPath) {
+  EXPECT_EQ(ProblemOfAddress("unix:/srv/calib/run/calib.sock"), "");
+  EXPECT_EQ(SocketPathOf("unix:/a/b"), "/a/b");
+  EXPECT_EQ(SocketPathOf("localhost:1"), "");
+  for (const std::string& bad : {std::string("unix:"), std::string("unix:run/sock"),
+                                 "unix:/" + std::string(kLongestSocketPath, 'a')}) {
+    EXPECT_EQ(ProblemOfAddress(bad),
+              "'" + bad + "' is not unix:/PATH with a path of at most 107 bytes");
+  }
+}
+
 TEST(Address, AServerMayTakeAnyPort) {
   EXPECT_EQ(ProblemOfAddress("127.0.0.1:0", 0), "");
   EXPECT_EQ(ProblemOfAddress("127.0.0.1:65536", 0),
@@ -26,10 +37,12 @@ TEST(Address, AServerMayTakeAnyPort) {
 }
 
 TEST(Address, OnlyThisMachineIsReachedByALoopback) {
-  for (const char* own : {"127.0.0.1:1", "127.3.2.1:1", "localhost:7443", "[::1]:7443"}) {
+  for (const char* own :
+       {"127.0.0.1:1", "127.3.2.1:1", "localhost:7443", "[::1]:7443", "unix:/a/b"}) {
     EXPECT_TRUE(IsLoopback(own)) << own;
   }
-  for (const char* open : {"0.0.0.0:1", "[::]:1", "node12:7443", "10.0.0.127:1"}) {
+  for (const char* open : {"0.0.0.0:1", "[::]:1", "node12:7443", "10.0.0.127:1",
+                           "127.0.0.1.example.org:1", "127.example.org:1"}) {
     EXPECT_FALSE(IsLoopback(open)) << open;
   }
 }
