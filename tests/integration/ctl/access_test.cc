@@ -397,7 +397,8 @@ TEST_F(Access, TokenIsShownToItsServerOnlyAndNotRepeated) {
   EXPECT_EQ(access->own_port, port) << "asked for again at every call";
   if (geteuid() == 0 && std::system("setpriv --version >/dev/null 2>&1") == 0) {
     // Another account beside it, on the other address that "localhost" stands for.
-    Process other({"setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", "python3", "-c",
+    Process other({"/usr/bin/env", "setpriv", "--reuid=65534", "--regid=65534", "--clear-groups",
+                   "/usr/bin/python3", "-c",
                    "import socket, sys, time\n"
                    "s = socket.socket(socket.AF_INET6)\n"
                    "s.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)\n"
