@@ -129,8 +129,8 @@ struct ServerLink::Impl {
   absl::StatusOr<std::shared_ptr<v1::WorkerLink::Stub>> Connection()
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
     if (stub == nullptr) {
-      ASSIGN_OR_RETURN(const rpc::Access access, rpc::FindAccess(address, choice));
-      stub = v1::WorkerLink::NewStub(rpc::OpenChannel(address, access));
+      ASSIGN_OR_RETURN(shown, rpc::FindAccess(address, choice));
+      stub = v1::WorkerLink::NewStub(rpc::OpenChannel(address, shown));
     }
     return stub;
   }
@@ -140,6 +140,7 @@ struct ServerLink::Impl {
   absl::Mutex mutex;
   /// With its channel, which must not go on a thread of gRPC's.
   std::shared_ptr<v1::WorkerLink::Stub> stub ABSL_GUARDED_BY(mutex);
+  rpc::Access shown ABSL_GUARDED_BY(mutex);            // over this connection
   bool was_not_let_in ABSL_GUARDED_BY(mutex) = false;  // over this connection
   std::unique_ptr<Stream> stream ABSL_GUARDED_BY(mutex);
   const LinkEvents events;
@@ -186,6 +187,12 @@ void ServerLink::FinishSending() {
   if (impl_->stream != nullptr) {
     impl_->stream->FinishSending();
   }
+}
+
+bool ServerLink::HasMoreToShow() {
+  const auto access = rpc::FindAccess(impl_->address, impl_->choice);
+  absl::MutexLock lock(&impl_->mutex);
+  return access.ok() && !(*access == impl_->shown);
 }
 
 absl::StatusOr<std::string> ServerLink::GetBlob(const std::string& digest, std::stop_token stop) {

@@ -39,6 +39,10 @@ class ServerLink {
   /// No more messages follow; the server then ends the stream.
   void FinishSending();
 
+  /// Whether there is something to show, by now, that the last connection did not: a token that a
+  /// server has left since.
+  bool HasMoreToShow();
+
   /// Content by digest: waits, with retries while the server is away, until it is there or `stop`.
   absl::StatusOr<std::string> GetBlob(const std::string& digest, std::stop_token stop);
 

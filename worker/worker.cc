@@ -9,12 +9,14 @@
 #include <csignal>
 #include <map>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "dem/model/state.h"
 #include "dem/registry/catalog.h"
 #include "proto/rpc/backoff.h"
 #include "proto/rpc/check_message.h"
+#include "proto/rpc/client_options.h"
 #include "proto/rpc/digest.h"
 #include "proto/rpc/random_id.h"
 #include "proto/rpc/text_kinds.h"
@@ -28,10 +30,9 @@ namespace {
 
 namespace asio = boost::asio;
 
-/// After these the server would say the same again. A worker that was welcome may have been given a
-/// new certificate since.
-bool IsFinal(const absl::Status& status, bool was_welcome) {
-  return (absl::IsUnauthenticated(status) && !was_welcome) || absl::IsPermissionDenied(status) ||
+/// After these the server would say the same again.
+bool IsFinal(const absl::Status& status) {
+  return absl::IsPermissionDenied(status) ||
          status.code() == absl::StatusCode::kFailedPrecondition ||
          status.code() == absl::StatusCode::kAlreadyExists ||
          status.code() == absl::StatusCode::kInvalidArgument;
@@ -112,7 +113,9 @@ class Worker::Impl {
       Quit();
       return;
     }
-    if (IsFinal(status, was_welcome)) {
+    // A worker that was welcome may have been given a new certificate since.
+    if (IsFinal(status) ||
+        (absl::IsUnauthenticated(status) && !was_welcome && !link_.HasMoreToShow())) {
       spdlog::error("refused server={} reason=\"{}\"", options_.server,
                     std::string(status.message()));
       result_ = status;
@@ -123,10 +126,27 @@ class Worker::Impl {
     const auto wait = backoff_.Next();
     spdlog::warn("disconnected server={} reason=\"{}\" retry_ms={}", options_.server,
                  std::string(status.message()), wait.count());
+    LookWhy();
     reconnect_.expires_after(wait);
     reconnect_.async_wait([this](const boost::system::error_code& error) {
       if (!error && !stopping_) {
         Connect();
+      }
+    });
+  }
+
+  /// Says in the log, once an outage, what is wrong with a server that is there and cannot be
+  /// talked to: that it speaks otherwise, or is not to be trusted.
+  void LookWhy() {
+    if (std::exchange(looked_why_, true)) {
+      return;
+    }
+    looking_why_ = std::jthread([server = options_.server, choice = options_.access] {
+      const auto access = rpc::FindAccess(server, choice);
+      const absl::Status why =
+          access.ok() ? rpc::WhyNotConnected(server, *access) : access.status();
+      if (!absl::IsUnavailable(why)) {
+        spdlog::error("no_connection server={} reason=\"{}\"", server, std::string(why.message()));
       }
     });
   }
@@ -190,6 +210,7 @@ class Worker::Impl {
   void Welcome(const v1::Welcome& welcome) {
     spdlog::info("connected server={} held={}", options_.server, held_.size());
     welcome_ = true;
+    looked_why_ = false;
     backoff_.Reset();
     heartbeat_every_ = std::chrono::milliseconds(std::max(1, welcome.heartbeat_ms()));
     for (auto& [id, attempt] : held_) {
@@ -392,6 +413,8 @@ class Worker::Impl {
   absl::Status result_;
   // Destroyed from the last to the first: simulations end before what they use.
   ServerLink link_;
+  bool looked_why_ = false;
+  std::jthread looking_why_;
   Specimens specimens_;
   std::optional<Checkpoints> checkpoints_;
   std::map<std::int64_t, HeldAttempt> ending_;  // dropped, thread on its way out

@@ -23,6 +23,8 @@ struct Access {
   /// The token is shown only while all that listens at this TCP port belongs to this account; 0: to
   /// whoever answers.
   int own_port = 0;
+
+  friend bool operator==(const Access&, const Access&) = default;
 };
 
 /// What this program has for the server at `address`: nothing where that is a socket, which asks

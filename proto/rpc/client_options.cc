@@ -124,7 +124,7 @@ bool SomethingListens(const std::string& address) {
   return listens;
 }
 
-/// What gRPC says of a call that finds no connection.
+/// What gRPC says of a call that finds no connection; empty: there is one by now.
 std::string HandshakeError(const std::string& address, const Access& access) {
   const auto channel = OpenChannel(address, access);
   grpc::GenericStub stub(channel);
@@ -140,7 +140,7 @@ std::string HandshakeError(const std::string& address, const Access& access) {
   bool ok = false;
   queue.Next(&tag, &ok);
   queue.Shutdown();
-  return status.error_message();
+  return channel->GetState(false) == GRPC_CHANNEL_READY ? "" : status.error_message();
 }
 
 }  // namespace
@@ -172,6 +172,9 @@ absl::Status WhyNotConnected(const std::string& address, const Access& access) {
     return absl::UnavailableError(absl::StrCat("no server answers at ", address));
   }
   const std::string error = HandshakeError(address, access);
+  if (error.empty()) {
+    return absl::UnavailableError(absl::StrCat("no server answered at ", address));
+  }
   // OpenSSL writes "certificate verify failed", BoringSSL "CERTIFICATE_VERIFY_FAILED".
   const std::string plain = absl::StrReplaceAll(absl::AsciiStrToLower(error), {{"_", " "}});
   const auto refused = [&](auto... words) {

@@ -1,5 +1,6 @@
 #include "server/access/certificate.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -90,6 +91,32 @@ absl::StatusOr<Credentials> ReadCredentials(const std::string& folder) {
                                             folder, "` writes it"));
   }
   return result;
+}
+
+absl::Status CheckOwn(const Credentials& credentials, std::int64_t now_unix_s) {
+  const Holder& holder = credentials.holder;
+  const auto refuse = [&holder](const std::string& why) {
+    return absl::FailedPreconditionError(absl::StrCat("the certificate of ", holder.name, why));
+  };
+  const std::string again = absl::StrCat(": `calibctl certs issue CA --role ", NameOf(holder.role),
+                                         " ", holder.name, " -o FOLDER` makes a new one");
+  if (now_unix_s < holder.not_before_unix_s) {
+    return refuse(absl::StrCat(" is not valid before ", DateOf(holder.not_before_unix_s),
+                               ": look at this machine's clock"));
+  }
+  if (now_unix_s > holder.not_after_unix_s) {
+    return refuse(absl::StrCat(" has expired on ", DateOf(holder.not_after_unix_s), again));
+  }
+  const CrlPtr revocations = ParseRevocations(credentials.crl_pem);
+  const X509Ptr own = ParseCertificate(credentials.cert_pem);
+  if (revocations != nullptr && own != nullptr) {
+    const auto revoked = RevokedSerials(revocations.get());
+    if (std::binary_search(revoked.begin(), revoked.end(),
+                           HexOf(X509_get0_serialNumber(own.get())))) {
+      return refuse(absl::StrCat(" was revoked", again));
+    }
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace calib::access

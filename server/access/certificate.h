@@ -38,6 +38,10 @@ struct Credentials {
 /// its owner may read). Waits up to 100 ms for key and certificate to belong together.
 absl::StatusOr<Credentials> ReadCredentials(const std::string& folder);
 
+/// Whether the folder's own certificate can be shown at `now_unix_s` [s since 1970].
+/// FAILED_PRECONDITION, a sentence: it has expired, is not valid yet, or stands in its own crl.pem.
+absl::Status CheckOwn(const Credentials& credentials, std::int64_t now_unix_s);
+
 /// Judges certificates of peers that ask, against the authority and the revocations of a folder.
 /// Thread-safe.
 class Verifier {

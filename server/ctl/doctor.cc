@@ -218,6 +218,13 @@ std::optional<Check> JudgeWaiting(const v1::ServerReport& server) {
 Check JudgeConnection(const std::string& address, const v1::ServerReport& server,
                       std::int64_t now_unix_s) {
   const std::string where = server.listen().empty() ? address : server.listen();
+  if (!server.certificate_problem().empty()) {
+    return {.name = "certificates",
+            .subject = "connection",
+            .health = Health::kProblem,
+            .found = absl::StrCat("The server's certificate: ", server.certificate_problem(), "."),
+            .advice = "Mend the folder of calibd --tls: it is read again by itself."};
+  }
   if (!server.certificate().empty()) {
     access::Holder holder{.name = server.certificate(), .role = access::Role::kServer};
     holder.not_after_unix_s = server.certificate_end_unix_s();

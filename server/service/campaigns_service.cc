@@ -29,6 +29,13 @@ constexpr std::chrono::seconds kLookingThroughTheFile{10};
 /// Campaigns that are read, or wait to be, at a time: each with its text, which may be a MiB.
 constexpr int kMostRead = 16;
 
+/// Under which a request is remembered: a submitter's is not another's, who owns what came of it.
+std::string RequestKey(const Caller& caller, const std::string& request_id) {
+  return caller.role == access::Role::kOperator || request_id.empty()
+             ? request_id
+             : absl::StrCat(caller.name, ":", request_id);
+}
+
 /// Who did what.
 void LogChange(const char* what, const std::string& of, const Caller& caller) {
   spdlog::info("change what={} of={} by={} role={}", what, of, caller.name,
@@ -62,21 +69,21 @@ grpc::ServerUnaryReactor* CampaignsService::Enter(
 template <typename Message>
 grpc::ServerWriteReactor<Message>* CampaignsService::EnterStream(
     Context* context, const google::protobuf::Message& request,
-    const std::function<grpc::ServerWriteReactor<Message>*(Door::Pass)>& go_on) {
+    const std::function<grpc::ServerWriteReactor<Message>*(Entry)>& go_on) {
   auto entry = Admit(core_, *context, Right::kRead, &request);
   if (!entry.ok()) {
     return new EndedCall<grpc::ServerWriteReactor<Message>>(entry.status());
   }
-  return go_on(std::move(entry->pass));
+  return go_on(*std::move(entry));
 }
 
 template <typename Message>
 grpc::ServerWriteReactor<Message>* CampaignsService::Stream(
     Context* context, const v1::CampaignRequest& request,
     absl::StatusOr<std::vector<Message>> (*load)(store::Reader&, std::int64_t)) {
-  return EnterStream<Message>(context, request, [&](Door::Pass pass) {
+  return EnterStream<Message>(context, request, [&](Entry entry) {
     return new StreamReactor<Message>(
-        core_, std::move(pass), &Core::Tell,
+        core_, std::move(entry.pass), &Core::Tell,
         AtOnce<Message>(
             [this, campaign = request.campaign(), load]() -> absl::StatusOr<std::vector<Message>> {
               ASSIGN_OR_RETURN(const auto id, ParseCampaign(campaign));
@@ -172,8 +179,8 @@ grpc::ServerUnaryReactor* CampaignsService::GetSource(Context* context,
 
 grpc::ServerWriteReactor<v1::CampaignStatus>* CampaignsService::Watch(
     Context* context, const v1::CampaignRequest* request) {
-  return EnterStream<v1::CampaignStatus>(context, *request, [this, request](Door::Pass pass) {
-    return WatchCampaign(core_, std::move(pass), request->campaign());
+  return EnterStream<v1::CampaignStatus>(context, *request, [this, request](Entry entry) {
+    return WatchCampaign(core_, std::move(entry), request->campaign());
   });
 }
 
@@ -184,12 +191,12 @@ grpc::ServerWriteReactor<v1::Sample>* CampaignsService::GetSamples(
 
 grpc::ServerWriteReactor<v1::SampleStates>* CampaignsService::GetStates(
     Context* context, const v1::StatesRequest* request) {
-  return EnterStream<v1::SampleStates>(context, *request, [this, request](Door::Pass pass) {
+  return EnterStream<v1::SampleStates>(context, *request, [this, request](Entry entry) {
     auto pieces = std::make_shared<StatePieces>(
         request->campaign(),
         request->has_sample() ? std::optional<int>(request->sample()) : std::nullopt);
     return new StreamReactor<v1::SampleStates>(
-        core_, std::move(pass), &Core::Parse,
+        core_, std::move(entry.pass), &Core::Parse,
         [this, pieces]() -> absl::StatusOr<std::vector<v1::SampleStates>> {
           ASSIGN_OR_RETURN(auto reader, core_.Read());
           return pieces->Next(reader);
@@ -268,7 +275,8 @@ grpc::ServerUnaryReactor* CampaignsService::Submit(Context* context,
             auto latest = core_.Read();
             const store::RequestRecord record{.digest = ContentDigest(*request)};
             const auto before = latest.ok()
-                                    ? requests_.Begin(request->request_id(), record.digest, *latest)
+                                    ? requests_.Begin(RequestKey(caller, request->request_id()),
+                                                      record.digest, *latest)
                                     : absl::StatusOr<std::optional<std::string>>(latest.status());
             if (!before.ok() || before->has_value()) {
               if (before.ok()) {
@@ -281,9 +289,9 @@ grpc::ServerUnaryReactor* CampaignsService::Submit(Context* context,
             accepted.owner = caller.name;
             core_.scheduler().Submit(
                 std::move(accepted), {request->files().begin(), request->files().end()},
-                request->request_id(), record,
-                [this, reply, finish, caller,
-                 id = request->request_id()](const absl::StatusOr<std::string>& campaign) {
+                RequestKey(caller, request->request_id()), record,
+                [this, reply, finish, caller, id = RequestKey(caller, request->request_id())](
+                    const absl::StatusOr<std::string>& campaign) {
                   requests_.Done(id);
                   if (campaign.ok()) {
                     LogChange("submit", *campaign, caller);
@@ -312,14 +320,18 @@ void CampaignsService::Control(const std::string& verb, const Caller& caller,
     }
   }
   const std::string digest = absl::StrCat(verb, " ", request.campaign());
-  const auto before = requests_.Begin(request.request_id(), digest, *reader);
+  const std::string request_key = RequestKey(caller, request.request_id());
+  const auto before = requests_.Begin(request_key, digest, *reader);
   if (!before.ok() || before->has_value()) {
     done(before.ok() ? campaign : absl::StatusOr<std::int64_t>(before.status()));
     return;
   }
-  const auto finish = [this, verb, caller, id = request.request_id(), campaign,
+  const auto finish = [this, verb, caller, id = request_key, campaign,
                        done = std::move(done)](const absl::Status& status) {
     requests_.Done(id);
+    if (absl::IsPermissionDenied(status)) {
+      core_.door().LogRefusal(caller.peer, status);
+    }
     if (status.ok()) {
       LogChange(verb.c_str(), absl::StrCat("c", *campaign), caller);
     }
@@ -334,8 +346,8 @@ void CampaignsService::Control(const std::string& verb, const Caller& caller,
     return;
   }
   store::Store::Job remember;
-  if (!request.request_id().empty()) {
-    remember = [id = request.request_id(), digest](store::Transaction& transaction) {
+  if (!request_key.empty()) {
+    remember = [id = request_key, digest](store::Transaction& transaction) {
       transaction.PutRequest(id, {.digest = digest});
     };
   }
@@ -419,25 +431,30 @@ absl::StatusOr<NewFinding> CampaignsService::FindingToKeep(const v1::AddFindingR
 grpc::ServerUnaryReactor* CampaignsService::AddFinding(Context* context,
                                                        const v1::AddFindingRequest* request,
                                                        v1::Finding* reply) {
-  return Enter(
-      context, Right::kChange, *request,
-      [this, request, reply](Unary* reactor, const Caller& caller) {
-        core_.Post([this, request, reply, reactor, caller] {
-          const auto finding = FindingToKeep(*request, caller);
-          if (!finding.ok()) {
-            reactor->Finish(rpc::ToGrpc(finding.status()));
-            return;
-          }
-          reply->set_kind(finding->record.kind);
-          reply->set_digest(finding->record.digest);
-          reply->set_created_unix_ms(finding->record.created_unix_ms);
-          core_.WriteIfRoom(
-              [finding = *finding](store::Transaction& transaction) {
-                transaction.PutFinding(finding.campaign, finding.record);
-              },
-              [reactor](const absl::Status& status) { reactor->Finish(rpc::ToGrpc(status)); });
-        });
-      });
+  return Enter(context, Right::kChange, *request,
+               [this, request, reply](Unary* reactor, const Caller& caller) {
+                 core_.Post([this, request, reply, reactor, caller] {
+                   const auto finding = FindingToKeep(*request, caller);
+                   if (absl::IsPermissionDenied(finding.status())) {
+                     core_.door().LogRefusal(caller.peer, finding.status());
+                   }
+                   if (!finding.ok()) {
+                     reactor->Finish(rpc::ToGrpc(finding.status()));
+                     return;
+                   }
+                   reply->set_kind(finding->record.kind);
+                   reply->set_digest(finding->record.digest);
+                   reply->set_created_unix_ms(finding->record.created_unix_ms);
+                   core_.WriteIfRoom(
+                       [finding = *finding](store::Transaction& transaction) {
+                         transaction.PutFinding(finding.campaign, finding.record);
+                       },
+                       [reactor, caller, campaign = finding->campaign](const absl::Status& status) {
+                         if (status.ok()) LogChange("finding", absl::StrCat("c", campaign), caller);
+                         reactor->Finish(rpc::ToGrpc(status));
+                       });
+                 });
+               });
 }
 
 // ---- workers ----
@@ -464,8 +481,9 @@ grpc::ServerUnaryReactor* CampaignsService::DrainWorker(Context* context,
   return Enter(context, Right::kOperate, *request,
                [this, request, reply](Unary* reactor, const Caller& caller) {
                  core_.Post([this, request, reply, reactor, caller] {
-                   LogChange("drain", request->worker(), caller);
-                   Answer(reactor, core_.scheduler().Drain(request->worker()), reply);
+                   auto drained = core_.scheduler().Drain(request->worker());
+                   if (drained.ok()) LogChange("drain", request->worker(), caller);
+                   Answer(reactor, std::move(drained), reply);
                  });
                });
 }
@@ -487,11 +505,14 @@ grpc::ServerUnaryReactor* CampaignsService::Examine(Context* context,
         report.set_listen(site_.listen);
         if (!site_.tls.empty()) {
           const auto credentials = access::ReadCredentials(site_.tls);  // as it is by now
-          report.set_certificate(credentials.ok() ? credentials->holder.name
-                                                  : std::string(credentials.status().message()));
+          const absl::Status own = credentials.ok()
+                                       ? access::CheckOwn(*credentials, core_.UnixMs() / 1000)
+                                       : credentials.status();
+          report.set_certificate(credentials.ok() ? credentials->holder.name : "unknown");
           report.set_certificate_end_unix_s(
               credentials.ok() ? std::max<std::int64_t>(0, credentials->holder.not_after_unix_s)
                                : 0);
+          report.set_certificate_problem(std::string(own.message()));
         }
         *report.mutable_state_folder() = messages::ExamineFolder(site_.state_folder);
         auto reader = core_.Read();

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calib/v1/campaign.grpc.pb.h"
+#include "server/service/calls.h"
 #include "server/service/core.h"
 #include "server/service/guard.h"
 #include "server/service/requests.h"
@@ -58,11 +59,11 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   /// A call that goes on where it is let in (calls.h), and else ends there.
   Unary* Enter(Context* context, Right right, const google::protobuf::Message& request,
                const std::function<void(Unary*, const Caller&)>& go_on);
-  /// The same of a call that is answered with a stream, made by `go_on` from its pass.
+  /// The same of a call that is answered with a stream, made by `go_on` from its entry.
   template <typename Message>
   grpc::ServerWriteReactor<Message>* EnterStream(
       Context* context, const google::protobuf::Message& request,
-      const std::function<grpc::ServerWriteReactor<Message>*(Door::Pass)>& go_on);
+      const std::function<grpc::ServerWriteReactor<Message>*(Entry)>& go_on);
   /// Streams what `load` reads of a campaign.
   template <typename Message>
   grpc::ServerWriteReactor<Message>* Stream(

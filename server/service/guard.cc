@@ -145,6 +145,7 @@ absl::StatusOr<Caller> Guard::Admit(const grpc::ServerContextBase& context, Righ
         caller.name, " has the role ", access::NameOf(caller.role), ", whose holders may ",
         WhatTheyMay(caller.role), "; this needs the role ", RoleThatHas(right)));
   }
+  caller.peer = context.peer();
   return caller;
 }
 

@@ -25,6 +25,7 @@ struct Caller {
   std::string name{};
   access::Role role = access::Role::kViewer;
   std::string certificate{};  ///< PEM; empty: it came with a token or over a socket
+  std::string peer{};         ///< as gRPC names the connection
 
   friend bool operator==(const Caller&, const Caller&) = default;
 };

@@ -6,7 +6,7 @@
 namespace calib::service {
 namespace {
 
-constexpr std::size_t kLongestId = 128;
+constexpr std::size_t kLongestId = 128 + 65;  // the id and whose it is
 
 }  // namespace
 

@@ -16,7 +16,8 @@ class Requests {
  public:
   /// The stored answer if the request was carried out before; nothing if it is new, and then it is
   /// in progress until Done(). ALREADY_EXISTS: same id, other content. UNAVAILABLE: the first one
-  /// is still in progress (retry). INVALID_ARGUMENT: an id longer than 128 characters. An empty id
+  /// is still in progress (retry). INVALID_ARGUMENT: an id longer than 193 characters, whose it is
+  /// included. An empty id
   /// is always new.
   absl::StatusOr<std::optional<std::string>> Begin(const std::string& id, const std::string& digest,
                                                    store::Reader& reader);

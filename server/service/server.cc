@@ -84,7 +84,11 @@ absl::Status CheckReach(const ServerOptions& options) {
         ", and a server wants its own "
         "(`calibctl certs issue CA --role server NAME --host HOST -o DIR`)"));
   }
-  return absl::OkStatus();
+  const absl::Status own =
+      access::CheckOwn(*credentials, std::chrono::duration_cast<std::chrono::seconds>(
+                                         std::chrono::system_clock::now().time_since_epoch())
+                                         .count());
+  return own.ok() ? own : absl::InvalidArgumentError(own.message());
 }
 
 absl::Status StartLog(const std::string& file) {
@@ -116,7 +120,9 @@ struct Server::Impl {
   std::unique_ptr<Listener> listener;  // goes first: it hands connections to the acceptor
   std::string address;
 
-  absl::Status Listen(const std::string& listen, const std::string& tls, const Limits& limits) {
+  /// token: left for programs of this account before anybody is let in; empty: nobody needs one.
+  absl::Status Listen(const std::string& listen, const std::string& tls, const std::string& token,
+                      const Limits& limits) {
     const std::int64_t files = RaiseFileLimit();
     const std::int64_t most =
         std::max<std::int64_t>(1, std::min<std::int64_t>(limits.connections, files - kOtherFiles));
@@ -141,6 +147,11 @@ struct Server::Impl {
     grpc = builder.BuildAndStart();
     if (grpc == nullptr) {
       return absl::InternalError("gRPC does not start");
+    }
+    if (!token.empty() && listener->port() != 0) {
+      if (const auto left = folder->LeaveToken(token, listener->port()); !left.ok()) {
+        spdlog::warn("token_not_left reason=\"{}\"", std::string(left.message()));
+      }
     }
     listener->Start([this](int connection) {
       grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
@@ -199,12 +210,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(ServerOptions options) {
   std::promise<absl::Status> loaded;
   impl->core->Post([&] { loaded.set_value(impl->core->Start()); });
   RETURN_IF_ERROR(loaded.get_future().get());
-  RETURN_IF_ERROR(impl->Listen(options.listen, options.tls, options.limits));
-  if (options.tls.empty() && impl->listener->port() != 0) {
-    if (const auto left = impl->folder->LeaveToken(token, impl->listener->port()); !left.ok()) {
-      spdlog::warn("token_not_left reason=\"{}\"", std::string(left.message()));
-    }
-  }
+  RETURN_IF_ERROR(
+      impl->Listen(options.listen, options.tls, options.tls.empty() ? token : "", options.limits));
   // From here on peers may be connected, which only a shutdown parts with in time.
   std::unique_ptr<Server> server(new Server(std::move(impl)));
   RETURN_IF_ERROR(server->impl_->folder->Announce(server->impl_->address, options.stays));

@@ -16,8 +16,8 @@ constexpr std::chrono::milliseconds kPeriod{500};
 /// Goes round: look on the strand, read on the pool, write, wait. Deletes itself.
 class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
  public:
-  Watcher(Core& core, Door::Pass pass, const std::string& campaign)
-      : core_(core), pass_(std::move(pass)), timer_(core.strand()) {
+  Watcher(Core& core, Entry entry, const std::string& campaign)
+      : core_(core), entry_(std::move(entry)), timer_(core.strand()) {
     const auto id = ParseCampaign(campaign);
     if (!id.ok()) {
       Finish(rpc::ToGrpc(id.status()));
@@ -55,7 +55,8 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
   void Wait() {
     timer_.expires_after(kPeriod);
     timer_.async_wait([this](const boost::system::error_code& /*error*/) {
-      if (!cancelled_ && core_.health().ok() && core_.version() == seen_) {
+      if (!cancelled_ && core_.health().ok() && core_.version() == seen_ &&
+          core_.guard().Recheck(entry_.caller).ok()) {
         Wait();
       } else {
         Look();
@@ -70,6 +71,10 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
     }
     if (!core_.health().ok()) {
       Finish(rpc::ToGrpc(core_.health()));
+      return;
+    }
+    if (const absl::Status welcome = core_.guard().Recheck(entry_.caller); !welcome.ok()) {
+      Finish(rpc::ToGrpc(welcome));
       return;
     }
     seen_ = core_.version();
@@ -87,7 +92,7 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
   }
 
   Core& core_;
-  const Door::Pass pass_;
+  const Entry entry_;
   boost::asio::steady_timer timer_;  // the strand's, like everything below but status_
   std::int64_t campaign_ = 0;
   std::uint64_t seen_ = 0;
@@ -97,9 +102,9 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core, Door::Pass pass,
+grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core, Entry entry,
                                                             const std::string& campaign) {
-  return new Watcher(core, std::move(pass), campaign);
+  return new Watcher(core, std::move(entry), campaign);
 }
 
 }  // namespace calib::service

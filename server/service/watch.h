@@ -6,13 +6,14 @@
 #include <string>
 
 #include "calib/v1/campaign.pb.h"
+#include "server/service/calls.h"
 #include "server/service/core.h"
 
 namespace calib::service {
 
 /// One status at once, then one whenever something changed, at most two a second, until the
 /// campaign is over.
-grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core, Door::Pass pass,
+grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core, Entry entry,
                                                             const std::string& campaign);
 
 }  // namespace calib::service

@@ -96,6 +96,10 @@ class Store::Writer {
     if (!absl::IsResourceExhausted(status)) {
       return status;
     }
+    AnswerThoseThatDoNotWait(group);
+    if (group.empty()) {
+      return absl::OkStatus();
+    }
     Tell(status);
     while (absl::IsResourceExhausted(status)) {
       {
@@ -124,6 +128,17 @@ class Store::Writer {
       }
     }
     return any;
+  }
+
+  /// They hear of it now, not when what waits with them is on disk.
+  static void AnswerThoseThatDoNotWait(std::vector<Entry>& group) {
+    std::erase_if(group, [](Entry& entry) {
+      if (!absl::IsResourceExhausted(entry.refused)) {
+        return false;
+      }
+      entry.done(entry.refused);
+      return true;
+    });
   }
 
   void Tell(const absl::Status& room) {

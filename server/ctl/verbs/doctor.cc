@@ -125,8 +125,11 @@ absl::Status ExamineServer(client::Session& session, bool is_own, std::vector<Ch
 absl::StatusOr<int> Doctor(const CommonOptions& common) {
   std::vector<Check> checks;
   ExamineNode(checks);
-  if (!common.server.tls.empty()) {
-    const auto credentials = access::ReadCredentials(common.server.tls);
+  const char* const variable = std::getenv("CALIB_TLS");
+  const std::string tls =
+      !common.server.tls.empty() || variable == nullptr ? common.server.tls : variable;
+  if (!tls.empty()) {
+    const auto credentials = access::ReadCredentials(tls);
     checks.push_back(JudgeCertificate(credentials.ok()
                                           ? absl::StatusOr<access::Holder>(credentials->holder)
                                           : credentials.status(),

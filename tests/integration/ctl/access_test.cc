@@ -169,6 +169,11 @@ TEST_F(Access, PlainTextAndCertificatesTellEachOtherApart) {
   const auto secure = Serve("secure", {"--tls", At("head")});
   EXPECT_THAT(Refused("list", ""), HasSubstr("does not answer as calibd does in plain text"));
   EXPECT_THAT(Refused("list", "--token secure/token"), HasSubstr("in plain text"));
+  Process worker({Program("calib-worker"), "--server", address_, "--slots", "1"}, At("worker.err"));
+  EXPECT_TRUE(Eventually(kPatience, [&] {
+    return Read("worker.err").find("does not answer as calibd does in plain text") !=
+           std::string::npos;
+  })) << Read("worker.err");
   const Answer nobody = Call("list --server 127.0.0.1:9 --tls viewer");
   EXPECT_EQ(nobody.code, 3) << nobody.err;
 }
@@ -408,6 +413,20 @@ TEST_F(Access, TokenIsShownToItsServerOnlyAndNotRepeated) {
     EXPECT_TRUE(Eventually(kPatience, [&] { return !rpc::IsOwnPort(port); })) << Read("other.err");
     EXPECT_THAT(Refused("list", ""), HasSubstr("no token was shown"));
   }
+}
+
+TEST_F(Access, WorkerThatWasThereFirstFindsTheTokenThatIsLeftLater) {
+  auto server = Serve("state", {});
+  server->Signal(SIGTERM);
+  EXPECT_EQ(server->Wait(kPatience), 0);
+  server.reset();
+  Process worker({Program("calib-worker"), "--server", address_, "--slots", "1"}, At("worker.err"));
+  EXPECT_TRUE(Eventually(
+      kPatience, [&] { return Read("worker.err").find("disconnected") != std::string::npos; }));
+  std::filesystem::remove_all(work_ / "state");
+  server = Serve("state", {"--listen", address_});
+  EXPECT_TRUE(Eventually(kPatience, [&] { return Ask("workers --json", "").json().size() == 1; }))
+      << Read("worker.err");
 }
 
 TEST_F(Access, FoldersAndSocketsOfOthersAreLeftAlone) {

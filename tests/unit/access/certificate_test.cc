@@ -141,6 +141,20 @@ TEST_F(CredentialsFolder, ReadersDuringRenewalsMeetWholePairs) {
   EXPECT_GT(seen, 1) << "no renewal came between two readings";
 }
 
+TEST_F(CredentialsFolder, OwnCertificateIsShownWhileItIsValidAndNotRevoked) {
+  const Holder holder = Given("head", Role::kServer);
+  auto credentials = ReadCredentials(At("head"));
+  ASSERT_TRUE(credentials.ok()) << credentials.status();
+  EXPECT_TRUE(CheckOwn(*credentials, Now()).ok());
+  EXPECT_THAT(std::string(CheckOwn(*credentials, holder.not_after_unix_s + 1).message()),
+              ::testing::HasSubstr("the certificate of head has expired on "));
+  EXPECT_FALSE(CheckOwn(*credentials, holder.not_before_unix_s - 1).ok());
+  ASSERT_TRUE(Revoke(ca(), "head").ok());
+  credentials->crl_pem = ReadText(At("ca/crl.pem"));
+  EXPECT_EQ(CheckOwn(*credentials, Now()).message().substr(0, 35),
+            "the certificate of head was revoked");
+}
+
 TEST(DateOf, IsTheDayInUtc) {
   EXPECT_EQ(DateOf(1793577599), "2026-11-01");
   EXPECT_EQ(DateOf(1793577600), "2026-11-02");

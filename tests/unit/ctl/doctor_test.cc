@@ -152,6 +152,8 @@ TEST(Doctor, CertificateOfTheServerIsJudgedByItsEnd) {
   EXPECT_EQ(JudgeConnection("node1:7443", server, 900 * kDay).health, Health::kOk);
   EXPECT_EQ(JudgeConnection("node1:7443", server, 990 * kDay).health, Health::kWarning);
   EXPECT_EQ(JudgeConnection("node1:7443", server, 1001 * kDay).health, Health::kProblem);
+  server.set_certificate_problem("the certificate of head was revoked");
+  EXPECT_EQ(JudgeConnection("node1:7443", server, 900 * kDay).health, Health::kProblem);
 }
 
 TEST(Doctor, WorkersThatWereTurnedAwayAreNamed) {

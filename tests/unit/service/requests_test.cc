@@ -27,7 +27,7 @@ TEST(Requests, FirstAnswerIsGivenAgainAndOtherContentRefused) {
   requests.Done("r");
   EXPECT_EQ(**begin("r", "content"), "c1");
   EXPECT_EQ(begin("r", "other").status().code(), absl::StatusCode::kAlreadyExists);
-  EXPECT_EQ(begin(std::string(129, 'x'), "content").status().code(),
+  EXPECT_EQ(begin(std::string(194, 'x'), "content").status().code(),
             absl::StatusCode::kInvalidArgument);
   EXPECT_FALSE(begin("", "content")->has_value());
   EXPECT_FALSE(begin("", "content")->has_value()) << "without an id every request is new";

@@ -92,6 +92,35 @@ TEST_F(FullDisk, NothingIsAcknowledgedUntilThereIsRoomAndTheOrderIsKept) {
   EXPECT_EQ(heard_, (std::vector{absl::StatusCode::kResourceExhausted, absl::StatusCode::kOk}));
 }
 
+TEST_F(FullDisk, AWriteThatDoesNotWaitHearsOfItWhileTheOthersOfItsGroupWait) {
+  absl::Notification begun;
+  absl::Notification go;
+  absl::Notification written;
+  absl::Notification refused;
+  store_->Write(
+      [&begun, &go](Transaction&) {
+        begun.Notify();
+        go.WaitForNotification();
+      },
+      [this](const absl::Status&) { full_ = true; });
+  begun.WaitForNotification();
+  store_->Write(Says("one"), [&written](const absl::Status& status) {
+    EXPECT_TRUE(status.ok()) << status;
+    written.Notify();
+  });
+  store_->WriteIfRoom([](Transaction& t) { t.PutBlob("large", "content"); },
+                      [&refused](const absl::Status& status) {
+                        EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+                        refused.Notify();
+                      });
+  go.Notify();
+  refused.WaitForNotification();
+  EXPECT_FALSE(written.HasBeenNotified());
+  full_ = false;
+  written.WaitForNotification();
+  EXPECT_EQ(Events(), std::vector<std::string>{"one"});
+}
+
 TEST_F(FullDisk, AWriteThatDoesNotWaitIsRefusedAndTheOthersOfItsGroupAreWritten) {
   // They wait for the first, which is held up, and go into one commit, whose first try finds it
   // full.
