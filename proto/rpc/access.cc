@@ -77,7 +77,6 @@ absl::StatusOr<std::string> ReadToken(const std::string& path) {
 }
 
 bool IsOwnPort(int port) {
-  bool any = false;
   for (const char* table : {"/proc/net/tcp", "/proc/net/tcp6"}) {
     std::ifstream file(table);
     std::string line;
@@ -98,10 +97,9 @@ bool IsOwnPort(int port) {
       if (account != static_cast<std::int64_t>(geteuid())) {
         return false;
       }
-      any = true;
     }
   }
-  return any;
+  return true;
 }
 
 std::vector<std::string> TokenFolders() {

@@ -33,8 +33,8 @@ struct Access {
 /// file that is named and cannot be read or holds no token, a folder that is none.
 absl::StatusOr<Access> FindAccess(const std::string& address, const AccessChoice& choice);
 
-/// Whether something listens at a TCP port of this machine, and nothing there belongs to another
-/// account: not what has taken the port of a server that ended.
+/// Whether nothing that listens at a TCP port of this machine belongs to another account, as what
+/// has taken the port of a server that ended. Where nothing listens nobody reads what is shown.
 bool IsOwnPort(int port);
 
 /// Whether a text is a token: 64 hexadecimal digits.
