@@ -52,7 +52,8 @@ class SmallDisk {
  public:
   explicit SmallDisk(std::string folder, int mebibytes) : folder_(std::move(folder)) {
     std::filesystem::create_directories(folder_);
-    const std::string size = "size=" + std::to_string(mebibytes) + "m,mode=0700";  // a state folder is its account's
+    const std::string size =
+        "size=" + std::to_string(mebibytes) + "m,mode=0700";  // a state folder is its account's
     mounted_ = mount("tmpfs", folder_.c_str(), "tmpfs", 0, size.c_str()) == 0;
   }
   ~SmallDisk() {
