@@ -17,6 +17,7 @@
 #include "proto/rpc/check_message.h"
 #include "proto/rpc/chunking.h"
 #include "proto/rpc/client_options.h"
+#include "proto/rpc/shown_access.h"
 #include "proto/rpc/status.h"
 
 namespace calib::worker {
@@ -129,8 +130,8 @@ struct ServerLink::Impl {
   absl::StatusOr<std::shared_ptr<v1::WorkerLink::Stub>> Connection()
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex) {
     if (stub == nullptr) {
-      ASSIGN_OR_RETURN(shown, rpc::FindAccess(address, choice));
-      stub = v1::WorkerLink::NewStub(rpc::OpenChannel(address, shown));
+      ASSIGN_OR_RETURN(shown, rpc::FindShownAccess(address, choice));
+      stub = v1::WorkerLink::NewStub(rpc::OpenChannel(address, shown.access));
     }
     return stub;
   }
@@ -140,7 +141,7 @@ struct ServerLink::Impl {
   absl::Mutex mutex;
   /// With its channel, which must not go on a thread of gRPC's.
   std::shared_ptr<v1::WorkerLink::Stub> stub ABSL_GUARDED_BY(mutex);
-  rpc::Access shown ABSL_GUARDED_BY(mutex);            // over this connection
+  rpc::ShownAccess shown ABSL_GUARDED_BY(mutex);       // over this connection
   bool was_not_let_in ABSL_GUARDED_BY(mutex) = false;  // over this connection
   std::unique_ptr<Stream> stream ABSL_GUARDED_BY(mutex);
   const LinkEvents events;
@@ -190,9 +191,9 @@ void ServerLink::FinishSending() {
 }
 
 bool ServerLink::HasMoreToShow() {
-  const auto access = rpc::FindAccess(impl_->address, impl_->choice);
+  const auto now = rpc::FindShownAccess(impl_->address, impl_->choice);
   absl::MutexLock lock(&impl_->mutex);
-  return access.ok() && !(*access == impl_->shown);
+  return now.ok() && *now != impl_->shown;
 }
 
 absl::StatusOr<std::string> ServerLink::GetBlob(const std::string& digest, std::stop_token stop) {

@@ -40,7 +40,7 @@ class ServerLink {
   void FinishSending();
 
   /// Whether there is something to show, by now, that the last connection did not: a token that a
-  /// server has left since.
+  /// server has left since, a certificate that was renewed.
   bool HasMoreToShow();
 
   /// Content by digest: waits, with retries while the server is away, until it is there or `stop`.

@@ -126,7 +126,9 @@ class Worker::Impl {
     const auto wait = backoff_.Next();
     spdlog::warn("disconnected server={} reason=\"{}\" retry_ms={}", options_.server,
                  std::string(status.message()), wait.count());
-    LookWhy();
+    if (absl::IsUnavailable(status)) {
+      LookWhy();
+    }
     reconnect_.expires_after(wait);
     reconnect_.async_wait([this](const boost::system::error_code& error) {
       if (!error && !stopping_) {
@@ -136,18 +138,25 @@ class Worker::Impl {
   }
 
   /// Says in the log, once an outage, what is wrong with a server that is there and cannot be
-  /// talked to: that it speaks otherwise, or is not to be trusted.
+  /// talked to: that it speaks otherwise, or is not to be trusted. One that is only away may be
+  /// such when it comes.
   void LookWhy() {
-    if (std::exchange(looked_why_, true)) {
+    if (said_why_ || std::exchange(looks_why_, true)) {
       return;
     }
-    looking_why_ = std::jthread([server = options_.server, choice = options_.access] {
-      const auto access = rpc::FindAccess(server, choice);
+    looking_why_ = std::jthread([this] {
+      const auto access = rpc::FindAccess(options_.server, options_.access);
       const absl::Status why =
-          access.ok() ? rpc::WhyNotConnected(server, *access) : access.status();
-      if (!absl::IsUnavailable(why)) {
-        spdlog::error("no_connection server={} reason=\"{}\"", server, std::string(why.message()));
-      }
+          access.ok() ? rpc::WhyNotConnected(options_.server, *access) : access.status();
+      asio::post(io_, [this, why] {
+        looks_why_ = false;
+        if (welcome_ || stopping_ || why.ok() || absl::IsUnavailable(why)) {
+          return;
+        }
+        said_why_ = true;
+        spdlog::error("no_connection server={} reason=\"{}\"", options_.server,
+                      std::string(why.message()));
+      });
     });
   }
 
@@ -210,7 +219,7 @@ class Worker::Impl {
   void Welcome(const v1::Welcome& welcome) {
     spdlog::info("connected server={} held={}", options_.server, held_.size());
     welcome_ = true;
-    looked_why_ = false;
+    said_why_ = false;
     backoff_.Reset();
     heartbeat_every_ = std::chrono::milliseconds(std::max(1, welcome.heartbeat_ms()));
     for (auto& [id, attempt] : held_) {
@@ -410,15 +419,16 @@ class Worker::Impl {
   bool leaving_ = false;   // everything is sent, the stream is being closed
   bool stopping_ = false;  // a signal was caught
   bool said_refusal_ = false;
+  bool looks_why_ = false;  // another thread does
+  bool said_why_ = false;   // in this outage
   absl::Status result_;
   // Destroyed from the last to the first: simulations end before what they use.
   ServerLink link_;
-  bool looked_why_ = false;
-  std::jthread looking_why_;
   Specimens specimens_;
   std::optional<Checkpoints> checkpoints_;
   std::map<std::int64_t, HeldAttempt> ending_;  // dropped, thread on its way out
   std::map<std::int64_t, HeldAttempt> held_;
+  std::jthread looking_why_;  // joined first
 };
 
 Worker::Worker(WorkerOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}

@@ -15,6 +15,8 @@ struct AccessChoice {
   std::string token{};  ///< file that holds a token [$CALIB_TOKEN, which may be the token itself]
   /// The token is of a server of this account, and shown to no listener of another.
   bool is_own = false;
+
+  friend bool operator==(const AccessChoice&, const AccessChoice&) = default;
 };
 
 struct Access {

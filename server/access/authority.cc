@@ -249,24 +249,13 @@ struct Pair {
 /// is whole: ReadCredentials knows where the key then is.
 absl::Status WriteCredentials(const std::string& out, const Authority& authority,
                               const Pair& pair) {
+  ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::TakeItself(out));
   RETURN_IF_ERROR(ReplaceFile(out + "/ca.pem", authority.ca_pem, kPublicFile));
   RETURN_IF_ERROR(ReplaceFile(out + "/crl.pem", authority.crl_pem, kPublicFile));
   RETURN_IF_ERROR(WriteDraft(out + "/key.pem", pair.key_pem, kSecretFile));
   RETURN_IF_ERROR(WriteDraft(out + "/cert.pem", pair.cert_pem, kPublicFile));
   RETURN_IF_ERROR(SyncFolder(out));
   RETURN_IF_ERROR(PutDraft(out + "/cert.pem"));
-  RETURN_IF_ERROR(PutDraft(out + "/key.pem"));
-  return SyncFolder(out);
-}
-
-/// A renewal that was killed between its renames is finished before its drafts are written over.
-absl::Status FinishRenewal(const std::string& out) {
-  const auto cert_pem = ReadFile(out + "/cert.pem");
-  const auto key_pem = ReadSecret(DraftOf(out + "/key.pem"));
-  if (!cert_pem.ok() || !key_pem.ok()) return absl::OkStatus();
-  const X509Ptr certificate = ParseCertificate(*cert_pem);
-  const KeyPtr key = ParseKey(*key_pem);
-  if (!certificate || !key || !IsKeyOf(key.get(), certificate.get())) return absl::OkStatus();
   RETURN_IF_ERROR(PutDraft(out + "/key.pem"));
   return SyncFolder(out);
 }
@@ -350,7 +339,7 @@ absl::StatusOr<Holder> Issue(const std::string& authority_folder, const Request&
   ASSIGN_OR_RETURN(pair.cert_pem, PemOf(certificate.get()));
   ASSIGN_OR_RETURN(pair.key_pem, PemOf(key.get()));
   RETURN_IF_ERROR(MakeOwnFolder(out));
-  RETURN_IF_ERROR(FinishRenewal(out));
+  RETURN_IF_ERROR(FinishRenewal(out));  // before its drafts are written over
   // The ledger comes first: what is not in it could not be revoked.
   it.ledger.push_back({.serial = holder.serial,
                        .name = holder.name,

@@ -1,5 +1,7 @@
 #include "server/access/certificate.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -104,7 +106,7 @@ absl::Status CheckOwn(const Credentials& credentials, std::int64_t now_unix_s) {
     return refuse(absl::StrCat(" is not valid before ", DateOf(holder.not_before_unix_s),
                                ": look at this machine's clock"));
   }
-  if (now_unix_s > holder.not_after_unix_s) {
+  if (now_unix_s >= holder.not_after_unix_s) {
     return refuse(absl::StrCat(" has expired on ", DateOf(holder.not_after_unix_s), again));
   }
   const CrlPtr revocations = ParseRevocations(credentials.crl_pem);
@@ -117,6 +119,19 @@ absl::Status CheckOwn(const Credentials& credentials, std::int64_t now_unix_s) {
     }
   }
   return absl::OkStatus();
+}
+
+absl::Status FinishRenewal(const std::string& folder) {
+  if (::access(DraftOf(folder + "/key.pem").c_str(), F_OK) != 0) return absl::OkStatus();
+  ASSIGN_OR_RETURN(const FolderLock lock, FolderLock::TakeItself(folder));
+  const auto cert_pem = ReadFile(folder + "/cert.pem");
+  const auto key_pem = ReadSecret(DraftOf(folder + "/key.pem"));
+  if (!cert_pem.ok() || !key_pem.ok()) return absl::OkStatus();
+  const X509Ptr certificate = ParseCertificate(*cert_pem);
+  const KeyPtr key = ParseKey(*key_pem);
+  if (!certificate || !key || !IsKeyOf(key.get(), certificate.get())) return absl::OkStatus();
+  RETURN_IF_ERROR(PutDraft(folder + "/key.pem"));
+  return SyncFolder(folder);
 }
 
 }  // namespace calib::access

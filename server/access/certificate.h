@@ -42,6 +42,12 @@ absl::StatusOr<Credentials> ReadCredentials(const std::string& folder);
 /// FAILED_PRECONDITION, a sentence: it has expired, is not valid yet, or stands in its own crl.pem.
 absl::Status CheckOwn(const Credentials& credentials, std::int64_t now_unix_s);
 
+/// Finishes a renewal of `folder` that was killed after its certificate and before its key was put
+/// in place, which gRPC could not use; OK, and nothing done, where there is none. A renewal that
+/// goes on is waited for. Errors: PERMISSION_DENIED or RESOURCE_EXHAUSTED, the folder cannot be
+/// written.
+absl::Status FinishRenewal(const std::string& folder);
+
 /// Judges certificates of peers that ask, against the authority and the revocations of a folder.
 /// Thread-safe.
 class Verifier {

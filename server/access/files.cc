@@ -1,6 +1,7 @@
 #include "server/access/files.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -80,6 +81,22 @@ absl::StatusOr<std::string> ReadAllOf(const std::string& path, bool secret) {
   }
 }
 
+/// Calls `take` until it gives 0, or says that it never will.
+template <typename Take>
+absl::Status WaitForLock(const std::string& folder, const std::string& path, const Take& take) {
+  const absl::Time end = absl::Now() + kLongestWait;
+  for (;;) {
+    if (take() == 0) return absl::OkStatus();
+    if (errno != EAGAIN && errno != EACCES && errno != EINTR) return CannotWrite(path, errno);
+    if (absl::Now() > end) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("another process has been working on ", folder, " for ",
+                       absl::FormatDuration(kLongestWait), ": try again when it has ended"));
+    }
+    absl::SleepFor(kLockPause);
+  }
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> ReadFile(const std::string& path) { return ReadAllOf(path, false); }
@@ -147,20 +164,21 @@ absl::StatusOr<FolderLock> FolderLock::Take(const std::string& folder) {
   const int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kSecretFile);
   if (file < 0) return CannotWrite(path, errno);
   FolderLock lock(file);
-  const absl::Time end = absl::Now() + kLongestWait;
-  for (;;) {
+  RETURN_IF_ERROR(WaitForLock(folder, path, [file] {
     struct flock exclusive = {};
     exclusive.l_type = F_WRLCK;
     exclusive.l_whence = SEEK_SET;
-    if (fcntl(file, F_OFD_SETLK, &exclusive) == 0) return lock;
-    if (errno != EAGAIN && errno != EACCES && errno != EINTR) return CannotWrite(path, errno);
-    if (absl::Now() > end) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat("another process has been working on ", folder, " for ",
-                       absl::FormatDuration(kLongestWait), ": try again when it has ended"));
-    }
-    absl::SleepFor(kLockPause);
-  }
+    return fcntl(file, F_OFD_SETLK, &exclusive);
+  }));
+  return lock;
+}
+
+absl::StatusOr<FolderLock> FolderLock::TakeItself(const std::string& folder) {
+  const int file = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (file < 0) return CannotRead(folder, errno);
+  FolderLock lock(file);
+  RETURN_IF_ERROR(WaitForLock(folder, folder, [file] { return flock(file, LOCK_EX | LOCK_NB); }));
+  return lock;
 }
 
 FolderLock::FolderLock(FolderLock&& other) noexcept : file_(std::exchange(other.file_, -1)) {}

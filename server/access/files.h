@@ -37,11 +37,13 @@ absl::Status CheckIsOwn(const std::string& folder);
 /// there keeps its mode, which CheckIsOwn judges.
 absl::Status MakeOwnFolder(const std::string& folder);
 
-/// The file `lock` of a folder, locked for this object: threads and processes exclude each other.
+/// A folder, locked for this object: threads and processes exclude each other.
 class FolderLock {
  public:
-  /// Waits up to 30 s; then RESOURCE_EXHAUSTED.
+  /// By its file `lock`. Waits up to 30 s; then RESOURCE_EXHAUSTED.
   static absl::StatusOr<FolderLock> Take(const std::string& folder);
+  /// The same without a file: of a folder that is copied elsewhere.
+  static absl::StatusOr<FolderLock> TakeItself(const std::string& folder);
   FolderLock(FolderLock&& other) noexcept;
   FolderLock& operator=(FolderLock&&) = delete;
   ~FolderLock();

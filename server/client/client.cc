@@ -16,6 +16,7 @@
 #include "proto/rpc/client_options.h"
 #include "proto/rpc/digest.h"
 #include "proto/rpc/random_id.h"
+#include "proto/rpc/shown_access.h"
 #include "proto/rpc/status.h"
 #include "server/client/interrupt.h"
 
@@ -38,15 +39,16 @@ using Stub = v1::Campaigns::Stub;
 struct Connection {
   std::string address;
   rpc::AccessChoice choice;
-  rpc::Access access;
+  rpc::ShownAccess shown;
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<Stub> stub;
   Client::FindServer find_server;
 
-  absl::Status Open(const std::string& where) {
-    ASSIGN_OR_RETURN(access, rpc::FindAccess(where, choice));
-    address = where;
-    channel = rpc::OpenChannel(address, access);
+  absl::Status Open(const Client::Place& where) {
+    ASSIGN_OR_RETURN(shown, rpc::FindShownAccess(where.address, where.access));
+    address = where.address;
+    choice = where.access;
+    channel = rpc::OpenChannel(address, shown.access);
     stub = v1::Campaigns::NewStub(channel);
     return absl::OkStatus();
   }
@@ -58,13 +60,21 @@ struct Connection {
       std::this_thread::sleep_for(kLull);
       if (Interrupted()) return false;
       if (find_server) {
-        const std::string found = find_server();
-        if (found.empty()) return false;
-        if (found != address && !Open(found).ok()) return false;
+        const Client::Place found = find_server();
+        if (found.address.empty()) return false;
+        const bool is_here = found.address == address && found.access == choice;
+        if (!is_here && !Open(found).ok()) return false;
       }
       if (channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) return true;
     } while (std::chrono::system_clock::now() < end);
     return false;
+  }
+
+  /// After what was shown was refused: true if something else can be shown by now, over a new
+  /// connection.
+  bool ShowAnother() {
+    const auto now = rpc::FindShownAccess(address, choice);
+    return now.ok() && *now != shown && Open({.address = address, .access = choice}).ok();
   }
 };
 
@@ -98,6 +108,9 @@ absl::Status Insist(Connection& connection, std::optional<std::chrono::milliseco
       case grpc::StatusCode::CANCELLED:  // by a server that ends
       case grpc::StatusCode::UNAVAILABLE:
         if (++lost > kLostConnections || !connection.Return()) return NoAnswer(status);
+        break;
+      case grpc::StatusCode::UNAUTHENTICATED:
+        if (!connection.ShowAnother()) return rpc::FromGrpc(status);
         break;
       default:
         return rpc::FromGrpc(status);
@@ -177,16 +190,16 @@ absl::StatusOr<std::unique_ptr<Client>> Client::Connect(const std::string& addre
     return absl::InvalidArgumentError(problem);  // of $CALIB_SERVER: options are checked before
   }
   auto impl = std::make_unique<Impl>();
-  impl->connection.choice = access;
-  RETURN_IF_ERROR(impl->connection.Open(address));
+  RETURN_IF_ERROR(impl->connection.Open({.address = address, .access = access}));
   if (!impl->connection.channel->WaitForConnected(std::chrono::system_clock::now() + kConnect)) {
-    const absl::Status why = rpc::WhyNotConnected(address, impl->connection.access);
-    return !absl::IsUnavailable(why)
-               ? why
-               : absl::UnavailableError(
-                     absl::StrCat(why.message(),
-                                  "; start one with `calibd --state DIR`, name another with "
-                                  "--server HOST:PORT, or work on a folder with --state DIR"));
+    const absl::Status why = rpc::WhyNotConnected(address, impl->connection.shown.access);
+    if (absl::IsUnavailable(why)) {
+      return absl::UnavailableError(
+          absl::StrCat(why.message(),
+                       "; start one with `calibd --state DIR`, name another with "
+                       "--server HOST:PORT, or work on a folder with --state DIR"));
+    }
+    RETURN_IF_ERROR(why);  // OK: it has come meanwhile
   }
   return std::unique_ptr<Client>(new Client(std::move(impl)));
 }

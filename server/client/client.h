@@ -21,12 +21,17 @@ class Client {
  public:
   /// UNAVAILABLE when nothing answers at the address within about two seconds;
   /// FAILED_PRECONDITION or PERMISSION_DENIED when what answers there cannot be talked to
-  /// (rpc::WhyNotConnected). access: what is shown there, and at every address found later.
+  /// (rpc::WhyNotConnected). access: what is shown there. Where that has changed when the
+  /// server refuses it, as a certificate that was renewed, the call is made once more.
   static absl::StatusOr<std::unique_ptr<Client>> Connect(const std::string& address,
                                                          const rpc::AccessChoice& access = {});
-  /// How to find the server again when the connection is lost: its address, or "" when that is
-  /// hopeless. Without it the same address is tried.
-  using FindServer = std::function<std::string()>;
+  /// Where a server is, and what is shown there.
+  struct Place {
+    std::string address{};  ///< empty: it is hopeless to look for one
+    rpc::AccessChoice access{};
+  };
+  /// How to find the server again when the connection is lost. Without it the same is tried.
+  using FindServer = std::function<Place()>;
   void OnLoss(FindServer find_server);
   ~Client();
   Client(const Client&) = delete;

@@ -91,6 +91,11 @@ rpc::AccessChoice Session::AccessAt(const std::string& address) const {
   return access;
 }
 
+bool Session::shows_certificate() const {
+  const auto access = rpc::FindAccess(address_, AccessAt(address_));
+  return access.ok() && !access->tls.empty();
+}
+
 absl::StatusOr<std::string> Session::ServeOrFind() {
   constexpr int kTries = 5;
   service::ServerOptions options;
@@ -130,7 +135,10 @@ absl::Status Session::ServeOrJoin() {
   }
   host_stays_ = is_guest() && service::IsServedForGood(state_);
   if (client_ != nullptr) {
-    client_->OnLoss([this] { return TakeOverOrFind(); });
+    client_->OnLoss([this] {
+      const std::string address = TakeOverOrFind();
+      return Client::Place{.address = address, .access = AccessAt(address)};
+    });
   }
   return last;
 }

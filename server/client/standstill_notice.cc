@@ -47,6 +47,7 @@ void StandstillNotice::Look(const v1::CampaignStatus& status) {
   said_ = true;
   std::cerr << "\nno worker is connected to " << session_.address() << ", so nothing runs: start `"
             << "calib-worker --server " << session_.address()
+            << (session_.shows_certificate() ? " --tls DIR" : "")
             << "`, or stop this and give --state DIR --workers N (nothing is lost)\n";
 }
 
@@ -55,7 +56,8 @@ void StandstillNotice::LookAtServer(const v1::CampaignStatus& status) {
   if (waits == said_of_server_) return;
   said_of_server_ = waits;
   std::cerr << "\n"
-            << (waits ? status.server_waits() : "there is room on the disk, and the server goes on")
+            << (waits ? status.server_waits()
+                      : "the disk takes what is written again, and the server goes on")
             << "\n";
 }
 

@@ -211,8 +211,9 @@ std::optional<Check> JudgeWaiting(const v1::ServerReport& server) {
                .health = Health::kProblem,
                .found = absl::StrCat("It waits: ", server.waits(), "."),
                .advice =
-                   "Free some space on that disk, or make it larger; nothing that was acknowledged "
-                   "is lost, and the server need not be started again."};
+                   "Free some space on that disk, make it larger or let it be written to again; "
+                   "nothing that was acknowledged is lost, and the server need not be started "
+                   "again."};
 }
 
 Check JudgeConnection(const std::string& address, const v1::ServerReport& server,
@@ -255,7 +256,9 @@ Check JudgeCertificate(const absl::StatusOr<access::Holder>& holder, std::int64_
   if (!holder.ok()) {
     check.health = Health::kProblem;
     check.found = absl::StrCat(std::string(holder.status().message()), ".");
-    check.advice = "Give --tls a whole folder of `calibctl certs issue`.";
+    check.advice = absl::IsFailedPrecondition(holder.status())
+                       ? "Those it is shown to refuse it."
+                       : "Give --tls a whole folder of `calibctl certs issue`.";
     return check;
   }
   const std::string role = access::NameOf(holder->role);

@@ -54,7 +54,7 @@ std::optional<Check> JudgeWaiting(const v1::ServerReport& server);
 Check JudgeConnection(const std::string& address, const v1::ServerReport& server,
                       std::int64_t now_unix_s);
 /// A node's own certificate, which is warned of from 30 days before its end. holder: as read from
-/// its folder, or why it could not be.
+/// its folder, or why it could not be; FAILED_PRECONDITION: why it is refused (access::CheckOwn).
 Check JudgeCertificate(const absl::StatusOr<access::Holder>& holder, std::int64_t now_unix_s);
 /// One check for each worker that is silent or was turned away, or one that all is well.
 std::vector<Check> JudgeWorkers(const std::vector<v1::WorkerInfo>& workers,

@@ -15,13 +15,8 @@ namespace {
 
 class BlobReceiver final : public grpc::ServerReadReactor<v1::BlobChunk> {
  public:
-  BlobReceiver(Core& core, std::string peer, Door::Pass pass, std::unique_ptr<Spool> spool,
-               v1::BlobReceipt* receipt)
-      : core_(core),
-        peer_(std::move(peer)),
-        pass_(std::move(pass)),
-        spool_(std::move(spool)),
-        receipt_(receipt) {
+  BlobReceiver(Core& core, Entry entry, std::unique_ptr<Spool> spool, v1::BlobReceipt* receipt)
+      : core_(core), entry_(std::move(entry)), spool_(std::move(spool)), receipt_(receipt) {
     StartRead(&chunk_);
   }
 
@@ -30,7 +25,7 @@ class BlobReceiver final : public grpc::ServerReadReactor<v1::BlobChunk> {
       Store();
       return;
     }
-    absl::Status status = core_.door().Check(peer_, chunk_);
+    absl::Status status = core_.door().Check(entry_.caller.peer, chunk_);
     if (status.ok()) {
       status = spool_->Add(chunk_);
     }
@@ -62,13 +57,17 @@ class BlobReceiver final : public grpc::ServerReadReactor<v1::BlobChunk> {
                 spool->digest(), spool->bytes(),
                 [&spool](std::int64_t from, std::span<char> to) { return spool->Read(from, to); });
           },
-          [this](const absl::Status& status) { Finish(rpc::ToGrpc(status)); });
+          [this](const absl::Status& status) {
+            if (status.ok()) {
+              LogChange("put", spool_->digest(), entry_.caller);
+            }
+            Finish(rpc::ToGrpc(status));
+          });
     });
   }
 
   Core& core_;
-  const std::string peer_;
-  const Door::Pass pass_;
+  const Entry entry_;
   const std::shared_ptr<Spool> spool_;
   v1::BlobReceipt* receipt_;
   v1::BlobChunk chunk_;
@@ -81,12 +80,12 @@ grpc::ServerWriteReactor<v1::BlobChunk>* SendBlob(Core& core,
                                                   Right right,
                                                   const google::protobuf::Message& request,
                                                   const std::string& digest) {
-  auto pass = AdmitWithBlob(core, context, right, &request);
-  if (!pass.ok()) {
-    return new EndedCall<grpc::ServerWriteReactor<v1::BlobChunk>>(pass.status());
+  auto entry = AdmitWithBlob(core, context, right, &request);
+  if (!entry.ok()) {
+    return new EndedCall<grpc::ServerWriteReactor<v1::BlobChunk>>(entry.status());
   }
   return new StreamReactor<v1::BlobChunk>(
-      core, *std::move(pass), &Core::Query,
+      core, std::move(entry->pass), &Core::Query,
       [&core, digest,
        sent = std::int64_t{0}]() mutable -> absl::StatusOr<std::vector<v1::BlobChunk>> {
         ASSIGN_OR_RETURN(auto reader, core.Read());
@@ -107,15 +106,15 @@ grpc::ServerReadReactor<v1::BlobChunk>* ReceiveBlob(Core& core,
                                                     const std::string& folder,
                                                     v1::BlobReceipt* receipt) {
   using Reactor = grpc::ServerReadReactor<v1::BlobChunk>;
-  auto pass = AdmitWithBlob(core, context, Right::kChange, nullptr);
-  if (!pass.ok()) {
-    return new EndedCall<Reactor>(pass.status());
+  auto entry = AdmitWithBlob(core, context, Right::kChange, nullptr);
+  if (!entry.ok()) {
+    return new EndedCall<Reactor>(entry.status());
   }
   auto spool = Spool::Open(folder, core.door().limits().blob_mib << 20);
   if (!spool.ok()) {
     return new EndedCall<Reactor>(spool.status());
   }
-  return new BlobReceiver(core, context.peer(), *std::move(pass), *std::move(spool), receipt);
+  return new BlobReceiver(core, *std::move(entry), *std::move(spool), receipt);
 }
 
 }  // namespace calib::service

@@ -43,6 +43,12 @@ struct Entry {
   Caller caller;
 };
 
+/// Says in the log who did what, once it is done.
+inline void LogChange(const std::string& what, const std::string& of, const Caller& caller) {
+  spdlog::info("change what={} of={} by={} role={}", what, of, caller.name,
+               access::NameOf(caller.role));
+}
+
 /// Lets a call in: its caller has the right (guard.h), the door has room for it, and its first
 /// message, if it has come with one, keeps its rules. What is turned away is logged.
 inline absl::StatusOr<Entry> Admit(Core& core, const grpc::ServerContextBase& context, Right right,
@@ -61,11 +67,12 @@ inline absl::StatusOr<Entry> Admit(Core& core, const grpc::ServerContextBase& co
 }
 
 /// The same of a call that carries a content.
-inline absl::StatusOr<Door::Pass> AdmitWithBlob(Core& core, const grpc::ServerContextBase& context,
-                                                Right right,
-                                                const google::protobuf::Message* request) {
-  RETURN_IF_ERROR(Admit(core, context, right, request).status());
-  return core.door().EnterWithBlob(context.peer());
+inline absl::StatusOr<Entry> AdmitWithBlob(Core& core, const grpc::ServerContextBase& context,
+                                           Right right, const google::protobuf::Message* request) {
+  ASSIGN_OR_RETURN(Entry entry, Admit(core, context, right, request));
+  entry.pass.reset();
+  ASSIGN_OR_RETURN(entry.pass, core.door().EnterWithBlob(context.peer()));
+  return entry;
 }
 
 /// An answer as it leaves: its texts cut to what their rules allow. DATA_LOSS, and logged, where it

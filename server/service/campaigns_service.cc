@@ -29,19 +29,6 @@ constexpr std::chrono::seconds kLookingThroughTheFile{10};
 /// Campaigns that are read, or wait to be, at a time: each with its text, which may be a MiB.
 constexpr int kMostRead = 16;
 
-/// Under which a request is remembered: a submitter's is not another's, who owns what came of it.
-std::string RequestKey(const Caller& caller, const std::string& request_id) {
-  return caller.role == access::Role::kOperator || request_id.empty()
-             ? request_id
-             : absl::StrCat(caller.name, ":", request_id);
-}
-
-/// Who did what.
-void LogChange(const char* what, const std::string& of, const Caller& caller) {
-  spdlog::info("change what={} of={} by={} role={}", what, of, caller.name,
-               access::NameOf(caller.role));
-}
-
 /// Ends a call with its answer, or with why there is none.
 template <typename Reply>
 void Answer(grpc::ServerUnaryReactor* reactor, absl::StatusOr<Reply> answer, Reply* reply) {
@@ -50,6 +37,19 @@ void Answer(grpc::ServerUnaryReactor* reactor, absl::StatusOr<Reply> answer, Rep
     *reply = *std::move(outgoing);
   }
   reactor->Finish(rpc::ToGrpc(outgoing.status()));
+}
+
+/// The certificate in a folder as it is by now, and why it cannot be used.
+void TellCertificate(const std::string& folder, std::int64_t now_unix_s, v1::ServerReport& report) {
+  const auto credentials = access::ReadCredentials(folder);
+  const absl::Status usable =
+      credentials.ok() ? access::CheckOwn(*credentials, now_unix_s) : credentials.status();
+  report.set_certificate_problem(std::string(usable.message()));
+  if (credentials.ok()) {
+    report.set_certificate(credentials->holder.name);
+    report.set_certificate_end_unix_s(
+        std::max<std::int64_t>(0, credentials->holder.not_after_unix_s));
+  }
 }
 
 }  // namespace
@@ -274,9 +274,9 @@ grpc::ServerUnaryReactor* CampaignsService::Submit(Context* context,
             }
             auto latest = core_.Read();
             const store::RequestRecord record{.digest = ContentDigest(*request)};
+            const std::string key = RequestKey(caller, request->request_id());
             const auto before = latest.ok()
-                                    ? requests_.Begin(RequestKey(caller, request->request_id()),
-                                                      record.digest, *latest)
+                                    ? requests_.Begin(key, record.digest, *latest)
                                     : absl::StatusOr<std::optional<std::string>>(latest.status());
             if (!before.ok() || before->has_value()) {
               if (before.ok()) {
@@ -288,11 +288,10 @@ grpc::ServerUnaryReactor* CampaignsService::Submit(Context* context,
             accepted.created_unix_ms = core_.UnixMs();
             accepted.owner = caller.name;
             core_.scheduler().Submit(
-                std::move(accepted), {request->files().begin(), request->files().end()},
-                RequestKey(caller, request->request_id()), record,
-                [this, reply, finish, caller, id = RequestKey(caller, request->request_id())](
-                    const absl::StatusOr<std::string>& campaign) {
-                  requests_.Done(id);
+                std::move(accepted), {request->files().begin(), request->files().end()}, key,
+                record,
+                [this, reply, finish, caller, key](const absl::StatusOr<std::string>& campaign) {
+                  requests_.Done(key);
                   if (campaign.ok()) {
                     LogChange("submit", *campaign, caller);
                     reply->set_campaign(*campaign);
@@ -302,6 +301,15 @@ grpc::ServerUnaryReactor* CampaignsService::Submit(Context* context,
           });
         });
       });
+}
+
+absl::Status CampaignsService::MayChange(const Caller& caller, const std::string& campaign,
+                                         const std::string& owner) {
+  absl::Status status = Guard::MayChange(caller, campaign, owner);
+  if (!status.ok()) {
+    core_.door().LogRefusal(caller.peer, status);
+  }
+  return status;
 }
 
 void CampaignsService::Control(const std::string& verb, const Caller& caller,
@@ -320,35 +328,32 @@ void CampaignsService::Control(const std::string& verb, const Caller& caller,
     }
   }
   const std::string digest = absl::StrCat(verb, " ", request.campaign());
-  const std::string request_key = RequestKey(caller, request.request_id());
-  const auto before = requests_.Begin(request_key, digest, *reader);
+  const std::string key = RequestKey(caller, request.request_id());
+  const auto before = requests_.Begin(key, digest, *reader);
   if (!before.ok() || before->has_value()) {
     done(before.ok() ? campaign : absl::StatusOr<std::int64_t>(before.status()));
     return;
   }
-  const auto finish = [this, verb, caller, id = request_key, campaign,
+  const auto finish = [this, verb, caller, key, campaign,
                        done = std::move(done)](const absl::Status& status) {
-    requests_.Done(id);
-    if (absl::IsPermissionDenied(status)) {
-      core_.door().LogRefusal(caller.peer, status);
-    }
+    requests_.Done(key);
     if (status.ok()) {
-      LogChange(verb.c_str(), absl::StrCat("c", *campaign), caller);
+      LogChange(verb, absl::StrCat("c", *campaign), caller);
     }
     done(status.ok() ? campaign : absl::StatusOr<std::int64_t>(status));
   };
   const auto record = reader->Campaign(*campaign);
   if (const absl::Status status =
-          record.ok() ? Guard::MayChange(caller, request.campaign(), record->submitted.owner)
+          record.ok() ? MayChange(caller, request.campaign(), record->submitted.owner)
                       : record.status();
       !status.ok()) {
     finish(status);
     return;
   }
   store::Store::Job remember;
-  if (!request_key.empty()) {
-    remember = [id = request_key, digest](store::Transaction& transaction) {
-      transaction.PutRequest(id, {.digest = digest});
+  if (!key.empty()) {
+    remember = [key, digest](store::Transaction& transaction) {
+      transaction.PutRequest(key, {.digest = digest});
     };
   }
   act(*campaign, remember, finish);
@@ -424,7 +429,7 @@ absl::StatusOr<NewFinding> CampaignsService::FindingToKeep(const v1::AddFindingR
   ASSIGN_OR_RETURN(auto reader, core_.Read());
   ASSIGN_OR_RETURN(auto finding, CheckFinding(request, core_.UnixMs(), reader));
   ASSIGN_OR_RETURN(const auto record, reader.Campaign(finding.campaign));
-  RETURN_IF_ERROR(Guard::MayChange(caller, request.campaign(), record.submitted.owner));
+  RETURN_IF_ERROR(MayChange(caller, request.campaign(), record.submitted.owner));
   return finding;
 }
 
@@ -435,9 +440,6 @@ grpc::ServerUnaryReactor* CampaignsService::AddFinding(Context* context,
                [this, request, reply](Unary* reactor, const Caller& caller) {
                  core_.Post([this, request, reply, reactor, caller] {
                    const auto finding = FindingToKeep(*request, caller);
-                   if (absl::IsPermissionDenied(finding.status())) {
-                     core_.door().LogRefusal(caller.peer, finding.status());
-                   }
                    if (!finding.ok()) {
                      reactor->Finish(rpc::ToGrpc(finding.status()));
                      return;
@@ -449,8 +451,10 @@ grpc::ServerUnaryReactor* CampaignsService::AddFinding(Context* context,
                        [finding = *finding](store::Transaction& transaction) {
                          transaction.PutFinding(finding.campaign, finding.record);
                        },
-                       [reactor, caller, campaign = finding->campaign](const absl::Status& status) {
-                         if (status.ok()) LogChange("finding", absl::StrCat("c", campaign), caller);
+                       [reactor, caller, of = request->campaign()](const absl::Status& status) {
+                         if (status.ok()) {
+                           LogChange("finding", of, caller);
+                         }
                          reactor->Finish(rpc::ToGrpc(status));
                        });
                  });
@@ -481,9 +485,11 @@ grpc::ServerUnaryReactor* CampaignsService::DrainWorker(Context* context,
   return Enter(context, Right::kOperate, *request,
                [this, request, reply](Unary* reactor, const Caller& caller) {
                  core_.Post([this, request, reply, reactor, caller] {
-                   auto drained = core_.scheduler().Drain(request->worker());
-                   if (drained.ok()) LogChange("drain", request->worker(), caller);
-                   Answer(reactor, std::move(drained), reply);
+                   auto worker = core_.scheduler().Drain(request->worker());
+                   if (worker.ok()) {
+                     LogChange("drain", request->worker(), caller);
+                   }
+                   Answer(reactor, std::move(worker), reply);
                  });
                });
 }
@@ -504,15 +510,7 @@ grpc::ServerUnaryReactor* CampaignsService::Examine(Context* context,
         report.set_catalog_digest(campaign::Sha256Hex(dem::CatalogText()));
         report.set_listen(site_.listen);
         if (!site_.tls.empty()) {
-          const auto credentials = access::ReadCredentials(site_.tls);  // as it is by now
-          const absl::Status own = credentials.ok()
-                                       ? access::CheckOwn(*credentials, core_.UnixMs() / 1000)
-                                       : credentials.status();
-          report.set_certificate(credentials.ok() ? credentials->holder.name : "unknown");
-          report.set_certificate_end_unix_s(
-              credentials.ok() ? std::max<std::int64_t>(0, credentials->holder.not_after_unix_s)
-                               : 0);
-          report.set_certificate_problem(std::string(own.message()));
+          TellCertificate(site_.tls, report.unix_ms() / 1000, report);
         }
         *report.mutable_state_folder() = messages::ExamineFolder(site_.state_folder);
         auto reader = core_.Read();

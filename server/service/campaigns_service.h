@@ -78,6 +78,9 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   /// On the strand: a change of one campaign, once per request_id. done gets its outcome.
   void Control(const std::string& verb, const Caller& caller, const v1::ControlRequest& request,
                const Act& act, std::function<void(const absl::StatusOr<std::int64_t>&)> done);
+  /// Guard::MayChange(); a refusal is logged.
+  absl::Status MayChange(const Caller& caller, const std::string& campaign,
+                         const std::string& owner);
   /// On the strand: what AddFinding() is to store, if it may.
   absl::StatusOr<NewFinding> FindingToKeep(const v1::AddFindingRequest& request,
                                            const Caller& caller);

@@ -137,8 +137,8 @@ void Core::Written(absl::Status status, const std::function<void(const absl::Sta
   } else if (absl::IsResourceExhausted(status)) {
     spdlog::warn("write_refused reason=\"{}\"", std::string(status.message()));
     status = absl::ResourceExhaustedError(
-        absl::StrCat("the disk of the state folder has no room for this (", FreeSpace(),
-                     "): free some space and send it again"));
+        absl::StrCat("the disk of the state folder does not take this (", status.message(), "; ",
+                     FreeSpace(), "): send it again when that is mended"));
   } else if (absl::IsCancelled(status)) {  // by StopWaiting()
     status = absl::UnavailableError(status.message());
   } else if (!status.ok()) {
@@ -177,8 +177,9 @@ std::string Core::WaitsFor() const {
   if (!wait_.has_value()) {
     return "";
   }
-  return absl::StrCat("the disk of the state folder is full since ", InUtc(wait_->began_unix_ms),
-                      ": ", FreeSpace(), "; the server goes on by itself when there is room");
+  return absl::StrCat("the disk of the state folder takes nothing since ",
+                      InUtc(wait_->began_unix_ms), " (", wait_->reason, "; ", FreeSpace(),
+                      "); the server goes on by itself when it does");
 }
 
 absl::Status Core::WhyNotStore() const {

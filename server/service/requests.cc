@@ -4,32 +4,29 @@
 #include "calib/return_if_error.h"
 
 namespace calib::service {
-namespace {
 
-constexpr std::size_t kLongestId = 128 + 65;  // the id and whose it is
+std::string RequestKey(const Caller& caller, const std::string& id) {
+  // No name has a colon (access::IsName).
+  return id.empty() || caller.role == access::Role::kOperator ? id
+                                                              : absl::StrCat(caller.name, ":", id);
+}
 
-}  // namespace
-
-absl::StatusOr<std::optional<std::string>> Requests::Begin(const std::string& id,
+absl::StatusOr<std::optional<std::string>> Requests::Begin(const std::string& key,
                                                            const std::string& digest,
                                                            store::Reader& reader) {
-  if (id.empty()) {
+  if (key.empty()) {
     return std::optional<std::string>();
   }
-  if (id.size() > kLongestId) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("request_id has ", id.size(), " characters, at most ", kLongestId));
-  }
-  ASSIGN_OR_RETURN(const auto stored, reader.Request(id));
+  ASSIGN_OR_RETURN(const auto stored, reader.Request(key));
   if (stored.has_value()) {
     if (stored->digest != digest) {
       return absl::AlreadyExistsError(
-          absl::StrCat("request ", id, " was made before with another content"));
+          absl::StrCat("request ", key, " was made before with another content"));
     }
     return std::optional<std::string>(stored->answer);
   }
-  if (!in_progress_.insert(id).second) {
-    return absl::UnavailableError(absl::StrCat("request ", id, " is in progress"));
+  if (!in_progress_.insert(key).second) {
+    return absl::UnavailableError(absl::StrCat("request ", key, " is in progress"));
   }
   return std::optional<std::string>();
 }

@@ -7,21 +7,26 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "server/service/guard.h"
 #include "server/store/reader.h"
 
 namespace calib::service {
+
+/// Under what a caller's request is remembered: operators act for everybody and have one memory,
+/// others each their own, so that nobody is answered with what somebody else has asked for. Empty
+/// for an empty id.
+std::string RequestKey(const Caller& caller, const std::string& id);
 
 /// Which requests are being carried out. Not thread-safe: it is used on the strand only.
 class Requests {
  public:
   /// The stored answer if the request was carried out before; nothing if it is new, and then it is
   /// in progress until Done(). ALREADY_EXISTS: same id, other content. UNAVAILABLE: the first one
-  /// is still in progress (retry). INVALID_ARGUMENT: an id longer than 193 characters, whose it is
-  /// included. An empty id
-  /// is always new.
-  absl::StatusOr<std::optional<std::string>> Begin(const std::string& id, const std::string& digest,
+  /// is still in progress (retry). key: RequestKey(); an empty one is always new.
+  absl::StatusOr<std::optional<std::string>> Begin(const std::string& key,
+                                                   const std::string& digest,
                                                    store::Reader& reader);
-  void Done(const std::string& id) { in_progress_.erase(id); }
+  void Done(const std::string& key) { in_progress_.erase(key); }
 
  private:
   std::set<std::string> in_progress_;

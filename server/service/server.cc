@@ -74,6 +74,9 @@ absl::Status CheckReach(const ServerOptions& options) {
         "is sent can be read and forged there: make one (`calibctl certs init`, `calibctl certs "
         "issue`) and name its folder with --tls, or listen on 127.0.0.1, or say --insecure"));
   }
+  if (const absl::Status whole = access::FinishRenewal(options.tls); !whole.ok()) {
+    return absl::InvalidArgumentError(whole.message());
+  }
   const auto credentials = access::ReadCredentials(options.tls);
   if (!credentials.ok()) {
     return absl::InvalidArgumentError(credentials.status().message());

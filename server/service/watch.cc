@@ -5,7 +5,6 @@
 
 #include "proto/rpc/status.h"
 #include "server/messages/read_words.h"
-#include "server/service/calls.h"
 #include "server/service/queries.h"
 
 namespace calib::service {
@@ -74,6 +73,7 @@ class Watcher final : public grpc::ServerWriteReactor<v1::CampaignStatus> {
       return;
     }
     if (const absl::Status welcome = core_.guard().Recheck(entry_.caller); !welcome.ok()) {
+      core_.door().LogRefusal(entry_.caller.peer, welcome);
       Finish(rpc::ToGrpc(welcome));
       return;
     }

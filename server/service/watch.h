@@ -7,12 +7,11 @@
 
 #include "calib/v1/campaign.pb.h"
 #include "server/service/calls.h"
-#include "server/service/core.h"
 
 namespace calib::service {
 
 /// One status at once, then one whenever something changed, at most two a second, until the
-/// campaign is over.
+/// campaign is over. UNAUTHENTICATED once the caller may not stay (Guard::Recheck).
 grpc::ServerWriteReactor<v1::CampaignStatus>* WatchCampaign(Core& core, Entry entry,
                                                             const std::string& campaign);
 

@@ -17,9 +17,19 @@ constexpr int kBusyTimeoutMs = 5000;
 constexpr mode_t kOwnersAlone = 0600;
 constexpr const char* kNeedsRoom = "; its disk needs room";
 
-/// Whether the disk takes nothing now, though the file is as it should be.
-bool IsNoRoom(int system_errno) {
-  return system_errno == ENOSPC || system_errno == EDQUOT || system_errno == EROFS;
+/// What a disk wants that takes nothing now, though the file is as it should be; empty: it is not
+/// for that.
+std::string WantedBy(int system_errno) {
+  switch (system_errno) {
+    case ENOSPC:
+      return kNeedsRoom;
+    case EDQUOT:
+      return "; this account has used up its quota of the disk";
+    case EROFS:
+      return "; its file system has to be writable";
+    default:
+      return "";
+  }
 }
 
 /// The path, once the files of its database are their owner's alone; SQLite gives those that it
@@ -54,9 +64,10 @@ absl::Status ToStatus(const SQLite::Exception& error, int system_errno) {
     case SQLITE_IOERR:
     case SQLITE_READONLY:
     case SQLITE_CANTOPEN:
-      return IsNoRoom(system_errno)
-                 ? absl::ResourceExhaustedError(absl::StrCat(
-                       text, " (", std::generic_category().message(system_errno), ")", kNeedsRoom))
+      return !WantedBy(system_errno).empty()
+                 ? absl::ResourceExhaustedError(
+                       absl::StrCat(text, " (", std::generic_category().message(system_errno), ")",
+                                    WantedBy(system_errno)))
                  : absl::PermissionDeniedError(
                        absl::StrCat(text, "; the folder must be writable and its disk sound"));
     case SQLITE_CONSTRAINT:

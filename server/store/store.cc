@@ -1,7 +1,9 @@
 #include "server/store/store.h"
 
+#include <algorithm>
 #include <deque>
 #include <future>
+#include <iterator>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -91,17 +93,14 @@ class Store::Writer {
   absl::Status CommitOnceThereIsRoom(std::vector<Entry>& group) {
     absl::Status status = Commit(group);
     if (absl::IsResourceExhausted(status) && RefuseThoseThatDoNotWait(group, status)) {
-      status = Commit(group);
+      status = group.empty() ? absl::OkStatus() : Commit(group);
     }
     if (!absl::IsResourceExhausted(status)) {
       return status;
     }
-    AnswerThoseThatDoNotWait(group);
-    if (group.empty()) {
-      return absl::OkStatus();
-    }
     Tell(status);
     while (absl::IsResourceExhausted(status)) {
+      std::vector<Entry> refused;
       {
         absl::MutexLock lock(&mutex_);
         if (mutex_.AwaitWithTimeout(absl::Condition(this, &Writer::IsEnding),
@@ -109,7 +108,12 @@ class Store::Writer {
           return absl::CancelledError(
               absl::StrCat("not written, for the server ends: ", status.message()));
         }
+        const auto waiting = std::stable_partition(
+            queue_.begin(), queue_.end(), [](const Entry& entry) { return !entry.waits_for_room; });
+        std::move(queue_.begin(), waiting, std::back_inserter(refused));
+        queue_.erase(queue_.begin(), waiting);
       }
+      RefuseThoseThatDoNotWait(refused, status);
       status = Commit(group);
     }
     if (status.ok()) {
@@ -118,27 +122,15 @@ class Store::Writer {
     return status;
   }
 
-  /// Whether there are any that had not been refused before.
+  /// Those that do not wait for room are told so at once, and are of the group no more. Whether
+  /// there were any.
   static bool RefuseThoseThatDoNotWait(std::vector<Entry>& group, const absl::Status& why) {
-    bool any = false;
-    for (Entry& entry : group) {
-      if (!entry.waits_for_room && !absl::IsInvalidArgument(entry.refused)) {
-        entry.refused = why;
-        any = true;
-      }
-    }
-    return any;
-  }
-
-  /// They hear of it now, not when what waits with them is on disk.
-  static void AnswerThoseThatDoNotWait(std::vector<Entry>& group) {
-    std::erase_if(group, [](Entry& entry) {
-      if (!absl::IsResourceExhausted(entry.refused)) {
-        return false;
-      }
-      entry.done(entry.refused);
-      return true;
-    });
+    return std::erase_if(group, [&why](const Entry& entry) {
+             if (!entry.waits_for_room) {
+               entry.done(absl::IsInvalidArgument(entry.refused) ? entry.refused : why);
+             }
+             return !entry.waits_for_room;
+           }) > 0;
   }
 
   void Tell(const absl::Status& room) {
@@ -180,9 +172,6 @@ class Store::Writer {
     try {
       const std::unique_ptr<SQLite::Transaction> scope = Begin();
       for (Entry& entry : group) {
-        if (absl::IsResourceExhausted(entry.refused)) {
-          continue;
-        }
         if (alone) connection_->Run("SAVEPOINT job");
         Transaction transaction(*connection_);
         entry.job(transaction);

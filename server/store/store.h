@@ -49,7 +49,8 @@ class Store {
   /// must be short.
   void Write(Job job, Done done);
   /// The same of a job that nothing else depends on: where the disk has no room it is not tried
-  /// again but gets RESOURCE_EXHAUSTED, so that the others need not wait for it.
+  /// again but gets RESOURCE_EXHAUSTED, within one pause between tries and before those that wait:
+  /// neither waits for the other.
   void WriteIfRoom(Job job, Done done);
   /// Write() that waits. Not to be called from a Job or Done.
   absl::Status WriteNow(Job job);

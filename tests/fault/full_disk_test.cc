@@ -28,8 +28,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr const char* kFull = "the disk of the state folder is full since ";
-constexpr const char* kGoesOn = "the server goes on by itself when there is room";
+constexpr const char* kFull = "the disk of the state folder takes nothing since ";
+constexpr const char* kGoesOn = "the server goes on by itself when it does";
 
 void WriteTo(const std::string& path, const std::string& text) { std::ofstream(path) << text; }
 
@@ -156,13 +156,13 @@ TEST_F(FullDiskInUse, IsSaidAndWaitedForAndChangesNoBit) {
   EXPECT_THAT(Waits(), HasSubstr(kGoesOn));
   const Answer show = Calibctl("show c1");
   EXPECT_EQ(show.code, 0) << show.out;
-  EXPECT_THAT(show.out, HasSubstr("! the disk of the state folder is full"));
+  EXPECT_THAT(show.out, HasSubstr("! the disk of the state folder takes nothing"));
   const auto json = nlohmann::json::parse(Calibctl("show c1 --json").out, nullptr, false);
   EXPECT_THAT(json.value("server_waits", ""), HasSubstr(kFull));
-  EXPECT_THAT(Calibctl("list").out, HasSubstr("! the disk of the state folder is full"));
+  EXPECT_THAT(Calibctl("list").out, HasSubstr("! the disk of the state folder takes nothing"));
   const Answer doctor = Calibctl("doctor");
   EXPECT_EQ(doctor.code, 1) << doctor.out;
-  EXPECT_THAT(doctor.out, HasSubstr("It waits: the disk of the state folder is full"));
+  EXPECT_THAT(doctor.out, HasSubstr("It waits: the disk of the state folder takes nothing"));
   EXPECT_THAT(doctor.out, HasSubstr("need not be started again"));
 
   // Changes are refused at once; what was asked can be asked again.
@@ -284,7 +284,7 @@ TEST_F(FullDiskInUse, CalibctlRunWaitsAndSaysSo) {
   EXPECT_TRUE(run.Running());
   disk_->MakeRoom();
   EXPECT_EQ(run.Wait(kLong), 0) << TextOf(log);
-  EXPECT_EQ(Count(TextOf(log), "there is room on the disk, and the server goes on"), 1)
+  EXPECT_EQ(Count(TextOf(log), "the disk takes what is written again, and the server goes on"), 1)
       << TextOf(log);
   EXPECT_EQ(Count(TextOf(deployment_.state() + "/server.log"), "store_goes_on"), 1);
   ASSERT_TRUE(deployment_.StartServer()) << deployment_.Logs();

@@ -122,18 +122,26 @@ absl::Status ExamineServer(client::Session& session, bool is_own, std::vector<Ch
   return absl::OkStatus();
 }
 
+/// Where this node's certificate is: --tls, else $CALIB_TLS; empty: it has none.
+std::string OwnFolder(const client::ServerChoice& choice) {
+  const char* const variable = std::getenv("CALIB_TLS");
+  return !choice.tls.empty() || variable == nullptr ? choice.tls : variable;
+}
+
+/// Whose certificate is in a folder; why it could not be read, or is refused.
+absl::StatusOr<access::Holder> OwnCertificate(const std::string& folder, std::int64_t now_unix_s) {
+  RETURN_IF_ERROR(access::FinishRenewal(folder));  // which no connection could use
+  ASSIGN_OR_RETURN(const auto credentials, access::ReadCredentials(folder));
+  RETURN_IF_ERROR(access::CheckOwn(credentials, now_unix_s));
+  return credentials.holder;
+}
+
 absl::StatusOr<int> Doctor(const CommonOptions& common) {
   std::vector<Check> checks;
   ExamineNode(checks);
-  const char* const variable = std::getenv("CALIB_TLS");
-  const std::string tls =
-      !common.server.tls.empty() || variable == nullptr ? common.server.tls : variable;
-  if (!tls.empty()) {
-    const auto credentials = access::ReadCredentials(tls);
-    checks.push_back(JudgeCertificate(credentials.ok()
-                                          ? absl::StatusOr<access::Holder>(credentials->holder)
-                                          : credentials.status(),
-                                      static_cast<std::int64_t>(UnixSeconds())));
+  if (const std::string tls = OwnFolder(common.server); !tls.empty()) {
+    const auto now = static_cast<std::int64_t>(UnixSeconds());
+    checks.push_back(JudgeCertificate(OwnCertificate(tls, now), now));
   }
   const bool named = !common.server.state.empty() || common.server.given ||
                      common.server.address != client::ServerChoice().address;

@@ -76,11 +76,12 @@ TEST(Doctor, AFolderThatCannotBeWrittenIsAProblemForAnyUse) {
 TEST(Doctor, AServerThatWaitsForRoomIsAProblem) {
   v1::ServerReport server;
   EXPECT_FALSE(JudgeWaiting(server).has_value());
-  server.set_waits("the disk of the state folder is full since 2026-01-31 08:05:09 UTC");
+  server.set_waits("the disk of the state folder takes nothing since 2026-01-31 08:05:09 UTC");
   const auto check = JudgeWaiting(server);
   ASSERT_TRUE(check.has_value());
   EXPECT_EQ(check->health, Health::kProblem);
-  EXPECT_THAT(check->found, HasSubstr("It waits: the disk of the state folder is full since"));
+  EXPECT_THAT(check->found,
+              HasSubstr("It waits: the disk of the state folder takes nothing since"));
   EXPECT_THAT(check->advice, HasSubstr("Free some space"));
 }
 

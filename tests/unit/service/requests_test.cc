@@ -27,10 +27,18 @@ TEST(Requests, FirstAnswerIsGivenAgainAndOtherContentRefused) {
   requests.Done("r");
   EXPECT_EQ(**begin("r", "content"), "c1");
   EXPECT_EQ(begin("r", "other").status().code(), absl::StatusCode::kAlreadyExists);
-  EXPECT_EQ(begin(std::string(194, 'x'), "content").status().code(),
-            absl::StatusCode::kInvalidArgument);
   EXPECT_FALSE(begin("", "content")->has_value());
   EXPECT_FALSE(begin("", "content")->has_value()) << "without an id every request is new";
+}
+
+TEST(Requests, AreRememberedForEachCallerButOperators) {
+  const Caller ann{.name = "ann", .role = access::Role::kSubmitter};
+  const Caller eve{.name = "eve", .role = access::Role::kSubmitter};
+  EXPECT_NE(RequestKey(ann, "r"), RequestKey(eve, "r"));
+  EXPECT_NE(RequestKey(ann, "r"), "r");
+  EXPECT_EQ(RequestKey({.name = "ops", .role = access::Role::kOperator}, "r"),
+            RequestKey({.name = "root", .role = access::Role::kOperator}, "r"));
+  EXPECT_EQ(RequestKey(ann, ""), "");
 }
 
 }  // namespace

@@ -92,35 +92,6 @@ TEST_F(FullDisk, NothingIsAcknowledgedUntilThereIsRoomAndTheOrderIsKept) {
   EXPECT_EQ(heard_, (std::vector{absl::StatusCode::kResourceExhausted, absl::StatusCode::kOk}));
 }
 
-TEST_F(FullDisk, AWriteThatDoesNotWaitHearsOfItWhileTheOthersOfItsGroupWait) {
-  absl::Notification begun;
-  absl::Notification go;
-  absl::Notification written;
-  absl::Notification refused;
-  store_->Write(
-      [&begun, &go](Transaction&) {
-        begun.Notify();
-        go.WaitForNotification();
-      },
-      [this](const absl::Status&) { full_ = true; });
-  begun.WaitForNotification();
-  store_->Write(Says("one"), [&written](const absl::Status& status) {
-    EXPECT_TRUE(status.ok()) << status;
-    written.Notify();
-  });
-  store_->WriteIfRoom([](Transaction& t) { t.PutBlob("large", "content"); },
-                      [&refused](const absl::Status& status) {
-                        EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
-                        refused.Notify();
-                      });
-  go.Notify();
-  refused.WaitForNotification();
-  EXPECT_FALSE(written.HasBeenNotified());
-  full_ = false;
-  written.WaitForNotification();
-  EXPECT_EQ(Events(), std::vector<std::string>{"one"});
-}
-
 TEST_F(FullDisk, AWriteThatDoesNotWaitIsRefusedAndTheOthersOfItsGroupAreWritten) {
   // They wait for the first, which is held up, and go into one commit, whose first try finds it
   // full.
@@ -165,6 +136,38 @@ TEST_F(FullDisk, AWriteThatDoesNotWaitIsRefusedAndTheOthersOfItsGroupAreWritten)
   EXPECT_EQ(Events(), (std::vector<std::string>{"one", "two"}));
   EXPECT_FALSE(*store_->Read()->HasBlob("large"));
   EXPECT_TRUE(heard_.empty()) << "nobody had to wait";
+}
+
+TEST_F(FullDisk, WhoDoesNotWaitIsToldWhileTheOthersWait) {
+  absl::Notification begun, go, refused, refused_later, written;
+  store_->Write(
+      [&begun, &go](Transaction&) {
+        begun.Notify();
+        go.WaitForNotification();
+      },
+      [this](const absl::Status&) { full_ = true; });
+  begun.WaitForNotification();  // the next two are one group
+  const auto told = [](absl::Notification& heard) {
+    return [&heard](const absl::Status& status) {
+      EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
+      heard.Notify();
+    };
+  };
+  store_->Write(Says("waits"), [&written](const absl::Status& status) {
+    EXPECT_TRUE(status.ok()) << status;
+    written.Notify();
+  });
+  store_->WriteIfRoom(Says("large"), told(refused));
+  go.Notify();
+  constexpr absl::Duration kPatience = absl::Seconds(20);
+  EXPECT_TRUE(refused.WaitForNotificationWithTimeout(kPatience));
+  waits_.WaitForNotification();
+  store_->WriteIfRoom(Says("later"), told(refused_later));
+  EXPECT_TRUE(refused_later.WaitForNotificationWithTimeout(kPatience));
+  EXPECT_FALSE(written.HasBeenNotified()) << "the disk is full yet";
+  full_ = false;
+  written.WaitForNotification();
+  EXPECT_EQ(Events(), std::vector<std::string>{"waits"});
 }
 
 TEST_F(FullDisk, WhoEndsDoesNotWaitAndHasAcknowledgedNothing) {
@@ -231,6 +234,13 @@ TEST(StoreStatus, ADiskThatTakesNothingIsToldFromOneThatIsBroken) {
     EXPECT_EQ(code(kIoError, takes_nothing), absl::StatusCode::kResourceExhausted);
     EXPECT_EQ(code(kCannotOpen, takes_nothing), absl::StatusCode::kResourceExhausted);
   }
+  const auto words = [](int result, int system_errno) {
+    return std::string(ToStatus(SQLite::Exception("disk", result), system_errno).message());
+  };
+  EXPECT_NE(words(kFull, 0).find("needs room"), std::string::npos);
+  EXPECT_NE(words(kIoError, ENOSPC).find("needs room"), std::string::npos);
+  EXPECT_NE(words(kIoError, EDQUOT).find("used up its quota"), std::string::npos);
+  EXPECT_NE(words(kIoError, EROFS).find("has to be writable"), std::string::npos);
   EXPECT_EQ(code(kIoError, EIO), absl::StatusCode::kPermissionDenied);
   EXPECT_EQ(code(kIoError, 0), absl::StatusCode::kPermissionDenied);
   EXPECT_EQ(code(kCannotOpen, EACCES), absl::StatusCode::kPermissionDenied);
