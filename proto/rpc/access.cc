@@ -76,7 +76,7 @@ absl::StatusOr<std::string> ReadToken(const std::string& path) {
   return token;
 }
 
-bool IsOwnPort(int port) {
+bool AnotherAccountListens(int port) {
   for (const char* table : {"/proc/net/tcp", "/proc/net/tcp6"}) {
     std::ifstream file(table);
     std::string line;
@@ -95,11 +95,11 @@ bool IsOwnPort(int port) {
         continue;
       }
       if (account != static_cast<std::int64_t>(geteuid())) {
-        return false;
+        return true;
       }
     }
   }
-  return true;
+  return false;
 }
 
 std::vector<std::string> TokenFolders() {

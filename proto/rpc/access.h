@@ -22,8 +22,7 @@ struct AccessChoice {
 struct Access {
   std::string tls{};    ///< folder of a certificate; empty: plain text
   std::string token{};  ///< 64 hexadecimal digits; empty: none
-  /// The token is shown only while all that listens at this TCP port belongs to this account; 0: to
-  /// whoever answers.
+  /// The token is not shown while another account listens at this TCP port; 0: to whoever answers.
   int own_port = 0;
 
   friend bool operator==(const Access&, const Access&) = default;
@@ -35,9 +34,9 @@ struct Access {
 /// file that is named and cannot be read or holds no token, a folder that is none.
 absl::StatusOr<Access> FindAccess(const std::string& address, const AccessChoice& choice);
 
-/// Whether nothing that listens at a TCP port of this machine belongs to another account, as what
+/// Whether anything that listens at a TCP port of this machine belongs to another account, as what
 /// has taken the port of a server that ended. Where nothing listens nobody reads what is shown.
-bool IsOwnPort(int port);
+bool AnotherAccountListens(int port);
 
 /// Whether a text is a token: 64 hexadecimal digits.
 bool IsToken(const std::string& text);

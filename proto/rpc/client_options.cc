@@ -42,7 +42,7 @@ class ShowToken final : public grpc::experimental::Interceptor {
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(
             grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA) &&
-        (own_port_ == 0 || IsOwnPort(own_port_))) {
+        (own_port_ == 0 || !AnotherAccountListens(own_port_))) {
       methods->GetSendInitialMetadata()->insert({"authorization", value_});
     }
     methods->Proceed();

@@ -89,4 +89,14 @@ absl::StatusOr<Reply> Outgoing(absl::StatusOr<Reply> reply) {
   return reply;
 }
 
+/// Ends a call with its answer, or with why there is none.
+template <typename Reply>
+void Answer(grpc::ServerUnaryReactor* reactor, absl::StatusOr<Reply> answer, Reply* reply) {
+  auto outgoing = Outgoing(std::move(answer));
+  if (outgoing.ok()) {
+    *reply = *std::move(outgoing);
+  }
+  reactor->Finish(rpc::ToGrpc(outgoing.status()));
+}
+
 }  // namespace calib::service

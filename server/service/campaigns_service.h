@@ -73,6 +73,9 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   template <typename Request, typename Reply>
   Unary* Ask(Context* context, const Request* request, Reply* reply,
              std::function<absl::StatusOr<Reply>(store::Reader&)> answer);
+  /// On the strand: stores a campaign that was checked, once per request, and ends the call.
+  void Keep(store::NewCampaign accepted, const v1::SubmitRequest& request, const Caller& caller,
+            Unary* reactor, v1::SubmitReply* reply);
   /// Status of a campaign, live parts included, then the end of the call.
   void FinishWithStatus(Unary* reactor, std::int64_t campaign, v1::CampaignStatus* reply);
   /// On the strand: a change of one campaign, once per request_id. done gets its outcome.

@@ -153,7 +153,24 @@ absl::Status Guard::Recheck(const Caller& caller) {
   if (verifier_ == nullptr) {
     return absl::OkStatus();
   }
-  return verifier_->Verify(caller.certificate, UnixSeconds()).status();
+  const std::int64_t now = UnixSeconds();
+  {
+    absl::MutexLock lock(&mutex_);
+    if (std::exchange(judged_unix_s_, now) != now) {
+      good_.clear();
+    }
+    if (good_.contains(caller.certificate)) {
+      return absl::OkStatus();
+    }
+  }
+  absl::Status status = verifier_->Verify(caller.certificate, now).status();
+  if (status.ok()) {
+    absl::MutexLock lock(&mutex_);
+    if (judged_unix_s_ == now) {
+      good_.insert(caller.certificate);
+    }
+  }
+  return status;
 }
 
 absl::Status Guard::MayChange(const Caller& caller, const std::string& campaign,

@@ -2,7 +2,9 @@
 // Who calls, and what they may do. A certificate says its holder's name and role; a token, and the
 // socket of an embedded server, are those of the account that runs the server, who operates it.
 
+#include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "absl/base/thread_annotations.h"
@@ -43,7 +45,7 @@ class Guard {
   /// the right. Each a sentence, with what would be right.
   absl::StatusOr<Caller> Admit(const grpc::ServerContextBase& context, Right right);
   /// Whether one who came in may stay, hours later: a certificate that has ended or was revoked
-  /// since may not. Looks again after a few seconds.
+  /// since may not. Judges each certificate once a second, however often it is asked.
   absl::Status Recheck(const Caller& caller);
 
   /// PERMISSION_DENIED: a submitter, of a campaign that is somebody else's.
@@ -57,6 +59,9 @@ class Guard {
   const std::unique_ptr<access::Verifier> verifier_;  // nullptr: no certificates
   const std::string token_;
   const std::string account_;
+  absl::Mutex mutex_;
+  std::int64_t judged_unix_s_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::set<std::string> good_ ABSL_GUARDED_BY(mutex_);  // certificates, judged in that second
 };
 
 /// The name of the account that this process runs under, its number where it has none.

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "server/campaign/file/derive.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/support/stl_text.h"
@@ -60,7 +62,35 @@ void CheckRuns(const campaign::Campaign& campaign) {
   }
 }
 
+constexpr const char* kModel = R"(name: fuzz
+model:
+    contact: hertz_mindlin
+    density: 2650 kg/m^3
+    fixed: {poisson_ratio: 0.2}
+)";
+constexpr const char* kTest = R"(parameters:
+  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
+  friction_angle: {prior: uniform, min: 10 deg, max: 45 deg}
+inference: {method: iterative_bayesian_filter, samples: 20, max_iterations: 3}
+experiments:
+    - name: tx
+      test: triaxial_drained
+      confining_pressure: 0.2 MPa
+)";
+
 }  // namespace
+
+std::string TriaxialCampaign(const std::string& model, const std::string& experiment) {
+  return absl::StrCat(kModel, model, kTest, experiment);
+}
+
+std::string Indented(const std::string& text, int blanks) {
+  std::string lines;
+  for (const auto line : absl::StrSplit(text, '\n')) {
+    absl::StrAppend(&lines, std::string(static_cast<std::size_t>(blanks), ' '), line, "\n");
+  }
+  return lines;
+}
 
 const std::map<std::string, std::string>& SmallFiles() {
   static const std::map<std::string, std::string> files = [] {

@@ -12,6 +12,13 @@ namespace calib::fuzz {
 /// corpora speak of them.
 const std::map<std::string, std::string>& SmallFiles();
 
+/// A campaign of one triaxial test. model: further lines under `model`, four blanks deep;
+/// experiment: what is measured and on which packing, each line six blanks deep.
+std::string TriaxialCampaign(const std::string& model, const std::string& experiment);
+
+/// Lines, each behind so many blanks.
+std::string Indented(const std::string& text, int blanks);
+
 /// Reads a campaign over SmallFiles(), some of them replaced. Ends the program where a problem is
 /// no sentence of one line, or a campaign without problems holds a number that is none, cannot be
 /// made into data and runs, or would be refused once it is stored.

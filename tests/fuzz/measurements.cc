@@ -1,24 +1,13 @@
 // A laboratory's table. Lines up to one that is "---" are what the experiment says of it (data,
 // control, observables), the rest is the table; without such a line all of it is.
-#include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
 #include "tests/fuzz/campaign_checks.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace {
 
-constexpr const char* kCampaign = R"(name: table
-model: {contact: hertz_mindlin, density: 2650 kg/m^3, fixed: {poisson_ratio: 0.2}}
-parameters:
-  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
-  friction_angle: {prior: uniform, min: 10 deg, max: 45 deg}
-inference: {method: iterative_bayesian_filter, samples: 20, max_iterations: 3}
-experiments:
-  - name: tx
-    test: triaxial_drained
-    confining_pressure: 0.2 MPa
-    packing: {generate: {particles: 100, void_ratio: 0.68, radii: {mean: 1 mm, spread: 0.2}}}
-)";
+constexpr const char* kPacking =
+    "      packing: {generate: {particles: 100, void_ratio: 0.68, radii: {mean: 1 mm, spread: "
+    "0.2}}}\n";
 constexpr const char* kPlain =
     "data: {file: table.txt}\n"
     "control: axial_strain\n"
@@ -38,8 +27,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     keys = input.substr(0, end + 1);
     table = input.substr(end + kEnd.size());
   }
-  std::string yaml = kCampaign;
-  for (const auto line : absl::StrSplit(keys, '\n')) absl::StrAppend(&yaml, "    ", line, "\n");
+  const std::string yaml = TriaxialCampaign("", kPacking + Indented(keys, 6));
   last_was_good = ReadAndCheck(yaml, {{"table.txt", table}}).problems.empty();
   return 0;
 }

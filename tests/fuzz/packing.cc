@@ -8,21 +8,11 @@
 
 namespace {
 
-constexpr const char* kCampaign = R"(name: packing
-model: {contact: hertz_mindlin, density: 2650 kg/m^3, fixed: {poisson_ratio: 0.2}}
-parameters:
-  young_modulus: {prior: log_uniform, min: 1e8 Pa, max: 1e11 Pa}
-  friction_angle: {prior: uniform, min: 10 deg, max: 45 deg}
-inference: {method: iterative_bayesian_filter, samples: 20, max_iterations: 3}
-experiments:
-  - name: tx
-    test: triaxial_drained
-    confining_pressure: 0.2 MPa
-    packing: {file: packing.txt}
-    realizations: 2
-    data: {file: validation.csv, strain: logarithmic}
-    control: axial_strain
-    observables: {q_over_p: {noise: {relative: 0.05}}}
+constexpr const char* kExperiment = R"(      packing: {file: packing.txt}
+      realizations: 2
+      data: {file: validation.csv, strain: logarithmic}
+      control: axial_strain
+      observables: {q_over_p: {noise: {relative: 0.05}}}
 )";
 
 }  // namespace
@@ -56,6 +46,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::Expect(problems.empty() && dem::FormatPacking(again) == text && again.x == packing.x &&
                    again.radius == packing.radius && again.clump == packing.clump,
                "a packing that is written is read with the same bits");
-  fuzz::ReadAndCheck(kCampaign, {{"packing.txt", text}});
+  fuzz::ReadAndCheck(fuzz::TriaxialCampaign("", kExperiment), {{"packing.txt", text}});
   return 0;
 }

@@ -292,7 +292,7 @@ TEST_F(Access, TokenIsShownToItsServerOnlyAndNotRepeated) {
   EXPECT_THAT(option.err, Not(HasSubstr(token.substr(0, 32))));
 
   const int port = std::stoi(address_.substr(address_.rfind(':') + 1));
-  EXPECT_TRUE(rpc::IsOwnPort(port));
+  EXPECT_FALSE(rpc::AnotherAccountListens(port));
   const auto access = rpc::FindAccess(address_, {});
   ASSERT_TRUE(access.ok()) << access.status();
   EXPECT_EQ(access->token, token);
@@ -307,7 +307,8 @@ TEST_F(Access, TokenIsShownToItsServerOnlyAndNotRepeated) {
                    "s.bind(('::1', int(sys.argv[1])))\ns.listen()\ntime.sleep(30)\n",
                    std::to_string(port)},
                   At("other.err"));
-    EXPECT_TRUE(Eventually(kPatience, [&] { return !rpc::IsOwnPort(port); })) << Read("other.err");
+    EXPECT_TRUE(Eventually(kPatience, [&] { return rpc::AnotherAccountListens(port); }))
+        << Read("other.err");
     EXPECT_THAT(Refused("list", ""), HasSubstr("no token was shown"));
   }
 }
