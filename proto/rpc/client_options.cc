@@ -26,6 +26,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "proto/rpc/address.h"
+#include "proto/rpc/server_certificate.h"
 
 namespace calib::rpc {
 namespace {
@@ -77,6 +78,7 @@ std::shared_ptr<grpc::ChannelCredentials> CredentialsOf(const Access& access) {
           access.tls + "/key.pem", access.tls + "/cert.pem", access.tls + "/ca.pem", kFilesAgain));
   options.watch_root_certs();
   options.watch_identity_key_cert_pairs();
+  options.set_certificate_verifier(MakeServerVerifier(access.tls));
   return grpc::experimental::TlsCredentials(options);
 }
 
@@ -194,6 +196,11 @@ absl::Status WhyNotConnected(const std::string& address, const Access& access) {
   if (absl::StrContains(plain, "verify failed")) {
     return refused("shows a certificate that was not issued by the authority of ", access.tls,
                    "/ca.pem, that has ended, or that is none of a server");
+  }
+  if (absl::StrContains(error, kRevoked)) {
+    return refused("shows a certificate that ", access.tls,
+                   "/crl.pem revokes: calibd needs another, and whoever answers with this one may "
+                   "be somebody else");
   }
   if (absl::StrContains(plain, "hostname") || absl::StrContains(plain, "peer name")) {
     return refused("shows a certificate that is not for ", HostOf(address),

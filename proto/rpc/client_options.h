@@ -24,13 +24,14 @@ inline constexpr std::chrono::seconds kBlobDeadline{120};
 /// A channel with quick reconnects (at most 2 s between tries) and keep-alive pings, so that a peer
 /// which vanished without closing its socket is noticed. Never shared with other channels to the
 /// same address. With access.tls it shows that certificate, which is read again when it is renewed,
-/// and takes only a server of its authority that is certified for the host of the address; without,
-/// plain text. A token is shown with each call.
+/// and takes only a server of its authority that is certified for the host of the address and not
+/// revoked (crl.pem); without, plain text. A token is shown with each call.
 std::shared_ptr<grpc::Channel> OpenChannel(const std::string& address, const Access& access);
 
 /// Why a channel to the address does not connect, for people. UNAVAILABLE: nothing listens there.
 /// FAILED_PRECONDITION: something does, and speaks otherwise (plain text, TLS), shows a certificate
-/// of another authority or host, or belongs to another account. Takes up to two seconds.
+/// of another authority or host or one that is revoked, or belongs to another account. Takes up to
+/// two seconds.
 absl::Status WhyNotConnected(const std::string& address, const Access& access);
 
 /// The call fails with DEADLINE_EXCEEDED this long from now.

@@ -43,7 +43,8 @@ absl::StatusOr<Holder> Issue(const std::string& authority_folder, const Request&
 
 /// Revokes every certificate of `name` that is neither revoked nor expired and writes crl.pem of
 /// the authority, with a higher number than before. How many were revoked; NOT_FOUND where the name
-/// was never issued, else as Issue. Servers refuse them once crl.pem is copied into their folders.
+/// was never issued, else as Issue. Servers refuse them once crl.pem is copied into their folders,
+/// and clients a server once it is copied into theirs.
 absl::StatusOr<int> Revoke(const std::string& authority_folder, const std::string& name);
 
 }  // namespace calib::access

@@ -72,6 +72,13 @@ auto OnceThereIsRoom(Session& session, const std::string& campaign, const Change
   }
 }
 
+/// What the server has no room for, told from the budget of a question that is spent, which is
+/// RESOURCE_EXHAUSTED to who asks.
+absl::Status ServersLimit(const absl::Status& status) {
+  return absl::IsResourceExhausted(status) ? absl::OutOfRangeError(std::string(status.message()))
+                                           : status;
+}
+
 }  // namespace
 
 absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& campaign) {
@@ -132,8 +139,8 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
   if (parent.source.has_seed()) request.set_seed(parent.source.seed());
   *request.mutable_files() = parent.source.files();
   for (const auto& [path, content] : further) {
-    RETURN_IF_ERROR(OnceThereIsRoom(session_, parent.status.campaign(),
-                                    [&] { return session_.client().PutBlob(content); }));
+    RETURN_IF_ERROR(ServersLimit(OnceThereIsRoom(
+        session_, parent.status.campaign(), [&] { return session_.client().PutBlob(content); })));
     (*request.mutable_files())[path] = campaign::Sha256Hex(content);
   }
   campaign::Submission submission{.campaign_file = yaml,
@@ -143,16 +150,16 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
   if (parent.source.has_seed()) submission.seed = parent.source.seed();
   submission.files.insert(request.files().begin(), request.files().end());
   request.set_request_id(campaign::IdentityDigest(submission));
-  ASSIGN_OR_RETURN(const auto reply, OnceThereIsRoom(session_, parent.status.campaign(), [&] {
-                     return session_.client().Submit(request);
-                   }));
-  if (!reply.problems().empty()) {
-    const v1::Problem& problem = reply.problems(0);
+  const auto reply = OnceThereIsRoom(session_, parent.status.campaign(),
+                                     [&] { return session_.client().Submit(request); });
+  RETURN_IF_ERROR(ServersLimit(reply.status()));
+  if (!reply->problems().empty()) {
+    const v1::Problem& problem = reply->problems(0);
     return absl::InvalidArgumentError(absl::StrCat(
         what, " cannot be run: ",
         campaign::ToString({problem.file(), problem.line(), problem.key(), problem.message()})));
   }
-  const std::string& campaign = reply.campaign();
+  const std::string& campaign = reply->campaign();
   ASSIGN_OR_RETURN(auto status, session_.client().Show(campaign));
   if (messages::StateOf(status) == CampaignState::kPaused) {
     std::cerr << "campaign " << campaign << " was paused (" << status.reason() << "); it goes on\n";

@@ -25,6 +25,7 @@ class Laboratory {
 
   /// Submits the text with the parent's files and does not wait, so that several campaigns keep all
   /// workers busy; returns the campaign's id. Submitted again it is the same campaign.
+  /// OUT_OF_RANGE: it is more than the server takes.
   absl::StatusOr<std::string> Submit(const report::CampaignView& parent, const std::string& yaml,
                                      const std::string& what,
                                      const std::map<std::string, std::string>& further = {});
@@ -32,7 +33,7 @@ class Laboratory {
   /// Submits the text with the parent's files and waits for the end, progress on standard error.
   /// further: files by the path that the text names them by, in addition to the parent's.
   /// ABORTED when the campaign failed, FAILED_PRECONDITION when somebody paused or cancelled it,
-  /// CANCELLED on Ctrl-C (nothing is lost).
+  /// OUT_OF_RANGE when it is more than the server takes, CANCELLED on Ctrl-C (nothing is lost).
   absl::StatusOr<report::CampaignView> Run(const report::CampaignView& parent,
                                            const std::string& yaml, const std::string& what,
                                            const std::map<std::string, std::string>& further = {});

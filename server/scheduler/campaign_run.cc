@@ -15,6 +15,15 @@ namespace calib::scheduler {
 using store::EvaluationKey;
 using store::EvaluationStatus;
 
+namespace {
+
+/// Ended by itself: nothing lets it go on.
+bool IsForGood(EvaluationStatus status) {
+  return status == EvaluationStatus::kFinished || status == EvaluationStatus::kDiverged;
+}
+
+}  // namespace
+
 CampaignRun::CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition)
     : id_(id), definition_(std::move(definition)) {
   for (std::size_t e = 0; e < definition_->campaign.experiments.size(); ++e) {
@@ -44,6 +53,7 @@ absl::StatusOr<std::unique_ptr<CampaignRun>> CampaignRun::Load(store::Reader& re
   run->record_ = record;
   run->state_ = record.progress.state;
   RETURN_IF_ERROR(run->Reload(reader));
+  run->FindOtherMechanics();
   return run;
 }
 
@@ -165,20 +175,24 @@ CampaignRun::Evaluation* CampaignRun::Find(const EvaluationKey& key) {
   return found == evaluations_.end() ? nullptr : &found->second;
 }
 
-std::map<EvaluationKey, std::string> CampaignRun::OfOtherMechanics() const {
-  std::map<EvaluationKey, std::string> others;
+void CampaignRun::FindOtherMechanics() {
   for (const auto& [key, evaluation] : evaluations_) {
-    const bool for_good = evaluation.status == EvaluationStatus::kFinished ||
-                          evaluation.status == EvaluationStatus::kDiverged;
-    // What rests or was stopped may be asked to go on while its iteration is not concluded.
-    const bool stopped = evaluation.status == EvaluationStatus::kStoppedEarly &&
-                         record_.progress.phase != campaign::Phase::kCalibrating;
-    if (for_good || stopped || evaluation.digest.empty()) continue;
-    const std::string digest = messages::SpecDigest(messages::SpecOf(
+    if (IsForGood(evaluation.status) || evaluation.digest.empty()) continue;
+    std::string digest = messages::SpecDigest(messages::SpecOf(
         definition_->campaign, key.experiment, parameters_.at(key.sample), key.sample));
-    if (digest != evaluation.digest) others[key] = digest;
+    if (digest != evaluation.digest) of_other_mechanics_[key] = std::move(digest);
   }
-  return others;
+}
+
+std::map<EvaluationKey, std::string> CampaignRun::OfOtherMechanics() const {
+  std::map<EvaluationKey, std::string> open = of_other_mechanics_;
+  std::erase_if(open, [this](const auto& entry) {
+    const EvaluationStatus status = evaluations_.at(entry.first).status;
+    // What rests or was stopped may be asked to go on while its iteration is not concluded.
+    return IsForGood(status) || (status == EvaluationStatus::kStoppedEarly &&
+                                 record_.progress.phase != campaign::Phase::kCalibrating);
+  });
+  return open;
 }
 
 bool CampaignRun::HasBegun() const {
@@ -195,6 +209,7 @@ void CampaignRun::BeginAnew(const EvaluationKey& key, const std::string& digest)
   evaluation.missing = {steps.begin(), steps.end()};
   evaluation.held_in.clear();
   evaluation.digest = digest;
+  of_other_mechanics_.erase(key);
   SetStatus(key, EvaluationStatus::kWaiting, 0);
   const auto arrived = arrived_.find(key.sample);
   if (arrived == arrived_.end()) return;

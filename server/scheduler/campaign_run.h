@@ -120,6 +120,8 @@ class CampaignRun {
  private:
   CampaignRun(std::int64_t id, std::shared_ptr<const Definition> definition);
   void FactoriseErrors();
+  /// Compares digests, which takes tens of microseconds each: once, where the campaign is read.
+  void FindOtherMechanics();
   /// Readings of a sample of the running iteration, or of one before it that had not ended.
   struct Arrived {
     Eigen::RowVectorXd predictions;  ///< NaN where they have not
@@ -145,6 +147,9 @@ class CampaignRun {
   std::optional<inference::GaussianLikelihood> likelihood_;
   std::map<store::EvaluationKey, Evaluation> evaluations_;
   std::map<store::EvaluationStatus, std::set<store::EvaluationKey>> by_status_;
+  /// Planned by a program with other mechanics and not over when they were read, with their digests
+  /// by this one.
+  std::map<store::EvaluationKey, std::string> of_other_mechanics_;
   std::map<int, std::vector<double>> parameters_;  // by sample
   std::map<int, double> stop_below_;               // samples that may be stopped early
   ArrivedBySample arrived_;

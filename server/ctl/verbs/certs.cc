@@ -192,8 +192,8 @@ absl::StatusOr<int> Revoke(const CommonOptions& common, const CertsOptions& opti
     std::cout << revoked << (revoked == 1 ? " certificate of " : " certificates of ")
               << options.name << " revoked in " << list << ".\n";
   }
-  std::cout << "Next: copy " << list << " into the folder that calibd --tls names; it reads the "
-            << "new list by itself.\n";
+  std::cout << "Next: copy " << list << " into the folder that calibd --tls names (the list of a "
+            << "server: into those of all who ask it); it is read again by itself.\n";
   return kDone;
 }
 

@@ -156,7 +156,8 @@ TEST_F(AccessUpkeep, GuestOfAFolderShowsItsTokenToTheServerThatFollowsItsHost) {
   Process host({CALIBCTL, "run", At("campaign.yaml"), "--state", At("s"), "--workers", "0"},
                At("host.err"));
   ASSERT_TRUE(Eventually(kPatience, [&] {
-    return Call("list --state s --json").json().size() == 1 || !host.Running();
+    const Json listed = Call("list --state s --json").json();  // no folder yet: no JSON
+    return (listed.is_array() && listed.size() == 1) || !host.Running();
   })) << Read("host.err");
   Process guest({CALIBCTL, "watch", "c1", "--state", At("s")}, At("guest.err"));
   std::this_thread::sleep_for(std::chrono::seconds(1));
@@ -187,6 +188,27 @@ TEST_F(AccessUpkeep, WatchOutlivesTheCertificateThatItBeganWith) {
     return Read("state.log").find("the certificate of viewer has expired") != std::string::npos;
   })) << Read("state.log");
   EXPECT_EQ(watch->Wait(std::chrono::seconds(3)), -1000) << Read("viewer.err");
+}
+
+TEST_F(AccessUpkeep, ServerWhoseCertificateIsRevokedIsNotAsked) {
+  ASSERT_NO_FATAL_FAILURE(IssueAll());
+  const auto server = Serve("state", {"--tls", At("head")});
+  ASSERT_EQ(Call("certs revoke ca head").code, 0) << Read("err");
+  EXPECT_EQ(Ask("list", "--tls viewer").code, 0) << "it does not know yet";
+  const auto learns = [this](const std::string& who) {
+    std::filesystem::copy_file(work_ / "ca/crl.pem", work_ / who / "crl.pem",
+                               std::filesystem::copy_options::overwrite_existing);
+  };
+  learns("viewer");
+  EXPECT_THAT(Refused("list", "--tls viewer"), HasSubstr("viewer/crl.pem revokes"));
+  learns("worker");
+  const auto worker = StartWorker(address_, "worker", "worker.err");
+  EXPECT_TRUE(Eventually(kPatience, [&] {
+    return Count(Read("worker.err"), "worker/crl.pem revokes") == 1;
+  })) << Read("worker.err");
+  Write("viewer/crl.pem", "");
+  EXPECT_THAT(Refused("list", "--tls viewer"), HasSubstr("no list of revocations"));
+  EXPECT_EQ(Ask("list", "--tls operator").code, 0) << Read("err");
 }
 
 TEST_F(AccessUpkeep, DoctorJudgesBothCertificates) {
