@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
 #include "calib/return_if_error.h"
+#include "proto/rpc/check_message.h"
 #include "proto/rpc/status.h"
 #include "server/service/blob_stream.h"
 #include "server/service/calls.h"
@@ -128,11 +129,12 @@ class WorkerStream final : public grpc::ServerBidiReactor<v1::WorkerMessage, v1:
     unwritten_bytes_ += message.ByteSizeLong();
     ++unwritten_messages_;
     if (!broken.ok()) {
-      const std::int64_t attempt = AttemptOf(message);
-      if (name_.empty() || attempt < 1) {
+      v1::Ack answer;  // what it says of an attempt is answered, if it can be one at all
+      answer.set_attempt(AttemptOf(message));
+      if (name_.empty() || !rpc::CheckMessage(answer).ok()) {
         return broken;
       }
-      scheduler.Reject(session_, attempt, std::string(broken.message()));
+      scheduler.Reject(session_, answer.attempt(), std::string(broken.message()));
       return absl::OkStatus();
     }
     if (name_.empty()) {
