@@ -147,6 +147,12 @@ const ParameterInfo* FindParameter(const Model& model, const std::string& dotted
   return law == nullptr ? nullptr : Named(law->parameters, name);
 }
 
+bool IsMaterialName(const std::string& name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
+    return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_';
+  });
+}
+
 std::vector<std::string> MaterialParameters(const Model& model) {
   const ContactInfo* law = FindContact(model.contact);
   std::vector<std::string> dotted;
@@ -178,10 +184,7 @@ std::vector<std::string> MaterialProblems(const Model& model) {
   }
   for (std::size_t m = 0; m < model.materials.size(); ++m) {
     const std::string& name = model.materials[m];
-    const bool word = !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
-      return absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '_';
-    });
-    if (!word) {
+    if (!IsMaterialName(name)) {
       problems.push_back(
           absl::StrCat("material \"", name, "\": a name has letters, digits and _ only"));
     } else if (name == kOwnMaterial) {

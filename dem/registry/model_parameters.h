@@ -14,6 +14,9 @@ namespace calib::dem {
 /// included, or nullptr when the model has none of that name.
 const ParameterInfo* FindParameter(const Model& model, const std::string& dotted_name);
 
+/// Whether a material may have this name: letters, digits and _.
+bool IsMaterialName(const std::string& name);
+
 /// Dotted names that the model's materials and pairs of them may give values to; pairs once, in the
 /// order in which the materials are named.
 std::vector<std::string> MaterialParameters(const Model& model);

@@ -60,7 +60,12 @@ void ReadMaterials(MapReader& model_map, dem::Model& model) {
   auto pairs = model_map.Map("pairs");
   if (materials) {
     for (const std::string& name : materials->Keys()) {
-      if (!Has(model.materials, name)) model.materials.push_back(name);
+      if (!dem::IsMaterialName(name)) {  // a dot in it would make another name of its parameters
+        materials->Ignore({name});
+        materials->Problem(name, "is no name of a material: letters, digits and _ only");
+      } else if (!Has(model.materials, name)) {
+        model.materials.push_back(name);
+      }
     }
     for (const std::string& name : model.materials) ReadValues(*materials, name, model);
     materials->Finish();

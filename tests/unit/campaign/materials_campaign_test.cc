@@ -157,6 +157,9 @@ TEST(MaterialsCampaign, EveryMistakeIsOneSentence) {
   EXPECT_THAT(With("    wood: {density: 700, friction_coefficient: 0.4}\n",
                    "    wood: {density: 700, friction_coefficient: 0.4}\n    felt: {}\n"),
               HasSubstr("material felt has no part in any of the experiments"));
+  EXPECT_THAT(With("    wood: {density", "    wo.od: {density"),
+              HasSubstr("model.materials.wo.od: is no name of a material: letters, digits and _ "
+                        "only"));
   EXPECT_THAT(With("  density: 2700", "  effects: [wall_friction]\n  density: 2700"),
               HasSubstr("effect wall_friction knows one material only"));
 }
