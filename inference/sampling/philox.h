@@ -29,6 +29,9 @@ enum class StreamPurpose : std::uint64_t {
   kHalves = 28,
   kEmulatedPath = 29,
   kStoppedRuns = 30,
+  kDiagnosisEmulator = 31,
+  kDiagnosisEvidence = 32,
+  kDiagnosisForecast = 33,
 };
 
 /// Random numbers of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration,

@@ -1,0 +1,146 @@
+// Coordinates of histories: what they keep, how measurements scatter in them, what is left out.
+#include "inference/diagnosis/stage_coordinates.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+
+#include "inference/diagnosis/diagnosis_set.h"
+#include "tests/support/history_toy.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+using ::testing::HasSubstr;
+
+TEST(StageProjection, TakesPolynomialsOfEachStageAsTheyAre) {
+  PathCurve curve{.stage = {0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 2}, .path = Eigen::VectorXd(11)};
+  for (Index i = 0; i < 11; ++i) curve.path[i] = 0.1 * static_cast<double>(i * i);
+  const StageProjection projection = ProjectStages({curve, curve});
+  EXPECT_EQ(projection.degree, (std::vector<int>{0, 1, 2, 3, 0, 1, 0, 0, 1, 2, 3, 0, 1, 0}));
+  Eigen::VectorXd y = Eigen::VectorXd::Zero(22);
+  for (Index i = 0; i < 7; ++i) {
+    const double x = 2 * std::sqrt(curve.path[i] / curve.path[6]) - 1;
+    y[i] = 2 - 3 * x + 0.5 * (3 * x * x - 1);
+  }
+  y[10] = 7;
+  y[21] = -1;
+  Eigen::VectorXd expected = Eigen::VectorXd::Zero(14);
+  expected.head(3) << 2, -3, 1;
+  expected[6] = 7;
+  expected[13] = -1;
+  EXPECT_LT((projection.matrix * y - expected).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+class Coordinates : public ::testing::Test {
+ protected:
+  HistoryToy toy_{2};
+  SetRuns runs_ = toy_.Runs(90, 90, 18);
+};
+
+// By the scatter that was seen, plus what is not seen of it: the optimism.
+TEST(CoordinatesOfSixDesigns, MeasurementsScatterAsStatedAndIndependently) {
+  double mean = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    HistoryToy toy(seed);
+    const auto coordinates = StageCoordinates::Fit(toy.Runs(90, 90, 18));
+    ASSERT_TRUE(coordinates.ok()) << coordinates.status();
+    EXPECT_EQ(coordinates->count(), 20);
+    EXPECT_GE(coordinates->noise().minCoeff(), 0);
+    EXPECT_LE(coordinates->noise().maxCoeff(), 1);
+    const DesignPoints point = toy.Points(1, 0);
+    const int n = 1000;
+    Eigen::MatrixXd measured(n, HistoryToy::kAll);
+    for (int i = 0; i < n; ++i) measured.row(i) = toy.Measure(point) - toy.Mean(point, 0);
+    const Eigen::MatrixXd z = coordinates->OfDifferences(measured);
+    const Eigen::MatrixXd covariance = z.transpose() * z / n;
+    const Eigen::VectorXd stated =
+        coordinates->noise() +
+        coordinates->optimism() * (Eigen::VectorXd::Ones(20) - coordinates->noise());
+    const Eigen::VectorXd ratio = covariance.diagonal().cwiseQuotient(stated);
+    std::cout << "optimism " << coordinates->optimism() << ", scatter " << ratio.mean()
+              << " of what is stated, from " << ratio.minCoeff() << " to " << ratio.maxCoeff()
+              << "\n";
+    mean += ratio.mean() / 6;
+    EXPECT_GT(coordinates->optimism(), 1);
+    EXPECT_LT(coordinates->optimism(), 1.5);
+    // 18 packings, half of the scatter, and 90 runs stand behind each variance: 20 %.
+    EXPECT_GT(ratio.minCoeff(), 0.4);
+    EXPECT_LT(ratio.maxCoeff(), 2.8);
+    Eigen::MatrixXd beside = covariance;
+    beside.diagonal().setZero();
+    EXPECT_LT(std::sqrt(beside.squaredNorm() / (20 * 19)), 0.25);
+  }
+  // 16 independent directions of 18 packings in six designs: 2 %; the rest is what the closed form
+  // that holds the covariance together is off by.
+  EXPECT_NEAR(mean, 1, 0.15);
+}
+
+TEST_F(Coordinates, HoldWhatEveryEffectChanges) {
+  const auto coordinates = StageCoordinates::Fit(runs_);
+  ASSERT_TRUE(coordinates.ok());
+  // Six effects, one of both signs, at two strengths and four points, those that are seen.
+  EXPECT_GE(coordinates->captured().size(), 40u);
+  EXPECT_GT(*std::min_element(coordinates->captured().begin(), coordinates->captured().end()), 0.9);
+  // And of the base parameters: what the coordinates do not see of a step is small against what
+  // they see.
+  const DesignPoints a{.base = Eigen::MatrixXd{{0.2, 0.2}},
+                       .strength = Eigen::MatrixXd::Zero(1, 6),
+                       .shape = Eigen::MatrixXd(1, 0)};
+  DesignPoints b = a;
+  b.base(0, 0) += 0.3;
+  EXPECT_GT(coordinates->OfDifferences(toy_.Mean(b, 0) - toy_.Mean(a, 0)).norm(), 2);
+}
+
+TEST_F(Coordinates, LeftOutMisfitIsThatOfChanceAndSeesWhatIsRough) {
+  const auto coordinates = StageCoordinates::Fit(runs_, {.count = 14});
+  ASSERT_TRUE(coordinates.ok());
+  double mean = 0;
+  int small = 0;
+  const int n = 60;
+  for (int i = 0; i < n; ++i) {
+    const DesignPoints point = toy_.Points(1, i % 2);
+    const LeftOutMisfit misfit = coordinates->LeftOut(toy_.Measure(point), point);
+    EXPECT_GT(misfit.expected, 0);
+    mean += misfit.chance / n;
+    small += misfit.chance < 0.01 ? 1 : 0;
+  }
+  // Uniform: sd of the mean 0.04, of the count 0.8; a covariance from 18 packings adds to it.
+  EXPECT_NEAR(mean, 0.5, 0.2);
+  EXPECT_LE(small, 4);
+  const DesignPoints point = toy_.Points(1, 0);
+  Eigen::VectorXd rough = toy_.Measure(point);
+  for (Index i = 0; i < 12; ++i)
+    rough[i] += i < 6 ? 0.15 * std::cos(0.9 * static_cast<double>(i)) : 0;
+  EXPECT_LT(coordinates->LeftOut(rough, point).chance, 0.01);
+}
+
+TEST_F(Coordinates, StagingEntersAsItsDirection) {
+  runs_.staging = Eigen::MatrixXd::Constant(HistoryToy::kAll, 1, 0.02);
+  const auto set = DiagnosisSet::Fit(runs_);
+  ASSERT_TRUE(set.ok()) << set.status();
+  EXPECT_LT((set->errors().staging -
+             set->coordinates()->OfDifferences(runs_.staging.transpose()).transpose())
+                .norm(),
+            1e-12);
+  EXPECT_GT(set->errors().staging.norm(), 0.5);
+  const auto again = DiagnosisSet::Refit(*set, runs_);
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ(again->emulator().variances().run, set->emulator().variances().run);
+}
+
+TEST_F(Coordinates, SayWhatDoesNotFit) {
+  SetRuns few = toy_.Runs(10, 30, 4);
+  EXPECT_THAT(StageCoordinates::Fit(few).status().message(), HasSubstr("are asked for"));
+  SetRuns broken = runs_;
+  broken.curves.pop_back();
+  EXPECT_THAT(StageCoordinates::Fit(broken).status().message(), HasSubstr("do not fit"));
+}
+
+}  // namespace
+}  // namespace calib::inference

@@ -1,0 +1,445 @@
+// Evidences of models against quadrature and closed form, and what the answer may not say.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <vector>
+
+#include "inference/diagnosis/effect_probabilities.h"
+#include "inference/diagnosis/model_evidence.h"
+#include "inference/diagnosis/visible_strength.h"
+#include "inference/numerics/log_weights.h"
+#include "tests/support/effects_toy.h"
+
+namespace calib::inference {
+namespace {
+
+using Eigen::Index;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// A set whose variances are the true ones: coordinates of scatter one, noise 0.2.
+DiagnosisSet SetOf(const CoordinateToy& toy, const EmulatorData& data,
+                   double freedom = std::numeric_limits<double>::infinity()) {
+  auto emulator =
+      FeatureEmulator::Fit(toy.features(), data, {.start = toy.Variances(), .hold = true});
+  EXPECT_TRUE(emulator.ok()) << emulator.status();
+  const Index q = data.outputs.cols();
+  SpecimenErrors errors{.specimen = emulator->specimen(),
+                        .run = emulator->variances().run,
+                        .noise = Eigen::VectorXd::Constant(q, 0.2),
+                        .staging = Eigen::MatrixXd(q, 0),
+                        .share = 1,
+                        .freedom = freedom};
+  return {*std::move(emulator), std::move(errors)};
+}
+
+double SumOfLogs(const std::vector<double>& logs) {
+  return LogSumExp(Eigen::Map<const Eigen::VectorXd>(logs.data(), static_cast<Index>(logs.size())));
+}
+
+// One parameter, two effects, four packings, runs few enough that the emulator's variance counts.
+class EffectEvidence : public ::testing::Test {
+ protected:
+  CoordinateToy toy_{
+      {.parameters = 1, .effects = 2, .coordinates = 4, .seed = 3, .two_sided = {1}}};
+  EmulatorData data_ = toy_.Runs(16, 16, 4);
+  DiagnosisSet set_ = SetOf(toy_, data_);
+  // A specimen with effect 0 at strength 1.5.
+  Eigen::VectorXd z_ = [this] {
+    const DesignPoints truth{.base = Eigen::MatrixXd{{0.3}},
+                             .strength = Eigen::MatrixXd{{1.5, 0}},
+                             .shape = Eigen::MatrixXd(1, 0)};
+    return Eigen::VectorXd(toy_.Mean(truth).row(0).transpose() +
+                           std::sqrt(1.2) * toy_.Normal(4, 1));
+  }();
+
+  // ln of p(z | base, strengths), packings and coefficients integrated: the joint normal law of
+  // runs and measurement, without the emulator.
+  double Joint(const DesignPoints& point) const {
+    const Eigen::MatrixXd f = toy_.features().All(data_.points);
+    const Eigen::MatrixXd g = toy_.features().All(point);
+    const Eigen::VectorXd tau = toy_.FeatureVariances();
+    if (inverse_.size() == 0) {
+      Eigen::MatrixXd k = f * tau.asDiagonal() * f.transpose();
+      for (Index i = 0; i < k.rows(); ++i) {
+        for (Index j = 0; j < k.rows(); ++j) {
+          if (data_.packing[static_cast<std::size_t>(i)] ==
+              data_.packing[static_cast<std::size_t>(j)])
+            k(i, j) += 0.3;
+        }
+        k(i, i) += 0.7;
+      }
+      inverse_ = k.inverse();
+    }
+    const Eigen::VectorXd cross = f * tau.asDiagonal() * g.row(0).transpose();
+    const Eigen::VectorXd gain = inverse_ * cross;
+    const double variance =
+        g.row(0).dot(tau.asDiagonal() * g.row(0).transpose()) - cross.dot(gain) + 0.3 + 0.7 + 0.2;
+    double result = 0;
+    for (Index c = 0; c < z_.size(); ++c) {
+      const double r = z_[c] - gain.dot(data_.outputs.col(c));
+      result += -0.5 * r * r / variance - 0.5 * std::log(2 * M_PI * variance);
+    }
+    return result;
+  }
+
+  // The evidence of a model by the midpoint rule over base parameter and ln of the strength.
+  double Quadrature(int effect, const StrengthPrior& prior) const {
+    const int n = 80;
+    std::vector<double> logs;
+    for (int i = 0; i < n; ++i) {
+      DesignPoints point{.base = Eigen::MatrixXd::Constant(1, 1, -1 + 2 * (i + 0.5) / n),
+                         .strength = Eigen::MatrixXd::Zero(1, 2),
+                         .shape = Eigen::MatrixXd(1, 0)};
+      if (effect < 0) {
+        logs.push_back(Joint(point) - std::log(n));
+        continue;
+      }
+      const bool two_sided = toy_.features().effects()[static_cast<std::size_t>(effect)].two_sided;
+      for (int j = 0; j < n; ++j) {
+        const double t = (j + 0.5) / n;
+        point.strength(0, effect) = prior.low * std::pow(prior.high / prior.low, t);
+        logs.push_back(Joint(point) - 2 * std::log(n) - (two_sided ? std::log(2) : 0));
+        if (!two_sided) continue;
+        point.strength(0, effect) =
+            -prior.negative_low * std::pow(prior.negative_high / prior.negative_low, t);
+        logs.push_back(Joint(point) - 2 * std::log(n) - std::log(2));
+      }
+    }
+    return SumOfLogs(logs);
+  }
+
+  mutable Eigen::MatrixXd inverse_;
+};
+
+// 0.05 nats; 3 % of sampling error at 2000 points, quadrature error far below. Each width sampled
+// by itself, and all from the points of the widest.
+TEST_F(EffectEvidence, IsThatOfQuadratureUnderEveryWidth) {
+  ModelSpace space = ToySpace(toy_);
+  space.models = {{}, {.effects = {0}}, {.effects = {1}}};
+  std::vector<std::vector<StrengthPrior>> priors;
+  for (const auto& [low, high] : {std::pair{0.1, 20.0}, std::pair{0.4, 5.0}, std::pair{0.8, 2.5}}) {
+    priors.emplace_back(
+        2, StrengthPrior{.low = low, .high = high, .negative_low = low, .negative_high = high / 2});
+  }
+  space.strength = priors[0];
+  const auto together =
+      ModelEvidencesUnder({{&set_, z_}}, space, priors, {.sampling = {.seed = 5}});
+  ASSERT_TRUE(together.ok()) << together.status();
+  double largest = 0;
+  for (std::size_t w = 0; w < 3; ++w) {
+    space.strength = priors[w];
+    const auto alone = ModelEvidences({{&set_, z_}}, space, {.sampling = {.seed = 9}});
+    ASSERT_TRUE(alone.ok()) << alone.status();
+    for (int effect = -1; effect < 2; ++effect) {
+      const double exact = Quadrature(effect, priors[w][0]);
+      const auto place = static_cast<std::size_t>(effect + 1);
+      for (const ModelEvidence& model : {(*alone)[place], (*together)[w][place]}) {
+        largest = std::max(largest, std::abs(model.evidence.log_evidence - exact));
+        EXPECT_NEAR(model.evidence.log_evidence, exact, 0.05)
+            << "effect " << effect << ", width " << w;
+        EXPECT_LT(model.evidence.standard_error, 0.04);
+        EXPECT_GT(model.draws.rows(), 190);
+        if (effect < 0) continue;
+        EXPECT_GE(model.draws.strength.col(effect).cwiseAbs().minCoeff(),
+                  priors[w][0].low * (1 - 1e-12));
+        EXPECT_LE(model.draws.strength.col(effect).maxCoeff(), priors[w][0].high * (1 + 1e-12));
+      }
+    }
+  }
+  std::cout << "largest error of an evidence " << largest << "\n";
+  EXPECT_THAT(ModelEvidencesUnder({{&set_, z_}}, space, priors).status().message(),
+              HasSubstr("is not within the space's"));
+}
+
+// Everything linear and normal, so that the evidence itself has a closed form: base parameter
+// normal, its slope known from 400 runs, packings in the measurement's covariance.
+TEST(LinearEvidence, IsTheClosedForm) {
+  CoordinateToy toy({.parameters = 1, .effects = 1, .coordinates = 5, .seed = 21, .degree = 1});
+  const DiagnosisSet set = SetOf(toy, toy.Runs(396, 4, 100));
+  ModelSpace space = ToySpace(toy);
+  space.models = {{}};
+  const double sd = 0.1, mean = 0.2;
+  space.log_base_prior = [&](const Eigen::MatrixXd& base) {
+    return Eigen::VectorXd(-0.5 * ((base.col(0).array() - mean) / sd).square() -
+                           std::log(sd * std::sqrt(2 * M_PI) / 2));
+  };
+  const Eigen::MatrixXd at = Eigen::MatrixXd::Constant(1, 1, mean);
+  const DesignPoints centre{
+      .base = at, .strength = Eigen::MatrixXd::Zero(1, 1), .shape = Eigen::MatrixXd(1, 0)};
+  const EmulatorPrediction prediction = set.emulator().Predict(centre);
+  const Eigen::VectorXd slope = set.emulator().BaseDerivative(at, 0).row(0);
+  Eigen::MatrixXd v = sd * sd * slope * slope.transpose();
+  v.diagonal() +=
+      set.errors().specimen + set.errors().noise + prediction.variance.row(0).transpose();
+  for (int i = 0; i < 5; ++i) {
+    const Eigen::VectorXd r = Eigen::LLT<Eigen::MatrixXd>(v).matrixL() * toy.Normal(5, 1);
+    const Eigen::VectorXd z = prediction.mean.row(0).transpose() + r;
+    const double closed =
+        -0.5 * r.dot(v.inverse() * r) - 0.5 * std::log((2 * M_PI * v).determinant());
+    const auto found = ModelEvidences({{&set, z}}, space, {.sampling = {.seed = 1}});
+    ASSERT_TRUE(found.ok());
+    EXPECT_NEAR((*found)[0].evidence.log_evidence, closed, 0.05);
+    std::cout << "closed form " << closed << ", found " << (*found)[0].evidence.log_evidence
+              << "\n";
+  }
+}
+
+// A discrepancy along coordinates that no parameter moves, against quadrature over tau.
+TEST_F(EffectEvidence, NoneOfTheseIsThatOfQuadrature) {
+  ModelSpace space = ToySpace(toy_);
+  space.models = {{.none_of_these = true}};
+  Eigen::VectorXd z = z_;
+  z[2] += 6;
+  const auto found = ModelEvidences({{&set_, z}}, space, {.sampling = {.seed = 9}});
+  ASSERT_TRUE(found.ok());
+  const int n = 80;
+  std::vector<double> logs;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const DesignPoints point{.base = Eigen::MatrixXd::Constant(1, 1, -1 + 2 * (i + 0.5) / n),
+                               .strength = Eigen::MatrixXd::Zero(1, 2),
+                               .shape = Eigen::MatrixXd(1, 0)};
+      const double tau = space.tau_low * std::pow(space.tau_high / space.tau_low, (j + 0.5) / n);
+      logs.push_back(
+          set_.LogDensityWithDiscrepancy(z, point, Eigen::VectorXd::Constant(1, tau))[0] -
+          2 * std::log(n));
+    }
+  }
+  EXPECT_NEAR((*found)[0].evidence.log_evidence, SumOfLogs(logs), 0.05);
+}
+
+// Evidence averaged over realisations of the emulator is the evidence with its variance.
+TEST_F(EffectEvidence, RealisationsHaveTheEvidenceAsTheirMean) {
+  ModelSpace space = ToySpace(toy_);
+  const auto found = ModelEvidences({{&set_, z_}}, space,
+                                    {.sampling = {.seed = 9}, .draws = 400, .realisations = 400});
+  ASSERT_TRUE(found.ok());
+  for (const ModelEvidence& model : *found) {
+    if (model.model.none_of_these) continue;
+    const Eigen::VectorXd log_ratio = model.realised.array() - model.evidence.log_evidence;
+    const double mean = LogSumExp(log_ratio) - std::log(400.0);
+    const double error =
+        std::sqrt((log_ratio.array().exp() - std::exp(mean)).square().mean() / 400) /
+        std::exp(mean);
+    EXPECT_LT(std::abs(mean), 4 * error + 0.05);
+  }
+}
+
+TEST_F(EffectEvidence, SameSeedSameBitsAndMoreModelsMoveNone) {
+  ModelSpace space = ToySpace(toy_);
+  const auto all = ModelEvidences({{&set_, z_}}, space, {.sampling = {.seed = 4}});
+  space.models.resize(2);
+  const auto two = ModelEvidences({{&set_, z_}}, space, {.sampling = {.seed = 4}});
+  ASSERT_TRUE(all.ok() && two.ok());
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ((*all)[i].evidence.log_evidence, (*two)[i].evidence.log_evidence);
+    EXPECT_EQ((*all)[i].draws.base, (*two)[i].draws.base);
+    EXPECT_EQ((*all)[i].realised, (*two)[i].realised);
+  }
+}
+
+// Densities of two specimens, whose emulator is one, and of their mean differ by what points share.
+TEST_F(EffectEvidence, SpecimensOfASetShareTheEmulatorsErrors) {
+  const Eigen::VectorXd other = z_ + Eigen::Vector4d(0.5, -1, 0.2, 0.8);
+  const Eigen::VectorXd own = set_.errors().specimen + set_.errors().noise;
+  const auto joint = [&](const DesignPoints& point) {
+    const EmulatorPrediction p = set_.emulator().Predict(point);
+    double result = 0;
+    for (Index c = 0; c < 4; ++c) {
+      const double shared = p.variance(0, c);
+      const Eigen::Matrix2d v{{own[c] + shared, shared}, {shared, own[c] + shared}};
+      const Eigen::Vector2d r(z_[c] - p.mean(0, c), other[c] - p.mean(0, c));
+      result += -0.5 * r.dot(v.inverse() * r) - 0.5 * std::log(v.determinant());
+    }
+    return result;
+  };
+  const Eigen::VectorXd mean = 0.5 * (z_ + other);
+  const DesignPoints points{.base = Eigen::MatrixXd{{0.1}, {-0.6}},
+                            .strength = Eigen::MatrixXd{{3, 0}, {0, -1}},
+                            .shape = Eigen::MatrixXd(2, 0)};
+  const Eigen::VectorXd found = set_.LogDensity(mean, points, 2);
+  EXPECT_NEAR(found[0] - found[1], joint(RowsOf(points, {0})) - joint(RowsOf(points, {1})), 1e-9);
+}
+
+TEST(ModelSpaceTest, ListsModelsAndSharesThePrior) {
+  const std::vector<EffectModel> models = AllModels(4, {{2, 1}}, {{0, 1, 3}});
+  EXPECT_EQ(models.size(), 1u + 4 + 5 + 1 + 1);
+  CoordinateToy toy({.effects = 4});
+  ModelSpace space = ToySpace(toy);
+  space.models = models;
+  ASSERT_TRUE(space.Validate().ok());
+  const Eigen::VectorXd prior = space.LogPrior().array().exp();
+  EXPECT_NEAR(prior.sum(), 1, 1e-12);
+  EXPECT_NEAR(prior[0] / prior[1], 4, 1e-12);  // 0.4 for it, 0.4 for four singles
+  EXPECT_NEAR(prior[5] * 5 / (prior[1] * 4), 0.25, 1e-12);
+  space.strength[1].high = 0.1;
+  EXPECT_THAT(space.Validate().message(), HasSubstr("strengths of effect 1 range from 0.4 to 0.1"));
+}
+
+// An effect under two names: nothing tells them apart.
+TEST(EffectAnswer, DuplicatedEffectIsSharedAndNeverNamed) {
+  CoordinateToy single({.parameters = 1, .effects = 2, .coordinates = 5, .seed = 30, .main = 4});
+  const EmulatorData half = single.Runs(30, 40, 5);
+  // Effect 2 is effect 0 once more: its runs are those of effect 0.
+  std::vector<DesignEffect> effects = single.features().effects();
+  effects.push_back(effects[0]);
+  const EffectFeatures features(1, effects, 2);
+  EmulatorData data = half;
+  const Index n = half.points.rows();
+  data.points.base = half.points.base.replicate(2, 1);
+  data.points.shape = Eigen::MatrixXd(2 * n, 0);
+  data.points.strength = Eigen::MatrixXd::Zero(2 * n, 3);
+  data.points.strength.topLeftCorner(n, 2) = half.points.strength;
+  data.points.strength.block(n, 1, n, 1) = half.points.strength.col(1);
+  data.points.strength.block(n, 2, n, 1) = half.points.strength.col(0);
+  data.outputs = half.outputs.replicate(2, 1);
+  data.packing.insert(data.packing.end(), half.packing.begin(), half.packing.end());
+  auto emulator = FeatureEmulator::Fit(features, data);
+  ASSERT_TRUE(emulator.ok()) << emulator.status();
+  SpecimenErrors errors{.specimen = emulator->specimen(),
+                        .run = emulator->variances().run,
+                        .noise = Eigen::VectorXd::Constant(5, 0.2),
+                        .staging = Eigen::MatrixXd(5, 0),
+                        .share = 1,
+                        .freedom = 20};
+  const DiagnosisSet set(*std::move(emulator), std::move(errors));
+  ModelSpace space = ToySpace(single);
+  space.effects = effects;
+  space.strength.resize(3, space.strength[0]);
+  space.models = AllModels(3, {{0, 2}});
+  const DesignPoints truth{.base = Eigen::MatrixXd{{0.1}},
+                           .strength = Eigen::MatrixXd{{4, 0, 0}},
+                           .shape = Eigen::MatrixXd(1, 0)};
+  const Eigen::VectorXd z = set.emulator().PredictMean(truth).row(0);
+  const auto evidence = ModelEvidences({{&set, z}}, space);
+  ASSERT_TRUE(evidence.ok());
+  const auto p = ProbabilitiesOf(*evidence, space);
+  ASSERT_TRUE(p.ok());
+  EXPECT_GT(p->inclusion[0] + p->inclusion[2], 0.95);
+  EXPECT_NEAR(p->inclusion[0], p->inclusion[2], 0.05);  // two sampling errors of 0.02 each
+  const Eigen::MatrixXd angles =
+      SignatureAngles({&set}, truth.base.row(0), Eigen::Vector3d(2, 2, 2));
+  EXPECT_LT(angles(0, 2), 1);
+  const std::vector<std::vector<int>> families = Families(angles, {});
+  const auto answer = AnswerOf({.widths = {*p},
+                                .beyond = {Eigen::Vector3d::Zero()},
+                                .families = families,
+                                .verification = Eigen::Vector3d::Ones()},
+                               space.models);
+  ASSERT_TRUE(answer.ok());
+  EXPECT_THAT(answer->alone, ElementsAre());
+  ASSERT_EQ(answer->families.size(), 1u);
+  EXPECT_THAT(answer->families[0].effects, ElementsAre(0, 2));
+  EXPECT_GE(answer->set.size(), 2u);
+}
+
+// What is beyond the design is not named, and neither is what one prior alone makes probable.
+TEST(EffectAnswer, BeyondTheDesignNothingIsNamed) {
+  CoordinateToy toy({.parameters = 1, .effects = 2, .coordinates = 5, .seed = 31, .main = 4});
+  const EmulatorData data = toy.Runs(40, 60, 6);
+  const DiagnosisSet set = SetOf(toy, data, 20);
+  ModelSpace space = ToySpace(toy, 30);
+  const DesignRange range = RangeOf(data.points);
+  EXPECT_LE(range.strength_high[0], 5);
+  const auto answer_at = [&](double strength) {
+    const DesignPoints truth{.base = Eigen::MatrixXd{{0.1}},
+                             .strength = Eigen::MatrixXd{{strength, 0}},
+                             .shape = Eigen::MatrixXd(1, 0)};
+    const Eigen::VectorXd z = toy.Mean(truth).row(0);
+    const auto evidence = ModelEvidences({{&set, z}}, space);
+    EXPECT_TRUE(evidence.ok());
+    const auto p = ProbabilitiesOf(*evidence, space);
+    EXPECT_TRUE(p.ok());
+    EXPECT_GT(p->inclusion[0], 0.95) << strength;
+    return AnswerOf({.widths = {*p},
+                     .beyond = {BeyondDesign(*evidence, *p, range)},
+                     .families = {{0}, {1}},
+                     .verification = Eigen::Vector2d::Ones()},
+                    space.models);
+  };
+  const auto inside = answer_at(2.5), outside = answer_at(7);
+  ASSERT_TRUE(inside.ok() && outside.ok());
+  EXPECT_THAT(inside->alone, ElementsAre(0));
+  EXPECT_THAT(outside->alone, ElementsAre());
+  ASSERT_EQ(outside->not_named.size(), 1u);
+  EXPECT_EQ(outside->not_named[0].second, NotNamed::kBeyondDesign);
+}
+
+EffectProbabilities Stated(const Eigen::Vector4d& model) {
+  // Base, effect 0, effect 1, none.
+  return {.model = model,
+          .inclusion = model.segment(1, 2),
+          .share = model.segment(1, 2),
+          .adequate = model[0],
+          .none_of_these = model[3],
+          .inclusion_sd = Eigen::Vector2d::Zero()};
+}
+
+TEST(EffectAnswer, LevelsAreThoseStated) {
+  const std::vector<EffectModel> models = {
+      {}, {.effects = {0}}, {.effects = {1}}, {.none_of_these = true}};
+  AnswerBasis basis{.widths = {Stated({0.01, 0.97, 0.01, 0.01})},
+                    .beyond = {Eigen::Vector2d::Zero()},
+                    .families = {{0, 1}},
+                    .verification = Eigen::Vector2d::Ones()};
+  auto answer = AnswerOf(basis, models);
+  ASSERT_TRUE(answer.ok());
+  EXPECT_THAT(answer->alone, ElementsAre(0));
+  EXPECT_FALSE(answer->sure);  // below 0.99
+  EXPECT_EQ(answer->set.size(), 1u);
+  EXPECT_NEAR(answer->families.at(0).probability, 0.98, 1e-12);
+
+  basis.verification[0] = 0.001;
+  answer = AnswerOf(basis, models);
+  EXPECT_THAT(answer->alone, ElementsAre());
+  EXPECT_EQ(answer->not_named.at(0).second, NotNamed::kVerification);
+
+  basis.verification[0] = 1;
+  basis.widths.push_back(Stated({0.02, 0.94, 0.02, 0.02}));
+  basis.beyond.emplace_back(Eigen::Vector2d::Zero());
+  answer = AnswerOf(basis, models);
+  EXPECT_THAT(answer->alone, ElementsAre());
+  EXPECT_EQ(answer->not_named.at(0).second, NotNamed::kOtherPrior);
+
+  basis.widths = {Stated({0.1, 0.2, 0.1, 0.6})};
+  basis.beyond.resize(1);
+  answer = AnswerOf(basis, models);
+  EXPECT_TRUE(answer->unexplained);
+  EXPECT_EQ(answer->set.size(), 4u);
+  EXPECT_EQ(answer->set[0].effect, CredibleEntry::kNoneOfThese);
+}
+
+TEST(EffectAnswer, FamiliesHoldOnlyPairsThatAreAlike) {
+  // 0 and 1, 1 and 2 are alike, 0 and 2 are not; 3 is kin of 2.
+  const Eigen::MatrixXd angles{{0, 15, 40, 80}, {15, 0, 20, 80}, {40, 20, 0, 80}, {80, 80, 80, 0}};
+  const auto families = Families(angles, {{2, 3}});
+  EXPECT_THAT(families, ElementsAre(ElementsAre(0, 1), ElementsAre(2, 3)));
+}
+
+TEST_F(EffectEvidence, StrengthOfLambdaIsSeenAsStated) {
+  const ModelSpace space = ToySpace(toy_);
+  const Eigen::RowVectorXd base = Eigen::RowVectorXd::Constant(1, 0.1);
+  for (const double lambda : {4.0, 21.0}) {
+    const double strength = StrengthOfLambda(
+        {&set_}, space, base, {.effect = 0, .sign = 1, .lambda = lambda, .largest = 200});
+    const DesignPoints point{
+        .base = base, .strength = Eigen::MatrixXd{{strength, 0}}, .shape = Eigen::MatrixXd(1, 0)};
+    EXPECT_NEAR(SquaredDistanceFromBase({&set_}, space, point), lambda, 0.05 * lambda);
+  }
+}
+
+TEST_F(EffectEvidence, RefusesWhatDoesNotFit) {
+  const ModelSpace space = ToySpace(toy_);
+  EXPECT_THAT(ModelEvidences({{&set_, Eigen::VectorXd::Zero(3)}}, space).status().message(),
+              HasSubstr("has 3 coordinates, its set 4"));
+  EXPECT_THAT(ModelEvidences({}, space).status().message(), HasSubstr("nothing is measured"));
+}
+
+}  // namespace
+}  // namespace calib::inference
