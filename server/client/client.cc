@@ -28,7 +28,7 @@ constexpr std::chrono::minutes kLongestStream{10};
 
 /// A server that is slow to answer (a disk that stalls, a machine that sleeps) or is started again
 /// is asked again, so that hours of a diagnosis do not end with one late answer. Every call may be
-/// made twice: those that change something carry a request_id or a digest.
+/// made twice: those that change something carry a request_id, a digest or the number of a batch.
 constexpr int kLateAnswers = 10;
 constexpr int kLostConnections = 2;
 constexpr std::chrono::minutes kReturn{1};       // of a server that was lost
@@ -234,6 +234,10 @@ absl::StatusOr<std::string> Client::GetBlob(const std::string& digest) {
 
 absl::StatusOr<v1::SubmitReply> Client::Submit(const v1::SubmitRequest& request) {
   return Call<v1::SubmitReply>(impl_->connection, &Stub::Submit, request);
+}
+
+absl::StatusOr<v1::CampaignStatus> Client::AddRuns(const v1::AddRunsRequest& request) {
+  return Call<v1::CampaignStatus>(impl_->connection, &Stub::AddRuns, request);
 }
 
 absl::StatusOr<std::vector<v1::CampaignStatus>> Client::List() {

@@ -40,6 +40,7 @@ class Client {
   absl::Status PutBlob(const std::string& content);
   absl::StatusOr<std::string> GetBlob(const std::string& digest);
   absl::StatusOr<v1::SubmitReply> Submit(const v1::SubmitRequest& request);
+  absl::StatusOr<v1::CampaignStatus> AddRuns(const v1::AddRunsRequest& request);
   absl::StatusOr<std::vector<v1::CampaignStatus>> List();
   absl::StatusOr<v1::CampaignStatus> Show(const std::string& campaign);
   /// Calls `seen` with every status until the campaign ends.

@@ -43,7 +43,7 @@ std::string WhatToDo(const v1::CampaignStatus& status) {
 // Runs that another verb made for a purpose of its own say nothing by themselves.
 std::string WhyNoCalibration(const v1::CampaignStatus& status) {
   const bool trial = messages::PurposeOf(status) == campaign::DerivedFor::kWarmFit ||
-                     messages::MethodOf(status) == campaign::Method::kTable;
+                     messages::RunsRowsOnly(status);
   if (!trial || status.parent().empty()) return "";
   return absl::StrCat(status.campaign(), " is no calibration but a trial (", status.purpose(),
                       ") made of ", status.parent(), "; ask ", status.parent(), " instead");
@@ -160,19 +160,35 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
         campaign::ToString({problem.file(), problem.line(), problem.key(), problem.message()})));
   }
   const std::string& campaign = reply->campaign();
-  ASSIGN_OR_RETURN(auto status, session_.client().Show(campaign));
+  ASSIGN_OR_RETURN(const auto status, session_.client().Show(campaign));
+  RETURN_IF_ERROR(GoOn(status));
+  return campaign;
+}
+
+absl::Status Laboratory::GoOn(const v1::CampaignStatus& status) {
+  if (messages::IsOver(status)) return absl::OkStatus();
+  const std::string& campaign = status.campaign();
   if (messages::StateOf(status) == CampaignState::kPaused) {
     std::cerr << "campaign " << campaign << " was paused (" << status.reason() << "); it goes on\n";
-    ASSIGN_OR_RETURN(status, OnceThereIsRoom(session_, campaign,
-                                             [&] { return session_.client().Resume(campaign); }));
+    const auto resumed =
+        OnceThereIsRoom(session_, campaign, [&] { return session_.client().Resume(campaign); });
+    RETURN_IF_ERROR(resumed.status());
   }
-  if (!messages::IsOver(status)) {
-    if (!workers_started_ && !choice_.workers && !choice_.state.empty()) {
-      RETURN_IF_ERROR(session_.UseWorkers(std::nullopt));
-    }
-    workers_started_ = true;
+  if (!workers_started_ && !choice_.workers && !choice_.state.empty()) {
+    RETURN_IF_ERROR(session_.UseWorkers(std::nullopt));
   }
-  return campaign;
+  workers_started_ = true;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<report::CampaignView> Laboratory::Grow(const v1::AddRunsRequest& batch,
+                                                      const std::string& what) {
+  const auto status =
+      OnceThereIsRoom(session_, batch.campaign(), [&] { return session_.client().AddRuns(batch); });
+  RETURN_IF_ERROR(ServersLimit(status.status()));
+  RETURN_IF_ERROR(GoOn(*status));
+  RETURN_IF_ERROR(Wait(batch.campaign(), what));
+  return LoadView(session_.client(), batch.campaign());
 }
 
 absl::StatusOr<report::CampaignView> Laboratory::Run(

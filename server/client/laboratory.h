@@ -38,11 +38,18 @@ class Laboratory {
                                            const std::string& yaml, const std::string& what,
                                            const std::map<std::string, std::string>& further = {});
 
+  /// Adds a batch of runs to a design and waits for their end, progress on standard error; a batch
+  /// that is there already is waited for alone. Errors: those of the rpc AddRuns, and as Run().
+  absl::StatusOr<report::CampaignView> Grow(const v1::AddRunsRequest& batch,
+                                            const std::string& what);
+
   /// Whether the text is a campaign without a problem; files as for Run().
   bool Accepts(const report::CampaignView& parent, const std::string& yaml,
                const std::map<std::string, std::string>& further);
 
  private:
+  /// Of a campaign that is not over: resumes it if it was paused, and starts local workers.
+  absl::Status GoOn(const v1::CampaignStatus& status);
   absl::Status Wait(const std::string& campaign, const std::string& what);
 
   Session& session_;

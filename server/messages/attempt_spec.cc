@@ -131,11 +131,10 @@ v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& 
 }
 
 v1::AttemptSpec SpecOf(const campaign::Campaign& campaign, int experiment,
-                       const std::vector<double>& values, int sample) {
+                       const campaign::RunOf& run) {
   const campaign::Experiment& measured = campaign.experiments[static_cast<std::size_t>(experiment)];
-  const auto specimen =
-      static_cast<std::size_t>(campaign::StreamOf(campaign, sample)) % measured.specimens.size();
-  v1::AttemptSpec spec = ToSpec(campaign::MakeScenario(campaign, measured, values, sample),
+  const auto specimen = static_cast<std::size_t>(run.stream) % measured.specimens.size();
+  v1::AttemptSpec spec = ToSpec(campaign::MakeScenario(campaign, measured, run),
                                 measured.specimens[specimen], measured.name);
   for (const auto& [name, file] : measured.meshes) {
     v1::Mesh& message = *spec.add_meshes();

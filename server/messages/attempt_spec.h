@@ -15,9 +15,9 @@ namespace calib::messages {
 v1::AttemptSpec ToSpec(const dem::Scenario& scenario, const campaign::Specimen& specimen,
                        const std::string& experiment);
 
-/// The spec of one evaluation. values: SI, in the order of campaign.parameters.
+/// The spec of one evaluation.
 v1::AttemptSpec SpecOf(const campaign::Campaign& campaign, int experiment,
-                       const std::vector<double>& values, int sample);
+                       const campaign::RunOf& run);
 
 /// SHA-256 of everything that determines the states: the spec without its name and thread count,
 /// and the version of the mechanics.

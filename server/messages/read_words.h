@@ -23,6 +23,11 @@ inline std::optional<campaign::Phase> PhaseOf(const v1::CampaignStatus& status) 
 inline std::optional<campaign::Method> MethodOf(const v1::CampaignStatus& status) {
   return campaign::ValueOf(campaign::kMethodWords, status.method());
 }
+/// True where runs are made and nothing is inferred from them by the server.
+inline bool RunsRowsOnly(const v1::CampaignStatus& status) {
+  const auto method = MethodOf(status);
+  return method && campaign::RunsRowsOnly(*method);
+}
 inline std::optional<campaign::DerivedFor> PurposeOf(const v1::CampaignStatus& status) {
   return campaign::ToDerivedFor(status.purpose());
 }

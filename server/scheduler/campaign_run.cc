@@ -58,7 +58,7 @@ absl::StatusOr<std::unique_ptr<CampaignRun>> CampaignRun::Load(store::Reader& re
 }
 
 absl::Status CampaignRun::Reload(store::Reader& reader) {
-  parameters_.clear();
+  samples_.clear();
   stop_below_.clear();
   arrived_.clear();
   evaluations_.clear();
@@ -77,7 +77,7 @@ void CampaignRun::Fill(CampaignRun&& reloaded) {
   ++changes_;
   evaluations_ = std::move(reloaded.evaluations_);
   by_status_ = std::move(reloaded.by_status_);
-  parameters_ = std::move(reloaded.parameters_);
+  samples_ = std::move(reloaded.samples_);
   stop_below_ = std::move(reloaded.stop_below_);
   arrived_ = std::move(reloaded.arrived_);
 }
@@ -109,7 +109,7 @@ absl::Status CampaignRun::Extend(store::Reader& reader) {
     return !IsOfRunningIteration(entry.first) && open.count(entry.first) == 0;
   });
   for (const store::SampleRecord& sample : samples) {
-    if (!parameters_.emplace(sample.sample, sample.parameters).second) {
+    if (!samples_.emplace(sample.sample, ToRun(definition_->campaign, sample)).second) {
       continue;
     }
     if (!std::isnan(sample.stop_below)) {
@@ -178,8 +178,8 @@ CampaignRun::Evaluation* CampaignRun::Find(const EvaluationKey& key) {
 void CampaignRun::FindOtherMechanics() {
   for (const auto& [key, evaluation] : evaluations_) {
     if (IsForGood(evaluation.status) || evaluation.digest.empty()) continue;
-    std::string digest = messages::SpecDigest(messages::SpecOf(
-        definition_->campaign, key.experiment, parameters_.at(key.sample), key.sample));
+    std::string digest = messages::SpecDigest(
+        messages::SpecOf(definition_->campaign, key.experiment, samples_.at(key.sample)));
     if (digest != evaluation.digest) of_other_mechanics_[key] = std::move(digest);
   }
 }
@@ -388,7 +388,7 @@ std::set<int> CampaignRun::EndedForPause() const {
   const bool overlaps = definition_->campaign.method == campaign::Method::kSurrogateMsrs;
   const auto most = static_cast<std::size_t>(record_.submitted.samples);
   std::set<int> ended;
-  for (auto it = parameters_.rbegin(); it != parameters_.rend(); ++it) {
+  for (auto it = samples_.rbegin(); it != samples_.rend(); ++it) {
     if (overlaps ? ended.size() == most : !IsOfRunningIteration(it->first)) break;
     if (open.count(it->first) == 0) ended.insert(it->first);
   }

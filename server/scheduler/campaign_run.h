@@ -77,7 +77,7 @@ class CampaignRun {
   void BeginAnew(const store::EvaluationKey& key, const std::string& digest);
   /// A plan is made of what is known now. again: and one more after it, whatever it says.
   void Planned(bool again);
-  const std::vector<double>& Parameters(int sample) const { return parameters_.at(sample); }
+  const campaign::RunOf& RunOfSample(int sample) const { return samples_.at(sample); }
 
   /// Load steps of an experiment's path.
   std::size_t PathLength(int experiment) const {
@@ -150,8 +150,8 @@ class CampaignRun {
   /// Planned by a program with other mechanics and not over when they were read, with their digests
   /// by this one.
   std::map<store::EvaluationKey, std::string> of_other_mechanics_;
-  std::map<int, std::vector<double>> parameters_;  // by sample
-  std::map<int, double> stop_below_;               // samples that may be stopped early
+  std::map<int, campaign::RunOf> samples_;  // by number
+  std::map<int, double> stop_below_;        // samples that may be stopped early
   ArrivedBySample arrived_;
   std::optional<std::size_t> planned_;                 // Results() when a plan was made last
   std::vector<std::map<int, std::size_t>> positions_;  // in the path, by experiment and load step

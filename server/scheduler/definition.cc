@@ -96,6 +96,11 @@ campaign::FileReader StoredFiles(store::Reader& reader,
   };
 }
 
+campaign::RunOf ToRun(const campaign::Campaign& campaign, const store::SampleRecord& sample) {
+  return {.values = sample.parameters,
+          .stream = sample.stream.value_or(campaign::StreamOf(campaign, sample.sample))};
+}
+
 std::shared_ptr<const Definition> MakeDefinition(campaign::Campaign campaign) {
   inference::DataSet data = campaign::MakeDataSet(campaign);
   inference::JointPrior priors = campaign::Priors(campaign);

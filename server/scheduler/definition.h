@@ -70,6 +70,9 @@ struct Definition {
 campaign::FileReader StoredFiles(store::Reader& reader,
                                  const std::map<std::string, std::string>& files);
 
+/// What a stored sample is run with.
+campaign::RunOf ToRun(const campaign::Campaign& campaign, const store::SampleRecord& sample);
+
 /// FAILED_PRECONDITION when what was accepted once is refused by this program (the message has the
 /// first problem).
 absl::StatusOr<std::shared_ptr<const Definition>> LoadDefinition(

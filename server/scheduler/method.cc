@@ -12,7 +12,8 @@ std::unique_ptr<Method> MakeMethod(const Definition& definition) {
       return MakeSurrogateMethod(definition);
     case campaign::Method::kSqmc:
     case campaign::Method::kIterativeBayesianFilter:
-    case campaign::Method::kTable:  // the planner runs its rows and concludes nothing
+    case campaign::Method::kTable:  // the planner runs their rows and concludes nothing
+    case campaign::Method::kDesign:
       break;
   }
   return MakeFilterMethod(definition);

@@ -13,7 +13,6 @@
 #include "server/scheduler/answer.h"
 #include "server/scheduler/decisions.h"
 #include "server/scheduler/early_stopping.h"
-#include "server/scheduler/held_out.h"
 #include "server/scheduler/history.h"
 #include "server/scheduler/method.h"
 #include "server/scheduler/posterior_record.h"
@@ -57,7 +56,10 @@ class Planner {
     plan_.phase = record_.progress.phase;
     plan_.converged = record_.progress.converged;
     absl::Status status;
-    if (history_.iterations.empty()) {
+    const bool runs_rows_only = campaign::RunsRowsOnly(campaign_.method);
+    if (history_.iterations.empty() && runs_rows_only && !campaign_.table.has_value()) {
+      Finish();  // a design to which nothing has been added
+    } else if (history_.iterations.empty()) {
       status = Begin(campaign_.table.has_value() ? TableBatch() : MakeMethod(definition_)->First());
       if (DecidesAtOnce(definition_)) {
         plan_.log.emplace_back(
@@ -71,10 +73,10 @@ class Planner {
       status = GoOn();
     } else if (history_.open > 0) {
       return std::move(plan_);  // nothing to say
-    } else if (plan_.phase == campaign::Phase::kCalibrating && !campaign_.table.has_value()) {
+    } else if (plan_.phase == campaign::Phase::kCalibrating && !runs_rows_only) {
       status = Conclude(!BudgetSpent() && !replicating_);
     } else {
-      Finish();  // the runs of a table are all there is
+      Finish();  // the runs are all there is
     }
     if (!status.ok()) {
       return status;

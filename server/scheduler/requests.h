@@ -1,7 +1,10 @@
 #pragma once
 // The evaluations that a sample needs: to be run, done before under the same digest, refused or
-// taken from tables of runs made elsewhere.
+// taken from tables of runs made elsewhere. And the samples that held-out experiments are run for:
+// those that carry the posterior.
 
+#include <Eigen/Core>
+#include <cstddef>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -34,5 +37,19 @@ class Requests {
   store::Reader& reader_;
   Plan& plan_;
 };
+
+/// Most samples that held-out experiments are run for.
+inline constexpr std::size_t kHeldOutRuns = 20;
+
+/// log_weights: normalised, of all samples. Positions of the samples with the largest weights
+/// (ties: the earlier sample), no more than hold 99 % of the weight.
+std::vector<std::size_t> Heaviest(const std::vector<double>& log_weights);
+
+/// Positions, ascending, of the samples on which kHeldOutRuns evenly spaced shares of the weight
+/// fall.
+std::vector<std::size_t> EvenlyByWeight(const std::vector<double>& log_weights);
+
+/// Rows of draws (n x d), evenly spaced in their order: `most` or kHeldOutRuns of them, or all.
+Eigen::MatrixXd EvenlySpaced(const Eigen::MatrixXd& draws, std::size_t most);
 
 }  // namespace calib::scheduler

@@ -312,14 +312,21 @@ void Scheduler::Enqueue(CampaignRun& run) {
   }
 }
 
+absl::Status Scheduler::WhyNoMore() const {
+  if (runs_.size() + loading_.size() < static_cast<std::size_t>(options_.most_campaigns)) {
+    return absl::OkStatus();
+  }
+  return absl::ResourceExhaustedError(
+      absl::StrCat(options_.most_campaigns,
+                   " campaigns are not over, and the server takes no more (calibd "
+                   "--max-campaigns): wait for one to finish, or cancel one"));
+}
+
 void Scheduler::Submit(store::NewCampaign submitted, std::map<std::string, std::string> files,
                        const std::string& request_id, const store::RequestRecord& request,
                        std::function<void(absl::StatusOr<std::string>)> reply) {
-  if (runs_.size() + loading_.size() >= static_cast<std::size_t>(options_.most_campaigns)) {
-    reply(absl::ResourceExhaustedError(
-        absl::StrCat(options_.most_campaigns,
-                     " campaigns are not over, and the server takes no more (calibd "
-                     "--max-campaigns): wait for one to finish, or cancel one")));
+  if (const absl::Status full = WhyNoMore(); !full.ok()) {
+    reply(full);
     return;
   }
   submitted.id = ++last_campaign_;

@@ -15,6 +15,7 @@
 #include "calib/v1/campaign.pb.h"
 #include "calib/v1/worker.pb.h"
 #include "server/scheduler/campaign_run.h"
+#include "server/scheduler/growth.h"
 #include "server/scheduler/leases/lease_table.h"
 #include "server/scheduler/leases/worker_table.h"
 #include "server/scheduler/plan.h"
@@ -81,6 +82,10 @@ class Scheduler {
   void Submit(store::NewCampaign submitted, std::map<std::string, std::string> files,
               const std::string& request_id, const store::RequestRecord& request,
               std::function<void(absl::StatusOr<std::string>)> reply);
+  /// Adds runs to a design (growth.cc): true once they are on the disk, false where the
+  /// same are there already. Errors: those of PlanGrowth(), RESOURCE_EXHAUSTED as for Submit().
+  using GrowthReply = std::function<void(absl::StatusOr<bool>)>;
+  void AddRuns(const NewRuns& runs, const GrowthReply& reply);
   /// FAILED_PRECONDITION when the campaign's state does not allow it. `also` is written with the
   /// change (the request that asked for it); may be empty. A paused campaign's running evaluations
   /// go on to their ends.
@@ -147,7 +152,13 @@ class Scheduler {
   /// What TakeFromOthers has written is taken into memory.
   void Taken(std::int64_t campaign, const std::vector<store::EvaluationKey>& keys);
 
+  // Runs that are added (growth.cc)
+  void Grow(const NewRuns& runs, const GrowthReply& reply);
+  void WriteGrowth(std::int64_t campaign, const Growth& growth, const GrowthReply& reply);
+
   // Campaigns (scheduler.cc)
+  /// RESOURCE_EXHAUSTED when as many campaigns are not over as the server takes.
+  absl::Status WhyNoMore() const;
   void TakeUp(std::int64_t campaign, absl::StatusOr<std::unique_ptr<CampaignRun>> loaded);
   /// Forgets what other mechanics have begun, leases included; the job does so in the store.
   store::Store::Job BeginAnew(CampaignRun& run,

@@ -506,8 +506,8 @@ void Scheduler::Grant(const WorkerEntry& worker, const EvaluationKey& key) {
   }
   v1::ServerMessage message;
   message.mutable_lease()->set_attempt(attempt);
-  *message.mutable_lease()->mutable_spec() = messages::SpecOf(
-      run.definition().campaign, key.experiment, run.Parameters(key.sample), key.sample);
+  *message.mutable_lease()->mutable_spec() =
+      messages::SpecOf(run.definition().campaign, key.experiment, run.RunOfSample(key.sample));
   message.mutable_lease()->mutable_spec()->set_threads(worker.hello.threads_per_slot());
   const CampaignRun::Evaluation& evaluation = *run.Find(key);
   if (evaluation.rest_after.has_value() || !evaluation.held_in.empty()) {

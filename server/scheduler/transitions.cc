@@ -31,6 +31,7 @@ constexpr std::array kTransitions = {
     Transition{S::kPaused, E::kCancel, S::kCancelled},
     Transition{S::kPaused, E::kFail, S::kFailed},  // the computation that ran when it was paused
     Transition{S::kPaused, E::kFinish, S::kFinished},  // likewise
+    Transition{S::kFinished, E::kGrow, S::kRunning},
 };
 
 }  // namespace
@@ -47,6 +48,8 @@ const char* ToString(CampaignEvent event) {
       return "cancel";
     case E::kFinish:
       return "finish";
+    case E::kGrow:
+      return "grow";
     case E::kFail:
       break;
   }

@@ -250,4 +250,41 @@ grpc::ServerUnaryReactor* CampaignsService::AddFinding(Context* context,
                });
 }
 
+absl::StatusOr<scheduler::NewRuns> CampaignsService::RunsToAdd(const v1::AddRunsRequest& request,
+                                                               const Caller& caller) {
+  RETURN_IF_ERROR(core_.WhyNotStore());
+  ASSIGN_OR_RETURN(auto runs, CheckRuns(request));
+  ASSIGN_OR_RETURN(auto reader, core_.Read());
+  ASSIGN_OR_RETURN(const auto record, reader.Campaign(runs.campaign));
+  RETURN_IF_ERROR(MayChange(caller, request.campaign(), record.submitted.owner));
+  return runs;
+}
+
+grpc::ServerUnaryReactor* CampaignsService::AddRuns(Context* context,
+                                                    const v1::AddRunsRequest* request,
+                                                    v1::CampaignStatus* reply) {
+  return Enter(context, Right::kChange, *request,
+               [this, request, reply](Unary* reactor, const Caller& caller) {
+                 core_.Post([this, request, reply, reactor, caller] {
+                   const auto runs = RunsToAdd(*request, caller);
+                   if (!runs.ok()) {
+                     reactor->Finish(rpc::ToGrpc(runs.status()));
+                     return;
+                   }
+                   core_.scheduler().AddRuns(
+                       *runs, [this, reactor, reply, caller,
+                               campaign = runs->campaign](const absl::StatusOr<bool>& added) {
+                         if (!added.ok()) {
+                           reactor->Finish(rpc::ToGrpc(added.status()));
+                           return;
+                         }
+                         if (*added) {
+                           LogChange("add_runs", absl::StrCat("c", campaign), caller);
+                         }
+                         FinishWithStatus(reactor, campaign, reply);
+                       });
+                 });
+               });
+}
+
 }  // namespace calib::service

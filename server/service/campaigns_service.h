@@ -31,6 +31,7 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
 
   grpc::ServerReadReactor<v1::BlobChunk>* PutBlob(Context*, v1::BlobReceipt* reply) override;
   Unary* Submit(Context*, const v1::SubmitRequest*, v1::SubmitReply*) override;
+  Unary* AddRuns(Context*, const v1::AddRunsRequest*, v1::CampaignStatus*) override;
   Unary* List(Context*, const v1::ListRequest*, v1::ListReply*) override;
   Unary* Show(Context*, const v1::CampaignRequest*, v1::CampaignStatus*) override;
   grpc::ServerWriteReactor<v1::CampaignStatus>* Watch(Context*,
@@ -87,6 +88,9 @@ class CampaignsService final : public v1::Campaigns::CallbackService {
   /// On the strand: what AddFinding() is to store, if it may.
   absl::StatusOr<NewFinding> FindingToKeep(const v1::AddFindingRequest& request,
                                            const Caller& caller);
+  /// On the strand: what AddRuns() is to add, if it may.
+  absl::StatusOr<scheduler::NewRuns> RunsToAdd(const v1::AddRunsRequest& request,
+                                               const Caller& caller);
   Unary* ControlWithStatus(Context* context, const std::string& verb,
                            const v1::ControlRequest* request, v1::CampaignStatus* reply,
                            const Act& act);

@@ -4,11 +4,13 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/campaign/file/text/origin.h"
 #include "server/scheduler/definition.h"
+#include "server/scheduler/growth.h"
 #include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
 #include "server/service/calls.h"
@@ -98,6 +100,18 @@ void CountSamples(const store::CampaignRecord& record,
   }
 }
 
+/// Rows of the last batch of a design.
+int RowsOfBatch(const store::CampaignRecord& record,
+                const std::vector<EvaluationRecord>& evaluations) {
+  std::set<int> rows;
+  for (const EvaluationRecord& evaluation : evaluations) {
+    if (evaluation.key.sample / record.submitted.samples == record.progress.iteration) {
+      rows.insert(evaluation.key.sample);
+    }
+  }
+  return static_cast<int>(rows.size());
+}
+
 struct Concluded {
   std::optional<v1::Posterior> last;  ///< nothing before the first
   double best_misfit = 0;             ///< the smallest of all iterations, 0: none has one
@@ -166,6 +180,10 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_iteration(record.progress.iteration);
   status.set_max_iterations(record.submitted.max_iterations);
   status.set_samples(record.submitted.samples);
+  if (record.submitted.method == campaign::Method::kDesign) {  // what may be added nobody knows
+    status.set_max_iterations(record.progress.iteration + 1);
+    status.set_samples(RowsOfBatch(record, evaluations));
+  }
   CountSamples(record, evaluations, status);
   if (concluded.last.has_value()) {
     status.set_effective_sample_size(concluded.last->ess());
@@ -227,10 +245,10 @@ absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t ca
       }
     }
   }
-  if (found == nullptr && record.submitted.method == campaign::Method::kTable) {
+  if (found == nullptr && campaign::RunsRowsOnly(record.submitted.method)) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "campaign c", campaign,
-        " runs the rows of its table and infers nothing: see samples, states and export"));
+        "campaign c", campaign, " runs the rows of its ", ToString(record.submitted.method),
+        " and infers nothing: see samples, states and export"));
   }
   if (found == nullptr) {
     return absl::FailedPreconditionError(
@@ -264,6 +282,9 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
     if (iteration.proposal == scheduler::kHeldOutDraws) {
       purposes[iteration.number] = SamplePurpose::kDraw;
     }
+    if (record.submitted.method == campaign::Method::kDesign) {
+      purposes[iteration.number] = scheduler::StageIn(iteration.proposal);
+    }
   }
   auto statuses = StatusBySample(evaluations);
   std::vector<v1::Sample> messages;
@@ -279,6 +300,9 @@ absl::StatusOr<std::vector<v1::Sample>> SamplesOf(store::Reader& reader, std::in
     const auto made = attempts.find(sample.sample);
     message.set_purpose(ToString(purposes[sample.iteration]));
     message.set_attempts(made == attempts.end() ? 0 : made->second);
+    if (sample.stream.has_value()) {
+      message.set_stream(*sample.stream);
+    }
   }
   return messages;
 }

@@ -99,9 +99,14 @@ absl::Status StartLog(const std::string& file) {
     close(open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, S_IRUSR | S_IWUSR));
   }
   try {
-    auto logger =
-        file.empty() ? spdlog::stderr_logger_mt("calibd") : spdlog::basic_logger_mt("calibd", file);
-    spdlog::drop("calibd");  // kept by the default logger; the name is free for the next server
+    // Not from spdlog's factories, which refuse a name that the server before still has here.
+    spdlog::sink_ptr sink;
+    if (file.empty()) {
+      sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
+    } else {
+      sink = std::make_shared<spdlog::sinks::basic_file_sink_mt>(file);
+    }
+    auto logger = std::make_shared<spdlog::logger>("calibd", std::move(sink));
     spdlog::set_default_logger(std::move(logger));
   } catch (const spdlog::spdlog_ex& error) {
     return absl::ResourceExhaustedError(absl::StrCat("log: ", error.what()));

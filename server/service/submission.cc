@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "calib/return_if_error.h"
 #include "proto/rpc/check_message.h"
 #include "proto/rpc/digest.h"
 #include "server/campaign/file/campaign_file.h"
+#include "server/campaign/model/race.h"
 #include "server/messages/attempt_spec.h"
 #include "server/scheduler/definition.h"
 #include "server/service/queries.h"
@@ -65,18 +67,20 @@ std::vector<campaign::Problem> BeyondRules(const campaign::Campaign& campaign,
   if (campaign.precomputed.has_value()) {
     return {};
   }
-  std::vector<double> middle;
-  for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
-    middle.push_back(parameter.prior.Quantile(0.5));
+  std::vector<campaign::RunOf> runs = {{.values = campaign::MiddleValues(campaign), .stream = 0}};
+  for (const std::string& effect : campaign.race) {
+    runs.push_back({.values = campaign::MiddleValues(campaign, {effect}), .stream = 0});
   }
   for (std::size_t e = 0; e < campaign.experiments.size(); ++e) {
-    const auto spec = messages::SpecOf(campaign, static_cast<int>(e), middle, 0);
-    if (const absl::Status status = rpc::CheckMessage(spec); !status.ok()) {
-      return {{.file = file,
-               .line = 0,
-               .key = "experiments",
-               .message = absl::StrCat(campaign.experiments[e].name, ": workers are told of it as ",
-                                       status.message())}};
+    for (const campaign::RunOf& run : runs) {
+      const auto spec = messages::SpecOf(campaign, static_cast<int>(e), run);
+      if (const absl::Status status = rpc::CheckMessage(spec); !status.ok()) {
+        return {{.file = file,
+                 .line = 0,
+                 .key = "experiments",
+                 .message = absl::StrCat(campaign.experiments[e].name,
+                                         ": workers are told of it as ", status.message())}};
+      }
     }
   }
   return {};
@@ -178,6 +182,32 @@ absl::StatusOr<NewFinding> CheckFinding(const v1::AddFindingRequest& request, st
     }
   }
   return finding;
+}
+
+absl::StatusOr<scheduler::NewRuns> CheckRuns(const v1::AddRunsRequest& request) {
+  ASSIGN_OR_RETURN(const auto campaign, ParseCampaign(request.campaign()));
+  const auto stage = campaign::ValueOf(campaign::kSamplePurposeWords, request.stage());
+  if (!stage || !campaign::IsStageOfDesign(*stage)) {
+    std::vector<std::string> stages;
+    for (const auto& word : campaign::kSamplePurposeWords) {
+      if (campaign::IsStageOfDesign(word.value)) stages.emplace_back(word.text);
+    }
+    return absl::InvalidArgumentError(
+        absl::StrCat(request.stage(), " is no stage of a design: ", absl::StrJoin(stages, ", ")));
+  }
+  if (request.rows().empty()) {
+    return absl::InvalidArgumentError("a batch without a row adds nothing");
+  }
+  scheduler::NewRuns runs{
+      .campaign = campaign,
+      .iteration = request.iteration(),
+      .stage = *stage,
+      .experiments = {request.experiments().begin(), request.experiments().end()}};
+  for (const v1::AddRunsRequest::Row& row : request.rows()) {
+    runs.rows.push_back(
+        {.values = {row.parameters().begin(), row.parameters().end()}, .stream = row.stream()});
+  }
+  return runs;
 }
 
 std::string ContentDigest(const v1::SubmitRequest& request) {

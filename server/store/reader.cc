@@ -249,8 +249,8 @@ absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign,
   return Guard([&] {
     std::vector<SampleRecord> records;
     SQLite::Statement& row = connection_->Bind(
-        "SELECT sample, iteration, parameters, log_weight, log_likelihood, stop_below, audited "
-        "FROM sample "
+        "SELECT sample, iteration, parameters, log_weight, log_likelihood, stop_below, audited, "
+        "stream FROM sample "
         "WHERE campaign = ? AND sample >= ? ORDER BY sample",
         campaign, first);
     while (row.executeStep()) {
@@ -260,7 +260,10 @@ absl::StatusOr<std::vector<SampleRecord>> Reader::Samples(std::int64_t campaign,
                          .log_weight = ToDouble(row.getColumn(3)),
                          .log_likelihood = ToDouble(row.getColumn(4)),
                          .stop_below = ToDouble(row.getColumn(5)),
-                         .audited = ToDouble(row.getColumn(6))});
+                         .audited = ToDouble(row.getColumn(6)),
+                         .stream = row.getColumn(7).isNull()
+                                       ? std::nullopt
+                                       : std::optional<int>(row.getColumn(7).getInt())});
     }
     return records;
   });

@@ -70,6 +70,8 @@ struct SampleRecord {
   /// For a sample that was stopped and is run to its end to see what that would have lost: the
   /// share of the finished mass that its bound left it. Unknown: not audited.
   double audited = kUnknown;
+  /// Decides on packing and seed, >= 0; empty: campaign::StreamOf().
+  std::optional<int> stream{};
 };
 
 /// Names one model evaluation; its order is the order in which work is handed out.

@@ -143,9 +143,9 @@ void Transaction::InsertSample(std::int64_t campaign, const SampleRecord& sample
   Guard([&] {
     connection_.Run(
         "INSERT INTO sample(campaign, sample, iteration, parameters, log_weight, log_likelihood, "
-        "stop_below) VALUES(?, ?, ?, ?, ?, ?, ?)",
+        "stop_below, stream) VALUES(?, ?, ?, ?, ?, ?, ?, ?)",
         campaign, sample.sample, sample.iteration, DoubleBlob{sample.parameters}, sample.log_weight,
-        sample.log_likelihood, sample.stop_below);
+        sample.log_likelihood, sample.stop_below, std::optional<std::int64_t>(sample.stream));
   });
 }
 

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "server/campaign/file/derive.h"
+#include "server/campaign/model/race.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/support/stl_text.h"
 #include "tests/unit/campaign/good_campaign.h"
@@ -17,6 +18,7 @@ namespace {
 constexpr campaign::ReadLimits kLimits{.covariance = 100};
 /// Grains of recipes and realizations are made one by one below this number only.
 constexpr std::size_t kMostSpecimens = 4;
+constexpr Eigen::Index kMostRows = 4;
 
 void CheckNumbers(const campaign::Campaign& campaign) {
   for (const campaign::Experiment& experiment : campaign.experiments) {
@@ -41,25 +43,34 @@ void CheckNumbers(const campaign::Campaign& campaign) {
   }
 }
 
-void CheckRuns(const campaign::Campaign& campaign) {
-  std::vector<double> middle;
-  for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
-    middle.push_back(parameter.prior.Quantile(0.5));
-    Expect(parameter.prior.Validate().ok() && std::isfinite(middle.back()),
-           "the prior of " + parameter.name + " has a median");
-  }
-  if (campaign.precomputed.has_value()) {
-    return;
-  }
+void CheckRun(const campaign::Campaign& campaign, const std::vector<double>& values) {
   for (const campaign::Experiment& experiment : campaign.experiments) {
     for (std::size_t k = 0; k < std::min(experiment.specimens.size(), kMostSpecimens); ++k) {
       const dem::Scenario scenario =
-          campaign::MakeScenario(campaign, experiment, middle, static_cast<int>(k));
+          campaign::MakeScenario(campaign, experiment, {values, static_cast<int>(k)});
       for (const auto& [name, value] : scenario.model.parameters) {
         Expect(std::isfinite(value), "parameter " + name + " of a run is finite");
       }
     }
   }
+}
+
+void CheckRuns(const campaign::Campaign& campaign) {
+  for (const campaign::CalibratedParameter& parameter : campaign.parameters) {
+    Expect(parameter.prior.Validate().ok() && std::isfinite(parameter.prior.Quantile(0.5)),
+           "the prior of " + parameter.name + " has a median");
+  }
+  if (campaign.precomputed.has_value()) {
+    return;
+  }
+  std::vector<std::vector<double>> runs = {campaign::MiddleValues(campaign),
+                                           campaign::MiddleValues(campaign, campaign.race)};
+  const Eigen::Index rows = campaign.table ? campaign.table->parameters.rows() : 0;
+  for (Eigen::Index row = 0; row < std::min(rows, kMostRows); ++row) {
+    const Eigen::VectorXd values = campaign.table->parameters.row(row);
+    runs.emplace_back(values.begin(), values.end());
+  }
+  for (const std::vector<double>& values : runs) CheckRun(campaign, values);
 }
 
 constexpr const char* kModel = R"(name: fuzz

@@ -99,6 +99,7 @@ const std::vector<Entry>& Entries() {
       {{"ListWorkers", Default<v1::ListWorkersRequest>()}, Unary(&S::ListWorkers)},
       {{"DrainWorker", Default<v1::DrainRequest>()}, Unary(&S::DrainWorker)},
       {{"Examine", Default<v1::ExamineRequest>()}, Unary(&S::Examine)},
+      {{"AddRuns", Default<v1::AddRunsRequest>()}, Unary(&S::AddRuns)},
   };
   return entries;
 }

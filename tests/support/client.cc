@@ -64,9 +64,10 @@ v1::CampaignRequest Named(const std::string& campaign) {
 
 }  // namespace
 
-Client::Client(const std::string& address)
+Client::Client(const std::string& address, const rpc::AccessChoice& access)
     : impl_(std::make_unique<Impl>(Impl{.stub = v1::Campaigns::NewStub(rpc::OpenChannel(
-                                            address, rpc::FindAccess(address, {}).value()))})) {}
+                                            address, rpc::FindAccess(address, access).value()))})) {
+}
 Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
@@ -85,6 +86,10 @@ absl::Status Client::PutBlob(const std::string& content) {
 
 absl::StatusOr<v1::SubmitReply> Client::Submit(const v1::SubmitRequest& request) {
   return impl_->Call(&v1::Campaigns::Stub::Submit, request);
+}
+
+absl::StatusOr<v1::CampaignStatus> Client::AddRuns(const v1::AddRunsRequest& request) {
+  return impl_->Call(&v1::Campaigns::Stub::AddRuns, request);
 }
 
 absl::StatusOr<std::string> Client::SubmitCampaign(const std::string& yaml,

@@ -12,12 +12,14 @@
 #include "absl/status/statusor.h"
 #include "calib/v1/campaign.pb.h"
 #include "calib/v1/worker.pb.h"
+#include "proto/rpc/access.h"
 
 namespace calib::testing {
 
 class Client {
  public:
-  explicit Client(const std::string& address);
+  /// access: what is shown there.
+  explicit Client(const std::string& address, const rpc::AccessChoice& access = {});
   ~Client();
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
@@ -28,6 +30,7 @@ class Client {
   absl::StatusOr<std::string> SubmitCampaign(const std::string& yaml,
                                              const std::map<std::string, std::string>& files,
                                              const std::string& request_id);
+  absl::StatusOr<v1::CampaignStatus> AddRuns(const v1::AddRunsRequest& request);
   absl::StatusOr<v1::CampaignStatus> Show(const std::string& campaign);
   absl::StatusOr<v1::ListReply> List();
   absl::StatusOr<v1::Posterior> Posterior(const std::string& campaign);

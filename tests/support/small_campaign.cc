@@ -97,4 +97,16 @@ seed: 7
   return campaign;
 }
 
+SmallCampaign MakeSmallDesign(const SmallCampaignOptions& options, const std::string& parameters,
+                              const std::string& inference) {
+  SmallCampaignOptions of_design = options;
+  of_design.method = "design";
+  SmallCampaign campaign = MakeSmallCampaign(of_design);
+  std::string& yaml = campaign.yaml;
+  yaml.insert(yaml.find("experiments:"), parameters);
+  const std::size_t from = yaml.find("  samples:");
+  yaml.replace(from, yaml.find("failure:") - from, inference);
+  return campaign;
+}
+
 }  // namespace calib::testing

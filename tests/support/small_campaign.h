@@ -28,4 +28,9 @@ struct SmallCampaignOptions {
 
 SmallCampaign MakeSmallCampaign(const SmallCampaignOptions& options);
 
+/// The same experiments as a design. parameters, inference: further lines of these sections, each
+/// "  key: value\n".
+SmallCampaign MakeSmallDesign(const SmallCampaignOptions& options, const std::string& parameters,
+                              const std::string& inference);
+
 }  // namespace calib::testing

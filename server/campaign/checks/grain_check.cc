@@ -1,15 +1,13 @@
 #include "server/campaign/checks/grain_check.h"
 
 #include "dem/particles/random_cloud.h"
+#include "server/campaign/model/race.h"
 
 namespace calib::campaign {
 
-dem::Scenario MiddleScenario(const Campaign& campaign, const Experiment& experiment) {
-  std::vector<double> middle;
-  for (const CalibratedParameter& parameter : campaign.parameters) {
-    middle.push_back(parameter.prior.Quantile(0.5));
-  }
-  return MakeScenario(campaign, experiment, middle, 0);
+dem::Scenario MiddleScenario(const Campaign& campaign, const Experiment& experiment,
+                             const std::vector<std::string>& with) {
+  return MakeScenario(campaign, experiment, {.values = MiddleValues(campaign, with), .stream = 0});
 }
 
 std::vector<SpecimenRemarks> GrainRemarksOf(const Experiment& experiment,

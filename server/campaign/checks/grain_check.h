@@ -9,8 +9,10 @@
 
 namespace calib::campaign {
 
-/// The scenario of an experiment at the middle of the priors.
-dem::Scenario MiddleScenario(const Campaign& campaign, const Experiment& experiment);
+/// The scenario of an experiment at the middle of the priors, of the race of a design these effects
+/// in it.
+dem::Scenario MiddleScenario(const Campaign& campaign, const Experiment& experiment,
+                             const std::vector<std::string>& with = {});
 
 /// What is said of one specimen's grains.
 struct SpecimenRemarks {

@@ -20,8 +20,9 @@
 #include "server/campaign/file/read_joint_prior.h"
 #include "server/campaign/file/read_materials.h"
 #include "server/campaign/file/read_model.h"
-#include "server/campaign/file/read_noise_groups.h"
+#include "server/campaign/file/read_noise.h"
 #include "server/campaign/file/read_precomputed.h"
+#include "server/campaign/file/read_rows.h"
 #include "server/campaign/file/text/yaml_tree.h"
 #include "server/campaign/model/excitation.h"
 
@@ -63,9 +64,11 @@ void ReadName(MapReader& map, Campaign& campaign) {
 
 // What the engine itself would refuse. Asked last, at the middle of the priors, where only rare
 // things are left.
-void AskEngine(const MapReader& map, const Campaign& campaign) {
+// with: effects of the race that the run has.
+void AskEngine(const MapReader& map, const Campaign& campaign,
+               const std::vector<std::string>& with) {
   for (const Experiment& experiment : campaign.experiments) {
-    dem::Scenario scenario = MiddleScenario(campaign, experiment);
+    dem::Scenario scenario = MiddleScenario(campaign, experiment, with);
     std::set<std::string> said;
     const auto say = [&](const std::string& path, const std::string& problem) {
       if (!said.insert(problem).second) return;
@@ -157,6 +160,9 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     if (is_new && problems.size() == before) CheckCorrelationLengths(map, campaign);
     if (is_new && !campaign.precomputed) CheckBudget(map, campaign);
     if (is_new) CheckReplicates(map, campaign);
+    if (is_new && campaign.method == Method::kDesign && problems.size() == 0) {
+      CheckDesign(map, campaign);
+    }
     if (campaign.precomputed) {
       ReadPrecomputed(map, context, campaign);
       if (campaign.table || campaign.first_proposal) {
@@ -167,7 +173,10 @@ ReadOutcome ReadCampaign(const std::string& yaml_text, const std::string& file_n
     if (is_new && problems.size() == 0 && !campaign.precomputed) {
       for (const std::string& inert : EffectsWithoutPart(campaign)) map.Problem("model", inert);
       CheckMaterialsUsed(map, campaign);
-      AskEngine(map, campaign);
+      AskEngine(map, campaign, {});
+      for (const std::string& effect : campaign.race) {
+        if (problems.size() == 0) AskEngine(map, campaign, {effect});
+      }
     }
   }
   if (seed_override) campaign.seed = campaign.filter.seed = *seed_override;

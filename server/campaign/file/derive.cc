@@ -132,9 +132,16 @@ void RaiseSamples(YamlNode& root) {
 }
 
 void ChangeInference(const Derivation& derivation, YamlNode& root) {
-  if (!derivation.rows.empty()) {
-    YamlAt(root, "inference") =
-        YamlMap({{"method", YamlScalar("table")}, {"rows", Rows(derivation)}});
+  if (derivation.race || !derivation.rows.empty()) {
+    YamlNode inference = YamlMap(
+        {{"method", YamlScalar(ToString(derivation.race ? Method::kDesign : Method::kTable))}});
+    if (derivation.race) {
+      std::vector<YamlNode> race;
+      for (const std::string& effect : *derivation.race) race.push_back(YamlScalar(effect));
+      YamlAt(inference, "race") = YamlList(std::move(race));
+    }
+    if (!derivation.rows.empty()) YamlAt(inference, "rows") = Rows(derivation);
+    YamlAt(root, "inference") = std::move(inference);
     YamlErase(root, "early_stopping");
     YamlErase(root, "budget");
     return;

@@ -32,13 +32,17 @@ struct Derivation {
   std::optional<int> samples{}, max_iterations{};
   std::optional<FirstProposal> first_proposal{};
   std::optional<int> replicates{};
-  std::optional<std::int64_t> model_evaluations{};  ///< its budget; not of a table
-  /// Makes it a table: parameter values by name, and whose specimen and seed they take.
+  std::optional<std::int64_t> model_evaluations{};  ///< its budget; not of a table or design
+  /// Makes it a table, or gives a design its first batch: parameter values by name, and whose
+  /// specimen and seed they take.
   struct Row {
     int like = 0;
     std::map<std::string, double> values{};
   };
   std::vector<Row> rows{};
+  /// Makes it a design with these effects to race; their parameters and those of the numerics are
+  /// among `parameters`.
+  std::optional<std::vector<std::string>> race{};
   /// By name of an experiment: replaces the fields of its staging that are set here.
   std::map<std::string, dem::Staging> staging{};
 };

@@ -248,7 +248,7 @@ void ReadExperiment(MapReader& map, ReadContext& context, Campaign& campaign) {
   const MeasurementRules rules{
       .precomputed = campaign.precomputed.has_value(),
       .noise_needed = campaign.filter.noise != inference::NoiseMode::kEssTarget,
-      .measured = campaign.method != Method::kTable};
+      .measured = !RunsRowsOnly(campaign.method)};
   if (campaign.precomputed || test != nullptr) {
     ReadMeasurements(map, rules, context, experiment);
     map.Finish();

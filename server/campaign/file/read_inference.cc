@@ -6,6 +6,7 @@
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "server/campaign/file/read_rows.h"
 #include "server/campaign/file/text/suggestion.h"
 
 namespace calib::campaign {
@@ -42,6 +43,14 @@ void ReadMethod(MapReader& map, Campaign& campaign) {
   campaign.method = map.Choice("method", kMethodWords).value_or(campaign.method);
   if (campaign.method == Method::kTmcmc) campaign.max_iterations = kMostStages;
   if (IsFilter(campaign.method) || campaign.method == Method::kTable) return;
+  if (campaign.method == Method::kDesign) {
+    if (campaign.precomputed) {
+      map.Problem("method",
+                  "design is for runs still to be made; those that exist already are "
+                  "what they are: use sqmc");
+    }
+    return;
+  }
   if (campaign.precomputed) {
     map.Problem("method", absl::StrCat(ToString(campaign.method),
                                        " chooses its own samples, and runs that exist "
@@ -171,6 +180,12 @@ void RefuseKeysOfOthers(MapReader& map, Method method) {
     refuse({"surrogate", "termination", "in_flight"}, "method: surrogate_msrs");
   }
   if (method != Method::kTmcmc) refuse({"steps", "target_cv"}, "method: tmcmc");
+  if (method == Method::kDesign) {
+    refuse({"samples", "max_iterations", "replicates", "first_proposal"},
+           "methods that choose their samples");
+  } else {
+    refuse({"race"}, "method: design");
+  }
 }
 
 void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
@@ -182,6 +197,17 @@ void ReadMethodSection(MapReader& campaign_map, Campaign& campaign) {
   auto map = campaign_map.Map("inference");
   if (map) {
     ReadMethod(*map, campaign);
+    if (campaign.method == Method::kDesign) {
+      campaign.samples = kMostRowsOfBatch;
+      campaign.max_iterations = 1;
+      ReadRace(*map, campaign);
+      ReadFreeze(*map, campaign);
+      ReadDecisions(*map, campaign);
+      RefuseKeysOfOthers(*map, campaign.method);
+      map->Ignore({"rows"});  // read once the parameters are known
+      map->Finish();
+      return;
+    }
     const int fewest = campaign.method == Method::kTmcmc ? kFewestChains : 2;
     campaign.samples =
         static_cast<int>(map->Integer("samples", fewest, kMostSamples).value_or(campaign.samples));
@@ -267,6 +293,11 @@ void ReadEarlyStopping(MapReader& campaign_map, Campaign& campaign) {
                  "not; remove one of the two");
   }
   map->Finish();
+  if (campaign.method == Method::kDesign && !off) {
+    campaign_map.Problem("early_stopping",
+                         "is for campaigns that infer; the runs of a design go to their ends");
+    return;
+  }
   // A tempered likelihood has no bound that could be kept, and runs that exist already have nothing
   // to stop; the surrogate would take a bound for a value.
   if (!off && campaign.filter.noise != NoiseMode::kEssTarget && !campaign.precomputed &&
@@ -289,48 +320,16 @@ void ReadFailure(MapReader& campaign_map, Campaign& campaign) {
 void ReadBudget(MapReader& campaign_map, Campaign& campaign) {
   auto map = campaign_map.Map("budget");
   if (!map) return;
+  if (campaign.method == Method::kDesign) {
+    map->Ignore(map->Keys());
+    campaign_map.Problem("budget",
+                         "is for campaigns that infer; a design runs what is added to it");
+    return;
+  }
   constexpr std::int64_t kMost = 1'000'000'000;
   campaign.budget.model_evaluations = map->Integer("model_evaluations", 1, kMost);
   campaign.budget.core_hours = map->Quantity("core_hours", "1", kPositive);
   map->Finish();
-}
-
-// One row of the table: a value for every parameter, and the sample it is to be like.
-void ReadRow(const YamlNode& node, const std::string& path, Eigen::Index row, Campaign& campaign,
-             ProblemList& problems) {
-  MapReader map(node, path, problems);
-  constexpr std::int64_t kMostSamples = 1'000'000;
-  campaign.table->like.push_back(
-      static_cast<int>(map.Integer("like", 0, kMostSamples).value_or(row)));
-  for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
-    const CalibratedParameter& parameter = campaign.parameters[j];
-    const auto value = map.Require(parameter.name, "every row gives every parameter") != nullptr
-                           ? map.Quantity(parameter.name, parameter.unit, {})
-                           : std::nullopt;
-    campaign.table->parameters(row, static_cast<Eigen::Index>(j)) = value.value_or(0);
-  }
-  map.Finish();
-}
-
-void ReadTable(MapReader& map, Campaign& campaign) {
-  if (campaign.method != Method::kTable) {
-    if (map.Has("rows")) map.Problem("rows", "belongs to method: table");
-    return;
-  }
-  const YamlNode* rows = map.Require("rows", "the parameter values to run, a list of maps");
-  if (rows == nullptr) return;
-  if (rows->kind != YamlNode::Kind::kSequence || rows->items.empty()) {
-    map.Problem("rows", "has to be a list of maps, one per run");
-    return;
-  }
-  campaign.samples = static_cast<int>(rows->items.size());
-  campaign.table.emplace();
-  campaign.table->parameters.setZero(static_cast<Eigen::Index>(rows->items.size()),
-                                     static_cast<Eigen::Index>(campaign.parameters.size()));
-  for (std::size_t i = 0; i < rows->items.size(); ++i) {
-    ReadRow(rows->items[i], absl::StrCat(map.PathOf("rows"), "[", i, "]"),
-            static_cast<Eigen::Index>(i), campaign, map.problems());
-  }
 }
 
 void ReadFirstProposal(MapReader& inference_map, Campaign& campaign) {
@@ -396,9 +395,9 @@ void ReadStart(MapReader& campaign_map, Campaign& campaign) {
   if (!campaign_map.Has("inference")) return;
   auto map = campaign_map.Map("inference");
   if (!map) return;
-  ReadTable(*map, campaign);
+  ReadRows(*map, campaign);
   CheckFreeze(*map, campaign);
-  ReadFirstProposal(*map, campaign);
+  if (campaign.method != Method::kDesign) ReadFirstProposal(*map, campaign);
 }
 
 void ReadInference(MapReader& campaign_map, Campaign& campaign) {
@@ -431,7 +430,7 @@ void CheckReplicates(const MapReader& campaign_map, const Campaign& campaign) {
 }
 
 void CheckBudget(const MapReader& campaign_map, const Campaign& campaign) {
-  if (!campaign.budget.model_evaluations || campaign.method == Method::kTable) return;
+  if (!campaign.budget.model_evaluations || RunsRowsOnly(campaign.method)) return;
   const auto fitted = std::count_if(campaign.experiments.begin(), campaign.experiments.end(),
                                     [](const Experiment& e) { return e.role == Role::kCalibrate; });
   const std::int64_t first = static_cast<std::int64_t>(campaign.samples) * fitted;

@@ -13,6 +13,7 @@
 #include "server/campaign/file/read_user_effects.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/model/race.h"
 #include "server/campaign/model/range.h"
 #include "server/campaign/model/words.h"
 
@@ -197,11 +198,12 @@ void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign)
     campaign.parameters.push_back(parameter);
     return;
   }
-  const dem::ParameterInfo* info = dem::FindParameter(campaign.model, name);
+  const dem::Model model = ModelWithRace(campaign);
+  const bool is_design = campaign.method == Method::kDesign;
+  const dem::ParameterInfo* info = is_design ? FindNumerics(name) : nullptr;
+  if (info == nullptr) info = dem::FindParameter(model, name);
   if (info == nullptr) {
-    if (!campaign.model.contact.empty()) {
-      parameters.Problem(name, UnknownParameter(name, campaign.model));
-    }
+    if (!model.contact.empty()) parameters.Problem(name, UnknownParameter(name, model));
     return;
   }
   parameter.unit = dem::UnitFor(*info, campaign.model.contact);
@@ -219,7 +221,7 @@ void ReadOne(MapReader& parameters, const std::string& name, Campaign& campaign)
 }
 
 void CheckSources(const MapReader& campaign_map, const Campaign& campaign) {
-  const dem::Model& model = campaign.model;
+  const dem::Model model = ModelWithRace(campaign);
   const auto calibrated = [&campaign](const std::string& name) {
     return std::any_of(campaign.parameters.begin(), campaign.parameters.end(),
                        [&name](const CalibratedParameter& p) { return p.name == name; });

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/campaign/model/race.h"
+
 namespace calib::campaign {
 
 int LaterBatch(const Campaign& campaign) {
@@ -23,6 +25,7 @@ int MostBatches(const Campaign& campaign) {
     }
     case Method::kSqmc:
     case Method::kTable:
+    case Method::kDesign:  // how many follow nobody knows
       return 1;
     case Method::kIterativeBayesianFilter:
       break;
@@ -186,18 +189,14 @@ inference::Proposal FirstProposalOf(const Campaign& campaign) {
 }
 
 dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
-                           const std::vector<double>& values, int sample) {
+                           const RunOf& run) {
   dem::Scenario scenario;
-  scenario.model = campaign.model;
-  for (std::size_t i = 0; i < campaign.parameters.size(); ++i) {
-    scenario.model.parameters[campaign.parameters[i].name] = values[i];
-  }
+  scenario.model = ModelOf(campaign, run.values);
   scenario.test = experiment.test;
   scenario.settings = experiment.settings;
   scenario.materials = experiment.materials;
-  const int stream = StreamOf(campaign, sample);
   if (!experiment.specimens.empty()) {
-    const auto index = static_cast<std::size_t>(stream) % experiment.specimens.size();
+    const auto index = static_cast<std::size_t>(run.stream) % experiment.specimens.size();
     if (const auto* file = std::get_if<PackingFile>(&experiment.specimens[index])) {
       scenario.packing = file->packing;
     }
@@ -209,7 +208,8 @@ dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experimen
   scenario.loading_rate = experiment.loading_rate;
   scenario.staging = experiment.staging;
   scenario.path = experiment.path;
-  scenario.seed = campaign.seed + static_cast<std::uint64_t>(stream);
+  scenario.seed = campaign.seed + static_cast<std::uint64_t>(run.stream);
+  ChangeNumerics(campaign, experiment, run.values, scenario);
   return scenario;
 }
 

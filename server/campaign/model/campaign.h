@@ -134,6 +134,10 @@ struct Table {
   std::vector<int> like;
 };
 
+/// Rows of a batch of a design at most: sample = iteration * this + position in the batch. Chosen:
+/// some times what a stage of a diagnosis asks for, and a message of them stays far below a MiB.
+inline constexpr int kMostRowsOfBatch = 256;
+
 /// Where the first iteration looks: a share of the prior, the rest independent normals about
 /// `center` in the coordinate of the prior. Parameters that are not named are drawn from the width
 /// of their prior.
@@ -148,7 +152,7 @@ struct FirstProposal {
 /// Where a campaign comes from.
 struct Lineage {
   std::string parent;   ///< id of the campaign it was derived from
-  std::string purpose;  ///< screen, nuisance, warm_fit, extension
+  std::string purpose;  ///< a word of kDerivedForWords, or a user's own
 };
 
 /// Parameters that an iteration of the filter and all later ones hold at their mean so far.
@@ -218,7 +222,9 @@ struct Campaign {
   int samples = 100;
   /// tmcmc: tempering stages; surrogate_msrs: its evaluations are at most this times `samples`.
   int max_iterations = 4;
-  std::optional<Table> table;  ///< with kTable
+  std::optional<Table> table;  ///< with kTable; with kDesign the batch that it starts with
+  /// With kDesign: effects that a run may have or lack (race.h). None of them is part of `model`.
+  std::vector<std::string> race{};
   std::optional<FirstProposal> first_proposal;
   /// How often the best estimate is run to measure the scatter of packings; empty: as its number.
   std::optional<int> replicates;
@@ -273,15 +279,22 @@ inference::DataSet MakeDataSet(const Campaign& campaign, Role role = Role::kCali
 std::vector<inference::Prior> MarginalPriors(const Campaign& campaign);
 inference::JointPrior Priors(const Campaign& campaign);
 
-/// The sample number that decides on specimen and seed: its own, or the one a table's row names.
+/// The number that decides on specimen and seed of a sample that has none of its own: the sample's,
+/// or the one a table's row names.
 int StreamOf(const Campaign& campaign, int sample);
 
 /// What first_proposal says, in the coordinates of the priors; the prior alone without it.
 inference::Proposal FirstProposalOf(const Campaign& campaign);
 
-/// The scenario of one evaluation. values: SI, in the order of campaign.parameters. With a recipe
-/// the packing is left empty for the worker to generate.
+/// What one run of a campaign's experiments is made with.
+struct RunOf {
+  std::vector<double> values{};  ///< SI, finite, in the order of Campaign::parameters
+  int stream = 0;                ///< decides on specimen and seed (StreamOf), >= 0
+};
+
+/// The scenario of one evaluation; of a design without the effects that stand at their null
+/// (race.h). With a recipe the packing is left empty for the worker to generate.
 dem::Scenario MakeScenario(const Campaign& campaign, const Experiment& experiment,
-                           const std::vector<double>& values, int sample);
+                           const RunOf& run);
 
 }  // namespace calib::campaign

@@ -27,8 +27,8 @@ std::string WhereItActs(const dem::EffectInfo& effect);
 
 /// One sentence for each effect of the model that none of the experiments (calibrating or held
 /// out) can show though one of its parameters is calibrated, or though it is one of the grains'
-/// shape or strength or of the specimen's preparation, fixed or not. None for runs of a table,
-/// which infer nothing, and for a campaign derived from another, which was asked itself.
+/// shape or strength or of the specimen's preparation, fixed or not. None for a table or a
+/// design, which infer nothing, and for a campaign derived from another, which was asked itself.
 std::vector<std::string> EffectsWithoutPart(const Campaign& campaign);
 
 }  // namespace calib::campaign

@@ -58,6 +58,7 @@ std::string ScatterLeftOut(const Campaign& campaign) {
                           "noise of the readings. One from the emulator contains it, and with "
                           "noise: given it is measured and taken in.");
     case Method::kTable:
+    case Method::kDesign:
       break;
   }
   return "";

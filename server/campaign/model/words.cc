@@ -8,6 +8,8 @@ bool IsFilter(Method method) {
   return method == Method::kSqmc || method == Method::kIterativeBayesianFilter;
 }
 
+bool RunsRowsOnly(Method method) { return method == Method::kTable || method == Method::kDesign; }
+
 const char* ToString(CampaignState state) { return WordOf(kCampaignStateWords, state); }
 
 std::optional<CampaignState> ToCampaignState(std::string_view word) {
@@ -29,6 +31,11 @@ bool IsTerminal(EvaluationStatus status) {
 }
 
 const char* ToString(SamplePurpose purpose) { return WordOf(kSamplePurposeWords, purpose); }
+
+bool IsStageOfDesign(SamplePurpose purpose) {
+  return purpose != SamplePurpose::kEnsemble && purpose != SamplePurpose::kReplicate &&
+         purpose != SamplePurpose::kDraw;
+}
 
 const char* ToString(DerivedFor purpose) { return WordOf(kDerivedForWords, purpose); }
 

@@ -11,16 +11,20 @@
 
 namespace calib::campaign {
 
-/// kTable: the rows of Campaign::table are run, nothing is inferred.
-enum class Method { kSqmc, kIterativeBayesianFilter, kTmcmc, kSurrogateMsrs, kTable };
+/// kTable: the rows of Campaign::table are run, nothing is inferred. kDesign: likewise, and further
+/// rows are added while it lives; each may have effects of Campaign::race.
+enum class Method { kSqmc, kIterativeBayesianFilter, kTmcmc, kSurrogateMsrs, kTable, kDesign };
 inline constexpr std::array kMethodWords = {
     Word{Method::kSqmc, "sqmc"},
     Word{Method::kIterativeBayesianFilter, "iterative_bayesian_filter"},
     Word{Method::kTmcmc, "tmcmc"},
     Word{Method::kSurrogateMsrs, "surrogate_msrs"},
     Word{Method::kTable, "table"},
+    Word{Method::kDesign, "design"},
 };
 const char* ToString(Method method);
+/// True where runs are made and nothing is inferred from them by the server.
+bool RunsRowsOnly(Method method);
 /// True for the two filters, whose posterior is that of weighted samples.
 bool IsFilter(Method method);
 
@@ -71,14 +75,31 @@ const char* ToString(EvaluationStatus status);
 /// True when nothing more is to be run for an evaluation in this status.
 bool IsTerminal(EvaluationStatus status);
 
-/// Why a sample is run. kEnsemble, whose word is the empty text: for the posterior.
-enum class SamplePurpose { kEnsemble, kReplicate, kDraw };
+/// Why a sample is run. kEnsemble, whose word is the empty text: for the posterior, or as a row of
+/// the campaign file. kScout and what follows: the stage of a design for which it was added.
+enum class SamplePurpose {
+  kEnsemble,
+  kReplicate,
+  kDraw,
+  kScout,
+  kMain,
+  kSequential,
+  kVerification,
+  kNumerics
+};
 inline constexpr std::array kSamplePurposeWords = {
     Word{SamplePurpose::kEnsemble, ""},
     Word{SamplePurpose::kReplicate, "replicate"},
     Word{SamplePurpose::kDraw, "draw"},
+    Word{SamplePurpose::kScout, "scout"},
+    Word{SamplePurpose::kMain, "main"},
+    Word{SamplePurpose::kSequential, "sequential"},
+    Word{SamplePurpose::kVerification, "verification"},
+    Word{SamplePurpose::kNumerics, "numerics"},
 };
 const char* ToString(SamplePurpose purpose);
+/// True of the purposes that the runs added to a design have.
+bool IsStageOfDesign(SamplePurpose purpose);
 
 /// Why a campaign was derived from another, as verbs say it. A campaign file may give any other
 /// text.
@@ -89,7 +110,9 @@ enum class DerivedFor {
   kWarmFit,
   kWarmFitBatch,
   kPrediction,
-  kNextExperiment
+  kNextExperiment,
+  kDesign,
+  kThen
 };
 inline constexpr std::array kDerivedForWords = {
     Word{DerivedFor::kExtension, "extension"},
@@ -99,6 +122,8 @@ inline constexpr std::array kDerivedForWords = {
     Word{DerivedFor::kWarmFitBatch, "warm_fit_batch"},
     Word{DerivedFor::kPrediction, "prediction"},
     Word{DerivedFor::kNextExperiment, "next_experiment"},
+    Word{DerivedFor::kDesign, "design"},
+    Word{DerivedFor::kThen, "then"},
 };
 const char* ToString(DerivedFor purpose);
 /// Empty for a purpose of a user's own, and where there is none.

@@ -43,7 +43,7 @@ std::vector<std::pair<std::string, std::string>> Files(const report::CampaignVie
   const std::string& id = view.status.campaign();
   return {{"campaign.yaml", CampaignFile(view.source)},
           {"status.json", report::StatusJson(view.status)},
-          {"posterior.json", messages::MethodOf(view.status) == campaign::Method::kTable
+          {"posterior.json", messages::RunsRowsOnly(view.status)
                                  ? report::TablePosteriorJson(view.status)
                                  : report::PosteriorJson(view.posterior, view.campaign.parameters)},
           {"posterior.csv", report::PosteriorCsv(view.posterior)},

@@ -70,7 +70,7 @@ absl::StatusOr<v1::CampaignStatus> Follow(client::Session& session, const std::s
 
 absl::StatusOr<int> PrintAnswer(client::Session& session, const std::string& campaign, bool json) {
   ASSIGN_OR_RETURN(const auto view, client::LoadView(session.client(), campaign));
-  if (messages::MethodOf(view.status) == campaign::Method::kTable) {
+  if (messages::RunsRowsOnly(view.status)) {
     std::cout << (json ? report::TablePosteriorJson(view.status) : TableText(view.status));
     return kDone;
   }

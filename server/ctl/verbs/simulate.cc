@@ -142,7 +142,8 @@ class Simulation {
     const campaign::Experiment& experiment = campaign_.experiments[e];
     const std::filesystem::path own = std::filesystem::path(folder) / std::to_string(e);
     Evaluation::Task task{
-        .spec = messages::SpecOf(campaign_, static_cast<int>(e), values_, 0),
+        .spec = messages::SpecOf(campaign_, static_cast<int>(e),
+                                 {.values = values_, .stream = campaign::StreamOf(campaign_, 0)}),
         .packing = PackingText(experiment, source_),
         .meshes = MeshContents(experiment, source_),
         .vtk = HasPictures(experiment) ? Below(options_.vtk, experiment.name) : "",

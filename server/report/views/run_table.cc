@@ -62,6 +62,10 @@ Eigen::RowVectorXd HistoryOf(const CampaignView& view, int sample, const inferen
   return row;
 }
 
+int StreamOf(const CampaignView& view, const v1::Sample& sample) {
+  return sample.has_stream() ? sample.stream() : campaign::StreamOf(view.campaign, sample.index());
+}
+
 // Of the first replicates, as many as every experiment has packings.
 void AddDepartures(const CampaignView& view, const inference::DataSet& data,
                    ScatteredReadings& readings) {
@@ -78,7 +82,7 @@ void AddDepartures(const CampaignView& view, const inference::DataSet& data,
     Eigen::RowVectorXd row = HistoryOf(view, sample.index(), data, places);
     if (!row.allFinite()) continue;
     rows.push_back(std::move(row));
-    streams.push_back(campaign::StreamOf(view.campaign, sample.index()));
+    streams.push_back(StreamOf(view, sample));
   }
   Eigen::MatrixXd runs(static_cast<Index>(rows.size()), static_cast<Index>(data.readings.size()));
   for (std::size_t r = 0; r < rows.size(); ++r) runs.row(static_cast<Index>(r)) = rows[r];
@@ -146,7 +150,7 @@ RunTable RunsOf(const CampaignView& view, const inference::DataSet& units) {
     const Eigen::RowVectorXd row = HistoryOf(view, sample.index(), data, places);
     if (!row.allFinite()) continue;
     table.sample.push_back(sample.index());
-    table.stream.push_back(campaign::StreamOf(view.campaign, sample.index()));
+    table.stream.push_back(StreamOf(view, sample));
     histories.emplace_back((row - value).cwiseQuotient(sd));
     Eigen::RowVectorXd& own = parameters.emplace_back(d);
     for (Index j = 0; j < d; ++j) own[j] = sample.parameters(static_cast<int>(j));

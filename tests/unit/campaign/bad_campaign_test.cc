@@ -333,7 +333,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "latin_hypercube, symmetric_latin_hypercube"},
         Mistake{"NoSuchMethod", "method: iterative_bayesian_filter", "method: iterative_filter",
                 "c.yaml:36: inference.method: 'iterative_filter' is unknown; allowed: sqmc, "
-                "iterative_bayesian_filter, tmcmc, surrogate_msrs, table"},
+                "iterative_bayesian_filter, tmcmc, surrogate_msrs, table, design"},
         Mistake{"HalfASample", "samples: 20", "samples: 20.5",
                 "c.yaml:36: inference.samples: '20.5' is not a whole number from 2 to 1000000"},
         Mistake{"OneReplicate", "max_iterations: 3}", "max_iterations: 3, replicates: 1}",

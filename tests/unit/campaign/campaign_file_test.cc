@@ -59,7 +59,7 @@ TEST(CampaignFile, TheShearForceAtUnloadingIsChosen) {
           .campaign;
   EXPECT_EQ(rescaled.model.shear_unloading, dem::ShearUnloading::kRescaled);
   const std::vector<double> values(rescaled.parameters.size(), 0.3);
-  EXPECT_EQ(MakeScenario(rescaled, rescaled.experiments[0], values, 0).model.shear_unloading,
+  EXPECT_EQ(MakeScenario(rescaled, rescaled.experiments[0], {values, 0}).model.shear_unloading,
             dem::ShearUnloading::kRescaled);
 }
 
@@ -174,13 +174,13 @@ TEST(CampaignFile, ADenseCurveKeepsTheDistancesOfItsReadings) {
 
 TEST(CampaignFile, MakesTheScenarioOfASample) {
   const Campaign c = Read(GoodYaml()).campaign;
-  const dem::Scenario s = MakeScenario(c, c.experiments[0], {1e9, 0.5, 0.1, 0.2}, 3);
+  const dem::Scenario s = MakeScenario(c, c.experiments[0], {{1e9, 0.5, 0.1, 0.2}, 3});
   EXPECT_DOUBLE_EQ(s.model.parameters.at("young_modulus"), 1e9);
   EXPECT_DOUBLE_EQ(s.model.parameters.at("poisson_ratio"), 0.2);
   EXPECT_DOUBLE_EQ(s.settings.at("confining_pressure"), 2e5);
   EXPECT_THAT(s.packing.x, SizeIs(20));
   EXPECT_THAT(s.path, SizeIs(6));
-  EXPECT_THAT(MakeScenario(c, c.experiments[1], {1e9, 0.5, 0.1, 0.2}, 0).packing.x, IsEmpty());
+  EXPECT_THAT(MakeScenario(c, c.experiments[1], {{1e9, 0.5, 0.1, 0.2}, 0}).packing.x, IsEmpty());
 }
 
 TEST(CampaignFile, ASeedOnTheCommandLineWins) {

@@ -75,7 +75,7 @@ TEST(MaterialsCampaign, ValuesArePartOfTheModelAndUsesOfTheExperiments) {
   EXPECT_THAT(c.experiments[1].materials.bodies,
               ElementsAre(Pair("intruder", "steel"), Pair("walls", "wood")));
   EXPECT_THAT(c.experiments[1].materials.grains, ElementsAre(Pair("wood", 0.25)));
-  const dem::Scenario scenario = MakeScenario(c, c.experiments[1], {7e10, 1e10}, 0);
+  const dem::Scenario scenario = MakeScenario(c, c.experiments[1], {{7e10, 1e10}, 0});
   EXPECT_DOUBLE_EQ(scenario.model.parameters.at("wood.young_modulus"), 1e10);
   EXPECT_EQ(scenario.materials.grains.at("wood"), 0.25);
 }
@@ -99,7 +99,7 @@ TEST(MaterialsCampaign, PairsHaveValuesOfEffectsOfTheirOwn) {
   ASSERT_EQ(c.parameters.size(), 4U);
   EXPECT_EQ(c.parameters[2].name, "wood-grains.viscous_damping.ratio");
   EXPECT_EQ(c.parameters[3].name, "wood-wood.rolling_resistance.friction");
-  const dem::Scenario scenario = MakeScenario(c, c.experiments[1], {7e10, 1e10, 0.2, 0.3}, 0);
+  const dem::Scenario scenario = MakeScenario(c, c.experiments[1], {{7e10, 1e10, 0.2, 0.3}, 0});
   EXPECT_EQ(scenario.model.parameters.at("wood-grains.viscous_damping.ratio"), 0.2);
 }
 
@@ -212,14 +212,14 @@ TEST(MaterialsCampaign, SamplesOfOnePackingHaveOneMixture) {
   std::vector<std::uint64_t> mixtures;
   std::vector<std::uint64_t> runs;
   for (int sample = 0; sample < 4; ++sample) {
-    const dem::Scenario scenario = MakeScenario(c, c.experiments.at(1), {7e10, 1e10}, sample);
+    const dem::Scenario scenario = MakeScenario(c, c.experiments.at(1), {{7e10, 1e10}, sample});
     mixtures.push_back(scenario.materials.seed);
     runs.push_back(scenario.seed);
   }
   EXPECT_THAT(mixtures, ElementsAre(40, 41, 40, 41));
   EXPECT_THAT(runs, ElementsAre(40, 41, 42, 43));
   // Without a mixture nothing is drawn, and equal runs have equal specs.
-  EXPECT_EQ(MakeScenario(c, c.experiments.at(0), {7e10, 1e10}, 1).materials.seed, 0U);
+  EXPECT_EQ(MakeScenario(c, c.experiments.at(0), {{7e10, 1e10}, 1}).materials.seed, 0U);
 }
 
 }  // namespace

@@ -147,7 +147,7 @@ TEST(PouredCampaign, AMeshIsReadInItsUnit) {
   EXPECT_DOUBLE_EQ(dem::BoundsOf(mesh.mesh).high.z, 0.3);
   EXPECT_EQ(outcome.files, (std::vector<std::string>{"silo.stl", "silo.csv"}));
   const dem::Scenario scenario =
-      MakeScenario(outcome.campaign, outcome.campaign.experiments[0], {0.5, 0.5}, 0);
+      MakeScenario(outcome.campaign, outcome.campaign.experiments[0], {{0.5, 0.5}, 0});
   EXPECT_EQ(scenario.meshes.at("silo").size(), 8);
 }
 

@@ -1,8 +1,8 @@
-#include "server/scheduler/held_out.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "server/scheduler/requests.h"
 
 namespace calib::scheduler {
 namespace {

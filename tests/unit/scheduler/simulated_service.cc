@@ -30,7 +30,9 @@ double Model(const v1::AttemptSpec& spec, int load_step, double packing_scatter,
           : std::stoi(spec.packing_digest().substr(0, 4), nullptr, 16) / 32768.0 - 1;
   // Of digits that no measurement knows.
   const double repeat = 2 * std::fmod(1e9 * std::abs(stiffness), 1) - 1;
-  return (1 + friction * 2 * (1 - std::exp(-0.3 * stiffness * (load_step + 1)))) *
+  const auto gain = spec.parameters().find("load_cell_error.gain");  // where the run has it
+  const double read = gain == spec.parameters().end() ? 1 : 1 + gain->second;
+  return read * (1 + friction * 2 * (1 - std::exp(-0.3 * stiffness * (load_step + 1)))) *
          (1 + packing_scatter * packing + repeat_scatter * repeat);
 }
 
@@ -121,13 +123,20 @@ std::string SimulatedService::Submit(const testing::SmallCampaign& campaign) {
   scheduler_->Submit({.name = "small",
                       .yaml = campaign.yaml,
                       .file_name = "small.yaml",
-                      .method = campaign::Method::kIterativeBayesianFilter,
+                      .method = outcome.campaign.method,
                       .samples = outcome.campaign.samples,
                       .max_iterations = outcome.campaign.max_iterations},
                      digests, "", {},
                      [&id](const absl::StatusOr<std::string>& answer) { id = *answer; });
   ports_->Run();
   return id;
+}
+
+absl::StatusOr<bool> SimulatedService::AddRuns(const NewRuns& runs) {
+  absl::StatusOr<bool> added = absl::UnknownError("no answer");
+  scheduler_->AddRuns(runs, [&added](const absl::StatusOr<bool>& answer) { added = answer; });
+  ports_->Run();
+  return added;
 }
 
 std::int64_t SimulatedService::Connect(const std::string& worker, int slots,

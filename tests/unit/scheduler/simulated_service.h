@@ -67,6 +67,7 @@ class SimulatedService {
   /// A new server process on the same file: memory is gone, streams are cut.
   void Restart();
   std::string Submit(const testing::SmallCampaign& campaign);
+  absl::StatusOr<bool> AddRuns(const NewRuns& runs);
   std::int64_t Connect(const std::string& worker, int slots,
                        const std::vector<std::int64_t>& held = {});
   /// The next message of this kind for a session, others skipped; an empty message when there is

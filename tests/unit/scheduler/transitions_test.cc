@@ -12,12 +12,15 @@ using E = CampaignEvent;
 
 constexpr std::array kStates = {S::kQueued,   S::kRunning, S::kPaused,
                                 S::kFinished, S::kFailed,  S::kCancelled};
-constexpr std::array kEvents = {E::kStart, E::kPause, E::kResume, E::kCancel, E::kFinish, E::kFail};
+constexpr std::array kEvents = {E::kStart,  E::kPause, E::kResume, E::kCancel,
+                                E::kFinish, E::kFail,  E::kGrow};
 
-TEST(Transitions, NothingHappensToACampaignThatIsOver) {
+TEST(Transitions, NothingHappensToACampaignThatIsOverButThatADesignGrows) {
   for (const S state : kStates) {
     for (const E event : kEvents) {
-      if (IsOver(state)) {
+      if (state == S::kFinished && event == E::kGrow) {
+        EXPECT_EQ(*Next(state, event), S::kRunning);
+      } else if (IsOver(state) || event == E::kGrow) {
         EXPECT_FALSE(Next(state, event).ok()) << ToString(event) << " " << ToString(state);
       }
     }

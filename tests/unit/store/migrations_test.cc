@@ -53,7 +53,9 @@ std::string FileOfVersion(int version) {
     connection.database().exec(
         "INSERT INTO campaign(name, yaml, file_name, method, samples, max_iterations, "
         "created_unix_ms, state) VALUES('sand', 'name: sand', 'sand.yaml', 'sqmc', 4, 1, 0, "
-        "'finished')");
+        "'finished'); "
+        "INSERT INTO iteration(campaign, number, proposal) VALUES(1, 0, '{}'); "
+        "INSERT INTO sample(campaign, sample, iteration, parameters) VALUES(1, 3, 0, x'')");
   }
   return path;
 }
@@ -89,6 +91,11 @@ TEST(Migrations, FileOfEveryEarlierVersionOpensWithItsContent) {
     if (version >= 1) {
       EXPECT_EQ(campaigns->front().submitted.reading_rules, 1);
       EXPECT_EQ(campaigns->front().submitted.owner, "");
+      const auto samples = reader->Samples(1);  // and their samples have no stream of their own
+      ASSERT_TRUE(samples.ok()) << samples.status();
+      ASSERT_EQ(samples->size(), 1U);
+      EXPECT_EQ(samples->front().sample, 3);
+      EXPECT_FALSE(samples->front().stream.has_value());
     }
   }
 }

@@ -115,6 +115,21 @@ TEST_F(StoreTest, DoublesSurviveBitForBit) {
   EXPECT_TRUE(std::isnan(samples->front().log_likelihood));
 }
 
+TEST_F(StoreTest, AStreamOfItsOwnComesBackAndNoneStaysNone) {
+  Write([](Transaction& t) {
+    PutEvaluation(t);
+    t.InsertSample(1, {.sample = 1, .iteration = 0, .parameters = {1e9, 0.2}, .stream = 0});
+    t.InsertSample(1, {.sample = 2, .iteration = 0, .parameters = {1e9, 0.3}, .stream = 1'000'000});
+  });
+  Reader reader = Read();
+  const auto samples = reader.Samples(1);
+  ASSERT_TRUE(samples.ok()) << samples.status();
+  ASSERT_EQ(samples->size(), 3U);
+  EXPECT_FALSE((*samples)[0].stream.has_value());
+  EXPECT_EQ((*samples)[1].stream, 0);
+  EXPECT_EQ((*samples)[2].stream, 1'000'000);
+}
+
 TEST_F(StoreTest, StateThatArrivesTwiceIsHarmlessAndOtherBitsAreLogged) {
   Write([](Transaction& t) {
     PutEvaluation(t);

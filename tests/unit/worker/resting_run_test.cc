@@ -33,7 +33,7 @@ class RestingRun : public ::testing::Test {
           return campaign_.files.at(path);
         });
     EXPECT_TRUE(outcome.problems.empty());
-    spec_ = messages::SpecOf(outcome.campaign, 0, {2e8, 0.5}, 0);
+    spec_ = messages::SpecOf(outcome.campaign, 0, {{2e8, 0.5}, 0});
     std::filesystem::remove_all(folder_);
   }
 
