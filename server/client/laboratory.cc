@@ -40,10 +40,13 @@ std::string WhatToDo(const v1::CampaignStatus& status) {
   return absl::StrCat("wait for it with `calibctl watch ", id, "`");
 }
 
-// Runs that another verb made for a purpose of its own say nothing by themselves.
+// Runs that another verb made for a purpose of its own say nothing by themselves, and rows never.
 std::string WhyNoCalibration(const v1::CampaignStatus& status) {
-  const bool trial = messages::PurposeOf(status) == campaign::DerivedFor::kWarmFit ||
-                     messages::RunsRowsOnly(status);
+  const bool rows_only = messages::RunsRowsOnly(status);
+  if (rows_only && status.parent().empty()) {
+    return messages::InfersNothing(status.campaign(), *messages::MethodOf(status));
+  }
+  const bool trial = rows_only || messages::PurposeOf(status) == campaign::DerivedFor::kWarmFit;
   if (!trial || status.parent().empty()) return "";
   return absl::StrCat(status.campaign(), " is no calibration but a trial (", status.purpose(),
                       ") made of ", status.parent(), "; ask ", status.parent(), " instead");

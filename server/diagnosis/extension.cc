@@ -8,9 +8,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/registry/declared_effects.h"
-#include "dem/registry/model_parameters.h"
 #include "server/campaign/file/derive.h"
 #include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/model/race.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -22,16 +22,6 @@ constexpr double kNear = 0.2;  // times a value that is known to be good
 double SettingOr(const campaign::Experiment& experiment, const std::string& name, double other) {
   const auto found = experiment.settings.find(name);
   return found != experiment.settings.end() ? found->second : other;
-}
-
-bool HasClumps(const campaign::Experiment& experiment) {
-  return std::any_of(experiment.specimens.begin(), experiment.specimens.end(),
-                     [](const campaign::Specimen& specimen) {
-                       const auto* file = std::get_if<campaign::PackingFile>(&specimen);
-                       return file != nullptr &&
-                              std::any_of(file->packing.clump.begin(), file->packing.clump.end(),
-                                          [](int clump) { return clump >= 0; });
-                     });
 }
 
 double DiameterOf(const campaign::Experiment& experiment) {
@@ -194,8 +184,7 @@ std::map<std::string, dem::DefaultPrior> PriorsOfExtension(const report::Campaig
 
 std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& name) {
   const auto& declared = campaign.model.user_effects;
-  const dem::EffectInfo* effect = dem::FindEffect(declared, name);
-  if (effect == nullptr) {
+  if (dem::FindEffect(declared, name) == nullptr) {
     std::vector<std::string> names;
     for (const dem::EffectInfo* info : dem::AllEffects(declared)) names.push_back(info->name);
     return absl::StrCat("there is no effect ", name, "; this build has ",
@@ -212,27 +201,7 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
   if (std::find(has.begin(), has.end(), name) != has.end()) {
     return absl::StrCat(name, " is part of the model already");
   }
-  for (const std::string& other : has) {
-    const dem::EffectInfo* joined = dem::FindEffect(declared, other);
-    if (joined != nullptr && dem::Exclude(*effect, *joined)) {
-      return absl::StrCat(name, " is another law of what ", other,
-                          " stands for already: one of them, not both");
-    }
-  }
-  if (!effect->contacts.empty() && std::find(effect->contacts.begin(), effect->contacts.end(),
-                                             campaign.model.contact) == effect->contacts.end()) {
-    return absl::StrCat(name, " cannot join the contact ", campaign.model.contact,
-                        "; it works with ", absl::StrJoin(effect->contacts, ", "));
-  }
-  dem::Model joined = campaign.model;
-  joined.effects.push_back(name);
-  if (const auto problems = dem::MaterialProblems(joined); !problems.empty()) {
-    return problems.front();  // the model itself has none
-  }
-  const bool clumps =
-      std::any_of(campaign.experiments.begin(), campaign.experiments.end(), HasClumps);
-  const auto problems = dem::ShapeProblems(joined, clumps);
-  return problems.empty() ? "" : problems.front();
+  return campaign::WhyNotTogether(campaign, {name});
 }
 
 absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,

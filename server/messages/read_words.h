@@ -3,7 +3,9 @@
 // know, and for none.
 
 #include <optional>
+#include <string>
 
+#include "absl/strings/str_cat.h"
 #include "calib/v1/campaign.pb.h"
 #include "server/campaign/model/words.h"
 
@@ -27,6 +29,11 @@ inline std::optional<campaign::Method> MethodOf(const v1::CampaignStatus& status
 inline bool RunsRowsOnly(const v1::CampaignStatus& status) {
   const auto method = MethodOf(status);
   return method && campaign::RunsRowsOnly(*method);
+}
+/// What is said of such a campaign to who asks for what it has found.
+inline std::string InfersNothing(const std::string& campaign, campaign::Method method) {
+  return absl::StrCat("campaign ", campaign, " runs the rows of its ", ToString(method),
+                      " and infers nothing: see samples, states and export");
 }
 inline std::optional<campaign::DerivedFor> PurposeOf(const v1::CampaignStatus& status) {
   return campaign::ToDerivedFor(status.purpose());

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/campaign/file/text/origin.h"
+#include "server/messages/read_words.h"
 #include "server/scheduler/definition.h"
 #include "server/scheduler/growth.h"
 #include "server/scheduler/history.h"
@@ -246,9 +247,8 @@ absl::StatusOr<v1::Posterior> PosteriorOf(store::Reader& reader, std::int64_t ca
     }
   }
   if (found == nullptr && campaign::RunsRowsOnly(record.submitted.method)) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "campaign c", campaign, " runs the rows of its ", ToString(record.submitted.method),
-        " and infers nothing: see samples, states and export"));
+    return absl::FailedPreconditionError(
+        messages::InfersNothing(absl::StrCat("c", campaign), record.submitted.method));
   }
   if (found == nullptr) {
     return absl::FailedPreconditionError(

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """The machinery of deploy/nightly on made-up pieces: what fails, goes on and is skipped. usage: nightly_test.py ROOT"""
+import fnmatch
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -161,6 +163,33 @@ class Nightly(unittest.TestCase):
                               capture_output=True, text=True, timeout=60)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertRegex(done.stdout, r'(?m)^asan')
+
+    def test_every_slow_test_is_in_a_piece(self):
+        with open(f'{ROOT}/deploy/nightly.d/pieces.toml', encoding='utf-8') as file:
+            run = re.findall(r"bin/(\w+) --gtest_filter='([^']+)'", file.read())
+        slow = [name for name in slow_tests() if not any(
+            name[0] == target and any(fnmatch.fnmatchcase(name[1], one) for one in pattern.split(':')) for target, pattern in run)]
+        self.assertGreater(len(run), 3)
+        self.assertEqual(slow, [], 'no piece of deploy/nightly.d/pieces.toml runs these')
+
+
+def slow_tests():
+    """(target, Suite.Test) of what deploy/test leaves out."""
+    for folder, _, names in os.walk(f'{ROOT}/tests'):
+        for name in names:
+            if not name.endswith('.cc'):
+                continue
+            with open(os.path.join(folder, name), encoding='utf-8') as file:
+                found = re.findall(r'(?m)^TEST(?:_F|_P)?\((\w*Slow), (\w+)\)', file.read())
+            for suite, test in found:
+                yield target_of(folder, name), f'{suite}.{test}'
+
+
+def target_of(folder, name):
+    """The calib_test that lists the file."""
+    with open(os.path.join(folder, 'CMakeLists.txt'), encoding='utf-8') as file:
+        before = re.split(rf'\b{re.escape(name)}\b', file.read())[0]
+    return re.findall(r'calib_test\((\w+)', before)[-1]
 
 
 if __name__ == '__main__':

@@ -1,13 +1,18 @@
 #pragma once
 // Runs with few effects on, drawn from the very model that a FeatureEmulator takes for true.
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <random>
+#include <utility>
 #include <vector>
 
+#include "inference/diagnosis/diagnosis_set.h"
 #include "inference/diagnosis/feature_emulator.h"
 #include "inference/diagnosis/model_space.h"
 
@@ -168,6 +173,22 @@ inline ModelSpace ToySpace(const CoordinateToy& toy, double high = 5) {
   space.base_high = Eigen::VectorXd::Constant(toy.features().parameters(), 1);
   space.models = AllModels(static_cast<int>(k), {});
   return space;
+}
+
+/// A set whose variances are the true ones: coordinates of scatter one, noise 0.2.
+inline DiagnosisSet SetOf(const CoordinateToy& toy, const EmulatorData& data,
+                          double freedom = std::numeric_limits<double>::infinity()) {
+  auto emulator =
+      FeatureEmulator::Fit(toy.features(), data, {.start = toy.Variances(), .hold = true});
+  EXPECT_TRUE(emulator.ok()) << emulator.status();
+  const Eigen::Index q = data.outputs.cols();
+  SpecimenErrors errors{.specimen = emulator->specimen(),
+                        .run = emulator->variances().run,
+                        .noise = Eigen::VectorXd::Constant(q, 0.2),
+                        .staging = Eigen::MatrixXd(q, 0),
+                        .share = 1,
+                        .freedom = freedom};
+  return {*std::move(emulator), std::move(errors)};
 }
 
 }  // namespace calib::inference

@@ -14,7 +14,7 @@
 namespace calib::campaign {
 
 /// Prefix of the parameters by which a design changes how staged tests are walked: factors on what
-/// the engine takes for an experiment (dem::ResolveStaging), null 1. from 0.01 to 100.
+/// the engine takes for an experiment (dem::ResolveStaging), null 1, from 0.01 to 100.
 /// numerics.rate: on the rate. numerics.step: on the step. numerics.damping: on the damping while
 /// straining; where the product would pass 0.9 it is divided by the factor. Tests that are not read
 /// at rest are left alone.
@@ -49,7 +49,7 @@ dem::Model ModelOf(const Campaign& campaign, std::span<const double> values);
 void ChangeNumerics(const Campaign& campaign, const Experiment& experiment,
                     std::span<const double> values, dem::Scenario& scenario);
 
-/// Why these effects of the race cannot be in one run, in a sentence; empty: they can.
+/// Why these effects cannot join the model in one run, in a sentence; empty: they can.
 std::string WhyNotTogether(const Campaign& campaign, const std::vector<std::string>& effects);
 
 /// Why a design cannot run these values, in a sentence; empty: it can. They are finite, each within

@@ -111,8 +111,7 @@ enum class DerivedFor {
   kWarmFitBatch,
   kPrediction,
   kNextExperiment,
-  kDesign,
-  kThen
+  kDesign
 };
 inline constexpr std::array kDerivedForWords = {
     Word{DerivedFor::kExtension, "extension"},
@@ -123,7 +122,6 @@ inline constexpr std::array kDerivedForWords = {
     Word{DerivedFor::kPrediction, "prediction"},
     Word{DerivedFor::kNextExperiment, "next_experiment"},
     Word{DerivedFor::kDesign, "design"},
-    Word{DerivedFor::kThen, "then"},
 };
 const char* ToString(DerivedFor purpose);
 /// Empty for a purpose of a user's own, and where there is none.

@@ -12,6 +12,7 @@
 #include "server/ctl/next_step.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
+#include "server/messages/read_words.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/views/discrepancies.h"
 #include "server/report/views/parameter_drift.h"
@@ -42,6 +43,10 @@ void Declare(OptionList& list, CompareOptions& options) { list.Campaign(options.
 absl::StatusOr<int> Compare(const CommonOptions& common, const CompareOptions& options) {
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
   ASSIGN_OR_RETURN(const auto view, client::LoadView(session->client(), options.campaign));
+  if (messages::RunsRowsOnly(view.status)) {
+    return absl::FailedPreconditionError(
+        messages::InfersNothing(options.campaign, *messages::MethodOf(view.status)));
+  }
   if (view.iterations.empty()) {
     return absl::FailedPreconditionError("no iteration of " + options.campaign +
                                          " is complete yet: nothing to compare");

@@ -71,8 +71,13 @@ absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions&
   }
   std::cout << options.file << " is good: " << campaign.parameters.size() << " parameters, "
             << campaign.experiments.size() << " experiment(s), " << readings
-            << " measured numbers, " << campaign.samples << " samples in each of at most "
-            << campaign.max_iterations << " iteration(s).\n";
+            << " measured numbers, ";
+  if (campaign::RunsRowsOnly(campaign.method)) {
+    std::cout << (campaign.table ? campaign.table->like.size() : 0) << " row(s) to run.\n";
+  } else {
+    std::cout << campaign.samples << " samples in each of at most " << campaign.max_iterations
+              << " iteration(s).\n";
+  }
   for (const std::string& note : notes) std::cout << report::Wrapped(note, "  ", "  ");
   for (const campaign::Warning& warning : source->outcome.warnings) {
     std::cout << report::Wrapped(campaign::Sentence(warning), "! ", "  ");

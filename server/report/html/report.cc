@@ -21,6 +21,8 @@ std::string RenderReport(const CampaignView& view, const Story& story) {
     body += ParameterSection(data) + FitSection(data) + MissingPhysicsSection(data) +
             DiagnosisSection(data) + PosteriorSection(data) + SensitivitySection(data) +
             EvolutionSection(data);
+  } else if (campaign::RunsRowsOnly(view.campaign.method)) {
+    body += "<p>Rows are run here and nothing is inferred, so there is no posterior.</p>\n";
   } else {
     body += "<p>No iteration is complete yet, so there is no posterior to show.</p>\n";
   }

@@ -78,6 +78,24 @@ TEST_F(Calibctl, SimulateWritesARowPerLoadStep) {
   EXPECT_TRUE(std::filesystem::exists(work_ / "grains" / "tx" / "contacts_0002.vtp"));
 }
 
+TEST_F(Calibctl, RowsAreRunAndNothingIsInferred) {
+  Write("rows.yaml",
+        Rebounds("{contact: hertz_mindlin, density: 2700, fixed: {poisson_ratio: 0.3}}", "0.02",
+                 "{method: design, rows: [{young_modulus: 1 GPa, friction_coefficient: 0.1}, "
+                 "{young_modulus: 1 GPa, friction_coefficient: 0.4}]}"));
+  EXPECT_THAT(Call("validate rows.yaml").out, HasSubstr("3 measured numbers, 2 row(s) to run.\n"));
+  const Answer run = Call("run rows.yaml --state s --workers 1");
+  ASSERT_EQ(run.code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("2 rows run, 2 model evaluations, nothing inferred."));
+  EXPECT_EQ(Call("samples c1 --state s --json").json().size(), 2U);
+  for (const char* verb : {"posterior", "compare", "diagnose", "improve"}) {
+    const Answer answer = Call(std::string(verb) + " c1 --state s");
+    EXPECT_EQ(answer.code, 1) << verb;
+    EXPECT_THAT(answer.err, HasSubstr("campaign c1 runs the rows of its design and infers nothing"))
+        << verb;
+  }
+}
+
 TEST_F(Calibctl, AFileWhoseCampaignWasCancelledIsSaidToBe) {
   EXPECT_EQ(Call("submit good.yaml --state s").out, "c1\n");
   const Json shown = Call("show c1 --state s --json").json();
