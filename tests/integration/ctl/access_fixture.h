@@ -2,9 +2,13 @@
 // Servers that let in who shows a token or a certificate, and those who ask them.
 
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
@@ -55,6 +59,27 @@ class Access : public CalibctlFixture {
   Access() { Write("campaign.yaml", SmallCampaign(4, 1)); }
 
   std::string At(const std::string& name) const { return (work_ / name).string(); }
+
+  /// A TCP port of 127.0.0.1 at which nothing listens, below those that the system gives to who
+  /// asks for any (from 32768 on): no program beside this one takes it in between.
+  static int FreePort() {
+    constexpr int kLowest = 20000;
+    constexpr int kPorts = 12000;
+    for (int next = 0; next < kPorts; ++next) {
+      const int port = kLowest + (static_cast<int>(getpid()) + next) % kPorts;
+      const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+      sockaddr_in address{};
+      address.sin_family = AF_INET;
+      address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+      address.sin_port = htons(static_cast<std::uint16_t>(port));
+      const bool free =
+          bind(file, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+      close(file);
+      if (free) return port;
+    }
+    ADD_FAILURE() << "no port is free";
+    return 0;
+  }
 
   /// calibd over the folder `state`, once it serves; `address` is then where.
   std::unique_ptr<Process> Serve(const std::string& state, std::vector<std::string> options) {

@@ -314,7 +314,8 @@ TEST_F(Access, TokenIsShownToItsServerOnlyAndNotRepeated) {
 }
 
 TEST_F(Access, WorkerThatWasThereFirstFindsTheTokenThatIsLeftLater) {
-  auto server = Serve("state", {});
+  const std::string address = "127.0.0.1:" + std::to_string(FreePort());
+  auto server = Serve("state", {"--listen", address});
   server->Signal(SIGTERM);
   EXPECT_EQ(server->Wait(kPatience), 0);
   server.reset();
@@ -322,7 +323,7 @@ TEST_F(Access, WorkerThatWasThereFirstFindsTheTokenThatIsLeftLater) {
   EXPECT_TRUE(Eventually(
       kPatience, [&] { return Read("worker.err").find("disconnected") != std::string::npos; }));
   std::filesystem::remove_all(work_ / "state");
-  server = Serve("state", {"--listen", address_});
+  server = Serve("state", {"--listen", address});
   EXPECT_TRUE(Eventually(kPatience, [&] { return Ask("workers --json", "").json().size() == 1; }))
       << Read("worker.err");
 }

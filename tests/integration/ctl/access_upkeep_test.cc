@@ -1,9 +1,6 @@
 // Who is let in over time: servers that come later, certificates that are renewed or revoked, what
 // each caller has asked for, and what logs say of it.
 #include <gmock/gmock.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <csignal>
 #include <memory>
@@ -27,19 +24,6 @@ class AccessUpkeep : public Access {
       ++count;
     }
     return count;
-  }
-
-  /// A TCP port of 127.0.0.1 at which nothing listens.
-  static int FreePort() {
-    const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof(address);
-    EXPECT_EQ(bind(file, reinterpret_cast<const sockaddr*>(&address), size), 0);
-    EXPECT_EQ(getsockname(file, reinterpret_cast<sockaddr*>(&address), &size), 0);
-    close(file);
-    return ntohs(address.sin_port);
   }
 
   std::unique_ptr<Process> StartWorker(const std::string& server, const std::string& tls,

@@ -40,7 +40,9 @@ class CalibctlFixture : public ::testing::Test {
           "axial_strain,q_over_p,volumetric_strain\n0.002,0.5,0.0008\n0.005,0.8,0.0012\n"
           "0.01,1.0,0.001\n");
   }
-  ~CalibctlFixture() override { std::filesystem::remove_all(work_); }
+  ~CalibctlFixture() override {
+    if (!HasFailure()) std::filesystem::remove_all(work_);
+  }
 
   /// A campaign on data.csv: one triaxial test, two parameters, 15 lines.
   static std::string SmallCampaign(int samples, int iterations) {
