@@ -15,36 +15,7 @@ std::string OrDash(const std::optional<double>& value, int digits) {
   return value ? Number(*value, digits) : "–";
 }
 
-// The effects it is like, nearest first, with the angle between what they change.
-std::string Alike(const TriedEffect& tried) {
-  std::vector<std::pair<double, std::string>> alike;
-  for (const std::string& other : tried.confusable_with) {
-    const auto angle = tried.angles.find(other);
-    alike.emplace_back(angle == tried.angles.end() ? 180 : angle->second, other);
-  }
-  std::sort(alike.begin(), alike.end());
-  std::string text;
-  for (const auto& [angle, other] : alike) {
-    text += (text.empty() ? "" : ", ") + NameForPeople(other);
-    if (angle < 180) text += fmt::format(" ({}°)", Number(angle, 2));
-  }
-  return text;
-}
-
-// Beside the effect its own name in front of each parameter goes without saying.
-std::string OwnStrength(const std::string& effect, const std::map<std::string, double>& strength,
-                        const std::map<std::string, std::string>& units) {
-  std::map<std::string, double> values;
-  std::map<std::string, std::string> own_units;
-  for (const auto& [name, value] : strength) {
-    const std::string own =
-        NameForPeople(name.starts_with(effect + ".") ? name.substr(effect.size() + 1) : name);
-    values[own] = value;
-    if (const auto unit = units.find(name); unit != units.end()) own_units[own] = unit->second;
-  }
-  return StrengthInWords(values, own_units);
-}
-
+// Of records of earlier rules.
 std::string CandidateTable(const StoredDiagnosis& d) {
   if (d.candidates.empty()) return "";
   std::string html =
@@ -63,7 +34,7 @@ std::string CandidateTable(const StoredDiagnosis& d) {
         not_found ? "not found" : ShareExplained(tried.explained_fraction),
         Number(tried.predicted_rms_error, 3), not_found ? "–" : OrDash(tried.refit_p_value, 2),
         not_found ? "–" : OrDash(tried.left_out_error, 3),
-        Escape(OwnStrength(tried.effect, tried.amplitude, d.units)), Escape(Alike(tried)));
+        Escape(OwnStrength(tried.effect, tried.amplitude, d.units)), Escape(AlikeInWords(tried)));
   }
   html +=
       "</table></div>\n<p class=\"sub\">Best first. Explains: share of the misfit beyond noise "
@@ -124,6 +95,34 @@ std::string NextExperimentHtml(const StoredDiagnosis& d) {
 
 }  // namespace
 
+std::string AlikeInWords(const TriedEffect& tried) {
+  std::vector<std::pair<double, std::string>> alike;
+  for (const std::string& other : tried.confusable_with) {
+    const auto angle = tried.angles.find(other);
+    alike.emplace_back(angle == tried.angles.end() ? 180 : angle->second, other);
+  }
+  std::sort(alike.begin(), alike.end());
+  std::string text;
+  for (const auto& [angle, other] : alike) {
+    text += (text.empty() ? "" : ", ") + NameForPeople(other);
+    if (angle < 180) text += fmt::format(" ({}°)", Number(angle, 2));
+  }
+  return text;
+}
+
+std::string OwnStrength(const std::string& effect, const std::map<std::string, double>& strength,
+                        const std::map<std::string, std::string>& units) {
+  std::map<std::string, double> values;
+  std::map<std::string, std::string> own_units;
+  for (const auto& [name, value] : strength) {
+    const std::string own =
+        NameForPeople(name.starts_with(effect + ".") ? name.substr(effect.size() + 1) : name);
+    values[own] = value;
+    if (const auto unit = units.find(name); unit != units.end()) own_units[own] = unit->second;
+  }
+  return StrengthInWords(values, own_units);
+}
+
 std::string DiagnosisSection(const ReportData& data) {
   const std::string& campaign = data.view.status.campaign();
   const StoredDiagnosis* d = LatestOf(data.story.diagnoses, campaign);
@@ -142,7 +141,8 @@ std::string DiagnosisSection(const ReportData& data) {
       PValuesInWords(d->p_value, d->p_chi2, d->p_stages),
       d->only_adequacy ? " Whether an effect would fit better was not asked." : "");
   for (const std::string& warning : d->warnings) html += "<p>" + Escape(warning) + "</p>\n";
-  html += CandidateTable(*d) + Detectable(*d) + Reasons("Not to be detected", d->undetectable) +
+  html += d->probabilities.empty() ? CandidateTable(*d) : EffectsSection(data, *d);
+  html += Detectable(*d) + Reasons("Not to be detected", d->undetectable) +
           Reasons("Not tried", d->not_excitable) + NextExperimentHtml(*d);
   return html + fmt::format("<p class=\"sub\">Diagnosis of {}, kept as SHA-256 {}.</p>\n",
                             DateForPeople(d->created_unix_ms), Escape(d->digest));

@@ -33,23 +33,7 @@ DisplayUnit UnitOf(const std::string& observable, const std::vector<double>& val
   return UnitForPeople(observable, info != nullptr ? info->unit : "1", Largest(values));
 }
 
-// Standard deviations of tempering say nothing about the measurements: they are not drawn.
-bool ErrorsAreKnown(const CampaignView& view) {
-  return view.campaign.filter.noise != inference::NoiseMode::kEssTarget;
-}
-
 constexpr int kTicks = 5;  // wanted along a curve's values
-
-struct ControlAxis {
-  std::vector<double> values;  // as shown
-  std::string label;
-};
-
-ControlAxis ControlOf(const campaign::Experiment& experiment) {
-  if (experiment.control_name.empty()) return {experiment.control, "reading"};
-  const DisplayUnit unit = UnitOf(experiment.control_name, experiment.control);
-  return {Scaled(experiment.control, unit.factor), LabelWithUnit(experiment.control_name, unit)};
-}
 
 // Adds the ends of the bars that reach beyond the axis of what is shown by more than a plot's
 // margin takes.
@@ -282,6 +266,16 @@ std::string SegmentTable(const ReportData& data) {
 }
 
 }  // namespace
+
+bool ErrorsAreKnown(const CampaignView& view) {
+  return view.campaign.filter.noise != inference::NoiseMode::kEssTarget;
+}
+
+ControlAxis ControlOf(const campaign::Experiment& experiment) {
+  if (experiment.control_name.empty()) return {experiment.control, "reading"};
+  const DisplayUnit unit = UnitOf(experiment.control_name, experiment.control);
+  return {Scaled(experiment.control, unit.factor), LabelWithUnit(experiment.control_name, unit)};
+}
 
 std::string FitSection(const ReportData& data) {
   std::string html = "<h2>Model against measurements</h2>\n<p class=\"sub\">Points: measured";

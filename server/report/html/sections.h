@@ -1,6 +1,7 @@
 #pragma once
 // The sections of the report, each HTML of its own.
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,9 @@ std::string MissingPhysicsSection(
     const ReportData& data);  ///< section_missing_physics.cc: where it fails, what was tried on it
 std::string DiagnosisSection(
     const ReportData& data);  ///< section_diagnosis.cc: the verdict and what it rests on
+/// section_effects.cc: of a diagnosis by probabilities, models, families, and what each effect
+/// would change of the residuals.
+std::string EffectsSection(const ReportData& data, const StoredDiagnosis& diagnosis);
 std::string PosteriorSection(
     const ReportData& data);  ///< section_posterior.cc: marginals and pairs
 std::string EvolutionSection(
@@ -37,6 +41,20 @@ std::string EvolutionSection(
 std::string SensitivitySection(
     const ReportData& data);  ///< section_sensitivity.cc: which parameters move what
 std::string RecordSection(const ReportData& data);  ///< section_record.cc: campaign and provenance
+
+/// What a plot has along its horizontal axis: the control of an experiment, as shown.
+struct ControlAxis {
+  std::vector<double> values{};
+  std::string label{};
+};
+ControlAxis ControlOf(const campaign::Experiment& experiment);
+/// "friction = 0.3": the strengths of an effect; its own name before each goes without saying.
+std::string OwnStrength(const std::string& effect, const std::map<std::string, double>& strength,
+                        const std::map<std::string, std::string>& units);
+/// Standard deviations of tempering say nothing about the measurements: they are not drawn.
+bool ErrorsAreKnown(const CampaignView& view);
+/// The effects that an effect is like, nearest first, with the angle between what they change.
+std::string AlikeInWords(const TriedEffect& tried);
 
 /// The unit in which a calibrated parameter is shown throughout.
 DisplayUnit ParameterUnit(const v1::Posterior::Parameter& parameter);

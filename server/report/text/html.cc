@@ -51,7 +51,7 @@ figure{margin:0}.fit{grid-template-columns:repeat(auto-fit,minmax(min(440px,100%
 svg{display:block;max-width:100%;height:auto}svg text{fill:var(--ink);font-size:12px}svg .tick{fill:var(--soft);font-size:11px}
 .axis{stroke:var(--soft);fill:none;stroke-width:1}.gridline{stroke:var(--grid);stroke-width:1}.zero{stroke:var(--soft);stroke-dasharray:3 3}
 .band{fill:var(--band);fill-opacity:.2;stroke:none}.mean{stroke:var(--model);fill:none;stroke-width:2}
-.band.held{fill:var(--held)}.mean.held{stroke:var(--held)}
+.band.held{fill:var(--held)}.mean.held{stroke:var(--held)}.effect{stroke:var(--good);fill:none;stroke-width:2}
 .point{fill:var(--ink)}.error{stroke:var(--ink);stroke-opacity:.55;fill:none;stroke-width:1}
 .residual{fill:var(--model)}.residual.held{fill:var(--held)}
 .prior{stroke:var(--prior);fill:none;stroke-width:1.5;stroke-dasharray:5 3}.posterior{fill:var(--model);fill-opacity:.45;stroke:var(--model);stroke-width:1}
@@ -60,6 +60,7 @@ svg{display:block;max-width:100%;height:auto}svg text{fill:var(--ink);font-size:
 pre{background:var(--card);border:1px solid var(--line);border-radius:6px;padding:12px;overflow-x:auto;font-size:13px;line-height:1.4}
 summary{cursor:pointer;color:var(--soft)}dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 18px;margin:0}dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}
 .key{display:inline-block;width:18px;height:0;border-top:3px solid;vertical-align:middle;margin:0 4px 0 12px}
+.bar{display:inline-block;height:10px;background:var(--model);border-radius:2px}h4{font-size:14px;margin:18px 0 6px}
 )css";
 
 }  // namespace

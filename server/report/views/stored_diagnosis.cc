@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "server/report/text/people_units.h"
@@ -12,9 +13,49 @@ namespace {
 
 using Json = nlohmann::json;
 
+std::vector<std::string> Names(const Json& json) {
+  std::vector<std::string> names;
+  if (!json.is_array()) return names;
+  for (const Json& name : json) {
+    if (name.is_string()) names.push_back(name);
+  }
+  return names;
+}
+
+std::vector<ProbableEffects> ReadProbable(const Json& json, const char* key) {
+  std::vector<ProbableEffects> list;
+  const auto found = json.find(key);
+  if (found == json.end() || !found->is_array()) return list;
+  for (const Json& entry : *found) {
+    if (!entry.is_object() || !entry.contains("effects")) continue;
+    Read(entry, "probability", list.emplace_back().probability);
+    list.back().effects = Names(entry["effects"]);
+  }
+  return list;
+}
+
+std::vector<EffectCurve> ReadCurves(const Json& json) {
+  std::vector<EffectCurve> curves;
+  const auto found = json.find("curves");
+  if (found == json.end() || !found->is_array()) return curves;
+  for (const Json& entry : *found) {
+    if (!entry.is_object() || !entry.contains("change") || !entry["change"].is_array()) continue;
+    EffectCurve& curve = curves.emplace_back();
+    Read(entry, "experiment", curve.experiment);
+    Read(entry, "observable", curve.observable);
+    for (const Json& value : entry["change"]) {
+      curve.change.push_back(value.is_number() ? value.get<double>() : std::nan(""));
+    }
+  }
+  return curves;
+}
+
 TriedEffect ReadTried(const Json& json) {
   TriedEffect tried;
   Read(json, "effect", tried.effect);
+  Read(json, "probability", tried.probability);
+  Read(json, "alone", tried.alone);
+  tried.curves = ReadCurves(json);
   Read(json, "p_value", tried.p_value);
   Read(json, "explained_fraction", tried.explained_fraction);
   Read(json, "predicted_rms_error", tried.predicted_rms_error);
@@ -43,6 +84,16 @@ absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& text) {
     return absl::InvalidArgumentError("the document kept as a diagnosis is none");
   }
   Read(json, "effect", d.effect);
+  d.probabilities = ReadProbable(json, "probabilities");
+  Read(json, "none_of_these", d.none_of_these);
+  d.families = ReadProbable(json, "families");
+  if (const auto set = json.find("credible_set"); set != json.end() && set->is_array()) {
+    for (const Json& model : *set) d.credible_set.push_back(Names(model));
+  }
+  if (const auto specimens = json.find("specimens");
+      specimens != json.end() && specimens->is_object()) {
+    Read(*specimens, "repeat_names_alone", d.repeat_names_alone);
+  }
   Read(json, "sentence", d.sentence);
   Read(json, "only_adequacy", d.only_adequacy);
   if (const auto adequacy = json.find("adequacy");

@@ -13,10 +13,27 @@
 
 namespace calib::report {
 
+/// What an effect would change of one measured curve.
+struct EffectCurve {
+  std::string experiment{}, observable{};
+  std::vector<double> change{};  ///< at each reading: model with the effect less model without, SI
+};
+
+/// Effects that act together, and how probable that is. None: the model as it is.
+struct ProbableEffects {
+  std::vector<std::string> effects{};
+  double probability = 0;
+};
+
 /// An effect that was tried on the model.
 struct TriedEffect {
   std::string effect{};
-  double p_value = 1;             ///< p of the screen, adjusted for the number of candidates
+  std::optional<double> probability{};  ///< that it acts; none in records of earlier rules
+  bool alone = false;                   ///< named
+  std::vector<EffectCurve> curves{};
+  /// Of the likelihood ratio; in records of earlier rules of the screen, adjusted for the number of
+  /// candidates.
+  double p_value = 1;
   double explained_fraction = 0;  ///< share of the misfit beyond noise and scatter, 0 to 1
   double predicted_rms_error = 0;
   std::map<std::string, double>
@@ -31,11 +48,19 @@ struct StoredDiagnosis {
   std::string campaign{};
   std::string digest{};  ///< SHA-256 of the document
   std::int64_t created_unix_ms = 0;
-  std::string verdict{};       ///< adequate | missing_effect | ambiguous | unexplained
-  std::string effect{};        ///< named, with missing_effect
-  std::string sentence{};      ///< the verdict in words
-  bool only_adequacy = false;  ///< no effect was tried
-  double rms = 0;              ///< error of the best fit, in sd of a measurement
+  std::string verdict{};  ///< adequate | missing_effect | ambiguous | unexplained
+  std::string effect{};   ///< named, with missing_effect
+  /// Models by probability, the largest first; "other" stands for those that are not listed. Empty
+  /// in records of earlier rules.
+  std::vector<ProbableEffects> probabilities{};
+  double none_of_these = 0;  ///< probability; with those of the models it sums to one
+  /// The fewest models that hold 95 %; "none_of_these" may be one.
+  std::vector<std::vector<std::string>> credible_set{};
+  std::vector<ProbableEffects> families{};     ///< hardly told apart by these tests
+  std::optional<double> repeat_names_alone{};  ///< probability that a second specimen names one
+  std::string sentence{};                      ///< the verdict in words
+  bool only_adequacy = false;                  ///< no effect was tried
+  double rms = 0;                              ///< error of the best fit, in sd of a measurement
   double chi2 = 0, degrees = 0, p_value = 1;
   std::optional<double> p_chi2{}, p_stages{};  ///< p_value is of both together
   std::optional<double> left_out_error{};
