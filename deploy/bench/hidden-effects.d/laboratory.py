@@ -1,254 +1,199 @@
-"""Makes the measurements, runs the campaigns and keeps what came out; knows calibctl and files only."""
-import csv, hashlib, json, math, os, random, subprocess, sys, threading
+"""Makes measurements whose truth is known, and the campaign files that do not know it; knows calibctl and files only."""
+import csv, dataclasses, hashlib, json, math, os, random, shutil
 
-YOUNG, FRICTION = (0.6e9, 1.2e9), (0.3, 0.6)     # where the truth is drawn from, well inside the priors
-NOISE = {'q_over_p': (0.015, 0.01), 'volumetric_strain': (0.0, 3e-4)}   # relative, absolute
-READINGS, STRAIN = 24, 0.08
-PRESSURES = {'low': ('0.1 MPa', 'calibrate'), 'high': ('0.4 MPa', 'calibrate'), 'held': ('0.2 MPa', 'validate')}
+import programs
+
 PACKINGS = 16                                      # of a campaign; what diagnose recommends
-DRAWS = 5                                          # of base parameters, until the hidden effect can be as strong as wanted
-STAGING = {'rate': 0.1, 'step': 0.004, 'damping': 0.3, 'grains': 300}
+GRAINS, MORE = 300, 1.27                           # of the model; a measured specimen has up to so many times as many, drawn
+DRAWS = 5                                          # of base parameters, until the hidden effects can be as strong as wanted
+STAGING = {'rate': 0.1, 'step': 0.004, 'damping': 0.3}
+OTHERWISE = {'rate': {'rate': 0.2}, 'step': {'step': 0.002}, 'damping': {'damping': 0.6}, 'grains': {}, 'base': {}}
+MANY_GRAINS = 600                                  # of the specimen where the case says 'grains'
+STRAINS_AND_RATIO = {'q_over_p': (0.015, 0.01), 'volumetric_strain': (0.0, 3e-4)}   # relative, absolute
 
 
-class Failed(Exception):
-    pass
+def up_and_down(last, readings, back):
+    """A path to `last` with one unloading by `back` half-way, and reloading."""
+    up = [last * i / readings for i in range(readings + 1)]
+    half = len(up) // 2
+    return tuple(up[:half + 1] + [up[half] - back / 2, up[half] - back, up[half] - back / 2] + up[half + 1:])
+
+
+@dataclasses.dataclass(frozen=True)
+class Test:
+    test: str
+    settings: dict                                 # name: YAML
+    path: tuple = up_and_down(0.08, 24, 0.008)
+    noise: dict = dataclasses.field(default_factory=lambda: dict(STRAINS_AND_RATIO))   # observable: (relative, absolute)
+    control: str = 'axial_strain'
+    role: str = 'calibrate'
+    kind: str = 'cell'                             # poured: no porosity, no staging; collision: no packing either
+
+
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    tests: dict                                    # name: Test
+    priors: dict = dataclasses.field(default_factory=lambda: {
+        'young_modulus': ('log_uniform', 0.4e9, 1.8e9), 'friction_coefficient': ('uniform', 0.2, 0.8)})
+    truth: dict = dataclasses.field(default_factory=lambda: {     # where it is drawn from, well inside the priors
+        'young_modulus': (0.6e9, 1.2e9), 'friction_coefficient': (0.3, 0.6)})
+    reference: dict = dataclasses.field(default_factory=lambda: {'pressure': 0.2e6, 'diameter': 3e-3, 'modulus': 0.6e9})
+    density: str = '2650000 kg/m^3'                # a thousandfold: the tests are quasi-static
+    fixed: dict = dataclasses.field(default_factory=lambda: {'poisson_ratio': 0.2})
+    effects: tuple = ()                            # of the model that is calibrated
+    grains: int = GRAINS
+    packings: int = PACKINGS
+    radii: str = '{mean: 1.5 mm, spread: 0.3}'
+
+    def fitted(self):
+        return [name for name, of in self.tests.items() if of.role == 'calibrate']
+
+
+def triaxial(pressure, role='calibrate'):
+    return Test('triaxial_drained', {'confining_pressure': f'{pressure} MPa'}, role=role)
+
+
+STANDARD = Layout({'low': triaxial(0.1), 'high': triaxial(0.4), 'held': triaxial(0.2, 'validate')})
+INFERENCE = {'whole': '{method: iterative_bayesian_filter, samples: 24, max_iterations: 3}', 'shared': '{method: sqmc, samples: 96}'}
 
 
 def digest(text):
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def axial_strains():
-    """Loading with one unloading and reloading half-way."""
-    up = [STRAIN * i / READINGS for i in range(READINGS + 1)]
-    half = len(up) // 2
-    return up[:half + 1] + [up[half] - 0.004, up[half] - 0.008, up[half] - 0.004] + up[half + 1:]
+def campaign(layout, tests, packing, grains, realizations, effects=(), values=None, staging=None, inference='whole', seed=7):
+    """Text of a campaign file. values: parameters of effects that are fixed, SI; packing: seed of the recipe."""
+    fixed = {**layout.fixed, **(values or {})}
+    names = sorted({*layout.effects, *effects})
+    text = f"name: hidden\nmodel: {{contact: hertz_mindlin, density: {layout.density}, effects: [{', '.join(names)}], fixed: {{"
+    text += ', '.join(f'{name}: {value!r}' for name, value in sorted(fixed.items())) + '}}\nparameters:\n'
+    for name, (kind, low, high) in layout.priors.items():
+        text += f'  {name}: {{prior: {kind}, min: {low!r}, max: {high!r}}}\n'
+    text += 'experiments:\n'
+    own = {**STAGING, **(staging or {})}
+    for name in tests:
+        test = layout.tests[name]
+        settings = dict(test.settings)
+        text += f'  - name: {name}\n    test: {test.test}\n'
+        porosity = f"porosity: {settings.pop('porosity', 0.40)}, " if test.kind == 'cell' else ''
+        text += ''.join(f'    {key}: {value}\n' for key, value in settings.items())
+        if test.kind != 'collision':
+            text += f'    packing: {{generate: {{particles: {grains}, {porosity}radii: {layout.radii}, seed: {packing}}}}}\n'
+            text += f'    realizations: {realizations}\n'
+        if test.kind == 'cell':
+            text += f'    data: {{file: {name}.csv, strain: logarithmic}}\n    control: {{column: {test.control}, noise: 1e-5}}\n'
+            text += (f"    staging: {{rate: {own['rate']} 1/s, step: {own['step']}, damping: [{own['damping']}, 0.9], "
+                     f"unbalanced: 1e-3}}\n")
+        else:
+            text += f'    data: {{file: {name}.csv}}\n    control: {test.control}\n'
+        text += '    observables:\n'
+        for observable, (relative, absolute) in test.noise.items():
+            law = f'relative: {relative!r}, floor: {absolute!r}' if relative else f'absolute: {absolute!r}'
+            text += f'      {observable}: {{noise: {{{law}}}}}\n'
+        text += f'    role: {test.role}\n'
+    return text + f'inference: {INFERENCE[inference]}\nseed: {seed}\n'
+
+
+def table(test, readings):
+    """Text of a data file. readings: one {observable: value} for each value of the path."""
+    text = ','.join([test.control, *test.noise]) + '\n'
+    for at, row in zip(test.path, readings):
+        text += ','.join([repr(at), *(f'{row[observable]:.7g}' for observable in test.noise)]) + '\n'
+    return text
 
 
 class Laboratory:
-    def __init__(self, calibctl, folder):
-        self.calibctl, self.folder = calibctl, folder
-        self._lock, self._visibility = threading.Lock(), None
-        os.makedirs(os.path.join(folder, 'sealed'), exist_ok=True)
+    """Thread-safe: each case has a folder of its own."""
 
-    # ---- one case -----------------------------------------------------------------------------------------------------
-    def path(self, case, *names):
-        return os.path.join(self.folder, case.name, *names)
+    def __init__(self, run, folder):
+        """run: programs.Programs."""
+        self.run, self.folder = run, folder
+        self._catalogue = None
+        os.makedirs(folder, exist_ok=True)
 
-    def sealed(self, case, ending):
-        return os.path.join(self.folder, 'sealed', case.name + ending)
-
-    def finished(self, case, improve=False):
-        """improve: with the answer of improve, where the case asks for one."""
-        if not os.path.exists(self.path(case, 'verdict.json')):
-            return False
-        if not improve or case.verb != 'improve':
-            return True
-        with open(self.path(case, 'verdict.json')) as document:
-            return 'improve' in json.load(document)
-
-    def run(self, case, improve=True):
-        """What has been run is found again in the case's state: a verdict without improve gets one."""
-        if self.finished(case, improve):
-            return
-        os.makedirs(self.path(case), exist_ok=True)
-        if not os.path.exists(self.path(case, 'campaign.yaml')):
-            self.measure(case)
-        campaign = self.call(case, 'run', self.path(case, 'campaign.yaml'), '--workers', '1')
-        options = ['--without', case.removed] if case.removed else []
-        verdict = self.call(case, 'diagnose', campaign['campaign'], '--workers', '1', *options)
-        document = {'run': campaign, 'diagnose': verdict, 'compare': self.call(case, 'compare', campaign['campaign'])}
-        if case.verb == 'improve' and improve:
-            document['improve'] = self.call(case, 'improve', campaign['campaign'], '--workers', '1')
-            final = document['improve']['final_campaign']
-            document['final'] = self.call(case, 'posterior', final)
-        self.write(self.path(case, 'verdict.json'), json.dumps(document, indent=1))
-
-    def call(self, case, *arguments):
-        state = [] if arguments[0] in ('simulate', 'effects') else ['--state', self.path(case, 'state')]
-        r = subprocess.run([self.calibctl, *arguments, *state, '--json'], capture_output=True, text=True,
-                           stdin=subprocess.DEVNULL)
-        if r.returncode != 0:
-            raise Failed(f'{arguments[0]} ended with {r.returncode}: {r.stderr.strip()[-200:]}')
-        return json.loads(r.stdout)
-
-    def write(self, path, text):
-        with open(path + '.new', 'w') as out:
-            out.write(text)
-        os.replace(path + '.new', path)
-
-    # ---- measurements -------------------------------------------------------------------------------------------------
-    def campaign(self, seed, particles, staging, effects, parameters, realizations, tests=tuple(PRESSURES)):
-        fixed = ''.join(f', {name}: {value!r}' for name, value in parameters)
-        text = f"""name: hidden
-model: {{contact: hertz_mindlin, effects: [{', '.join(effects)}], density: 2650000 kg/m^3, fixed: {{poisson_ratio: 0.2{fixed}}}}}
-parameters:
-  young_modulus: {{prior: log_uniform, min: 0.2 GPa, max: 4 GPa}}
-  friction_coefficient: {{prior: uniform, min: 0.1, max: 1.0}}
-"""
-        text += 'experiments:\n'
-        for name in tests:
-            pressure, role = PRESSURES[name]
-            text += f"""  - name: {name}
-    test: triaxial_drained
-    confining_pressure: {pressure}
-    packing: {{generate: {{particles: {particles}, porosity: 0.40, radii: {{mean: 1.5 mm, spread: 0.3}}, seed: {seed}}}}}
-    realizations: {realizations}
-    data: {{file: {name}.csv, strain: logarithmic}}
-    control: {{column: axial_strain, noise: 1e-5}}
-    staging: {{rate: {staging['rate']} 1/s, step: {staging['step']}, damping: [{staging['damping']}, 0.9], unbalanced: 1e-3}}
-    observables:
-      q_over_p: {{noise: {{relative: {NOISE['q_over_p'][0]}, floor: {NOISE['q_over_p'][1]}}}}}
-      volumetric_strain: {{noise: {{absolute: {NOISE['volumetric_strain'][1]}}}}}
-    role: {role}
-"""
-        return text + 'inference: {method: iterative_bayesian_filter, samples: 24, max_iterations: 3}\nseed: 7\n'
-
-    def draw_truth(self, case, rnd):
-        """Base parameters, and strengths of what is hidden: of a single effect such that lambda is the case's at just these base
-        parameters. It differs by a factor of two over the priors; parameters where no strength reaches it are drawn again."""
-        for _ in range(DRAWS):
-            truth = {'young_modulus': math.exp(rnd.uniform(*map(math.log, YOUNG))), 'friction_coefficient': rnd.uniform(*FRICTION)}
-            if not case.strength:
-                return truth, case.parameters
-            effect, = case.effects
-            own = self.strengths()[effect]
-            tuned = self.visibility(1).tuned(effect, self.detectable()[effect], self.parameters_of(effect), own['measured'],
-                                             case.strength, truth)
-            if tuned is not None:
-                values, found = tuned
-                self.write(self.sealed(case, '.lambda.json'), json.dumps(found))
-                return truth, tuple(sorted(values.items()))
-        raise Failed(f'no strength of {effect} was found at which lambda is {case.strength}, for {DRAWS} draws of the base parameters')
-
-    def measure(self, case):
-        """Another packing (seed), 340 grains instead of 300, another rate, step or number of grains where the case says so."""
-        rnd = random.Random(case.seed)
-        truth, parameters = self.draw_truth(case, rnd)
-        staging = {**STAGING, 'grains': 340}
-        staging.update({'rate': {'rate': 0.2}, 'step': {'step': 0.002}, 'damping': {'damping': 0.6}, 'grains': {'grains': 600}}.get(case.staging, {}))
-        work = self.path(case, 'making')
-        os.makedirs(work, exist_ok=True)
-        path = axial_strains()
-        for name in PRESSURES:
-            rows = ''.join(f'{strain!r},1,1\n' for strain in path)
-            self.write(os.path.join(work, name + '.csv'), 'axial_strain,q_over_p,volumetric_strain\n' + rows)
-        self.write(os.path.join(work, 'campaign.yaml'),
-                   self.campaign(case.seed + 50000, staging['grains'], staging, case.effects, parameters, 1))
-        states = os.path.join(work, 'states.csv')
-        given = [a for k, v in truth.items() for a in ('--set', f'{k}={v!r}')]
-        r = subprocess.run([self.calibctl, 'simulate', os.path.join(work, 'campaign.yaml'), *given, '-o', states],
-                           capture_output=True, text=True, stdin=subprocess.DEVNULL)
-        if r.returncode != 0:
-            raise Failed(f'simulate ended with {r.returncode}: {r.stderr.strip()[-200:]}')
-        by_test = {name: [] for name in PRESSURES}
-        for row in csv.DictReader(open(states)):
-            by_test[row['experiment']].append(row)
-        for name, rows in by_test.items():
-            text = '# made by deploy/bench/hidden-effects\naxial_strain,q_over_p,volumetric_strain\n'
-            for strain, row in zip(path, rows):
-                values_ = []
-                for observable, (relative, absolute) in NOISE.items():
-                    y = float(row[observable])
-                    values_.append(y + rnd.gauss(0, 1) * math.hypot(relative * y, absolute))
-                text += f'{strain!r},{values_[0]:.6g},{values_[1]:.6g}\n'
-            self.write(self.path(case, name + '.csv'), text)
-        sealed = json.dumps({'effects': case.effects, 'parameters': {**truth, **dict(parameters)}, 'staging': case.staging}, indent=1)
-        self.write(self.sealed(case, '.json'), sealed)
-        self.write(self.path(case, 'truth.sha256'), digest(sealed) + '\n')
-        for entry in os.listdir(work):
-            os.remove(os.path.join(work, entry))
-        os.rmdir(work)
-        # Last: a folder with a campaign is a complete measurement.
-        self.write(self.path(case, 'campaign.yaml'), self.campaign(1, STAGING['grains'], STAGING, (), (), PACKINGS))
-
-    def verdict(self, case):
-        return json.load(open(self.path(case, 'verdict.json')))
-
-    def truth(self, case):
-        """Of a case that has its verdict; the digest must be the one written down when the measurement was made."""
-        if not self.finished(case):
-            raise Failed(f'{case.name}: sealed until there is a verdict')
-        sealed = open(self.sealed(case, '.json')).read()
-        if digest(sealed) != open(self.path(case, 'truth.sha256')).read().strip():
-            raise Failed(f'{case.name}: the sealed truth has been changed')
-        return json.loads(sealed)
-
-    # ---- strengths ----------------------------------------------------------------------------------------------------
     def catalogue(self):
-        if not hasattr(self, '_catalogue'):
-            r = subprocess.run([self.calibctl, 'effects', '--json'], capture_output=True, text=True, check=True)
-            self._catalogue = {e['name']: e for e in json.loads(r.stdout)}
+        """{effect: its entry of `calibctl effects`}."""
+        if self._catalogue is None:
+            self._catalogue = {e['name']: e for e in json.loads(self.run.call('effects', '--json'))}
         return self._catalogue
 
-    def parameters_of(self, effect):
-        return {f"{effect}.{p['name']}": p for p in self.catalogue()[effect]['parameters']}
+    def simulate(self, work, layout, tests, base, **of_campaign):
+        """{test: rows of `simulate`} of one run; work: a folder that is made and removed again."""
+        shutil.rmtree(work, ignore_errors=True)
+        os.makedirs(work)
+        for name in tests:
+            ones = [dict.fromkeys(layout.tests[name].noise, 1.0)] * len(layout.tests[name].path)
+            programs.write(os.path.join(work, name + '.csv'), table(layout.tests[name], ones))
+        file, states = os.path.join(work, 'campaign.yaml'), os.path.join(work, 'states.csv')
+        programs.write(file, campaign(layout, tests, realizations=1, **of_campaign))
+        given = [word for name, value in base.items() for word in ('--set', f'{name}={value!r}')]
+        try:
+            self.run.call('simulate', file, *given, '-o', states)
+            rows = {name: [] for name in tests}
+            with open(states, encoding='utf-8') as text:
+                for row in csv.DictReader(text):
+                    rows[row['experiment']].append(row)
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+        for name in tests:
+            if len(rows[name]) != len(layout.tests[name].path):
+                raise programs.Failed(f'simulate: {len(rows[name])} states of {name} for {len(layout.tests[name].path)} readings')
+        return rows
 
-    def detectable(self):
-        return json.load(open(os.path.join(self.folder, 'detectable.json')))['detectable']
+    # ---- measurements -----------------------------------------------------------------------------------------------------
+    def draw(self, case, rnd, layout, strengths):
+        """Base parameters, and strengths of what is hidden such that lambda of each alone is the case's at just these; parameters
+        where no strength reaches it are drawn again."""
+        for _ in range(DRAWS):
+            base = {name: math.exp(rnd.uniform(math.log(low), math.log(high))) if layout.priors[name][0] == 'log_uniform'
+                    else rnd.uniform(low, high) for name, (low, high) in layout.truth.items()}
+            values, found = {}, {}
+            for effect, turn in zip(case.effects, case.turns):
+                shape = strengths.draw_shape(effect, rnd) if case.shape else {}
+                tuned = strengths.tuned(effect, turn, case.strength, base, shape)
+                if tuned is None:
+                    break
+                values.update(tuned[0])
+                found[effect] = tuned[1]
+            else:
+                return base, values, found
+        raise programs.Failed(f'no strength of {" and ".join(case.effects)} gives lambda {case.strength}, for {DRAWS} draws')
 
-    def measure_detectability(self):
-        import cases
-        path = os.path.join(self.folder, 'detectable.json')
-        if os.path.exists(path):
-            return
-        for seed in range(1, 6):  # a control that is judged adequate says what could have been seen
-            case = cases.Case(f'scale-{seed}', ('scale',), seed)
-            self.run(case)
-            verdict = json.load(open(self.path(case, 'verdict.json')))['diagnose']
-            if verdict['verdict'] == 'adequate':
-                self.write(path, json.dumps({'detectable': verdict['detectable'],
-                                             'candidates': len(verdict['candidates'])}, indent=1))
-                return
-        raise Failed('none of five measurements without a hidden effect was judged adequate')
+    def specimen(self, case, rnd, layout):
+        """Another packing and number of grains, and another staging where the case says so."""
+        grains = MANY_GRAINS if case.staging == 'grains' else rnd.randint(layout.grains, int(MORE * layout.grains))
+        return {'packing': rnd.randrange(10**6, 2**31 - 1000), 'grains': grains, 'staging': OTHERWISE[case.staging]}
 
-    def visibility(self, jobs):
-        import strengths
-        with self._lock:  # cases are measured side by side
-            if self._visibility is None:
-                self._visibility = strengths.Strengths(self, jobs)
-                self._visibility.prepare()
-            self._visibility.jobs = jobs
-        return self._visibility
+    def measure(self, case, folder, layout, strengths):
+        """Data files in the folder and truth.json beside it, which the program that is asked never reads; complete once the truth
+        is there. The same case gives the same measurement."""
+        os.makedirs(folder, exist_ok=True)
+        sealed = os.path.join(folder, 'truth.json')
+        if not os.path.exists(sealed):
+            rnd = random.Random(case.seed)
+            base, values, found = self.draw(case, rnd, layout, strengths)
+            truth = {'effects': list(case.effects), 'base': base, 'values': values, 'lambda': found, **self.specimen(case, rnd, layout)}
+            self.read(truth, folder, layout, list(layout.tests), rnd)
+            programs.write(sealed, json.dumps(truth, indent=1))
+        with open(sealed, encoding='utf-8') as file:
+            return json.load(file)
 
-    def strengths(self, jobs=0):
-        """{effect: {'strengths': {lambda: [values, lambda found, its se, variance]}, 'measured': ..., 'rival': [degrees, effect]}};
-        measured once, with jobs > 0, and kept."""
-        import cases
-        path = os.path.join(self.folder, 'strengths.json')
-        if not os.path.exists(path):
-            if jobs == 0:
-                return {}
-            found, visible = self.detectable(), self.visibility(jobs)
-            document, signatures = {}, {}
-            for effect, values in sorted(found.items()):
-                of_effect, measured = visible.of(effect, values, self.parameters_of(effect), cases.LAMBDAS)
-                document[effect] = {'strengths': of_effect, 'measured': measured}
-                print(f'{effect}: lambda ' + ', '.join(f'{value:.0f} +- {error:.0f} at {multiple:.3g}x (variance {variance:.1f})' for multiple, value, error, variance in measured),
-                      file=sys.stderr, flush=True)
-                if of_effect:  # at 60, or the nearest that there is
-                    near = min(of_effect, key=lambda strength: abs(math.log(strength / 60)))
-                    signatures[effect], _ = visible.signature((effect,), of_effect[near][0])
-            for effect, own in signatures.items():
-                angles = []
-                for other, its in signatures.items():
-                    two_sided = any(self.catalogue()[e]['two_sided'] for e in (effect, other))
-                    degrees = visible.angle(own, its, two_sided) if other != effect else None
-                    if degrees is not None:
-                        angles.append((degrees, other))
-                document[effect]['rival'] = min(angles, default=None)
-            self.write(path, json.dumps(document, indent=1))
-        return json.load(open(path))
+    def read(self, truth, folder, layout, tests, rnd, names=None):
+        """One run at the truth, with noise, into NAME.csv of each test."""
+        rows = self.simulate(os.path.join(folder, 'making'), layout, tests, truth['base'], packing=truth['packing'],
+                             grains=truth['grains'], staging=truth['staging'], effects=truth['effects'], values=truth['values'])
+        for name in tests:
+            test, readings = layout.tests[name], []
+            for row in rows[name]:
+                readings.append({})
+                for observable, (relative, absolute) in test.noise.items():
+                    y = float(row[observable])
+                    readings[-1][observable] = y + rnd.gauss(0, 1) * math.hypot(relative * y, absolute)
+            programs.write(os.path.join(folder, (names or {}).get(name, name) + '.csv'), table(test, readings))
 
-    def visible_at_truth(self, case, jobs=0):
-        """lambda of what is hidden in a case at that case's own parameters, its standard error and the variance along it;
-        kept beside the sealed truth, which a finished verdict opens."""
-        path = self.sealed(case, '.lambda.json')
-        if not os.path.exists(path):
-            if jobs == 0:
-                return None
-            truth = self.truth(case)
-            base = {name: truth['parameters'][name] for name in ('young_modulus', 'friction_coefficient')}
-            values = {name: value for name, value in truth['parameters'].items() if name not in base}
-            self.write(path, json.dumps(self.visibility(jobs).visible(tuple(truth['effects']), values, base)))
-        return json.load(open(path))
+    def file(self, folder, layout, way, design=0):
+        """The campaign file of a measurement. Design k has packings and samples of its own."""
+        path = os.path.join(folder, 'campaign.yaml')
+        tests = list(layout.tests) if way == 'whole' else layout.fitted()
+        programs.write(path, campaign(layout, tests, 1 + 100 * design, layout.grains, layout.packings, inference=way, seed=7 + design))
+        return path

@@ -1,4 +1,4 @@
-"""Strengths of hidden effects by what is visible of them: simulated, not taken from the diagnosis under test.
+"""Strengths of hidden effects by what is visible of them: by runs of the engine, never by what a diagnosis makes of its own.
 
 lambda(strength) is the squared distance, in standard deviations of a measurement on one packing, between the model with
 the effect and the nearest that the model without it can do. Both are means over packings. Pairs of runs decorrelate within
@@ -8,19 +8,108 @@ are taken, whose mean is lambda without bias.
 Packings scatter more where friction is high, and more along smooth directions than neighbouring readings tell. So the
 covariance is that of the nearest imitation's friction, and lambda is divided by the variance of a measurement along the
 visible difference as the packings themselves show it: the square of a signal over its noise.
+
+Needs numpy, but for the table of rays.
 """
-import csv, concurrent.futures, dataclasses, itertools, json, math, os, statistics, subprocess, sys
+import collections, concurrent.futures, dataclasses, itertools, json, math, os, statistics, sys, threading
 
-import laboratory
+import laboratory, programs
 
-CENTER = {'young_modulus': 0.85e9, 'friction_coefficient': 0.45}
-REFERENCE = {'pressure': 0.2e6, 'diameter': 3e-3, 'modulus': 0.6e9}  # of the fitted tests; the softest grains of laboratory.YOUNG
-RANGE = {'young_modulus': 4 / 0.85, 'friction_coefficient': 1 / 0.45}  # factors either way, to the ends of the priors
-PAIRS, SCATTER = 4, 16                                           # packings of the differences, of a covariance
-FRICTIONS = (0.2, 0.45, 0.65, 1.0)                               # at which covariances are measured
-UPWARDS, DOWNWARDS = (1, 2, 4, 8), (0.5, 0.25, 0.125, 1 / 16, 1 / 32)   # times what the diagnosis calls detectable
-CORRECTIONS, NEAR = 3, 0.2                                       # of an interpolated strength, until lambda is this near
-FITTED = [name for name, (_, role) in laboratory.PRESSURES.items() if role == 'calibrate']
+LAYOUT = laboratory.STANDARD
+CENTER = {'young_modulus': 0.85e9, 'friction_coefficient': 0.4}
+RANGE = {'young_modulus': 1.8 / 0.85, 'friction_coefficient': 2}  # factors either way, to the ends of the priors
+PAIRS, SCATTER, MEAN_GRAINS = 4, 16, 340                          # packings of the differences, of a covariance; their grains
+FRICTIONS = (0.2, 0.4, 0.57, 0.8)                                 # at which covariances are measured
+CORRECTIONS, NEAR = 3, 0.2                                        # of an interpolated strength, until lambda is this near
+WANTED, FARTHEST = (60, 400), 6                                   # lambdas; doublings or halvings of a catalogue step
+
+
+@dataclasses.dataclass(frozen=True)
+class Ray:
+    """A way to turn an effect up, as in dem/effects: a parameter leaves its null while others are held."""
+    parameter: str
+    steps: tuple                 # from the null, in units of the parameter's reference scale, the nearer first
+    held: dict = dataclasses.field(default_factory=dict)     # other parameters over their scale
+    order: float = 1             # lambda goes with the step to twice this power, about
+
+
+RAYS = {
+    'adhesion_dmt': (Ray('work_of_adhesion', (0.1, 0.4)),),
+    'adhesion_jkr': (Ray('work_of_adhesion', (0.1, 0.4)),),
+    'apparatus_compliance': (Ray('compliance', (0.1, 0.5)),),
+    'capillary_bridges': (Ray('surface_tension', (0.05, 0.2), {'volume_ratio': 1e-3}),),
+    'contact_plasticity': (Ray('stiffness_ratio', (0.5, 2)),),
+    'hertz_nonlinearity': (Ray('exponent', (0.2, 0.4), {'reference_pressure': 1}),),
+    'initial_density': (Ray('densification', (0.5, 1.5)),),
+    'initial_fabric': (Ray('stress_anisotropy', (0.2, 0.5)),),
+    'linear_cohesion': (Ray('energy_density', (1, 3)),),
+    'load_cell_error': (Ray('gain', (0.05, 0.15)), Ray('offset', (0.03, 0.1))),
+    'membrane_stiffness': (Ray('stiffness', (0.5, 2)),),
+    'nonspherical_shape': (Ray('aspect', (0.1, 0.3)),),
+    'particle_crushing': (Ray('weakness', (0.1, 0.12), {'reference_diameter': 1}, order=3),),
+    'pressure_dependent_friction': (Ray('exponent', (0.1, 0.25), {'reference_pressure': 1}),),
+    'rolling_resistance': (Ray('friction', (0.1, 0.3), {'stiffness_ratio': 1}), Ray('stiffness_ratio', (0.1, 0.5), {'friction': 0.3})),
+    'strain_offset': (Ray('offset', (0.1, 0.4), {'stress': 0.3}),),
+    'twisting_resistance': (Ray('friction', (0.1, 0.3), {'stiffness_ratio': 1}), Ray('stiffness_ratio', (0.1, 0.5), {'friction': 0.3})),
+}
+NOT_HERE = {'viscous_damping': 'shows where grains move', 'wall_friction': 'shows where there are walls'}
+# Parameters that shape an effect, over their scale: drawn log-uniformly for the row of other shapes, on the first ray.
+SHAPES = {
+    'capillary_bridges': ('volume_ratio', 1e-4, 1e-2),
+    'particle_crushing': ('weibull_modulus', 1.5, 6),
+    'rolling_resistance': ('stiffness_ratio', 0.03, 0.5),
+    'strain_offset': ('stress', 0.075, 1.2),
+    'twisting_resistance': ('stiffness_ratio', 0.03, 0.5),
+}
+
+
+def scale_of(info, reference):
+    scale = info['reference_scale']
+    return scale['factor'] * math.prod(value ** scale[quantity] for quantity, value in reference.items())
+
+
+def prior_of(info, reference):
+    """Ends of the prior that the effect gets in these campaigns: the default one, or that of value over scale."""
+    scaled = info['scaled_default_prior']
+    return {end: scaled[end] * scale_of(info, reference) for end in ('min', 'max')} if scaled else info['default_prior']
+
+
+def values_on(effect, ray, step, entry, reference, shape=None, contact='hertz_mindlin'):
+    """SI values of the parameters of an effect at a signed step along a ray, within the prior. entry: of the catalogue; shape:
+    {parameter: value over scale} instead of what the ray holds."""
+    infos, values = {p['name']: p for p in entry['parameters']}, {}
+    for name, scaled in {**ray.held, **(shape or {})}.items():
+        values[f'{effect}.{name}'] = scaled * scale_of(infos[name], reference)
+    info = infos[ray.parameter]
+    null = (info.get('null_by_contact') or {}).get(contact, info['null_value'])
+    limits = prior_of(info, reference)
+    values[f'{effect}.{ray.parameter}'] = min(max(null + step * scale_of(info, reference), limits['min']), limits['max'])
+    return values
+
+
+def interpolate(measured, strength):
+    """The step at which lambda has the strength, in logarithms between points that rise beyond chance; None outside. measured:
+    {step: (lambda, its standard error, ...)}."""
+    rising, highest = [], 1
+    for step, (value, error, *_) in sorted(measured.items()):
+        if value > 2 * error and value > highest:
+            rising.append((math.log(step), math.log(value)))
+            highest = value
+    y = math.log(strength)
+    for (x0, y0), (x1, y1) in zip(rising, rising[1:]):
+        if y0 <= y <= y1:
+            return math.exp(x0 + (x1 - x0) * (y - y0) / (y1 - y0))
+    return None
+
+
+def next_step(step, found, wanted, order):
+    """A squared distance: it grows with the square of what goes with a power of the step."""
+    return step * min(max((wanted / max(found, 1)) ** (1 / (2 * order)), 0.4), 2.5)
+
+
+def reach(measured):
+    """Largest lambda beyond chance of {step: (lambda, its standard error, ...)}."""
+    return max((value for value, error, *_ in measured.values() if value > 2 * error), default=0)
 
 
 @dataclasses.dataclass
@@ -36,43 +125,143 @@ class Scatter:
 
 
 class Strengths:
-    """numpy arrays of T readings, in the order of `simulate`'s rows and NOISE's observables."""
+    """numpy arrays of T readings: of each fitted test and its observables, in order. Runs are kept in files; any number of threads."""
 
-    def __init__(self, lab, jobs):
-        import numpy
-        self.np, self.lab, self.jobs = numpy, lab, jobs
-        self.work = os.path.join(lab.folder, 'strengths')
+    def __init__(self, lab, folder, jobs=1, log=sys.stderr):
+        self.lab, self.folder, self.jobs, self.log = lab, folder, jobs, log
+        self.work = os.path.join(folder, 'runs')
         os.makedirs(self.work, exist_ok=True)
+        self._lock, self._locks, self._prepared = threading.Lock(), collections.defaultdict(threading.Lock), False
+        self.tests = LAYOUT.fitted()
 
-    # ---- runs ---------------------------------------------------------------------------------------------------------
+    # ---- what cases ask ---------------------------------------------------------------------------------------------------
+    def ways(self, effect):
+        """[(ray, sign)]: they go in turn."""
+        signs = (1, -1) if self.lab.catalogue()[effect]['two_sided'] else (1,)
+        return [(ray, sign) for ray in RAYS[effect] for sign in signs]
+
+    def excludes(self):
+        return {name: entry['excludes'] for name, entry in self.lab.catalogue().items()}
+
+    def known(self):
+        """Whether measured() runs nothing."""
+        return set(self.stored()) >= set(RAYS)
+
+    def stored(self):
+        path = os.path.join(self.folder, 'strengths.json')
+        if not os.path.exists(path):
+            return {}
+        with open(path, encoding='utf-8') as file:
+            return json.load(file)
+
+    def measured(self):
+        """{effect: [{step: (lambda, standard error, variance)} of each way]} at CENTER; measured once and kept, effect by effect."""
+        document = self.stored()
+        for effect in sorted(RAYS):
+            if effect not in document:
+                document[effect] = [sorted(self.along(effect, *way).items()) for way in self.ways(effect)]
+                programs.write(os.path.join(self.folder, 'strengths.json'), json.dumps(document, indent=1))
+        return {effect: [dict(of) for of in ways] for effect, ways in document.items()}
+
+    def reached(self):
+        """{effect: largest lambda of WANTED that it reaches within its prior at CENTER}, of those that reach any."""
+        found = {}
+        for effect, ways in self.measured().items():
+            lambdas = [wanted for wanted in WANTED if max(map(reach, ways)) >= wanted]
+            if lambdas:
+                found[effect] = max(lambdas)
+        return found
+
+    def draw_shape(self, effect, rnd):
+        name, low, high = SHAPES[effect]
+        return {name: math.exp(rnd.uniform(math.log(low), math.log(high)))}
+
+    def tuned(self, effect, turn, wanted, base, shape=None):
+        """(values, (lambda, its standard error, variance)) where lambda at these base parameters is the one wanted, within NEAR;
+        None where none was found: the end of the prior comes first, or runs diverge."""
+        at_center = self.measured()[effect]
+        able = [k for k, of in enumerate(at_center) if reach(of) >= wanted and not (shape and k)]
+        if not able:
+            return None
+        k = able[turn % len(able)]
+        ray, _ = self.ways(effect)[k]
+        step = interpolate(at_center[k], wanted) or max(at_center[k])
+        measured, tried = {}, None
+        for _ in range(1 + 2 * CORRECTIONS):
+            values = self.values(effect, k, step, shape)
+            if values == tried:  # the end of the prior
+                return None
+            tried, found = values, self.visible((effect,), values, base)
+            if found is None:
+                return None
+            if abs(found[0] / wanted - 1) < NEAR:
+                return values, found
+            measured[step] = found
+            step = interpolate(measured, wanted) or next_step(step, found[0], wanted, ray.order)
+        return None
+
+    def values(self, effect, way, step, shape=None):
+        ray, sign = self.ways(effect)[way]
+        return values_on(effect, ray, sign * step, self.lab.catalogue()[effect], LAYOUT.reference, shape)
+
+    def along(self, effect, ray, sign):
+        """{step: (lambda, standard error, variance)} at CENTER, from the catalogue's steps on, until all of WANTED lie between."""
+        measured, way = {}, self.ways(effect).index((ray, sign))
+
+        def measure(step):
+            values = self.values(effect, way, step)
+            if any(self.values(effect, way, known) == values for known in measured):
+                return False     # the end of the prior
+            found = self.visible((effect,), values)
+            if found is not None:
+                measured[step] = found
+            return found is not None
+        far = measure(ray.steps[0]) and measure(ray.steps[1])
+        for _ in range(FARTHEST):
+            if not far or reach(measured) > 1.2 * max(WANTED):
+                break
+            far = measure(2 * max(measured))
+        for _ in range(FARTHEST):
+            if not measured or min(value for value, *_ in measured.values()) < 0.8 * min(WANTED) or not measure(min(measured) / 2):
+                break
+        print(f'{effect}, {ray.parameter} {sign:+d}: lambda ' + ', '.join(
+            f'{value:.0f} +- {error:.0f} at {step:.3g} (variance {variance:.1f})' for step, (value, error, variance)
+            in sorted(measured.items())), file=self.log, flush=True)
+        return measured
+
+    # ---- runs -------------------------------------------------------------------------------------------------------------
     def history(self, packing, parameters, effects=(), values=()):
         """One run on one packing; kept in a file. None where it diverges."""
-        given = json.dumps([packing, sorted(parameters.items()), effects, sorted(values)])
-        name = os.path.join(self.work, laboratory.digest(given))
-        if not os.path.exists(name + '.csv'):
-            text = self.lab.campaign(60000 + packing, 340, {**laboratory.STAGING, 'grains': 340}, effects, sorted(values), 1, FITTED)
-            self.lab.write(name + '.yaml', text)
-            sets = [a for k, v in parameters.items() for a in ('--set', f'{k}={v!r}')]
-            r = subprocess.run([self.lab.calibctl, 'simulate', name + '.yaml', *sets, '-o', name + '.csv.new'],
-                               capture_output=True, text=True, stdin=subprocess.DEVNULL)
-            os.remove(name + '.yaml')
-            if r.returncode != 0:
-                return None
-            os.replace(name + '.csv.new', name + '.csv')
-        rows = list(csv.DictReader(open(name + '.csv')))
-        return self.np.array([float(row[o]) for test in FITTED for o in laboratory.NOISE for row in rows
-                              if row['experiment'] == test])
+        name = os.path.join(self.work, laboratory.digest(json.dumps([packing, sorted(parameters.items()), effects, sorted(values)])))
+        with self._lock:
+            own = self._locks[name]
+        with own:
+            if not os.path.exists(name):
+                try:
+                    rows = self.lab.simulate(name + '.making', LAYOUT, self.tests, parameters, packing=60000 + packing,
+                                             grains=MEAN_GRAINS, effects=effects, values=dict(values))
+                    curves = [float(row[o]) for test in self.tests for o in LAYOUT.tests[test].noise for row in rows[test]]
+                except programs.Failed as failure:
+                    if failure.code != 1:    # a slip of ours, no model that cannot go on
+                        raise
+                    curves = None
+                programs.write(name, json.dumps(curves))
+        with open(name, encoding='utf-8') as file:
+            curves = json.load(file)
+        return None if curves is None else self.np.array(curves)
 
     def histories(self, jobs):
         with concurrent.futures.ThreadPoolExecutor(self.jobs) as pool:
             return list(pool.map(lambda job: self.history(*job), jobs))
 
-    # ---- the model without the effect ---------------------------------------------------------------------------------
+    # ---- the model without the effect -------------------------------------------------------------------------------------
     def prepare(self):
-        np = self.np
-        for test in laboratory.PRESSURES:
-            rows = ''.join(f'{strain!r},1,1\n' for strain in laboratory.axial_strains())
-            self.lab.write(os.path.join(self.work, test + '.csv'), 'axial_strain,q_over_p,volumetric_strain\n' + rows)
+        """Once, before anything is measured."""
+        with self._lock:
+            if self._prepared:
+                return
+        import numpy
+        self.np = np = numpy
         self.plain = np.array(self.histories([(k, CENTER) for k in range(PAIRS)]))
         self.scatters = {friction: self.scatter(friction) for friction in FRICTIONS}
         # What the parameters can imitate: a polynomial in their logarithms, cubic in each, through the means over the packings.
@@ -87,20 +276,21 @@ class Strengths:
             rest = (np.array(runs[i * PAIRS:(i + 1) * PAIRS]) - self.plain - fit) @ self.near(grid[i]['friction_coefficient']).whiten.T
             missed.append(self.product(rest, rest)[0])
         print(f'imitation: squared distance of the polynomial from the means at its {len(grid)} points: median '
-              f'{statistics.median(missed):.0f}, largest {max(missed):.0f}', file=sys.stderr, flush=True)
+              f'{statistics.median(missed):.0f}, largest {max(missed):.0f}', file=self.log, flush=True)
         fine = np.linspace(-1, 1, 81)
         self.points = np.array(list(itertools.product(fine, fine)))
         self.imitations = self.terms(self.points) @ self.response
+        self._prepared = True
 
     def scatter(self, friction):
         """Of a measurement at a friction: noise, and what packings differ by, from SCATTER of them."""
         np = self.np
         runs = np.array(self.histories([(PAIRS + k, {**CENTER, 'friction_coefficient': friction}) for k in range(SCATTER)]))
         mean = runs.mean(axis=0)
-        steps = len(laboratory.axial_strains())
+        laws = [law for test in self.tests for law in LAYOUT.tests[test].noise.values()]
+        steps = len(mean) // len(laws)
         noise = np.concatenate([np.hypot(relative * mean[block], absolute) for block, (relative, absolute) in
-                                zip(np.split(np.arange(len(mean)), len(FITTED) * len(laboratory.NOISE)),
-                                    list(laboratory.NOISE.values()) * len(FITTED))])
+                                zip(np.split(np.arange(len(mean)), len(laws)), laws)])
         covariance = np.diag(noise ** 2)
         # Scatter of one packing: its own sd, correlated exponentially along the path within a test and observable.
         for block in np.split(np.arange(len(mean)), len(mean) // steps):
@@ -162,113 +352,3 @@ class Strengths:
             return 0.0, 0.0, 1.0
         variance = scatter.variance(visible)
         return tuple(value / variance for value in self.product(whitened, whitened)) + (variance,)
-
-    def angle(self, a, b, two_sided):
-        """Between two signatures (readings' units) in the errors at CENTER, degrees."""
-        a, b = (x @ self.near(CENTER['friction_coefficient']).whiten.T for x in (a, b))
-        lengths = [self.product(x, x)[0] for x in (a, b)]
-        if min(lengths) <= 0:
-            return None
-        cosine = max(-1.0, min(1.0, self.product(a, b)[0] / math.sqrt(lengths[0] * lengths[1])))
-        return math.degrees(math.acos(abs(cosine) if two_sided else cosine))
-
-    def of(self, effect, detectable, infos, wanted):
-        """{lambda: (values, lambda found there, its standard error, variance)} and what was measured on the way: strengths by
-        interpolation in logarithms, measured there and corrected; a lambda that no strength within the effect's default
-        prior reaches is left out."""
-        def at(multiple):
-            return values_at(multiple, detectable, infos)
-        measured = {}
-        def measure(multiple):
-            found = self.visible((effect,), at(multiple))
-            if found is not None:
-                measured[multiple] = found
-            return found
-        unseen = 0
-        for multiple in UPWARDS:
-            found = measure(multiple)
-            unseen = unseen + 1 if found is not None and found[0] <= 2 * found[1] else 0
-            if found is None or found[0] > max(wanted) or unseen == 2:
-                break
-        for multiple in DOWNWARDS:
-            least = min(value for value, *_ in measured.values())
-            if unseen == 2 or least < min(wanted):
-                break
-            found = measure(multiple)
-            if found is None or found[0] > least + 2 * found[1]:  # an effect that does not vanish towards its null
-                measured.pop(multiple, None)
-                break
-        strengths = {}
-        for strength in wanted:
-            for _ in range(CORRECTIONS):
-                multiple = interpolate(measured, strength)
-                if multiple is None:
-                    break
-                found = measured.get(multiple) or measure(multiple)
-                if found is None:
-                    break
-                strengths[strength] = (at(multiple), *found)
-                if abs(found[0] / strength - 1) < NEAR:
-                    break
-        return strengths, sorted((multiple, *found) for multiple, found in measured.items())
-
-
-    def tuned(self, effect, detectable, infos, known, wanted, base):
-        """(values, (lambda, its standard error, variance)) where lambda at these base parameters is the one wanted, within NEAR;
-        None where none was found: the end of the effect's default prior is reached before, or runs diverge. known: rows of what
-        of() measured at CENTER."""
-        measured, tried = {}, None
-        multiple = min((row for row in known if row[1] > 0), key=lambda row: abs(math.log(row[1] / wanted)))[0]
-        for _ in range(1 + 2 * CORRECTIONS):
-            values = values_at(multiple, detectable, infos)
-            if values == tried:  # the end of the prior
-                return None
-            tried, found = values, self.visible((effect,), values, base)
-            if found is None:
-                return None
-            if abs(found[0] / wanted - 1) < NEAR:
-                return values, found
-            measured[multiple] = found
-            between = interpolate(measured, wanted)
-            # A squared distance: it grows with the square of the strength, or about so.
-            multiple = between or multiple * min(max(math.sqrt(wanted / max(found[0], 1)), 0.4), 2.5)
-        return None
-
-
-def prior_of(info):
-    """Ends of the prior that the effect gets in these campaigns: the default one, or that of value over scale."""
-    scaled, scale = info['scaled_default_prior'], info['reference_scale']
-    if not scaled:
-        return info['default_prior']
-    unit = scale['factor']
-    for quantity, value in REFERENCE.items():
-        unit *= value ** scale[quantity]
-    return {end: scaled[end] * unit for end in ('min', 'max')}
-
-
-def values_at(multiple, detectable, infos):
-    """Parameters of an effect at a multiple of what is called detectable, within its default prior."""
-    own = {}
-    for name, value in detectable.items():
-        null = infos[name]['null_value']
-        null = infos[name].get('null_by_contact', {}).get('hertz_mindlin', null)
-        if null is None:  # what only shapes the effect is held
-            own[name] = value
-            continue
-        limits = prior_of(infos[name])
-        own[name] = min(max(null + (value - null) * multiple, limits['min']), limits['max'])
-    return own
-
-
-def interpolate(measured, strength):
-    """The multiple at which lambda has the strength, in logarithms between points that rise beyond chance; None outside."""
-    rising, highest = [], 1
-    for multiple, (value, error, _) in sorted(measured.items()):
-        if value > 2 * error and value > highest:
-            rising.append((math.log(multiple), math.log(value)))
-            highest = value
-    y = math.log(strength)
-    for (x0, y0), (x1, y1) in zip(rising, rising[1:]):
-        if y0 <= y <= y1:
-            return math.exp(x0 + (x1 - x0) * (y - y0) / (y1 - y0))
-    return None
