@@ -6,8 +6,7 @@
 // CALIB_DEM_NO_CLONES gives).
 
 #if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) &&                       \
-    !defined(CALIB_DEM_NO_CLONES)
+    !defined(__SANITIZE_ADDRESS__) && !defined(_GLIBCXX_TSAN) && !defined(CALIB_DEM_NO_CLONES)
 #define CALIB_DEM_CLONES \
   __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
 #else

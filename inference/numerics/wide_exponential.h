@@ -9,7 +9,7 @@
 // picks the widest that the CPU has. Such functions keep to + - * / and comparisons, and nothing is
 // contracted to fused multiply-adds (-ffp-contract=off), so every copy gives the same bits.
 #if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    !defined(__SANITIZE_ADDRESS__) && !defined(_GLIBCXX_TSAN)
 #define CALIB_INFERENCE_CLONES \
   __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
 #else
