@@ -32,6 +32,7 @@ enum class StreamPurpose : std::uint64_t {
   kDiagnosisEmulator = 31,
   kDiagnosisEvidence = 32,
   kDiagnosisForecast = 33,
+  kMainDesign = 34,
 };
 
 /// Random numbers of one sample: Philox4x64-10 with key (seed, purpose) and counter (iteration,

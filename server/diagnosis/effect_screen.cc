@@ -13,6 +13,7 @@
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/extension.h"
 #include "server/diagnosis/numerical_choices.h"
+#include "server/diagnosis/race_list.h"
 #include "server/diagnosis/reading_effects.h"
 #include "server/diagnosis/screen_strengths.h"
 

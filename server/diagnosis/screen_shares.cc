@@ -4,8 +4,7 @@
 #include <cstdint>
 #include <set>
 
-#include "absl/strings/str_cat.h"
-#include "server/campaign/model/excitation.h"
+#include "server/diagnosis/race_list.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -14,35 +13,6 @@ constexpr std::size_t kMostRuns = 4;   // model evaluations of one effect, or
 constexpr double kScreenShare = 0.25;  // of the campaign's over all effects
 
 }  // namespace
-
-std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect) {
-  std::set<double> pressures;
-  bool varied = false;  // the pressure, within a test
-  bool shown = false;
-  bool moving = false;
-  for (const campaign::Experiment& e : campaign.experiments) {
-    const dem::TestInfo* const test = dem::FindTest(e.test);
-    if (effect.kind == "particle" && test != nullptr && test->poured &&
-        !campaign::CanShow(e, effect)) {
-      return absl::StrCat("test ", e.test, " pours its grains, which it leaves whole");
-    }
-    if (e.role != campaign::Role::kCalibrate) continue;
-    const auto pressure = e.settings.find("confining_pressure");
-    if (pressure != e.settings.end()) pressures.insert(pressure->second);
-    varied = varied || (test != nullptr && !test->one_pressure);
-    moving = moving || !campaign::ReadAtRest(e);
-    shown = shown || campaign::CanShow(e, effect);
-  }
-  if (effect.needs_motion && !moving) {
-    return "all readings are taken at rest: "
-           "it shows in tests with a loading_rate, in collisions and in flows";
-  }
-  if (!shown) return "none of the fitted tests can show it";
-  if (effect.across_pressures && pressures.size() < 2 && !varied) {
-    return "it shows only between tests at different pressures, or in one whose pressure changes";
-  }
-  return "";
-}
 
 ScreenShares SharesOfScreen(const std::vector<const dem::EffectInfo*>& effects,
                             const std::vector<bool>& calculated, std::size_t samples,

@@ -11,9 +11,6 @@
 
 namespace calib::diagnosis {
 
-/// Why the calibrated experiments cannot show an effect, in a clause; empty: they can.
-std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect);
-
 /// What a screen runs.
 struct ScreenShares {
   std::size_t numerical = 0;  ///< numerical choices that are varied, in all fitted experiments

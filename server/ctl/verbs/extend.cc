@@ -13,7 +13,7 @@
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
 #include "server/diagnosis/extension.h"
-#include "server/diagnosis/screen_shares.h"
+#include "server/diagnosis/race_list.h"
 #include "server/report/documents/json_documents.h"
 #include "server/report/text/people_units.h"
 #include "server/report/views/warnings.h"

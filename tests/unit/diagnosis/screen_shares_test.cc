@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "server/diagnosis/race_list.h"
+
 namespace calib::diagnosis {
 namespace {
 

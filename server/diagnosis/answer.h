@@ -1,0 +1,99 @@
+#pragma once
+// The answer by probabilities: from evidences of models to verdict, levels, families and words.
+// Pure.
+
+#include <Eigen/Core>
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/diagnosis/effect_probabilities.h"
+#include "server/campaign/model/words.h"
+
+namespace calib::diagnosis {
+
+enum class AnswerVerdict { kAdequate, kMissingEffect, kAmbiguous, kUnexplained };
+inline constexpr std::array kVerdictWords = {
+    campaign::Word{AnswerVerdict::kAdequate, "adequate"},
+    campaign::Word{AnswerVerdict::kMissingEffect, "missing_effect"},
+    campaign::Word{AnswerVerdict::kAmbiguous, "ambiguous"},
+    campaign::Word{AnswerVerdict::kUnexplained, "unexplained"},
+};
+const char* ToString(AnswerVerdict verdict);
+
+/// A model by names; no effects: the base model.
+struct NamedModel {
+  std::vector<std::string> effects{};  ///< in the order of the race
+  bool none_of_these = false;
+  double probability = 0;
+};
+
+/// What is said of one effect of the race.
+struct EffectAnswer {
+  std::string effect{};
+  double probability = 0;  ///< that it acts, under the reference prior
+  double uncertain = 0;    ///< sd of that over what the emulator does not know
+  bool alone = false;
+  /// Why it is not named though it is probable enough.
+  std::optional<inference::NotNamed> not_named{};
+  /// Median over the posterior of the models that have it: dotted name -> SI.
+  std::map<std::string, double> amplitude{};
+  /// Smallest strengths that a measurement shows (lambda = 21): dotted name -> SI.
+  std::map<std::string, double> visible{};
+};
+
+struct NamedFamily {
+  std::vector<std::string> effects{};
+  double probability = 0;
+};
+
+/// The answer.
+struct Answer {
+  AnswerVerdict verdict = AnswerVerdict::kAmbiguous;
+  std::vector<std::string> effects{};       ///< named, most probable first
+  bool sure = false;                        ///< all of them at AnswerLevels::sure
+  std::vector<NamedModel> probabilities{};  ///< largest first; they sum to one
+  double adequate = 0;                      ///< probability of the base model
+  double none_of_these = 0;
+  std::vector<NamedModel> credible_set{};  ///< the fewest models that hold AnswerLevels::set
+  std::vector<NamedFamily> families{};     ///< at AnswerLevels::family
+  std::vector<EffectAnswer> candidates{};  ///< those of the credible set first, then by probability
+  double adequacy_p = 1;                   ///< chance of the base model's misfit
+  std::vector<std::pair<std::string, std::string>> not_excitable{};  ///< effect, why
+  std::map<std::string, int> runs{};                                 ///< by stage
+  std::vector<std::string> warnings{};
+  std::string sentence{};  ///< the verdict in words
+};
+
+/// What it is made of. Entries as in Race: strengths of one effect are merged here.
+struct AnswerParts {
+  std::vector<std::string> effect_of{};          ///< K: name of the effect of each entry
+  std::vector<inference::EffectModel> models{};  ///< of entries
+  /// Under each width, the reference first.
+  std::vector<inference::EffectProbabilities> widths{};
+  std::vector<Eigen::VectorXd> beyond{};         ///< BeyondDesign under each, K
+  Eigen::MatrixXd angles{};                      ///< K x K, degrees
+  std::vector<std::pair<int, int>> kin{};        ///< entries
+  std::map<std::string, double> verification{};  ///< by effect; not there: no runs were made
+  bool verified = false;                         ///< false: nothing had to be verified
+  double adequacy_p = 1;
+  /// Chance of the misfit of each model; 1 where it was not asked for.
+  std::vector<double> chance{};
+  double level = 0.01;  ///< of the adequacy test
+};
+
+/// AnswerVerdict, levels, families, words; candidates without strengths. In this order: the most
+/// probable model has effects and every one is named: missing_effect; the base model passes the
+/// adequacy test: adequate; none of these at AnswerLevels::unexplained or no model passes:
+/// unexplained; else ambiguous. Errors: INVALID_ARGUMENT for sizes that do not fit.
+absl::StatusOr<Answer> AnswerFrom(const AnswerParts& parts,
+                                  const inference::AnswerLevels& levels = {});
+
+/// The verdict in one or two sentences.
+std::string VerdictInWords(const Answer& answer);
+
+}  // namespace calib::diagnosis

@@ -1,0 +1,24 @@
+#pragma once
+// The answer of a design from what its runs say: evidences, misfits and strengths put together.
+// Pure.
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "server/diagnosis/answer.h"
+#include "server/diagnosis/knowledge.h"
+
+namespace calib::diagnosis {
+
+/// Chances of fresh runs by effect (ChancesOf); empty: none were made.
+using VerificationChances = std::optional<std::map<std::string, double>>;
+
+/// The answer but for Answer::runs. asked: with Effort::kToAnswer; level: of the adequacy test.
+/// Errors: those of AnswerFrom.
+absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge& known,
+                                      const Asked& asked, const VerificationChances& verification,
+                                      double level);
+
+}  // namespace calib::diagnosis

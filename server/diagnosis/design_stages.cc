@@ -1,0 +1,234 @@
+#include "server/diagnosis/design_stages.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
+#include "inference/diagnosis/next_runs.h"
+#include "server/diagnosis/design_caps.h"
+#include "server/diagnosis/stage_rows.h"
+
+namespace calib::diagnosis {
+namespace {
+
+using campaign::SamplePurpose;
+using Eigen::Index;
+using inference::DesignPoints;
+
+double LargestMove(const inference::EffectProbabilities& a,
+                   const inference::EffectProbabilities& b) {
+  double most =
+      std::max(std::abs(a.adequate - b.adequate), std::abs(a.none_of_these - b.none_of_these));
+  for (Index k = 0; k < a.inclusion.size(); ++k)
+    most = std::max(most, std::abs(a.inclusion[k] - b.inclusion[k]));
+  return most;
+}
+
+}  // namespace
+
+absl::StatusOr<DesignChain> DesignChain::Create(const report::CampaignView& base,
+                                                const DesignQuestion& question) {
+  ASSIGN_OR_RETURN(Race race, RaceOf(base, question.without));
+  ASSIGN_OR_RETURN(BaseRuns runs, BaseRunsOf(base));
+  inference::JointPrior prior = campaign::Priors(base.campaign);
+  ASSIGN_OR_RETURN(BaseRegion region, RegionOf(runs, prior));
+  race = WithCalculated(std::move(race), runs);
+  campaign::Campaign design = CampaignOfDesign(base.campaign, race);
+  const Eigen::VectorXd unit = UnitsOfCatalogue(race);
+  DesignRows rows(region.axes, std::move(race), unit);
+  return DesignChain({.base = std::move(runs),
+                      .region = std::move(region),
+                      .prior = std::move(prior),
+                      .seed = base.campaign.seed},
+                     std::move(rows), std::move(design), question.level);
+}
+
+absl::Status DesignChain::Add(EndedBatch batch) {
+  const int before = batches_.empty() ? 0 : static_cast<int>(batches_.back().stage);
+  const bool again = batch.stage == SamplePurpose::kSequential ||
+                     (batch.stage == SamplePurpose::kScout && batches_.size() == 1);
+  const bool first = batches_.empty() && batch.stage == SamplePurpose::kScout;
+  const auto stage = static_cast<int>(batch.stage);
+  if (!campaign::IsStageOfDesign(batch.stage) || batch.stage == SamplePurpose::kNumerics ||
+      (!first && !(stage > before && !batches_.empty()) && !(again && stage == before)) ||
+      (stage > static_cast<int>(SamplePurpose::kMain) && BatchesOf(SamplePurpose::kMain) == 0))
+    return absl::InvalidArgumentError(absl::StrCat("a batch of the stage ",
+                                                   campaign::ToString(batch.stage),
+                                                   " cannot follow what the design holds"));
+  for (const EndedRun& run : batch.runs) {
+    if (run.run.values.size() != names().size() ||
+        (run.readings &&
+         (run.readings->size() != before_.base.readings.cols() || !run.readings->allFinite())))
+      return absl::InvalidArgumentError("a run of the design does not fit its campaign");
+  }
+  batches_.push_back(std::move(batch));
+  return absl::OkStatus();
+}
+
+int DesignChain::BatchesOf(SamplePurpose stage) const {
+  return static_cast<int>(std::count_if(batches_.begin(), batches_.end(),
+                                        [stage](const auto& own) { return own.stage == stage; }));
+}
+
+int DesignChain::NextStream() const {
+  int rows = 0;
+  for (const EndedBatch& batch : batches_) rows += static_cast<int>(batch.runs.size());
+  return before_.base.samples + rows;
+}
+
+absl::StatusOr<const Knowledge*> DesignChain::KnownAfter(std::size_t n) {
+  if (const auto found = known_.find(n); found != known_.end()) return &found->second;
+  const auto scouts = static_cast<std::size_t>(BatchesOf(SamplePurpose::kScout));
+  const std::vector<EndedBatch> batches(batches_.begin(),
+                                        batches_.begin() + static_cast<std::ptrdiff_t>(n));
+  const DesignRows* guess = &scout_rows_;
+  if (n > scouts) {
+    ASSIGN_OR_RETURN(const Knowledge* scouted, KnownAfter(scouts));
+    guess = &scouted->rows;
+  }
+  ASSIGN_OR_RETURN(Knowledge known, Learn(before_, *guess, batches, n > scouts));
+  return &known_.emplace(n, std::move(known)).first->second;
+}
+
+absl::StatusOr<const Asked*> DesignChain::AskedAfter(std::size_t n, Effort effort) {
+  if (const auto found = asked_.find({n, effort}); found != asked_.end()) return &found->second;
+  ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n));
+  ASSIGN_OR_RETURN(Asked asked, Ask(before_, *known, effort));
+  return &asked_.emplace(std::pair(n, effort), std::move(asked)).first->second;
+}
+
+RunBatch DesignChain::BatchOf(SamplePurpose stage, std::vector<campaign::RunOf> rows) const {
+  return {.number = static_cast<int>(batches_.size()), .stage = stage, .rows = std::move(rows)};
+}
+
+RunBatch DesignChain::Scout() const {
+  RunBatch batch = BatchOf(SamplePurpose::kScout,
+                           AdmissibleRows(design_, scout_rows_, before_.region,
+                                          ScoutPoints(scout_rows_, before_.region,
+                                                      EntriesRun(race(), WholeOf(race()).kept), 1),
+                                          NextStream()));
+  for (campaign::RunOf& run : NumericsRows(scout_rows_, before_))
+    batch.rows.push_back(std::move(run));
+  return batch;
+}
+
+std::optional<RunBatch> DesignChain::ScoutAgain() const {
+  std::vector<int> missing;
+  for (const int k : EntriesRun(race(), WholeOf(race()).kept)) {
+    if (RunsWith(scout_rows_, batches_, k) < kDesignCaps.scout_runs) missing.push_back(k);
+  }
+  if (missing.empty()) return std::nullopt;
+  return BatchOf(SamplePurpose::kScout, AdmissibleRows(design_, scout_rows_, before_.region,
+                                                       ScoutPoints(scout_rows_, before_.region,
+                                                                   missing, kDesignCaps.weaker),
+                                                       NextStream()));
+}
+
+absl::StatusOr<RunBatch> DesignChain::Main() {
+  ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(batches_.size()));
+  if (EntriesRun(race(), known->part.kept).empty())
+    return absl::FailedPreconditionError(absl::StrCat(
+        "no effect can be tried: ", known->out.front().second, "; the tests stay unexplained"));
+  return BatchOf(SamplePurpose::kMain, AdmissibleRows(design_, known->rows, before_.region,
+                                                      MainPoints(before_, *known), NextStream()));
+}
+
+absl::StatusOr<std::optional<RunBatch>> DesignChain::Sequential(std::size_t n) {
+  const int made = BatchesOf(SamplePurpose::kSequential);
+  if (made >= kDesignCaps.sequential_batches) return std::nullopt;
+  ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n));
+  if (known->part.kept.empty()) return std::nullopt;
+  ASSIGN_OR_RETURN(const Asked* asked, AskedAfter(n, Effort::kToChoose));
+  if (made > 0) {
+    ASSIGN_OR_RETURN(const Knowledge* known_before, KnownAfter(n - 1));
+    ASSIGN_OR_RETURN(const Asked* asked_before, AskedAfter(n - 1, Effort::kToChoose));
+    if (known->part.kept == known_before->part.kept &&
+        LargestMove(asked->probabilities[0], asked_before->probabilities[0]) < kDesignCaps.moved)
+      return std::nullopt;
+  }
+  const DesignPoints candidates = SequentialCandidates(*asked);
+  ASSIGN_OR_RETURN(const inference::ChosenRuns chosen,
+                   inference::NextRuns({.set = known->set.get(), .z = known->z}, asked->evidence[0],
+                                       asked->probabilities[0], candidates,
+                                       {.runs = kDesignCaps.sequential_runs}));
+  if (chosen.information.back() < kDesignCaps.told) return std::nullopt;
+  return BatchOf(SamplePurpose::kSequential,
+                 AdmissibleRows(design_, known->rows, before_.region,
+                                WholePoints(known->rows, known->part,
+                                            inference::RowsOf(candidates, chosen.rows)),
+                                NextStream()));
+}
+
+absl::StatusOr<std::optional<RunBatch>> DesignChain::Verification() {
+  ASSIGN_OR_RETURN(const std::vector<VerifiedModel> models, ToVerify(batches_.size()));
+  if (models.empty()) return std::nullopt;
+  ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(batches_.size()));
+  return BatchOf(SamplePurpose::kVerification,
+                 AdmissibleRows(design_, known->rows, before_.region,
+                                WholePoints(known->rows, known->part, VerificationPoints(models)),
+                                NextStream()));
+}
+
+absl::StatusOr<std::vector<VerifiedModel>> DesignChain::ToVerify(std::size_t n) {
+  ASSIGN_OR_RETURN(const Answer answer, AnswerAfter(n, std::nullopt));
+  VerificationQuestion question{.most = kDesignCaps.verified_models,
+                                .sibling = kDesignCaps.sibling};
+  for (const EffectAnswer& own : answer.candidates) {
+    if (own.alone) question.named.push_back(own.effect);
+  }
+  if (question.named.empty()) return std::vector<VerifiedModel>();
+  ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n));
+  ASSIGN_OR_RETURN(const Asked* asked, AskedAfter(n, Effort::kToAnswer));
+  return ModelsToVerify(*known, *asked, question);
+}
+
+absl::StatusOr<Answer> DesignChain::AnswerAfter(std::size_t n,
+                                                const VerificationChances& verification) {
+  ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n));
+  ASSIGN_OR_RETURN(const Asked* asked, AskedAfter(n, Effort::kToAnswer));
+  ASSIGN_OR_RETURN(Answer answer, AnswerOfDesign(before_, *known, *asked, verification, level_));
+  for (std::size_t i = 0; i < n; ++i)
+    answer.runs[campaign::ToString(batches_[i].stage)] += static_cast<int>(batches_[i].runs.size());
+  return answer;
+}
+
+absl::StatusOr<NextStep> DesignChain::Next() {
+  if (batches_.empty()) return Scout();
+  const SamplePurpose last = batches_.back().stage;
+  if (last == SamplePurpose::kScout) {
+    if (batches_.size() == 1) {
+      if (std::optional<RunBatch> again = ScoutAgain()) return *std::move(again);
+    }
+    ASSIGN_OR_RETURN(RunBatch main, Main());
+    return main;
+  }
+  const std::size_t n = batches_.size();
+  if (last != SamplePurpose::kVerification) {
+    ASSIGN_OR_RETURN(std::optional<RunBatch> next, Sequential(n));
+    if (!next) {
+      ASSIGN_OR_RETURN(next, Verification());
+    }
+    if (next) return *std::move(next);
+    ASSIGN_OR_RETURN(Answer answer, AnswerAfter(n, std::nullopt));
+    return answer;
+  }
+  ASSIGN_OR_RETURN(const std::vector<VerifiedModel> models, ToVerify(n - 1));
+  ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n - 1));
+  ASSIGN_OR_RETURN(Answer answer, AnswerAfter(n, ChancesOf(before_, *known, models, batches_.back(),
+                                                           kDesignCaps.verification_runs)));
+  return answer;
+}
+
+absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker) {
+  ASSIGN_OR_RETURN(std::vector<EndedBatch> made, maker.Batches());
+  for (EndedBatch& batch : made) RETURN_IF_ERROR(chain.Add(std::move(batch)));
+  for (;;) {
+    ASSIGN_OR_RETURN(NextStep next, chain.Next());
+    if (auto* answer = std::get_if<Answer>(&next)) return std::move(*answer);
+    ASSIGN_OR_RETURN(EndedBatch ended, maker.Make(std::get<RunBatch>(next)));
+    RETURN_IF_ERROR(chain.Add(std::move(ended)));
+  }
+}
+
+}  // namespace calib::diagnosis

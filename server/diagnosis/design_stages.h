@@ -1,0 +1,86 @@
+#pragma once
+// The chain of a diagnosis: which batch of runs is next, until the answer. A pure function of the
+// base campaign, the batches that are stored and the campaign's seed: interrupted after any batch,
+// made by any number of workers, it ends with the same bits.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/diagnosis/answer.h"
+#include "server/diagnosis/design_answer.h"
+#include "server/diagnosis/knowledge.h"
+#include "server/diagnosis/run_maker.h"
+#include "server/diagnosis/verification.h"
+
+namespace calib::diagnosis {
+
+/// What a diagnosis asks before it runs anything.
+struct DesignQuestion {
+  std::vector<std::string> without{};  ///< effects that are left out
+  double level = 0.01;                 ///< of the adequacy test
+};
+
+/// The next batch, or the answer.
+using NextStep = std::variant<RunBatch, Answer>;
+
+/// The chain, from the batches that it is told of. What it has found is kept as long as it lives.
+/// Not thread-safe.
+class DesignChain {
+ public:
+  /// Errors: those of RaceOf, BaseRunsOf and RegionOf: FAILED_PRECONDITION with a sentence.
+  static absl::StatusOr<DesignChain> Create(const report::CampaignView& base,
+                                            const DesignQuestion& question);
+
+  const Race& race() const { return scout_rows_.race(); }
+  /// Of the values of rows: DesignRows::names().
+  const std::vector<std::string>& names() const { return scout_rows_.names(); }
+  const std::vector<EndedBatch>& batches() const { return batches_; }
+
+  /// The next batch that was made. Errors: INVALID_ARGUMENT for one of a stage that cannot follow,
+  /// or rows of another length.
+  absl::Status Add(EndedBatch batch);
+  /// What comes after the batches so far. Errors: those of Learn and Ask.
+  absl::StatusOr<NextStep> Next();
+
+ private:
+  DesignChain(KnownBefore before, DesignRows scout_rows, campaign::Campaign design, double level)
+      : before_(std::move(before)),
+        scout_rows_(std::move(scout_rows)),
+        design_(std::move(design)),
+        level_(level) {}
+
+  int BatchesOf(campaign::SamplePurpose stage) const;
+  /// What the first n batches say.
+  absl::StatusOr<const Knowledge*> KnownAfter(std::size_t n);
+  absl::StatusOr<const Asked*> AskedAfter(std::size_t n, Effort effort);
+
+  RunBatch Scout() const;
+  std::optional<RunBatch> ScoutAgain() const;
+  absl::StatusOr<RunBatch> Main();
+  absl::StatusOr<std::optional<RunBatch>> Sequential(std::size_t n);
+  absl::StatusOr<std::optional<RunBatch>> Verification();
+  /// Models whose fresh runs would follow the first n batches.
+  absl::StatusOr<std::vector<VerifiedModel>> ToVerify(std::size_t n);
+  /// By the first n batches.
+  absl::StatusOr<Answer> AnswerAfter(std::size_t n, const VerificationChances& verification);
+  RunBatch BatchOf(campaign::SamplePurpose stage, std::vector<campaign::RunOf> rows) const;
+  int NextStream() const;
+
+  KnownBefore before_;
+  DesignRows scout_rows_;
+  campaign::Campaign design_;
+  double level_;
+  std::vector<EndedBatch> batches_;
+  std::map<std::size_t, Knowledge> known_;
+  std::map<std::pair<std::size_t, Effort>, Asked> asked_;
+};
+
+/// Asks the chain and has its batches made until there is an answer. Errors: those of both.
+absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker);
+
+}  // namespace calib::diagnosis

@@ -1,0 +1,287 @@
+#include "server/diagnosis/knowledge.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
+#include "inference/diagnosis/diagnosis_set.h"
+#include "inference/diagnosis/visible_strength.h"
+#include "inference/numerics/special_functions.h"
+#include "server/diagnosis/design_caps.h"
+
+namespace calib::diagnosis {
+namespace {
+
+using Eigen::Index;
+using inference::DesignPoints;
+
+constexpr double kSeen = 21;      // lambda of a unit: seen with a chance of 0.9 among 17 effects
+constexpr double kUnseen = 4;     // lambda below which a strength has no prior
+constexpr int kFewestRunsOn = 2;  // of an effect, as FeatureEmulator::Fit asks
+// Strengths beyond ten times what was tried are a power law's guess.
+constexpr double kBeyondTried = 10;
+constexpr double kLargestUnits = 100;  // up to which lambda is looked at
+
+inference::ModelSpace SpaceOf(const KnownBefore& before, const DesignRows& rows,
+                              const PartOfRace& part) {
+  inference::ModelSpace space;
+  const auto d = static_cast<Index>(rows.race().base.size());
+  Index shapes = 0;
+  for (const int k : part.kept) {
+    space.effects.push_back(rows.race().effects[static_cast<std::size_t>(k)].design);
+    shapes += space.effects.back().shapes;
+  }
+  space.strength.resize(space.effects.size());
+  space.shape_low = Eigen::VectorXd::Constant(shapes, -1);
+  space.shape_high = Eigen::VectorXd::Ones(shapes);
+  space.base_low = Eigen::VectorXd::Constant(d, -1);
+  space.base_high = Eigen::VectorXd::Ones(d);
+  space.log_base_prior = [prior = before.prior, axes = rows.axes()](const Eigen::MatrixXd& base) {
+    return LogBasePrior(prior, axes, base);
+  };
+  std::vector<std::pair<int, int>> excluded;
+  for (const auto& [a, b] : rows.race().excluded) {
+    const auto x = std::find(part.kept.begin(), part.kept.end(), a);
+    const auto y = std::find(part.kept.begin(), part.kept.end(), b);
+    if (x == part.kept.end() || y == part.kept.end()) continue;
+    excluded.emplace_back(static_cast<int>(x - part.kept.begin()),
+                          static_cast<int>(y - part.kept.begin()));
+  }
+  space.models = inference::AllModels(static_cast<int>(part.kept.size()), excluded);
+  return space;
+}
+
+absl::StatusOr<std::shared_ptr<const inference::DiagnosisSet>> FitSet(
+    const KnownBefore& before, const DesignRows& rows, const std::vector<EndedBatch>& batches,
+    const PartOfRace& part) {
+  ASSIGN_OR_RETURN(inference::DiagnosisSet set,
+                   inference::DiagnosisSet::Fit(SetRunsOf(before.base, rows, batches, part)));
+  return std::make_shared<const inference::DiagnosisSet>(std::move(set));
+}
+
+// A strength of one kept entry.
+struct EntryStrength {
+  int place = 0;  // among the kept
+  int sign = 1;
+  double most = 0;
+};
+
+std::vector<EntryStrength> SidesOf(const DesignRows& rows, const PartOfRace& part) {
+  const Eigen::VectorXd most = rows.Most(), other = rows.MostOther();
+  std::vector<EntryStrength> sides;
+  for (std::size_t i = 0; i < part.kept.size(); ++i) {
+    const int k = part.kept[i], place = static_cast<int>(i);
+    sides.push_back({.place = place, .sign = 1, .most = most[k]});
+    if (rows.race().effects[static_cast<std::size_t>(k)].design.two_sided)
+      sides.push_back({.place = place, .sign = -1, .most = other[k]});
+  }
+  return sides;
+}
+
+// Whether an entry shows at one side: at some strength of a design lambda is above what has a prior
+// and twice what chance makes of an effect that changes nothing, which is the emulator's own
+// variance of the change (at large strengths it grows faster than lambda does).
+bool IsSeen(const KnownBefore& before, const inference::ModelSpace& space,
+            const inference::DiagnosisSet& set, const EntryStrength& at) {
+  DesignPoints point{.base = before.region.centre.transpose(),
+                     .strength = Eigen::MatrixXd::Zero(1, static_cast<Index>(space.effects.size())),
+                     .shape = Eigen::MatrixXd::Zero(1, space.shape_low.size())};
+  const Eigen::RowVectorXd without = set.emulator().Factor(point).row(0);
+  const inference::SpecimenErrors& errors = set.errors();
+  const Eigen::VectorXd measurement = errors.share * errors.specimen + errors.noise;
+  for (const double strength : {1.0, 3.0, 10.0, kDesignCaps.strengths.high}) {
+    point.strength(0, at.place) = at.sign * std::min(at.most, strength);
+    const Eigen::RowVectorXd change = set.emulator().Factor(point).row(0) - without;
+    const Eigen::VectorXd variance = (change.cwiseAbs2() * set.emulator().shrink()).transpose();
+    if (inference::SquaredDistanceFromBase({&set}, space, point) >=
+        kUnseen + 2 * variance.cwiseQuotient(measurement).sum())
+      return true;
+  }
+  return false;
+}
+
+// Units in SI at which lambda is kSeen, the smaller of both signs.
+Eigen::VectorXd SeenUnits(const KnownBefore& before, const DesignRows& rows, const PartOfRace& part,
+                          const inference::DiagnosisSet& set) {
+  const inference::ModelSpace space = SpaceOf(before, rows, part);
+  Eigen::VectorXd unit = rows.unit();
+  std::vector<double> least(part.kept.size(), 1e300);
+  for (const EntryStrength& side : SidesOf(rows, part)) {
+    const double strength =
+        inference::StrengthOfLambda({&set}, space, before.region.centre.transpose(),
+                                    {.effect = side.place,
+                                     .sign = side.sign,
+                                     .lambda = kSeen,
+                                     .largest = std::min(side.most, kLargestUnits)});
+    double& own = least[static_cast<std::size_t>(side.place)];
+    own = std::min(own, strength);
+  }
+  for (std::size_t i = 0; i < part.kept.size(); ++i) {
+    const RacingEffect& entry = rows.race().effects[static_cast<std::size_t>(part.kept[i])];
+    double& own = unit[part.kept[i]];
+    own = std::clamp(least[i] * own, std::abs(entry.near) / kBeyondTried,
+                     std::abs(entry.far) * kBeyondTried);
+    own = std::min(own, std::max(entry.most, entry.most_other));
+  }
+  return unit;
+}
+
+// Why no run with the entry came to its end, in a clause.
+std::string WhyRunsEnd(const DesignRows& rows, const std::vector<EndedBatch>& batches, int entry) {
+  std::string reason;
+  for (const EndedBatch& batch : batches) {
+    for (const EndedRun& ended : batch.runs) {
+      if (ended.readings || ended.reason.empty()) continue;
+      if (rows.Points({ended.run.values}).strength(0, entry) != 0) reason = ended.reason;
+    }
+  }
+  return reason.empty() ? "runs with it diverge"
+                        : absl::StrCat("runs with it diverge (", reason, ")");
+}
+
+// Largest strength to a side that was run, or without end where the entry itself ends there.
+inference::DesignRange RangeWithEnds(const DesignRows& rows, const PartOfRace& part,
+                                     const DesignPoints& points) {
+  constexpr double kAtTheEnd = 0.98;  // of the way
+  inference::DesignRange range = inference::RangeOf(points);
+  const Eigen::VectorXd most = rows.Most(), other = rows.MostOther();
+  const double without_end = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < part.kept.size(); ++i) {
+    const int k = part.kept[i];
+    const auto place = static_cast<Index>(i);
+    const RacingEffect& entry = rows.race().effects[static_cast<std::size_t>(k)];
+    // Calculated at any strength.
+    if (entry.design.calculated)
+      range.strength_high[place] = range.negative_high[place] = without_end;
+    if (entry.ends && range.strength_high[place] >= kAtTheEnd * most[k])
+      range.strength_high[place] = without_end;
+    if (entry.other_ends && range.negative_high[place] >= kAtTheEnd * other[k])
+      range.negative_high[place] = without_end;
+  }
+  return range;
+}
+
+}  // namespace
+
+absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& guess,
+                                const std::vector<EndedBatch>& batches, bool with_flat) {
+  Knowledge known{.rows = guess, .part = {}, .set = nullptr};
+  for (int k = 0; k < static_cast<int>(guess.race().effects.size()); ++k) {
+    if (guess.race().effects[static_cast<std::size_t>(k)].design.calculated ||
+        RunsWith(guess, batches, k) >= kFewestRunsOn) {
+      known.part.kept.push_back(k);
+    } else {
+      known.out.emplace_back(k, WhyRunsEnd(guess, batches, k));
+    }
+  }
+  ASSIGN_OR_RETURN(known.set, FitSet(before, guess, batches, known.part));
+  known.rows = guess.With(guess.axes(), SeenUnits(before, guess, known.part, *known.set));
+  if (with_flat) {
+    const inference::ModelSpace space = SpaceOf(before, guess, known.part);
+    std::vector<bool> seen(known.part.kept.size(), false);
+    for (const EntryStrength& side : SidesOf(guess, known.part)) {
+      if (IsSeen(before, space, *known.set, side))
+        seen[static_cast<std::size_t>(side.place)] = true;
+    }
+    PartOfRace part;
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const int k = known.part.kept[i];
+      (seen[i] ? part.kept : part.flat).push_back(k);
+      if (!seen[i]) known.out.emplace_back(k, "it changes nothing in these tests that can be seen");
+    }
+    known.part = std::move(part);
+  }
+  const inference::SetRuns runs = SetRunsOf(before.base, known.rows, batches, known.part);
+  ASSIGN_OR_RETURN(known.set, FitSet(before, known.rows, batches, known.part));
+  known.z =
+      known.set->coordinates()->Of(Eigen::MatrixXd::Zero(1, before.base.histories.cols())).row(0);
+  known.range = RangeWithEnds(known.rows, known.part, runs.points);
+  known.angles =
+      inference::SignatureAngles({known.set.get()}, before.region.centre.transpose(),
+                                 Eigen::VectorXd::Ones(static_cast<Index>(known.part.kept.size())));
+  if (before.base.unfinished > 0)
+    known.warnings.push_back(absl::StrCat(before.base.unfinished,
+                                          " runs of the campaign did not come to their last "
+                                          "reading; the emulator does not know them"));
+  return known;
+}
+
+absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort) {
+  Asked asked{.space = SpaceOf(before, knowledge.rows, knowledge.part)};
+  const Eigen::VectorXd most = knowledge.rows.Most(), other = knowledge.rows.MostOther();
+  std::vector<std::vector<inference::StrengthPrior>> priors;
+  double widest_low = 1e300, widest_high = 0;
+  const auto prior_of = [&](double low, double high) {
+    std::vector<inference::StrengthPrior> prior;
+    for (const int k : knowledge.part.kept) {
+      // Half of the end, where an effect ends before it is seen.
+      prior.push_back({.low = std::min(low, most[k] / 2),
+                       .high = std::min(high, most[k]),
+                       .negative_low = std::min(low, other[k] / 2),
+                       .negative_high = std::min(high, other[k])});
+    }
+    return prior;
+  };
+  for (const StrengthWidth& width : kStrengthWidths) {
+    priors.push_back(prior_of(width.low, width.high));
+    widest_low = std::min(widest_low, width.low);
+    widest_high = std::max(widest_high, width.high);
+    if (effort == Effort::kToChoose) break;
+  }
+  asked.space.strength = prior_of(widest_low, widest_high);
+  inference::EvidenceOptions options{.sampling = {.seed = before.seed}};
+  // The width of a probability that runs are chosen by is that of a batch that moves it by a tenth.
+  if (effort == Effort::kToChoose) {
+    options.sampling.start = 256;
+    options.sampling.points = 250;
+    options.sampling.iterations = 2;
+    options.draws = 64;
+    options.realisations = 2;
+  } else {
+    options.realisations = 16;
+  }
+  ASSIGN_OR_RETURN(asked.evidence,
+                   inference::ModelEvidencesUnder({{knowledge.set.get(), knowledge.z}}, asked.space,
+                                                  priors, options));
+  for (const auto& evidence : asked.evidence) {
+    ASSIGN_OR_RETURN(auto probabilities, inference::ProbabilitiesOf(evidence, asked.space));
+    asked.probabilities.push_back(std::move(probabilities));
+  }
+  return asked;
+}
+
+double ChanceOfMisfit(const KnownBefore& before, const Knowledge& knowledge,
+                      const DesignPoints& points, int fitted) {
+  const inference::DiagnosisSet& set = *knowledge.set;
+  const inference::EmulatorPrediction prediction = set.emulator().Predict(points);
+  const inference::SpecimenErrors& errors = set.errors();
+  const Eigen::MatrixXd diagonal = inference::DiagonalVariance(prediction, errors);
+  const Index q = diagonal.cols();
+  double least = 1e300;
+  Index closest = 0;
+  for (Index i = 0; i < points.rows(); ++i) {
+    Eigen::MatrixXd v = errors.staging * errors.staging.transpose();
+    v.diagonal() += diagonal.row(i).transpose();
+    const Eigen::VectorXd r = knowledge.z - prediction.mean.row(i).transpose();
+    const double square = r.dot(Eigen::LLT<Eigen::MatrixXd>(v).solve(r));
+    if (square < least) {
+      least = square;
+      closest = i;
+    }
+  }
+  const auto degrees = static_cast<double>(std::max<Index>(1, q - fitted));
+  const double inside =
+      inference::FisherLaw{.numerator = degrees, .denominator = errors.freedom}.Tail(least /
+                                                                                     degrees);
+  const double outside = set.coordinates()
+                             ->LeftOut(Eigen::VectorXd::Zero(before.base.histories.cols()),
+                                       inference::RowsOf(points, {closest}))
+                             .chance;
+  return std::min(1.0, 2 * std::min(inside, outside));
+}
+
+}  // namespace calib::diagnosis

@@ -1,0 +1,68 @@
+#pragma once
+// What base and design runs so far say of a measurement: an emulator in units in which each effect
+// is just seen, evidences of the models that compete, their probabilities. Pure functions of the
+// runs and the seed.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "inference/diagnosis/effect_probabilities.h"
+#include "inference/diagnosis/model_evidence.h"
+#include "server/diagnosis/base_region.h"
+#include "server/diagnosis/run_matrices.h"
+
+namespace calib::diagnosis {
+
+/// What stays the same while a design grows.
+struct KnownBefore {
+  BaseRuns base;
+  BaseRegion region;
+  inference::JointPrior prior;  ///< of the base parameters
+  std::uint64_t seed = 0;
+};
+
+/// An emulator of the base's and the design's runs.
+struct Knowledge {
+  DesignRows rows;  ///< units: strengths at which a measurement shows the effect (lambda = 21)
+  PartOfRace part;  ///< entries that the emulator has, K of them
+  std::vector<std::pair<int, std::string>> out{};  ///< entries that it has not, and why
+  std::shared_ptr<const inference::DiagnosisSet> set;
+  Eigen::VectorXd z{};             ///< q: the measurement
+  inference::DesignRange range{};  ///< of the runs, of the kept entries
+  Eigen::MatrixXd angles{};        ///< K x K, degrees
+  std::vector<std::string> warnings{};
+};
+
+/// Learns from all batches. guess: rows with units near the right ones. with_flat: whether entries
+/// that no strength of a design shows (lambda below 4 and twice chance) are taken out; a scout does
+/// not know.
+/// Errors: those of DiagnosisSet::Fit.
+absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& guess,
+                                const std::vector<EndedBatch>& batches, bool with_flat);
+
+/// How much is spent on evidences. kToChoose: whom further runs would tell apart, under the
+/// first of kStrengthWidths alone; kToAnswer: what is said, under all of them.
+enum class Effort { kToChoose, kToAnswer };
+
+/// Evidences and what follows, under each width that was asked for.
+struct Asked {
+  inference::ModelSpace space{};
+  std::vector<std::vector<inference::ModelEvidence>> evidence{};
+  std::vector<inference::EffectProbabilities> probabilities{};
+};
+
+/// Errors: those of ModelEvidencesUnder and ProbabilitiesOf.
+absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort);
+
+/// Chance that a right model misses a measurement by as much as the closest of these points does:
+/// the smaller of that of the coordinates and that of what they leave out, doubled
+/// (Bonferroni). `fitted`: parameters that were free. in: points n >= 1, of the kept entries
+double ChanceOfMisfit(const KnownBefore& before, const Knowledge& knowledge,
+                      const inference::DesignPoints& points, int fitted);
+
+}  // namespace calib::diagnosis

@@ -1,0 +1,363 @@
+#include "server/diagnosis/run_matrices.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <optional>
+
+#include "absl/strings/str_cat.h"
+#include "calib/return_if_error.h"
+#include "server/diagnosis/design_caps.h"
+#include "server/diagnosis/left_out_packings.h"
+#include "server/diagnosis/reading_effects.h"
+#include "server/report/views/run_table.h"
+
+namespace calib::diagnosis {
+namespace {
+
+using Eigen::Index;
+using inference::DesignPoints;
+
+// A floor of the error below this part of its relative share leaves the logarithm's sd constant to
+// half a per cent.
+constexpr double kSmallFloor = 0.1;
+// Below this part of a reading the logarithm goes on as a straight line: a run there is wrong by
+// more than any error, and its logarithm has no bound.
+constexpr double kLineBelow = 0.05;
+constexpr double kEdgeOfBox = 1e-9;  // of rounding
+
+// Whether the error of a group of readings is relative: on their logarithm it is constant.
+bool IsRelative(const campaign::MeasuredObservable& observable, const inference::DataSet& data,
+                const std::vector<int>& readings) {
+  if (!observable.noise || observable.noise->absolute || !(observable.noise->relative > 0))
+    return false;
+  double least = 1e300;
+  for (const int k : readings)
+    least = std::min(least, data.readings[static_cast<std::size_t>(k)].value);
+  return least > 0 && observable.noise->floor <= kSmallFloor * observable.noise->relative * least;
+}
+
+inference::PathCurve CurveOf(const campaign::Experiment& experiment, const inference::DataSet& data,
+                             const std::vector<int>& readings) {
+  inference::PathCurve curve{.path = Eigen::VectorXd(static_cast<Index>(readings.size()))};
+  std::map<std::string, int> stages;
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    const inference::Reading& reading = data.readings[static_cast<std::size_t>(readings[i])];
+    const auto step = static_cast<std::size_t>(reading.load_step);
+    const std::string name = step < experiment.segment.size() ? experiment.segment[step] : "";
+    curve.stage.push_back(stages.emplace(name, static_cast<int>(stages.size())).first->second);
+    curve.path[static_cast<Index>(i)] = reading.control;
+  }
+  return curve;
+}
+
+// Complete runs of the batches whose numerics are unchanged.
+struct DesignRuns {
+  std::vector<std::vector<double>> values;
+  std::vector<int> stream;
+  std::vector<Eigen::RowVectorXd> readings;
+};
+
+DesignRuns RunsOfDesign(const DesignRows& rows, const std::vector<EndedBatch>& batches) {
+  DesignRuns runs;
+  for (const EndedBatch& batch : batches) {
+    for (const EndedRun& ended : batch.runs) {
+      if (!ended.readings || rows.ChangedNumerics(ended.run.values) >= 0) continue;
+      runs.values.push_back(ended.run.values);
+      runs.stream.push_back(ended.run.stream);
+      runs.readings.push_back(*ended.readings);
+    }
+  }
+  return runs;
+}
+
+// What numerical choices change, a column each, where both runs of a pair came to their ends.
+Eigen::MatrixXd StagingOf(const BaseRuns& base, const DesignRows& rows,
+                          const std::vector<EndedBatch>& batches) {
+  std::map<int, Eigen::VectorXd> change;  // by choice, the first that came
+  const Index d = base.values.cols();
+  for (const EndedBatch& batch : batches) {
+    for (const EndedRun& ended : batch.runs) {
+      const int choice = rows.ChangedNumerics(ended.run.values);
+      if (choice < 0 || !ended.readings) continue;
+      const Eigen::RowVectorXd own =
+          Eigen::Map<const Eigen::RowVectorXd>(ended.run.values.data(), d);
+      for (Index i = 0; i < base.values.rows(); ++i) {
+        if (base.stream[static_cast<std::size_t>(i)] != ended.run.stream ||
+            base.values.row(i) != own)
+          continue;
+        const Eigen::VectorXd difference =
+            (base.scale.Scaled(*ended.readings) - base.histories.row(i)).transpose();
+        change.emplace(choice, difference);
+        break;
+      }
+    }
+  }
+  Eigen::MatrixXd staging(base.histories.cols(), static_cast<Index>(change.size()));
+  Index column = 0;
+  for (const auto& [choice, difference] : change) staging.col(column++) = difference;
+  return staging;
+}
+
+std::vector<Index> ShapesOf(const DesignRows& rows, const std::vector<int>& entries) {
+  std::vector<Index> columns;
+  for (const int k : entries) {
+    const int shapes = rows.race().effects[static_cast<std::size_t>(k)].design.shapes;
+    for (int h = 0; h < shapes; ++h) columns.push_back(rows.first_shape(k) + h);
+  }
+  return columns;
+}
+
+constexpr int kDifferences = 32;  // of a calculated entry: five for each of its six features
+
+// What load cells do, where the curves let it be calculated.
+std::map<std::string, CurveEffect> CalculatedOn(const campaign::Campaign& campaign,
+                                                const inference::DataSet& data) {
+  const auto t = static_cast<Index>(data.readings.size());
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(1);
+  if (!MisreadLoads(campaign, data, Eigen::MatrixXd::Zero(1, t), none, none)) return {};
+  Eigen::RowVectorXd value(t), sd(t);
+  for (Index k = 0; k < t; ++k) {
+    value[k] = data.readings[static_cast<std::size_t>(k)].value;
+    sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+  }
+  const auto misread = [=](const Eigen::MatrixXd& readings, const Eigen::VectorXd& gain,
+                           const Eigen::VectorXd& offset) {
+    const Eigen::MatrixXd histories = (readings.rowwise() - value) * sd.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd read = *MisreadLoads(campaign, data, histories, gain, offset);
+    return Eigen::MatrixXd((read * sd.asDiagonal()).rowwise() + value);
+  };
+  return {{"load_cell_error.gain",
+           [misread](const Eigen::MatrixXd& readings, const Eigen::VectorXd& values) {
+             return misread(readings, values, Eigen::VectorXd::Zero(values.size()));
+           }},
+          {"load_cell_error.offset",
+           [misread](const Eigen::MatrixXd& readings, const Eigen::VectorXd& values) {
+             return misread(readings, Eigen::VectorXd::Zero(values.size()), values);
+           }}};
+}
+
+// Differences that calculated entries of the part make of these base runs, at scaled points.
+inference::CalculatedDifferences DifferencesOf(const BaseRuns& base, const DesignRows& rows,
+                                               const PartOfRace& part,
+                                               const std::vector<Index>& of_base,
+                                               const Eigen::MatrixXd& scaled) {
+  inference::CalculatedDifferences result;
+  std::vector<std::size_t> calculated;
+  for (std::size_t i = 0; i < part.kept.size(); ++i) {
+    if (rows.race().effects[static_cast<std::size_t>(part.kept[i])].design.calculated)
+      calculated.push_back(i);
+  }
+  if (calculated.empty() || of_base.empty()) return result;
+  const auto all = static_cast<Index>(calculated.size()) * kDifferences;
+  const auto columns = static_cast<Index>(part.kept.size());
+  result.without = {
+      .base = Eigen::MatrixXd(all, scaled.cols()),
+      .strength = Eigen::MatrixXd::Zero(all, columns),
+      .shape = Eigen::MatrixXd::Zero(all, static_cast<Index>(ShapesOf(rows, part.kept).size()))};
+  result.with = result.without;
+  result.outputs = Eigen::MatrixXd(all, base.histories.cols());
+  const Eigen::VectorXd most = rows.Most(), other = rows.MostOther();
+  Index row = 0;
+  for (const std::size_t place : calculated) {
+    const int k = part.kept[place];
+    const RacingEffect& entry = rows.race().effects[static_cast<std::size_t>(k)];
+    for (int i = 0; i < kDifferences; ++i, ++row) {
+      const auto n = static_cast<Index>(of_base.size());
+      const Index run = of_base[static_cast<std::size_t>(i * n / kDifferences)];
+      const bool negative = entry.design.two_sided && i % 2 == 1;
+      const double high = std::min(kDesignCaps.strengths.high, negative ? other[k] : most[k]);
+      const double low = std::min(kDesignCaps.strengths.low, high / 2);
+      // Strengths in another order than runs, which may go by the iterations of the campaign.
+      const double at = (i * 13 % kDifferences + 0.5) / kDifferences;
+      const double strength = (negative ? -1 : 1) * low * std::pow(high / low, at);
+      result.with.base.row(row) = result.without.base.row(row) = scaled.row(run);
+      result.with.strength(row, static_cast<Index>(place)) = strength;
+      const double parameter = entry.null + (entry.near > 0 ? 1 : -1) * strength * rows.unit()[k];
+      const Eigen::MatrixXd readings = base.readings.row(run);
+      result.outputs.row(row) = base.scale.Scaled(base.calculated.at(entry.strength)(
+                                    readings, Eigen::VectorXd::Constant(1, parameter))) -
+                                base.histories.row(run);
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+HistoryScale::HistoryScale(const campaign::Campaign& campaign, const inference::DataSet& data) {
+  const auto t = static_cast<Index>(data.readings.size());
+  value_.resize(t);
+  sd_.resize(t);
+  for (const auto& [group, readings] : inference::GroupsOf(data)) {
+    const campaign::Experiment& experiment =
+        campaign.experiments[static_cast<std::size_t>(group.first)];
+    const bool relative =
+        IsRelative(experiment.observables[static_cast<std::size_t>(group.second)], data, readings);
+    curves_.push_back(CurveOf(experiment, data, readings));
+    for (const int k : readings) {
+      const auto column = static_cast<Index>(order_.size());
+      const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
+      value_[column] = reading.value;
+      sd_[column] = reading.sd;
+      order_.push_back(k);
+      logarithmic_.push_back(relative);
+    }
+  }
+}
+
+Eigen::MatrixXd HistoryScale::Scaled(const Eigen::MatrixXd& of) const {
+  Eigen::MatrixXd result(of.rows(), of.cols());
+  for (Index c = 0; c < result.cols(); ++c) {
+    const auto y = of.col(order_[static_cast<std::size_t>(c)]);
+    if (!is_logarithmic(c)) {
+      result.col(c) = (y.array() - value_[c]) / sd_[c];
+      continue;
+    }
+    for (Index i = 0; i < result.rows(); ++i) {
+      const double ratio = y[i] / value_[c];
+      const double log =
+          ratio > kLineBelow ? std::log(ratio) : std::log(kLineBelow) + ratio / kLineBelow - 1;
+      result(i, c) = log * value_[c] / sd_[c];
+    }
+  }
+  return result;
+}
+
+absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
+  const inference::DataSet data = campaign::MakeDataSet(view.campaign);
+  if (const absl::Status status = inference::ValidateData(data, inference::NoiseMode::kGiven);
+      !status.ok())
+    return absl::FailedPreconditionError(absl::StrCat("the readings of ", view.status.campaign(),
+                                                      " cannot be judged: ", status.message()));
+  const report::RunTable table = report::RunsOf(view);
+  BaseRuns base{.scale = HistoryScale(view.campaign, data),
+                .calculated = CalculatedOn(view.campaign, data),
+                .values = table.parameters,
+                .readings = table.histories,
+                .stream = table.stream,
+                .packings = PackingsApart(view.campaign)};
+  const auto t = static_cast<Index>(data.readings.size());
+  Eigen::VectorXd sd(t);
+  for (Index k = 0; k < t; ++k) {
+    const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
+    sd[k] = reading.sd;
+    base.readings.col(k) = base.readings.col(k).array() * reading.sd + reading.value;
+  }
+  base.histories = base.scale.Scaled(base.readings);
+  int most = -1;
+  for (const v1::Sample& sample : view.samples) most = std::max(most, sample.index());
+  for (const int stream : base.stream) most = std::max(most, stream);
+  base.samples = most + 1;
+  base.unfinished = static_cast<int>(view.samples.size() - table.sample.size());
+  const Eigen::MatrixXd covariance = inference::ErrorCovariance(data);
+  const Eigen::MatrixXd correlation =
+      sd.cwiseInverse().asDiagonal() * covariance * sd.cwiseInverse().asDiagonal();
+  base.noise = correlation(base.scale.order(), base.scale.order());
+  base.share = 0;
+  for (const campaign::Experiment& experiment : view.campaign.experiments) {
+    if (experiment.role == campaign::Role::kCalibrate)
+      base.share = std::max(base.share, campaign::ScatterShare(experiment));
+  }
+  return base;
+}
+
+int FewestBaseRuns(int parameters) {
+  const int quadratic = (parameters + 1) * (parameters + 2) / 2;
+  return std::max(4 * quadratic, quadratic + 10);
+}
+
+PartOfRace WholeOf(const Race& race) {
+  PartOfRace part;
+  for (int k = 0; k < static_cast<int>(race.effects.size()); ++k) part.kept.push_back(k);
+  return part;
+}
+
+std::vector<int> EntriesRun(const Race& race, const std::vector<int>& entries) {
+  std::vector<int> run;
+  for (const int k : entries) {
+    if (!race.effects[static_cast<std::size_t>(k)].design.calculated) run.push_back(k);
+  }
+  return run;
+}
+
+Race WithCalculated(Race race, const BaseRuns& base) {
+  Race marked = race;
+  for (RacingEffect& entry : marked.effects)
+    entry.design.calculated = entry.shapes.empty() && base.calculated.count(entry.strength) > 0;
+  return EntriesRun(marked, WholeOf(marked).kept).empty() ? race : marked;
+}
+
+inference::DesignPoints PartOfPoints(const DesignRows& rows, const PartOfRace& part,
+                                     const DesignPoints& points) {
+  return {.base = points.base,
+          .strength = points.strength(Eigen::all, part.kept),
+          .shape = points.shape(Eigen::all, ShapesOf(rows, part.kept))};
+}
+
+inference::DesignPoints WholePoints(const DesignRows& rows, const PartOfRace& part,
+                                    const DesignPoints& points) {
+  DesignPoints whole{
+      .base = points.base,
+      .strength = Eigen::MatrixXd::Zero(points.rows(), static_cast<Index>(rows.unit().size())),
+      .shape = Eigen::MatrixXd::Zero(points.rows(), rows.shape_count())};
+  whole.strength(Eigen::all, part.kept) = points.strength;
+  whole.shape(Eigen::all, ShapesOf(rows, part.kept)) = points.shape;
+  return whole;
+}
+
+int RunsWith(const DesignRows& rows, const std::vector<EndedBatch>& batches, int entry) {
+  const DesignRuns design = RunsOfDesign(rows, batches);
+  return static_cast<int>((rows.Points(design.values).strength.col(entry).array() != 0).count());
+}
+
+inference::SetRuns SetRunsOf(const BaseRuns& base, const DesignRows& rows,
+                             const std::vector<EndedBatch>& batches, const PartOfRace& part) {
+  const DesignRuns design = RunsOfDesign(rows, batches);
+  const DesignPoints points = rows.Points(design.values);
+  std::vector<bool> known(rows.race().effects.size(), false);
+  for (const int k : part.kept) known[static_cast<std::size_t>(k)] = true;
+  for (const int k : part.flat) known[static_cast<std::size_t>(k)] = true;
+  const auto in_box = [](const auto& x) { return (x.array().abs() <= 1 + kEdgeOfBox).all(); };
+
+  const Eigen::MatrixXd scaled = rows.axes().Scaled(base.values);
+  std::vector<Index> of_base, of_design;
+  for (Index i = 0; i < scaled.rows(); ++i) {
+    if (in_box(scaled.row(i))) of_base.push_back(i);
+  }
+  for (Index i = 0; i < points.rows(); ++i) {
+    bool all_known = in_box(points.base.row(i));
+    for (std::size_t k = 0; k < known.size(); ++k)
+      all_known = all_known && (known[k] || points.strength(i, static_cast<Index>(k)) == 0);
+    if (all_known) of_design.push_back(i);
+  }
+  const auto n = static_cast<Index>(of_base.size()), m = static_cast<Index>(of_design.size());
+  const DesignPoints own = PartOfPoints(rows, part, inference::RowsOf(points, of_design));
+  inference::SetRuns runs{.curves = base.scale.curves(),
+                          .points = {.base = Eigen::MatrixXd(n + m, scaled.cols()),
+                                     .strength = Eigen::MatrixXd::Zero(n + m, own.strength.cols()),
+                                     .shape = Eigen::MatrixXd::Zero(n + m, own.shape.cols())},
+                          .histories = Eigen::MatrixXd(n + m, base.histories.cols()),
+                          .differences = DifferencesOf(base, rows, part, of_base, scaled),
+                          .noise = base.noise,
+                          .staging = StagingOf(base, rows, batches),
+                          .share = base.share};
+  for (const int k : part.kept)
+    runs.effects.push_back(rows.race().effects[static_cast<std::size_t>(k)].design);
+  runs.points.base.topRows(n) = scaled(of_base, Eigen::all);
+  runs.points.base.bottomRows(m) = own.base;
+  runs.points.strength.bottomRows(m) = own.strength;
+  runs.points.shape.bottomRows(m) = own.shape;
+  runs.histories.topRows(n) = base.histories(of_base, Eigen::all);
+  for (const Index i : of_base)
+    runs.packing.push_back(base.stream[static_cast<std::size_t>(i)] % base.packings);
+  for (Index i = 0; i < m; ++i) {
+    const auto from = static_cast<std::size_t>(of_design[static_cast<std::size_t>(i)]);
+    runs.histories.row(n + i) = base.scale.Scaled(design.readings[from]).row(0);
+    runs.packing.push_back(design.stream[from] % base.packings);
+  }
+  return runs;
+}
+
+}  // namespace calib::diagnosis

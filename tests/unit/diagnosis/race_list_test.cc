@@ -1,0 +1,119 @@
+// Who takes part in a diagnosis, along which parameter, and how far.
+#include "server/diagnosis/race_list.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/campaign/model/race.h"
+#include "server/diagnosis/design_rows.h"
+#include "tests/support/race_toy.h"
+
+namespace calib::diagnosis {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::Pair;
+
+Race RaceFor(const report::CampaignView& view, const std::vector<std::string>& without = {}) {
+  const auto race = RaceOf(view, without);
+  EXPECT_TRUE(race.ok()) << race.status();
+  return race.ok() ? *race : Race();
+}
+
+const RacingEffect& EntryOf(const Race& race, const std::string& strength) {
+  const auto found =
+      std::find_if(race.effects.begin(), race.effects.end(),
+                   [&](const RacingEffect& own) { return own.strength == strength; });
+  EXPECT_NE(found, race.effects.end()) << strength;
+  return found == race.effects.end() ? race.effects.front() : *found;
+}
+
+TEST(RaceList, HasTheEffectsOfTheBuildWithTheirStrengths) {
+  const RaceToy toy(1, 1, 1);
+  const report::CampaignView view = toy.Measured({}, 1);
+  const Race race = RaceFor(view, {"membrane_stiffness"});
+  const RacingEffect& rolling = EntryOf(race, "rolling_resistance.friction");
+  EXPECT_EQ(rolling.null, 0);
+  EXPECT_NEAR(rolling.near, 0.1, 1e-12);
+  EXPECT_NEAR(rolling.far, 0.3, 1e-12);
+  EXPECT_FALSE(rolling.design.two_sided);
+  ASSERT_EQ(rolling.shapes.size(), 1u) << "its stiffness shapes it";
+  EXPECT_EQ(rolling.shapes[0].name, "rolling_resistance.stiffness_ratio");
+  EXPECT_EQ(rolling.shapes[0].absent, 0) << "as a run without it has it";
+  // Gain and offset each act alone.
+  EXPECT_TRUE(EntryOf(race, "load_cell_error.gain").design.two_sided);
+  EXPECT_THAT(EntryOf(race, "load_cell_error.offset").shapes, IsEmpty());
+  EXPECT_THAT(race.Names(), Contains("load_cell_error").Times(1));
+  EXPECT_THAT(race.not_excitable, Contains(Pair("membrane_stiffness", "left out as asked for")));
+  EXPECT_THAT(race.not_excitable, Contains(Pair("viscous_damping", HasSubstr("at rest"))));
+  EXPECT_THAT(race.not_excitable, Contains(Pair("wall_friction", HasSubstr("none of the fitted"))));
+  EXPECT_THAT(race.Names(), Not(Contains("wall_friction")));
+  const auto place = [&race](const std::string& name) {
+    return static_cast<int>(
+        std::find_if(race.effects.begin(), race.effects.end(),
+                     [&name](const RacingEffect& own) { return own.name == name; }) -
+        race.effects.begin());
+  };
+  EXPECT_THAT(race.excluded, Contains(Pair(place("adhesion_dmt"), place("adhesion_jkr"))));
+  EXPECT_EQ(race.numerics.size(), 3u);
+}
+
+TEST(RaceList, HasUsersEffectsWithTheirSignsAndEnds) {
+  const RaceToy toy(7, 1, 1);
+  const report::CampaignView view = toy.Measured({}, 1);
+  const Race race = RaceFor(view, RaceToy::Without());
+  ASSERT_EQ(race.effects.size(), 7u);
+  EXPECT_TRUE(race.effects[2].design.two_sided);
+  EXPECT_NEAR(race.effects[2].most, race.effects[2].most_other, 1e-12);
+  EXPECT_FALSE(race.effects[2].ends) << "its prior ends before it does";
+  EXPECT_EQ(race.effects[0].most_other, 0);
+  EXPECT_EQ(race.effects[3].design.shapes, 1);
+  EXPECT_EQ(race.effects[1].design.power, 0.75);
+  EXPECT_THAT(race.excluded, ElementsAre(std::pair(1, 5)));
+}
+
+TEST(RaceList, ADesignAdmitsEveryRowOfItsRace) {
+  const RaceToy toy(4, 1, 2);
+  const report::CampaignView view = toy.Measured({}, 1);
+  const Race race = RaceFor(view, RaceToy::Without());
+  const campaign::Campaign design = CampaignOfDesign(view.campaign, race);
+  const DesignRows rows(
+      AxesOver(campaign::MarginalPriors(view.campaign), Eigen::MatrixXd{{0.5e9, 0.3}, {1e9, 0.6}}),
+      race, Eigen::VectorXd::Constant(4, 0.3));
+  ASSERT_EQ(rows.names().size(), design.parameters.size());
+  for (std::size_t j = 0; j < rows.names().size(); ++j)
+    EXPECT_EQ(rows.names()[j], design.parameters[j].name);
+  inference::DesignPoints points{.base = Eigen::MatrixXd::Zero(3, 2),
+                                 .strength = Eigen::MatrixXd::Zero(3, 4),
+                                 .shape = Eigen::MatrixXd::Zero(3, 1)};
+  points.strength.row(1) << 1e-9, 1e9, -1e9, 0.5;
+  points.strength.row(2) << 0, 0, 2, 0;
+  for (Eigen::Index i = 0; i < 3; ++i)
+    EXPECT_EQ(campaign::WhyNotRun(design, rows.Values(points, i)), "") << i;
+  EXPECT_THAT(campaign::ActiveEffects(design, rows.Values(points, 0)), IsEmpty());
+  EXPECT_THAT(campaign::ActiveEffects(design, rows.Values(points, 2)), ElementsAre("e2"));
+  EXPECT_EQ(campaign::WhyNotRun(design, rows.WithNumerics(rows.Values(points, 0), 1)), "");
+  const campaign::Derivation text = DesignOf(view, race);
+  EXPECT_EQ(text.lineage.purpose, "design");
+  EXPECT_EQ(text.parameters.size() + 2, design.parameters.size());
+  EXPECT_THAT(*text.race, ElementsAre("e0", "e1", "e2", "e3"));
+}
+
+TEST(RaceList, NobodyLeftIsSaid) {
+  const RaceToy toy(1, 1, 1);
+  std::vector<std::string> all = RaceToy::Without();
+  all.push_back("e0");
+  const auto race = RaceOf(toy.Measured({}, 1), all);
+  EXPECT_EQ(race.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(race.status().message(), HasSubstr("no effect of this build can join"));
+}
+
+}  // namespace
+}  // namespace calib::diagnosis
