@@ -6,6 +6,7 @@
 
 #include "calib/return_if_error.h"
 #include "inference/diagnosis/run_variance.h"
+#include "inference/diagnosis/twin_scatter.h"
 
 namespace calib::inference {
 
@@ -29,6 +30,13 @@ absl::StatusOr<DiagnosisSet> DiagnosisSet::WithCoordinates(
                         .staging = Eigen::MatrixXd(coordinates->count(), 0),
                         .share = runs.share,
                         .freedom = emulator.freedom()};
+  if (runs.twins.rows() > 0) {
+    TwinScatter split =
+        SplitByTwins(coordinates->OfDifferences(runs.twins), errors.specimen, errors.freedom);
+    errors.specimen = std::move(split.specimen);
+    errors.missed = std::move(split.missed);
+    errors.freedom = split.freedom;
+  }
   if (runs.staging.size() > 0) errors.staging = coordinates->weights() * runs.staging;
   DiagnosisSet result(std::move(emulator), std::move(errors));
   result.coordinates_ = std::move(coordinates);

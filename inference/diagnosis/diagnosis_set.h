@@ -39,7 +39,7 @@ class DiagnosisSet {
   Eigen::VectorXd LogDensityWithDiscrepancy(const Eigen::VectorXd& z, const DesignPoints& points,
                                             const Eigen::VectorXd& tau, int specimens = 1) const;
   /// errors() of the mean over n >= 1 specimens: what each has of its own is less, what they share
-  /// (emulator, staging, discrepancy) is not.
+  /// (emulator, what it misses, staging, discrepancy) is not.
   SpecimenErrors ErrorsOfMean(int specimens) const;
 
  private:

@@ -136,11 +136,12 @@ double VerificationChance(const DiagnosisSet& set, const DesignPoints& points,
     for (Index j = 0; j < n; ++j)
       same(i, j) = packing[static_cast<std::size_t>(i)] == packing[static_cast<std::size_t>(j)];
   }
+  const double optimism = set.coordinates()->optimism();
   double chi2 = 0;
   for (Index c = 0; c < q; ++c) {
     const double run = emulator.variances().run[c];
     Eigen::MatrixXd v = factor * emulator.shrink().col(c).asDiagonal() * factor.transpose() +
-                        (set.errors().specimen[c] - run) * same;
+                        (optimism * emulator.specimen()[c] - run) * same;
     v.diagonal().array() += run * (1 + prediction.added_run_variance.array());
     const double mean = error.col(c).mean();
     chi2 += mean * mean / v.mean();

@@ -44,6 +44,7 @@ std::vector<ForecastLaw> LawsOf(const ProposedMeasurement& proposed, const Model
     Eigen::MatrixXd shared = errors.staging * errors.staging.transpose();
     shared.diagonal() +=
         prediction.variance.row(i).transpose() + prediction.added_run_variance[i] * errors.run;
+    if (errors.missed.size() > 0) shared.diagonal() += errors.missed;
     if (model.model.none_of_these) {
       Eigen::MatrixXd directions(q, d);
       for (Index j = 0; j < d; ++j)
@@ -54,7 +55,7 @@ std::vector<ForecastLaw> LawsOf(const ProposedMeasurement& proposed, const Model
       shared += tau * tau / static_cast<double>(q - d) *
                 (Eigen::MatrixXd::Identity(q, q) - along * along.transpose());
     }
-    const Eigen::VectorXd own = errors.share * errors.specimen + errors.noise;
+    const Eigen::VectorXd own = errors.Own();
     Eigen::MatrixXd covariance = shared;
     covariance.diagonal() += own;
     ForecastLaw law{.mean = prediction.mean.row(i), .factor = {}, .log_determinant = 0};

@@ -35,7 +35,7 @@ class EllipticLaw {
 Eigen::MatrixXd DiagonalVariance(const EmulatorPrediction& prediction,
                                  const SpecimenErrors& errors) {
   return ((prediction.variance + prediction.added_run_variance * errors.run.transpose()).rowwise() +
-          (errors.share * errors.specimen + errors.noise).transpose());
+          errors.OfMeasurement().transpose());
 }
 
 Eigen::VectorXd SpecimenLogDensity(const Eigen::VectorXd& z, const EmulatorPrediction& prediction,

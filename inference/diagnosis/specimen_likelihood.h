@@ -14,11 +14,20 @@ struct SpecimenErrors {
   Eigen::VectorXd specimen{};  ///< q: variance of a specimen of as many grains as the model's
   Eigen::VectorXd run{};       ///< q: variance of a run; the unit of added_run_variance
   Eigen::VectorXd noise{};     ///< q: variance of the readings' noise
+  Eigen::VectorXd missed{};   ///< q: variance of what the emulator misses of runs beyond what their
+                              ///< twins scatter by (twin_scatter.h); empty: none
   Eigen::MatrixXd staging{};  ///< q x J, J >= 0: what rate, step, damping change, amplitudes normal
                               ///< of variance one
   double share =
       1;  ///< part of the specimen's variance that the measurement has: grains over grains
   double freedom = 20;  ///< of the Student law, > 0; infinite: normal
+
+  /// q: variances that a measurement has of its own.
+  Eigen::VectorXd Own() const { return share * specimen + noise; }
+  /// q: Own() and what is missed.
+  Eigen::VectorXd OfMeasurement() const {
+    return missed.size() > 0 ? Eigen::VectorXd(Own() + missed) : Own();
+  }
 };
 
 /// A discrepancy that no base parameter can mimic: normal, of covariance tau^2 / (q - d) P at each
@@ -29,8 +38,8 @@ struct OrthogonalDiscrepancy {
 };
 
 /// ln of the density of the measured coordinates z (q) at each of m points: Student's law of scale
-///   V = diag(share specimen + run added_run_variance + noise + emulator variance) + staging
-///   staging^T
+///   V = diag(share specimen + missed + run added_run_variance + noise + emulator variance)
+///       + staging staging^T
 /// about the emulated mean, which is what a normal law becomes where its covariance is known from
 /// few runs.      [Sellentin & Heavens, MNRAS 456 (2016) L132; Kotz & Nadarajah 2004, Eq. 1.1]
 /// The emulator's variance at a point averages the evidence over what the emulator does not know.

@@ -41,6 +41,9 @@ absl::Status CheckSetRuns(const SetRuns& runs, const CoordinateOptions& options)
     return absl::InvalidArgumentError("noise or staging does not fit the histories");
   if (runs.differences.outputs.rows() > 0 && runs.differences.outputs.cols() != t)
     return absl::InvalidArgumentError("calculated differences do not fit the histories");
+  if (runs.twins.rows() > 0 &&
+      (runs.twins.rows() < 2 || runs.twins.cols() != t || !runs.twins.allFinite()))
+    return absl::InvalidArgumentError("twins do not fit the histories, or there is one");
   if (!(runs.share > 0) || !(runs.share <= 1) || options.rest < 0 || options.count < 2 ||
       options.rest >= options.count)
     return absl::InvalidArgumentError("share, count or rest out of range");

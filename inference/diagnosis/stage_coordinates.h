@@ -25,6 +25,9 @@ struct SetRuns {
   /// T x J, J >= 0: what numerical choices change, each with an amplitude of variance one.
   Eigen::MatrixXd staging{};
   double share = 1;  ///< part of the scatter's variance that the measurement has as well, (0, 1]
+  /// R x T: departures from their mean of twins, runs of one parameter vector on the only packing
+  /// whose trajectories have parted; no rows, or two and more.
+  Eigen::MatrixXd twins{};
 };
 
 /// How many coordinates, and of what.

@@ -21,7 +21,7 @@ Eigen::MatrixXd WhitenedMeans(const std::vector<const DiagnosisSet*>& sets,
   Index column = 0;
   for (const DiagnosisSet* set : sets) {
     const SpecimenErrors& errors = set->errors();
-    const Eigen::VectorXd sd = (errors.share * errors.specimen + errors.noise).cwiseSqrt();
+    const Eigen::VectorXd sd = errors.OfMeasurement().cwiseSqrt();
     result.middleCols(column, sd.size()) =
         set->emulator().PredictMean(points) * sd.cwiseInverse().asDiagonal();
     column += sd.size();
@@ -39,7 +39,7 @@ Eigen::MatrixXd WhitenedSensitivities(const std::vector<const DiagnosisSet*>& se
   Index row = 0;
   for (const DiagnosisSet* set : sets) {
     const SpecimenErrors& errors = set->errors();
-    const Eigen::ArrayXd sd = (errors.share * errors.specimen + errors.noise).cwiseSqrt();
+    const Eigen::ArrayXd sd = errors.OfMeasurement().cwiseSqrt();
     for (Index j = 0; j < base.cols(); ++j)
       result.col(j).segment(row, sd.size()) =
           set->emulator().BaseDerivative(base, j).row(0).transpose().array() / sd;

@@ -84,6 +84,20 @@ ScatterMoments MomentsOfReplicates(const Eigen::MatrixXd& runs) {
   return moments;
 }
 
+bool HaveParted(const Eigen::MatrixXd& runs, const Eigen::VectorXd& number,
+                const Eigen::VectorXd& noise) {
+  assert(runs.rows() >= 2 && number.size() == runs.rows() && noise.size() == runs.cols());
+  Eigen::MatrixXd left = runs.rowwise() - runs.colwise().mean();
+  double freedom = static_cast<double>(runs.rows()) - 1;
+  if (runs.rows() > 2) {
+    const Eigen::VectorXd along = (number.array() - number.mean()).matrix().normalized();
+    left -= along * (along.transpose() * left).eval();
+    --freedom;
+  }
+  const Eigen::RowVectorXd sd = (left.colwise().squaredNorm() / freedom).cwiseSqrt();
+  return (sd.transpose().array() >= kParted * noise.array()).any();
+}
+
 GroupScatter FitScatter(const ScatterMoments& moments, const std::vector<int>& stage,
                         const Eigen::VectorXd& control) {
   const Index n = moments.variance.size();

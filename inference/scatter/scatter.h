@@ -21,6 +21,18 @@ struct ScatterMoments {
 /// (divisor R - 1). runs: R x n, finite.
 ScatterMoments MomentsOfReplicates(const Eigen::MatrixXd& runs);
 
+/// Least departure, in sd of a reading's noise, by which runs of nearly the same parameters count
+/// as different ones: far above what rounding leaves in a smooth model, far below what matters.
+inline constexpr double kParted = 1e-6;
+
+/// Whether R >= 2 twins have become runs of their own: run k has its parameters moved by number_k
+/// times a small step, so that those of a smooth model lie on a straight line over `number`. The
+/// largest root mean square about it, over the readings, is at least kParted of their noise sd; two
+/// runs are held to their mean. Pure.
+/// in: runs R x n, finite; number, R different ones; noise, n sd > 0
+bool HaveParted(const Eigen::MatrixXd& runs, const Eigen::VectorXd& number,
+                const Eigen::VectorXd& noise);
+
 /// Clock between neighbours that are taken for independent, in correlation lengths: exp(-1000) is
 /// zero in double.
 inline constexpr double kFarApart = 1e3;

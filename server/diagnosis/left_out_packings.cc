@@ -23,6 +23,14 @@ std::vector<Index> ReplicatesWithout(int left_out, int groups,
   return replicates;
 }
 
+std::vector<Index> AllBut(int left_out, int count) {
+  std::vector<Index> others;
+  for (int i = 0; i < count; ++i) {
+    if (i != left_out) others.push_back(i);
+  }
+  return others;
+}
+
 }  // namespace
 
 int PackingsApart(const campaign::Campaign& campaign) {
@@ -37,7 +45,8 @@ int PackingsApart(const campaign::Campaign& campaign) {
 std::vector<std::optional<Eigen::MatrixXd>> ClosedFormsWithout(
     const campaign::Campaign& campaign, const report::ScatteredReadings& readings) {
   std::vector<std::optional<Eigen::MatrixXd>> forms;
-  const int groups = PackingsApart(campaign);
+  const bool twins = readings.twins.rows() > 0;
+  const int groups = twins ? static_cast<int>(readings.twins.rows()) : PackingsApart(campaign);
   if (groups < 2 || !readings.measured) return forms;
   const inference::DataSet plain = campaign::MakeDataSet(campaign);
   const auto t = static_cast<Index>(plain.readings.size());
@@ -47,14 +56,15 @@ std::vector<std::optional<Eigen::MatrixXd>> ClosedFormsWithout(
   }
   for (int left_out = 0; left_out < groups; ++left_out) {
     std::optional<Eigen::MatrixXd>& form = forms.emplace_back();
-    const std::vector<Index> replicates = ReplicatesWithout(left_out, groups, readings);
+    const std::vector<Index> replicates =
+        twins ? AllBut(left_out, groups) : ReplicatesWithout(left_out, groups, readings);
     if (replicates.size() < 2) continue;
     form = Eigen::MatrixXd::Zero(t, t);
+    const Eigen::MatrixXd& departures = twins ? readings.twins : readings.departures;
     for (const auto& group : inference::GroupsOf(plain)) {
       const std::vector<int>& own = group.second;
       (*form)(own, own) = inference::ScatterCovariance(campaign::FitGroupScatter(
-          campaign, plain, group,
-          inference::MomentsOfReplicates(readings.departures(replicates, own))));
+          campaign, plain, group, inference::MomentsOfReplicates(departures(replicates, own))));
     }
     *form = inverse.asDiagonal() * *form * inverse.asDiagonal();
   }

@@ -16,7 +16,8 @@ int PackingsApart(const campaign::Campaign& campaign);
 
 /// Of each of those groups: the closed form of the scatter, a chain along the path for each
 /// observable, from the replicates on all the others; T x T in the sd of readings.of_mean. None
-/// where fewer than two replicates remain; no entries where packings were not varied.
+/// where fewer than two replicates remain; no entries where packings were not varied. With twins of
+/// each of them, from the others.
 std::vector<std::optional<Eigen::MatrixXd>> ClosedFormsWithout(
     const campaign::Campaign& campaign, const report::ScatteredReadings& readings);
 

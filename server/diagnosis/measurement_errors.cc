@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <utility>
@@ -36,6 +37,22 @@ Eigen::VectorXd NoiseSd(const FittedCampaign& base, const inference::DataSet& pl
   return unit;
 }
 
+Eigen::VectorXd InverseSd(const inference::DataSet& data) {
+  Eigen::VectorXd inverse(static_cast<Index>(data.readings.size()));
+  for (Index k = 0; k < inverse.size(); ++k) {
+    inverse[k] = 1 / data.readings[static_cast<std::size_t>(k)].sd;
+  }
+  return inverse;
+}
+
+// Lower triangular, of a covariance in sd of the readings that may lack directions.
+Eigen::MatrixXd FactorOf(const Eigen::MatrixXd& covariance) {
+  constexpr double kNothing = 1e-10;  // of their variance
+  const auto t = covariance.rows();
+  return Eigen::LLT<Eigen::MatrixXd>(covariance + kNothing * Eigen::MatrixXd::Identity(t, t))
+      .matrixL();
+}
+
 // What scatters of a measurement about the mean of the runs, of what the emulator misses of a run.
 Eigen::VectorXd ScatterOfMissed(const FittedCampaign& base, const inference::DataSet& plain) {
   Eigen::VectorXd scatter(static_cast<Index>(plain.readings.size()));
@@ -53,11 +70,17 @@ Eigen::VectorXd ScatterOfMissed(const FittedCampaign& base, const inference::Dat
   return scatter;
 }
 
-// Noise, nuisance and scatter of measurements; `missed` holds what the emulator misses of single
-// runs, n x T; group, of each of them, may be empty.
-void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
-                      const std::vector<int>& group, const std::vector<Eigen::VectorXd>& nuisance,
-                      MeasurementErrors& errors) {
+// What measurements are drawn from.
+struct Drawn {
+  Eigen::MatrixXd missed;    // n x T: what the emulator misses of single runs, or twins
+  std::vector<int> group{};  // of each of them, may be empty
+  Eigen::MatrixXd beside{};  // T x T: factor of the covariance of what is in none; may be empty
+};
+
+// Noise, nuisance and scatter of measurements.
+void DrawMeasurements(const FittedCampaign& base, const Drawn& drawn,
+                      const std::vector<Eigen::VectorXd>& nuisance, MeasurementErrors& errors) {
+  const Eigen::MatrixXd& missed = drawn.missed;
   const campaign::Campaign& campaign = base.view().campaign;
   const inference::DataSet plain = campaign::MakeDataSet(campaign);
   const auto t = static_cast<Index>(plain.readings.size());
@@ -80,8 +103,14 @@ void DrawMeasurements(const FittedCampaign& base, const Eigen::MatrixXd& missed,
     const Index own = s % missed.rows();
     const double sign = stream.Normal() < 0 ? -1 : 1;
     draw += sign * scatter.cwiseProduct(missed.row(own).transpose());
+    if (drawn.beside.size() > 0) {
+      for (Index k = 0; k < t; ++k) normal[k] = stream.Normal();
+      draw += drawn.beside * normal;
+    }
     errors.of_mean.draws.row(s) = draw;
-    if (!group.empty()) errors.of_mean.group.push_back(group[static_cast<std::size_t>(own)]);
+    if (!drawn.group.empty()) {
+      errors.of_mean.group.push_back(drawn.group[static_cast<std::size_t>(own)]);
+    }
     // The fits take the closest of the runs about the right point.
     double closest = std::numeric_limits<double>::infinity();
     for (int k = 0; k < kRunsAbout; ++k) {
@@ -122,11 +151,10 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
   const Eigen::VectorXd& sd = emulator.scatter_sd();
   const Eigen::MatrixXd missed =
       covariance_of((not_known.array().square() + sd.array().square()).sqrt());
-  // As large as near the best point: far out the emulator knows less, which is no scatter.
-  const Eigen::MatrixXd of_runs =
-      emulator.cross_validation().standardised * missed.diagonal().cwiseSqrt().asDiagonal();
   const inference::DataSet plain = campaign::MakeDataSet(base.view().campaign);
-  std::vector<int> group;
+  // As large as near the best point: far out the emulator knows less, which is no scatter.
+  Drawn drawn{.missed = emulator.cross_validation().standardised *
+                        missed.diagonal().cwiseSqrt().asDiagonal()};
   MeasurementErrors errors;
   if (readings.measured) {
     Eigen::VectorXd unit(t);  // sd of one run's difference over that of the mean history's
@@ -142,12 +170,22 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
     const Eigen::VectorXd noise = NoiseSd(base, plain);
     const Eigen::MatrixXd closed_form =
         NoiseCorrelation(data) - noise.asDiagonal() * NoiseCorrelation(plain) * noise.asDiagonal();
-    errors.packings = static_cast<int>(readings.departures.rows());
-    const std::set<int> apart(packing.begin(), packing.end());
-    if (static_cast<Index>(packing.size()) == of_runs.rows() &&
+    // On several packings the emulator's runs show it; on one the twins, each a packing of its own.
+    const auto twins = readings.twins.rows();
+    std::vector<int> own = packing;
+    if (twins > 0) {
+      drawn.missed = std::sqrt(static_cast<double>(twins) / static_cast<double>(twins - 1)) *
+                     readings.twins * InverseSd(data).asDiagonal();
+      drawn.beside = FactorOf(covariance_of(not_known));
+      own.resize(static_cast<std::size_t>(twins));
+      std::iota(own.begin(), own.end(), 0);
+    }
+    errors.packings = static_cast<int>(twins > 0 ? twins : readings.departures.rows());
+    const std::set<int> apart(own.begin(), own.end());
+    if (static_cast<Index>(own.size()) == drawn.missed.rows() &&
         static_cast<int>(apart.size()) >= kFewestPackings) {
       inference::PackingScatter scatter = inference::ScatterBetweenPackings(
-          of_runs * ScatterOfMissed(base, plain).asDiagonal(), packing,
+          drawn.missed * ScatterOfMissed(base, plain).asDiagonal(), own,
           [&](std::optional<int> left_out) {
             const auto& forms = base.closed_forms_without();
             const bool known = left_out && static_cast<std::size_t>(*left_out) < forms.size();
@@ -158,7 +196,7 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
       errors.of_mean.covariance = std::move(scatter.covariance);
       errors.of_mean.without = std::move(scatter.without);
       errors.packings = static_cast<int>(apart.size());
-      group = std::move(scatter.group);
+      drawn.group = std::move(scatter.group);
     }
     errors.of_run.covariance =
         unit.asDiagonal() * NoiseCorrelation(readings.of_run) * unit.asDiagonal();
@@ -169,7 +207,7 @@ MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
     errors.of_mean.covariance = noise + missed;
     errors.of_run.covariance = noise + 2 * covariance_of(sd);
   }
-  DrawMeasurements(base, of_runs, group, nuisance, errors);
+  DrawMeasurements(base, drawn, nuisance, errors);
   return errors;
 }
 

@@ -22,7 +22,7 @@ struct MeasurementErrors {
   DrawnErrors of_mean;  ///< from the mean history at the right point
   DrawnErrors of_run;   ///< from a run there; drawn: from the closest of a few
   double scatter = 0;   ///< of a single run, in sd of the readings' noise alone
-  int packings = 0;     ///< that scatter was measured on, see inference::FittedModel
+  int packings = 0;     ///< or twins that scatter was measured on, see inference::FittedModel
 };
 
 /// Packings whose runs say more of the scatter than a closed form, and without one of which enough
@@ -34,8 +34,9 @@ inline constexpr int kFewestPackings = 4;
 /// several packings were measured to differ by, a chain along the path for each observable, and,
 /// as far as their number supports it, what the emulator misses of the runs on them
 /// (inference/scatter/packing_scatter.h); draws on a packing are judged by the covariance without
-/// it. Where neither packings were varied nor repeats made, what the emulator does not
-/// explain of single runs. packing: of each run that the emulator was validated on, any numbers.
+/// it. On one packing twins stand in for runs on several, each by itself. Where neither were run,
+/// what the emulator does not explain of single runs. packing: of each run that the emulator was
+/// validated on, any numbers.
 MeasurementErrors ErrorsOfMeasurements(const FittedCampaign& base,
                                        const inference::StateEmulator& emulator,
                                        const Eigen::VectorXd& not_known,

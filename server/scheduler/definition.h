@@ -47,9 +47,9 @@ struct Definition {
   std::optional<inference::DataSet> mean_data{};
   /// Where the scatter has been measured on several packings.
   std::optional<inference::Replicates> replicates{};
-  /// Of the errors of `data`, where packings are part of them.
+  /// Of the errors of `data`, where the scatter of packings or twins is part of them.
   inference::KnownFrom known{};
-  Eigen::MatrixXd of_packings{};  ///< these packings' part of the covariance of `data`; or empty
+  Eigen::MatrixXd of_scatter{};  ///< that part of the covariance of `data`; or empty
   inference::JointPrior priors;
   ReadingIndex readings;
   /// Of surrogate_msrs, kept from one plan to the next: nothing that the store does not give again

@@ -9,6 +9,7 @@
 #include "calib/return_if_error.h"
 #include "inference/data/gaussian_likelihood.h"
 #include "server/campaign/checks/run_table_check.h"
+#include "server/campaign/model/replicates.h"
 #include "server/campaign/model/specimen_notes.h"
 #include "server/scheduler/answer.h"
 #include "server/scheduler/decisions.h"
@@ -209,6 +210,10 @@ class Planner {
     }
     if (!scatter_.empty()) {
       outcome->answer.scatter = scatter_;
+    } else if (TwinsShowNothing()) {
+      plan_.log.emplace_back(
+          "the twins show no scatter (they have not parted, or fewer than two came to their ends): "
+          "none of it is among the errors");
     }
     plan_.converged = outcome->converged;
     AddConclusion(*outcome);
@@ -255,7 +260,7 @@ class Planner {
     }
     const bool judged = outcome.answer.HasIntervals() || !campaign::IsFilter(campaign_.method);
     if (const std::string left_out = campaign::ScatterLeftOut(campaign_);
-        judged && !outcome.answer.FromEmulator() && !left_out.empty()) {
+        judged && !outcome.answer.FromEmulator() && !left_out.empty() && !TwinsShowNothing()) {
       conclusion.posterior.add_warnings(left_out);
     }
     conclusion.posterior.set_stated_loss(stated_loss_);
@@ -274,6 +279,10 @@ class Planner {
         posterior.ess, " effective samples, posterior from ", conclusion.posterior.posterior_from(),
         std::isfinite(evidence) ? absl::StrCat(", log evidence ", evidence) : ""));
     plan_.conclusion = std::move(conclusion);
+  }
+
+  bool TwinsShowNothing() const {
+    return replicating_ && scatter_.empty() && !campaign::VariesPackings(campaign_);
   }
 
   std::vector<int> SampleNumbers() const {
@@ -302,7 +311,7 @@ class Planner {
 
   /// How often the best estimate is to be run; 0: its scatter is not asked for or cannot be had.
   int Replicates() {
-    const int wanted = std::min(ReplicatesOf(campaign_), campaign_.samples);
+    const int wanted = campaign::ReplicatesOf(campaign_);
     if (wanted < 2) {
       return 0;
     }
@@ -311,10 +320,13 @@ class Planner {
       plan_.log.emplace_back("scatter is not measured: it would exceed the budget");
       return 0;
     }
+    if (std::string twins = campaign::TwinsInWords(campaign_); !twins.empty()) {
+      plan_.log.push_back(std::move(twins));
+    }
     return wanted;
   }
 
-  /// The best estimate on every packing, or repeated on the only one, all experiments, as samples
+  /// The best estimate on every packing, or its twins on the only one, all experiments, as samples
   /// of an iteration of their own: consecutive numbers meet every packing once.
   absl::Status Replicate(const Answer& answer, int count) {
     Start start{.iteration = static_cast<int>(history_.iterations.size()),
@@ -325,11 +337,11 @@ class Planner {
     for (std::size_t j = 0; j < parameters.size(); ++j) {
       best(static_cast<Eigen::Index>(j)) = parameters[j].mean;
     }
-    const bool moved = !VariesPackings(campaign_);
+    const bool moved = !campaign::VariesPackings(campaign_);
     std::vector<int> experiments(campaign_.experiments.size());
     std::iota(experiments.begin(), experiments.end(), 0);
     for (int i = 0; i < count; ++i) {
-      const Eigen::VectorXd own = moved ? Repeat(best, i) : best;
+      const Eigen::VectorXd own = moved ? Twin(best, i) : best;
       start.samples.push_back({.sample = start.iteration * record_.submitted.samples + i,
                                .iteration = start.iteration,
                                .parameters = {own.begin(), own.end()},
@@ -341,12 +353,12 @@ class Planner {
   }
 
   /// As good as the same parameters, towards the middle of their priors.
-  Eigen::VectorXd Repeat(const Eigen::VectorXd& parameters, int number) const {
+  Eigen::VectorXd Twin(const Eigen::VectorXd& parameters, int number) const {
     Eigen::VectorXd moved = parameters;
     for (Eigen::Index j = 0; number > 0 && j < moved.size(); ++j) {
       const inference::Prior& prior = definition_.priors[static_cast<std::size_t>(j)];
       const double standard = prior.ToStandard(moved(j));
-      moved(j) = prior.FromStandard(standard - std::copysign(kRepeatShift * number, standard));
+      moved(j) = prior.FromStandard(standard - std::copysign(kTwinShift * number, standard));
     }
     return moved;
   }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "calib/return_if_error.h"
+#include "server/campaign/model/replicates.h"
 #include "server/campaign/model/scatter_fit.h"
 #include "server/scheduler/history.h"
 
@@ -15,8 +16,6 @@ namespace {
 
 using campaign::Role;
 using Eigen::Index;
-
-constexpr std::size_t kMostReplicates = 16;
 
 // Replicates x readings of one role, NaN where a run did not come.
 absl::StatusOr<Eigen::MatrixXd> ReplicateRuns(const campaign::Campaign& campaign,
@@ -39,23 +38,6 @@ absl::StatusOr<Eigen::MatrixXd> ReplicateRuns(const campaign::Campaign& campaign
 }
 
 }  // namespace
-
-bool VariesPackings(const campaign::Campaign& campaign) {
-  return std::any_of(campaign.experiments.begin(), campaign.experiments.end(),
-                     [](const auto& experiment) { return experiment.specimens.size() > 1; });
-}
-
-int ReplicatesOf(const campaign::Campaign& campaign) {
-  if (campaign.precomputed || campaign.filter.noise == inference::NoiseMode::kEssTarget) {
-    return 0;
-  }
-  if (!VariesPackings(campaign)) return campaign.replicates.value_or(0);
-  std::size_t most = 0;
-  for (const campaign::Experiment& experiment : campaign.experiments) {
-    most = std::max(most, experiment.specimens.size());
-  }
-  return campaign.replicates.value_or(static_cast<int>(std::min(most, kMostReplicates)));
-}
 
 double LargestScatterShare(const campaign::Campaign& campaign) {
   double largest = 0;
@@ -94,18 +76,28 @@ absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std
       // Beyond its own packings an experiment's replicates are repetitions.
       const auto& specimens =
           definition.campaign.experiments[static_cast<std::size_t>(group.first.first)].specimens;
-      const bool varies = VariesPackings(definition.campaign);
+      const bool varies = campaign::VariesPackings(definition.campaign);
       const Index packings =
           varies ? std::min(runs.rows(), static_cast<Index>(specimens.size())) : runs.rows();
       Eigen::MatrixXd finished(packings, static_cast<Index>(group.second.size()));
+      Eigen::VectorXd number(packings);
       Index count = 0;
       for (Index r = 0; r < packings; ++r) {
         for (Index i = 0; i < finished.cols(); ++i) {
           finished(count, i) = runs(r, group.second[static_cast<std::size_t>(i)]);
         }
+        number[count] = static_cast<double>(r);
         count += finished.row(count).allFinite() ? 1 : 0;
       }
       if (count < 2) {
+        continue;
+      }
+      Eigen::VectorXd noise(finished.cols());
+      for (Index i = 0; i < noise.size(); ++i) {
+        const int reading = group.second[static_cast<std::size_t>(i)];
+        noise[i] = data.readings[static_cast<std::size_t>(reading)].sd;
+      }
+      if (!varies && !inference::HaveParted(finished.topRows(count), number.head(count), noise)) {
         continue;
       }
       result.observables.push_back({.group = campaign::FitGroupScatter(
@@ -148,6 +140,7 @@ Definition DefinitionWith(const Definition& definition, const MeasuredScatter& s
       definition.campaign.filter.noise != inference::NoiseMode::kGiven) {
     return with;
   }
+  const bool varies = campaign::VariesPackings(definition.campaign);
   std::vector<inference::GroupScatter> groups;
   std::vector<inference::GroupScatter> of_mean;
   int fewest = std::numeric_limits<int>::max();
@@ -158,18 +151,16 @@ Definition DefinitionWith(const Definition& definition, const MeasuredScatter& s
       groups.push_back(one.group);
       fewest = std::min(fewest, one.runs);
       // The mean over R packings is off by 1/R of the scatter, however many samples share them;
-      // every sample on the only packing is a repeat of its own.
+      // every sample on the only packing is a twin of its own.
       of_mean.push_back(one.group);
-      if (VariesPackings(definition.campaign)) of_mean.back().share += 1.0 / one.runs;
+      if (varies) of_mean.back().share += 1.0 / one.runs;
     }
   }
   if (!groups.empty()) {
     with.data = inference::WithScatter(definition.data, groups, 1);
-    if (VariesPackings(definition.campaign)) {
-      const Eigen::MatrixXd covariance = inference::ErrorCovariance(with.data);
-      with.of_packings = covariance - inference::ErrorCovariance(definition.data);
-      with.known = inference::WhatIsKnown(covariance, with.of_packings, fewest);
-    }
+    const Eigen::MatrixXd covariance = inference::ErrorCovariance(with.data);
+    with.of_scatter = covariance - inference::ErrorCovariance(definition.data);
+    with.known = inference::WhatIsKnown(covariance, with.of_scatter, fewest);
     with.mean_data = inference::WithScatter(definition.data, of_mean, 0);
     if (scatter.departures.rows() > 0) {
       with.replicates = {.departures = scatter.departures,

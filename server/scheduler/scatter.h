@@ -20,16 +20,9 @@ struct ObservableScatter {
   int runs = 0;                   ///< it was found from
 };
 
-/// Whether an experiment has two packings. Where none has, replicates are repeats on the one there
-/// is: every parameter is moved by some kRepeatShift, which rounding makes another run of within
-/// some percent of strain.
-bool VariesPackings(const campaign::Campaign& campaign);
-inline constexpr double kRepeatShift = 1e-6;  ///< in standardised coordinates, times the repeat
-
-/// How often the best estimate is to be run: as the campaign says, else once for each of the most
-/// realizations of an experiment, up to 16, and not at all where no experiment has two; 0 where
-/// runs are given and where errors are not (ess_target).
-int ReplicatesOf(const campaign::Campaign& campaign);
+/// By what twin k moves every parameter, times k, in standardised coordinates: rounding makes
+/// another run of it within some percent of strain (tests/verification/dem/twins_test.cc).
+inline constexpr double kTwinShift = 1e-6;
 
 /// campaign::ScatterShare, the largest of the calibrated experiments.
 double LargestScatterShare(const campaign::Campaign& campaign);
@@ -43,8 +36,8 @@ struct MeasuredScatter {
 };
 
 /// Scatter of every observable of every experiment (held-out ones too) that has two or more
-/// finished replicates on different packings, or where none are varied finished repeats. Errors:
-/// those of the store.
+/// finished replicates on different packings, or where none are varied finished twins that have
+/// parted (inference::HaveParted). Errors: those of the store.
 absl::StatusOr<MeasuredScatter> MeasureScatter(const Definition& definition, std::int64_t campaign,
                                                store::Reader& reader);
 

@@ -19,11 +19,11 @@ Stage MakeStage(const Definition& definition, std::pair<int, int> group,
   Stage stage{.experiment = group.first, .observable = group.second};
   stage.first = definition.data.readings[static_cast<std::size_t>(readings.front())].load_step;
   stage.last = definition.data.readings[static_cast<std::size_t>(readings.back())].load_step;
-  if (definition.of_packings.size() > 0) {
+  if (definition.of_scatter.size() > 0) {
     const std::vector<Index> at(readings.begin(), readings.end());
     const Eigen::MatrixXd covariance =
         inference::ErrorCovariance(inference::Restricted(definition.data, readings));
-    stage.judged.known = inference::WhatIsKnown(covariance, definition.of_packings(at, at),
+    stage.judged.known = inference::WhatIsKnown(covariance, definition.of_scatter(at, at),
                                                 definition.known.packings);
   }
   stage.judged.readings = std::move(readings);

@@ -40,36 +40,37 @@ TEST(Campaign, RunsToAPosteriorWithHeldOutExperiment) {
   const auto posterior = client.Posterior("c1");
   ASSERT_TRUE(posterior.ok()) << posterior.status();
   EXPECT_EQ(posterior->iterations(), 2);
-  EXPECT_EQ(posterior->model_evaluations(), 24);
+  EXPECT_EQ(posterior->model_evaluations(), 16 + 2 * 8 + 8);  // eight twins in both tests
   ASSERT_EQ(posterior->parameters_size(), 2);
   EXPECT_EQ(posterior->parameters(0).name(), "young_modulus");
   EXPECT_GT(posterior->parameters(0).sd(), 0);
 
   const auto samples = client.Samples("c1");
   ASSERT_TRUE(samples.ok());
-  EXPECT_EQ(samples->size(), 24U);
+  EXPECT_EQ(samples->size(), 32U);
   double total = 0;
   for (const v1::Sample& sample : *samples) {
     EXPECT_EQ(sample.status(), "finished");
     EXPECT_EQ(sample.attempts() >= 1, true);
     EXPECT_EQ(std::isfinite(sample.log_likelihood()), sample.iteration() < 2);
-    if (sample.iteration() == 2) {
+    if (sample.iteration() >= 2) {
       EXPECT_EQ(sample.weight(), 0);
+      EXPECT_EQ(sample.purpose(), sample.iteration() == 2 ? "replicate" : "draw");
     }
     total += sample.weight();
   }
   EXPECT_NEAR(total, 1, 1e-12);
-  // Held out: run for draws from the posterior (16 samples have to be emulated), none of them
-  // counted in it.
+  // Held out: run for the twins and for draws from the posterior (16 samples have to be emulated),
+  // none of them counted in it.
   const auto states = client.States("c1");
   std::size_t held_out = 0;
   for (const v1::SampleStates& of_sample : *states) {
     EXPECT_EQ(of_sample.states_size(), 4);
     held_out += of_sample.experiment() == "tx2" ? 1 : 0;
   }
-  EXPECT_EQ(held_out, 8U);
-  EXPECT_EQ(states->size(), 16 + held_out);
-  EXPECT_EQ(status->model_evaluations(), static_cast<std::int64_t>(16 + held_out));
+  EXPECT_EQ(held_out, 8U + 8U);
+  EXPECT_EQ(states->size(), 16 + 8 + held_out);
+  EXPECT_EQ(status->model_evaluations(), static_cast<std::int64_t>(16 + 8 + held_out));
 }
 
 TEST(Campaign, SameBitsForAnyNumberOfWorkers) {

@@ -75,18 +75,24 @@ class HistoryToy {
     Eigen::MatrixXd result(points.rows(), kAll);
     for (Eigen::Index i = 0; i < points.rows(); ++i) {
       auto [place, fresh] = packings_.try_emplace(packing[static_cast<std::size_t>(i)]);
-      if (fresh) place->second = Departure(0.012);
-      result.row(i) = Mean(points, i) + place->second + Departure(0.012);
+      if (fresh) place->second = Departure(kScatter);
+      result.row(i) = Mean(points, i) + place->second + Departure(kScatter);
     }
     return result;
   }
   /// What a laboratory reads of a specimen of its own.
   Eigen::RowVectorXd Measure(const DesignPoints& point) {
-    Eigen::RowVectorXd result = Mean(point, 0) + Departure(0.012) + Departure(0.012);
+    Eigen::RowVectorXd result = Mean(point, 0) + Departure(kScatter) + Departure(kScatter);
     for (double& value : result) value += kNoise * normal_(random_);
     return result;
   }
-  static constexpr double kNoise = 0.008;
+  static constexpr double kNoise = 0.008, kScatter = 0.012;
+  /// Departures of n twins of such scatter from their mean.
+  Eigen::MatrixXd Twins(Eigen::Index n, double scatter) {
+    Eigen::MatrixXd result(n, kAll);
+    for (Eigen::Index i = 0; i < n; ++i) result.row(i) = Departure(scatter);
+    return result.rowwise() - result.colwise().mean();
+  }
 
   DesignPoints Points(Eigen::Index n, int on, double low = 0.4, double high = 5) {
     DesignPoints points{.base = Eigen::MatrixXd(n, 2),

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "dem/registry/catalog.h"
+#include "server/campaign/model/replicates.h"
 
 namespace calib::campaign {
 
@@ -38,9 +39,11 @@ std::string ScatterLeftOut(const Campaign& campaign) {
   const bool packings = std::any_of(
       campaign.experiments.begin(), campaign.experiments.end(),
       [](const Experiment& e) { return e.role == Role::kCalibrate && e.specimens.size() > 1; });
-  if (campaign.precomputed || (!packings && campaign.replicates.value_or(0) < 2)) return "";
+  if (campaign.precomputed ||
+      (!packings && (VariesPackings(campaign) || ReplicatesOf(campaign) < 2)))
+    return "";
   const std::string what =
-      packings ? "what runs on different packings differ by" : "what repeats of a run differ by";
+      packings ? "what runs on different packings differ by" : "what twins of a run differ by";
   switch (campaign.method) {
     case Method::kTmcmc:
       return absl::StrCat("tmcmc compares runs by the stated errors alone: ", what,
@@ -70,8 +73,8 @@ std::vector<std::string> SpecimenNotes(const Campaign& campaign) {
     const std::string text = GeneratedFromFile(experiment);
     if (!text.empty()) notes.push_back(absl::StrCat(experiment.name, ": ", text, "."));
   }
-  if (std::string left_out = ScatterLeftOut(campaign); !left_out.empty()) {
-    notes.push_back(std::move(left_out));
+  for (std::string note : {TwinsInWords(campaign), ScatterLeftOut(campaign)}) {
+    if (!note.empty()) notes.push_back(std::move(note));
   }
   return notes;
 }

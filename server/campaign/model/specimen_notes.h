@@ -13,12 +13,13 @@ namespace calib::campaign {
 /// porosity of 0.405"; empty where each realization was given or has a recipe.
 std::string GeneratedFromFile(const Experiment& experiment);
 
-/// One sentence where calibrated runs are on several packings, or repeats of one are asked for, and
-/// what they differ by is in no error of the method; else empty. A posterior from the emulator
-/// contains it whatever the errors.
+/// One sentence where calibrated runs are on several packings, or twins on one are run, and what
+/// they differ by is in no error of the method; else empty. A posterior from the emulator contains
+/// it whatever the errors.
 std::string ScatterLeftOut(const Campaign& campaign);
 
-/// GeneratedFromFile() as a sentence for each experiment that has such, then ScatterLeftOut().
+/// GeneratedFromFile() as a sentence for each experiment that has such, then TwinsInWords(), then
+/// ScatterLeftOut().
 std::vector<std::string> SpecimenNotes(const Campaign& campaign);
 
 }  // namespace calib::campaign

@@ -138,7 +138,7 @@ inline constexpr std::array kPosteriorSourceWords = {
 };
 const char* ToString(PosteriorSource source);
 
-/// What the scatter between packings was found from: runs on several packings, repeats on the only
+/// What the scatter between packings was found from: runs on several packings, twins on the only
 /// one, or what the emulator does not explain of single runs.
 enum class ScatterSource { kRealizations, kRepeats, kEmulator };
 inline constexpr std::array kScatterSourceWords = {

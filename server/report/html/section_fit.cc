@@ -196,7 +196,7 @@ std::string ScatterOrigin(const v1::Posterior::Scatter& scatter) {
   if (source == campaign::ScatterSource::kRealizations) {
     return fmt::format("{} packings", scatter.runs());
   }
-  if (source == campaign::ScatterSource::kRepeats) return fmt::format("{} repeats", scatter.runs());
+  if (source == campaign::ScatterSource::kRepeats) return fmt::format("{} twins", scatter.runs());
   return fmt::format("emulator, {} runs", scatter.runs());
 }
 
@@ -205,8 +205,10 @@ std::string ObservableTable(const ReportData& data) {
   std::string html =
       "<h3>Misfit by observable</h3>\n<p class=\"sub\">Noise is the error stated for the "
       "measurement, scatter what runs of the model differ by among themselves, on other "
-      "packings, repeated on one or as an emulator of them leaves it: root mean squares of their "
-      "standard deviations. Both are part of sd in the error (root mean square of residual / sd) "
+      "packings, as twins on one or as an emulator of them leaves it: root mean squares of their "
+      "standard deviations. Twins are runs of the best estimate after the calibration whose "
+      "parameters differ by a millionth: what is left between them is chance of one specimen. "
+      "Both are part of sd in the error (root mean square of residual / sd) "
       "and in p, "
       "the scatter as far as the "
       "specimen has it too.</p>\n"

@@ -47,23 +47,26 @@ double EffectiveReadings(const Group& group, Eigen::Index first, Eigen::Index co
   return n * n / inverse.dot(covariance * inverse);
 }
 
-// Covariance of the residuals if the model is right, and the part of it that packings show.
+// Covariance of the residuals if the model is right, and the part of it that packings or twins
+// show.
 struct Expected {
   Eigen::MatrixXd covariance;
-  Eigen::MatrixXd scatter;  // zero where packings were not varied
+  Eigen::MatrixXd scatter;  // zero where neither were run
 };
 
-// A mean over R packings is off by 1/R of their scatter; of held-out data the prediction has it.
+// A mean over R packings is off by 1/R of their scatter, one over samples of which each is a twin
+// of its own by next to nothing; of held-out data the prediction has it.
 Expected ExpectedOf(const Group& group, const CampaignView& view, bool validation) {
   Expected expected{.covariance = group.covariance + group.of_prediction,
                     .scatter = Eigen::MatrixXd::Zero(group.residual.size(), group.residual.size())};
-  if (group.packings < 2) return expected;
+  if (group.scatter_runs < 2) return expected;
   const bool mean = messages::SourceOf(view.posterior) != campaign::PosteriorSource::kNone;
-  const double of_model = mean ? 1.0 / group.packings : 1;
+  const double of_mean = group.twins ? 0 : 1.0 / group.scatter_runs;
+  const double of_model = mean ? of_mean : 1;
   const double share = campaign::ScatterShare(*group.experiment);
   const bool predicted = mean && validation;
-  expected.scatter = (share + (predicted ? 0 : of_model)) * group.of_packings;
-  if (mean && !validation) expected.covariance += of_model * group.of_packings;
+  expected.scatter = (share + (predicted ? 0 : of_model)) * group.of_scatter;
+  if (mean && !validation) expected.covariance += of_model * group.of_scatter;
   return expected;
 }
 
@@ -116,11 +119,11 @@ void AddSegments(const CampaignView& view, const Group& group, const Expected& e
       const Eigen::MatrixXd scatter = expected.scatter.block(first, first, count, count);
       const auto n = static_cast<double>(count);
       misfit.z = inference::NormalDeviateOfMean(misfit.bias * n / std::sqrt(own.sum()),
-                                                scatter.sum() / own.sum(), group.packings);
+                                                scatter.sum() / own.sum(), group.scatter_runs);
       misfit.predictive_p = PredictiveP(view, group, first, count);
       misfit.p_value = misfit.predictive_p.value_or(
           inference::UpperTail(ChiSquared(expected.covariance, group.residual, first, count), n,
-                               inference::WhatIsKnown(own, scatter, group.packings)));
+                               inference::WhatIsKnown(own, scatter, group.scatter_runs)));
       // Divided by their sum in the end.
       misfit.chi2_share = ChiSquared(group.covariance, group.residual, first, count);
       misfit.pattern = PatternOf(CurveOf(group, first, count));
@@ -219,7 +222,7 @@ Comparison Compare(const CampaignView& view, const std::vector<ExperimentPredict
         const double chi2 =
             ChiSquared(expected.covariance, group.residual, 0, group.residual.size());
         const inference::KnownFrom known =
-            inference::WhatIsKnown(expected.covariance, expected.scatter, group.packings);
+            inference::WhatIsKnown(expected.covariance, expected.scatter, group.scatter_runs);
         misfit.pattern = PatternOf(CurveOf(group, 0, group.residual.size()));
         misfit.z = inference::NormalDeviate(chi2, n, known);
         misfit.predictive_p = PredictiveP(view, group, 0, group.residual.size());

@@ -21,13 +21,13 @@ struct ObservableMisfit {
   double rms_error = 0;        ///< rms of residual / sd of noise and packing scatter together
   double rms_residual = 0;     ///< rms of residual [SI]
   double scatter = 0;          ///< rms of the scatter's sd over that of the noise; 0: none is known
-  std::string scatter_from{};  ///< realizations | repeats | emulator; empty: none is known
+  std::string scatter_from{};  ///< realizations | repeats (twins) | emulator; empty: none is known
   std::optional<double>
       z;  ///< chi-squared of the group as a standard normal deviate (inference::NormalDeviate)
   /// Probability of a chi-squared at least as large if the model is right, scatter known from the
-  /// packings that were run (inference::UpperTail): predictive_p, else at the posterior mean. That
-  /// is too large by as many degrees of freedom as the parameters take of these readings. Of
-  /// held-out readings the errors of the prediction are among those of the residuals.
+  /// packings or twins that were run (inference::UpperTail): predictive_p, else at the posterior
+  /// mean. That is too large by as many degrees of freedom as the parameters take of these
+  /// readings. Of held-out readings the errors of the prediction are among those of the residuals.
   std::optional<double> p_value{};
   std::optional<double>
       predictive_p{};  ///< over draws of the posterior, fitted readings: the record's

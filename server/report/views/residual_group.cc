@@ -47,9 +47,11 @@ Eigen::MatrixXd AddScatter(const CampaignView& view, const std::vector<double>& 
   group.scatter = std::sqrt(ratio.mean());
   group.scatter_from = record->from();
   group.covariance += covariance;
-  if (messages::SourceOf(*record) == campaign::ScatterSource::kRealizations) {
-    group.of_packings = of_run;
-    group.packings = record->runs();
+  const auto source = messages::SourceOf(*record);
+  if (source != campaign::ScatterSource::kEmulator) {
+    group.of_scatter = of_run;
+    group.scatter_runs = record->runs();
+    group.twins = source == campaign::ScatterSource::kRepeats;
   }
   return of_run;
 }

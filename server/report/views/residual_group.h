@@ -22,10 +22,11 @@ struct ResidualGroup {
   /// Covariance of the mean of the model's runs, for data that were not fitted: how far its
   /// parameters may be off, and that the runs are finitely many. Zero where it is not known.
   Eigen::MatrixXd of_prediction;
-  /// Covariance of a single run by packings, and how many it is known from; 0 x 0 and 0 where
-  /// packings were not varied.
-  Eigen::MatrixXd of_packings{};
-  int packings = 0;
+  /// Covariance of a single run by packings or twins, and how many it is known from; 0 x 0 and 0
+  /// where neither were run.
+  Eigen::MatrixXd of_scatter{};
+  int scatter_runs = 0;
+  bool twins = false;  ///< these runs: each sample then has a scatter of its own
   Eigen::VectorXd model;
 };
 

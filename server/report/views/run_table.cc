@@ -66,29 +66,50 @@ int StreamOf(const CampaignView& view, const v1::Sample& sample) {
   return sample.has_stream() ? sample.stream() : campaign::StreamOf(view.campaign, sample.index());
 }
 
-// Of the first replicates, as many as every experiment has packings.
-void AddDepartures(const CampaignView& view, const inference::DataSet& data,
-                   ScatteredReadings& readings) {
+// Finished ones of the first `most` replicates, R x T, and the stream of each.
+struct FinishedReplicates {
+  Eigen::MatrixXd runs;
+  std::vector<int> streams;
+};
+
+FinishedReplicates ReplicatesOf(const CampaignView& view, const inference::DataSet& data,
+                                std::size_t most) {
   const Places places = PlacesOf(data);
-  const std::size_t packings = campaign::PackingsOfAll(view.campaign);
   std::size_t replicates = 0;
   std::vector<Eigen::RowVectorXd> rows;  // of those that came to their ends
-  std::vector<int> streams;
+  FinishedReplicates result;
   for (const v1::Sample& sample : view.samples) {
-    if (messages::PurposeOf(sample) != campaign::SamplePurpose::kReplicate ||
-        replicates == packings)
+    if (messages::PurposeOf(sample) != campaign::SamplePurpose::kReplicate || replicates == most)
       continue;
     ++replicates;
     Eigen::RowVectorXd row = HistoryOf(view, sample.index(), data, places);
     if (!row.allFinite()) continue;
     rows.push_back(std::move(row));
-    streams.push_back(StreamOf(view, sample));
+    result.streams.push_back(StreamOf(view, sample));
   }
-  Eigen::MatrixXd runs(static_cast<Index>(rows.size()), static_cast<Index>(data.readings.size()));
-  for (std::size_t r = 0; r < rows.size(); ++r) runs.row(static_cast<Index>(r)) = rows[r];
+  result.runs.resize(static_cast<Index>(rows.size()), static_cast<Index>(data.readings.size()));
+  for (std::size_t r = 0; r < rows.size(); ++r) result.runs.row(static_cast<Index>(r)) = rows[r];
+  return result;
+}
+
+// Of as many replicates as every experiment has packings.
+void AddDepartures(const CampaignView& view, const inference::DataSet& data,
+                   ScatteredReadings& readings) {
+  FinishedReplicates finished = ReplicatesOf(view, data, campaign::PackingsOfAll(view.campaign));
   readings.departures =
-      inference::ScaledDepartures(runs, campaign::ScatterShares(view.campaign, data));
-  if (readings.departures.rows() > 0) readings.departure_stream = std::move(streams);
+      inference::ScaledDepartures(finished.runs, campaign::ScatterShares(view.campaign, data));
+  if (readings.departures.rows() > 0) readings.departure_stream = std::move(finished.streams);
+}
+
+// parted: readings of the observables whose scatter twins have shown.
+void AddTwins(const CampaignView& view, const inference::DataSet& data,
+              const std::vector<int>& parted, ScatteredReadings& readings) {
+  const FinishedReplicates all = ReplicatesOf(view, data, view.samples.size());
+  if (all.runs.rows() < 2) return;
+  readings.twins = Eigen::MatrixXd::Zero(all.runs.rows(), all.runs.cols());
+  for (const int k : parted) {
+    readings.twins.col(k) = all.runs.col(k).array() - all.runs.col(k).mean();
+  }
 }
 
 }  // namespace
@@ -97,6 +118,7 @@ ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
   const inference::DataSet data = campaign::MakeDataSet(view.campaign);
   std::vector<inference::GroupScatter> of_mean;
   std::vector<inference::GroupScatter> of_run;
+  std::vector<int> parted;
   for (const auto& [key, readings] : inference::GroupsOf(data)) {
     const campaign::Experiment& experiment =
         view.campaign.experiments[static_cast<std::size_t>(key.first)];
@@ -116,13 +138,17 @@ ScatteredReadings ReadingsWithScatter(const CampaignView& view) {
     of_run.back().experiment = key.first;
     of_run.back().observable = key.second;
     of_mean.push_back(of_run.back());
-    if (messages::SourceOf(*record) == campaign::ScatterSource::kRealizations)
+    if (messages::SourceOf(*record) == campaign::ScatterSource::kRealizations) {
       of_mean.back().share += 1.0 / record->runs();
+    } else {
+      parted.insert(parted.end(), readings.begin(), readings.end());
+    }
   }
   ScatteredReadings readings{.of_mean = inference::WithScatter(data, of_mean, 0),
                              .of_run = inference::WithScatter(data, of_run, 1),
                              .measured = !of_run.empty()};
   AddDepartures(view, data, readings);
+  if (!parted.empty()) AddTwins(view, data, parted, readings);
   return readings;
 }
 

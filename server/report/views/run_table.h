@@ -25,18 +25,21 @@ RunTable RunsOf(const CampaignView& view);
 RunTable RunsOf(const CampaignView& view, const inference::DataSet& units);
 
 /// The readings of the calibrated experiments with the scatter in their errors that the campaign
-/// has measured on several packings, or on repeats.
+/// has measured on several packings, or by twins on one.
 struct ScatteredReadings {
   inference::DataSet of_mean;  ///< scatter of the measured specimen, and 1/R of it for the model's
-                               ///< mean history, which R packings know no better (repeats do)
+                               ///< mean history, which R packings know no better (twins do)
   inference::DataSet of_run;   ///< scatter of the specimen and of one run of the model
   /// Departures of the runs of the best estimate on every packing from their mean, for fits to some
   /// of the readings: R x T, see inference::Replicates; none where fewer than two runs came to
   /// their ends.
   Eigen::MatrixXd departures{};
   std::vector<int> departure_stream{};  ///< R, campaign::StreamOf of each
-  /// False where packings were not varied and no repeats made: both are MakeDataSet, and the
-  /// scatter of repeats is what an emulator of the runs says it is.
+  /// R x T, units of the readings: what twins on the only packing depart by from their mean, zero
+  /// of observables that they have not parted in; no rows where fewer than two came to their ends.
+  Eigen::MatrixXd twins{};
+  /// False where packings were not varied and no twins have parted: both are MakeDataSet, and the
+  /// scatter of single runs is what an emulator of them says it is.
   bool measured = false;
 };
 ScatteredReadings ReadingsWithScatter(const CampaignView& view);

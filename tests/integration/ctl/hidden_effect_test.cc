@@ -46,13 +46,14 @@ TEST_F(HiddenEffect, IsNamedAddedAndTheErrorFallsOnHeldOutData) {
   ASSERT_EQ(diagnosis.code, 0) << diagnosis.err;
   EXPECT_EQ(diagnosis.json()["verdict"], "missing_effect") << diagnosis.out;
   EXPECT_EQ(diagnosis.json()["effect"], "contact_plasticity");
-  // What it may cost: 4 runs for each effect, and as many samples for refits as the campaign had.
+  // What it may cost: 4 runs for each effect, and as many samples for refits as the campaign had,
+  // its eight twins among them.
   std::size_t tried = diagnosis.json()["candidates"].size();
   for (const Json& other : diagnosis.json()["not_excitable"]) {  // known only after its runs
     tried += other["reason"] == "it changes nothing in these tests" ? 1 : 0;
   }
   EXPECT_LE(diagnosis.json()["model_evaluations"].get<std::size_t>(), 4 * tried);
-  EXPECT_LE(diagnosis.json()["warm_fit_evaluations"], 2 * 90);
+  EXPECT_LE(diagnosis.json()["warm_fit_evaluations"], 2 * (90 + 8));
 
   // The next experiment goes into the campaign file as it is printed, once it has been measured.
   Write("pasted.yaml",

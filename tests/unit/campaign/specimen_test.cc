@@ -11,17 +11,20 @@
 
 #include "absl/strings/str_replace.h"
 #include "dem/particles/packing.h"
+#include "server/campaign/model/replicates.h"
 #include "server/campaign/model/specimen_notes.h"
 #include "tests/unit/campaign/good_campaign.h"
 
 namespace calib::campaign {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using testing::GoodFiles;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using testing::ProblemsOf;
 using testing::ReaderOf;
 using ::testing::SizeIs;
@@ -108,7 +111,7 @@ TEST(Realizations, BeyondSeveralFilesTakeThemInTurn) {
                           "and the other file in turn, generated at their porosities."));
   const Campaign fewer = Read(WithRealizations("files: [a.txt, b.txt]", 1), files).campaign;
   EXPECT_THAT(fewer.experiments[0].specimens, SizeIs(1));
-  EXPECT_THAT(SpecimenNotes(fewer), IsEmpty());
+  EXPECT_THAT(SpecimenNotes(fewer), Not(Contains(HasSubstr("realization"))));
 }
 
 // Where the method has no place for what packings differ by, a reader is told before a run is made.
@@ -125,11 +128,76 @@ TEST(Realizations, WhoLeavesTheirScatterOutSaysSo) {
                 HasSubstr(std::string(ToString(method)) + " compares runs by the stated errors"));
     EXPECT_THAT(SpecimenNotes(c), Contains(ScatterLeftOut(c)));
     Campaign one = c;
-    one.experiments[0].specimens.resize(1);
+    for (Experiment& e : one.experiments) e.specimens.resize(1);
+    EXPECT_THAT(ScatterLeftOut(one), HasSubstr("what twins of a run differ by"));
+    one.replicates = 0;
     EXPECT_EQ(ScatterLeftOut(one), "");
-    one.replicates = 4;
-    EXPECT_THAT(ScatterLeftOut(one), HasSubstr("what repeats of a run differ by"));
   }
+}
+
+Campaign OnOnePacking() {
+  Campaign c = Read(WithRealizations("file: packing.txt", 1), GoodFiles()).campaign;
+  for (Experiment& e : c.experiments) e.specimens.resize(1);
+  c.filter.noise = inference::NoiseMode::kGiven;
+  return c;
+}
+
+// Twins by default: on one packing of given grains, as far as samples and errors allow.
+TEST(Replicates, AreAsManyAsThereArePackingsOrEightTwinsOnOne) {
+  Campaign c = OnOnePacking();
+  ASSERT_EQ(c.samples, 20);
+  EXPECT_FALSE(VariesPackings(c));
+  EXPECT_EQ(ReplicatesOf(c), 8);
+  c.samples = 6;
+  EXPECT_EQ(ReplicatesOf(c), 6);
+  c.samples = 20;
+  for (const int said : {0, 2, 12}) {
+    c.replicates = said;
+    EXPECT_EQ(ReplicatesOf(c), said);
+  }
+  c.replicates.reset();
+  for (const Method method : {Method::kTmcmc, Method::kSurrogateMsrs, Method::kSqmc}) {
+    c.method = method;
+    EXPECT_EQ(ReplicatesOf(c), 8) << ToString(method);
+  }
+  for (const Method method : {Method::kTable, Method::kDesign}) {
+    c.method = method;
+    EXPECT_EQ(ReplicatesOf(c), 0) << ToString(method);
+  }
+  c.method = Method::kIterativeBayesianFilter;
+  c.filter.noise = inference::NoiseMode::kEssTarget;
+  EXPECT_EQ(ReplicatesOf(c), 0);
+  Campaign four = Read(WithRealizations("file: packing.txt", 4), GoodFiles()).campaign;
+  EXPECT_TRUE(VariesPackings(four));
+  EXPECT_EQ(ReplicatesOf(four), 4);
+  EXPECT_EQ(TwinsInWords(four), "");
+}
+
+TEST(Replicates, AreNotTwinsWhereNoPackingIsGiven) {
+  Campaign c = OnOnePacking();
+  Campaign collision = c;
+  for (Experiment& e : collision.experiments) e.specimens = {NoPacking{}};
+  EXPECT_EQ(ReplicatesOf(collision), 0);
+  Campaign poured = c;
+  for (Experiment& e : poured.experiments) e.test = "angle_of_repose";
+  EXPECT_EQ(ReplicatesOf(poured), 0);
+  EXPECT_EQ(TwinsInWords(poured), "");
+  Campaign precomputed = c;
+  precomputed.precomputed.emplace();
+  EXPECT_EQ(ReplicatesOf(precomputed), 0);
+  poured.experiments.push_back(c.experiments[0]);  // and a packing in a cell beside
+  EXPECT_EQ(ReplicatesOf(poured), 8);
+}
+
+TEST(Replicates, OfOnePackingSayWhatTheyCost) {
+  Campaign c = OnOnePacking();
+  const auto tests = std::to_string(8 * c.experiments.size());
+  EXPECT_THAT(TwinsInWords(c),
+              AllOf(HasSubstr("8 times with parameters that differ by a millionth"),
+                    HasSubstr(tests + " model evaluations"), HasSubstr("inference.replicates")));
+  EXPECT_THAT(SpecimenNotes(c), Contains(TwinsInWords(c)));
+  c.replicates = 0;
+  EXPECT_EQ(TwinsInWords(c), "");
 }
 
 TEST(Realizations, ACloudGivesOtherClouds) {

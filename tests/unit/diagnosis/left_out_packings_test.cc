@@ -90,6 +90,20 @@ TEST(ClosedFormsWithout, KnowNothingOfThePackingThatIsLeftOut) {
   }
 }
 
+TEST(ClosedFormsWithout, TakeTwinsOnOnePackingLikePackings) {
+  Scattered packings(4), twins(1);
+  twins.readings.twins = packings.readings.departures;
+  twins.readings.departures.resize(0, 6);
+  twins.readings.departure_stream.clear();
+  const auto expected = ClosedFormsWithout(packings.campaign, packings.readings);
+  const auto forms = ClosedFormsWithout(twins.campaign, twins.readings);
+  ASSERT_EQ(forms.size(), 4U);
+  for (std::size_t left_out = 0; left_out < 4; ++left_out) {
+    ASSERT_TRUE(forms[left_out].has_value());
+    EXPECT_EQ(*forms[left_out], *expected[left_out]);
+  }
+}
+
 TEST(ClosedFormsWithout, AreInTheErrorsOfTheReadings) {
   Scattered one(4);
   const auto forms = ClosedFormsWithout(one.campaign, one.readings);

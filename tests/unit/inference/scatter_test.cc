@@ -178,5 +178,25 @@ TEST(Scatter, WrongCovariancesAreRefusedWithASentence) {
   EXPECT_NE(singular.status().message().find("singular"), std::string_view::npos);
 }
 
+// A smooth model follows the small step of its parameters on a line; chance does not.
+TEST(HaveParted, WhatLiesOnALineHasNot) {
+  const Index n = 5;
+  const Eigen::VectorXd number = Eigen::VectorXd::LinSpaced(8, 0, 7);
+  const Eigen::VectorXd noise = Eigen::VectorXd::Constant(n, 0.1);
+  Eigen::MatrixXd runs(8, n);
+  for (Index r = 0; r < 8; ++r) {
+    for (Index i = 0; i < n; ++i) runs(r, i) = 3 + 1e-4 * number[r] * static_cast<double>(i + 1);
+  }
+  EXPECT_FALSE(HaveParted(runs, number, noise));
+  EXPECT_FALSE(HaveParted(runs({0, 2, 5}, Eigen::all), number({0, 2, 5}), noise)) << "some failed";
+  runs(3, 4) += 1e-8;
+  EXPECT_FALSE(HaveParted(runs, number, noise));
+  runs(3, 4) += 1e-6;
+  EXPECT_TRUE(HaveParted(runs, number, noise));
+  // Of two there is no line to tell: their difference decides.
+  EXPECT_TRUE(HaveParted(runs.topRows(2), number.head(2), noise));
+  EXPECT_FALSE(HaveParted(runs({0, 0}, Eigen::all), number.head(2), noise));
+}
+
 }  // namespace
 }  // namespace calib::inference

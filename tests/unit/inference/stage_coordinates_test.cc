@@ -1,4 +1,5 @@
-// Coordinates of histories: what they keep, how measurements scatter in them, what is left out.
+// Coordinates of histories: what they keep, how measurements scatter in them, by runs and by twins,
+// what is left out.
 #include "inference/diagnosis/stage_coordinates.h"
 
 #include <gmock/gmock.h>
@@ -8,8 +9,10 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <random>
 
 #include "inference/diagnosis/diagnosis_set.h"
+#include "inference/diagnosis/twin_scatter.h"
 #include "tests/support/history_toy.h"
 
 namespace calib::inference {
@@ -140,6 +143,130 @@ TEST_F(Coordinates, SayWhatDoesNotFit) {
   SetRuns broken = runs_;
   broken.curves.pop_back();
   EXPECT_THAT(StageCoordinates::Fit(broken).status().message(), HasSubstr("do not fit"));
+}
+
+constexpr Index kCoordinates = 20;
+constexpr double kResidualFreedom = 20;
+
+class Draws {
+ public:
+  explicit Draws(unsigned seed) : random_(seed) {}
+  // Departures of twins from their mean, of these variances.
+  Eigen::MatrixXd Twins(Index count, const Eigen::VectorXd& variance) {
+    Eigen::MatrixXd twins(count, variance.size());
+    for (double& z : twins.reshaped()) z = normal_(random_);
+    twins *= variance.cwiseSqrt().asDiagonal();
+    return twins.rowwise() - twins.colwise().mean();
+  }
+  // Estimates of variances one.
+  Eigen::VectorXd Residual() {
+    std::chi_squared_distribution<double> law(kResidualFreedom);
+    Eigen::VectorXd residual(kCoordinates);
+    for (double& s : residual) s = law(random_) / kResidualFreedom;
+    return residual;
+  }
+
+ private:
+  std::mt19937 random_;
+  std::normal_distribution<double> normal_;
+};
+
+// Mean over a thousand campaigns of the twins' scatter and of what is missed.
+struct MeanSplit {
+  double specimen = 0, missed = 0, freedom = 0, largest = 0;
+};
+MeanSplit Over(Index twins, double variance) {
+  constexpr int kCampaigns = 1000;
+  Draws draws(1);
+  MeanSplit mean;
+  for (int i = 0; i < kCampaigns; ++i) {
+    const TwinScatter split =
+        SplitByTwins(draws.Twins(twins, Eigen::VectorXd::Constant(kCoordinates, variance)),
+                     draws.Residual(), kResidualFreedom);
+    mean.specimen += split.specimen.mean() / kCampaigns;
+    mean.missed += split.missed.mean() / kCampaigns;
+    mean.freedom += split.freedom / kCampaigns;
+    mean.largest += split.specimen.maxCoeff() / kCampaigns;
+  }
+  return mean;
+}
+
+TEST(SplitByTwins, OfTheSameScatterLeavesTheResidualsWithNearlyTheirFreedom) {
+  const MeanSplit split = Over(8, 1);
+  EXPECT_NEAR(split.specimen, 1, 0.05);
+  EXPECT_LT(split.missed, 0.1);
+  EXPECT_GT(split.freedom, 12);
+  // Twenty variances of seven degrees of freedom reach 2.5 by chance, of twenty 1.7.
+  EXPECT_LT(split.largest, 1.9);
+}
+
+TEST(SplitByTwins, OfLessScatterPutsTheRestDownToTheEmulator) {
+  const MeanSplit split = Over(8, 0.3);
+  EXPECT_NEAR(split.specimen, 0.3, 0.03);
+  EXPECT_NEAR(split.specimen + split.missed, 1, 0.03);
+}
+
+TEST(SplitByTwins, OfMoreScatterAreBelieved) {
+  const MeanSplit split = Over(8, 4);
+  EXPECT_NEAR(split.specimen, 4, 0.3);
+  EXPECT_LT(split.missed, 0.01);
+}
+
+// What two twins say of one coordinate is next to nothing; of all together it is something.
+TEST(SplitByTwins, FewSayHowMuchAndNotWhere) {
+  const MeanSplit split = Over(2, 4);
+  EXPECT_NEAR(split.specimen, 4, 1.5);
+  EXPECT_LT(split.freedom, Over(8, 4).freedom);
+}
+
+// Where coordinates differ clearly each is known by its own twins, and no better.
+TEST(SplitByTwins, FreedomFollowsTheNumberOfTwinsWhereTheirShapeCounts) {
+  Eigen::VectorXd variance = Eigen::VectorXd::Constant(kCoordinates, 0.01);
+  variance.head(kCoordinates / 2).setConstant(20);
+  for (const Index twins : {4, 8, 16}) {
+    Draws draws(2);
+    const TwinScatter split =
+        SplitByTwins(draws.Twins(twins, variance), draws.Residual(), kResidualFreedom);
+    EXPECT_NEAR(split.freedom, static_cast<double>(twins) - 1, 0.35 * static_cast<double>(twins));
+    EXPECT_NEAR(std::log(split.specimen.head(kCoordinates / 2).mean() / 20), 0, 0.5);
+    EXPECT_NEAR(split.specimen.tail(kCoordinates / 2).mean(), 0.01, 0.015);
+  }
+}
+
+// A set on one packing: half of what runs depart by is put down to the emulator where twins scatter
+// by that much less, and a second specimen makes no less of it.
+TEST(TwinsOfASet, SplitTheErrorOfItsMeasurements) {
+  HistoryToy toy(3);
+  SetRuns runs = toy.Runs(90, 90, 1);
+  const auto without = DiagnosisSet::Fit(runs);
+  ASSERT_TRUE(without.ok()) << without.status();
+  EXPECT_EQ(without->errors().missed.size(), 0);
+  runs.twins = toy.Twins(8, HistoryToy::kScatter);
+  const auto alike = DiagnosisSet::Fit(runs);
+  runs.twins = toy.Twins(8, 0.5 * HistoryToy::kScatter);
+  const auto calm = DiagnosisSet::Fit(runs);
+  ASSERT_TRUE(alike.ok() && calm.ok()) << alike.status();
+  const Eigen::VectorXd before = without->errors().specimen;
+  const Eigen::VectorXd same = alike->errors().specimen.cwiseQuotient(before);
+  const Eigen::VectorXd less = calm->errors().specimen.cwiseQuotient(before);
+  std::cout << "scatter of twins alike " << same.mean() << ", half as large " << less.mean()
+            << " of the residuals' variance; freedom " << without->errors().freedom << " -> "
+            << alike->errors().freedom << ", " << calm->errors().freedom << "\n";
+  EXPECT_NEAR(same.mean(), 1, 0.25);
+  EXPECT_NEAR(less.mean(), 0.25, 0.1);
+  EXPECT_LE(alike->errors().freedom, without->errors().freedom);
+  EXPECT_LT((calm->errors().OfMeasurement() - without->errors().OfMeasurement()).norm(),
+            0.1 * before.norm());
+  const SpecimenErrors four = calm->ErrorsOfMean(4);
+  EXPECT_EQ(four.missed, calm->errors().missed);
+  EXPECT_EQ(four.specimen, Eigen::VectorXd(calm->errors().specimen / 4));
+}
+
+TEST(TwinsOfASet, AreTwoOrNone) {
+  HistoryToy toy(4);
+  SetRuns runs = toy.Runs(40, 40, 1);
+  runs.twins = Eigen::MatrixXd::Zero(1, HistoryToy::kAll);
+  EXPECT_THAT(DiagnosisSet::Fit(runs).status().message(), HasSubstr("twins"));
 }
 
 }  // namespace

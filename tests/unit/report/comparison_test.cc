@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "inference/scatter/chi_squared_law.h"
 #include "server/report/views/weighted_statistics.h"
 #include "tests/unit/report/example_view.h"
 
@@ -52,6 +53,42 @@ TEST(Comparison, IndependentErrors) {
   EXPECT_EQ(c.by_segment[0].segment, "initial_loading");
   EXPECT_NEAR(c.by_segment[0].bias, 0, 1e-12);
   EXPECT_FALSE(c.heldout_rms_error.has_value());
+}
+
+// As the noise in size; residuals of three sd of it.
+Comparison WithScatterFrom(const char* from, int runs) {
+  CampaignView view = FourReadings(0);
+  for (v1::State& state : view.states[{"a", 0}].states) {
+    const double measured = state.load_step() + 1;
+    state.set_values(0, measured + 3 * (state.values(0) - measured));
+  }
+  view.posterior.set_posterior_from("weights");
+  v1::Posterior::Scatter& scatter = *view.posterior.add_scatter();
+  scatter.set_experiment("a");
+  scatter.set_observable("q_over_p");
+  for (int i = 0; i < 4; ++i) {
+    scatter.add_load_step(i);
+    scatter.add_sd(0.5);
+  }
+  scatter.set_share(1);
+  scatter.set_from(from);
+  scatter.set_runs(runs);
+  return Compare(view, PredictReadings(view));
+}
+
+// Chi-squared is 18 by noise and scatter of the specimen alike; what is known of that sum makes it
+// more or less rare.
+TEST(Comparison, ScatterOfTwinsIsKnownFromAsManyAndTheirMeanIsNotOffByIt) {
+  const auto p = [](const char* from, int runs) {
+    return *WithScatterFrom(from, runs).by_observable[0].p_value;
+  };
+  EXPECT_NEAR(p("emulator", 100), inference::UpperTail(18, 4, {}), 1e-9);
+  const inference::KnownFrom four{.readings = 4, .scatter = 4 * 0.25, .packings = 4};
+  EXPECT_NEAR(p("repeats", 4), inference::UpperTail(18, 4, four), 1e-9);
+  EXPECT_GT(p("repeats", 4), 5 * p("emulator", 100));
+  EXPECT_NEAR(p("repeats", 4000) / p("emulator", 100), 1, 0.1);
+  EXPECT_GT(p("realizations", 4), p("repeats", 4)) << "a quarter of it in the mean";
+  EXPECT_EQ(WithScatterFrom("repeats", 4).rms_error, WithScatterFrom("emulator", 100).rms_error);
 }
 
 TEST(Comparison, WhatTheRecordSaysOfAStageOverDrawsGoesBeforeThePosteriorMean) {

@@ -65,8 +65,40 @@ TEST(RunTable, UnitsMayComeFromACampaignWithHeldOutExperiments) {
   EXPECT_EQ(runs.histories, RunsOf(view).histories);
 }
 
-TEST(RunTable, ScatterOfRepeatsIsLeftToTheEmulator) {
-  CampaignView view = testing::ExampleView("repeated");
+// Twins of the best estimate: every sample is one of its own, so that their mean is off by nothing.
+TEST(RunTable, TwinsDepartFromTheirMeanInWhatTheyHavePartedIn) {
+  CampaignView view = testing::ExampleView("twins");
+  const inference::DataSet plain = campaign::MakeDataSet(view.campaign);
+  AddScatter(view, "repeats");
+  constexpr int kFirst = 500, kTwins = 4, kStrength = 2;  // the value that AddScatter is about
+  for (int r = 0; r < kTwins; ++r) {
+    v1::Sample& sample = view.samples.emplace_back(view.samples.front());
+    sample.set_index(kFirst + r);
+    sample.set_purpose("replicate");
+    StateHistory history = view.states.at({"tx02", 7});
+    for (v1::State& state : history.states) {
+      for (int k = 0; k < state.values_size(); ++k) {
+        state.set_values(k, state.values(k) + (k == kStrength ? 0.01 : 1e-9) * r);
+      }
+    }
+    view.states[{"tx02", kFirst + r}] = history;
+  }
+  const ScatteredReadings readings = ReadingsWithScatter(view);
+  EXPECT_TRUE(readings.measured);
+  EXPECT_EQ(readings.departures.rows(), 0) << "no packing was varied";
+  ASSERT_EQ(readings.twins.rows(), kTwins);
+  for (std::size_t k = 0; k < plain.readings.size(); ++k) {
+    const bool parted = plain.readings[k].observable == 0;
+    const auto at = static_cast<Eigen::Index>(k);
+    EXPECT_NEAR(readings.twins(3, at), parted ? 0.015 : 0, 1e-12);
+    EXPECT_NEAR(readings.twins.col(at).sum(), 0, 1e-12);
+    EXPECT_NEAR(readings.of_mean.readings[k].sd,
+                std::hypot(plain.readings[k].sd, parted ? std::sqrt(0.5) * kScatter : 0), 1e-12);
+  }
+}
+
+TEST(RunTable, ScatterOfSingleRunsIsLeftToTheEmulator) {
+  CampaignView view = testing::ExampleView("single");
   AddScatter(view, "emulator");
   const ScatteredReadings readings = ReadingsWithScatter(view);
   EXPECT_FALSE(readings.measured);

@@ -292,7 +292,7 @@ TEST(EarlyStopping, DecidedAtOnceItStopsInTheFirstIterationWithinTheStatedLoss) 
          .failure_attempts = 100,
          .relative_noise = 0.02,
          .method = "sqmc",
-         .inference = "  ess_target: 0.1\n  decisions: " + decisions + "\n",
+         .inference = "  ess_target: 0.1\n  replicates: 0\n  decisions: " + decisions + "\n",
          .extra = "early_stopping: {discard_at_most: 1e-3, exponent: 1}\n"});
   };
   SimulatedService depth("at_once_not");
@@ -331,6 +331,7 @@ TEST(EarlyStopping, WhatWasStoppedTooSoonIsResumedUntilTheLossIsAllowed) {
                                        .load_steps = 12,
                                        .failure_attempts = 100,
                                        .relative_noise = 0.05,
+                                       .inference = "  replicates: 0\n",
                                        .extra = extra});
   };
   SimulatedService full("too_soon_full");
@@ -440,6 +441,7 @@ testing::SmallCampaign TwoExperiments(const std::string& extra) {
                                      .failure_attempts = 100,
                                      .relative_noise = 0.04,
                                      .with_second = true,
+                                     .inference = "  replicates: 0\n",
                                      .extra = extra});
 }
 constexpr const char* kOwnWeights = "early_stopping: {discard_at_most: 1e-3, exponent: 1}\n";

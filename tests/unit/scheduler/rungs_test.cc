@@ -21,7 +21,7 @@ testing::SmallCampaign Campaign(const std::string& stopping, const std::string& 
                                      .failure_attempts = 100,
                                      .relative_noise = noise,
                                      .method = method,
-                                     .inference = inference,
+                                     .inference = "  replicates: 0\n" + inference,
                                      .extra = "early_stopping: {" + stopping + "}\n"});
 }
 

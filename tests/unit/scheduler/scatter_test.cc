@@ -61,6 +61,35 @@ Ended RunCampaign(const std::string& name, const testing::SmallCampaign& campaig
   return run;
 }
 
+campaign::Campaign ReadCampaignOf(const testing::SmallCampaign& campaign) {
+  campaign::ReadOutcome read =
+      campaign::ReadCampaign(campaign.yaml, "c.yaml", [&campaign](const std::string& path) {
+        const auto file = campaign.files.find(path);
+        return file != campaign.files.end() ? absl::StatusOr<std::string>(file->second)
+                                            : absl::NotFoundError(path);
+      });
+  EXPECT_TRUE(read.problems.empty());
+  return std::move(read.campaign);
+}
+
+// A scatter of sd one of every observable.
+MeasuredScatter Measured(const Definition& definition, const char* from, int runs) {
+  MeasuredScatter measured;
+  for (const auto& [group, readings] : inference::GroupsOf(definition.data)) {
+    const auto n = static_cast<Eigen::Index>(readings.size());
+    measured.observables.push_back({.group = {.experiment = group.first,
+                                              .observable = group.second,
+                                              .sd = Eigen::VectorXd::Ones(n),
+                                              .clock = Eigen::VectorXd::LinSpaced(n, 0, 1),
+                                              .length = 1,
+                                              .share = 1},
+                                    .from = from,
+                                    .runs = runs});
+  }
+  EXPECT_FALSE(measured.observables.empty());
+  return measured;
+}
+
 TEST(Realizations, ReplicatesAreMadeAsOftenAsTheCampaignSays) {
   const auto replicates_of = [](int replicates) {
     const std::string number = std::to_string(replicates);
@@ -82,8 +111,10 @@ TEST(Realizations, ReplicatesAreMadeAsOftenAsTheCampaignSays) {
 TEST(Realizations, BestEstimateRunsOnEveryPacking) {
   const Ended one = RunCampaign("scatter_one", Campaign(1), 0.05);
   const Ended four = RunCampaign("scatter_four", Campaign(4), 0.05);
-  EXPECT_TRUE(std::none_of(one.iterations.begin(), one.iterations.end(),
-                           [](const auto& i) { return i.proposal == kReplicates; }));
+  // Twins of this smooth model have not parted: what single runs scatter by is the emulator's to
+  // say.
+  ASSERT_EQ(one.posterior.scatter_size(), 1);
+  EXPECT_EQ(one.posterior.scatter(0).from(), "emulator");
   const auto replicates = std::find_if(four.iterations.begin(), four.iterations.end(),
                                        [](const auto& i) { return i.proposal == kReplicates; });
   ASSERT_NE(replicates, four.iterations.end());
@@ -112,8 +143,8 @@ TEST(Realizations, BestEstimateRunsOnEveryPacking) {
 }
 
 // One packing, run again and again with parameters that differ by a millionth.
-TEST(Repeats, OfTheBestEstimateOnTheOnlyPackingAreMadeWhereAskedFor) {
-  SimulatedService service("repeats");
+TEST(Twins, OfTheBestEstimateOnTheOnlyPackingAreMadeAsOftenAsTheCampaignSays) {
+  SimulatedService service("twins_twelve");
   service.repeat_scatter = 0.05;
   service.Submit(Campaign(1, "", "  replicates: 12\n"));
   service.RunToEnd(1, true);
@@ -144,10 +175,96 @@ TEST(Repeats, OfTheBestEstimateOnTheOnlyPackingAreMadeWhereAskedFor) {
   }
 }
 
-TEST(Repeats, AreNotMadeUnasked) {
-  const Ended run = RunCampaign("no_repeats", Campaign(1), 0);
-  EXPECT_TRUE(std::none_of(run.iterations.begin(), run.iterations.end(),
-                           [](const auto& i) { return i.proposal == kReplicates; }));
+std::size_t TwinsOf(const Ended& run) {
+  for (const store::IterationRecord& iteration : run.iterations) {
+    if (iteration.proposal != kReplicates) continue;
+    return static_cast<std::size_t>(std::count_if(
+        run.samples.begin(), run.samples.end(),
+        [&iteration](const auto& sample) { return sample.iteration == iteration.number; }));
+  }
+  return 0;
+}
+
+bool LogHas(SimulatedService& service, const std::string& what) {
+  const auto log = Value(service.Read().Events(1));
+  return std::any_of(log.begin(), log.end(), [&what](const auto& event) {
+    return event.what.find(what) != std::string::npos;
+  });
+}
+
+TEST(Twins, OfTheBestEstimateAreEightWhereNothingIsSaid) {
+  SimulatedService service("twins");
+  service.repeat_scatter = 0.05;
+  service.Submit(Campaign(1));
+  service.RunToEnd(1, true);
+  const v1::Posterior posterior = LastPosterior(service);
+  ASSERT_EQ(posterior.scatter_size(), 2) << "the held-out test's among them";
+  for (const auto& scatter : posterior.scatter()) {
+    EXPECT_EQ(scatter.from(), "repeats");
+    EXPECT_EQ(scatter.runs(), 8);
+    EXPECT_GT(scatter.sd(11), 0.01);
+  }
+  EXPECT_TRUE(LogHas(service, "8 times with parameters that differ by a millionth, 16 model eval"));
+  EXPECT_FALSE(LogHas(service, "the twins show no scatter"));
+}
+
+TEST(Twins, AreNotMadeWhereTheUserSaysNoneAndNeverMoreThanSamples) {
+  EXPECT_EQ(TwinsOf(RunCampaign("no_twins", Campaign(1, "", "  replicates: 0\n"), 0)), 0U);
+  testing::SmallCampaign few = testing::MakeSmallCampaign({.samples = 5, .max_iterations = 1});
+  EXPECT_EQ(TwinsOf(RunCampaign("few_twins", few, 0)), 5U);
+}
+
+TEST(Twins, ThatHaveNotPartedCountAsNone) {
+  SimulatedService smooth("smooth_twins");
+  smooth.Submit(Campaign(1));
+  smooth.RunToEnd(1, true);
+  EXPECT_TRUE(LogHas(smooth, "the twins show no scatter"));
+  const Ended none = RunCampaign("without_twins", Campaign(1, "", "  replicates: 0\n"), 0);
+  // The same posterior, bit for bit.
+  const v1::Posterior with = LastPosterior(smooth);
+  ASSERT_EQ(with.parameters_size(), none.posterior.parameters_size());
+  for (int j = 0; j < with.parameters_size(); ++j) {
+    EXPECT_EQ(with.parameters(j).mean(), none.posterior.parameters(j).mean());
+    EXPECT_EQ(with.parameters(j).sd(), none.posterior.parameters(j).sd());
+  }
+  EXPECT_EQ(with.log_evidence(), none.posterior.log_evidence());
+}
+
+TEST(Twins, BudgetAllows) {
+  SimulatedService service("twins_budget");
+  service.repeat_scatter = 0.05;
+  service.Submit(Campaign(1, "budget: {model_evaluations: 125}\n"));
+  service.RunToEnd(1, true);
+  EXPECT_TRUE(LogHas(service, "scatter is not measured: it would exceed the budget"));
+  const v1::Posterior posterior = LastPosterior(service);
+  for (const auto& scatter : posterior.scatter()) {
+    EXPECT_EQ(scatter.from(), "emulator");
+  }
+}
+
+TEST(Twins, TroubleChangesNoBit) {
+  SimulatedService calm("twins_calm");
+  calm.repeat_scatter = 0.05;
+  calm.Submit(Campaign(1));
+  calm.RunToEnd(1, true);
+  SimulatedService storm("twins_storm");
+  storm.repeat_scatter = 0.05;
+  storm.Submit(Campaign(1));
+  storm.RunToEnd(5, false);
+  EXPECT_TRUE(storm.Fingerprint() == calm.Fingerprint());
+}
+
+// The scatter joins the errors once, its size known from the twins.
+TEST(Twins, ErrorsAreKnownFromAsManyAsThereAreAndTheMeanIsNotOffByThem) {
+  const Definition definition = *MakeDefinition(ReadCampaignOf(Campaign(1)));
+  const Definition with = DefinitionWith(definition, Measured(definition, "repeats", 8));
+  EXPECT_EQ(with.known.packings, 8);
+  EXPECT_GE(with.known.Freedom(), 7);
+  EXPECT_TRUE(std::isfinite(with.known.Freedom()));
+  EXPECT_FALSE(with.replicates.has_value());
+  const double noise = definition.data.readings[0].sd;
+  EXPECT_NEAR(with.mean_data->readings[0].sd, std::hypot(noise, 1), 1e-12);
+  EXPECT_NEAR(with.data.readings[0].sd, std::hypot(noise, std::sqrt(2.0)), 1e-12);
 }
 
 TEST(Realizations, ASpecimenOfManyGrainsSharesLittleOfTheScatterAndIsKnownBetter) {
@@ -173,30 +290,9 @@ TEST(Realizations, ASpecimenOfManyGrainsSharesLittleOfTheScatterAndIsKnownBetter
 
 // The p-value of the posterior asks how many packings the scatter is known from.
 TEST(Realizations, ErrorsAreKnownFromAsManyPackingsAsThereAre) {
-  const testing::SmallCampaign campaign = Campaign(4);
-  const campaign::ReadOutcome read =
-      campaign::ReadCampaign(campaign.yaml, "c.yaml", [&campaign](const std::string& path) {
-        const auto file = campaign.files.find(path);
-        return file != campaign.files.end() ? absl::StatusOr<std::string>(file->second)
-                                            : absl::NotFoundError(path);
-      });
-  ASSERT_TRUE(read.problems.empty());
-  const auto definition = MakeDefinition(read.campaign);
-  EXPECT_EQ(definition->known.packings, 0);
-  MeasuredScatter measured;
-  for (const auto& [group, readings] : inference::GroupsOf(definition->data)) {
-    const auto n = static_cast<Eigen::Index>(readings.size());
-    measured.observables.push_back({.group = {.experiment = group.first,
-                                              .observable = group.second,
-                                              .sd = Eigen::VectorXd::Ones(n),
-                                              .clock = Eigen::VectorXd::LinSpaced(n, 0, 1),
-                                              .length = 1,
-                                              .share = 1},
-                                    .from = "realizations",
-                                    .runs = 3});
-  }
-  ASSERT_FALSE(measured.observables.empty());
-  const Definition with = DefinitionWith(*definition, measured);
+  const Definition definition = *MakeDefinition(ReadCampaignOf(Campaign(4)));
+  EXPECT_EQ(definition.known.packings, 0);
+  const Definition with = DefinitionWith(definition, Measured(definition, "realizations", 3));
   EXPECT_EQ(with.known.packings, 3);  // one of the four did not finish
   EXPECT_EQ(with.known.readings, static_cast<double>(with.data.readings.size()));
   // Two degrees of freedom where the scatter is all there is, more where noise stands beside it.
@@ -268,15 +364,33 @@ TEST(Budget, AnIterationThatWouldExceedTheCoreHoursIsNotBegun) {
   }
 }
 
+testing::SmallCampaign ChainsOn(int packings) {
+  return testing::MakeSmallCampaign({.samples = 20,
+                                     .max_iterations = 40,
+                                     .load_steps = 6,
+                                     .failure_attempts = 100,
+                                     .relative_noise = 0.1,
+                                     .packings = packings,
+                                     .method = "tmcmc",
+                                     .inference = "  steps: 2\n"});
+}
+
+TEST(Twins, OtherMethodsKeepTheirPosteriorAndStateTheScatter) {
+  SimulatedService service("twins_tmcmc");
+  service.repeat_scatter = 0.05;
+  service.Submit(ChainsOn(1));
+  service.RunToEnd(1, true);
+  const v1::Posterior posterior = LastPosterior(service);
+  ASSERT_EQ(posterior.scatter_size(), 1);
+  EXPECT_EQ(posterior.scatter(0).from(), "repeats");
+  EXPECT_EQ(posterior.scatter(0).runs(), 8);
+  const auto said = Contains(HasSubstr("what twins of a run differ by is not in them"));
+  EXPECT_THAT(posterior.warnings(), said);
+  EXPECT_THAT(RunCampaign("smooth_tmcmc", ChainsOn(1), 0).posterior.warnings(), Not(said));
+}
+
 TEST(Realizations, OtherMethodsKeepTheirPosteriorAndStateTheScatter) {
-  testing::SmallCampaign campaign = testing::MakeSmallCampaign({.samples = 20,
-                                                                .max_iterations = 40,
-                                                                .load_steps = 6,
-                                                                .failure_attempts = 100,
-                                                                .relative_noise = 0.1,
-                                                                .packings = 2,
-                                                                .method = "tmcmc",
-                                                                .inference = "  steps: 2\n"});
+  const testing::SmallCampaign campaign = ChainsOn(2);
   const Ended run = RunCampaign("scatter_tmcmc", campaign, 0.05);
   ASSERT_EQ(run.posterior.scatter_size(), 1);
   EXPECT_EQ(run.posterior.scatter(0).from(), "realizations");

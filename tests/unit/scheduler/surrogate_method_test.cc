@@ -19,6 +19,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
+// Without twins: what is counted here are its points.
 testing::SmallCampaign Campaign(int samples, int times, double noise, const std::string& extra = "",
                                 const std::string& inference = "") {
   return testing::MakeSmallCampaign({.samples = samples,
@@ -27,7 +28,7 @@ testing::SmallCampaign Campaign(int samples, int times, double noise, const std:
                                      .failure_attempts = 100,
                                      .relative_noise = noise,
                                      .method = "surrogate_msrs",
-                                     .inference = inference,
+                                     .inference = "  replicates: 0\n" + inference,
                                      .extra = extra});
 }
 

@@ -25,7 +25,8 @@ void RunIteration(SimulatedService& service, int survivors, const std::string& n
       testing::MakeSmallCampaign({.samples = kStarted,
                                   .max_iterations = method == "sqmc" ? 1 : 2,
                                   .load_steps = kLoadSteps,
-                                  .method = method});
+                                  .method = method,
+                                  .inference = "  replicates: 0\n"});
   const auto set = [&campaign](const std::string& from, const std::string& to) {
     campaign.yaml.replace(campaign.yaml.find(from), from.size(), to);
   };

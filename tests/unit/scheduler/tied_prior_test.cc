@@ -83,7 +83,8 @@ TEST(TiedPriors, NoRunOfAnyMethodViolatesAConstraint) {
 TEST(HeldParameters, AreTheSameInEveryLaterSampleAndReportedAsGiven) {
   SimulatedService service("held");
   service.Submit(Campaign("iterative_bayesian_filter",
-                          "  freeze: {1: [young_modulus]}\n  tolerance: 1e-9\n", ""));
+                          "  freeze: {1: [young_modulus]}\n  tolerance: 1e-9\n  replicates: 0\n",
+                          ""));
   service.RunToEnd(1, true);
   const v1::Posterior posterior = Last(service);
   ASSERT_EQ(posterior.parameters_size(), 2);

@@ -102,13 +102,20 @@ TEST_F(FinishedTmcmcCampaign, HasNotRunProposalsOutsideThePrior) {
     ++refused;
   }
   EXPECT_GT(refused, 0);
-  EXPECT_EQ(LastPosterior(*service_).model_evaluations(), runs);
+  EXPECT_EQ(LastPosterior(*service_).model_evaluations(), runs + 8)
+      << "and the twins' held-out test";
   EXPECT_EQ(LastPosterior(*service_).stopped_early(), 0);
 }
 
 TEST_F(FinishedTmcmcCampaign, HasRunHeldOutTestsOnSomeOfTheChains) {
   const auto samples = Value(service_->Read().Samples(1));
-  const auto held_out = EvaluationsOf(*service_, 1);
+  auto held_out = EvaluationsOf(*service_, 1);
+  const store::IterationRecord last = Value(service_->Read().Iterations(1)).back();
+  ASSERT_EQ(last.proposal, kReplicates);
+  const auto twins = std::erase_if(held_out, [&](const store::EvaluationRecord& evaluation) {
+    return samples[static_cast<std::size_t>(evaluation.key.sample)].iteration == last.number;
+  });
+  EXPECT_EQ(twins, 8U);
   for (const store::EvaluationRecord& evaluation : held_out) {
     EXPECT_GT(samples[static_cast<std::size_t>(evaluation.key.sample)].log_weight, -INFINITY);
   }
