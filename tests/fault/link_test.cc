@@ -20,8 +20,8 @@ class Link : public ::testing::Test {
   void SetUp() override {
     ASSERT_TRUE(deployment_.StartServer()) << deployment_.Logs();
     client_ = deployment_.client();
-    const SmallCampaign campaign =
-        MakeSmallCampaign({.samples = 8, .max_iterations = 1, .load_steps = 2});
+    const SmallCampaign campaign = MakeSmallCampaign(
+        {.samples = 8, .max_iterations = 1, .load_steps = 2, .inference = "  replicates: 0\n"});
     ASSERT_TRUE(client_.SubmitCampaign(campaign.yaml, campaign.files, "r").ok());
   }
 

@@ -66,8 +66,8 @@ inline void ExpectUndisturbed(const Deployment& deployment) {
     total += sample.weight();
   }
   EXPECT_NEAR(total, 1, 1e-12);
-  // Two iterations of 24, and 20 draws from the posterior for the held-out test.
-  EXPECT_EQ(indices.size(), 68U);
+  // Two iterations of 24, 8 twins, and 20 draws from the posterior for the held-out test.
+  EXPECT_EQ(indices.size(), 76U);
   const auto log = client.Log("c1");
   ASSERT_TRUE(log.ok()) << log.status();
   for (const v1::LogEntry& entry : *log) {
