@@ -12,7 +12,10 @@
 
 namespace calib::testing {
 
-inline constexpr std::chrono::seconds kLong{100};
+#ifndef CALIB_SLOWER  // a sanitizer's preset says how many times
+#define CALIB_SLOWER 1
+#endif
+inline constexpr std::chrono::seconds kLong{100 * CALIB_SLOWER};
 
 /// The campaign of the fault tests: enough evaluations to be hit at any stage of two iterations and
 /// the validation. Every lost attempt counts as a failure, so many are allowed.
