@@ -11,6 +11,7 @@
 #include "server/diagnosis/design_caps.h"
 #include "server/diagnosis/left_out_packings.h"
 #include "server/diagnosis/reading_effects.h"
+#include "server/messages/read_words.h"
 #include "server/report/views/run_table.h"
 
 namespace calib::diagnosis {
@@ -19,38 +20,7 @@ namespace {
 using Eigen::Index;
 using inference::DesignPoints;
 
-// A floor of the error below this part of its relative share leaves the logarithm's sd constant to
-// half a per cent.
-constexpr double kSmallFloor = 0.1;
-// Below this part of a reading the logarithm goes on as a straight line: a run there is wrong by
-// more than any error, and its logarithm has no bound.
-constexpr double kLineBelow = 0.05;
 constexpr double kEdgeOfBox = 1e-9;  // of rounding
-
-// Whether the error of a group of readings is relative: on their logarithm it is constant.
-bool IsRelative(const campaign::MeasuredObservable& observable, const inference::DataSet& data,
-                const std::vector<int>& readings) {
-  if (!observable.noise || observable.noise->absolute || !(observable.noise->relative > 0))
-    return false;
-  double least = 1e300;
-  for (const int k : readings)
-    least = std::min(least, data.readings[static_cast<std::size_t>(k)].value);
-  return least > 0 && observable.noise->floor <= kSmallFloor * observable.noise->relative * least;
-}
-
-inference::PathCurve CurveOf(const campaign::Experiment& experiment, const inference::DataSet& data,
-                             const std::vector<int>& readings) {
-  inference::PathCurve curve{.path = Eigen::VectorXd(static_cast<Index>(readings.size()))};
-  std::map<std::string, int> stages;
-  for (std::size_t i = 0; i < readings.size(); ++i) {
-    const inference::Reading& reading = data.readings[static_cast<std::size_t>(readings[i])];
-    const auto step = static_cast<std::size_t>(reading.load_step);
-    const std::string name = step < experiment.segment.size() ? experiment.segment[step] : "";
-    curve.stage.push_back(stages.emplace(name, static_cast<int>(stages.size())).first->second);
-    curve.path[static_cast<Index>(i)] = reading.control;
-  }
-  return curve;
-}
 
 // Complete runs of the batches whose numerics are unchanged.
 struct DesignRuns {
@@ -186,45 +156,6 @@ inference::CalculatedDifferences DifferencesOf(const BaseRuns& base, const Desig
 
 }  // namespace
 
-HistoryScale::HistoryScale(const campaign::Campaign& campaign, const inference::DataSet& data) {
-  const auto t = static_cast<Index>(data.readings.size());
-  value_.resize(t);
-  sd_.resize(t);
-  for (const auto& [group, readings] : inference::GroupsOf(data)) {
-    const campaign::Experiment& experiment =
-        campaign.experiments[static_cast<std::size_t>(group.first)];
-    const bool relative =
-        IsRelative(experiment.observables[static_cast<std::size_t>(group.second)], data, readings);
-    curves_.push_back(CurveOf(experiment, data, readings));
-    for (const int k : readings) {
-      const auto column = static_cast<Index>(order_.size());
-      const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
-      value_[column] = reading.value;
-      sd_[column] = reading.sd;
-      order_.push_back(k);
-      logarithmic_.push_back(relative);
-    }
-  }
-}
-
-Eigen::MatrixXd HistoryScale::Scaled(const Eigen::MatrixXd& of) const {
-  Eigen::MatrixXd result(of.rows(), of.cols());
-  for (Index c = 0; c < result.cols(); ++c) {
-    const auto y = of.col(order_[static_cast<std::size_t>(c)]);
-    if (!is_logarithmic(c)) {
-      result.col(c) = (y.array() - value_[c]) / sd_[c];
-      continue;
-    }
-    for (Index i = 0; i < result.rows(); ++i) {
-      const double ratio = y[i] / value_[c];
-      const double log =
-          ratio > kLineBelow ? std::log(ratio) : std::log(kLineBelow) + ratio / kLineBelow - 1;
-      result(i, c) = log * value_[c] / sd_[c];
-    }
-  }
-  return result;
-}
-
 absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
   const inference::DataSet data = campaign::MakeDataSet(view.campaign);
   if (const absl::Status status = inference::ValidateData(data, inference::NoiseMode::kGiven);
@@ -247,10 +178,14 @@ absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
   }
   base.histories = base.scale.Scaled(base.readings);
   int most = -1;
-  for (const v1::Sample& sample : view.samples) most = std::max(most, sample.index());
+  std::size_t calibrated = 0;  // draws are run on what was held out alone
+  for (const v1::Sample& sample : view.samples) {
+    most = std::max(most, sample.index());
+    calibrated += messages::PurposeOf(sample) != campaign::SamplePurpose::kDraw ? 1 : 0;
+  }
   for (const int stream : base.stream) most = std::max(most, stream);
   base.samples = most + 1;
-  base.unfinished = static_cast<int>(view.samples.size() - table.sample.size());
+  base.unfinished = static_cast<int>(calibrated - table.sample.size());
   const Eigen::MatrixXd covariance = inference::ErrorCovariance(data);
   const Eigen::MatrixXd correlation =
       sd.cwiseInverse().asDiagonal() * covariance * sd.cwiseInverse().asDiagonal();

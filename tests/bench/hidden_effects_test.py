@@ -303,6 +303,11 @@ class Judge(unittest.TestCase):
         self.assertEqual([judge.alone_right(r) for r in (right, wrong, half, also, group)], [True, False, False, False, False])
         self.assertEqual([judge.alone_wrong(r) for r in (right, wrong, control, half, also, group)], [False, True, True, False, True, False])
         self.assertTrue(judge.COUNTS['alone'].of(record(removed=True, verdict='missing_effect', named=['a'])))
+        # One of a pair is called so, and the answer names nothing.
+        of_pair = record()
+        of_pair['diagnose']['candidates'] = [{'effect': 'adhesion_dmt', 'probability': 0.97, 'alone': True}]
+        self.assertTrue(judge.alone_wrong(of_pair))
+        self.assertFalse(judge.alone_right(of_pair))
         grains = judge.COUNTS['alone_right_grains'].of
         self.assertIsNone(grains(record(effects=('load_cell_error',))))
         self.assertTrue(grains(right))

@@ -43,6 +43,11 @@ def named(answer):
     return sorted(answer.get('effects') or [answer['effect']])
 
 
+def alone(answer):
+    """Every effect that is called so, one of a model whose others are not among them."""
+    return set(named(answer)) | {c['effect'] for c in answer['candidates'] if c.get('alone')}
+
+
 def families(answer):
     """Sets of effects that are said at 0.95: families, and an effect of its own."""
     told = [set(f['effects']) for f in answer['families'] if f['probability'] >= 0.95]
@@ -81,7 +86,7 @@ def family_wrong(record):
 
 
 def alone_wrong(record):
-    return bool(set(named(record['diagnose'])) - set(record['truth']['effects']))
+    return bool(alone(record['diagnose']) - set(record['truth']['effects']))
 
 
 def alone_right(record):
@@ -106,7 +111,7 @@ COUNTS = {
     'alone_right_grains': Count(lambda r: None if set(r['truth']['effects']) & cases.MEASUREMENT_SIDE else alone_right(r), 'rate'),
     'alone_wrong': Count(alone_wrong, 'rate'),
     'alone_wrong_count': Count(alone_wrong, 'count'),
-    'alone': Count(lambda r: bool(named(r['diagnose'])), 'rate'),
+    'alone': Count(lambda r: bool(alone(r['diagnose'])), 'rate'),
     'family_right': Count(family_right, 'rate'),
     'family_wrong_count': Count(family_wrong, 'count'),
     'adequate': Count(lambda r: r['diagnose']['verdict'] == 'adequate', 'rate'),

@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "server/campaign/file/campaign_file.h"
 #include "server/campaign/model/race.h"
 #include "server/diagnosis/design_rows.h"
 #include "tests/support/race_toy.h"
+#include "tests/support/sixty_four_grains.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -104,6 +107,45 @@ TEST(RaceList, ADesignAdmitsEveryRowOfItsRace) {
   EXPECT_EQ(text.lineage.purpose, "design");
   EXPECT_EQ(text.parameters.size() + 2, design.parameters.size());
   EXPECT_THAT(*text.race, ElementsAre("e0", "e1", "e2", "e3"));
+}
+
+// What is submitted: the text, read as the server reads it.
+TEST(RaceList, TheTextOfADesignIsReadBackAsItsCampaign) {
+  const auto read = [](const std::string& text) {
+    return campaign::ReadCampaign(text, "c.yaml", [](const std::string&) {
+      return std::string(
+          "axial_strain,q_over_p,volumetric_strain\n0.002,0.5,0.0008\n0.005,0.8,0.0012\n"
+          "0.01,1.0,0.001\n");
+    });
+  };
+  const std::string base = calib::testing::SixtyFourGrains(
+      "{q_over_p: {noise: {absolute: 0.3}}, volumetric_strain: {noise: {absolute: 0.002}}}", 12, 2);
+  const campaign::ReadOutcome parent = read(base);
+  ASSERT_THAT(parent.problems, IsEmpty());
+  report::CampaignView view;
+  view.campaign = parent.campaign;
+  view.status.set_campaign("c1");
+  const Race race = RaceFor(view);
+  ASSERT_GT(race.effects.size(), 10U);
+  const auto text = campaign::Derive(base, DesignOf(view, race));
+  ASSERT_TRUE(text.ok()) << text.status();
+  const campaign::ReadOutcome outcome = read(*text);
+  std::string problems;
+  for (const campaign::Problem& problem : outcome.problems) problems += problem.message + "\n";
+  ASSERT_EQ(problems, "") << *text;
+  const campaign::Campaign expected = CampaignOfDesign(view.campaign, race);
+  const campaign::Campaign& design = outcome.campaign;
+  EXPECT_EQ(design.method, campaign::Method::kDesign);
+  EXPECT_EQ(design.race, expected.race);
+  ASSERT_EQ(design.parameters.size(), expected.parameters.size());
+  for (const campaign::CalibratedParameter& own : expected.parameters) {
+    const auto found = std::find_if(design.parameters.begin(), design.parameters.end(),
+                                    [&own](const auto& other) { return other.name == own.name; });
+    ASSERT_NE(found, design.parameters.end()) << own.name;
+    EXPECT_EQ(found->prior.kind, own.prior.kind) << own.name;
+    EXPECT_EQ(found->prior.min, own.prior.min) << own.name;
+    EXPECT_EQ(found->prior.max, own.prior.max) << own.name;
+  }
 }
 
 TEST(RaceList, NobodyLeftIsSaid) {

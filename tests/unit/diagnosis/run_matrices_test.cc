@@ -53,6 +53,17 @@ TEST_F(RunMatrices, HistoriesAreOnTheScaleOfTheirErrors) {
   EXPECT_LT((base_.noise - Eigen::MatrixXd::Identity(96, 96)).norm(), 1e-12);
 }
 
+TEST_F(RunMatrices, DrawsForWhatWasHeldOutAreNoUnfinishedRuns) {
+  v1::Sample draw = view_.samples.back();
+  draw.set_index(40);
+  draw.set_purpose("draw");
+  view_.samples.push_back(draw);
+  EXPECT_EQ(BaseRunsOf(view_)->unfinished, 0);
+  EXPECT_EQ(BaseRunsOf(view_)->samples, 41);
+  view_.samples.back().clear_purpose();
+  EXPECT_EQ(BaseRunsOf(view_)->unfinished, 1);
+}
+
 TEST_F(RunMatrices, PackingsGoByStreamAndStreamsGoOn) {
   EXPECT_EQ(base_.packings, RaceToy::kPackings);
   EXPECT_EQ(base_.samples, 30);

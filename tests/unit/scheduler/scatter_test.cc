@@ -72,6 +72,18 @@ campaign::Campaign ReadCampaignOf(const testing::SmallCampaign& campaign) {
   return std::move(read.campaign);
 }
 
+// On so many packings; scattered as their runs are, or as twins are.
+void ExpectTroubleChangesNoBit(int packings) {
+  const auto run = [packings](const char* name, unsigned seed, bool calm) {
+    SimulatedService service(name);
+    (packings > 1 ? service.packing_scatter : service.repeat_scatter) = 0.05;
+    service.Submit(Campaign(packings));
+    service.RunToEnd(seed, calm);
+    return service.Fingerprint();
+  };
+  EXPECT_TRUE(run("scatter_storm", 5, false) == run("scatter_calm", 1, true));
+}
+
 // A scatter of sd one of every observable.
 MeasuredScatter Measured(const Definition& definition, const char* from, int runs) {
   MeasuredScatter measured;
@@ -242,17 +254,7 @@ TEST(Twins, BudgetAllows) {
   }
 }
 
-TEST(Twins, TroubleChangesNoBit) {
-  SimulatedService calm("twins_calm");
-  calm.repeat_scatter = 0.05;
-  calm.Submit(Campaign(1));
-  calm.RunToEnd(1, true);
-  SimulatedService storm("twins_storm");
-  storm.repeat_scatter = 0.05;
-  storm.Submit(Campaign(1));
-  storm.RunToEnd(5, false);
-  EXPECT_TRUE(storm.Fingerprint() == calm.Fingerprint());
-}
+TEST(Twins, TroubleChangesNoBit) { ExpectTroubleChangesNoBit(1); }
 
 // The scatter joins the errors once, its size known from the twins.
 TEST(Twins, ErrorsAreKnownFromAsManyAsThereAreAndTheMeanIsNotOffByThem) {
@@ -322,17 +324,7 @@ TEST(Realizations, AFinishedPosteriorCountsItsHeldOutRuns) {
   EXPECT_EQ(Value(service::PosteriorOf(reader, 1, 0)).model_evaluations(), kSamples);
 }
 
-TEST(Realizations, TroubleChangesNoBit) {
-  SimulatedService calm("scatter_calm");
-  calm.packing_scatter = 0.05;
-  calm.Submit(Campaign(3));
-  calm.RunToEnd(1, true);
-  SimulatedService storm("scatter_storm");
-  storm.packing_scatter = 0.05;
-  storm.Submit(Campaign(3));
-  storm.RunToEnd(5, false);
-  EXPECT_TRUE(storm.Fingerprint() == calm.Fingerprint());
-}
+TEST(Realizations, TroubleChangesNoBit) { ExpectTroubleChangesNoBit(3); }
 
 TEST(Realizations, BudgetAllows) {
   const Ended run =

@@ -220,11 +220,12 @@ TEST(DiagnosisChain, SaysTheSameWhereverItWasInterrupted) {
 
 TEST(DiagnosisChain, NamesWhatIsHiddenAndNothingElse) { Cases("6 effects", 6, 3, 4, 1); }
 
-TEST(DiagnosisChainSlow, OfSixEffectsFirst) { Cases("6 effects", 6, 150, 150, 101); }
+// Cases of the seeds 1, 101 and 501 have served to mend the rules; these have not.
+TEST(DiagnosisChainSlow, OfSixEffectsFirst) { Cases("6 effects", 6, 150, 150, 1001); }
 
 TEST(DiagnosisChainSlow, OfSixEffectsSecond) { Cases("6 effects", 6, 150, 150, 301); }
 
-TEST(DiagnosisChainSlow, OfSeventeenEffects) { Cases("17 effects", 17, 10, 10, 501); }
+TEST(DiagnosisChainSlow, OfSeventeenEffects) { Cases("17 effects", 17, 10, 10, 1501); }
 
 }  // namespace
 }  // namespace calib::diagnosis
