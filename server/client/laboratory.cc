@@ -184,6 +184,16 @@ absl::Status Laboratory::GoOn(const v1::CampaignStatus& status) {
   return absl::OkStatus();
 }
 
+absl::StatusOr<report::CampaignView> Laboratory::Design(const report::CampaignView& parent,
+                                                        const std::string& yaml,
+                                                        const std::string& what) {
+  ASSIGN_OR_RETURN(const auto campaign, Submit(parent, yaml, what));
+  ASSIGN_OR_RETURN(const auto status, session_.client().Show(campaign));
+  // Without runs it is queued until the first are added.
+  if (messages::StateOf(status) != CampaignState::kQueued) RETURN_IF_ERROR(Wait(campaign, what));
+  return LoadView(session_.client(), campaign);
+}
+
 absl::StatusOr<report::CampaignView> Laboratory::Grow(const v1::AddRunsRequest& batch,
                                                       const std::string& what) {
   const auto status =

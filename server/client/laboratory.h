@@ -38,6 +38,11 @@ class Laboratory {
                                            const std::string& yaml, const std::string& what,
                                            const std::map<std::string, std::string>& further = {});
 
+  /// Submits the text of a design (`method: design`) with the parent's files; waits for the runs that
+  /// it has, which are none at first. Errors: as Run().
+  absl::StatusOr<report::CampaignView> Design(const report::CampaignView& parent,
+                                              const std::string& yaml, const std::string& what);
+
   /// Adds a batch of runs to a design and waits for their end, progress on standard error; a batch
   /// that is there already is waited for alone. Errors: those of the rpc AddRuns, and as Run().
   absl::StatusOr<report::CampaignView> Grow(const v1::AddRunsRequest& batch,
