@@ -122,8 +122,8 @@ struct CoefficientPosterior {
   Eigen::VectorXd used;        // q: degrees of freedom used
 };
 
-CoefficientPosterior Posterior(const EmulatorRows& rows, const Eigen::VectorXd& tau,
-                               const Eigen::VectorXd& run) {
+CoefficientPosterior PosteriorAt(const EmulatorRows& rows, const Eigen::VectorXd& tau,
+                                 const Eigen::VectorXd& run) {
   const Eigen::VectorXd root = tau.cwiseSqrt();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(root.asDiagonal() * rows.squares *
                                                              root.asDiagonal());
@@ -163,7 +163,7 @@ double ImproveVariances(const EffectFeatures& features, const EmulatorData& data
                         const EmulatorRows& rows, const EmulatorVariances& start,
                         EmulatorVariances& variances) {
   const CoefficientPosterior posterior =
-      Posterior(rows, VarianceOfEach(features, variances, rows.packings), variances.run);
+      PosteriorAt(rows, VarianceOfEach(features, variances, rows.packings), variances.run);
   const Index q = data.outputs.cols(), n = rows.x.rows();
   // Sum over coordinates of mean^2 + variance of each coefficient.
   const Eigen::VectorXd squares =
@@ -238,7 +238,7 @@ absl::StatusOr<FeatureEmulator> FeatureEmulator::Fit(const EffectFeatures& featu
   }
 
   const CoefficientPosterior posterior =
-      Posterior(rows, VarianceOfEach(features, variances, rows.packings), variances.run);
+      PosteriorAt(rows, VarianceOfEach(features, variances, rows.packings), variances.run);
   result.coefficients_ = posterior.mean.topRows(p);
   result.directions_ = posterior.directions.topRows(p);
   result.shrink_ = posterior.shrink;

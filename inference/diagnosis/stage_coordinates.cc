@@ -293,6 +293,14 @@ absl::StatusOr<StageCoordinates> StageCoordinates::Fit(const SetRuns& runs,
   return result;
 }
 
+Eigen::MatrixXd StageCoordinates::HistoriesAt(const DesignPoints& points) const {
+  const Eigen::MatrixXd functions = all_.Predict(points).mean;  // n x M
+  // The shortest change of a history that has these functions.
+  const Eigen::LLT<Eigen::MatrixXd> gram(whitener_ * whitener_.transpose());
+  const Eigen::MatrixXd change = whitener_.transpose() * gram.solve(functions.transpose());
+  return change.transpose().rowwise() + mean_;
+}
+
 LeftOutMisfit StageCoordinates::LeftOut(const Eigen::VectorXd& history,
                                         const DesignPoints& point) const {
   if (rest_.rows() == 0) return {};

@@ -78,6 +78,10 @@ class StageCoordinates {
   /// By how much farther runs on a packing lie from the mean, in squares, by the scatter of the
   /// other packings than by that of all; >= 1. Scatter of a new specimen is larger by as much.
   double optimism() const { return optimism_; }
+  /// Histories that the model is expected to show at points, n x T: mean of the runs without
+  /// effects and what the points change of the stage functions; what changes within a stage more
+  /// quickly than these is left at that mean.
+  Eigen::MatrixXd HistoriesAt(const DesignPoints& points) const;
   /// What a measured history (T) shows beside the coordinates at one point of the model.
   ///                                  [square of correlated normals: Box, Ann. Math. Stat. 25
   ///                                  (1954) 290]

@@ -34,8 +34,7 @@ constexpr const char* kErrorMeans =
     "expected.\n"
     "  fitted, held out   of the model at its posterior, by the role of the experiments\n"
     "  of the best fit    of the point of the parameter space that comes closest (diagnose)\n"
-    "  with an effect     of the best fit with it: by the screen, or refitted where a p says so\n"
-    "  left out           of data that the model was not fitted to, part after part";
+    "  with an effect     of the best fit with it alone";
 
 // What stands where the verb should, if it is none; the values of options before it are passed
 // over.

@@ -122,6 +122,8 @@ std::string InWords(const NamedModel& model) {
   return absl::StrJoin(model.effects, " with ");
 }
 
+constexpr double kWorthTelling = 0.05;  // of a second specimen: one chance in twenty
+
 constexpr const char* kNumberWords[] = {"none", "one", "two",   "three", "four",
                                         "five", "six", "seven", "eight", "nine"};
 
@@ -272,6 +274,8 @@ std::string VerdictInWords(const Answer& answer) {
                           Percent(answer.adequate), ").", beside);
     }
     case AnswerVerdict::kUnexplained:
+      if (answer.candidates.empty())
+        return "The model misses the readings by more than noise and scatter explain.";
       if (answer.none_of_these >= inference::AnswerLevels().unexplained)
         return absl::StrCat("None of these, ", Percent(answer.none_of_these),
                             ": what is missing is like no effect of this library.", beside);
@@ -290,7 +294,12 @@ std::string VerdictInWords(const Answer& answer) {
       words.pop_back();
       return absl::StrCat("One of these ", NumberInWords(words.size() + 1), ", ", Percent(sum),
                           ": ", absl::StrJoin(words, ", "), " or ", last,
-                          "; which of them, these tests cannot tell.", beside);
+                          "; which of them, these tests cannot tell",
+                          answer.repeat_names_alone >= kWorthTelling
+                              ? absl::StrCat("; on a second specimen they would, with probability ",
+                                             Percent(answer.repeat_names_alone))
+                              : "",
+                          ".", beside);
     }
   }
   return "";

@@ -12,6 +12,7 @@
 
 #include "absl/status/statusor.h"
 #include "inference/diagnosis/effect_probabilities.h"
+#include "server/campaign/model/campaign.h"
 #include "server/campaign/model/words.h"
 
 namespace calib::diagnosis {
@@ -30,6 +31,19 @@ struct NamedModel {
   std::vector<std::string> effects{};  ///< in the order of the race
   bool none_of_these = false;
   double probability = 0;
+  /// Points of its posterior, the one that the measurement is most probable at first: parameters of
+  /// the base and of the effects by dotted name, SI. Of models that are asked for alone.
+  std::vector<std::map<std::string, double>> points{};
+  /// Mean and sd of the same parameters.
+  std::map<std::string, campaign::FirstProposal::Place> posterior{};
+  double rms = 0;  ///< of what its best point misses, in sd of a measurement
+};
+
+/// What an effect would change of one measured curve: the model with it at its best less the model
+/// without at its own.
+struct ChangedCurve {
+  std::string experiment{}, observable{};
+  std::vector<double> change{};  ///< at each reading, SI
 };
 
 /// What is said of one effect of the race.
@@ -40,10 +54,18 @@ struct EffectAnswer {
   bool alone = false;
   /// Why it is not named though it is probable enough.
   std::optional<inference::NotNamed> not_named{};
-  /// Median over the posterior of the models that have it: dotted name -> SI.
-  std::map<std::string, double> amplitude{};
-  /// Smallest strengths that a measurement shows (lambda = 21): dotted name -> SI.
+  // Of the model with that effect alone, at its posterior:
+  std::map<std::string, double> amplitude{};  ///< medians: dotted name -> SI
+  /// Of the likelihood ratio against the model without, one-sided where the effect's sign is known;
+  /// not adjusted for the number of effects.     [Chernoff, Ann. Math. Stat. 25 (1954) 573]
+  double p_value = 1;
+  double explained = 0;                ///< share of the squared error beyond one sd, 0 to 1
+  double rms = 0;                      ///< of what it misses, in sd of a measurement
+  std::vector<ChangedCurve> curves{};  ///< where it is probable enough to be asked for
+  /// Smallest strengths that a measurement shows nine times in ten (lambda = 21), where there are
+  /// such: dotted name -> SI.
   std::map<std::string, double> visible{};
+  std::map<std::string, double> angles{};  ///< to the others, degrees
 };
 
 struct NamedFamily {
@@ -63,6 +85,14 @@ struct Answer {
   std::vector<NamedFamily> families{};     ///< at AnswerLevels::family
   std::vector<EffectAnswer> candidates{};  ///< those of the credible set first, then by probability
   double adequacy_p = 1;                   ///< chance of the base model's misfit
+  double square = 0, degrees = 0;          ///< of that misfit in the coordinates; its expectation
+  double p_square = 1;                     ///< chance of a square as large
+  double rms = 0;  ///< of what the base model misses, in sd of a measurement
+  /// The same by observable beyond the noise, in sd of that.
+  std::map<std::string, double> missed{};
+  double scatter = 0;  ///< of a single run, in sd of the noise of the coordinates
+  /// Chance that the same tests on a second specimen name an effect that acts.
+  double repeat_names_alone = 0;
   std::vector<std::pair<std::string, std::string>> not_excitable{};  ///< effect, why
   std::map<std::string, int> runs{};                                 ///< by stage
   std::vector<std::string> warnings{};

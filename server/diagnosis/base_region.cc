@@ -88,6 +88,14 @@ absl::StatusOr<BaseRegion> RegionOf(const BaseRuns& base, const inference::Joint
   for (const bool last : {false, true}) {
     ASSIGN_OR_RETURN(inference::DiagnosisSet set,
                      inference::DiagnosisSet::Fit(WithoutRace(base, region.axes)));
+    if (set.coordinates()->count() <= d)
+      return absl::FailedPreconditionError(absl::StrCat("the fitted curves have ",
+                                                        set.coordinates()->count(),
+                                                        " shapes that can be told apart, "
+                                                        "and ",
+                                                        d, d == 1 ? " parameter" : " parameters",
+                                                        " may take them all: give longer curves "
+                                                        "or more tests"));
     BaseFit fit{.set = std::move(set), .z = {}};
     fit.z = fit.set.coordinates()->Of(Eigen::MatrixXd::Zero(1, base.histories.cols())).row(0);
     const Eigen::MatrixXd scaled = region.axes.Scaled(base.values);

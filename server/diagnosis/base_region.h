@@ -23,7 +23,8 @@ struct BaseRegion {
 /// posterior ten times as wide (as extensions start), or less, until ten base runs count; the box
 /// holds four sd of that to both sides, within the range of the runs, and is the whole range where
 /// too few runs would be left in it. Deterministic. Errors: FAILED_PRECONDITION for fewer than
-/// FewestBaseRuns, naming both numbers; those of the emulator.
+/// FewestBaseRuns, naming both numbers, and for curves that have no more coordinates than there are
+/// parameters; those of the emulator.
 absl::StatusOr<BaseRegion> RegionOf(const BaseRuns& base, const inference::JointPrior& prior);
 
 /// ln of the base parameters' prior over scaled coordinates at n x d points, n entries, up to a

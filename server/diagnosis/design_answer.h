@@ -8,6 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "server/diagnosis/answer.h"
+#include "server/diagnosis/base_misfit.h"
 #include "server/diagnosis/knowledge.h"
 
 namespace calib::diagnosis {
@@ -16,9 +17,9 @@ namespace calib::diagnosis {
 using VerificationChances = std::optional<std::map<std::string, double>>;
 
 /// The answer but for Answer::runs. asked: with Effort::kToAnswer; level: of the adequacy test.
-/// Errors: those of AnswerFrom.
+/// Errors: those of AnswerFrom and DescribeEffects.
 absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge& known,
-                                      const Asked& asked, const VerificationChances& verification,
-                                      double level);
+                                      const Asked& asked, const BaseMisfit& misfit,
+                                      const VerificationChances& verification, double level);
 
 }  // namespace calib::diagnosis

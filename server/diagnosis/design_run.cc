@@ -1,23 +1,48 @@
 #include "server/diagnosis/design_run.h"
 
 #include <utility>
+#include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/campaign/file/derive.h"
 
 namespace calib::diagnosis {
+namespace {
+
+// Of a campaign whose runs were made elsewhere: no batch of its chain is asked for.
+class NoRuns : public RunMaker {
+ public:
+  absl::StatusOr<std::vector<EndedBatch>> Batches() override { return std::vector<EndedBatch>(); }
+  absl::StatusOr<EndedBatch> Make(const RunBatch& batch) override {
+    return absl::FailedPreconditionError(
+        absl::StrCat("runs of the stage ", campaign::ToString(batch.stage),
+                     " are asked for, and those of this campaign were made elsewhere"));
+  }
+};
+
+}  // namespace
 
 absl::StatusOr<DesignedAnswer> AnswerOnServer(client::Laboratory& laboratory,
                                               const report::CampaignView& base,
-                                              const DesignQuestion& question) {
+                                              const DesignQuestion& question,
+                                              std::optional<std::int64_t> most_runs) {
   ASSIGN_OR_RETURN(DesignChain chain, DesignChain::Create(base, question));
-  ASSIGN_OR_RETURN(const std::string text, campaign::Derive(base.source.campaign_file(),
-                                                            DesignOf(base, chain.race())));
+  if (base.campaign.precomputed) {
+    NoRuns none;
+    DesignedAnswer calculated;
+    ASSIGN_OR_RETURN(calculated.answer, AnswerBy(chain, none, most_runs));
+    return calculated;
+  }
+  const campaign::Derivation derivation = DesignOf(base, chain.race());
+  ASSIGN_OR_RETURN(const std::string text,
+                   campaign::Derive(base.source.campaign_file(), derivation));
   ASSIGN_OR_RETURN(report::CampaignView design,
                    laboratory.Design(base, text, "runs that tell effects apart"));
-  DesignedAnswer designed{.answer = {}, .campaign = design.status.campaign()};
+  DesignedAnswer designed{
+      .answer = {}, .campaign = design.status.campaign(), .parameters = derivation.parameters};
   ServerRunMaker maker(laboratory, std::move(design), chain.names());
-  ASSIGN_OR_RETURN(designed.answer, AnswerBy(chain, maker));
+  ASSIGN_OR_RETURN(designed.answer, AnswerBy(chain, maker, most_runs));
   return designed;
 }
 

@@ -50,7 +50,8 @@ absl::Status DesignChain::Add(EndedBatch batch) {
                      (batch.stage == SamplePurpose::kScout && batches_.size() == 1);
   const bool first = batches_.empty() && batch.stage == SamplePurpose::kScout;
   const auto stage = static_cast<int>(batch.stage);
-  if (!campaign::IsStageOfDesign(batch.stage) || batch.stage == SamplePurpose::kNumerics ||
+  if (before_.base.elsewhere || !campaign::IsStageOfDesign(batch.stage) ||
+      batch.stage == SamplePurpose::kNumerics ||
       (!first && !(stage > before && !batches_.empty()) && !(again && stage == before)) ||
       (stage > static_cast<int>(SamplePurpose::kMain) && BatchesOf(SamplePurpose::kMain) == 0))
     return absl::InvalidArgumentError(absl::StrCat("a batch of the stage ",
@@ -83,11 +84,16 @@ absl::StatusOr<const Knowledge*> DesignChain::KnownAfter(std::size_t n) {
   const std::vector<EndedBatch> batches(batches_.begin(),
                                         batches_.begin() + static_cast<std::ptrdiff_t>(n));
   const DesignRows* guess = &scout_rows_;
-  if (n > scouts) {
+  std::optional<Knowledge> calculated;  // as a scout, where there is none
+  if (before_.base.elsewhere) {
+    ASSIGN_OR_RETURN(calculated, Learn(before_, *guess, batches, false));
+    guess = &calculated->rows;
+  } else if (n > scouts) {
     ASSIGN_OR_RETURN(const Knowledge* scouted, KnownAfter(scouts));
     guess = &scouted->rows;
   }
-  ASSIGN_OR_RETURN(Knowledge known, Learn(before_, *guess, batches, n > scouts));
+  const bool with_flat = before_.base.elsewhere || n > scouts;
+  ASSIGN_OR_RETURN(Knowledge known, Learn(before_, *guess, batches, with_flat));
   return &known_.emplace(n, std::move(known)).first->second;
 }
 
@@ -187,13 +193,21 @@ absl::StatusOr<Answer> DesignChain::AnswerAfter(std::size_t n,
                                                 const VerificationChances& verification) {
   ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n));
   ASSIGN_OR_RETURN(const Asked* asked, AskedAfter(n, Effort::kToAnswer));
-  ASSIGN_OR_RETURN(Answer answer, AnswerOfDesign(before_, *known, *asked, verification, level_));
+  if (!misfit_) {
+    ASSIGN_OR_RETURN(misfit_, MisfitOfBase(before_, scout_rows_, batches_));
+  }
+  ASSIGN_OR_RETURN(Answer answer,
+                   AnswerOfDesign(before_, *known, *asked, *misfit_, verification, level_));
   for (std::size_t i = 0; i < n; ++i)
     answer.runs[campaign::ToString(batches_[i].stage)] += static_cast<int>(batches_[i].runs.size());
   return answer;
 }
 
 absl::StatusOr<NextStep> DesignChain::Next() {
+  if (before_.base.elsewhere) {
+    ASSIGN_OR_RETURN(Answer answer, AnswerAfter(0, std::nullopt));
+    return answer;
+  }
   if (batches_.empty()) return Scout();
   const SamplePurpose last = batches_.back().stage;
   if (last == SamplePurpose::kScout) {
@@ -220,15 +234,44 @@ absl::StatusOr<NextStep> DesignChain::Next() {
   return answer;
 }
 
-absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker) {
+absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker,
+                                std::optional<std::int64_t> most_runs) {
   ASSIGN_OR_RETURN(std::vector<EndedBatch> made, maker.Batches());
   for (EndedBatch& batch : made) RETURN_IF_ERROR(chain.Add(std::move(batch)));
   for (;;) {
-    ASSIGN_OR_RETURN(NextStep next, chain.Next());
-    if (auto* answer = std::get_if<Answer>(&next)) return std::move(*answer);
-    ASSIGN_OR_RETURN(EndedBatch ended, maker.Make(std::get<RunBatch>(next)));
+    absl::StatusOr<NextStep> next = chain.Next();
+    RETURN_IF_ERROR(next.status());
+    if (auto* answer = std::get_if<Answer>(&*next)) return std::move(*answer);
+    const RunBatch& batch = std::get<RunBatch>(*next);
+    std::int64_t runs = std::ssize(batch.rows);
+    for (const EndedBatch& before : chain.batches()) runs += std::ssize(before.runs);
+    if (most_runs && runs > *most_runs)
+      return absl::ResourceExhaustedError(
+          absl::StrCat("the runs that tell effects apart are ", runs, " with those of the stage ",
+                       campaign::ToString(batch.stage),
+                       ", each one parameter set through all fitted tests, and ", *most_runs,
+                       " are allowed (what an earlier diagnosis has run counts too)"));
+    ASSIGN_OR_RETURN(EndedBatch ended, maker.Make(batch));
     RETURN_IF_ERROR(chain.Add(std::move(ended)));
   }
+}
+
+absl::StatusOr<Answer> AdequacyOf(const report::CampaignView& base, double level) {
+  ASSIGN_OR_RETURN(BaseRuns runs, BaseRunsOf(base));
+  inference::JointPrior prior = campaign::Priors(base.campaign);
+  ASSIGN_OR_RETURN(BaseRegion region, RegionOf(runs, prior));
+  Race nobody;
+  for (const campaign::CalibratedParameter& parameter : base.campaign.parameters)
+    nobody.base.push_back(parameter.name);
+  const DesignRows rows(region.axes, std::move(nobody), Eigen::VectorXd(0));
+  const KnownBefore before{.base = std::move(runs),
+                           .region = std::move(region),
+                           .prior = std::move(prior),
+                           .seed = base.campaign.seed};
+  ASSIGN_OR_RETURN(const BaseMisfit misfit, MisfitOfBase(before, rows, {}));
+  ASSIGN_OR_RETURN(const Knowledge known, LearnBase(before, rows, {}));
+  ASSIGN_OR_RETURN(const Asked asked, Ask(before, known, Effort::kToAnswer));
+  return AnswerOfDesign(before, known, asked, misfit, std::nullopt, level);
 }
 
 }  // namespace calib::diagnosis

@@ -3,6 +3,7 @@
 // base campaign, the batches that are stored and the campaign's seed: interrupted after any batch,
 // made by any number of workers, it ends with the same bits.
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -28,8 +29,9 @@ struct DesignQuestion {
 /// The next batch, or the answer.
 using NextStep = std::variant<RunBatch, Answer>;
 
-/// The chain, from the batches that it is told of. What it has found is kept as long as it lives.
-/// Not thread-safe.
+/// The chain, from the batches that it is told of. Where the base's runs were made elsewhere it
+/// makes none and answers at once, from them and what is calculated on them. What it has found is
+/// kept as long as it lives. Not thread-safe.
 class DesignChain {
  public:
   /// Errors: those of RaceOf, BaseRunsOf and RegionOf: FAILED_PRECONDITION with a sentence.
@@ -41,8 +43,8 @@ class DesignChain {
   const std::vector<std::string>& names() const { return scout_rows_.names(); }
   const std::vector<EndedBatch>& batches() const { return batches_; }
 
-  /// The next batch that was made. Errors: INVALID_ARGUMENT for one of a stage that cannot follow,
-  /// or rows of another length.
+  /// The next batch that was made. Errors: INVALID_ARGUMENT for one of a stage that cannot follow
+  /// (none can where the base's runs were made elsewhere), or rows of another length.
   absl::Status Add(EndedBatch batch);
   /// What comes after the batches so far. Errors: those of Learn and Ask.
   absl::StatusOr<NextStep> Next();
@@ -76,11 +78,18 @@ class DesignChain {
   campaign::Campaign design_;
   double level_;
   std::vector<EndedBatch> batches_;
+  std::optional<BaseMisfit> misfit_;  ///< by the scout's numerics, which later batches leave alone
   std::map<std::size_t, Knowledge> known_;
   std::map<std::pair<std::size_t, Effort>, Asked> asked_;
 };
 
-/// Asks the chain and has its batches made until there is an answer. Errors: those of both.
-absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker);
+/// Asks the chain and has its batches made until there is an answer. Errors: those of both;
+/// RESOURCE_EXHAUSTED before a batch with which there would be more than most_runs.
+absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker,
+                                std::optional<std::int64_t> most_runs = std::nullopt);
+
+/// The adequacy of the base model alone, by the errors and the emulator of its own runs: verdict
+/// adequate or unexplained, nobody in the race. Errors: those of BaseRunsOf, RegionOf, Learn, Ask.
+absl::StatusOr<Answer> AdequacyOf(const report::CampaignView& base, double level);
 
 }  // namespace calib::diagnosis

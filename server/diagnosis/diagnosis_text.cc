@@ -4,10 +4,10 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
-#include "dem/registry/catalog.h"
+#include "server/diagnosis/design_caps.h"
 #include "server/diagnosis/diagnosis.h"
-#include "server/diagnosis/measurement_errors.h"
 #include "server/diagnosis/plan_words.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
@@ -19,26 +19,10 @@ namespace {
 using Json = nlohmann::json;
 using report::Number;
 
+constexpr double kListed = 1e-3;  // smallest probability of a model that is listed
+
 Json OrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
-
-bool ComesCloser(const CandidateEffect& c) { return c.refit_p_value >= 0 && c.over_base.nats > 0; }
-
-// Without the effect it is the base model: a refit that is further off has merely not been found.
-// One that is calculated has been looked for at every strength.
-bool NotFound(const CandidateEffect& c) {
-  return !c.campaign.empty() && c.refit_p_value >= 0 && !ComesCloser(c);
-}
-
-// Tenths are more than their errors allow to tell.
-std::string Nats(double value) { return fmt::format("{:.1f}", value); }
-
-Json EvidenceJson(const std::optional<ScaledEvidence>& evidence) {
-  if (!evidence) return nullptr;
-  return {{"strength_prior_scale", kStrengthScales},
-          {"log_bayes_factor", evidence->log_evidence},
-          {"standard_error", evidence->standard_error}};
-}
 
 Json ReasonsJson(const std::vector<std::pair<std::string, std::string>>& list) {
   Json json = Json::array();
@@ -48,26 +32,73 @@ Json ReasonsJson(const std::vector<std::pair<std::string, std::string>>& list) {
   return json;
 }
 
-Json CandidateJson(const CandidateEffect& c) {
-  Json json = {{"effect", c.effect},
-               {"p_value", c.p_value},
-               {"explained_fraction", c.explained_fraction},
-               {"amplitude", c.amplitude},
-               {"predicted_rms_error", c.predicted_rms_error},
-               {"predicted_by", c.predicted_by},
-               {"confusable_with", c.confusable_with},
-               {"angles", c.angles}};
-  if (!c.campaign.empty()) {
-    json["warm_fit"] = {{"campaign", c.campaign},
-                        {"p_value", c.refit_p_value < 0 ? Json(nullptr) : Json(c.refit_p_value)},
-                        {"chi2", c.refit_p_value < 0 ? Json(nullptr) : Json(c.refit_chi2)},
-                        {"left_out_error", OrNull(c.left_out_error)},
-                        {"advantage_nats", c.over_base.nats},
-                        {"advantage_sd", c.over_base.sd},
-                        {"gain_p_value", OrNull(c.gain_p_value)},
-                        {"evidence", EvidenceJson(c.over_base_evidence)}};
+// Models but for none of these, those that are not listed as one.
+Json ProbabilitiesJson(const Answer& answer) {
+  Json json = Json::array();
+  double other = 0;
+  for (const NamedModel& model : answer.probabilities) {
+    if (model.none_of_these) continue;
+    if (model.probability < kListed) {
+      other += model.probability;
+      continue;
+    }
+    json.push_back({{"effects", model.effects}, {"probability", model.probability}});
+  }
+  if (other > 0) json.push_back({{"effects", {"other"}}, {"probability", other}});
+  return json;
+}
+
+Json CredibleSetJson(const Answer& answer) {
+  Json json = Json::array();
+  for (const NamedModel& model : answer.credible_set) {
+    json.push_back(model.none_of_these ? Json({"none_of_these"}) : Json(model.effects));
   }
   return json;
+}
+
+Json FamiliesJson(const Answer& answer) {
+  Json json = Json::array();
+  for (const NamedFamily& family : answer.families) {
+    json.push_back({{"effects", family.effects}, {"probability", family.probability}});
+  }
+  return json;
+}
+
+// Of the credible set, but for this one, in the order of the candidates.
+std::vector<std::string> OthersOfSet(const Answer& answer, const std::string& effect) {
+  std::set<std::string> in_set;
+  for (const NamedModel& model : answer.credible_set)
+    in_set.insert(model.effects.begin(), model.effects.end());
+  std::vector<std::string> others;
+  for (const EffectAnswer& own : answer.candidates) {
+    if (own.effect != effect && in_set.count(own.effect) > 0) others.push_back(own.effect);
+  }
+  return in_set.count(effect) > 0 ? others : std::vector<std::string>();
+}
+
+Json CurvesJson(const EffectAnswer& own) {
+  Json json = Json::array();
+  for (const ChangedCurve& curve : own.curves) {
+    json.push_back({{"experiment", curve.experiment},
+                    {"observable", curve.observable},
+                    {"change", curve.change}});
+  }
+  return json;
+}
+
+Json CandidateJson(const Answer& answer, const EffectAnswer& own) {
+  const bool first = &own == &answer.candidates.front();
+  return {{"effect", own.effect},
+          {"probability", own.probability},
+          {"probability_sd", own.uncertain},
+          {"alone", own.alone},
+          {"p_value", own.p_value},
+          {"explained_fraction", own.explained},
+          {"amplitude", own.amplitude},
+          {"predicted_rms_error", own.rms},
+          {"confusable_with", first ? OthersOfSet(answer, own.effect) : std::vector<std::string>()},
+          {"angles", own.angles},
+          {"curves", CurvesJson(own)}};
 }
 
 Json PlannedJson(const PlannedExperiment& planned) {
@@ -96,7 +127,7 @@ Json NextJson(const std::optional<NextExperiment>& next) {
   json["in_words"] = InWords(next->best);
   json["separates"] = next->separates;
   json["snippet"] = next->snippet;
-  json["evaluations_for_planning"] = next->evaluations;
+  json["model_evaluations"] = next->evaluations;
   json["considered"] = Json::array();
   for (const PlannedExperiment& planned : next->considered) {
     json["considered"].push_back(PlannedJson(planned));
@@ -154,12 +185,6 @@ std::string NextText(const NextExperiment& next) {
   return text;
 }
 
-std::string Listed(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 // Effects that share a reason in one sentence.
 std::string ByReason(const std::string& begin,
                      const std::vector<std::pair<std::string, std::string>>& list) {
@@ -175,196 +200,161 @@ std::string ByReason(const std::string& begin,
   return text;
 }
 
-std::string VerdictInWords(const Diagnosis& d) {
-  if (d.verdict == "adequate" && d.packings > 1 && d.packings < kFewestPackings) {
-    return fmt::format(
-        "Adequate, as far as {} packings tell, which is next to nothing: what is left may be "
-        "scatter.",
-        d.packings);
-  }
-  if (d.verdict == "adequate") {
-    return "Adequate: noise, scatter and the emulator's error explain what is left.";
-  }
-  if (d.verdict == "missing_effect") {
-    return fmt::format("Missing: {}. With it the model fits, and no other effect does as well.",
-                       d.effect);
-  }
-  if (d.verdict == "ambiguous") {
-    const CandidateEffect& first = d.candidates.front();
-    std::string alike = first.effect;
-    std::string open;
-    for (const std::string& other : first.confusable_with) {
-      const bool unfinished =
-          std::find(d.unfinished.begin(), d.unfinished.end(), other) != d.unfinished.end();
-      std::string& names = unfinished ? open : alike;
-      names += (names.empty() ? "" : " or ") + other;
-    }
-    return fmt::format(
-        "Ambiguous: {}.{}{}", open.empty() ? alike : alike + " or " + open,
-        alike == first.effect ? "" : fmt::format(" These tests do not tell {} apart.", alike),
-        open.empty()
-            ? ""
-            : fmt::format(
-                  " Not excluded, since no refit has come to an end that shows what it can do: {}.",
-                  open));
-  }
-  return fmt::format(
-      "Unexplained: the model misses the data, and {}{}",
-      d.reason.empty() ? "no effect was tried" : d.reason,
-      d.best_partial.empty() ? "." : fmt::format("; {} helps most.", d.best_partial));
-}
-
 std::string Sentence(const Diagnosis& d) {
-  return VerdictInWords(d) +
+  return d.answer.sentence +
          (d.in_doubt ? " This is in doubt, for what the warnings say of the readings." : "");
 }
 
-// Of the effects that are named together, where the screen has measured both.
-std::string GroupAngles(const Diagnosis& d) {
-  const CandidateEffect& first = d.candidates.front();
-  std::vector<std::string> group = first.confusable_with;
-  group.insert(group.begin(), first.effect);
-  std::vector<std::string> pairs;
-  for (const CandidateEffect& c : d.candidates) {
-    const auto at = std::find(group.begin(), group.end(), c.effect);
-    if (at == group.end()) continue;
-    for (auto other = group.begin(); other != at; ++other) {
-      const auto angle = c.angles.find(*other);
-      if (angle == c.angles.end()) continue;
-      pairs.push_back(fmt::format("{} and {} {}°", *other, c.effect, Number(angle->second, 2)));
+std::string NameOf(const NamedModel& model) {
+  if (model.none_of_these) return "none of these";
+  return model.effects.empty() ? "the model as it is"
+                               : fmt::format("{}", fmt::join(model.effects, " + "));
+}
+
+std::string ModelsText(const Answer& answer) {
+  report::TextTable table({"<model", "probability"});
+  double other = 0;
+  for (const NamedModel& model : answer.probabilities) {
+    if (model.probability < kListed) {
+      other += model.probability;
+      continue;
+    }
+    table.AddRow({NameOf(model), report::Percent(model.probability, 3)});
+  }
+  if (other > 0) table.AddRow({"all others", report::Percent(other, 2)});
+  return "\n" + table.ToString();
+}
+
+std::string EffectsText(const Answer& answer) {
+  report::TextTable table({"<effect", "acts", "<named", "explains", "error", "p"});
+  for (const EffectAnswer& own : answer.candidates) {
+    table.AddRow({own.effect, report::Percent(own.probability, 3), own.alone ? "yes" : "",
+                  report::ShareExplained(own.explained), Number(own.rms, 3),
+                  Number(own.p_value, 2)});
+  }
+  return "\n" + table.ToString() +
+         report::Wrapped(
+             fmt::format("Acts: probability that it acts, alone or with another. Explains, error, "
+                         "p: of the model with it alone; share of the misfit beyond noise and "
+                         "scatter; rms in sd of a measurement, {} without it; likelihood ratio.",
+                         Number(answer.rms, 3)),
+             "", "");
+}
+
+std::string FamiliesText(const Answer& answer) {
+  std::string text;
+  for (const NamedFamily& family : answer.families) {
+    if (family.effects.size() < 2) continue;
+    text += report::Wrapped(
+        fmt::format("Hardly told apart by these tests: {}; one of them acts "
+                    "with probability {}.",
+                    fmt::join(family.effects, ", "), report::Percent(family.probability, 3)),
+        "", "  ");
+  }
+  return text;
+}
+
+std::string DetectableText(const Diagnosis& d) {
+  std::string text, never;
+  for (const EffectAnswer& own : d.answer.candidates) {
+    if (own.visible.empty()) {
+      never += (never.empty() ? "" : ", ") + own.effect;
+    } else {
+      text += fmt::format("  {}: {}\n", own.effect, report::StrengthInWords(own.visible, d.units));
     }
   }
-  if (pairs.empty()) return "";
-  return report::Wrapped(
-      fmt::format("Angle between what the tests see of them: {}.", fmt::join(pairs, ", ")), "",
-      "  ");
+  if (!text.empty()) text = "\nWould be found nine times in ten from:\n" + text;
+  if (!never.empty())
+    text += report::Wrapped("At no strength that it can have so often: " + never + ".", "", "  ");
+  return text;
+}
+
+std::string RunsText(const Diagnosis& d) {
+  if (d.design.empty()) return "";
+  std::string stages;
+  int runs = 0;
+  for (const auto& [stage, number] : d.answer.runs) {
+    stages += fmt::format("{}{} {}", stages.empty() ? "" : ", ", stage, number);
+    runs += number;
+  }
+  return fmt::format("{} runs ({}) in {}, {} model evaluations.\n", runs, stages, d.design,
+                     d.evaluations);
 }
 
 }  // namespace
 
 std::string DiagnosisJson(const Diagnosis& d) {
+  const Answer& answer = d.answer;
   Json candidates = Json::array();
-  for (const CandidateEffect& c : d.candidates) candidates.push_back(CandidateJson(c));
+  Json detectable = Json::object(), undetectable = Json::array();
+  for (const EffectAnswer& own : answer.candidates) {
+    candidates.push_back(CandidateJson(answer, own));
+    if (own.visible.empty()) {
+      undetectable.push_back({{"effect", own.effect},
+                              {"reason",
+                               "at no strength that it can have do these tests show it "
+                               "nine times in ten"}});
+    } else {
+      detectable[own.effect] = own.visible;
+    }
+  }
   Json json = {{"campaign", d.campaign},
-               {"verdict", d.verdict},
-               {"effect", OrNull(d.effect)},
+               {"verdict", ToString(answer.verdict)},
+               {"effect", answer.effects.empty() ? Json(nullptr) : Json(answer.effects.front())},
+               {"effects", answer.effects},
                {"candidates", candidates},
-               {"not_excitable", ReasonsJson(d.not_excitable)},
+               {"not_excitable", ReasonsJson(answer.not_excitable)},
                {"next_experiment", NextJson(d.next_experiment)},
-               {"model_evaluations", d.screen_evaluations},
-               {"warm_fit_evaluations", d.warm_evaluations},
+               {"model_evaluations", d.evaluations},
                {"adequacy",
-                {{"chi2", d.adequacy.chi2},
-                 {"degrees", d.adequacy.degrees},
-                 {"p_value", d.adequacy.p_value},
-                 {"p_chi2", d.adequacy.p_chi2},
-                 {"p_stages", OrNull(d.adequacy.p_shapes)},
-                 {"rms", d.rms},
-                 {"left_out_error", OrNull(d.left_out_error)},
-                 {"emulator_error", d.emulator_error},
-                 {"scatter", d.scatter},
+                {{"chi2", answer.square},
+                 {"degrees", answer.degrees},
+                 {"p_value", answer.adequacy_p},
+                 {"p_chi2", answer.p_square},
+                 {"rms", answer.rms},
+                 {"scatter", answer.scatter},
                  {"packings", d.packings}}}};
   json["only_adequacy"] = d.only_adequacy;
   json["units"] = d.units;
   json["sentence"] = Sentence(d);
   json["in_doubt"] = d.in_doubt;
   json["warnings"] = d.warnings;
-  if (d.verdict == "adequate") {
-    json["detectable"] = d.detectable;
-    json["undetectable"] = ReasonsJson(d.undetectable);
-  }
-  if (d.verdict == "ambiguous") json["unfinished"] = d.unfinished;
-  if (d.verdict == "unexplained") {
-    json["best_partial"] = OrNull(d.best_partial);
-    json["reason"] = OrNull(d.reason);
+  if (!d.only_adequacy) {
+    json["probabilities"] = ProbabilitiesJson(answer);
+    json["none_of_these"] = answer.none_of_these;
+    json["credible_set"] = CredibleSetJson(answer);
+    json["families"] = FamiliesJson(answer);
+    json["specimens"] = {{"repeat_names_alone", answer.repeat_names_alone}};
+    json["detectable"] = detectable;
+    json["undetectable"] = undetectable;
+    json["design"] = {{"campaign", OrNull(d.design)}, {"runs", answer.runs}};
   }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string DiagnosisText(const Diagnosis& d) {
+  const Answer& answer = d.answer;
   std::string text = report::Wrapped(Sentence(d), "", "");
   text += report::Wrapped(
-      fmt::format(
-          "Error of the best fit: {} sd; chi-squared {}, of a right model {} are expected "
-          "({}).",
-          Number(d.rms, 3), Number(d.adequacy.chi2, 4), Number(d.adequacy.degrees, 4),
-          report::PValuesInWords(d.adequacy.p_value, d.adequacy.p_chi2, d.adequacy.p_shapes)),
-      "", "  ");
+      fmt::format("Error of the best fit: {} sd; squared misfit {}, of a right model {} are "
+                  "expected (p = {}).",
+                  Number(answer.rms, 3), Number(answer.square, 4), Number(answer.degrees, 4),
+                  Number(answer.adequacy_p, 2)),
+      "", "");
   for (const std::string& warning : d.warnings) text += report::Wrapped(warning, "! ", "  ");
-  if (!d.candidates.empty()) {
-    report::TextTable table(
-        {"<effect", "p (screen)", "explains", "error with it", "refitted p", "left out"});
-    for (const CandidateEffect& c : d.candidates) {
-      table.AddRow({c.effect, Number(c.p_value, 2),
-                    NotFound(c) ? "not found" : report::ShareExplained(c.explained_fraction),
-                    Number(c.predicted_rms_error, 3),
-                    c.refit_p_value < 0 || NotFound(c) ? "–" : Number(c.refit_p_value, 2),
-                    c.left_out_error && !NotFound(c) ? Number(*c.left_out_error, 3) : "–"});
+  if (!d.only_adequacy) {
+    text += ModelsText(answer) + EffectsText(answer) + FamiliesText(answer);
+    for (const EffectAnswer& own : answer.candidates) {
+      if (own.probability < kDesignCaps.asked || own.amplitude.empty()) continue;
+      text += report::Wrapped(fmt::format("{} fits best at {}.", own.effect,
+                                          report::StrengthInWords(own.amplitude, d.units)),
+                              "", "  ");
     }
-    text += "\n" + table.ToString();
-    if (std::any_of(d.candidates.begin(), d.candidates.end(), &NotFound)) {
-      text += report::Wrapped(
-          "Not found: the refit came no closer than the model without the effect, which it "
-          "contains, before its runs were used up; more samples tell.",
-          "", "");
-    }
-    if (std::any_of(d.candidates.begin(), d.candidates.end(), [&d](const CandidateEffect& c) {
-          return !NotFound(c) && c.explained_fraction > 0 && c.predicted_rms_error > d.rms;
-        })) {
-      text += report::Wrapped(
-          fmt::format(
-              "Explains: share of the excess of chi-squared, which counts readings that err "
-              "together (neighbours on one curve, the scatter of a packing) once. The error "
-              "takes each reading alone: it may stay, or rise above the {} of the model "
-              "without an effect, while chi-squared falls.",
-              Number(d.rms, 3)),
-          "", "");
-    }
-    if (d.left_out_error) {
-      text += report::Wrapped(
-          fmt::format("Left out: error on data that a model was not fitted to, one "
-                      "experiment or stage after the other, in sd of a measurement; {} without any "
-                      "of these effects.",
-                      Number(*d.left_out_error, 3)),
-          "", "");
-    }
+    text += DetectableText(d);
   }
-  for (const CandidateEffect& c : d.candidates) {
-    if (!ComesCloser(c)) continue;
-    text += report::Wrapped(fmt::format("{} comes closest at {}.", c.effect,
-                                        report::StrengthInWords(c.amplitude, d.units)),
-                            "", "  ");
-  }
-  if (d.verdict == "ambiguous") text += GroupAngles(d);
-  for (const CandidateEffect& c : d.candidates) {
-    const bool named = d.verdict == "ambiguous" && &c == &d.candidates.front();
-    if (c.confusable_with.empty() || named) continue;
-    text += report::Wrapped(
-        fmt::format("To the screen {} is like {}.", c.effect, Listed(c.confusable_with)), "", "  ");
-  }
-  for (const CandidateEffect& c : d.candidates) {
-    if (!c.over_base_evidence) continue;
-    const auto& nats = c.over_base_evidence->log_evidence;
-    text += report::Wrapped(
-        fmt::format("Log Bayes factor of {} over the model without it: {}, {}, {} where the prior "
-                    "of its strength is a quarter, once and four times as wide.",
-                    c.effect, Nats(nats[0]), Nats(nats[1]), Nats(nats[2])),
-        "", "");
-  }
-  if (d.verdict == "adequate" && !d.detectable.empty()) {
-    text += "\nWould have been found with 90 % power from:\n";
-    for (const auto& [effect, strength] : d.detectable) {
-      text += fmt::format("  {}: {}\n", effect, report::StrengthInWords(strength, d.units));
-    }
-  }
-  if (d.verdict == "adequate") {
-    text += ByReason("Would not have been found at any strength, because", d.undetectable);
-  }
-  text += ByReason("Not tried, because", d.not_excitable);
+  text += ByReason("Not tried, because", answer.not_excitable);
   if (d.next_experiment) text += NextText(*d.next_experiment);
-  text += fmt::format("{} model evaluations for the screen, {} for warm fits.\n",
-                      d.screen_evaluations, d.warm_evaluations);
-  return text;
+  return text + RunsText(d);
 }
 
 }  // namespace calib::diagnosis

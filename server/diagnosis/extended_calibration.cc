@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "calib/return_if_error.h"
@@ -22,7 +21,7 @@ std::int64_t MostEvaluations(const campaign::Campaign& campaign, int times) {
 }
 
 // Whether more samples are not needed: the posterior is known, and as close as it should be.
-bool IsFound(const report::CampaignView& view, const ClosestRun& closest) {
+bool IsFound(const report::CampaignView& view, const NamedModel& model) {
   // Over a posterior, of noise sd: where the emulator knows less, the mean may lie anywhere
   // (inference/emulator/README.md).
   constexpr double kKnown = 0.3;
@@ -31,7 +30,7 @@ bool IsFound(const report::CampaignView& view, const ClosestRun& closest) {
   if (view.posterior.posterior_from() == "none") return false;
   const double unknown =
       view.posterior.posterior_from() == "emulator" ? view.posterior.emulator().unknown() : 0;
-  return unknown <= kKnown && ErrorOf(view) <= std::max(closest.rms, kRight);
+  return unknown <= kKnown && ErrorOf(view) <= std::max(model.rms, kRight);
 }
 
 bool IsCloser(const report::CampaignView& a, const report::CampaignView& b) {
@@ -42,35 +41,15 @@ bool IsCloser(const report::CampaignView& a, const report::CampaignView& b) {
 
 }  // namespace
 
-ClosestRun ClosestRunWith(const std::string& effect, const Diagnosis& diagnosis) {
-  for (const CandidateEffect& candidate : diagnosis.candidates) {
-    if (candidate.effect == effect && !candidate.closest.empty()) {
-      return {.values = candidate.closest, .rms = candidate.predicted_rms_error};
-    }
-  }
-  return {};
-}
-
-ClosestRun ClosestRunWithout(const std::string& effect, const report::CampaignView& view) {
-  ClosestRun run;
-  for (const auto& parameter : view.posterior.parameters()) {
-    if (!absl::StartsWith(parameter.name(), effect + ".")) {
-      run.values[parameter.name()] = parameter.mean();
-    }
-  }
-  return run;
-}
-
 double ErrorOf(const report::CampaignView& view) {
   return report::Compare(view, report::PredictReadings(view)).rms_error;
 }
 
-absl::StatusOr<report::CampaignView> ExtendedCalibration::Of(
-    const report::CampaignView& parent, const std::vector<std::string>& effects,
-    const ClosestRun& closest) {
-  absl::StatusOr<report::CampaignView> best = Once(parent, effects, closest, 1);
-  for (int times = 2; best.ok() && times <= times_ && !IsFound(*best, closest); ++times) {
-    auto again = Once(parent, effects, closest, times);
+absl::StatusOr<report::CampaignView> ExtendedCalibration::Of(const report::CampaignView& parent,
+                                                             const NamedModel& model) {
+  absl::StatusOr<report::CampaignView> best = Once(parent, model, 1);
+  for (int times = 2; best.ok() && times <= times_ && !IsFound(*best, model); ++times) {
+    auto again = Once(parent, model, times);
     if (absl::IsResourceExhausted(again.status())) break;
     if (!again.ok()) return again;
     if (IsCloser(*again, *best)) best = std::move(again);
@@ -78,9 +57,8 @@ absl::StatusOr<report::CampaignView> ExtendedCalibration::Of(
   return best;
 }
 
-absl::StatusOr<report::CampaignView> ExtendedCalibration::Once(
-    const report::CampaignView& parent, const std::vector<std::string>& effects,
-    const ClosestRun& closest, int times) {
+absl::StatusOr<report::CampaignView> ExtendedCalibration::Once(const report::CampaignView& parent,
+                                                               const NamedModel& model, int times) {
   const campaign::Campaign& campaign = parent.campaign;
   // One iteration, whatever is asked for: as much again is as many samples.
   const bool by_samples = campaign.method == campaign::Method::kSqmc;
@@ -101,9 +79,9 @@ absl::StatusOr<report::CampaignView> ExtendedCalibration::Once(
   } else if (budget && *budget >= MostEvaluations(campaign, times)) {
     budget.reset();
   }
-  ExtensionPlan plan{.effects = effects,
+  ExtensionPlan plan{.effects = model.effects,
                      .purpose = "extension",
-                     .near = closest.values,
+                     .near = model.posterior,
                      .samples = std::nullopt,
                      .iterations = std::nullopt,
                      .replicates = std::nullopt,
@@ -112,7 +90,7 @@ absl::StatusOr<report::CampaignView> ExtendedCalibration::Once(
   if (times > 1 && !by_samples) plan.iterations = times * campaign.max_iterations;
   ASSIGN_OR_RETURN(const auto text, ExtensionText(parent, plan));
   auto extended =
-      laboratory_.Run(parent, text, "calibration with " + absl::StrJoin(effects, " + "));
+      laboratory_.Run(parent, text, "calibration with " + absl::StrJoin(model.effects, " + "));
   if (extended.ok()) evaluations_ += extended->status.model_evaluations();
   return extended;
 }

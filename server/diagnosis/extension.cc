@@ -17,7 +17,8 @@ namespace {
 
 constexpr double kTempered = 10;  // times the parent's standard deviation
 constexpr double kPriorShare = 0.5;
-constexpr double kNear = 0.2;  // times a value that is known to be good
+constexpr double kWider = 2;        // times the sd of a posterior by an emulator
+constexpr double kDefensive = 0.1;  // share of the prior beside such a posterior
 
 double SettingOr(const campaign::Experiment& experiment, const std::string& name, double other) {
   const auto found = experiment.settings.find(name);
@@ -222,7 +223,9 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
       .held_out = plan.held_out,
       .samples = plan.samples,
       .max_iterations = plan.iterations,
-      .first_proposal = campaign::FirstProposal{.prior_share = kPriorShare, .places = {}},
+      .first_proposal =
+          campaign::FirstProposal{.prior_share = plan.near.empty() ? kPriorShare : kDefensive,
+                                  .places = {}},
       .replicates = plan.replicates,
       .model_evaluations = plan.model_evaluations,
       .rows = {}};
@@ -243,10 +246,9 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
     derivation.first_proposal->places[parameter.name()] = {.center = parameter.mean(),
                                                            .sd = kTempered * parameter.sd()};
   }
-  for (const auto& [name, value] : plan.near) {
-    if (value != 0) {
-      derivation.first_proposal->places[name] = {.center = value, .sd = kNear * std::abs(value)};
-    }
+  for (const auto& [name, place] : plan.near) {
+    if (place.sd > 0)
+      derivation.first_proposal->places[name] = {.center = place.center, .sd = kWider * place.sd};
   }
   return campaign::Derive(parent.source.campaign_file(), derivation);
 }

@@ -29,9 +29,10 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& ef
 struct ExtensionPlan {
   std::vector<std::string> effects{};
   std::string purpose{};  ///< extension | warm_fit
-  /// Parameters of a run that is known to come close, SI; takes the place of the parent's posterior
-  /// in the half of the first samples that is not from the prior.
-  std::map<std::string, double> near{};
+  /// What is known of the parameters with the effects, SI: the first samples, but for a tenth from
+  /// the prior, are drawn twice as wide about it. Empty: half of them from the prior, half about
+  /// the parent's posterior.
+  std::map<std::string, campaign::FirstProposal::Place> near{};
   bool held_out = true;                             ///< false: held-out experiments stay closed
   std::optional<int> samples{};                     ///< as the parent
   std::optional<int> iterations{};                  ///< as the parent
@@ -39,8 +40,8 @@ struct ExtensionPlan {
   std::optional<std::int64_t> model_evaluations{};  ///< budget; as the parent
 };
 
-/// Half of the first samples from the prior, half about the parent's posterior ten times as wide:
-/// parameters that were bent to hide an effect lie far from where they belong.
+/// Without `near`, the parent's posterior is taken ten times as wide: parameters that were bent to
+/// hide an effect lie far from where they belong.
 /// Errors: INVALID_ARGUMENT for effects that are unknown or cannot join; FAILED_PRECONDITION when
 /// no iteration of the parent is complete.
 absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,

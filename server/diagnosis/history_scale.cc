@@ -56,6 +56,8 @@ HistoryScale::HistoryScale(const campaign::Campaign& campaign, const inference::
     const bool relative =
         IsRelative(experiment.observables[static_cast<std::size_t>(group.second)], data, readings);
     curves_.push_back(CurveOf(experiment, data, readings));
+    names_.emplace_back(experiment.name,
+                        experiment.observables[static_cast<std::size_t>(group.second)].name);
     for (const int k : readings) {
       const auto column = static_cast<Index>(order_.size());
       const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
@@ -83,6 +85,27 @@ Eigen::MatrixXd HistoryScale::Scaled(const Eigen::MatrixXd& of) const {
     }
   }
   return result;
+}
+
+Eigen::MatrixXd HistoryScale::Readings(const Eigen::MatrixXd& scaled) const {
+  Eigen::MatrixXd result(scaled.rows(), scaled.cols());
+  const double least = std::log(kLineBelow);
+  for (Index c = 0; c < scaled.cols(); ++c) {
+    auto y = result.col(order_[static_cast<std::size_t>(c)]);
+    if (!is_logarithmic(c)) {
+      y = scaled.col(c).array() * sd_[c] + value_[c];
+      continue;
+    }
+    for (Index i = 0; i < scaled.rows(); ++i) {
+      const double log = scaled(i, c) * sd_[c] / value_[c];
+      y[i] = value_[c] * (log > least ? std::exp(log) : kLineBelow * (log - least + 1));
+    }
+  }
+  return result;
+}
+
+Eigen::MatrixXd HistoryScale::Departures(const Eigen::MatrixXd& of) const {
+  return of(Eigen::all, order_) * sd_.cwiseInverse().asDiagonal();
 }
 
 }  // namespace calib::diagnosis

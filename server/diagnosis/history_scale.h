@@ -2,6 +2,8 @@
 // The scale on which the diagnosis sees readings: errors are constant along a curve there and add.
 
 #include <Eigen/Core>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "inference/data/data_set.h"
@@ -20,8 +22,16 @@ class HistoryScale {
   /// n x T of n x T readings in SI; columns of `of` stand in the order of the data, those of the
   /// result one curve after the other.
   Eigen::MatrixXd Scaled(const Eigen::MatrixXd& of) const;
+  /// n x T of n x T scaled ones: readings in SI, in the order of the data.
+  Eigen::MatrixXd Readings(const Eigen::MatrixXd& scaled) const;
+  /// What small departures from the measured history (R x T, SI, in the order of the data) are on
+  /// this scale, R x T in the order of the result: to first order, which is one over the sd of the
+  /// reading in either kind of column.
+  Eigen::MatrixXd Departures(const Eigen::MatrixXd& of) const;
   /// The curves, in the order of the result.
   const std::vector<inference::PathCurve>& curves() const { return curves_; }
+  /// Experiment and observable of each curve, by name.
+  const std::vector<std::pair<std::string, std::string>>& names() const { return names_; }
   /// For each column of the result its place in the data.
   const std::vector<Eigen::Index>& order() const { return order_; }
   bool is_logarithmic(Eigen::Index column) const {
@@ -30,6 +40,7 @@ class HistoryScale {
 
  private:
   std::vector<inference::PathCurve> curves_;
+  std::vector<std::pair<std::string, std::string>> names_;
   std::vector<Eigen::Index> order_;
   std::vector<bool> logarithmic_;
   Eigen::VectorXd value_, sd_;  // in the order of the result

@@ -2,7 +2,6 @@
 // compare -> diagnose -> extend until the misfit is explained or nothing helps. Held-out data are
 // looked at for the first and the last model alone, after the verdict.
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -12,7 +11,6 @@
 #include "server/client/client.h"
 #include "server/client/laboratory.h"
 #include "server/diagnosis/diagnosis.h"
-#include "server/diagnosis/extended_calibration.h"
 #include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
@@ -20,20 +18,21 @@ namespace calib::diagnosis {
 struct ImproveStep {
   std::string campaign{};
   std::vector<std::string> effects{};
+  /// Of this model among those that competed when it was asked for last.
+  std::optional<double> probability{};
   double rms_error = 0;  ///< of the fitted data, as in report::Comparison
   std::optional<double> heldout_rms_error{};
-  std::optional<double> left_out_error{};  ///< within the fitted data, see LeftOutErrorOf
   double log_evidence = 0;
   std::string verdict{};
-  std::string next_effect{};  ///< joins the model in the next step; empty: the last one
-  std::string reason{};       ///< why the next effect, or why there is no next step; a sentence
+  std::vector<std::string> next_effects{};  ///< join the model in the next step; none: the last one
+  std::string reason{};  ///< why the next effects, or why there is no next step; a sentence
 };
 
 struct ImprovementLimits {
   int effects = 3;  ///< that are added, at most
-  /// Model evaluations of the screens, refits and calibrations, those that were made before
-  /// included, so that the same call ends the same way. What a calibration runs on held-out tests
-  /// counts, and may exceed it.
+  /// Model evaluations of the designs and calibrations, those that were made before included, so
+  /// that the same call ends the same way. What a calibration runs on held-out tests counts, and
+  /// may exceed it.
   std::optional<std::int64_t> evaluations{};
   std::vector<std::string> without{};  ///< effects that are not to be thought of
 };
@@ -59,34 +58,13 @@ class Improvement {
   std::string Json() const;
 
  private:
-  /// The model from which the last effect was added, and why.
-  struct Fork {
-    report::CampaignView view;
-    Diagnosis diagnosis;
-  };
-
   bool Spent() const { return limits_.evaluations && evaluations_ >= *limits_.evaluations; }
   std::optional<std::int64_t> Left() const;
   absl::StatusOr<Diagnosis> Ask(const report::CampaignView& view, bool only_adequacy,
                                 std::string& reason);
-  absl::StatusOr<Diagnosis> Judge(const report::CampaignView& view, bool only_adequacy);
-  absl::Status Climb(report::CampaignView view, std::vector<std::string>& added);
+  absl::StatusOr<Diagnosis> Judge(const report::CampaignView& view, bool last);
   absl::StatusOr<std::optional<report::CampaignView>> Forward(const report::CampaignView& view,
-                                                              const Diagnosis& diagnosis);
-  absl::StatusOr<report::CampaignView> Extended(const report::CampaignView& view,
-                                                const std::vector<std::string>& effects,
-                                                const ClosestRun& closest, int times = 3);
-  ImproveStep StepOf(const report::CampaignView& view, const std::string& verdict,
-                     std::string reason);
-  std::string WhyNot(const report::CampaignView& without, double without_error,
-                     const report::CampaignView& with, double with_error);
-  absl::Status Exchange(std::vector<std::string>& added);
-  absl::StatusOr<bool> Replace(std::size_t doubted, std::vector<std::string>& added,
-                               const report::CampaignView& full);
-  absl::Status Instead(std::vector<std::string>& added);
-  absl::Status Prune(std::vector<std::string> added);
-  absl::StatusOr<std::string> TakeOutNeedless(const std::vector<std::string>& added);
-  bool Fits(const report::CampaignView& view);
+                                                              const Answer& answer, int most);
   absl::Status Open();
   absl::StatusOr<std::vector<std::string>> OpenedBefore();
 
@@ -95,10 +73,8 @@ class Improvement {
   ImprovementLimits limits_;
   std::int64_t evaluations_ = 0;
   std::vector<ImproveStep> steps_;
-  /// Of the last model that was screened: the others are judged by the same.
-  std::vector<Eigen::VectorXd> nuisance_;
+  std::optional<double> probability_{};  ///< of the model that is judged next
   std::optional<report::CampaignView> first_, last_;
-  std::optional<Fork> fork_;
   std::string digest_;
   std::vector<std::string> opened_before_;
 };

@@ -93,8 +93,7 @@ bool IsSeen(const KnownBefore& before, const inference::ModelSpace& space,
                      .strength = Eigen::MatrixXd::Zero(1, static_cast<Index>(space.effects.size())),
                      .shape = Eigen::MatrixXd::Zero(1, space.shape_low.size())};
   const Eigen::RowVectorXd without = set.emulator().Factor(point).row(0);
-  const inference::SpecimenErrors& errors = set.errors();
-  const Eigen::VectorXd measurement = errors.share * errors.specimen + errors.noise;
+  const Eigen::VectorXd measurement = set.errors().OfMeasurement();
   for (const double strength : {1.0, 3.0, 10.0, kDesignCaps.strengths.high}) {
     point.strength(0, at.place) = at.sign * std::min(at.most, strength);
     const Eigen::RowVectorXd change = set.emulator().Factor(point).row(0) - without;
@@ -106,12 +105,18 @@ bool IsSeen(const KnownBefore& before, const inference::ModelSpace& space,
   return false;
 }
 
-// Units in SI at which lambda is kSeen, the smaller of both signs.
-Eigen::VectorXd SeenUnits(const KnownBefore& before, const DesignRows& rows, const PartOfRace& part,
-                          const inference::DiagnosisSet& set) {
+// Units in SI at which lambda is kSeen, the smaller of both signs; whether there are such.
+struct SeenUnits {
+  Eigen::VectorXd unit;       // of all entries
+  std::vector<bool> reached;  // of those of the part
+};
+
+SeenUnits UnitsSeen(const KnownBefore& before, const DesignRows& rows, const PartOfRace& part,
+                    const inference::DiagnosisSet& set) {
   const inference::ModelSpace space = SpaceOf(before, rows, part);
   Eigen::VectorXd unit = rows.unit();
   std::vector<double> least(part.kept.size(), std::numeric_limits<double>::infinity());
+  std::vector<bool> reached(part.kept.size(), false);
   for (const EntryStrength& side : SidesOf(rows, part)) {
     const double strength =
         inference::StrengthOfLambda({&set}, space, before.region.centre.transpose(),
@@ -121,15 +126,18 @@ Eigen::VectorXd SeenUnits(const KnownBefore& before, const DesignRows& rows, con
                                      .largest = std::min(side.most, kLargestUnits)});
     double& own = least[static_cast<std::size_t>(side.place)];
     own = std::min(own, strength);
+    if (strength < std::min(side.most, kLargestUnits))
+      reached[static_cast<std::size_t>(side.place)] = true;
   }
   for (std::size_t i = 0; i < part.kept.size(); ++i) {
     const RacingEffect& entry = rows.race().effects[static_cast<std::size_t>(part.kept[i])];
     double& own = unit[part.kept[i]];
-    own = std::clamp(least[i] * own, std::abs(entry.near) / kBeyondTried,
-                     std::abs(entry.far) * kBeyondTried);
+    const double most = std::abs(entry.far) * kBeyondTried;
+    if (least[i] * own > most) reached[i] = false;
+    own = std::clamp(least[i] * own, std::abs(entry.near) / kBeyondTried, most);
     own = std::min(own, std::max(entry.most, entry.most_other));
   }
-  return unit;
+  return {.unit = std::move(unit), .reached = std::move(reached)};
 }
 
 // Why no run with the entry came to its end, in a clause.
@@ -181,7 +189,9 @@ absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& gue
     }
   }
   ASSIGN_OR_RETURN(known.set, FitSet(before, guess, batches, known.part));
-  known.rows = guess.With(guess.axes(), SeenUnits(before, guess, known.part, *known.set));
+  SeenUnits seen_units = UnitsSeen(before, guess, known.part, *known.set);
+  known.rows = guess.With(guess.axes(), std::move(seen_units.unit));
+  known.reached = std::move(seen_units.reached);
   if (with_flat) {
     const inference::ModelSpace space = SpaceOf(before, guess, known.part);
     std::vector<bool> seen(known.part.kept.size(), false);
@@ -190,12 +200,15 @@ absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& gue
         seen[static_cast<std::size_t>(side.place)] = true;
     }
     PartOfRace part;
+    std::vector<bool> reached;
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const int k = known.part.kept[i];
       (seen[i] ? part.kept : part.flat).push_back(k);
+      if (seen[i]) reached.push_back(known.reached[i]);
       if (!seen[i]) known.out.emplace_back(k, "it changes nothing in these tests that can be seen");
     }
     known.part = std::move(part);
+    known.reached = std::move(reached);
   }
   const inference::SetRuns runs = SetRunsOf(before.base, known.rows, batches, known.part);
   ASSIGN_OR_RETURN(known.set, FitSet(before, known.rows, batches, known.part));
@@ -209,6 +222,16 @@ absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& gue
     known.warnings.push_back(absl::StrCat(before.base.unfinished,
                                           " runs of the campaign did not come to their last "
                                           "reading; the emulator does not know them"));
+  return known;
+}
+
+absl::StatusOr<Knowledge> LearnBase(const KnownBefore& before, const DesignRows& rows,
+                                    const std::vector<EndedBatch>& batches) {
+  Knowledge known{.rows = rows, .part = {}, .set = nullptr};
+  ASSIGN_OR_RETURN(known.set, FitSet(before, rows, batches, known.part));
+  known.z =
+      known.set->coordinates()->Of(Eigen::MatrixXd::Zero(1, before.base.histories.cols())).row(0);
+  known.angles.resize(0, 0);
   return known;
 }
 
@@ -256,29 +279,47 @@ absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge,
   return asked;
 }
 
-double ChanceOfMisfit(const KnownBefore& before, const Knowledge& knowledge,
-                      const DesignPoints& points, int fitted) {
+std::vector<std::string> EffectsNamed(const Knowledge& knowledge,
+                                      const inference::EffectModel& model) {
+  std::vector<std::string> names;
+  for (const int k : model.effects) {
+    const int entry = knowledge.part.kept[static_cast<std::size_t>(k)];
+    const std::string& name = knowledge.rows.race().effects[static_cast<std::size_t>(entry)].name;
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return names;
+}
+
+DesignPoints BestDraw(const Knowledge& knowledge, const DesignPoints& draws) {
+  Index best = 0;
+  knowledge.set->LogDensity(knowledge.z, draws).maxCoeff(&best);
+  return inference::RowsOf(draws, {best});
+}
+
+Eigen::VectorXd SquaresOfMisfit(const Knowledge& knowledge, const DesignPoints& points) {
   const inference::DiagnosisSet& set = *knowledge.set;
   const inference::EmulatorPrediction prediction = set.emulator().Predict(points);
   const inference::SpecimenErrors& errors = set.errors();
   const Eigen::MatrixXd diagonal = inference::DiagonalVariance(prediction, errors);
-  const Index q = diagonal.cols();
-  double least = std::numeric_limits<double>::infinity();
-  Index closest = 0;
+  Eigen::VectorXd squares(points.rows());
   for (Index i = 0; i < points.rows(); ++i) {
     Eigen::MatrixXd v = errors.staging * errors.staging.transpose();
     v.diagonal() += diagonal.row(i).transpose();
     const Eigen::VectorXd r = knowledge.z - prediction.mean.row(i).transpose();
-    const double square = r.dot(Eigen::LLT<Eigen::MatrixXd>(v).solve(r));
-    if (square < least) {
-      least = square;
-      closest = i;
-    }
+    squares[i] = r.dot(Eigen::LLT<Eigen::MatrixXd>(v).solve(r));
   }
-  const auto degrees = static_cast<double>(std::max<Index>(1, q - fitted));
+  return squares;
+}
+
+double ChanceOfMisfit(const KnownBefore& before, const Knowledge& knowledge,
+                      const DesignPoints& points, int fitted) {
+  const inference::DiagnosisSet& set = *knowledge.set;
+  Index closest = 0;
+  const double least = SquaresOfMisfit(knowledge, points).minCoeff(&closest);
+  const auto degrees = static_cast<double>(std::max<Index>(1, knowledge.z.size() - fitted));
   const double inside =
-      inference::FisherLaw{.numerator = degrees, .denominator = errors.freedom}.Tail(least /
-                                                                                     degrees);
+      inference::FisherLaw{.numerator = degrees, .denominator = set.errors().freedom}.Tail(least /
+                                                                                           degrees);
   const double outside = set.coordinates()
                              ->LeftOut(Eigen::VectorXd::Zero(before.base.histories.cols()),
                                        inference::RowsOf(points, {closest}))

@@ -35,6 +35,9 @@ struct Knowledge {
   Eigen::VectorXd z{};             ///< q: the measurement
   inference::DesignRange range{};  ///< of the runs, of the kept entries
   Eigen::MatrixXd angles{};        ///< K x K, degrees
+  /// K: whether lambda = 21 is reached at a strength that the entry can have, not beyond ten times
+  /// what the catalogue tries.
+  std::vector<bool> reached{};
   std::vector<std::string> warnings{};
 };
 
@@ -44,6 +47,11 @@ struct Knowledge {
 /// Errors: those of DiagnosisSet::Fit.
 absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& guess,
                                 const std::vector<EndedBatch>& batches, bool with_flat);
+
+/// Learns from the runs of the base alone, and from what the batches say of numerical choices.
+/// rows: of the values of the batches. Errors: those of DiagnosisSet::Fit.
+absl::StatusOr<Knowledge> LearnBase(const KnownBefore& before, const DesignRows& rows,
+                                    const std::vector<EndedBatch>& batches);
 
 /// How much is spent on evidences. kToChoose: whom further runs would tell apart, under the
 /// first of kStrengthWidths alone; kToAnswer: what is said, under all of them.
@@ -58,6 +66,17 @@ struct Asked {
 
 /// Errors: those of ModelEvidencesUnder and ProbabilitiesOf.
 absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort);
+
+/// Names of the effects of a model of kept entries, each once.
+std::vector<std::string> EffectsNamed(const Knowledge& knowledge,
+                                      const inference::EffectModel& model);
+
+/// Of a model's posterior draws the one that the measurement is most probable at, 1 row. in: draws,
+/// at least one
+inference::DesignPoints BestDraw(const Knowledge& knowledge, const inference::DesignPoints& draws);
+
+/// n: squares of the measurement's distances from points, over errors and what is not known there.
+Eigen::VectorXd SquaresOfMisfit(const Knowledge& knowledge, const inference::DesignPoints& points);
 
 /// Chance that a right model misses a measurement by as much as the closest of these points does:
 /// the smaller of that of the coordinates and that of what they leave out, doubled

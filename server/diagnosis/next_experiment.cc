@@ -94,7 +94,7 @@ absl::StatusOr<std::string> RivalsText(const Rival& rival,
                           {.name = fmt::format("{}: next experiment", rival.view->campaign.name),
                            .lineage = {.parent = parent, .purpose = "next_experiment"},
                            .effects = rival.effects,
-                           .fixed = rival.fixed,
+                           .parameters = rival.parameters,
                            .experiments = entries,
                            .rows = std::move(rows)});
 }

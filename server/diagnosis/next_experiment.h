@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "dem/registry/catalog.h"
 #include "server/client/laboratory.h"
 #include "server/diagnosis/test_plans.h"
 #include "server/report/views/campaign_view.h"
@@ -22,7 +23,8 @@ struct Rival {
   std::map<std::string, double> values{};             ///< calibrated parameters, SI
   std::vector<std::map<std::string, double>> near{};  ///< others that the readings do not exclude
   std::vector<std::string> effects{};                 ///< that join the model of the view, and
-  std::map<std::string, double> fixed{};              ///< their parameters, SI
+  /// ranges of their parameters, which are among the values.
+  std::map<std::string, dem::DefaultPrior> parameters{};
 };
 
 /// What two runs differ by beyond what two runs of one model do, as a squared distance in units of

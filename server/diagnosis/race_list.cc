@@ -6,13 +6,17 @@
 #include <set>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "dem/registry/declared_effects.h"
 #include "server/campaign/model/excitation.h"
 #include "server/campaign/model/race.h"
 #include "server/diagnosis/extension.h"
+#include "server/diagnosis/reading_effects.h"
 
 namespace calib::diagnosis {
 namespace {
+
+constexpr const char* kNotCalculated = "the runs were made elsewhere, none can be made with it";
 
 bool IsAmong(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -109,6 +113,49 @@ std::vector<RacingEffect> EntriesOf(const report::CampaignView& view,
   return entries;
 }
 
+// Those of an effect's entries that are calculated on curves, shapes held as they are there.
+std::vector<RacingEffect> EntriesOnCurves(const report::CampaignView& view,
+                                          const dem::EffectInfo& effect,
+                                          const EffectsOnCurves& curves) {
+  std::vector<RacingEffect> entries = EntriesOf(view, effect);
+  std::erase_if(entries, [&curves](const RacingEffect& entry) {
+    return curves.by_strength.count(entry.strength) == 0;
+  });
+  for (RacingEffect& entry : entries) {
+    entry.shapes.clear();
+    entry.design.shapes = 0;
+  }
+  return entries;
+}
+
+// Why an effect cannot be calculated on curves, in a clause; empty: it can.
+std::string WhyNotCalculated(const EffectsOnCurves& curves, const std::string& effect) {
+  for (const auto& [name, why] : curves.impossible) {
+    if (name == effect) return why;
+  }
+  const std::string prefix = effect + ".";
+  const auto first = curves.by_strength.lower_bound(prefix);
+  const bool can =
+      first != curves.by_strength.end() && first->first.compare(0, prefix.size(), prefix) == 0;
+  return can ? "" : kNotCalculated;
+}
+
+// Nobody takes part in a race.
+absl::Status NobodyIn(const campaign::Campaign& campaign, const Race& race) {
+  if (!campaign.precomputed)
+    return absl::FailedPreconditionError(
+        "no effect of this build can join the model and be seen in the fitted experiments, so "
+        "there is nothing to ask; `not_excitable` says why");
+  std::vector<std::string> reasons;
+  for (const auto& [effect, why] : race.not_excitable) {
+    if (why != kNotCalculated) reasons.push_back(absl::StrCat(effect, " (", why, ")"));
+  }
+  return absl::FailedPreconditionError(
+      absl::StrCat("the runs of this campaign were made elsewhere, and no effect can be calculated "
+                   "on what they read: ",
+                   absl::StrJoin(reasons, ", ")));
+}
+
 std::vector<NumericalChoice> NumericsOf(const campaign::Campaign& campaign) {
   const bool staged = std::any_of(
       campaign.experiments.begin(), campaign.experiments.end(), [](const auto& experiment) {
@@ -186,17 +233,20 @@ std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInf
 absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
                             const std::vector<std::string>& without) {
   const campaign::Campaign& campaign = view.campaign;
+  const bool elsewhere = campaign.precomputed.has_value();
+  const EffectsOnCurves curves = elsewhere ? EffectsOnReadings(campaign) : EffectsOnCurves{};
   Race race{.left_out = without};
   for (const campaign::CalibratedParameter& parameter : campaign.parameters)
     race.base.push_back(parameter.name);
   for (const dem::EffectInfo* effect : dem::AllEffects(campaign.model.user_effects)) {
     if (IsAmong(campaign.model.effects, effect->name)) continue;
-    std::string why = WhyNotJoin(campaign, effect->name);
+    std::string why =
+        elsewhere ? WhyNotCalculated(curves, effect->name) : WhyNotJoin(campaign, effect->name);
     if (why.empty() && IsAmong(without, effect->name)) why = "left out as asked for";
-    if (why.empty()) why = WhyNotShown(campaign, *effect);
+    if (why.empty() && !elsewhere) why = WhyNotShown(campaign, *effect);
     std::vector<RacingEffect> entries;
     if (why.empty()) {
-      entries = EntriesOf(view, *effect);
+      entries = elsewhere ? EntriesOnCurves(view, *effect, curves) : EntriesOf(view, *effect);
       if (entries.empty()) why = "the catalogue gives no strength to try";
     }
     if (why.empty()) {
@@ -205,11 +255,9 @@ absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
       race.not_excitable.emplace_back(effect->name, why);
     }
   }
-  if (race.effects.empty())
-    return absl::FailedPreconditionError(
-        "no effect of this build can join the model and be seen in the fitted experiments, so "
-        "there "
-        "is nothing to ask; `not_excitable` says why");
+  if (race.effects.empty()) return NobodyIn(campaign, race);
+  // Instruments and a denser start exclude nobody, and there is no engine whose choices matter.
+  if (elsewhere) return race;
   for (int a = 0; a < static_cast<int>(race.effects.size()); ++a) {
     for (int b = a + 1; b < static_cast<int>(race.effects.size()); ++b) {
       const std::string& one = race.effects[static_cast<std::size_t>(a)].name;

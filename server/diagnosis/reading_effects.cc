@@ -2,19 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "inference/numerics/decompositions.h"
+#include <memory>
+#include <set>
 
 namespace calib::diagnosis {
 namespace {
 
 using Eigen::Index;
 
-constexpr double kGain = 0.05;         // of the load
-constexpr double kOffset = 0.03;       // of the largest mean stress
-constexpr double kStrain = 1e-3;       // of the rig at the largest load, and of seating
-constexpr double kSeatingShare = 0.1;  // of the largest load: the stress that closes 63 % of it
+// Strengths at which it is asked whether an effect changes anything.
+constexpr double kGain = 0.05;    // of the load
+constexpr double kOffset = 0.03;  // of the largest mean stress
+constexpr double kStrain = 1e-3;  // of the rig at the largest load, and of seating
 constexpr double kPorosity = 0.01;
+constexpr double kSeatingShare = 0.1;  // of the largest load: the stress that closes 63 % of gaps
 constexpr const char* kNoStress = "the readings do not give axial and lateral stress";
 constexpr const char* kNoStrain = "axial strain is not the control of any fitted test";
 constexpr const char* kNoPorosity = "no fitted test reads porosity or void ratio";
@@ -155,7 +156,8 @@ void MisreadLoad(const Curve& curve, double gain, double offset, const Eigen::Ro
       if (at[s] < 0 || !path[s] || !path.front()) continue;
       Stress read = *path[s];
       read.axial += gain * LoadOf(curve, *path[s], *path.front()) + offset;
-      if (const auto value = Read(name, read)) change[at[s]] = *value - y[at[s]];
+      const auto value = Read(name, read);
+      if (value && std::isfinite(*value)) change[at[s]] = *value - y[at[s]];
     }
   }
 }
@@ -187,75 +189,106 @@ void MisreadStrain(const Curve& curve, const StrainOfLoad& strain, const Eigen::
 }
 
 // A denser start, kept along the whole curve.
-void ShiftPorosity(const Curve& curve, const Eigen::RowVectorXd& y,
+void ShiftPorosity(const Curve& curve, double fall, const Eigen::RowVectorXd& y,
                    Eigen::Ref<Eigen::RowVectorXd> change) {
   for (const auto& [name, at] : curve.at) {
     for (const Index k : at) {
       if (k < 0) continue;
-      if (name == "porosity") change[k] = -kPorosity;
-      if (name == "void_ratio") change[k] = -kPorosity * (1 + y[k]) * (1 + y[k]);
+      if (name == "porosity") change[k] = -fall;
+      if (name == "void_ratio") change[k] = -fall * (1 + y[k]) * (1 + y[k]);
     }
   }
 }
 
+// One strength of an effect, and what it changes along a curve.
+struct ActOnCurve {
+  std::string effect, parameter;
+  double unit;  // at which it is asked whether it changes anything, SI
+  const char* why_not;
+  std::function<void(const Curve&, double strength, const Eigen::RowVectorXd& y,
+                     Eigen::Ref<Eigen::RowVectorXd> change)>
+      act;
+};
+
+// Nothing is known of experiments that name no test.
+bool MayHaveRig(const Curve& curve) {
+  return curve.experiment->test.empty() || HasLoadCell(*curve.experiment);
+}
+
+std::vector<ActOnCurve> ActsOnCurves(const Scales& scales) {
+  const double load = scales.load, seating = kSeatingShare * load;
+  const char* const no_strain = load > 0 ? kNoStrain : kNoStress;
+  const auto reads_strain = [load](const Curve& c) {
+    return load > 0 && MayHaveRig(c) && c.experiment->control_name == "axial_strain";
+  };
+  using Row = Eigen::RowVectorXd;
+  using Change = Eigen::Ref<Eigen::RowVectorXd>;
+  return {{"load_cell_error", "gain", kGain, kNoStress,
+           [](const Curve& c, double gain, const Row& y, Change change) {
+             if (MayHaveRig(c)) MisreadLoad(c, gain, 0, y, change);
+           }},
+          {"load_cell_error", "offset", kOffset * scales.stress, kNoStress,
+           [](const Curve& c, double offset, const Row& y, Change change) {
+             if (MayHaveRig(c)) MisreadLoad(c, 0, offset, y, change);
+           }},
+          {"apparatus_compliance", "compliance", load > 0 ? kStrain / load : 1, no_strain,
+           [reads_strain](const Curve& c, double compliance, const Row& y, Change change) {
+             if (!reads_strain(c)) return;
+             MisreadStrain(
+                 c, [compliance](double x) { return compliance * x; }, y, change);
+           }},
+          {"strain_offset", "offset", kStrain, no_strain,
+           [reads_strain, seating](const Curve& c, double offset, const Row& y, Change change) {
+             if (!reads_strain(c)) return;
+             const auto closed = [offset, seating](double x) {
+               return offset * (1 - std::exp(-std::max(x, 0.0) / seating));
+             };
+             MisreadStrain(c, closed, y, change);
+           }},
+          {"initial_density", "densification", kPorosity, kNoPorosity,
+           [](const Curve& c, double fall, const Row& y, Change change) {
+             ShiftPorosity(c, fall, y, change);
+           }}};
+}
+
+// A campaign of its own with its curves.
+struct OwnCurves {
+  campaign::Campaign campaign;
+  std::vector<Curve> curves;
+};
+
 }  // namespace
 
-std::vector<ReadingEffect> EffectsOnReadings(
-    const campaign::Campaign& campaign, const Eigen::MatrixXd& histories,
-    std::vector<std::pair<std::string, std::string>>& impossible) {
+EffectsOnCurves EffectsOnReadings(const campaign::Campaign& campaign) {
+  const auto own = std::make_shared<OwnCurves>();
+  own->campaign.experiments = campaign.experiments;
   const inference::DataSet data = campaign::MakeDataSet(campaign);
-  const std::vector<Curve> curves = CurvesOf(campaign, data);
-  const Rows rows = ReadingRows(data);
-  const Eigen::RowVectorXd& value = rows.value;
-  const Eigen::RowVectorXd& sd = rows.sd;
-  const Index t = value.size();
-  const Scales scales = ScalesOf(curves, value);
-  std::vector<ReadingEffect> effects;
-  const auto add = [&](const char* effect, const char* parameter, double unit, const char* why_not,
-                       const auto& act) {
-    ReadingEffect found{.effect = effect,
-                        .parameter = std::string(effect) + "." + parameter,
-                        .unit = unit,
-                        .change = Eigen::MatrixXd::Zero(histories.rows(), t)};
-    Eigen::RowVectorXd change(t);
-    for (Index g = 0; g < histories.rows(); ++g) {
-      const Eigen::RowVectorXd y = value + histories.row(g).cwiseProduct(sd);
-      change.setZero();
-      for (const Curve& curve : curves) act(curve, y, change);
-      found.change.row(g) = change.cwiseQuotient(sd);
-    }
-    if (found.change.allFinite() && found.change.cwiseAbs().maxCoeff() > 0) {
-      effects.push_back(std::move(found));
-    } else if (impossible.empty() || impossible.back().first != effect) {
-      impossible.emplace_back(effect, why_not);
-    }
-  };
-  const double offset = kOffset * scales.stress;
-  add("load_cell_error", "gain", kGain, kNoStress,
-      [](const Curve& c, const Eigen::RowVectorXd& y, Eigen::RowVectorXd& change) {
-        MisreadLoad(c, kGain, 0, y, change);
-      });
-  add("load_cell_error", "offset", offset, kNoStress,
-      [offset](const Curve& c, const Eigen::RowVectorXd& y, Eigen::RowVectorXd& change) {
-        MisreadLoad(c, 0, offset, y, change);
-      });
-  const double load = scales.load;
-  const auto of_strain = [&](const char* effect, const char* parameter, double unit,
-                             const auto& strain) {
-    add(effect, parameter, unit, load > 0 ? kNoStrain : kNoStress,
-        [&strain, load](const Curve& c, const Eigen::RowVectorXd& y, Eigen::RowVectorXd& change) {
-          if (load > 0 && c.experiment->control_name == "axial_strain") {
-            MisreadStrain(c, strain, y, change);
-          }
-        });
-  };
-  of_strain("apparatus_compliance", "compliance", load > 0 ? kStrain / load : 1,
-            [load](double x) { return kStrain * x / load; });
-  of_strain("strain_offset", "offset", kStrain, [load](double x) {
-    return kStrain * (1 - std::exp(-std::max(x, 0.0) / (kSeatingShare * load)));
-  });
-  add("initial_density", "densification", kPorosity, kNoPorosity, ShiftPorosity);
-  return effects;
+  own->curves = CurvesOf(own->campaign, data);
+  const Eigen::RowVectorXd value = ReadingRows(data).value;
+  EffectsOnCurves found;
+  std::set<std::string> possible;
+  const std::vector<ActOnCurve> acts = ActsOnCurves(ScalesOf(own->curves, value));
+  for (const ActOnCurve& one : acts) {
+    const CurveEffect effect = [own = std::shared_ptr<const OwnCurves>(own), act = one.act](
+                                   const Eigen::MatrixXd& readings, const Eigen::VectorXd& values) {
+      Eigen::MatrixXd read = readings;
+      Eigen::RowVectorXd change(readings.cols());
+      for (Index i = 0; i < readings.rows(); ++i) {
+        const Eigen::RowVectorXd y = readings.row(i);
+        change.setZero();
+        for (const Curve& curve : own->curves) act(curve, values[i], y, change);
+        read.row(i) += change;
+      }
+      return read;
+    };
+    if (effect(value, Eigen::VectorXd::Constant(1, one.unit)) == value) continue;
+    found.by_strength.emplace(one.effect + "." + one.parameter, effect);
+    possible.insert(one.effect);
+  }
+  for (const ActOnCurve& one : acts) {
+    if (possible.insert(one.effect).second) found.impossible.emplace_back(one.effect, one.why_not);
+  }
+  return found;
 }
 
 std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
@@ -301,25 +334,6 @@ std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
     misread.row(i) += change.cwiseQuotient(sd);
   }
   return misread;
-}
-
-inference::FittedModel Join(const inference::FittedModel& model, const ReadingEffect& effect,
-                            double lowest, double highest, Eigen::VectorXd& strengths) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(model.covariance);
-  Eigen::MatrixXd histories = model.histories.Values();
-  const Eigen::MatrixXd whitened = factor.matrixL().solve(histories.transpose());
-  const Eigen::MatrixXd change = factor.matrixL().solve(effect.change.transpose());
-  inference::FittedModel joined = model;
-  ++joined.parameters;
-  strengths.resize(histories.rows());
-  for (Index g = 0; g < strengths.size(); ++g) {
-    const double square = change.col(g).squaredNorm();
-    strengths[g] =
-        square > 0 ? std::clamp(-whitened.col(g).dot(change.col(g)) / square, lowest, highest) : 0;
-    histories.row(g) += strengths[g] * effect.change.row(g);
-  }
-  joined.histories = std::move(histories);
-  return joined;
 }
 
 }  // namespace calib::diagnosis

@@ -4,33 +4,45 @@
 // what an instrument does to a curve can be calculated; and of load cells for all campaigns.
 
 #include <Eigen/Dense>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "inference/diagnosis/screen.h"
+#include "inference/data/data_set.h"
 #include "server/campaign/model/campaign.h"
 
 namespace calib::diagnosis {
 
-/// One effect at unit strength, as it acts on every history of a model.
-struct ReadingEffect {
-  std::string effect;      ///< as in the catalogue
-  std::string parameter;   ///< dotted name of its strength
-  double unit = 1;         ///< strength that `change` is for, SI
-  Eigen::MatrixXd change;  ///< G x T, with minus without, over the noise sd
+/// Readings (n x T, SI, in the order of the data) as they are with an effect whose parameter stands
+/// at these values (n, SI): what the grains do does not depend on it. Pure.
+using CurveEffect =
+    std::function<Eigen::MatrixXd(const Eigen::MatrixXd& readings, const Eigen::VectorXd& values)>;
+
+/// Effects that are calculated on curves.
+struct EffectsOnCurves {
+  std::map<std::string, CurveEffect> by_strength{};  ///< by dotted name of the strength
+  /// Effects none of whose strengths can be calculated, and why, in a clause.
+  std::vector<std::pair<std::string, std::string>> impossible{};
 };
 
-/// histories: G x T, (prediction - reading) / sd in the order of MakeDataSet. load_cell_error (gain
-/// and offset), apparatus_compliance, strain_offset and initial_density, each where the observables
-/// of a calibrated experiment let it be calculated: axial and lateral stress from p and q, from q/p
-/// or a stress ratio with a confining pressure, or given themselves; strains where axial strain is
-/// the control. `impossible` tells which cannot be, and why.
-std::vector<ReadingEffect> EffectsOnReadings(
-    const campaign::Campaign& campaign, const Eigen::MatrixXd& histories,
-    std::vector<std::pair<std::string, std::string>>& impossible);
+/// What instruments and a denser start do to the curves of a campaign: load_cell_error (gain and
+/// offset), apparatus_compliance, strain_offset and initial_density, each where the observables of
+/// a calibrated experiment let it be calculated: axial and lateral stress from p and q, from q/p or
+/// a stress ratio with a confining pressure, or given themselves; strains where axial strain is the
+/// control. An experiment that names a test without a load on a rig shows none of the first three.
+///
+/// The load cell is exact (dem/effects/load_cell_error) but for where loads count from: the first
+/// reading, which is the start of loading where it is read. The others are the first order of their
+/// strength about zero, which is what the limit is: a strain d read too large moves a reading by
+/// -d times the slope of its own curve towards the neighbour on its stage, so that d has to stay
+/// below what readings are apart; a densification d lowers the porosity by d and the void ratio e
+/// by d (1 + e)^2 along the whole curve, and does not alter stresses. strain_offset.stress is held
+/// at a tenth of the largest load that was measured. A reading whose stresses a run does not tell,
+/// or whose ratio they leave without a value, stays as it is.
+EffectsOnCurves EffectsOnReadings(const campaign::Campaign& campaign);
 
 /// Histories as load cells with these errors read them, one gain [-] and offset [Pa] for each:
 /// exact, the specimen does not feel them. histories: N x T, (prediction - reading) / sd in the
@@ -42,10 +54,5 @@ std::optional<Eigen::MatrixXd> MisreadLoads(const campaign::Campaign& campaign,
                                             const Eigen::MatrixXd& histories,
                                             const Eigen::VectorXd& gain,
                                             const Eigen::VectorXd& offset);
-
-/// The model joined by the effect: at every point the strength in [lowest, highest] units that
-/// brings it closest to the readings. `strengths`: that of each point, in units.
-inference::FittedModel Join(const inference::FittedModel& model, const ReadingEffect& effect,
-                            double lowest, double highest, Eigen::VectorXd& strengths);
 
 }  // namespace calib::diagnosis

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <numeric>
 #include <optional>
+#include <set>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/diagnosis/design_caps.h"
-#include "server/diagnosis/left_out_packings.h"
-#include "server/diagnosis/reading_effects.h"
 #include "server/messages/read_words.h"
 #include "server/report/views/run_table.h"
 
@@ -77,6 +77,24 @@ std::vector<Index> ShapesOf(const DesignRows& rows, const std::vector<int>& entr
     for (int h = 0; h < shapes; ++h) columns.push_back(rows.first_shape(k) + h);
   }
   return columns;
+}
+
+// Rows of the table that are witnesses of their own: of twins the first.
+std::vector<Index> RunsOfTheirOwn(const report::CampaignView& view, const report::RunTable& table) {
+  std::set<int> replicates;
+  for (const v1::Sample& sample : view.samples) {
+    if (messages::PurposeOf(sample) == campaign::SamplePurpose::kReplicate)
+      replicates.insert(sample.index());
+  }
+  const bool varied = campaign::PackingsOfAll(view.campaign) > 0;
+  std::vector<Index> rows;
+  bool has_twin = false;
+  for (std::size_t i = 0; i < table.sample.size(); ++i) {
+    const bool twin = !varied && replicates.count(table.sample[i]) > 0;
+    if (!twin || !has_twin) rows.push_back(static_cast<Index>(i));
+    has_twin = has_twin || twin;
+  }
+  return rows;
 }
 
 constexpr int kDifferences = 32;  // of a calculated entry: five for each of its six features
@@ -156,6 +174,15 @@ inference::CalculatedDifferences DifferencesOf(const BaseRuns& base, const Desig
 
 }  // namespace
 
+int PackingsApart(const campaign::Campaign& campaign) {
+  int packings = 0;
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    if (experiment.role != campaign::Role::kCalibrate || experiment.specimens.size() < 2) continue;
+    packings = std::gcd(packings, static_cast<int>(experiment.specimens.size()));
+  }
+  return std::max(1, packings);
+}
+
 absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
   const inference::DataSet data = campaign::MakeDataSet(view.campaign);
   if (const absl::Status status = inference::ValidateData(data, inference::NoiseMode::kGiven);
@@ -163,12 +190,16 @@ absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
     return absl::FailedPreconditionError(absl::StrCat("the readings of ", view.status.campaign(),
                                                       " cannot be judged: ", status.message()));
   const report::RunTable table = report::RunsOf(view);
+  const std::vector<Index> own = RunsOfTheirOwn(view, table);
   BaseRuns base{.scale = HistoryScale(view.campaign, data),
-                .calculated = CalculatedOn(view.campaign, data),
-                .values = table.parameters,
-                .readings = table.histories,
-                .stream = table.stream,
+                .elsewhere = view.campaign.precomputed.has_value(),
+                .calculated = view.campaign.precomputed
+                                  ? EffectsOnReadings(view.campaign).by_strength
+                                  : CalculatedOn(view.campaign, data),
+                .values = table.parameters(own, Eigen::all),
+                .readings = table.histories(own, Eigen::all),
                 .packings = PackingsApart(view.campaign)};
+  for (const Index i : own) base.stream.push_back(table.stream[static_cast<std::size_t>(i)]);
   const auto t = static_cast<Index>(data.readings.size());
   Eigen::VectorXd sd(t);
   for (Index k = 0; k < t; ++k) {
@@ -183,7 +214,7 @@ absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
     most = std::max(most, sample.index());
     calibrated += messages::PurposeOf(sample) != campaign::SamplePurpose::kDraw ? 1 : 0;
   }
-  for (const int stream : base.stream) most = std::max(most, stream);
+  for (const int stream : table.stream) most = std::max(most, stream);
   base.samples = most + 1;
   base.unfinished = static_cast<int>(calibrated - table.sample.size());
   const Eigen::MatrixXd covariance = inference::ErrorCovariance(data);
@@ -195,6 +226,13 @@ absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
     if (experiment.role == campaign::Role::kCalibrate)
       base.share = std::max(base.share, campaign::ScatterShare(experiment));
   }
+  const report::ScatteredReadings scattered = report::ReadingsWithScatter(view);
+  base.sd.resize(t);
+  for (Index c = 0; c < t; ++c) {
+    const Index k = base.scale.order()[static_cast<std::size_t>(c)];
+    base.sd[c] = scattered.of_mean.readings[static_cast<std::size_t>(k)].sd / sd[k];
+  }
+  if (scattered.twins.rows() > 0) base.twins = base.scale.Departures(scattered.twins);
   return base;
 }
 
@@ -221,7 +259,7 @@ Race WithCalculated(Race race, const BaseRuns& base) {
   Race marked = race;
   for (RacingEffect& entry : marked.effects)
     entry.design.calculated = entry.shapes.empty() && base.calculated.count(entry.strength) > 0;
-  return EntriesRun(marked, WholeOf(marked).kept).empty() ? race : marked;
+  return !base.elsewhere && EntriesRun(marked, WholeOf(marked).kept).empty() ? race : marked;
 }
 
 inference::DesignPoints PartOfPoints(const DesignRows& rows, const PartOfRace& part,
@@ -277,7 +315,8 @@ inference::SetRuns SetRunsOf(const BaseRuns& base, const DesignRows& rows,
                           .differences = DifferencesOf(base, rows, part, of_base, scaled),
                           .noise = base.noise,
                           .staging = StagingOf(base, rows, batches),
-                          .share = base.share};
+                          .share = base.share,
+                          .twins = base.twins};
   for (const int k : part.kept)
     runs.effects.push_back(rows.race().effects[static_cast<std::size_t>(k)].design);
   runs.points.base.topRows(n) = scaled(of_base, Eigen::all);

@@ -3,7 +3,6 @@
 // Pure functions of what is stored; nothing in them is NaN.
 
 #include <Eigen/Core>
-#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -13,19 +12,23 @@
 #include "inference/diagnosis/stage_coordinates.h"
 #include "server/diagnosis/design_rows.h"
 #include "server/diagnosis/history_scale.h"
+#include "server/diagnosis/reading_effects.h"
 #include "server/diagnosis/run_maker.h"
 #include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
 
-/// Readings (n x T, SI, in the order of the data) as they are with an effect whose parameter stands
-/// at these values (n, SI): exact, what the grains do does not depend on it.
-using CurveEffect =
-    std::function<Eigen::MatrixXd(const Eigen::MatrixXd& readings, const Eigen::VectorXd& values)>;
+/// How many groups of runs share no packing in any fitted experiment with another group: run i is
+/// of group StreamOf(i) mod that. Experiments of 4 and 6 packings have 2, not 4; 1 where packings
+/// were not varied.
+int PackingsApart(const campaign::Campaign& campaign);
 
-/// What the base campaign's runs are.
+/// What the base campaign's runs are. Of twins (runs of one parameter vector where no fitted
+/// experiment has a second packing) the first alone is among the n: what an emulator misses there
+/// all of them share, so that they are one witness of it, and `twins` holds what they differ by.
 struct BaseRuns {
   HistoryScale scale;
+  bool elsewhere = false;  ///< another code made the runs: none can be added
   std::map<std::string, CurveEffect> calculated{};  ///< by dotted name of the strength
   Eigen::MatrixXd values{};                         ///< n x d, SI
   Eigen::MatrixXd readings{};                       ///< n x T, SI, in the order of the data
@@ -36,6 +39,12 @@ struct BaseRuns {
   int samples = 0;          ///< of the campaign: streams of further runs begin here
   Eigen::MatrixXd noise{};  ///< T x T: covariance of the errors of histories
   double share = 1;         ///< largest ScatterShare of the fitted experiments
+  /// R x T: ScatteredReadings::twins as HistoryScale::Departures, zero where those are; no rows
+  /// where no twins have parted.
+  Eigen::MatrixXd twins{};
+  /// T, in the order of `scale`, > 0: sd of a measurement about the model's mean history, scatter
+  /// in it (ScatteredReadings::of_mean), over that of its noise; 1 where scatter was not measured.
+  Eigen::VectorXd sd{};
 };
 
 /// Reads a finished campaign. Errors: FAILED_PRECONDITION with a sentence where the errors of its
@@ -56,8 +65,9 @@ struct PartOfRace {
 /// All entries.
 PartOfRace WholeOf(const Race& race);
 
-/// The race with DesignEffect::calculated as the base's curves allow it, as long as some entry is
-/// run.
+/// The race with DesignEffect::calculated as the base's curves allow it: of all entries where the
+/// runs were made elsewhere, else as long as some entry is run, since a design without runs is
+/// none.
 Race WithCalculated(Race race, const BaseRuns& base);
 
 /// Those of the entries that are run.
@@ -65,7 +75,8 @@ std::vector<int> EntriesRun(const Race& race, const std::vector<int>& entries);
 
 /// Runs of the base within its axes, and complete runs of the design with unchanged numerics and
 /// only effects of the part; what numerics change, against the run of the base that each repeats;
-/// what calculated entries change of base runs, at strengths of the reference prior.
+/// the base's twins; what calculated entries change of base runs, at strengths of the reference
+/// prior.
 inference::SetRuns SetRunsOf(const BaseRuns& base, const DesignRows& rows,
                              const std::vector<EndedBatch>& batches, const PartOfRace& part);
 

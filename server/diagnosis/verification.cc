@@ -7,30 +7,8 @@
 #include "inference/diagnosis/next_runs.h"
 
 namespace calib::diagnosis {
-namespace {
 
 using Eigen::Index;
-
-std::vector<std::string> EffectsNamed(const Knowledge& knowledge,
-                                      const inference::EffectModel& model) {
-  std::vector<std::string> names;
-  for (const int k : model.effects) {
-    const int entry = knowledge.part.kept[static_cast<std::size_t>(k)];
-    const std::string& name = knowledge.rows.race().effects[static_cast<std::size_t>(entry)].name;
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  }
-  return names;
-}
-
-// Of the posterior draws the one that the measurement is most probable at.
-inference::DesignPoints OptimumOf(const Knowledge& knowledge,
-                                  const inference::ModelEvidence& evidence) {
-  Index best = 0;
-  knowledge.set->LogDensity(knowledge.z, evidence.draws).maxCoeff(&best);
-  return inference::RowsOf(evidence.draws, {best});
-}
-
-}  // namespace
 
 std::vector<VerifiedModel> ModelsToVerify(const Knowledge& knowledge, const Asked& asked,
                                           const VerificationQuestion& question) {
@@ -51,7 +29,7 @@ std::vector<VerifiedModel> ModelsToVerify(const Knowledge& knowledge, const Aske
                              asked.probabilities[0].model[i] < question.sibling)
       continue;
     taken.push_back(each);
-    models.push_back({.effects = names, .optimum = OptimumOf(knowledge, own)});
+    models.push_back({.effects = names, .optimum = BestDraw(knowledge, own.draws)});
     if (static_cast<int>(models.size()) == question.most) break;
   }
   return models;

@@ -19,16 +19,22 @@ namespace {
 struct DiagnoseOptions {
   std::string campaign;
   std::vector<std::string> without{};  ///< effects that are not to be thought of
+  bool gate = false;
 };
 
 std::string Next(const CommonOptions& common, const DiagnoseOptions& options,
-                 const report::CampaignView& view, const diagnosis::Diagnosis& diagnosis) {
+                 const report::CampaignView& view, const diagnosis::Diagnosis& found) {
   const std::string& id = options.campaign;
-  if (diagnosis.verdict == "adequate" || view.campaign.precomputed) {
+  using diagnosis::AnswerVerdict;
+  const AnswerVerdict verdict = found.answer.verdict;
+  if (verdict == AnswerVerdict::kAdequate || view.campaign.precomputed) {
     return NextStep(CommandOf(common.server, absl::StrCat("report ", id, " -o ", id, ".html")),
                     "this verdict with parameters and curves, in one file");
   }
-  if (diagnosis.verdict == "unexplained" && diagnosis.best_partial.empty()) {
+  if (found.only_adequacy) {
+    return NextStep(CommandOf(common.server, "diagnose " + id), "which effect it lacks");
+  }
+  if (verdict == AnswerVerdict::kUnexplained) {
     return NextStep(CommandOf(common.server, "compare " + id),
                     "where the model fails; an effect of your own may be declared in the file");
   }
@@ -41,6 +47,7 @@ std::string Next(const CommonOptions& common, const DiagnoseOptions& options,
 void Declare(OptionList& list, DiagnoseOptions& options) {
   list.Campaign(options.campaign);
   list.Texts("--without", options.without, "effect that is not to be thought of");
+  list.Flag("--gate", options.gate, "adequate or not, by the runs that are there; tries no effect");
 }
 
 absl::StatusOr<int> Diagnose(const CommonOptions& common, const DiagnoseOptions& options) {
@@ -49,8 +56,9 @@ absl::StatusOr<int> Diagnose(const CommonOptions& common, const DiagnoseOptions&
   client::Laboratory laboratory(*session, common.server);
   ASSIGN_OR_RETURN(const auto view, laboratory.Finished(options.campaign));
   RETURN_IF_ERROR(diagnosis::CheckLeftOut(options.without, view.campaign));
-  ASSIGN_OR_RETURN(const auto diagnosis,
-                   diagnosis::Diagnose(laboratory, view, {.without = options.without}));
+  ASSIGN_OR_RETURN(const auto diagnosis, diagnosis::Diagnose(laboratory, view,
+                                                             {.only_adequacy = options.gate,
+                                                              .without = options.without}));
   client::StoreFinding(session->client(), options.campaign, client::kDiagnosis,
                        diagnosis::DiagnosisJson(diagnosis));
   std::cout << (common.json

@@ -35,16 +35,16 @@ std::string ToText(const diagnosis::Improvement& improvement) {
     return error ? report::Number(*error, 3) : "–";
   };
   report::TextTable table(
-      {"<campaign", "<effects", "error", "left out", "held out", "log evidence", "<verdict"});
+      {"<campaign", "<effects", "probable", "error", "held out", "log evidence", "<verdict"});
   for (const diagnosis::ImproveStep& step : steps) {
     table.AddRow({step.campaign, step.effects.empty() ? "none" : absl::StrJoin(step.effects, " + "),
-                  report::Number(step.rms_error, 3), number(step.left_out_error),
-                  number(step.heldout_rms_error), report::Number(step.log_evidence, 5),
-                  step.verdict});
+                  step.probability ? report::Percent(*step.probability, 2) : "–",
+                  report::Number(step.rms_error, 3), number(step.heldout_rms_error),
+                  report::Number(step.log_evidence, 5), step.verdict});
   }
   std::string text = table.ToString() + "\n";
   text +=
-      "Errors in sd: of the fitted data; of each part of them, fitted to the others; of held-out "
+      "Probable: when it was asked for last. Errors in sd, of the fitted data and of held-out "
       "data.\n\n";
   for (const diagnosis::ImproveStep& step : steps) {
     text += report::Wrapped(fmt::format("{}: {}", step.campaign, step.reason), "", "  ");
@@ -84,7 +84,7 @@ void Declare(OptionList& list, ImproveOptions& options) {
                      "at most so many are added [3]");
   list.BoundedNumber(
       "--max-evaluations", options.max_evaluations, {1, 1'000'000'000},
-      "model evaluations of all screens, refits and calibrations, those that diagnose "
+      "model evaluations of all designs and calibrations, those that diagnose "
       "has made already included; held-out tests of a calibration count and may exceed it");
   list.Texts("--without", options.without, "effect that is not to be thought of");
 }

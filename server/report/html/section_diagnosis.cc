@@ -132,8 +132,12 @@ std::string DiagnosisSection(const ReportData& data) {
                      Escape(campaign) + "</code> says whether one is.</p>\n"
                : "";
   }
+  const bool by_earlier_rules = d->probabilities.empty() && !d->only_adequacy;
   std::string html = "<h2>Which effect is missing</h2>\n<p><strong>" +
                      Escape(d->sentence.empty() ? d->verdict : d->sentence) + "</strong></p>\n";
+  if (by_earlier_rules)
+    html += "<p>By rules of an earlier build; <code>calibctl diagnose " + Escape(campaign) +
+            "</code> asks again.</p>\n";
   html += fmt::format(
       "<p>Error of the best fit: {} sd; chi-squared {}, of a right model {} are expected "
       "({}).{}</p>\n",
@@ -141,7 +145,7 @@ std::string DiagnosisSection(const ReportData& data) {
       PValuesInWords(d->p_value, d->p_chi2, d->p_stages),
       d->only_adequacy ? " Whether an effect would fit better was not asked." : "");
   for (const std::string& warning : d->warnings) html += "<p>" + Escape(warning) + "</p>\n";
-  html += d->probabilities.empty() ? CandidateTable(*d) : EffectsSection(data, *d);
+  html += by_earlier_rules ? CandidateTable(*d) : EffectsSection(data, *d);
   html += Detectable(*d) + Reasons("Not to be detected", d->undetectable) +
           Reasons("Not tried", d->not_excitable) + NextExperimentHtml(*d);
   return html + fmt::format("<p class=\"sub\">Diagnosis of {}, kept as SHA-256 {}.</p>\n",

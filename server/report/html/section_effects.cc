@@ -143,10 +143,14 @@ std::string ChangePlot(const ReportData& data, std::size_t e, std::size_t j,
   const ControlAxis control = ControlOf(experiment);
   std::vector<double> missing, change;
   double largest = 3;
+  const std::vector<Eigen::Index> read = campaign::RowsRead(observable);
+  std::size_t next = 0;  // of the changes, which are those of rows that were read
   for (std::size_t i = 0; i < observable.values.size(); ++i) {
     const double sd = ErrorOf(data.view, observable, i);
     missing.push_back((observable.values[i] - prediction.mean[i]) / sd);
-    change.push_back(i < curve.change.size() ? curve.change[i] / sd : std::nan(""));
+    const bool has = next < read.size() && next < curve.change.size() &&
+                     read[next] == static_cast<Eigen::Index>(i);
+    change.push_back(has ? curve.change[next++] / sd : std::nan(""));
     for (const double value : {missing.back(), change.back()}) {
       if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
     }

@@ -13,7 +13,7 @@ class UserEffects : public CalibctlFixture {
  protected:
   // The small campaign with `hardening` declared, named in model.effects or not.
   static std::string Campaign(bool used, const std::string& formula = "1 + c * axial_strain") {
-    std::string text = SmallCampaign(12, 1);
+    std::string text = SmallCampaign(28, 1);
     const std::string fixed = "fixed: {poisson_ratio: 0.3}}";
     text.replace(
         text.find(fixed), fixed.size(),

@@ -8,6 +8,7 @@ namespace calib::diagnosis {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
@@ -74,6 +75,19 @@ TEST(Answer, SumsToOneAndSaysWhoIsInTheSet) {
   EXPECT_THAT(answer.credible_set[0].effects, ElementsAre("rolling"));
   EXPECT_EQ(answer.sentence,
             "One of these two, 95 %: rolling or cohesion; which of them, these tests cannot tell.");
+}
+
+// Where the chance that it names one is worth telling.
+TEST(Answer, ASecondSpecimenIsSpokenOfWhereItWouldTell) {
+  Eigen::VectorXd model(6);
+  model << 0.02, 0.5, 0.45, 0.01, 0.01, 0.01;
+  Answer answer = Said(PartsOf(kThree, model, 1e-5));
+  answer.repeat_names_alone = 0.42;
+  EXPECT_EQ(VerdictInWords(answer),
+            "One of these two, 95 %: rolling or cohesion; which of them, these tests cannot tell; "
+            "on a second specimen they would, with probability 42 %.");
+  answer.repeat_names_alone = 0.01;
+  EXPECT_THAT(VerdictInWords(answer), EndsWith("these tests cannot tell."));
 }
 
 TEST(Answer, PairsAreNamedTogetherOrNot) {

@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdint>
+
 #include "server/diagnosis/design_caps.h"
 #include "tests/support/race_toy.h"
 
@@ -82,11 +85,118 @@ TEST_F(DesignStages, BatchesThatDoNotFollowAreRefused) {
   EXPECT_FALSE(chain_.Add(scout).ok());
 }
 
+// What is not allowed is not begun: a batch that was paid for and tells nothing helps nobody.
+TEST_F(DesignStages, ABatchThatWouldExceedTheRunsAllowedIsNotMade) {
+  ToyRunMaker maker(toy_, chain_.names());
+  const absl::Status few = AnswerBy(chain_, maker, 8).status();
+  EXPECT_EQ(few.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(few.message(), HasSubstr("effects apart are 9 with those of the stage scout"));
+  EXPECT_THAT(few.message(), HasSubstr("8 are allowed"));
+  EXPECT_EQ(maker.made(), 0);
+  const absl::Status scout = AnswerBy(chain_, maker, 9).status();
+  EXPECT_EQ(scout.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(scout.message(), HasSubstr("are 33 with those of the stage main"));
+  EXPECT_EQ(maker.made(), 1);
+  EXPECT_EQ(maker.batches()[0].runs.size(), 9U);
+}
+
 TEST_F(DesignStages, TooFewBaseRunsAreSaidWithTheNumberNeeded) {
   const auto chain =
       DesignChain::Create(RaceToy(3, 5, 20).Measured({}, 1), {.without = RaceToy::Without()});
   EXPECT_EQ(chain.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(chain.status().message(), HasSubstr("it takes 24 runs"));
+}
+
+// A campaign whose runs another code made. Measured: specimen `number`, its load cell read with a
+// gain from the first reading on.
+report::CampaignView MadeElsewhere(double gain, std::uint64_t number) {
+  report::CampaignView view = RaceToy(1, 7, 96).Measured({.x = 0.4, .y = 0.6}, number);
+  view.campaign.model = {};
+  view.campaign.precomputed.emplace();
+  for (campaign::Experiment& e : view.campaign.experiments) {
+    e.specimens.clear();
+    campaign::MeasuredObservable& stress = e.observables[0];
+    const double start = stress.values.front();
+    for (std::size_t i = 0; i < stress.values.size(); ++i) {
+      stress.values[i] += gain * (stress.values[i] - start);
+      stress.sd[i] = campaign::ErrorOf(*stress.noise, stress.values[i]);
+    }
+  }
+  return view;
+}
+
+Answer AnswerAtOnce(DesignChain& chain) {
+  const auto next = chain.Next();
+  EXPECT_TRUE(next.ok()) << next.status();
+  if (!next.ok() || !std::holds_alternative<Answer>(*next)) {
+    ADD_FAILURE() << "a batch, and no answer";
+    return {};
+  }
+  return std::get<Answer>(*next);
+}
+
+void ExpectFinite(const Answer& answer) {
+  double sum = 0;
+  for (const NamedModel& model : answer.probabilities) sum += model.probability;
+  EXPECT_NEAR(sum, 1, 1e-9);
+  EXPECT_TRUE(std::isfinite(answer.adequacy_p));
+  for (const EffectAnswer& own : answer.candidates) {
+    EXPECT_TRUE(std::isfinite(own.uncertain)) << own.effect;
+    for (const auto& [name, value] : own.amplitude) EXPECT_TRUE(std::isfinite(value)) << name;
+    for (const auto& [name, value] : own.visible) EXPECT_TRUE(std::isfinite(value)) << name;
+  }
+}
+
+TEST(DesignStagesElsewhere, AnErrorOfTheLoadCellLeadsWithoutARun) {
+  for (const std::uint64_t number : {1UL, 2UL}) {
+    DesignChain chain = *DesignChain::Create(MadeElsewhere(0.25, number), {});
+    const Answer answer = AnswerAtOnce(chain);
+    ExpectFinite(answer);
+    ASSERT_EQ(answer.candidates.size(), 3U);
+    const EffectAnswer& first = answer.candidates.front();
+    EXPECT_EQ(first.effect, "load_cell_error");
+    EXPECT_GT(first.probability, 0.9);
+    EXPECT_LT(answer.adequate, 0.05);
+    EXPECT_TRUE(answer.runs.empty());
+    EXPECT_THAT(chain.Add({.stage = SamplePurpose::kScout}).message(), HasSubstr("cannot follow"));
+    // A negative offset is alike; of the second specimen the gain is the likelier strength.
+    if (number == 2) {
+      EXPECT_NEAR(first.amplitude.at("load_cell_error.gain"), 0.25, 0.1);
+    }
+  }
+}
+
+TEST(DesignStagesElsewhere, ARightModelIsAdequate) {
+  for (const std::uint64_t number : {1UL, 2UL}) {
+    DesignChain chain = *DesignChain::Create(MadeElsewhere(0, number), {});
+    const Answer answer = AnswerAtOnce(chain);
+    ExpectFinite(answer);
+    EXPECT_EQ(answer.verdict, AnswerVerdict::kAdequate) << answer.sentence;
+    EXPECT_GT(answer.adequacy_p, 0.01);
+    EXPECT_GT(answer.adequate, 0.5);
+    EXPECT_TRUE(answer.effects.empty());
+  }
+}
+
+// By the base's runs alone: nobody is in the race.
+TEST(Adequacy, OfANullIsPassedAndOfAStrongEffectIsNot) {
+  const RaceToy toy(1, 5);
+  const auto judged = [&toy](const HiddenTruth& truth) {
+    const auto answer = AdequacyOf(toy.Measured(truth, 1), 0.01);
+    EXPECT_TRUE(answer.ok()) << answer.status();
+    return answer.ok() ? *answer : Answer();
+  };
+  const Answer right = judged({.x = 0.3, .y = 0.7});
+  EXPECT_EQ(right.verdict, AnswerVerdict::kAdequate);
+  EXPECT_GE(right.adequacy_p, 0.01);
+  EXPECT_TRUE(right.candidates.empty());
+  EXPECT_TRUE(right.runs.empty());
+  const Answer wrong = judged({.x = 0.3, .y = 0.7, .effect = 0, .units = 5});
+  EXPECT_EQ(wrong.verdict, AnswerVerdict::kUnexplained);
+  EXPECT_LT(wrong.adequacy_p, 0.01);
+  EXPECT_GT(wrong.rms, right.rms);
+  EXPECT_EQ(wrong.sentence,
+            "The model misses the readings by more than noise and scatter explain.");
 }
 
 TEST(DesignCaps, OfSeventeenEffectsStayWithinTheirBudget) {

@@ -1,3 +1,4 @@
+// Which models are calibrated next, why, and what speaks against one.
 #include "server/diagnosis/improve_step.h"
 
 #include <gmock/gmock.h>
@@ -12,65 +13,69 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-CandidateEffect Candidate(const std::string& effect, std::optional<double> log_bayes) {
-  CandidateEffect candidate;
-  candidate.effect = effect;
-  if (log_bayes) {
-    candidate.over_base_evidence = ScaledEvidence{.log_evidence = {0, *log_bayes, 0}};
-  }
-  return candidate;
+using Names = std::vector<std::string>;
+
+// Models by probability; those that hold 95 % are the first seven.
+Answer AnswerWith(AnswerVerdict verdict) {
+  Answer answer{.verdict = verdict};
+  answer.probabilities = {{.effects = {"a", "b"}, .probability = 0.3},
+                          {.effects = {}, .probability = 0.2},
+                          {.effects = {"a"}, .probability = 0.15},
+                          {.effects = {"b"}, .probability = 0.12},
+                          {.effects = {}, .none_of_these = true, .probability = 0.1},
+                          {.effects = {"c"}, .probability = 0.05},
+                          {.effects = {"d"}, .probability = 0.04},
+                          {.effects = {"e"}, .probability = 0.04}};
+  return answer;
 }
 
-Diagnosis GroupOf(std::vector<CandidateEffect> candidates) {
-  Diagnosis diagnosis;
-  diagnosis.verdict = "ambiguous";
-  for (std::size_t k = 1; k < candidates.size(); ++k) {
-    candidates.front().confusable_with.push_back(candidates[k].effect);
-  }
-  diagnosis.candidates = std::move(candidates);
-  diagnosis.candidates.push_back(Candidate("outsider", 1e6));
-  return diagnosis;
+std::vector<Names> Tried(const Answer& answer, int most) {
+  std::vector<Names> effects;
+  for (const NamedModel* model : ModelsToTry(answer, most)) effects.push_back(model->effects);
+  return effects;
 }
 
-TEST(ImproveStep, ANamedEffectIsTriedAlone) {
-  Diagnosis diagnosis;
-  diagnosis.verdict = "missing_effect";
-  diagnosis.effect = "a";
-  diagnosis.candidates = {Candidate("a", 1), Candidate("b", 2)};
-  EXPECT_THAT(EffectsToTry(diagnosis), ElementsAre("a"));
-  EXPECT_EQ(WhyNext(diagnosis, "a"), "a is named and added.");
+TEST(ImproveStep, TheNamedModelIsTriedAlone) {
+  Answer answer = AnswerWith(AnswerVerdict::kMissingEffect);
+  answer.effects = {"b", "a"};  // most probable effect first: not the order of the model
+  EXPECT_THAT(Tried(answer, 3), ElementsAre(Names({"a", "b"})));
+  EXPECT_THAT(Tried(answer, 1), IsEmpty()) << "half of what is named is another model";
+  answer.effects = {"c"};
+  EXPECT_THAT(Tried(answer, 1), ElementsAre(Names({"c"})));
+  EXPECT_EQ(WhyNext(answer, *ModelsToTry(answer, 1)[0]), "c is named and added.");
+  answer.effects = {"a", "b"};
+  EXPECT_EQ(WhyNext(answer, answer.probabilities[0]), "a and b are named and added.");
 }
 
-TEST(ImproveStep, AGroupIsTriedByEvidenceWhereThatOfAllIsKnown) {
-  EXPECT_THAT(EffectsToTry(GroupOf({Candidate("a", 10), Candidate("b", 30), Candidate("c", 20)})),
-              ElementsAre("b", "c", "a"));
-  const Diagnosis partly =
-      GroupOf({Candidate("a", 10), Candidate("b", std::nullopt), Candidate("c", 20)});
-  EXPECT_THAT(EffectsToTry(partly), ElementsAre("a", "b", "c"));
-  EXPECT_THAT(WhyNext(partly, "b"), HasSubstr("do not tell apart: a, c as well."));
+TEST(ImproveStep, TheThreeFirstOfACredibleSetAreTried) {
+  Answer answer = AnswerWith(AnswerVerdict::kAmbiguous);
+  EXPECT_THAT(Tried(answer, 2), ElementsAre(Names({"a", "b"}), Names({"a"}), Names({"b"})));
+  EXPECT_THAT(Tried(answer, 1), ElementsAre(Names({"a"}), Names({"b"}), Names({"c"})));
+  EXPECT_THAT(Tried(answer, 0), IsEmpty());
+  EXPECT_EQ(WhyNext(answer, answer.probabilities[2]),
+            "a is added, of what these tests do not tell apart (probability 15 %).");
 }
 
-TEST(ImproveStep, OthersAreTriedWhoseRefitsCameNear) {
-  Diagnosis diagnosis;
-  for (const auto& [effect, error] :
-       {std::pair("wrong", 3.0), std::pair("near", 5.9), std::pair("far", 6.1),
-        std::pair("nearer", 4.0), std::pair("third", 2.0)}) {
-    diagnosis.candidates.push_back(Candidate(effect, std::nullopt));
-    diagnosis.candidates.back().campaign = "c9";
-    diagnosis.candidates.back().predicted_rms_error = error;
-  }
-  EXPECT_THAT(OthersToTry(diagnosis, "wrong", 3), ElementsAre("near", "nearer"));
-  EXPECT_THAT(OthersToTry(diagnosis, "near", 1), ElementsAre("third"));
-  diagnosis.candidates.back().campaign = "";
-  EXPECT_THAT(OthersToTry(diagnosis, "near", 1), IsEmpty()) << "not refitted";
+TEST(ImproveStep, WhoIsNotInTheSetIsNotTried) {
+  Answer answer = AnswerWith(AnswerVerdict::kAmbiguous);
+  answer.probabilities = {{.effects = {}, .probability = 0.9},
+                          {.effects = {"d"}, .probability = 0.06},
+                          {.effects = {"e"}, .probability = 0.04}};
+  EXPECT_THAT(Tried(answer, 3), ElementsAre(Names({"d"})));
 }
 
-TEST(ImproveStep, WhatHelpsMostIsTriedWhereNothingExplains) {
-  Diagnosis diagnosis;
-  diagnosis.verdict = "unexplained";
-  EXPECT_THAT(EffectsToTry(diagnosis), IsEmpty());
-  diagnosis.best_partial = "a";
-  EXPECT_THAT(EffectsToTry(diagnosis), ElementsAre("a"));
+TEST(ImproveStep, WhereNothingExplainsTheMostProbableIsTriedWhateverItsProbability) {
+  Answer answer = AnswerWith(AnswerVerdict::kUnexplained);
+  EXPECT_THAT(Tried(answer, 3), ElementsAre(Names({"a", "b"})));
+  EXPECT_THAT(Tried(answer, 1), ElementsAre(Names({"a"})));
+  EXPECT_EQ(WhyNext(answer, answer.probabilities[0]),
+            "a and b are added, the most probable of what does not explain all (30 %).");
+  answer.probabilities = {{.none_of_these = true, .probability = 0.98},
+                          {.effects = {}, .probability = 0.01},
+                          {.effects = {"c"}, .probability = 0.01}};
+  EXPECT_THAT(Tried(answer, 3), ElementsAre(Names({"c"})));
+  answer.probabilities.pop_back();
+  EXPECT_THAT(Tried(answer, 3), IsEmpty());
 }
 
 TEST(ImproveStep, AModelThatComesNoCloserIsNoStep) {
@@ -78,7 +83,8 @@ TEST(ImproveStep, AModelThatComesNoCloserIsNoStep) {
   EXPECT_EQ(WhyNoStep(without, {.rms_error = 1, .has_posterior = true, .log_evidence = 5}), "");
   EXPECT_EQ(WhyNoStep(without, {.rms_error = 2.5, .has_posterior = true, .log_evidence = 50}),
             "it comes no closer, 2.5 sd, 2 without it");
-  EXPECT_THAT(WhyNoStep(without, {.rms_error = 2.5}), HasSubstr("it has no posterior and it"));
+  EXPECT_THAT(WhyNoStep(without, {.rms_error = 2.5, .has_posterior = false}),
+              HasSubstr("it has no posterior and it"));
   EXPECT_NE(WhyNoStep(without, {.rms_error = std::numeric_limits<double>::quiet_NaN(),
                                 .has_posterior = true}),
             "");
@@ -94,21 +100,8 @@ TEST(ImproveStep, EvidenceAgainstItOutweighsAFitThatIsALittleCloser) {
   EXPECT_EQ(WhyNoStep(without, with), "");
   with.log_evidence = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(WhyNoStep(without, with), "");
-  with = {.rms_error = 1.0};  // nothing to hold against it but that it is not known
-  EXPECT_EQ(WhyNoStep(without, with), "");
-}
-
-TEST(ImproveStep, AnEffectThatMissesWhatIsLeftOutIsNoStep) {
-  CalibratedModel without{.rms_error = 2, .has_posterior = true, .left_out_error = 2.5};
-  CalibratedModel with{.rms_error = 1, .has_posterior = true, .left_out_error = 3};
-  EXPECT_THAT(WhyNoStep(without, with), HasSubstr("left out of the fit, 3 sd, 2.5 without it"));
-  with.left_out_error = 2.4;
-  EXPECT_EQ(WhyNoStep(without, with), "");
-  with.left_out_error = std::nullopt;
-  EXPECT_EQ(WhyNoStep(without, with), "") << "not known, so nothing to hold against it";
-  without.left_out_error = 0.7;
-  with.left_out_error = 0.9;
-  EXPECT_EQ(WhyNoStep(without, with), "") << "both as of a right model";
+  with = {.rms_error = 1.0, .has_posterior = false, .log_evidence = -1e3};
+  EXPECT_EQ(WhyNoStep(without, with), "") << "an evidence without a posterior is none";
 }
 
 }  // namespace

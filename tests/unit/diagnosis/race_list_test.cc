@@ -148,6 +148,46 @@ TEST(RaceList, TheTextOfADesignIsReadBackAsItsCampaign) {
   }
 }
 
+report::CampaignView RunsOfAnotherCode() {
+  report::CampaignView view = RaceToy(1, 1, 1).Measured({}, 1);
+  view.campaign.model = {};
+  view.campaign.precomputed.emplace();
+  for (campaign::Experiment& e : view.campaign.experiments) e.specimens.clear();
+  return view;
+}
+
+TEST(RaceList, OfRunsThatWereMadeElsewhereHasWhatIsCalculatedOnCurves) {
+  const Race race = RaceFor(RunsOfAnotherCode(), {"apparatus_compliance"});
+  EXPECT_THAT(race.Names(), ElementsAre("strain_offset", "load_cell_error"));
+  ASSERT_EQ(race.effects.size(), 3U);
+  for (const RacingEffect& entry : race.effects) {
+    EXPECT_THAT(entry.shapes, IsEmpty()) << entry.strength;
+    EXPECT_EQ(entry.design.shapes, 0) << entry.strength;
+    EXPECT_TRUE(std::isfinite(entry.near) && entry.most >= std::abs(entry.near)) << entry.strength;
+  }
+  EXPECT_THAT(race.numerics, IsEmpty());
+  EXPECT_THAT(race.excluded, IsEmpty());
+  EXPECT_THAT(race.not_excitable,
+              Contains(Pair("rolling_resistance",
+                            "the runs were made elsewhere, none can be made with it")));
+  EXPECT_THAT(race.not_excitable,
+              Contains(Pair("initial_density", "no fitted test reads porosity or void ratio")));
+  EXPECT_THAT(race.not_excitable, Contains(Pair("apparatus_compliance", "left out as asked for")));
+}
+
+TEST(RaceList, NobodyWhoCanBeCalculatedIsSaid) {
+  report::CampaignView view = RunsOfAnotherCode();
+  for (campaign::Experiment& e : view.campaign.experiments) e.test.clear();
+  const auto race = RaceOf(view, {});
+  EXPECT_EQ(race.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(race.status().message(),
+              HasSubstr("the runs of this campaign were made elsewhere, and no effect can be "
+                        "calculated on what they read: "));
+  EXPECT_THAT(race.status().message(),
+              HasSubstr("load_cell_error (the readings do not give axial and lateral stress)"));
+  EXPECT_THAT(race.status().message(), Not(HasSubstr("rolling_resistance")));
+}
+
 TEST(RaceList, NobodyLeftIsSaid) {
   const RaceToy toy(1, 1, 1);
   std::vector<std::string> all = RaceToy::Without();
@@ -155,6 +195,49 @@ TEST(RaceList, NobodyLeftIsSaid) {
   const auto race = RaceOf(toy.Measured({}, 1), all);
   EXPECT_EQ(race.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(race.status().message(), HasSubstr("no effect of this build can join"));
+}
+
+// The engine refuses shapes and crushing wherever a test pours spheres: no run of a design may ask
+// for them.
+TEST(WhyNotShown, GrainsOfAPouredTestMayKeepTheirShape) {
+  campaign::Campaign campaign;
+  campaign.experiments.resize(1);
+  campaign.experiments[0].test = "silo_discharge";
+  const auto why = [&campaign](const char* effect) {
+    return WhyNotShown(campaign, *dem::FindEffect(effect));
+  };
+  EXPECT_NE(why("initial_density"), "");
+  EXPECT_NE(why("initial_fabric"), "");
+  EXPECT_EQ(why("wall_friction"), "");
+  campaign.experiments.resize(2);
+  campaign.experiments[1].test = "triaxial_drained";
+  EXPECT_EQ(why("initial_density"), "") << "of the triaxial specimen";
+  EXPECT_EQ(why("nonspherical_shape"), "");
+  EXPECT_EQ(why("particle_crushing"),
+            "test silo_discharge pours its grains, which it leaves whole");
+  campaign.experiments[0].test = "collision";
+  EXPECT_EQ(why("particle_crushing"), "");
+}
+
+TEST(WhyNotShown, WhatDependsOnPressureShowsWhereThatDiffers) {
+  campaign::Campaign campaign;
+  campaign.experiments.resize(2);
+  for (campaign::Experiment& experiment : campaign.experiments) {
+    experiment.test = "triaxial_drained";
+    experiment.settings["confining_pressure"] = 2e5;
+  }
+  const auto why = [&campaign] {
+    return WhyNotShown(campaign, *dem::FindEffect("pressure_dependent_friction"));
+  };
+  EXPECT_EQ(why(),
+            "it shows only between tests at different pressures, or in one whose pressure changes");
+  campaign.experiments[1].settings["confining_pressure"] = 4e5;
+  EXPECT_EQ(why(), "");
+  campaign.experiments.resize(1);
+  for (const char* test : {"oedometric", "isotropic", "triaxial_undrained", "collision"}) {
+    campaign.experiments[0].test = test;
+    EXPECT_EQ(why(), "") << test;
+  }
 }
 
 }  // namespace

@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <string>
+#include <vector>
 
 namespace calib::diagnosis {
 namespace {
@@ -32,44 +35,61 @@ campaign::Campaign Triaxial(const std::string& observable, const std::vector<dou
   return campaign;
 }
 
-const ReadingEffect* Find(const std::vector<ReadingEffect>& effects, const std::string& parameter) {
-  for (const ReadingEffect& effect : effects) {
-    if (effect.parameter == parameter) return &effect;
-  }
-  return nullptr;
+Eigen::RowVectorXd RowOf(const std::vector<double>& values) {
+  return Eigen::Map<const Eigen::RowVectorXd>(values.data(),
+                                              static_cast<Eigen::Index>(values.size()));
+}
+
+// The readings of one run with an effect of this strength, less those without.
+Eigen::RowVectorXd Change(const campaign::Campaign& campaign, const std::string& strength,
+                          double value, const std::vector<double>& readings) {
+  const EffectsOnCurves effects = EffectsOnReadings(campaign);
+  const auto found = effects.by_strength.find(strength);
+  EXPECT_NE(found, effects.by_strength.end()) << strength;
+  if (found == effects.by_strength.end()) return {};
+  return found->second(RowOf(readings), Eigen::VectorXd::Constant(1, value)) - RowOf(readings);
 }
 
 const std::vector<double> kRatio = {1, 2, 3, 2, 3};
 
 // sigma_a is read as sigma_a + g (q - q0) [dem/effects/load_cell_error.h], here R + g (R - 1).
 TEST(EffectsOnReadings, GainOfTheLoadCell) {
-  std::vector<std::pair<std::string, std::string>> impossible;
-  const auto effects = EffectsOnReadings(Triaxial("stress_ratio", kRatio, 0.1),
-                                         Eigen::MatrixXd::Zero(1, 5), impossible);
-  const ReadingEffect* gain = Find(effects, "load_cell_error.gain");
-  ASSERT_NE(gain, nullptr);
-  for (int k = 0; k < 5; ++k) {
-    EXPECT_NEAR(gain->change(0, k), gain->unit * (kRatio[static_cast<std::size_t>(k)] - 1) / 0.1,
-                1e-12);
-  }
+  const campaign::Campaign campaign = Triaxial("stress_ratio", kRatio, 0.1);
+  const std::vector<double> run = {1, 2.5, 3.5, 2.5, 4};
+  const Eigen::RowVectorXd change = Change(campaign, "load_cell_error.gain", -0.2, run);
+  for (int k = 0; k < 5; ++k)
+    EXPECT_NEAR(change[k], -0.2 * (run[static_cast<std::size_t>(k)] - 1), 1e-12);
+  EXPECT_EQ(Change(campaign, "load_cell_error.gain", 0, run).cwiseAbs().maxCoeff(), 0);
+  const auto impossible = EffectsOnReadings(campaign).impossible;
   ASSERT_EQ(impossible.size(), 1U);
   EXPECT_EQ(impossible[0].first, "initial_density");
+  EXPECT_EQ(impossible[0].second, "no fitted test reads porosity or void ratio");
 }
 
-// The same through q/p: R = (1 + 2 m / 3) / (1 - m / 3).
+// The same through q/p: R = (1 + 2 m / 3) / (1 - m / 3). Exact at any strength.
 TEST(EffectsOnReadings, StressesFromTheirRatio) {
+  constexpr double kGain = 0.3;
   std::vector<double> q_over_p;
   for (const double r : kRatio) q_over_p.push_back(3 * (r - 1) / (r + 2));
-  std::vector<std::pair<std::string, std::string>> impossible;
-  const auto effects = EffectsOnReadings(Triaxial("q_over_p", q_over_p, 0.1),
-                                         Eigen::MatrixXd::Zero(1, 5), impossible);
-  const ReadingEffect* gain = Find(effects, "load_cell_error.gain");
-  ASSERT_NE(gain, nullptr);
+  const Eigen::RowVectorXd change =
+      Change(Triaxial("q_over_p", q_over_p, 0.1), "load_cell_error.gain", kGain, q_over_p);
   for (std::size_t k = 0; k < 5; ++k) {
-    const double r = kRatio[k] + gain->unit * (kRatio[k] - 1);
-    EXPECT_NEAR(gain->change(0, static_cast<Eigen::Index>(k)),
-                (3 * (r - 1) / (r + 2) - q_over_p[k]) / 0.1, 1e-12);
+    const double r = kRatio[k] + kGain * (kRatio[k] - 1);
+    EXPECT_NEAR(change[static_cast<Eigen::Index>(k)], 3 * (r - 1) / (r + 2) - q_over_p[k], 1e-12);
   }
+}
+
+// As MisreadLoads has it, where that can be.
+TEST(EffectsOnReadings, LoadCellsAreReadAsMisreadLoadsHasThem) {
+  const campaign::Campaign campaign = Triaxial("stress_ratio", kRatio, 0.1);
+  const std::vector<double> run = {1, 2.5, 3.5, 2.5, 4};
+  const Eigen::MatrixXd history = (RowOf(run) - RowOf(kRatio)) / 0.1;
+  const auto misread = MisreadLoads(campaign, campaign::MakeDataSet(campaign), history,
+                                    Eigen::VectorXd::Zero(1), Eigen::VectorXd::Constant(1, 3e3));
+  ASSERT_TRUE(misread);
+  const Eigen::RowVectorXd change = Change(campaign, "load_cell_error.offset", 3e3, run);
+  EXPECT_NEAR(change[0], 0.03, 1e-12);
+  EXPECT_LT((change - 0.1 * (*misread - history)).norm(), 1e-12);
 }
 
 TEST(MisreadLoads, EachHistoryByItsOwnGainAndOffset) {
@@ -135,45 +155,66 @@ TEST(MisreadLoads, NothingWhereItCannotBeCalculated) {
   EXPECT_FALSE(of(undrained)) << "q alone, at a lateral stress that is not known";
 }
 
-// y read at strain e is y(e - x C): minus the slope of its stage times x C.
+// y read at strain e is y(e - x C): minus the slope of its stage times x C, linear in C.
 TEST(EffectsOnReadings, ComplianceOfTheFrame) {
-  std::vector<std::pair<std::string, std::string>> impossible;
-  const auto effects = EffectsOnReadings(Triaxial("stress_ratio", kRatio, 0.1),
-                                         Eigen::MatrixXd::Zero(1, 5), impossible);
-  const ReadingEffect* compliance = Find(effects, "apparatus_compliance.compliance");
-  ASSERT_NE(compliance, nullptr);
-  const auto strain = [&](double ratio) { return compliance->unit * kPressure * (ratio - 1); };
-  EXPECT_NEAR(compliance->change(0, 0), 0, 1e-12);
-  EXPECT_NEAR(compliance->change(0, 2), -100 * strain(3) / 0.1, 1e-9);
-  EXPECT_NEAR(compliance->change(0, 3), 0, 1e-12) << "no neighbour on its stage";
+  constexpr double kCompliance = 2e-9;
+  const Eigen::RowVectorXd change = Change(Triaxial("stress_ratio", kRatio, 0.1),
+                                           "apparatus_compliance.compliance", kCompliance, kRatio);
+  EXPECT_NEAR(change[0], 0, 1e-12);
+  EXPECT_NEAR(change[2], -100 * kCompliance * kPressure * (3 - 1), 1e-12);
+  EXPECT_NEAR(change[3], 0, 1e-12) << "no neighbour on its stage";
 }
 
-// A measurement made with a gain is explained by it exactly, and never by a negative strength of a
-// one-sided effect.
-TEST(Join, FindsTheStrength) {
-  const double gain = 0.08;
-  std::vector<double> read;
-  for (const double r : kRatio) read.push_back(r + gain * (r - 1));
-  const auto campaign = Triaxial("stress_ratio", read, 0.1);
-  Eigen::MatrixXd histories(1, 5);  // the model: kRatio
-  for (Eigen::Index k = 0; k < 5; ++k) {
-    histories(0, k) =
-        (kRatio[static_cast<std::size_t>(k)] - read[static_cast<std::size_t>(k)]) / 0.1;
-  }
-  std::vector<std::pair<std::string, std::string>> impossible;
-  const auto effects = EffectsOnReadings(campaign, histories, impossible);
-  const ReadingEffect* effect = Find(effects, "load_cell_error.gain");
-  ASSERT_NE(effect, nullptr);
-  const inference::FittedModel model{
-      .histories = histories, .covariance = Eigen::MatrixXd::Identity(5, 5), .parameters = 1};
-  Eigen::VectorXd strengths;
-  const auto joined = Join(model, *effect, -10, 10, strengths);
-  EXPECT_NEAR(strengths[0] * effect->unit, gain, 1e-12);
-  EXPECT_NEAR(joined.histories.Values().norm(), 0, 1e-12);
-  EXPECT_EQ(joined.parameters, 2);
-  Join({.histories = -histories, .covariance = model.covariance, .parameters = 1}, *effect, 0, 10,
-       strengths);
-  EXPECT_EQ(strengths[0], 0);
+// The stress that closes 63 % of the gaps is a tenth of the largest load.
+TEST(EffectsOnReadings, GapsThatCloseUnderLoad) {
+  const Eigen::RowVectorXd change =
+      Change(Triaxial("stress_ratio", kRatio, 0.1), "strain_offset.offset", 1e-3, kRatio);
+  EXPECT_NEAR(change[1], -100 * 1e-3 * (1 - std::exp(-5)), 1e-12) << "at half the load";
+}
+
+// n falls by d; e = n / (1 - n), so that de = -d (1 + e)^2 to first order.
+TEST(EffectsOnReadings, ADenserStart) {
+  const std::vector<double> void_ratio = {0.8, 0.79, 0.78, 0.78, 0.77};
+  const Eigen::RowVectorXd change = Change(Triaxial("void_ratio", void_ratio, 0.1),
+                                           "initial_density.densification", 0.02, void_ratio);
+  EXPECT_NEAR(change[0], -0.02 * 1.8 * 1.8, 1e-12);
+  EXPECT_NEAR(change[4], -0.02 * 1.77 * 1.77, 1e-12);
+}
+
+TEST(EffectsOnReadings, WhatTheReadingsDoNotTellIsSaid) {
+  const auto reasons = [](const campaign::Campaign& campaign) {
+    std::map<std::string, std::string> by_effect;
+    for (const auto& [effect, why] : EffectsOnReadings(campaign).impossible)
+      by_effect[effect] = why;
+    return by_effect;
+  };
+  const std::string no_stress = "the readings do not give axial and lateral stress";
+  campaign::Campaign campaign = Triaxial("void_ratio", kRatio, 0.1);
+  EXPECT_EQ(reasons(campaign).at("load_cell_error"), no_stress);
+  EXPECT_EQ(reasons(campaign).at("strain_offset"), no_stress);
+  campaign = Triaxial("stress_ratio", kRatio, 0.1);
+  campaign.experiments[0].control_name = "axial_stress";
+  EXPECT_EQ(reasons(campaign).at("apparatus_compliance"),
+            "axial strain is not the control of any fitted test");
+  EXPECT_EQ(reasons(campaign).count("load_cell_error"), 0U);
+  // A test without a rig has no load on it, whatever it reads.
+  campaign = Triaxial("stress_ratio", kRatio, 0.1);
+  campaign.experiments[0].observables[0].name = "axial_stress";
+  campaign.experiments[0].observables.push_back(campaign.experiments[0].observables[0]);
+  campaign.experiments[0].observables[1].name = "lateral_stress";
+  campaign.experiments[0].observables[1].values = {1, 1, 1, 1, 1};
+  EXPECT_EQ(reasons(campaign).count("load_cell_error"), 0U);
+  campaign.experiments[0].test = "simple_shear";
+  EXPECT_EQ(reasons(campaign).at("load_cell_error"), no_stress);
+}
+
+// A run in which q is three p has no ratio of stresses; nothing is NaN.
+TEST(EffectsOnReadings, ARunWithoutAStressRatioStaysAsItIs) {
+  const campaign::Campaign campaign = Triaxial("q_over_p", {0, 0.5, 1, 0.5, 1}, 0.1);
+  const Eigen::RowVectorXd change =
+      Change(campaign, "load_cell_error.gain", 0.1, {0, 0.5, 3, 0.5, 1});
+  EXPECT_GT(change[1], 0);
+  EXPECT_EQ(change[2], 0);
 }
 
 }  // namespace

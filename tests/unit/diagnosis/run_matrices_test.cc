@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "server/diagnosis/base_region.h"
 #include "tests/support/race_toy.h"
@@ -62,6 +64,82 @@ TEST_F(RunMatrices, DrawsForWhatWasHeldOutAreNoUnfinishedRuns) {
   EXPECT_EQ(BaseRunsOf(view_)->samples, 41);
   view_.samples.back().clear_purpose();
   EXPECT_EQ(BaseRunsOf(view_)->unfinished, 1);
+}
+
+// The campaign on one packing, its best estimate run three times more: the twins depart from the
+// tenth run in both readings of the first test, and the posterior's record knows of its stress.
+report::CampaignView WithTwins(report::CampaignView view) {
+  for (campaign::Experiment& e : view.campaign.experiments) e.specimens.resize(1);
+  for (int r = 0; r < 3; ++r) {
+    v1::Sample& twin = view.samples.emplace_back(view.samples[9]);
+    twin.set_index(30 + r);
+    twin.set_purpose("replicate");
+    for (const char* name : {"low", "high"}) {
+      report::StateHistory history = view.states[{name, 9}];
+      for (v1::State& state : history.states) {
+        const double part = 0.01 * (r - 1) * (1 + state.load_step());
+        state.set_values(0, state.values(0) * (1 + part));
+        state.set_values(1, state.values(1) + part);
+      }
+      view.states[{name, 30 + r}] = std::move(history);
+    }
+  }
+  v1::Posterior::Scatter& record = *view.posterior.add_scatter();
+  record.set_experiment("low");
+  record.set_observable("deviatoric_stress");
+  record.set_from("repeats");
+  record.set_runs(3);
+  for (int i = 0; i < RaceToy::kReadings; ++i) record.add_sd(1e3);
+  return view;
+}
+
+TEST_F(RunMatrices, TwinsAreKeptAsDeparturesOnTheScaleOfHistories) {
+  const report::CampaignView view = WithTwins(view_);
+  const BaseRuns base = *BaseRunsOf(view);
+  ASSERT_EQ(base.twins.rows(), 3);
+  ASSERT_EQ(base.twins.cols(), 96);
+  EXPECT_LT(base.twins.row(1).cwiseAbs().maxCoeff(), 1e-9) << "the middle one";
+  EXPECT_EQ(base.twins.rightCols(72).cwiseAbs().maxCoeff(), 0) << "of what no record knows";
+  const report::StateHistory& own = view.states.at({"low", 9});
+  const std::vector<double>& measured = view.campaign.experiments[0].observables[0].values;
+  for (int i = 0; i < RaceToy::kReadings; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double stress = own.states[at].values(0), sd = RaceToy::kNoise * measured[at];
+    EXPECT_NEAR(base.twins(2, i), 0.01 * (1 + i) * stress / sd, 1e-9) << i;
+    EXPECT_NEAR(base.twins(0, i), -base.twins(2, i), 1e-9) << i;
+  }
+  const DesignRows rows(AxesOver(campaign::MarginalPriors(view.campaign), base.values), race_,
+                        Eigen::Vector4d::Ones());
+  EXPECT_EQ(SetRunsOf(base, rows, {}, WholeOf(race_)).twins, base.twins);
+  EXPECT_EQ(base_.twins.rows(), 0);
+}
+
+TEST_F(RunMatrices, DeparturesAreTheScaleToFirstOrder) {
+  constexpr double kSmall = 1e-6;  // of an sd: what is of second order is below 1e-7 of it
+  const inference::DataSet data = campaign::MakeDataSet(view_.campaign);
+  Eigen::MatrixXd value(1, 96), departure(1, 96);
+  for (Index k = 0; k < 96; ++k) {
+    const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
+    value(0, k) = reading.value;
+    departure(0, k) = kSmall * reading.sd * (1 + static_cast<double>(k));
+  }
+  const Eigen::MatrixXd expected =
+      base_.scale.Scaled(value + departure) - base_.scale.Scaled(value);
+  EXPECT_LT((base_.scale.Departures(departure) - expected).norm(), 1e-5 * expected.norm());
+}
+
+// What an emulator misses at one point all twins share; runs on other packings are of their own.
+TEST_F(RunMatrices, TheFirstTwinAloneIsARunOfItsOwn) {
+  report::CampaignView view = WithTwins(view_);
+  const BaseRuns base = *BaseRunsOf(view);
+  EXPECT_EQ(base.values.rows(), 31);
+  EXPECT_EQ(base.histories.rows(), 31);
+  ASSERT_EQ(base.stream.size(), 31u);
+  EXPECT_EQ(base.stream.back(), 30);
+  EXPECT_EQ(base.samples, 33) << "streams go on behind all of them";
+  EXPECT_EQ(base.unfinished, 0);
+  view.campaign.experiments[1].specimens.resize(4);
+  EXPECT_EQ(BaseRunsOf(view)->values.rows(), 33);
 }
 
 TEST_F(RunMatrices, PackingsGoByStreamAndStreamsGoOn) {
@@ -141,6 +219,50 @@ TEST_F(RunMatrices, LoadCellsAreCalculatedWhereTheCurvesAllowIt) {
   EXPECT_NEAR(d.outputs(0, 11) * RaceToy::kNoise, g, 0.5 * std::abs(g));
 }
 
+// A design without runs is none; where none can be made every entry is calculated all the same.
+TEST_F(RunMatrices, AllEntriesAreCalculatedOfRunsMadeElsewhereAlone) {
+  std::vector<std::string> without = RaceToy::Without();
+  std::erase(without, "load_cell_error");
+  for (campaign::Experiment& e : view_.campaign.experiments) e.control[0] = e.path[0].target = 0;
+  view_.campaign.model.user_effects.clear();
+  const BaseRuns own = *BaseRunsOf(view_);
+  EXPECT_FALSE(own.elsewhere);
+  const Race run = WithCalculated(*RaceOf(view_, without), own);
+  ASSERT_EQ(run.effects.size(), 2u);
+  EXPECT_EQ(EntriesRun(run, WholeOf(run).kept).size(), 2u);
+  view_.campaign.precomputed.emplace();
+  for (campaign::Experiment& e : view_.campaign.experiments) e.specimens.clear();
+  const BaseRuns base = *BaseRunsOf(view_);
+  EXPECT_TRUE(base.elsewhere);
+  EXPECT_EQ(base.packings, 1);
+  EXPECT_EQ(base.share, 1);
+  EXPECT_EQ(base.calculated.count("apparatus_compliance.compliance"), 1u);
+  const Race race = WithCalculated(*RaceOf(view_, without), base);
+  EXPECT_EQ(race.effects.size(), 2u);
+  EXPECT_TRUE(EntriesRun(race, WholeOf(race).kept).empty());
+  const DesignRows rows(rows_.axes(), race, Eigen::Vector2d(0.01, 1e3));
+  const inference::SetRuns runs = SetRunsOf(base, rows, {}, WholeOf(race));
+  EXPECT_EQ(runs.histories.rows(), 30);
+  EXPECT_EQ(runs.differences.outputs.rows(), 64);
+  EXPECT_TRUE(runs.differences.outputs.allFinite());
+}
+
+// Hand calculation: 2 sd of the noise as scatter, all of which the measurement has, and an eighth
+// of it for the mean of eight packings: sqrt(1 + 9 / 8 * 4).
+TEST_F(RunMatrices, ErrorsOfAMeasurementHoldItsScatter) {
+  EXPECT_EQ(base_.sd, Eigen::VectorXd::Ones(96));
+  v1::Posterior::Scatter& record = *view_.posterior.add_scatter();
+  record.set_experiment("high");
+  record.set_observable("volumetric_strain");
+  record.set_from("realizations");
+  record.set_runs(8);
+  record.set_share(1);
+  for (int i = 0; i < RaceToy::kReadings; ++i) record.add_sd(2 * RaceToy::kNoise);
+  const BaseRuns base = *BaseRunsOf(view_);
+  EXPECT_EQ(base.sd.head(72), Eigen::VectorXd::Ones(72));
+  EXPECT_LT((base.sd.tail(24).array() - std::sqrt(5.5)).abs().maxCoeff(), 1e-9);
+}
+
 TEST_F(RunMatrices, RegionHoldsThePosteriorAndSaysWhenRunsAreTooFew) {
   const auto region = RegionOf(base_, campaign::Priors(view_.campaign));
   ASSERT_TRUE(region.ok()) << region.status();
@@ -158,6 +280,42 @@ TEST_F(RunMatrices, RegionHoldsThePosteriorAndSaysWhenRunsAreTooFew) {
 TEST_F(RunMatrices, ReadingsWithoutAnErrorCannotBeJudged) {
   view_.campaign.experiments[0].observables[0].sd.clear();
   EXPECT_EQ(BaseRunsOf(view_).status().code(), absl::StatusCode::kFailedPrecondition);
+}
+
+campaign::Campaign WithPackings(const std::vector<std::size_t>& packings) {
+  campaign::Campaign campaign;
+  for (const std::size_t count : packings) {
+    campaign::Experiment& experiment = campaign.experiments.emplace_back();
+    experiment.role = campaign::Role::kCalibrate;
+    experiment.specimens.resize(count);
+  }
+  return campaign;
+}
+
+// A packing that is on both sides would let a draw be judged by runs on it.
+TEST(PackingsApart, NoPackingOfAnyExperimentIsInTwoGroups) {
+  const std::vector<std::vector<std::size_t>> cases = {{8, 8}, {4, 8}, {4, 6}, {5, 8}, {6, 9, 1}};
+  for (const std::vector<std::size_t>& packings : cases) {
+    const int groups = PackingsApart(WithPackings(packings));
+    for (const std::size_t count : packings) {
+      if (count < 2) continue;
+      std::set<std::pair<std::size_t, int>> seen;
+      for (int stream = 0; stream < 400; ++stream) {
+        seen.emplace(static_cast<std::size_t>(stream) % count, stream % groups);
+      }
+      EXPECT_EQ(seen.size(), count) << packings.front() << " packings and others";
+    }
+  }
+  EXPECT_EQ(PackingsApart(WithPackings({8, 8})), 8);
+  EXPECT_EQ(PackingsApart(WithPackings({4, 8})), 4);
+  EXPECT_EQ(PackingsApart(WithPackings({4, 6})), 2);
+  EXPECT_EQ(PackingsApart(WithPackings({1})), 1);
+}
+
+TEST(PackingsApart, HeldOutExperimentsDoNotCount) {
+  campaign::Campaign campaign = WithPackings({8, 3});
+  campaign.experiments[1].role = campaign::Role::kValidate;
+  EXPECT_EQ(PackingsApart(campaign), 8);
 }
 
 }  // namespace
