@@ -84,7 +84,6 @@ absl::StatusOr<report::CampaignView> ExtendedCalibration::Once(const report::Cam
                      .near = model.posterior,
                      .samples = std::nullopt,
                      .iterations = std::nullopt,
-                     .replicates = std::nullopt,
                      .model_evaluations = budget};
   if (times > 1 && by_samples) plan.samples = samples;
   if (times > 1 && !by_samples) plan.iterations = times * campaign.max_iterations;

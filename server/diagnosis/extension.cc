@@ -219,14 +219,12 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
       .lineage = {.parent = parent.status.campaign(), .purpose = plan.purpose},
       .effects = plan.effects,
       .parameters = {},
-      .fixed = {},
       .held_out = plan.held_out,
       .samples = plan.samples,
       .max_iterations = plan.iterations,
       .first_proposal =
           campaign::FirstProposal{.prior_share = plan.near.empty() ? kPriorShare : kDefensive,
                                   .places = {}},
-      .replicates = plan.replicates,
       .model_evaluations = plan.model_evaluations,
       .rows = {}};
   campaign::Campaign grown = parent.campaign;

@@ -28,7 +28,7 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& ef
 
 struct ExtensionPlan {
   std::vector<std::string> effects{};
-  std::string purpose{};  ///< extension | warm_fit
+  std::string purpose{};  ///< a word of kDerivedForWords
   /// What is known of the parameters with the effects, SI: the first samples, but for a tenth from
   /// the prior, are drawn twice as wide about it. Empty: half of them from the prior, half about
   /// the parent's posterior.
@@ -36,7 +36,6 @@ struct ExtensionPlan {
   bool held_out = true;                             ///< false: held-out experiments stay closed
   std::optional<int> samples{};                     ///< as the parent
   std::optional<int> iterations{};                  ///< as the parent
-  std::optional<int> replicates{};                  ///< as the parent
   std::optional<std::int64_t> model_evaluations{};  ///< budget; as the parent
 };
 

@@ -14,34 +14,6 @@ namespace {
 
 using Kind = YamlNode::Kind;
 
-// What ties a parameter to others goes with it: entries of the lists that name it.
-void Untie(const std::string& name, YamlNode& root) {
-  const auto names = [&name](const YamlNode& item) {
-    for (const YamlNode& part : item.items) {
-      if (part.scalar == name) return true;
-    }
-    // In the text of a constraint, as a whole word.
-    for (std::size_t at = item.scalar.find(name); at != std::string::npos;
-         at = item.scalar.find(name, at + 1)) {
-      const auto part_of_name = [&item](std::size_t i) {
-        return i < item.scalar.size() &&
-               (std::isalnum(static_cast<unsigned char>(item.scalar[i])) != 0 ||
-                item.scalar[i] == '_' || item.scalar[i] == '.');
-      };
-      if (!part_of_name(at - 1) && !part_of_name(at + name.size())) return true;
-    }
-    return false;
-  };
-  for (const char* key : {"prior_correlation", "constraints"}) {
-    if (YamlFind(root, key) == nullptr) continue;
-    YamlNode& list = YamlAt(root, key);
-    if (list.kind == Kind::kScalar ? names(list)
-                                   : (std::erase_if(list.items, names), list.items.empty())) {
-      YamlErase(root, key);
-    }
-  }
-}
-
 void ChangeModel(const Derivation& derivation, YamlNode& root) {
   YamlNode& model = YamlAt(root, "model");
   if (!derivation.effects.empty()) {
@@ -59,11 +31,6 @@ void ChangeModel(const Derivation& derivation, YamlNode& root) {
                                         {"min", YamlNumber(prior.min)},
                                         {"max", YamlNumber(prior.max)}});
   }
-  for (const auto& [name, value] : derivation.fixed) {
-    YamlErase(parameters, name);
-    Untie(name, root);
-    YamlAt(YamlAt(model, "fixed"), name) = YamlNumber(value);
-  }
 }
 
 bool IsHeldOut(const YamlNode& experiment) {
@@ -71,27 +38,10 @@ bool IsHeldOut(const YamlNode& experiment) {
   return role != nullptr && ValueOf(kRoleWords, role->scalar) == Role::kValidate;
 }
 
-// out: an entry of `experiments`.
-void SetStaging(const dem::Staging& staging, YamlNode& out) {
-  YamlNode& node = YamlAt(out, "staging");
-  if (staging.rate) YamlAt(node, "rate") = YamlNumber(*staging.rate);
-  if (staging.step) YamlAt(node, "step") = YamlNumber(*staging.step);
-  if (staging.damping_loading && staging.damping_settling) {
-    YamlAt(node, "damping") =
-        YamlList({YamlNumber(*staging.damping_loading), YamlNumber(*staging.damping_settling)});
-  }
-}
-
 void ChangeExperiments(const Derivation& derivation, YamlNode& root) {
   YamlNode& experiments = YamlAt(root, "experiments");
   if (!derivation.experiments.empty()) experiments = YamlList(derivation.experiments);
   if (!derivation.held_out) std::erase_if(experiments.items, IsHeldOut);
-  for (YamlNode& experiment : experiments.items) {
-    const YamlNode* name = YamlFind(experiment, "name");
-    if (name == nullptr) continue;
-    const auto staging = derivation.staging.find(name->scalar);
-    if (staging != derivation.staging.end()) SetStaging(staging->second, experiment);
-  }
 }
 
 YamlNode Rows(const Derivation& derivation) {
@@ -102,19 +52,6 @@ YamlNode Rows(const Derivation& derivation) {
     rows.push_back(std::move(node));
   }
   return YamlList(std::move(rows));
-}
-
-// A batch of runs about a place is no calibration: what steers the parent's would refuse it, or not
-// look at that place.
-void MakeBatch(YamlNode& root) {
-  YamlNode batch = YamlMap({{"method", YamlScalar("iterative_bayesian_filter")}});
-  if (const YamlNode* parent = YamlFind(root, "inference"); parent != nullptr) {
-    if (const YamlNode* design = YamlFind(*parent, "design"); design != nullptr) {
-      YamlAt(batch, "design") = *design;
-    }
-  }
-  YamlAt(root, "inference") = std::move(batch);
-  YamlErase(root, "early_stopping");
 }
 
 // The samples that surrogate_msrs starts from grow with the parameters.
@@ -146,7 +83,6 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
     YamlErase(root, "budget");
     return;
   }
-  if (ToDerivedFor(derivation.lineage.purpose) == DerivedFor::kWarmFit) MakeBatch(root);
   YamlNode& inference = YamlAt(root, "inference");
   if (derivation.samples) {
     YamlAt(inference, "samples") = YamlScalar(absl::StrCat(*derivation.samples));
@@ -154,9 +90,6 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
   if (!derivation.parameters.empty()) RaiseSamples(root);
   if (derivation.max_iterations) {
     YamlAt(inference, "max_iterations") = YamlScalar(absl::StrCat(*derivation.max_iterations));
-  }
-  if (derivation.replicates) {
-    YamlAt(inference, "replicates") = YamlScalar(absl::StrCat(*derivation.replicates));
   }
   if (derivation.model_evaluations) {
     YamlAt(YamlAt(root, "budget"), "model_evaluations") =

@@ -1,9 +1,8 @@
 #pragma once
 // The text of a campaign that follows from another one: the same experiments, model and settings,
 // with what is said here changed. Pure: the same parent and changes give the same text, by which it
-// is recognised when it is asked for again. However many runs diverge, it is not paused. With the
-// purpose warm_fit it is a batch of runs: iterative_bayesian_filter whatever the parent's method,
-// none stopped early. An extension of surrogate_msrs gets the samples that its parameters ask for.
+// is recognised when it is asked for again. However many runs diverge, it is not paused. An
+// extension of surrogate_msrs gets the samples that its parameters ask for.
 
 #include <cstdint>
 #include <map>
@@ -25,13 +24,10 @@ struct Derivation {
   std::vector<std::string> effects{};  ///< joined to the model, in addition to the parent's
   /// Parameters that are calibrated in addition (dotted names), with their priors in SI.
   std::map<std::string, dem::DefaultPrior> parameters{};
-  /// Held constant; replaces what the parent calibrates or fixes under the name.
-  std::map<std::string, double> fixed{};
   bool held_out = true;                 ///< false: experiments with role validate are left out
   std::vector<YamlNode> experiments{};  ///< in the place of the parent's, if there are any
   std::optional<int> samples{}, max_iterations{};
   std::optional<FirstProposal> first_proposal{};
-  std::optional<int> replicates{};
   std::optional<std::int64_t> model_evaluations{};  ///< its budget; not of a table or design
   /// Makes it a table, or gives a design its first batch: parameter values by name, and whose
   /// specimen and seed they take.
@@ -43,8 +39,6 @@ struct Derivation {
   /// Makes it a design with these effects to race; their parameters and those of the numerics are
   /// among `parameters`.
   std::optional<std::vector<std::string>> race{};
-  /// By name of an experiment: replaces the fields of its staging that are set here.
-  std::map<std::string, dem::Staging> staging{};
 };
 
 /// INVALID_ARGUMENT when the parent's text cannot be read; whether the result is a valid campaign

@@ -22,32 +22,19 @@ TEST(YamlText, ReadsBackToTheSameTree) {
   EXPECT_EQ(again.root->entries[1].value.items[0].entries[1].value.items[0].scalar, "-1");
 }
 
-dem::Staging Staged(std::optional<double> rate, std::optional<double> step) {
-  dem::Staging staging;
-  staging.rate = rate;
-  staging.step = step;
-  if (step) {
-    staging.damping_loading = 0.4;
-    staging.damping_settling = 0.9;
-  }
-  return staging;
-}
-
 TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
   const auto text = Derive(
       "name: a\nmodel: {contact: linear}\nparameters: {young_modulus: default}\n"
       "experiments:\n  - {name: x, staging: {rate: 0.2 1/s}}\n  - {name: z}\n"
       "  - {name: y, role: validate}\n",
       {.name = "a + rolling_resistance",
-       .lineage = {.parent = "c1", .purpose = "warm_fit"},
+       .lineage = {.parent = "c1", .purpose = "extension"},
        .effects = {"rolling_resistance"},
        .parameters = {{"rolling_resistance.friction", {.kind = "uniform", .min = 0, .max = 1}}},
        .held_out = false,
        .samples = 12,
        .first_proposal = FirstProposal{.prior_share = 0.5,
-                                       .places = {{"young_modulus", {.center = 1e9, .sd = 1e7}}}},
-       .replicates = 0,
-       .staging = {{"x", Staged(0.4, std::nullopt)}, {"z", Staged(std::nullopt, 0.001)}}});
+                                       .places = {{"young_modulus", {.center = 1e9, .sd = 1e7}}}}});
   ASSERT_TRUE(text.ok()) << text.status();
   EXPECT_EQ(
       *text,
@@ -55,13 +42,10 @@ TEST(Derive, JoinsAnEffectAndStartsWhereTheParentEnded) {
       "model: {contact: linear, effects: [rolling_resistance]}\n"
       "parameters: {young_modulus: default, rolling_resistance.friction: {prior: uniform, min: "
       "0, max: 1}}\n"
-      "experiments: [{name: x, staging: {rate: 0.4}}, {name: z, staging: {step: 0.001, damping: "
-      "[0.4, 0.9]}}]\n"
-      "lineage: {parent: c1, purpose: warm_fit}\n"
+      "experiments: [{name: x, staging: {rate: 0.2 1/s}}, {name: z}]\n"
+      "lineage: {parent: c1, purpose: extension}\n"
       "inference:\n"
-      "  method: iterative_bayesian_filter\n"
       "  samples: 12\n"
-      "  replicates: 0\n"
       "  first_proposal: {prior_share: 0.5, young_modulus: {center: 1e+09, sd: 1e+07}}\n"
       "failure: {pause_above: 1}\n")
       << *text;
@@ -82,27 +66,6 @@ class DerivedFrom : public ::testing::TestWithParam<const char*> {
       {"twisting_resistance.friction", {.kind = "uniform", .min = 0, .max = 1}},
       {"twisting_resistance.stiffness_ratio", {.kind = "uniform", .min = 0.1, .max = 1}}};
 };
-
-TEST_P(DerivedFrom, AWarmFitIsABatchAboutItsPlace) {
-  const auto text =
-      Derive(Parent(), {.name = "fit",
-                        .lineage = {.parent = "c1", .purpose = "warm_fit"},
-                        .effects = {"twisting_resistance"},
-                        .parameters = kNew,
-                        .samples = 6,
-                        .max_iterations = 1,
-                        .first_proposal = FirstProposal{.prior_share = 0.5, .places = {}},
-                        .replicates = 0});
-  ASSERT_TRUE(text.ok()) << text.status();
-  EXPECT_EQ(testing::ProblemsOf(*text), "") << *text;
-  const Campaign fit =
-      ReadCampaign(*text, "c.yaml", testing::ReaderOf(testing::GoodFiles())).campaign;
-  EXPECT_EQ(fit.method, Method::kIterativeBayesianFilter);
-  EXPECT_EQ(fit.samples, 6);
-  EXPECT_TRUE(fit.first_proposal.has_value());
-  EXPECT_FALSE(fit.early_stopping.has_value());
-  EXPECT_TRUE(fit.freeze.empty());
-}
 
 TEST_P(DerivedFrom, AnExtensionIsCalibratedAsItsParent) {
   const std::string parent = Parent();
@@ -135,19 +98,6 @@ TEST(Derive, ABudgetTakesThePlaceOfTheParents) {
   ASSERT_TRUE(text.ok()) << text.status();
   EXPECT_NE(text->find("budget: {model_evaluations: 37, core_hours: 2}"), std::string::npos)
       << *text;
-}
-
-TEST(Derive, WhatTiesAParameterGoesWithIt) {
-  const auto text = Derive(
-      "name: a\nmodel: {contact: linear}\nparameters: {f: default, f.g: default, h: default}\n"
-      "prior_correlation: [[f, h, 0.5], [f.g, h, 0.2]]\nconstraints: [f <= h, 2 * f.g <= h]\n",
-      {.name = "b",
-       .lineage = {.parent = "c1", .purpose = "screen"},
-       .fixed = {{"f", 1}},
-       .first_proposal = std::nullopt});
-  ASSERT_TRUE(text.ok()) << text.status();
-  EXPECT_NE(text->find("prior_correlation: [[f.g, h, 0.2]]"), std::string::npos) << *text;
-  EXPECT_NE(text->find("constraints: [\"2 * f.g <= h\"]"), std::string::npos) << *text;
 }
 
 }  // namespace
