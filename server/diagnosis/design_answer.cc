@@ -80,8 +80,15 @@ absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge
   answer.scatter = misfit.scatter;
   RETURN_IF_ERROR(DescribeEffects(before, known, asked, answer));
   answer.not_excitable = race.not_excitable;
-  for (const auto& [entry, why] : known.out)
-    answer.not_excitable.emplace_back(race.effects[static_cast<std::size_t>(entry)].name, why);
+  // An effect of which another strength is seen takes part; of two that are not, one reason is
+  // enough.
+  for (const auto& [entry, why] : known.out) {
+    const std::string& name = race.effects[static_cast<std::size_t>(entry)].name;
+    const auto is_known = [&name](const auto& said) { return said.first == name; };
+    if (std::count(parts.effect_of.begin(), parts.effect_of.end(), name) == 0 &&
+        std::none_of(answer.not_excitable.begin(), answer.not_excitable.end(), is_known))
+      answer.not_excitable.emplace_back(name, why);
+  }
   answer.warnings = known.warnings;
   answer.sentence = VerdictInWords(answer);
   return answer;
