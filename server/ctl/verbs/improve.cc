@@ -29,6 +29,12 @@ struct ImproveOptions {
   std::vector<std::string> without{};  ///< effects that are not to be thought of
 };
 
+std::string Probable(const std::optional<double>& probability) {
+  constexpr double kLeast = 1e-3;  // below it only how small
+  if (!probability) return "–";
+  return *probability < kLeast ? "< 0.1 %" : report::Percent(*probability, 2);
+}
+
 std::string ToText(const diagnosis::Improvement& improvement) {
   const std::vector<diagnosis::ImproveStep>& steps = improvement.steps();
   const auto number = [](const std::optional<double>& error) {
@@ -38,9 +44,9 @@ std::string ToText(const diagnosis::Improvement& improvement) {
       {"<campaign", "<effects", "probable", "error", "held out", "log evidence", "<verdict"});
   for (const diagnosis::ImproveStep& step : steps) {
     table.AddRow({step.campaign, step.effects.empty() ? "none" : absl::StrJoin(step.effects, " + "),
-                  step.probability ? report::Percent(*step.probability, 2) : "–",
-                  report::Number(step.rms_error, 3), number(step.heldout_rms_error),
-                  report::Number(step.log_evidence, 5), step.verdict});
+                  Probable(step.probability), report::Number(step.rms_error, 3),
+                  number(step.heldout_rms_error), report::Number(step.log_evidence, 5),
+                  step.verdict});
   }
   std::string text = table.ToString() + "\n";
   text +=

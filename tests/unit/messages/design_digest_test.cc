@@ -131,14 +131,13 @@ TEST_F(DesignDigest, OfOtherNumericsIsThatOfACampaignWithThem) {
                .first_proposal = std::nullopt,
                .race = std::vector<std::string>{}});
   EXPECT_EQ(DigestOf(design, {}), DigestOf(Read(small_.yaml), {}));
-  dem::Staging changed;  // of rate 5 1/s, damping 0.4 and 0.9
-  changed.rate = 10;
-  changed.damping_loading = 0.8;
-  changed.damping_settling = 0.9;
-  const campaign::Campaign other = Derived({.name = "other",
-                                            .lineage = {.parent = "c1", .purpose = "nuisance"},
-                                            .first_proposal = std::nullopt,
-                                            .staging = {{"tx", changed}}});
+  std::string yaml = small_.yaml;
+  for (const auto& [old, now] : std::map<std::string, std::string>{
+           {"rate: 5 1/s", "rate: 10 1/s"}, {"damping: [0.4, 0.9]", "damping: [0.8, 0.9]"}}) {
+    ASSERT_NE(yaml.find(old), std::string::npos) << yaml;
+    yaml.replace(yaml.find(old), old.size(), now);
+  }
+  const campaign::Campaign other = Read(yaml);
   EXPECT_EQ(DigestOf(design, {{"numerics.rate", 2}, {"numerics.damping", 2}}), DigestOf(other, {}));
 }
 
