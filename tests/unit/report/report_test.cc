@@ -203,7 +203,8 @@ TEST(Report, ShowsTheDiagnosisThatWasKept) {
         "<td>0.56</td><td>1.02</td>", ">cohesion: range = 2, stiffness = 3.2 kPa<",
         "twisting resistance (12°)", "&lt;b&gt;membrane", "chi-squared 431", "SHA-256 5f1e",
         "wall friction: none of the fitted tests can show it", "closer than the stated errors",
-        "  - name: next", ", but not adhesion dmt from adhesion jkr."}) {
+        "  - name: next", ", but not adhesion dmt from adhesion jkr.",
+        "By rules of an earlier build; <code>calibctl diagnose c1</code> asks again."}) {
     EXPECT_THAT(html, HasSubstr(said));
   }
   EXPECT_THAT(html, Not(HasSubstr("nan")));
