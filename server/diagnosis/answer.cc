@@ -265,6 +265,7 @@ std::string VerdictInWords(const Answer& answer) {
     case AnswerVerdict::kAdequate: {
       const std::string passes =
           "The model is adequate: it misses the readings no more than a right one would";
+      if (answer.probabilities.empty()) return absl::StrCat(passes, ".");  // nobody raced
       const NamedModel& first = answer.probabilities.front();
       if (first.effects.empty() && !first.none_of_these)
         return absl::StrCat(passes, "; that nothing is missing has probability ",

@@ -53,6 +53,16 @@ std::vector<double> ChancesOfMisfit(const KnownBefore& before, const Knowledge& 
 
 }  // namespace
 
+void TellMisfit(const BaseMisfit& misfit, Answer& answer) {
+  answer.adequacy_p = misfit.chance;
+  answer.square = misfit.square;
+  answer.degrees = misfit.degrees;
+  answer.p_square = misfit.chance_of_square;
+  answer.rms = misfit.rms;
+  answer.missed = misfit.missed;
+  answer.scatter = misfit.scatter;
+}
+
 absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge& known,
                                       const Asked& asked, const BaseMisfit& misfit,
                                       const VerificationChances& verification, double level) {
@@ -72,12 +82,7 @@ absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge
     parts.beyond.push_back(
         inference::BeyondDesign(asked.evidence[w], asked.probabilities[w], known.range));
   ASSIGN_OR_RETURN(Answer answer, AnswerFrom(parts));
-  answer.square = misfit.square;
-  answer.degrees = misfit.degrees;
-  answer.p_square = misfit.chance_of_square;
-  answer.rms = misfit.rms;
-  answer.missed = misfit.missed;
-  answer.scatter = misfit.scatter;
+  TellMisfit(misfit, answer);
   RETURN_IF_ERROR(DescribeEffects(before, known, asked, answer));
   answer.not_excitable = race.not_excitable;
   // An effect of which another strength is seen takes part; of two that are not, one reason is

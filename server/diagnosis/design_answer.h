@@ -16,6 +16,9 @@ namespace calib::diagnosis {
 /// Chances of fresh runs by effect (ChancesOf); empty: none were made.
 using VerificationChances = std::optional<std::map<std::string, double>>;
 
+/// What an answer says of the base model's misfit.
+void TellMisfit(const BaseMisfit& misfit, Answer& answer);
+
 /// The answer but for Answer::runs. asked: with Effort::kToAnswer; level: of the adequacy test.
 /// Errors: those of AnswerFrom and DescribeEffects.
 absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge& known,

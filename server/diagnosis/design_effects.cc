@@ -123,7 +123,6 @@ std::vector<ChangedCurve> CurvesOf(const HistoryScale& scale, const Eigen::RowVe
 struct AtBest {
   DesignPoints point;
   double log_density = 0;
-  double square = 0;
   Eigen::RowVectorXd history;
 };
 
@@ -131,7 +130,6 @@ AtBest BestOf(const Knowledge& known, const ModelEvidence& model) {
   AtBest best;
   best.point = BestDraw(known, model.draws);
   best.log_density = known.set->LogDensity(known.z, best.point)[0];
-  best.square = SquaresOfMisfit(known, best.point)[0];
   best.history = known.set->coordinates()->HistoriesAt(best.point).row(0);
   return best;
 }

@@ -269,9 +269,11 @@ absl::StatusOr<Answer> AdequacyOf(const report::CampaignView& base, double level
                            .prior = std::move(prior),
                            .seed = base.campaign.seed};
   ASSIGN_OR_RETURN(const BaseMisfit misfit, MisfitOfBase(before, rows, {}));
-  ASSIGN_OR_RETURN(const Knowledge known, LearnBase(before, rows, {}));
-  ASSIGN_OR_RETURN(const Asked asked, Ask(before, known, Effort::kToAnswer));
-  return AnswerOfDesign(before, known, asked, misfit, std::nullopt, level);
+  Answer answer{.verdict = misfit.chance >= level ? AnswerVerdict::kAdequate
+                                                  : AnswerVerdict::kUnexplained};
+  TellMisfit(misfit, answer);
+  answer.sentence = VerdictInWords(answer);
+  return answer;
 }
 
 }  // namespace calib::diagnosis

@@ -89,7 +89,8 @@ absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker,
                                 std::optional<std::int64_t> most_runs = std::nullopt);
 
 /// The adequacy of the base model alone, by the errors and the emulator of its own runs: verdict
-/// adequate or unexplained, nobody in the race. Errors: those of BaseRunsOf, RegionOf, Learn, Ask.
+/// adequate or unexplained, nobody in the race and no probabilities. Errors: those of BaseRunsOf,
+/// RegionOf, MisfitOfBase.
 absl::StatusOr<Answer> AdequacyOf(const report::CampaignView& base, double level);
 
 }  // namespace calib::diagnosis

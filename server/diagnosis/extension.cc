@@ -18,7 +18,7 @@ namespace {
 constexpr double kTempered = 10;  // times the parent's standard deviation
 constexpr double kPriorShare = 0.5;
 constexpr double kWider = 2;        // times the sd of a posterior by an emulator
-constexpr double kDefensive = 0.1;  // share of the prior beside such a posterior
+constexpr double kDefensive = 0.1;  // share of the prior beside it [Hesterberg, Technometrics 1995]
 
 double SettingOr(const campaign::Experiment& experiment, const std::string& name, double other) {
   const auto found = experiment.settings.find(name);
