@@ -3,6 +3,7 @@
 // Plain values.
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 namespace calib::inference {
@@ -39,6 +40,20 @@ inline DesignPoints RowsOf(const DesignPoints& points, const std::vector<Eigen::
   return {.base = points.base(rows, Eigen::all),
           .strength = points.strength(rows, Eigen::all),
           .shape = points.shape(rows, Eigen::all)};
+}
+
+/// Columns of points that an emulator of fewer effects has, ascending; none: it has all.
+struct PointColumns {
+  std::vector<Eigen::Index> strength{}, shape{};
+};
+using PartOfColumns = std::optional<PointColumns>;
+
+/// The points as that emulator takes them.
+inline DesignPoints ColumnsOf(const DesignPoints& points, const PartOfColumns& part) {
+  if (!part) return points;
+  return {.base = points.base,
+          .strength = points.strength(Eigen::all, part->strength),
+          .shape = points.shape(Eigen::all, part->shape)};
 }
 
 /// The same points without effects.

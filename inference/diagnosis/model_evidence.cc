@@ -25,10 +25,19 @@ absl::Status CheckMeasured(const std::vector<MeasuredSet>& measured, const Model
       return absl::InvalidArgumentError(absl::StrCat("a measurement has ", m.z.size(),
                                                      " coordinates, its set ",
                                                      m.set->emulator().coordinates()));
-    if (features.effects().size() != space.effects.size() ||
+    const PartOfColumns& part = m.columns;
+    if (features.effects().size() != (part ? part->strength.size() : space.effects.size()) ||
         features.parameters() != space.base_low.size() ||
-        features.shape_count() != space.shape_low.size())
+        features.shape_count() !=
+            (part ? static_cast<Index>(part->shape.size()) : space.shape_low.size()))
       return absl::InvalidArgumentError("a set's emulator has other parameters than the space");
+    for (const EffectModel& model : space.models) {
+      for (const int k : model.effects) {
+        if (part && std::count(part->strength.begin(), part->strength.end(), k) == 0)
+          return absl::InvalidArgumentError(
+              absl::StrCat("a model has effect ", k, ", which a set's emulator has not"));
+      }
+    }
     if (m.specimens < 1) return absl::InvalidArgumentError("a measurement has no specimen");
     if (m.z.size() <= features.parameters())
       return absl::InvalidArgumentError("fewer coordinates than base parameters");
@@ -44,9 +53,13 @@ Eigen::VectorXd FiniteOrNone(Eigen::VectorXd log_density) {
 Eigen::VectorXd LogDensityOf(const std::vector<MeasuredSet>& measured, const EffectModel& model,
                              const DesignPoints& points, const Eigen::VectorXd& tau) {
   Eigen::VectorXd result = Eigen::VectorXd::Zero(points.rows());
-  for (const MeasuredSet& m : measured)
-    result += model.none_of_these ? m.set->LogDensityWithDiscrepancy(m.z, points, tau, m.specimens)
-                                  : m.set->LogDensity(m.z, points, m.specimens);
+  for (const MeasuredSet& m : measured) {
+    const DesignPoints own = ColumnsOf(points, m.columns);
+    const Eigen::VectorXd density =
+        model.none_of_these ? m.set->LogDensityWithDiscrepancy(m.z, own, tau, m.specimens)
+                            : m.set->LogDensity(m.z, own, m.specimens);
+    result += m.taken_out ? Eigen::VectorXd(-density) : density;
+  }
   return FiniteOrNone(std::move(result));
 }
 
@@ -54,9 +67,10 @@ Eigen::VectorXd LogDensityOf(const std::vector<MeasuredSet>& measured, const Eff
 Eigen::VectorXd RealisedLogDensity(const std::vector<MeasuredSet>& measured,
                                    const std::vector<Eigen::MatrixXd>& coefficients,
                                    const ModelEvidence& model) {
-  const DesignPoints& points = model.draws;
-  Eigen::VectorXd result = Eigen::VectorXd::Zero(points.rows());
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(model.draws.rows());
   for (std::size_t s = 0; s < measured.size(); ++s) {
+    const DesignPoints points = ColumnsOf(model.draws, measured[s].columns);
+    const double sign = measured[s].taken_out ? -1 : 1;
     const FeatureEmulator& emulator = measured[s].set->emulator();
     const SpecimenErrors errors = measured[s].set->ErrorsOfMean(measured[s].specimens);
     const Eigen::MatrixXd terms = emulator.features().VarianceTerms(points);
@@ -69,9 +83,9 @@ Eigen::VectorXd RealisedLogDensity(const std::vector<MeasuredSet>& measured,
       OrthogonalDiscrepancy discrepancy{.sensitivities = {}, .tau = model.tau};
       for (Index j = 0; j < points.base.cols(); ++j)
         discrepancy.sensitivities.push_back(emulator.BaseDerivative(points.base, j));
-      result += SpecimenLogDensity(measured[s].z, prediction, errors, discrepancy);
+      result += sign * SpecimenLogDensity(measured[s].z, prediction, errors, discrepancy);
     } else {
-      result += SpecimenLogDensity(measured[s].z, prediction, errors);
+      result += sign * SpecimenLogDensity(measured[s].z, prediction, errors);
     }
   }
   return FiniteOrNone(std::move(result));
@@ -223,9 +237,13 @@ void Realise(const std::vector<MeasuredSet>& measured, const EvidenceOptions& op
   }
   for (int r = 0; r < options.realisations; ++r) {
     std::vector<Eigen::MatrixXd> coefficients;
-    for (std::size_t s = 0; s < measured.size(); ++s)
-      coefficients.push_back(measured[s].set->emulator().Realisation(
-          options.sampling.seed + s, static_cast<std::uint64_t>(r)));
+    for (const MeasuredSet& own : measured) {  // one realisation of each emulator
+      const auto first = std::find_if(measured.begin(), measured.end(),
+                                      [&own](const auto& other) { return other.set == own.set; });
+      const auto s = static_cast<std::uint64_t>(first - measured.begin());
+      coefficients.push_back(own.set->emulator().Realisation(options.sampling.seed + s,
+                                                             static_cast<std::uint64_t>(r)));
+    }
     for (std::size_t i = 0; i < result.size(); ++i) {
       ModelEvidence& model = result[i];
       if (model.draws.rows() == 0) continue;

@@ -16,9 +16,13 @@ namespace calib::inference {
 /// measurement, since the emulator errs in all of them alike: densities of all specimens and of
 /// their mean differ by a factor that all models share.
 struct MeasuredSet {
-  const DiagnosisSet* set = nullptr;  ///< not null; another one in each measurement
+  const DiagnosisSet* set = nullptr;  ///< not null
   Eigen::VectorXd z{};                ///< q: coordinates, the mean over specimens
   int specimens = 1;                  ///< >= 1
+  /// Effects that the set's emulator has; the space's models have no others.
+  PartOfColumns columns{};
+  /// Its density divides: another entry, of more specimens or tests, holds this measurement too.
+  bool taken_out = false;
 };
 
 /// How ModelEvidences goes about it.

@@ -33,7 +33,7 @@ std::vector<ForecastLaw> LawsOf(const ProposedMeasurement& proposed, const Model
   const Index all = model.draws.rows(), take = std::min<Index>(draws, all);
   std::vector<Index> rows;
   for (Index i = 0; i < take; ++i) rows.push_back((2 * i + 1) * all / (2 * take));
-  const DesignPoints at = RowsOf(model.draws, rows);
+  const DesignPoints at = ColumnsOf(RowsOf(model.draws, rows), proposed.columns);
   const EmulatorPrediction prediction = emulator.Predict(at);
   std::vector<Eigen::MatrixXd> sensitivities;
   for (Index j = 0; j < d && model.model.none_of_these; ++j)
@@ -74,6 +74,12 @@ std::vector<ForecastLaw> LawsOf(const ProposedMeasurement& proposed, const Model
   return result;
 }
 
+bool HasAll(const PartOfColumns& part, const EffectModel& model) {
+  return !part || std::all_of(model.effects.begin(), model.effects.end(), [&part](int k) {
+    return std::count(part->strength.begin(), part->strength.end(), k) > 0;
+  });
+}
+
 double Entropy(const Eigen::VectorXd& p) {
   double result = 0;
   for (const double x : p) result -= x > 0 ? x * std::log(x) : 0;
@@ -91,8 +97,11 @@ absl::StatusOr<Forecast> ExpectedInformation(const ProposedMeasurement& proposed
       probabilities.model.size() != static_cast<Index>(evidence.size()) ||
       (proposed.measured.size() > 0 && proposed.measured.size() != q) || proposed.specimens < 1)
     return absl::InvalidArgumentError("measurement, models or options do not fit");
-  const std::vector<Index> leading =
+  std::vector<Index> leading =
       LeadingModels(evidence, probabilities, options.leading, options.most_models);
+  std::erase_if(leading, [&](Index m) {
+    return !HasAll(proposed.columns, evidence[static_cast<std::size_t>(m)].model);
+  });
   if (leading.empty()) return absl::InvalidArgumentError("no model has posterior draws");
   const auto models = static_cast<Index>(leading.size());
   Eigen::VectorXd weight(models);
@@ -100,7 +109,8 @@ absl::StatusOr<Forecast> ExpectedInformation(const ProposedMeasurement& proposed
   for (Index m = 0; m < models; ++m) {
     const ModelEvidence& model =
         evidence[static_cast<std::size_t>(leading[static_cast<std::size_t>(m)])];
-    if (!proposed.set->emulator().features().Fits(model.draws) || q <= model.draws.base.cols())
+    if (!proposed.set->emulator().features().Fits(ColumnsOf(model.draws, proposed.columns)) ||
+        q <= model.draws.base.cols())
       return absl::InvalidArgumentError("the set's emulator has other parameters than the models");
     weight[m] = probabilities.model[leading[static_cast<std::size_t>(m)]];
     laws.push_back(LawsOf(proposed, model, options.draws));
@@ -159,6 +169,7 @@ absl::StatusOr<Forecast> ExpectedInformation(const ProposedMeasurement& proposed
       (std::count(acts.begin(), acts.end(), static_cast<int>(e)) > 0 ? right : wrong) = true;
     }
     result.named_right += right ? 1 / n : 0;
+    result.decided += right || (acts.empty() && after[truth] >= options.alone) ? 1 / n : 0;
     result.named_wrong += wrong ? 1 / n : 0;
   }
   result.error =

@@ -19,6 +19,8 @@ struct ProposedMeasurement {
   /// test.
   Eigen::VectorXd measured{};
   int specimens = 1;  ///< that `measured` is the mean of, >= 1
+  /// Effects that the set's emulator has; models with others do not take part.
+  PartOfColumns columns{};
 };
 
 /// How ExpectedInformation goes about it.
@@ -36,6 +38,8 @@ struct Forecast {
   double information = 0;  ///< nats about the model indicator, >= 0 but for chance
   double error = 0;        ///< standard error of that
   double named_right = 0;  ///< chance that an effect of the true model is at `alone` or above
+  /// Chance of that, or where the true model has no effect that it is at `alone` or above itself.
+  double decided = 0;
   double named_wrong = 0;  ///< chance that one that is not is
 };
 

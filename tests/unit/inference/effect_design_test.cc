@@ -98,6 +98,38 @@ TEST_F(EffectDesign, SameModelTwiceTellsNothing) {
   EXPECT_NEAR(runs->information[1], 0, 1e-9);
 }
 
+// Where the base model may be the right one, it is told by a measurement too, and no effect named.
+TEST_F(EffectDesign, TheBaseModelIsAnAnswerToo) {
+  std::vector<ModelEvidence> models = Two(Point(0.1, 8, 0), Point(0.1, 0, 0));
+  models[1].model.effects.clear();
+  EffectProbabilities even = Even();
+  even.inclusion = even.share = Eigen::Vector2d(0.5, 0);
+  const auto found = ExpectedInformation({.set = &set_}, models, even);
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_NEAR(found->named_right, 0.5, 0.05);
+  EXPECT_GT(found->decided, 0.95);
+}
+
+// Models with an effect that the test's emulator does not know take no part in what it tells.
+TEST_F(EffectDesign, ATestOfFewerEffectsTellsItsOwnModelsApart) {
+  CoordinateToy other({.parameters = 1, .effects = 1, .coordinates = 4, .seed = 5});
+  auto emulator = FeatureEmulator::Fit(other.features(), other.Runs(40, 24, 8),
+                                       {.start = other.Variances(), .hold = true});
+  ASSERT_TRUE(emulator.ok()) << emulator.status();
+  SpecimenErrors errors = set_.errors();
+  errors.specimen = emulator->specimen();
+  const DiagnosisSet one(*std::move(emulator), std::move(errors));
+  const ProposedMeasurement proposed{.set = &one, .columns = PointColumns{.strength = {0}}};
+  const auto alone =
+      ExpectedInformation(proposed, Two(Point(0.1, 3, 0), Point(0.1, 0, 3)), Even());
+  ASSERT_TRUE(alone.ok()) << alone.status();
+  EXPECT_NEAR(alone->information, 0, 1e-12);
+  EXPECT_THAT(ExpectedInformation({.set = &one}, Two(Point(0.1, 3, 0), Point(0.1, 0, 3)), Even())
+                  .status()
+                  .message(),
+              HasSubstr("other parameters"));
+}
+
 // A repeat has the errors of the emulator once more: it tells less than the same tests would whose
 // emulator errs independently.
 TEST_F(EffectDesign, RepeatSharesTheEmulatorsErrors) {

@@ -248,6 +248,51 @@ TEST_F(EffectEvidence, SpecimensOfASetShareTheEmulatorsErrors) {
   EXPECT_NEAR(found[0] - found[1], joint(RowsOf(points, {0})) - joint(RowsOf(points, {1})), 1e-9);
 }
 
+// A first measurement and the mean of both hold it twice; once is taken out.
+TEST_F(EffectEvidence, RepeatOfAMeasuredTestCountsTheFirstOnce) {
+  const Eigen::VectorXd mean = z_ + 0.5 * Eigen::Vector4d(0.5, -1, 0.2, 0.8);
+  const ModelSpace space = ToySpace(toy_);
+  const EvidenceOptions options{.sampling = {.seed = 4}};
+  const auto both = ModelEvidences({{.set = &set_, .z = z_},
+                                    {.set = &set_, .z = mean, .specimens = 2},
+                                    {.set = &set_, .z = z_, .taken_out = true}},
+                                   space, options);
+  const auto once = ModelEvidences({{.set = &set_, .z = mean, .specimens = 2}}, space, options);
+  ASSERT_TRUE(both.ok() && once.ok()) << both.status();
+  for (std::size_t i = 0; i < once->size(); ++i) {
+    EXPECT_NEAR((*both)[i].evidence.log_evidence, (*once)[i].evidence.log_evidence, 0.05);
+    EXPECT_LT(((*both)[i].realised - (*once)[i].realised).cwiseAbs().mean(), 0.2);
+  }
+}
+
+// Another test, whose emulator knows one effect of two: its part of the evidence is the mean of its
+// density over the posterior of the first.
+TEST_F(EffectEvidence, AnotherTestMayKnowFewerEffects) {
+  const CoordinateToy other({.parameters = 1, .effects = 1, .coordinates = 3, .seed = 8});
+  const DiagnosisSet second = SetOf(other, other.Runs(16, 16, 4));
+  const Eigen::VectorXd z = other.Mean({.base = Eigen::MatrixXd{{0.3}},
+                                        .strength = Eigen::MatrixXd{{1.5}},
+                                        .shape = Eigen::MatrixXd(1, 0)})
+                                .row(0);
+  ModelSpace space = ToySpace(toy_);
+  const std::vector<MeasuredSet> measured = {
+      {.set = &set_, .z = z_},
+      {.set = &second, .z = z, .columns = PointColumns{.strength = {0}}}};
+  EXPECT_THAT(ModelEvidences(measured, space).status().message(),
+              HasSubstr("a model has effect 1, which a set's emulator has not"));
+  space.models = {{}, {.effects = {0}}};
+  const EvidenceOptions options{.sampling = {.seed = 4}, .draws = 2000};
+  const auto joint = ModelEvidences(measured, space, options);
+  const auto first = ModelEvidences({measured[0]}, space, options);
+  ASSERT_TRUE(joint.ok() && first.ok()) << joint.status();
+  for (std::size_t i = 0; i < 2; ++i) {
+    const DesignPoints draws = ColumnsOf((*first)[i].draws, measured[1].columns);
+    const double gain = LogSumExp(second.LogDensity(z, draws)) -
+                        std::log(static_cast<double>(draws.rows()));
+    EXPECT_NEAR((*joint)[i].evidence.log_evidence - (*first)[i].evidence.log_evidence, gain, 0.1);
+  }
+}
+
 TEST(ModelSpaceTest, ListsModelsAndSharesThePrior) {
   const std::vector<EffectModel> models = AllModels(4, {{2, 1}}, {{0, 1, 3}});
   EXPECT_EQ(models.size(), 1u + 4 + 5 + 1 + 1);
