@@ -184,10 +184,10 @@ absl::Status Laboratory::GoOn(const v1::CampaignStatus& status) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<report::CampaignView> Laboratory::Design(const report::CampaignView& parent,
-                                                        const std::string& yaml,
-                                                        const std::string& what) {
-  ASSIGN_OR_RETURN(const auto campaign, Submit(parent, yaml, what));
+absl::StatusOr<report::CampaignView> Laboratory::Design(
+    const report::CampaignView& parent, const std::string& yaml, const std::string& what,
+    const std::map<std::string, std::string>& further) {
+  ASSIGN_OR_RETURN(const auto campaign, Submit(parent, yaml, what, further));
   ASSIGN_OR_RETURN(const auto status, session_.client().Show(campaign));
   // Without runs it is queued until the first are added.
   if (messages::StateOf(status) != CampaignState::kQueued) RETURN_IF_ERROR(Wait(campaign, what));
@@ -212,8 +212,9 @@ absl::StatusOr<report::CampaignView> Laboratory::Run(
   return LoadView(session_.client(), campaign);
 }
 
-bool Laboratory::Accepts(const report::CampaignView& parent, const std::string& yaml,
-                         const std::map<std::string, std::string>& further) {
+absl::StatusOr<campaign::Campaign> Laboratory::Read(
+    const report::CampaignView& parent, const std::string& yaml,
+    const std::map<std::string, std::string>& further) {
   const campaign::FileReader reader =
       [this, &parent, &further](const std::string& path) -> absl::StatusOr<std::string> {
     if (const auto own = further.find(path); own != further.end()) return own->second;
@@ -221,7 +222,10 @@ bool Laboratory::Accepts(const report::CampaignView& parent, const std::string& 
     if (digest == parent.source.files().end()) return absl::NotFoundError("was not submitted");
     return session_.client().GetBlob(digest->second);
   };
-  return campaign::ReadCampaign(yaml, parent.source.file_name(), reader).problems.empty();
+  auto read = campaign::ReadCampaign(yaml, parent.source.file_name(), reader);
+  if (!read.problems.empty())
+    return absl::InvalidArgumentError(campaign::ToString(read.problems.front()));
+  return std::move(read.campaign);
 }
 
 }  // namespace calib::client

@@ -40,17 +40,20 @@ class Laboratory {
 
   /// Submits the text of a design (`method: design`) with the parent's files; waits for the runs that
   /// it has, which are none at first. Errors: as Run().
-  absl::StatusOr<report::CampaignView> Design(const report::CampaignView& parent,
-                                              const std::string& yaml, const std::string& what);
+  absl::StatusOr<report::CampaignView> Design(
+      const report::CampaignView& parent, const std::string& yaml, const std::string& what,
+      const std::map<std::string, std::string>& further = {});
 
   /// Adds a batch of runs to a design and waits for their end, progress on standard error; a batch
   /// that is there already is waited for alone. Errors: those of the rpc AddRuns, and as Run().
   absl::StatusOr<report::CampaignView> Grow(const v1::AddRunsRequest& batch,
                                             const std::string& what);
 
-  /// Whether the text is a campaign without a problem; files as for Run().
-  bool Accepts(const report::CampaignView& parent, const std::string& yaml,
-               const std::map<std::string, std::string>& further);
+  /// The campaign that the text is, without a server's knowing; files as for Run().
+  /// INVALID_ARGUMENT with its first problem.
+  absl::StatusOr<campaign::Campaign> Read(const report::CampaignView& parent,
+                                          const std::string& yaml,
+                                          const std::map<std::string, std::string>& further);
 
  private:
   /// Of a campaign that is not over: resumes it if it was paused, and starts local workers.

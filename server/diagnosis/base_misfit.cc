@@ -50,8 +50,8 @@ absl::StatusOr<BaseMisfit> MisfitOfBase(const KnownBefore& before, const DesignR
   const inference::SpecimenErrors& errors = known.set->errors();
   const inference::DesignPoints best = BestDraw(known, draws);
   const Eigen::RowVectorXd history = known.set->coordinates()->HistoriesAt(best).row(0);
-  misfit.chance = ChanceOfMisfit(before, known, draws, parameters);
-  misfit.square = SquaresOfMisfit(known, draws).minCoeff();
+  misfit.chance = ChanceOfMisfit(*known.set, Eigen::VectorXd::Zero(before.base.histories.cols()), draws, parameters);
+  misfit.square = SquaresOfMisfit(*known.set, known.z, draws).minCoeff();
   misfit.degrees = static_cast<double>(std::max<Index>(1, known.z.size() - parameters));
   misfit.chance_of_square =
       inference::FisherLaw{.numerator = misfit.degrees, .denominator = errors.freedom}.Tail(

@@ -33,20 +33,26 @@ std::vector<std::pair<int, int>> KeptPairs(const Knowledge& known,
   return result;
 }
 
+// Of two tests of one thing the smaller chance, doubled (Bonferroni).
+double OfBoth(double a, double b) { return std::min(1.0, 2 * std::min(a, b)); }
+
 // Chance of the misfit of each model that is probable enough to be asked, and of the base model; 0
 // of the others and of none of these.
-std::vector<double> ChancesOfMisfit(const KnownBefore& before, const Knowledge& known,
-                                    const Asked& asked) {
+std::vector<double> ChancesOfMisfit(const KnownBefore& before, const Knowledge& known, const Asked& asked,
+                                    const ChanceElsewhere& elsewhere) {
   std::vector<double> chances;
   const auto parameters = static_cast<int>(known.rows.race().base.size());
   for (std::size_t i = 0; i < asked.evidence[0].size(); ++i) {
     const inference::ModelEvidence& own = asked.evidence[0][i];
     const bool wanted = own.model.effects.empty() ||
                         asked.probabilities[0].model[static_cast<Index>(i)] >= kDesignCaps.asked;
-    chances.push_back(wanted && !own.model.none_of_these && own.draws.rows() > 0
-                          ? ChanceOfMisfit(before, known, own.draws,
-                                           parameters + static_cast<int>(own.model.effects.size()))
-                          : 0);
+    double chance = 0;
+    if (wanted && !own.model.none_of_these && own.draws.rows() > 0) {
+      chance = ChanceOfMisfit(*known.set, Eigen::VectorXd::Zero(before.base.histories.cols()), own.draws,
+                              parameters + static_cast<int>(own.model.effects.size()));
+      if (elsewhere) chance = OfBoth(chance, elsewhere(own));
+    }
+    chances.push_back(chance);
   }
   return chances;
 }
@@ -65,17 +71,20 @@ void TellMisfit(const BaseMisfit& misfit, Answer& answer) {
 
 absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge& known,
                                       const Asked& asked, const BaseMisfit& misfit,
-                                      const VerificationChances& verification, double level) {
+                                      const VerificationChances& verification, double level,
+                                      const ChanceElsewhere& elsewhere) {
   const Race& race = known.rows.race();
   AnswerParts parts{.models = asked.space.models,
                     .widths = asked.probabilities,
                     .angles = known.angles,
                     .kin = KeptPairs(known, race.kin),
                     .verified = verification.has_value(),
-                    .chance = ChancesOfMisfit(before, known, asked),
+                    .chance = ChancesOfMisfit(before, known, asked, elsewhere),
                     .level = level};
   if (verification) parts.verification = *verification;
-  parts.adequacy_p = parts.chance.front() = misfit.chance;  // the base model is the first
+  // The base model is the first.
+  parts.adequacy_p = parts.chance.front() =
+      elsewhere ? OfBoth(misfit.chance, elsewhere(asked.evidence[0].front())) : misfit.chance;
   for (int i = 0; i < static_cast<int>(known.part.kept.size()); ++i)
     parts.effect_of.push_back(KeptEntry(known, i).name);
   for (std::size_t w = 0; w < asked.evidence.size(); ++w)
@@ -83,6 +92,7 @@ absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge
         inference::BeyondDesign(asked.evidence[w], asked.probabilities[w], known.range));
   ASSIGN_OR_RETURN(Answer answer, AnswerFrom(parts));
   TellMisfit(misfit, answer);
+  answer.adequacy_p = parts.adequacy_p;
   RETURN_IF_ERROR(DescribeEffects(before, known, asked, answer));
   answer.not_excitable = race.not_excitable;
   // An effect of which another strength is seen takes part; of two that are not, one reason is

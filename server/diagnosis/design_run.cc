@@ -27,10 +27,12 @@ absl::StatusOr<DesignedAnswer> AnswerOnServer(client::Laboratory& laboratory,
                                               const report::CampaignView& base,
                                               const DesignQuestion& question,
                                               std::optional<std::int64_t> most_runs) {
-  ASSIGN_OR_RETURN(DesignChain chain, DesignChain::Create(base, question));
+  ASSIGN_OR_RETURN(DesignChain created, DesignChain::Create(base, question));
+  const auto kept = std::make_shared<DesignChain>(std::move(created));
+  DesignChain& chain = *kept;
   if (base.campaign.precomputed) {
     NoRuns none;
-    DesignedAnswer calculated;
+    DesignedAnswer calculated{.chain = kept};
     ASSIGN_OR_RETURN(calculated.answer, AnswerBy(chain, none, most_runs));
     return calculated;
   }
@@ -40,7 +42,7 @@ absl::StatusOr<DesignedAnswer> AnswerOnServer(client::Laboratory& laboratory,
   ASSIGN_OR_RETURN(report::CampaignView design,
                    laboratory.Design(base, text, "runs that tell effects apart"));
   DesignedAnswer designed{
-      .answer = {}, .campaign = design.status.campaign(), .parameters = derivation.parameters};
+      .chain = kept, .campaign = design.status.campaign(), .parameters = derivation.parameters};
   ServerRunMaker maker(laboratory, std::move(design), chain.names());
   ASSIGN_OR_RETURN(designed.answer, AnswerBy(chain, maker, most_runs));
   return designed;

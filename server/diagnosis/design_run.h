@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -18,6 +19,7 @@ namespace calib::diagnosis {
 /// An answer, and the campaign that its runs are in.
 struct DesignedAnswer {
   Answer answer{};
+  std::shared_ptr<DesignChain> chain{};  ///< that has answered
   std::string campaign{};  ///< id of the design; empty: it has no runs
   /// Of the parameters that the design has beside those of the base: ranges, SI.
   std::map<std::string, dem::DefaultPrior> parameters{};

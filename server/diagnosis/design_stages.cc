@@ -64,6 +64,7 @@ absl::Status DesignChain::Add(EndedBatch batch) {
       return absl::InvalidArgumentError("a run of the design does not fit its campaign");
   }
   batches_.push_back(std::move(batch));
+  verification_.reset();
   return absl::OkStatus();
 }
 
@@ -203,11 +204,28 @@ absl::StatusOr<Answer> DesignChain::AnswerAfter(std::size_t n,
   return answer;
 }
 
+absl::StatusOr<NextStep> DesignChain::Ended(std::size_t n,
+                                            const VerificationChances& verification) {
+  ASSIGN_OR_RETURN(Answer answer, AnswerAfter(n, verification));
+  verification_ = verification;
+  return answer;
+}
+
+absl::StatusOr<AnsweredDesign> DesignChain::Answered() {
+  if (!verification_) return absl::FailedPreconditionError("the design has no answer yet");
+  AnsweredDesign answered{.before = &before_,
+                          .batches = &batches_,
+                          .design = &design_,
+                          .misfit = *misfit_,
+                          .verification = *verification_,
+                          .level = level_};
+  ASSIGN_OR_RETURN(answered.known, KnownAfter(batches_.size()));
+  ASSIGN_OR_RETURN(answered.asked, AskedAfter(batches_.size(), Effort::kToAnswer));
+  return answered;
+}
+
 absl::StatusOr<NextStep> DesignChain::Next() {
-  if (before_.base.elsewhere) {
-    ASSIGN_OR_RETURN(Answer answer, AnswerAfter(0, std::nullopt));
-    return answer;
-  }
+  if (before_.base.elsewhere) return Ended(0, std::nullopt);
   if (batches_.empty()) return Scout();
   const SamplePurpose last = batches_.back().stage;
   if (last == SamplePurpose::kScout) {
@@ -224,14 +242,12 @@ absl::StatusOr<NextStep> DesignChain::Next() {
       ASSIGN_OR_RETURN(next, Verification());
     }
     if (next) return *std::move(next);
-    ASSIGN_OR_RETURN(Answer answer, AnswerAfter(n, std::nullopt));
-    return answer;
+    return Ended(n, std::nullopt);
   }
   ASSIGN_OR_RETURN(const std::vector<VerifiedModel> models, ToVerify(n - 1));
   ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n - 1));
-  ASSIGN_OR_RETURN(Answer answer, AnswerAfter(n, ChancesOf(before_, *known, models, batches_.back(),
-                                                           kDesignCaps.verification_runs)));
-  return answer;
+  return Ended(n, ChancesOf(before_.base, *known, models, batches_.back(),
+                            kDesignCaps.verification_runs));
 }
 
 absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker,

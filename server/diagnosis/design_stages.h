@@ -29,6 +29,18 @@ struct DesignQuestion {
 /// The next batch, or the answer.
 using NextStep = std::variant<RunBatch, Answer>;
 
+/// What an answer rests on. Pointers are into the chain, until a batch is added.
+struct AnsweredDesign {
+  const KnownBefore* before = nullptr;
+  const Knowledge* known = nullptr;
+  const Asked* asked = nullptr;  ///< with Effort::kToAnswer
+  const std::vector<EndedBatch>* batches = nullptr;
+  const campaign::Campaign* design = nullptr;  ///< CampaignOfDesign
+  BaseMisfit misfit{};
+  VerificationChances verification{};
+  double level = 0.01;  ///< of the adequacy test
+};
+
 /// The chain, from the batches that it is told of. Where the base's runs were made elsewhere it
 /// makes none and answers at once, from them and what is calculated on them. What it has found is
 /// kept as long as it lives. Not thread-safe.
@@ -48,6 +60,9 @@ class DesignChain {
   absl::Status Add(EndedBatch batch);
   /// What comes after the batches so far. Errors: those of Learn and Ask.
   absl::StatusOr<NextStep> Next();
+  /// What the answer of Next() rests on. Errors: those of Next; FAILED_PRECONDITION while there is
+  /// none.
+  absl::StatusOr<AnsweredDesign> Answered();
 
  private:
   DesignChain(KnownBefore before, DesignRows scout_rows, campaign::Campaign design, double level)
@@ -70,6 +85,8 @@ class DesignChain {
   absl::StatusOr<std::vector<VerifiedModel>> ToVerify(std::size_t n);
   /// By the first n batches.
   absl::StatusOr<Answer> AnswerAfter(std::size_t n, const VerificationChances& verification);
+  /// The answer by the first n batches, which is the last word.
+  absl::StatusOr<NextStep> Ended(std::size_t n, const VerificationChances& verification);
   RunBatch BatchOf(campaign::SamplePurpose stage, std::vector<campaign::RunOf> rows) const;
   int NextStream() const;
 
@@ -78,6 +95,7 @@ class DesignChain {
   campaign::Campaign design_;
   double level_;
   std::vector<EndedBatch> batches_;
+  std::optional<VerificationChances> verification_;  ///< of the answer, once there is one
   std::optional<BaseMisfit> misfit_;  ///< by the scout's numerics, which later batches leave alone
   std::map<std::size_t, Knowledge> known_;
   std::map<std::pair<std::size_t, Effort>, Asked> asked_;

@@ -8,6 +8,7 @@
 #include "calib/return_if_error.h"
 #include "dem/registry/declared_effects.h"
 #include "server/campaign/checks/noise_check.h"
+#include "server/campaign/model/sha256.h"
 #include "server/diagnosis/design_run.h"
 #include "server/diagnosis/diagnosis_support.h"
 #include "server/diagnosis/run_matrices.h"
@@ -34,6 +35,7 @@ class Inquiry {
   absl::StatusOr<Diagnosis> Run() {
     diagnosis_.campaign = view_.status.campaign();
     diagnosis_.only_adequacy = options_.only_adequacy;
+    diagnosis_.left_out = options_.without;
     Doubt(campaign::Sentences(campaign::NoiseWarnings(view_.campaign)));
     for (const report::PriorConflict& conflict : report::PriorConflicts(view_))
       diagnosis_.warnings.push_back(report::InWords(conflict));
@@ -57,6 +59,7 @@ class Inquiry {
       for (const auto& [stage, runs] : diagnosis_.answer.runs)
         diagnosis_.evaluations += static_cast<std::int64_t>(runs) * FittedExperiments();
     }
+    if (options_.then) RETURN_IF_ERROR(TellMeasurement(*options_.then));
     for (const std::string& warning : diagnosis_.answer.warnings)
       diagnosis_.warnings.push_back(warning + ".");
     if (diagnosis_.answer.p_square > kTooGood)
@@ -64,7 +67,8 @@ class Inquiry {
           {"The model is closer to the readings than the stated errors and the scatter explain: "
            "they seem too large, and an effect can hide in them."});
     NameUnits();
-    if (options_.next_experiment && !options_.only_adequacy && !view_.campaign.precomputed &&
+    if (options_.next_experiment && !options_.then && !options_.only_adequacy &&
+        !view_.campaign.precomputed &&
         diagnosis_.answer.verdict != AnswerVerdict::kAdequate) {
       const absl::Status planned = PlanNext();
       if (absl::IsCancelled(planned)) return planned;
@@ -98,6 +102,24 @@ class Inquiry {
     for (const EffectAnswer& own : diagnosis_.answer.candidates)
       diagnosis_.units.merge(
           UnitsOf(*dem::FindEffect(model.user_effects, own.effect), model.contact));
+  }
+
+  absl::Status TellMeasurement(const MadeMeasurement& made) {
+    if (options_.only_adequacy || view_.campaign.precomputed)
+      return absl::FailedPreconditionError(
+          "a further measurement is told by runs of its test, and here none are made");
+    ASSIGN_OR_RETURN(const AnsweredDesign answered, designed_.chain->Answered());
+    ASSIGN_OR_RETURN(ThenAnswer then, AnswerWith(laboratory_, view_, answered, made));
+    std::map<std::string, int> runs = std::move(diagnosis_.answer.runs);
+    diagnosis_.answer = std::move(then.answer);
+    diagnosis_.answer.runs = std::move(runs);
+    for (std::string& warning : then.warnings) diagnosis_.warnings.push_back(std::move(warning));
+    diagnosis_.then = {.plan = made.plan,
+                       .file = made.file,
+                       .digest = campaign::Sha256Hex(made.content),
+                       .campaign = std::move(then.campaign),
+                       .evaluations = then.evaluations};
+    return absl::OkStatus();
   }
 
   Rival RivalOf(const NamedModel& model) const {
@@ -141,14 +163,19 @@ class Inquiry {
     const report::RunTable runs = report::RunsOf(view_);
     Index like = 0;  // the run that comes closest
     runs.histories.rowwise().squaredNorm().minCoeff(&like);
-    ASSIGN_OR_RETURN(auto next, PlanNextExperiment(laboratory_, rivals, None(rivals),
-                                                   runs.sample[static_cast<std::size_t>(like)],
-                                                   diagnosis_.answer.scatter));
-    diagnosis_.next_experiment = std::move(next.next);
-    if (!next.warning.empty()) diagnosis_.warnings.push_back(next.warning + ".");
+    ASSIGN_OR_RETURN(const AnsweredDesign answered, designed_.chain->Answered());
+    ASSIGN_OR_RETURN(
+        NextPlan plan,
+        PlanNextExperiment(laboratory_, view_, answered,
+                           {.rivals = rivals,
+                            .none = None(rivals),
+                            .like = runs.sample[static_cast<std::size_t>(like)],
+                            .scatter = diagnosis_.answer.scatter}));
+    diagnosis_.next_experiment = std::move(plan.next);
+    for (std::string& warning : plan.warnings) diagnosis_.warnings.push_back(std::move(warning));
     if (!diagnosis_.next_experiment)
       diagnosis_.warnings.push_back(
-          absl::StrCat("No next experiment is planned: ", next.why_none, "."));
+          absl::StrCat("No next experiment is planned: ", plan.why_none, "."));
     return absl::OkStatus();
   }
 

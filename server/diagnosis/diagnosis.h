@@ -12,9 +12,18 @@
 #include "server/client/laboratory.h"
 #include "server/diagnosis/answer.h"
 #include "server/diagnosis/next_experiment.h"
+#include "server/diagnosis/then_answer.h"
 #include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
+
+/// A measurement that was told, and the runs that it took.
+struct ToldMeasurement {
+  PlannedExperiment plan{};
+  std::string file{}, digest{};  ///< name, and SHA-256 of its content
+  std::string campaign{};        ///< id; empty: no runs were needed
+  std::int64_t evaluations = 0;
+};
 
 struct Diagnosis {
   std::string campaign{};  ///< id
@@ -25,6 +34,8 @@ struct Diagnosis {
   std::int64_t evaluations = 0;
   int packings = 0;  ///< that the best estimate was run on; 0: scatter is that of twins, or of runs
   std::optional<NextExperiment> next_experiment{};
+  std::optional<ToldMeasurement> then{};  ///< of which the answer knows too
+  std::vector<std::string> left_out{};    ///< effects that did not take part, as asked for
   /// The errors are stated too small or too large by what the readings show, or readings are few:
   /// what is said rests on them.
   bool in_doubt = false;
@@ -39,12 +50,16 @@ struct DiagnosisOptions {
   std::vector<std::string> without = {};  ///< effects that do not take part
   /// Of the design, on the fitted experiments; those that were made before count too.
   std::optional<std::int64_t> max_evaluations = {};
-  bool next_experiment = true;  ///< where the model is not adequate: the test that separates rivals
+  bool next_experiment = true;  ///< where the model is not adequate: what to measure next
+  /// A proposal of an earlier answer that has been measured: the answer is that of both, and plans
+  /// no further one.
+  std::optional<MadeMeasurement> then = {};
 };
 
 /// Errors: FAILED_PRECONDITION with a sentence when nothing can be said (no posterior, noise not
 /// given independently, too few runs); RESOURCE_EXHAUSTED when max_evaluations does not suffice;
-/// those of the runs. Where the next experiment alone cannot be planned, a warning.
+/// those of the runs and of AnswerWith. Where the next experiment alone cannot be planned, a
+/// warning.
 absl::StatusOr<Diagnosis> Diagnose(client::Laboratory& laboratory, const report::CampaignView& view,
                                    const DiagnosisOptions& options = {});
 

@@ -8,6 +8,7 @@
 
 #include "server/diagnosis/design_caps.h"
 #include "server/diagnosis/diagnosis.h"
+#include "server/diagnosis/plan_json.h"
 #include "server/diagnosis/plan_words.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
@@ -22,7 +23,6 @@ using report::Number;
 constexpr double kListed = 1e-3;  // smallest probability of a model that is listed
 
 Json OrNull(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
-Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 Json ReasonsJson(const std::vector<std::pair<std::string, std::string>>& list) {
   Json json = Json::array();
@@ -101,26 +101,6 @@ Json CandidateJson(const Answer& answer, const EffectAnswer& own) {
           {"curves", CurvesJson(own)}};
 }
 
-Json PlannedJson(const PlannedExperiment& planned) {
-  return {{"test", planned.test},
-          {"settings", planned.settings},
-          {"unloading", planned.unloading_at.has_value()},
-          {"unloading_at", OrNull(planned.unloading_at)},
-          {"control", planned.control},
-          {"control_from", planned.path.front()},
-          {"control_to", planned.path.back()},
-          {"expected_power", planned.expected_power},
-          {"distance_sd", planned.distance},
-          {"points", planned.points},
-          {"not_separated", planned.together},
-          {"cost",
-           {{"core_seconds_per_evaluation",
-             planned.core_seconds > 0 ? Json(planned.core_seconds) : Json(nullptr)}}},
-          {"none_of_these",
-           {{"distance_sd", OrNull(planned.distance_from_none)},
-            {"expected_power", OrNull(planned.power_against_none)}}}};
-}
-
 Json NextJson(const std::optional<NextExperiment>& next) {
   if (!next) return nullptr;
   Json json = PlannedJson(next->best);
@@ -135,15 +115,7 @@ Json NextJson(const std::optional<NextExperiment>& next) {
   return json;
 }
 
-// And from a misfit that none of them makes.
-std::string AgainstNone(const PlannedExperiment& planned) {
-  if (!planned.power_against_none) return "";
-  return fmt::format(
-      ", and them from a misfit of unknown cause as large as the present one with {} ({} sd)",
-      report::Percent(*planned.power_against_none, 3), Number(*planned.distance_from_none, 3));
-}
-
-// Pairs of rivals that a planned test leaves together.
+// Screened rivals that a planned test leaves together.
 std::string NotTold(const PlannedExperiment& planned) {
   std::string text;
   for (const auto& [a, b] : planned.together) {
@@ -154,35 +126,49 @@ std::string NotTold(const PlannedExperiment& planned) {
 
 std::string CostOf(const PlannedExperiment& planned) {
   if (!(planned.core_seconds > 0)) return "";
-  return fmt::format("; an evaluation costs about {} core seconds",
+  return fmt::format(" An evaluation costs about {} core seconds.",
                      Number(planned.core_seconds, 2));
 }
 
+std::string ForecastInWords(const PlanForecast& forecast) {
+  return fmt::format("one answer, and the right one, with probability {} ({} bits)",
+                     report::Percent(forecast.decides, 3), Number(forecast.bits, 2));
+}
+
 std::string NextText(const NextExperiment& next) {
-  std::string names;
-  for (const std::string& name : next.separates) names += (names.empty() ? "" : " and ") + name;
   std::string text =
       "\n" +
-      report::Wrapped(
-          fmt::format(
-              "Next experiment: {}. It separates {} with a power of {} ({} sd apart){}{}{}. "
-              "For the campaign file:",
-              InWords(next.best), names, report::Percent(next.best.expected_power, 3),
-              Number(next.best.distance, 3), NotTold(next.best), AgainstNone(next.best),
-              CostOf(next.best)),
-          "", "") +
+      report::Wrapped(fmt::format("Next experiment: {}. Expected of it: {}; a wrong name with {}.{} "
+                                  "For the campaign file:",
+                                  InWords(next.best), ForecastInWords(*next.best.forecast),
+                                  report::Percent(next.best.forecast->wrong, 2),
+                                  CostOf(next.best)),
+                      "", "") +
       "\n" + next.snippet;
   if (next.considered.size() > 1) text += "\nAlso tried:\n";
   for (std::size_t k = 1; k < next.considered.size(); ++k) {
     const PlannedExperiment& planned = next.considered[k];
-    text +=
-        "  " + InWords(planned) + ": " +
-        (planned.expected_power < kToldApart
-             ? "tells none of them apart\n"
-             : fmt::format("power {}, {} sd apart{}\n", report::Percent(planned.expected_power, 2),
-                           Number(planned.distance, 3), NotTold(planned)));
+    text += "  " + InWords(planned) + ": ";
+    if (planned.forecast) {
+      text += ForecastInWords(*planned.forecast) + "\n";
+    } else {
+      text += planned.expected_power < kToldApart
+                  ? "at first sight tells none of them apart\n"
+                  : fmt::format("at first sight {} sd apart{}\n", Number(planned.distance, 3),
+                                NotTold(planned));
+    }
   }
   return text;
+}
+
+Json ThenJson(const std::optional<ToldMeasurement>& then) {
+  if (!then) return nullptr;
+  return {{"file", then->file},
+          {"digest", then->digest},
+          {"plan", PlannedJson(then->plan)},
+          {"in_words", InWords(then->plan)},
+          {"campaign", OrNull(then->campaign)},
+          {"model_evaluations", then->evaluations}};
 }
 
 // Effects that share a reason in one sentence.
@@ -201,7 +187,14 @@ std::string ByReason(const std::string& begin,
 }
 
 std::string Sentence(const Diagnosis& d) {
-  return d.answer.sentence +
+  std::string sentence = d.answer.sentence;
+  if (d.then)
+    sentence = fmt::format("With {} ({}): {}", d.then->file, InWords(d.then->plan), sentence);
+  if (d.next_experiment && d.answer.verdict == AnswerVerdict::kAmbiguous &&
+      d.next_experiment->best.repeats.empty())
+    sentence += fmt::format(" {} would, with probability {}.", InWords(d.next_experiment->best),
+                            report::Percent(d.next_experiment->best.expected_power, 2));
+  return sentence +
          (d.in_doubt ? " This is in doubt, for what the warnings say of the readings." : "");
 }
 
@@ -277,8 +270,12 @@ std::string RunsText(const Diagnosis& d) {
     stages += fmt::format("{}{} {}", stages.empty() ? "" : ", ", stage, number);
     runs += number;
   }
-  return fmt::format("{} runs ({}) in {}, {} model evaluations.\n", runs, stages, d.design,
-                     d.evaluations);
+  std::string text = fmt::format("{} runs ({}) in {}, {} model evaluations.\n", runs, stages,
+                                 d.design, d.evaluations);
+  if (d.then && !d.then->campaign.empty())
+    text += fmt::format("{} runs of {} in {}.\n", d.then->evaluations, InWords(d.then->plan),
+                        d.then->campaign);
+  return text;
 }
 
 }  // namespace
@@ -328,6 +325,8 @@ std::string DiagnosisJson(const Diagnosis& d) {
     json["detectable"] = detectable;
     json["undetectable"] = undetectable;
     json["design"] = {{"campaign", OrNull(d.design)}, {"runs", answer.runs}};
+    json["without"] = d.left_out;
+    json["then"] = ThenJson(d.then);
   }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

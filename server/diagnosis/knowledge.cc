@@ -235,8 +235,14 @@ absl::StatusOr<Knowledge> LearnBase(const KnownBefore& before, const DesignRows&
   return known;
 }
 
-absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort) {
+absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort,
+                          const FurtherMeasured* further) {
   Asked asked{.space = SpaceOf(before, knowledge.rows, knowledge.part)};
+  std::vector<inference::MeasuredSet> measured = {{.set = knowledge.set.get(), .z = knowledge.z}};
+  if (further != nullptr) {
+    asked.space.models = further->models;
+    measured.insert(measured.end(), further->sets.begin(), further->sets.end());
+  }
   const Eigen::VectorXd most = knowledge.rows.Most(), other = knowledge.rows.MostOther();
   std::vector<std::vector<inference::StrengthPrior>> priors;
   double widest_low = std::numeric_limits<double>::infinity(), widest_high = 0;
@@ -270,8 +276,7 @@ absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge,
     options.realisations = 16;
   }
   ASSIGN_OR_RETURN(asked.evidence,
-                   inference::ModelEvidencesUnder({{knowledge.set.get(), knowledge.z}}, asked.space,
-                                                  priors, options));
+                   inference::ModelEvidencesUnder(measured, asked.space, priors, options));
   for (const auto& evidence : asked.evidence) {
     ASSIGN_OR_RETURN(auto probabilities, inference::ProbabilitiesOf(evidence, asked.space));
     asked.probabilities.push_back(std::move(probabilities));
@@ -296,8 +301,8 @@ DesignPoints BestDraw(const Knowledge& knowledge, const DesignPoints& draws) {
   return inference::RowsOf(draws, {best});
 }
 
-Eigen::VectorXd SquaresOfMisfit(const Knowledge& knowledge, const DesignPoints& points) {
-  const inference::DiagnosisSet& set = *knowledge.set;
+Eigen::VectorXd SquaresOfMisfit(const inference::DiagnosisSet& set, const Eigen::VectorXd& z,
+                                const DesignPoints& points) {
   const inference::EmulatorPrediction prediction = set.emulator().Predict(points);
   const inference::SpecimenErrors& errors = set.errors();
   const Eigen::MatrixXd diagonal = inference::DiagonalVariance(prediction, errors);
@@ -305,23 +310,23 @@ Eigen::VectorXd SquaresOfMisfit(const Knowledge& knowledge, const DesignPoints& 
   for (Index i = 0; i < points.rows(); ++i) {
     Eigen::MatrixXd v = errors.staging * errors.staging.transpose();
     v.diagonal() += diagonal.row(i).transpose();
-    const Eigen::VectorXd r = knowledge.z - prediction.mean.row(i).transpose();
+    const Eigen::VectorXd r = z - prediction.mean.row(i).transpose();
     squares[i] = r.dot(Eigen::LLT<Eigen::MatrixXd>(v).solve(r));
   }
   return squares;
 }
 
-double ChanceOfMisfit(const KnownBefore& before, const Knowledge& knowledge,
+double ChanceOfMisfit(const inference::DiagnosisSet& set, const Eigen::VectorXd& history,
                       const DesignPoints& points, int fitted) {
-  const inference::DiagnosisSet& set = *knowledge.set;
+  const Eigen::VectorXd z = set.coordinates()->Of(history.transpose()).row(0);
   Index closest = 0;
-  const double least = SquaresOfMisfit(knowledge, points).minCoeff(&closest);
-  const auto degrees = static_cast<double>(std::max<Index>(1, knowledge.z.size() - fitted));
+  const double least = SquaresOfMisfit(set, z, points).minCoeff(&closest);
+  const auto degrees = static_cast<double>(std::max<Index>(1, z.size() - fitted));
   const double inside =
       inference::FisherLaw{.numerator = degrees, .denominator = set.errors().freedom}.Tail(least /
                                                                                            degrees);
   const double outside = set.coordinates()
-                             ->LeftOut(Eigen::VectorXd::Zero(before.base.histories.cols()),
+                             ->LeftOut(history,
                                        inference::RowsOf(points, {closest}))
                              .chance;
   return std::min(1.0, 2 * std::min(inside, outside));

@@ -64,8 +64,16 @@ struct Asked {
   std::vector<inference::EffectProbabilities> probabilities{};
 };
 
+/// Measurements in further tests, and who competes for them and the first ones together.
+struct FurtherMeasured {
+  std::vector<inference::MeasuredSet> sets{};
+  std::vector<inference::EffectModel> models{};  ///< of kept entries; the base model the first
+};
+
+/// further: null where there are the base's fitted tests alone, for which all models compete.
 /// Errors: those of ModelEvidencesUnder and ProbabilitiesOf.
-absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort);
+absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort,
+                          const FurtherMeasured* further = nullptr);
 
 /// Names of the effects of a model of kept entries, each once.
 std::vector<std::string> EffectsNamed(const Knowledge& knowledge,
@@ -75,13 +83,16 @@ std::vector<std::string> EffectsNamed(const Knowledge& knowledge,
 /// at least one
 inference::DesignPoints BestDraw(const Knowledge& knowledge, const inference::DesignPoints& draws);
 
-/// n: squares of the measurement's distances from points, over errors and what is not known there.
-Eigen::VectorXd SquaresOfMisfit(const Knowledge& knowledge, const inference::DesignPoints& points);
+/// n: squares of a measurement's distances (z: its coordinates in the set) from points, over errors
+/// and what is not known there.
+Eigen::VectorXd SquaresOfMisfit(const inference::DiagnosisSet& set, const Eigen::VectorXd& z,
+                                const inference::DesignPoints& points);
 
-/// Chance that a right model misses a measurement by as much as the closest of these points does:
-/// the smaller of that of the coordinates and that of what they leave out, doubled
-/// (Bonferroni). `fitted`: parameters that were free. in: points n >= 1, of the kept entries
-double ChanceOfMisfit(const KnownBefore& before, const Knowledge& knowledge,
+/// Chance that a right model misses a measured history (T, on the set's scale) by as much as the
+/// closest of these points does: the smaller of that of the coordinates and that of what they leave
+/// out, doubled (Bonferroni). `fitted`: parameters that were free. in: a set with coordinates;
+/// points n >= 1, of its emulator
+double ChanceOfMisfit(const inference::DiagnosisSet& set, const Eigen::VectorXd& history,
                       const inference::DesignPoints& points, int fitted);
 
 }  // namespace calib::diagnosis

@@ -1,94 +1,56 @@
 #pragma once
-// Which test to do next: among the tests of this build and a grid of their settings, the one in
-// which the models still in the race differ most.
+// Which measurement to make next: the one that is expected to tell most about which model is right,
+// a repeat of a fitted test on another specimen among them.
 
-#include <Eigen/Core>
-#include <map>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "dem/registry/catalog.h"
 #include "server/client/laboratory.h"
-#include "server/diagnosis/test_plans.h"
+#include "server/diagnosis/design_stages.h"
+#include "server/diagnosis/plan_screen.h"
 #include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
 
-/// A model in the race at its best point. The view must outlive it.
-struct Rival {
-  std::string name{};  ///< of the effect; "base": the campaign's own model
-  const report::CampaignView* view = nullptr;
-  std::map<std::string, double> values{};             ///< calibrated parameters, SI
-  std::vector<std::map<std::string, double>> near{};  ///< others that the readings do not exclude
-  std::vector<std::string> effects{};                 ///< that join the model of the view, and
-  /// ranges of their parameters, which are among the values.
-  std::map<std::string, dem::DefaultPrior> parameters{};
-};
-
-/// What two runs differ by beyond what two runs of one model do, as a squared distance in units of
-/// what a measurement and both runs scatter by; 0 where it is no more. departures: per curve, the
-/// difference of the runs over the noise. scatter s of a single run in units of the noise: half of
-/// its variance shifts a curve as a whole, half is from reading to reading. shift: per curve, sd of
-/// what else may shift it as a whole, in units of the noise; empty: nothing does.
-double SeparationOf(const std::vector<Eigen::VectorXd>& departures, double scatter,
-                    const std::vector<double>& shift = {});
-
-/// Two rivals in a planned test; means over their points.
-struct RivalPair {
-  std::string a, b;
-  double distance = 0;  ///< sd of a measurement, >= 0
-  double power = 0;     ///< chance to see it at the 1 % level
-};
-
-/// With less a pair is not told apart: ten times what is seen of two that are the same.
-inline constexpr double kToldApart = 0.1;
-
-/// Fills expected_power, distance and together of a plan.
-void Weigh(const std::vector<RivalPair>& pairs, PlannedExperiment& planned);
-
-/// Share of the pairs that is expected to be told apart.
-double ShareToldApart(const std::vector<RivalPair>& pairs);
-
-/// "None of these": the campaign's own model with a smooth misfit as large as the one that is
-/// there.
-struct NoneOfThese {
-  Rival base{};
-  /// By observable: rms of what it misses of the fitted readings beyond their noise, in units of
-  /// it.
-  std::map<std::string, double> missed{};
-};
-
 struct NextExperiment {
-  PlannedExperiment best;
-  std::vector<std::string> separates;  ///< rivals that the best tells from another
-  std::string snippet;  ///< an entry of `experiments`, indented, with a comment; the file of the
-                        ///< measurement is to be made
-  std::vector<PlannedExperiment> considered;  ///< best first
+  PlannedExperiment best{};
+  std::vector<std::string> separates{};  ///< models that it tells from another
+  std::string snippet{};  ///< an entry of `experiments`, indented, with a comment; the file of the
+                          ///< measurement is to be made
+  /// All that were tried: those with a forecast first, by what they tell.
+  std::vector<PlannedExperiment> considered{};
   std::int64_t evaluations = 0;
 };
 
 struct NextPlan {
   std::optional<NextExperiment> next{};
-  std::string why_none{};  ///< a clause; empty where there is one
-  std::string warning{};   ///< a sentence without its full stop; may be empty
+  std::string why_none{};               ///< a clause; empty where there is one
+  std::vector<std::string> warnings{};  ///< a sentence each
 };
 
-/// Runs every rival, and the model of `none`, once in every planned test, from the specimen and
-/// seed of sample `like`, first with one thing changed at a time. The three best are run at the
-/// rivals' other points too, and of these the best is chosen by what is expected over them; where
-/// that does not tell 99 % of the pairs apart, the same with the best changes together (GridOf()).
-/// Errors of a measurement: the noise that the campaign states for the observables at values of
-/// their size, and `scatter` (of a single run, in units of that noise) for
-/// the measurement and both runs: see SeparationOf(). None for fewer than two rivals, without a
-/// known size of the errors, where no plan is a campaign that this build accepts, is finished by
-/// all rivals, or tells any two of them apart. Errors: those of the runs. The best is that which
-/// tells the most pairs apart, and of equals the closest of them best; their distance from none of
-/// them is told beside it.
+/// Who is screened, as ScreenPlans takes them.
+struct ScreenQuestion {
+  std::vector<Rival> rivals{};
+  std::optional<NoneOfThese> none{};
+  int like = 0;
+  double scatter = 0;
+};
+
+/// Screens plans by few runs of each rival (ScreenPlans). The two best get runs of their own
+/// (RowsOfTest) at draws of the leading models' posteriors, rivals refitted and none of these among
+/// them, and are told by inference::ExpectedInformation, as a repeat of each fitted test is by the
+/// runs of the design; a plan whose emulator does not predict its own runs is not promised. The
+/// best tells most. None where nothing tells as much as a further batch of the design has to
+/// (DesignCaps::told). Errors: those of the runs.
 absl::StatusOr<NextPlan> PlanNextExperiment(client::Laboratory& laboratory,
-                                            const std::vector<Rival>& rivals,
-                                            const std::optional<NoneOfThese>& none, int like,
-                                            double scatter);
+                                            const report::CampaignView& base,
+                                            const AnsweredDesign& answered,
+                                            const ScreenQuestion& question);
+
+/// The proposal "a fitted test again, on another specimen". experiment: of the campaign.
+PlannedExperiment RepeatOf(const campaign::Experiment& experiment);
 
 }  // namespace calib::diagnosis

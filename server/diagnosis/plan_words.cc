@@ -26,6 +26,8 @@ std::string Quantity(const PlannedExperiment& planned, const std::string& name, 
 }  // namespace
 
 std::string InWords(const PlannedExperiment& planned) {
+  if (!planned.repeats.empty())
+    return fmt::format("{} again, on another specimen", planned.repeats);
   std::string text = planned.test;
   for (const auto& [name, value] : planned.settings) {
     text += fmt::format(", {} {}", report::NameForPeople(name), Quantity(planned, name, value));

@@ -60,6 +60,7 @@ class ServerRunMaker : public RunMaker {
                  std::vector<std::string> names);
   absl::StatusOr<std::vector<EndedBatch>> Batches() override;
   absl::StatusOr<EndedBatch> Make(const RunBatch& batch) override;
+  const report::CampaignView& design() const { return design_; }  ///< with all batches so far
 
  private:
   client::Laboratory& laboratory_;

@@ -172,6 +172,27 @@ inference::CalculatedDifferences DifferencesOf(const BaseRuns& base, const Desig
   return result;
 }
 
+// Errors of readings that are stated.
+absl::Status CheckErrors(const report::CampaignView& view, const inference::DataSet& data) {
+  const absl::Status status = inference::ValidateData(data, inference::NoiseMode::kGiven);
+  return status.ok() ? status
+                     : absl::FailedPreconditionError(
+                           absl::StrCat("the readings of ", view.status.campaign(),
+                                        " cannot be judged: ", status.message()));
+}
+
+// Places of an experiment's readings among the columns of a history, ascending.
+std::vector<Index> ColumnsOfExperiment(const HistoryScale& scale, const std::string& experiment) {
+  std::vector<Index> columns;
+  Index column = 0;
+  for (std::size_t c = 0; c < scale.curves().size(); ++c) {
+    for (Index i = 0; i < scale.curves()[c].path.size(); ++i, ++column) {
+      if (scale.names()[c].first == experiment) columns.push_back(column);
+    }
+  }
+  return columns;
+}
+
 }  // namespace
 
 int PackingsApart(const campaign::Campaign& campaign) {
@@ -183,28 +204,41 @@ int PackingsApart(const campaign::Campaign& campaign) {
   return std::max(1, packings);
 }
 
-absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
-  const inference::DataSet data = campaign::MakeDataSet(view.campaign);
-  if (const absl::Status status = inference::ValidateData(data, inference::NoiseMode::kGiven);
-      !status.ok())
-    return absl::FailedPreconditionError(absl::StrCat("the readings of ", view.status.campaign(),
-                                                      " cannot be judged: ", status.message()));
-  const report::RunTable table = report::RunsOf(view);
-  const std::vector<Index> own = RunsOfTheirOwn(view, table);
-  BaseRuns base{.scale = HistoryScale(view.campaign, data),
-                .elsewhere = view.campaign.precomputed.has_value(),
-                .calculated = view.campaign.precomputed
-                                  ? EffectsOnReadings(view.campaign).by_strength
-                                  : CalculatedOn(view.campaign, data),
-                .values = table.parameters(own, Eigen::all),
-                .readings = table.histories(own, Eigen::all),
-                .packings = PackingsApart(view.campaign)};
-  for (const Index i : own) base.stream.push_back(table.stream[static_cast<std::size_t>(i)]);
+BaseRuns WithoutRuns(const campaign::Campaign& campaign) {
+  const inference::DataSet data = campaign::MakeDataSet(campaign);
+  BaseRuns base{.scale = HistoryScale(campaign, data),
+                .elsewhere = campaign.precomputed.has_value(),
+                .calculated = campaign.precomputed ? EffectsOnReadings(campaign).by_strength
+                                                   : CalculatedOn(campaign, data),
+                .packings = PackingsApart(campaign)};
   const auto t = static_cast<Index>(data.readings.size());
   Eigen::VectorXd sd(t);
+  for (Index k = 0; k < t; ++k) sd[k] = data.readings[static_cast<std::size_t>(k)].sd;
+  const Eigen::MatrixXd correlation = sd.cwiseInverse().asDiagonal() *
+                                      inference::ErrorCovariance(data) *
+                                      sd.cwiseInverse().asDiagonal();
+  base.noise = correlation(base.scale.order(), base.scale.order());
+  base.share = 0;
+  for (const campaign::Experiment& experiment : campaign.experiments) {
+    if (experiment.role == campaign::Role::kCalibrate)
+      base.share = std::max(base.share, campaign::ScatterShare(experiment));
+  }
+  base.sd = Eigen::VectorXd::Ones(t);
+  return base;
+}
+
+absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
+  const inference::DataSet data = campaign::MakeDataSet(view.campaign);
+  RETURN_IF_ERROR(CheckErrors(view, data));
+  const report::RunTable table = report::RunsOf(view);
+  const std::vector<Index> own = RunsOfTheirOwn(view, table);
+  BaseRuns base = WithoutRuns(view.campaign);
+  base.values = table.parameters(own, Eigen::all);
+  base.readings = table.histories(own, Eigen::all);
+  for (const Index i : own) base.stream.push_back(table.stream[static_cast<std::size_t>(i)]);
+  const auto t = static_cast<Index>(data.readings.size());
   for (Index k = 0; k < t; ++k) {
     const inference::Reading& reading = data.readings[static_cast<std::size_t>(k)];
-    sd[k] = reading.sd;
     base.readings.col(k) = base.readings.col(k).array() * reading.sd + reading.value;
   }
   base.histories = base.scale.Scaled(base.readings);
@@ -217,23 +251,65 @@ absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view) {
   for (const int stream : table.stream) most = std::max(most, stream);
   base.samples = most + 1;
   base.unfinished = static_cast<int>(calibrated - table.sample.size());
-  const Eigen::MatrixXd covariance = inference::ErrorCovariance(data);
-  const Eigen::MatrixXd correlation =
-      sd.cwiseInverse().asDiagonal() * covariance * sd.cwiseInverse().asDiagonal();
-  base.noise = correlation(base.scale.order(), base.scale.order());
-  base.share = 0;
-  for (const campaign::Experiment& experiment : view.campaign.experiments) {
-    if (experiment.role == campaign::Role::kCalibrate)
-      base.share = std::max(base.share, campaign::ScatterShare(experiment));
-  }
   const report::ScatteredReadings scattered = report::ReadingsWithScatter(view);
-  base.sd.resize(t);
   for (Index c = 0; c < t; ++c) {
-    const Index k = base.scale.order()[static_cast<std::size_t>(c)];
-    base.sd[c] = scattered.of_mean.readings[static_cast<std::size_t>(k)].sd / sd[k];
+    const auto k = static_cast<std::size_t>(base.scale.order()[static_cast<std::size_t>(c)]);
+    base.sd[c] = scattered.of_mean.readings[k].sd / data.readings[k].sd;
   }
   if (scattered.twins.rows() > 0) base.twins = base.scale.Departures(scattered.twins);
   return base;
+}
+
+absl::StatusOr<TestRuns> RunsOfTest(const report::CampaignView& design, const DesignRows& rows,
+                                    int most) {
+  const inference::DataSet data = campaign::MakeDataSet(design.campaign);
+  RETURN_IF_ERROR(CheckErrors(design, data));
+  TestRuns result{.base = WithoutRuns(design.campaign)};
+  ASSIGN_OR_RETURN(std::vector<EndedBatch> batches, EndedBatchesOf(design, rows.names()));
+  std::vector<EndedRun> without;
+  if (std::ssize(batches) > most) batches.resize(static_cast<std::size_t>(most));
+  for (EndedBatch& batch : batches) {
+    if (batch.stage == campaign::SamplePurpose::kVerification) continue;
+    EndedBatch& others = result.batches.emplace_back(EndedBatch{.stage = batch.stage});
+    for (EndedRun& ended : batch.runs) {
+      const bool has_effect = (rows.Points({ended.run.values}).strength.array() != 0).any() ||
+                              rows.ChangedNumerics(ended.run.values) >= 0;
+      if (has_effect) {
+        others.runs.push_back(std::move(ended));
+      } else if (ended.readings) {
+        without.push_back(std::move(ended));
+      }
+    }
+  }
+  const auto d = static_cast<Index>(rows.race().base.size());
+  const auto n = static_cast<Index>(without.size());
+  result.base.values.resize(n, d);
+  result.base.readings.resize(n, static_cast<Index>(data.readings.size()));
+  for (Index i = 0; i < n; ++i) {
+    const EndedRun& own = without[static_cast<std::size_t>(i)];
+    result.base.values.row(i) = Eigen::Map<const Eigen::RowVectorXd>(own.run.values.data(), d);
+    result.base.readings.row(i) = *own.readings;
+    result.base.stream.push_back(own.run.stream);
+  }
+  result.base.histories = result.base.scale.Scaled(result.base.readings);
+  return result;
+}
+
+inference::SetRuns OfExperiment(const inference::SetRuns& runs, const HistoryScale& scale,
+                                const std::string& experiment) {
+  const std::vector<Index> columns = ColumnsOfExperiment(scale, experiment);
+  inference::SetRuns own = runs;
+  own.curves.clear();
+  for (std::size_t c = 0; c < runs.curves.size(); ++c) {
+    if (scale.names()[c].first == experiment) own.curves.push_back(runs.curves[c]);
+  }
+  own.histories = runs.histories(Eigen::all, columns);
+  own.noise = runs.noise(columns, columns);
+  if (runs.differences.outputs.rows() > 0)
+    own.differences.outputs = runs.differences.outputs(Eigen::all, columns);
+  if (runs.staging.size() > 0) own.staging = runs.staging(columns, Eigen::all);
+  if (runs.twins.rows() > 0) own.twins = runs.twins(Eigen::all, columns);
+  return own;
 }
 
 int FewestBaseRuns(int parameters) {

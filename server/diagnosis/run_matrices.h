@@ -51,6 +51,20 @@ struct BaseRuns {
 /// readings are not stated.
 absl::StatusOr<BaseRuns> BaseRunsOf(const report::CampaignView& view);
 
+/// Scale and errors of a campaign's fitted tests, without runs; `sd` of the noise alone.
+BaseRuns WithoutRuns(const campaign::Campaign& campaign);
+
+/// Runs of a test that the base campaign does not have.
+struct TestRuns {
+  BaseRuns base;  ///< runs without effects; no twins, and `sd` of the noise alone
+  std::vector<EndedBatch> batches{};  ///< the others
+};
+
+/// Reads the first `most` batches of a design of this test alone, whose data are in its file; runs
+/// that verify are left out. rows: of its values. Errors: as BaseRunsOf and EndedBatchesOf.
+absl::StatusOr<TestRuns> RunsOfTest(const report::CampaignView& design, const DesignRows& rows,
+                                    int most);
+
 /// Fewest base runs that an emulator which bends in all of d parameters is fitted to: four for each
 /// coefficient of a quadratic, and ten more than coefficients (EffectFeatures::DegreeFor,
 /// StageCoordinates::Fit).
@@ -79,6 +93,10 @@ std::vector<int> EntriesRun(const Race& race, const std::vector<int>& entries);
 /// prior.
 inference::SetRuns SetRunsOf(const BaseRuns& base, const DesignRows& rows,
                              const std::vector<EndedBatch>& batches, const PartOfRace& part);
+
+/// The columns of one experiment (HistoryScale::names) of these runs.
+inference::SetRuns OfExperiment(const inference::SetRuns& runs, const HistoryScale& scale,
+                                const std::string& experiment);
 
 /// Complete runs of the design in which an entry is on.
 int RunsWith(const DesignRows& rows, const std::vector<EndedBatch>& batches, int entry);

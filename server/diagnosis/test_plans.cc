@@ -173,17 +173,31 @@ std::vector<TestPlan> Named(std::vector<PlannedExperiment> plans, std::size_t fi
   return named;
 }
 
-std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern) {
+std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern,
+                   const std::vector<Eigen::VectorXd>& curves) {
   std::string text = planned.control;
   for (const auto& observable : pattern.observables) text += "," + observable.name;
   text += "\n";
-  for (const double value : planned.path) {
-    text += fmt::format("{:.9g}", value);
+  for (std::size_t i = 0; i < planned.path.size(); ++i) {
+    text += fmt::format("{:.9g}", planned.path[i]);
     // Runs of a table are not compared with readings: at one a relative noise is known.
-    for (std::size_t k = 0; k < pattern.observables.size(); ++k) text += ",1";
+    for (std::size_t k = 0; k < pattern.observables.size(); ++k)
+      text += curves.empty() ? ",1" : fmt::format(",{:.9g}", curves[k][static_cast<Eigen::Index>(i)]);
     text += "\n";
   }
   return text;
+}
+
+std::optional<YamlNode> EntryNamed(const std::string& campaign_file,
+                                   const std::string& experiment) {
+  const auto parsed = campaign::ParseYaml(campaign_file);
+  const YamlNode* list = parsed.root ? campaign::YamlFind(*parsed.root, "experiments") : nullptr;
+  if (list == nullptr) return std::nullopt;
+  for (const YamlNode& item : list->items) {
+    const YamlNode* name = campaign::YamlFind(item, "name");
+    if (name != nullptr && name->scalar == experiment) return item;
+  }
+  return std::nullopt;
 }
 
 YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,

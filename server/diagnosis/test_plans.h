@@ -13,6 +13,14 @@
 
 namespace calib::diagnosis {
 
+/// What a measurement is expected to tell.
+struct PlanForecast {
+  double bits = 0;     ///< about which model is right
+  double decides = 0;  ///< chance of one answer, and that it is right (inference::Forecast)
+  double wrong = 0;    ///< chance that a wrong effect is named
+  int runs = 0;        ///< of the test that this rests on; of a repeat those of the design
+};
+
 struct PlannedExperiment {
   std::string test;
   /// SI; in addition to the test's own `porosity` (of another specimen) and `loading_rate` (1/s).
@@ -28,6 +36,9 @@ struct PlannedExperiment {
   std::vector<std::pair<std::string, std::string>> together{};  ///< pairs that are not told apart
   /// The same of the rivals against none of them (NoneOfThese); where that was asked for.
   std::optional<double> distance_from_none{}, power_against_none{};
+  /// By runs of its own; then expected_power is its `decides`.
+  std::optional<PlanForecast> forecast{};
+  std::string repeats{};  ///< experiment of the campaign that it is, on another specimen; or empty
 };
 
 struct TestPlan {
@@ -55,8 +66,14 @@ std::vector<PlannedExperiment> PlansFor(const campaign::Campaign& campaign);
 /// With a name and a file of data each; numbers from `first` on.
 std::vector<TestPlan> Named(std::vector<PlannedExperiment> plans, std::size_t first);
 
-/// Text of the plan's file: the way of the control. Only that is read of it.
-std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern);
+/// Text of the plan's file: the way of the control, and at it these curves of the pattern's
+/// observables; none: ones, where only the control is read.
+std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment& pattern,
+                   const std::vector<Eigen::VectorXd>& curves = {});
+
+/// The entry of an experiment in a campaign file; empty: it is not there.
+std::optional<campaign::YamlNode> EntryNamed(const std::string& campaign_file,
+                                             const std::string& experiment);
 
 /// The pattern's entry in the campaign file with another test, settings and measurement.
 campaign::YamlNode EntryFor(const TestPlan& plan, const campaign::Experiment& pattern,

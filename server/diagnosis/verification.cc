@@ -35,7 +35,7 @@ std::vector<VerifiedModel> ModelsToVerify(const Knowledge& knowledge, const Aske
   return models;
 }
 
-std::map<std::string, double> ChancesOf(const KnownBefore& before, const Knowledge& knowledge,
+std::map<std::string, double> ChancesOf(const BaseRuns& base, const Knowledge& knowledge,
                                         const std::vector<VerifiedModel>& models,
                                         const EndedBatch& runs, int each) {
   std::map<std::string, double> chances;
@@ -49,7 +49,7 @@ std::map<std::string, double> ChancesOf(const KnownBefore& before, const Knowled
       if (!ended.readings) continue;
       values.push_back(ended.run.values);
       // One packing is chaos alone: each run is another specimen.
-      packing.push_back(before.base.packings > 1 ? ended.run.stream % before.base.packings : r);
+      packing.push_back(base.packings > 1 ? ended.run.stream % base.packings : r);
       readings.push_back(*ended.readings);
     }
     double chance = 0;
@@ -60,7 +60,7 @@ std::map<std::string, double> ChancesOf(const KnownBefore& before, const Knowled
       chance = inference::VerificationChance(
           *knowledge.set,
           PartOfPoints(knowledge.rows, knowledge.part, knowledge.rows.Points(values)), packing,
-          before.base.scale.Scaled(rows));
+          base.scale.Scaled(rows));
     }
     for (const std::string& effect : model.effects) {
       const auto [place, fresh] = chances.try_emplace(effect, chance);

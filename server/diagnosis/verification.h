@@ -29,10 +29,10 @@ std::vector<VerifiedModel> ModelsToVerify(const Knowledge& knowledge, const Aske
                                           const VerificationQuestion& question);
 
 /// For each effect of the models the smallest chance of the fresh runs of a model that has it
-/// (inference::VerificationChance). knowledge: without these runs. runs: `each` of every model in
-/// their order; those that did not come to their ends are left out, and where none came the chance
-/// is 0.
-std::map<std::string, double> ChancesOf(const KnownBefore& before, const Knowledge& knowledge,
+/// (inference::VerificationChance). base: of the tests that were run; knowledge: of them, without
+/// these runs. runs: `each` of every model in their order; those that did not come to their ends
+/// are left out, and where none came the chance is 0.
+std::map<std::string, double> ChancesOf(const BaseRuns& base, const Knowledge& knowledge,
                                         const std::vector<VerifiedModel>& models,
                                         const EndedBatch& runs, int each);
 

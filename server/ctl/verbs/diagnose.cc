@@ -1,9 +1,14 @@
+#include <filesystem>
 #include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
+#include "server/campaign/file/campaign_file.h"
 #include "server/client/findings.h"
 #include "server/client/interrupt.h"
 #include "server/ctl/exit_codes.h"
@@ -12,6 +17,7 @@
 #include "server/ctl/verb.h"
 #include "server/diagnosis/diagnosis.h"
 #include "server/diagnosis/diagnosis_support.h"
+#include "server/diagnosis/plan_json.h"
 
 namespace calib::ctl {
 namespace {
@@ -20,6 +26,8 @@ struct DiagnoseOptions {
   std::string campaign;
   std::vector<std::string> without{};  ///< effects that are not to be thought of
   bool gate = false;
+  std::string then{};  ///< file of the proposed measurement
+  std::optional<int> plan{};
 };
 
 std::string Next(const CommonOptions& common, const DiagnoseOptions& options,
@@ -47,7 +55,49 @@ std::string Next(const CommonOptions& common, const DiagnoseOptions& options,
 void Declare(OptionList& list, DiagnoseOptions& options) {
   list.Campaign(options.campaign);
   list.Texts("--without", options.without, "effect that is not to be thought of");
-  list.Flag("--gate", options.gate, "adequate or not, by the runs that are there; tries no effect");
+  const Option gate =
+      list.Flag("--gate", options.gate, "adequate or not, by the runs that are there; tries no effect");
+  list.Text("--then", options.then,
+            "file of the proposed measurement, once it is made: the answer with both")
+      .Excludes(gate);
+  list.WholeNumber("--plan", options.plan,
+                   "which of what was considered that file is, from 0, the best [0]");
+}
+
+// The proposal that the file is a measurement of, as the newest answer with proposals has it.
+absl::StatusOr<diagnosis::MadeMeasurement> MadeOf(client::Client& client,
+                                                  const DiagnoseOptions& options,
+                                                  std::vector<std::string>& without) {
+  const std::string name = std::filesystem::path(options.then).filename().string();
+  auto content = campaign::DiskReader(options.then)(name);
+  if (!content.ok())
+    return absl::InvalidArgumentError(
+        absl::StrCat(options.then, ": ", content.status().message()));
+  ASSIGN_OR_RETURN(const auto findings, client.Findings(options.campaign));
+  nlohmann::json found;
+  std::int64_t newest = -1;
+  for (const v1::Finding& finding : findings) {
+    if (finding.kind() != client::kDiagnosis || finding.created_unix_ms() < newest) continue;
+    ASSIGN_OR_RETURN(const auto document, client.GetBlob(finding.digest()));
+    auto json = nlohmann::json::parse(document, nullptr, false);
+    if (!json.is_object() || !json["next_experiment"].is_object()) continue;
+    newest = finding.created_unix_ms();
+    found = std::move(json);
+  }
+  if (newest < 0)
+    return absl::FailedPreconditionError(
+        absl::StrCat("no measurement has been proposed for ", options.campaign, "; `calibctl "
+                     "diagnose ", options.campaign, "` does where the model is not adequate"));
+  const nlohmann::json& considered = found["next_experiment"]["considered"];
+  const int number = options.plan.value_or(0);
+  if (!considered.is_array() || number < 0 || number >= static_cast<int>(considered.size()))
+    return absl::InvalidArgumentError(
+        absl::StrCat("--plan ", number, ": ", considered.size(), " were considered, from 0 on"));
+  ASSIGN_OR_RETURN(auto plan,
+                   diagnosis::PlannedFrom(considered[static_cast<std::size_t>(number)]));
+  if (without.empty()) without = found.value("without", without);
+  return diagnosis::MadeMeasurement{
+      .plan = std::move(plan), .file = name, .content = *std::move(content)};
 }
 
 absl::StatusOr<int> Diagnose(const CommonOptions& common, const DiagnoseOptions& options) {
@@ -55,10 +105,12 @@ absl::StatusOr<int> Diagnose(const CommonOptions& common, const DiagnoseOptions&
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
   client::Laboratory laboratory(*session, common.server);
   ASSIGN_OR_RETURN(const auto view, laboratory.Finished(options.campaign));
-  RETURN_IF_ERROR(diagnosis::CheckLeftOut(options.without, view.campaign));
-  ASSIGN_OR_RETURN(const auto diagnosis, diagnosis::Diagnose(laboratory, view,
-                                                             {.only_adequacy = options.gate,
-                                                              .without = options.without}));
+  diagnosis::DiagnosisOptions question{.only_adequacy = options.gate, .without = options.without};
+  if (!options.then.empty()) {
+    ASSIGN_OR_RETURN(question.then, MadeOf(session->client(), options, question.without));
+  }
+  RETURN_IF_ERROR(diagnosis::CheckLeftOut(question.without, view.campaign));
+  ASSIGN_OR_RETURN(const auto diagnosis, diagnosis::Diagnose(laboratory, view, question));
   client::StoreFinding(session->client(), options.campaign, client::kDiagnosis,
                        diagnosis::DiagnosisJson(diagnosis));
   std::cout << (common.json

@@ -268,7 +268,7 @@ TEST_F(EffectEvidence, RepeatOfAMeasuredTestCountsTheFirstOnce) {
 // Another test, whose emulator knows one effect of two: its part of the evidence is the mean of its
 // density over the posterior of the first.
 TEST_F(EffectEvidence, AnotherTestMayKnowFewerEffects) {
-  const CoordinateToy other({.parameters = 1, .effects = 1, .coordinates = 3, .seed = 8});
+  CoordinateToy other({.parameters = 1, .effects = 1, .coordinates = 3, .seed = 8});
   const DiagnosisSet second = SetOf(other, other.Runs(16, 16, 4));
   const Eigen::VectorXd z = other.Mean({.base = Eigen::MatrixXd{{0.3}},
                                         .strength = Eigen::MatrixXd{{1.5}},

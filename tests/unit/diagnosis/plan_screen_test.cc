@@ -1,4 +1,4 @@
-#include "server/diagnosis/next_experiment.h"
+#include "server/diagnosis/plan_screen.h"
 
 #include <gtest/gtest.h>
 

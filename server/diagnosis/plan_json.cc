@@ -1,0 +1,65 @@
+#include "server/diagnosis/plan_json.h"
+
+#include <nlohmann/json.hpp>
+
+namespace calib::diagnosis {
+namespace {
+
+nlohmann::json NumberOrNull(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+}
+
+nlohmann::json ForecastJson(const std::optional<PlanForecast>& forecast) {
+  if (!forecast) return nullptr;
+  return {{"decides", forecast->decides},
+          {"names_wrong", forecast->wrong},
+          {"told_apart_bits", forecast->bits},
+          {"runs", forecast->runs}};
+}
+
+}  // namespace
+
+nlohmann::json PlannedJson(const PlannedExperiment& planned) {
+  using nlohmann::json;
+  return {{"test", planned.test},
+          {"repeat_of", planned.repeats.empty() ? json(nullptr) : json(planned.repeats)},
+          {"settings", planned.settings},
+          {"unloading", planned.unloading_at.has_value()},
+          {"unloading_at", NumberOrNull(planned.unloading_at)},
+          {"control", planned.control},
+          {"control_from", planned.path.front()},
+          {"control_to", planned.path.back()},
+          {"path", planned.path},
+          {"expected_power", planned.expected_power},
+          {"forecast", ForecastJson(planned.forecast)},
+          {"distance_sd", planned.distance},
+          {"points", planned.points},
+          {"not_separated", planned.together},
+          {"cost",
+           {{"core_seconds_per_evaluation",
+             planned.core_seconds > 0 ? json(planned.core_seconds) : json(nullptr)}}},
+          {"none_of_these",
+           {{"distance_sd", NumberOrNull(planned.distance_from_none)},
+            {"expected_power", NumberOrNull(planned.power_against_none)}}}};
+}
+
+absl::StatusOr<PlannedExperiment> PlannedFrom(const nlohmann::json& json) {
+  PlannedExperiment planned;
+  try {
+    planned.test = json.at("test");
+    planned.settings = json.at("settings").get<std::map<std::string, double>>();
+    planned.control = json.at("control");
+    planned.path = json.at("path").get<std::vector<double>>();
+    const nlohmann::json& unloading = json.at("unloading_at");
+    if (!unloading.is_null()) planned.unloading_at = unloading.get<double>();
+    const nlohmann::json& repeats = json.at("repeat_of");
+    if (!repeats.is_null()) planned.repeats = repeats;
+  } catch (const nlohmann::json::exception&) {
+    return absl::InvalidArgumentError("the proposal does not say how the test is made");
+  }
+  if (planned.path.size() < 2)
+    return absl::InvalidArgumentError("the proposal does not say how the test is driven");
+  return planned;
+}
+
+}  // namespace calib::diagnosis
