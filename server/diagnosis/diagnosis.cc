@@ -51,7 +51,8 @@ class Inquiry {
       ASSIGN_OR_RETURN(
           designed_,
           AnswerOnServer(laboratory_, view_, {.without = options_.without, .level = options_.level},
-                         MostRuns()));
+                         options_.design, MostRuns()));
+      diagnosis_.borrowed = options_.design;
       diagnosis_.answer = designed_.answer;
       diagnosis_.design = designed_.campaign;
       for (const auto& [stage, runs] : diagnosis_.answer.runs)

@@ -77,6 +77,9 @@ inference::DesignPoints BestDraw(const Knowledge& knowledge, const inference::De
 
 /// n: squares of the measurement's distances from points, over errors and what is not known there.
 Eigen::VectorXd SquaresOfMisfit(const Knowledge& knowledge, const inference::DesignPoints& points);
+/// n: the same over what these are at one point, `at`, so that models are held to one measure.
+Eigen::VectorXd SquaresAsAt(const Knowledge& knowledge, const inference::DesignPoints& at,
+                            const inference::DesignPoints& points);
 
 /// Chance that a right model misses a measurement by as much as the closest of these points does:
 /// the smaller of that of the coordinates and that of what they leave out, doubled

@@ -19,7 +19,9 @@ namespace {
 struct DiagnoseOptions {
   std::string campaign;
   std::vector<std::string> without{};  ///< effects that are not to be thought of
+  std::string design{};                ///< id of another campaign's design
   bool gate = false;
+  bool no_plan = false;
 };
 
 std::string Next(const CommonOptions& common, const DiagnoseOptions& options,
@@ -47,6 +49,11 @@ std::string Next(const CommonOptions& common, const DiagnoseOptions& options,
 void Declare(OptionList& list, DiagnoseOptions& options) {
   list.Campaign(options.campaign);
   list.Texts("--without", options.without, "effect that is not to be thought of");
+  list.Text("--design", options.design,
+            "id of another campaign's design of the same tests (`design.campaign` of its JSON), "
+            "whose runs serve this one too");
+  list.Flag("--no-plan", options.no_plan,
+            "proposes no next experiment, which takes runs of its own");
   list.Flag("--gate", options.gate, "adequate or not, by the runs that are there; tries no effect");
 }
 
@@ -56,9 +63,12 @@ absl::StatusOr<int> Diagnose(const CommonOptions& common, const DiagnoseOptions&
   client::Laboratory laboratory(*session, common.server);
   ASSIGN_OR_RETURN(const auto view, laboratory.Finished(options.campaign));
   RETURN_IF_ERROR(diagnosis::CheckLeftOut(options.without, view.campaign));
-  ASSIGN_OR_RETURN(const auto diagnosis, diagnosis::Diagnose(laboratory, view,
-                                                             {.only_adequacy = options.gate,
-                                                              .without = options.without}));
+  ASSIGN_OR_RETURN(const auto diagnosis,
+                   diagnosis::Diagnose(laboratory, view,
+                                       {.only_adequacy = options.gate,
+                                        .without = options.without,
+                                        .design = options.design,
+                                        .next_experiment = !options.no_plan}));
   client::StoreFinding(session->client(), options.campaign, client::kDiagnosis,
                        diagnosis::DiagnosisJson(diagnosis));
   std::cout << (common.json
