@@ -260,8 +260,9 @@ absl::StatusOr<std::vector<std::vector<ModelEvidence>>> ModelEvidencesUnder(
     const std::vector<MeasuredSet>& measured, const ModelSpace& space,
     const std::vector<std::vector<StrengthPrior>>& priors, const EvidenceOptions& options) {
   RETURN_IF_ERROR(CheckMeasured(measured, space));
-  if (options.draws < 2 || options.realisations < 2 || priors.empty())
-    return absl::InvalidArgumentError("a prior, two draws and realisations are asked for");
+  if (options.draws < 2 || options.realisations < 2 || options.first < 0 || priors.empty())
+    return absl::InvalidArgumentError(
+        "a prior, two draws and realisations and a place >= 0 are asked for");
   for (const std::vector<StrengthPrior>& prior : priors) {
     if (prior.size() != space.effects.size())
       return absl::InvalidArgumentError("as many strength priors as effects are asked for");
@@ -274,11 +275,12 @@ absl::StatusOr<std::vector<std::vector<ModelEvidence>>> ModelEvidencesUnder(
   std::vector<std::vector<ModelEvidence>> result(priors.size());
   for (std::size_t i = 0; i < space.models.size(); ++i) {
     const EffectModel& model = space.models[i];
-    const std::vector<SignedSample> signs = SampleSigns(measured, space, model, i, options);
+    const std::uint64_t place = i + static_cast<std::uint64_t>(options.first);
+    const std::vector<SignedSample> signs = SampleSigns(measured, space, model, place, options);
     PhiloxStream stream({.seed = options.sampling.seed,
                          .purpose = StreamPurpose::kDiagnosisEvidence,
                          .iteration = ~std::uint64_t{0},
-                         .sample = i});
+                         .sample = place});
     const double start = stream.Uniform();
     for (std::size_t w = 0; w < priors.size(); ++w)
       result[w].push_back(EvidenceUnder(signs, space, model, priors[w], options.draws, start));

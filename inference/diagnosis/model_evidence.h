@@ -30,6 +30,7 @@ struct EvidenceOptions {
   CubeSamplingOptions sampling{};  ///< seed, sizes
   int draws = 200;                 ///< of each posterior, >= 2
   int realisations = 64;           ///< of the emulators, >= 2
+  int first = 0;                   ///< place of the space's first model in a longer list, >= 0
 };
 
 /// What a model says of a measurement.

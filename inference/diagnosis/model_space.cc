@@ -67,10 +67,12 @@ absl::Status ModelSpace::Validate() const {
 }
 
 Eigen::VectorXd ModelSpace::LogPrior() const {
+  if (log_prior.size() > 0) return log_prior;
   const std::array<double, 5> share = {shares.adequate, shares.singles, shares.pairs,
                                        shares.triples, shares.none_of_these};
   std::array<int, 5> number{};
   for (const EffectModel& model : models) ++number[ShareOf(model)];
+  number[3] = number[3] > 0 ? std::max(number[3], triples) : 0;
   double total = 0;
   for (std::size_t s = 0; s < share.size(); ++s) total += number[s] > 0 ? share[s] : 0;
   Eigen::VectorXd result(static_cast<Index>(models.size()));
@@ -81,8 +83,7 @@ Eigen::VectorXd ModelSpace::LogPrior() const {
   return result;
 }
 
-std::vector<EffectModel> AllModels(int effects, const std::vector<std::pair<int, int>>& excluded,
-                                   const std::vector<std::vector<int>>& triples) {
+std::vector<EffectModel> AllModels(int effects, const std::vector<std::pair<int, int>>& excluded) {
   std::set<std::pair<int, int>> apart;
   for (const auto& [a, b] : excluded) apart.insert(std::minmax(a, b));
   std::vector<EffectModel> result = {{}};
@@ -92,9 +93,36 @@ std::vector<EffectModel> AllModels(int effects, const std::vector<std::pair<int,
       if (apart.count({k, l}) == 0) result.push_back({.effects = {k, l}});
     }
   }
-  for (const std::vector<int>& triple : triples) result.push_back({.effects = triple});
   result.push_back({.none_of_these = true});
   return result;
+}
+
+std::vector<EffectModel> TriplesOf(int effects, const std::vector<std::pair<int, int>>& excluded,
+                                   const std::vector<EffectModel>& pairs) {
+  std::set<std::pair<int, int>> apart;
+  for (const auto& [a, b] : excluded) apart.insert(std::minmax(a, b));
+  std::vector<EffectModel> result;
+  for (const EffectModel& pair : pairs) {
+    for (int k = 0; k < effects; ++k) {
+      const auto goes = [&apart, k](int e) {
+        return e != k && apart.count(std::minmax(e, k)) == 0;
+      };
+      if (!std::all_of(pair.effects.begin(), pair.effects.end(), goes)) continue;
+      EffectModel triple = pair;
+      triple.effects.insert(std::upper_bound(triple.effects.begin(), triple.effects.end(), k), k);
+      if (std::find(result.begin(), result.end(), triple) == result.end())
+        result.push_back(std::move(triple));
+    }
+  }
+  return result;
+}
+
+int CountTriples(int effects, const std::vector<std::pair<int, int>>& excluded) {
+  std::vector<EffectModel> pairs;
+  for (EffectModel& model : AllModels(effects, excluded)) {
+    if (model.effects.size() == 2) pairs.push_back(std::move(model));
+  }
+  return static_cast<int>(TriplesOf(effects, excluded, pairs).size());
 }
 
 ModelCube::ModelCube(const ModelSpace& space, const EffectModel& model, std::vector<int> sign)

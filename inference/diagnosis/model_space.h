@@ -27,8 +27,9 @@ struct StrengthPrior {
   double negative_low = 0.4, negative_high = 17;  ///< likewise; of two-sided effects alone
 };
 
-/// Prior shares of what a model may lack, normalised on use; equal within each. A model with one
-/// effect more counts a quarter of what those with one less do.
+/// Prior shares of what a model may lack, normalised on use; equal within each, those of triples
+/// among all that there could be. A model with one effect more counts a quarter of what those with
+/// one less do.
 struct PriorShares {
   double adequate = 0.4, singles = 0.4, pairs = 0.1, triples = 0.025, none_of_these = 0.1;
 };
@@ -45,7 +46,11 @@ struct ModelSpace {
   /// Expected length of a discrepancy, log-uniform: lambda from 4 to 1000, as strengths.
   double tau_low = 2, tau_high = 31.6;
   std::vector<EffectModel> models{};  ///< who competes
+  /// How many triples there could be, those among the models included; fewer: as many as these.
+  int triples = 0;
   PriorShares shares{};
+  /// ln of the prior probability of each model up to a constant; empty: by the shares.
+  Eigen::VectorXd log_prior{};
 
   /// INVALID_ARGUMENT naming what does not fit.
   absl::Status Validate() const;
@@ -53,11 +58,16 @@ struct ModelSpace {
   Eigen::VectorXd LogPrior() const;
 };
 
-/// The base model, every effect, every pair that is not excluded, the triples asked for, none of
-/// these; in this order.
-/// in: excluded, pairs of effects; triples, each ascending
-std::vector<EffectModel> AllModels(int effects, const std::vector<std::pair<int, int>>& excluded,
-                                   const std::vector<std::vector<int>>& triples = {});
+/// The base model, every effect, every pair that is not excluded, none of these; in this order.
+/// in: excluded, pairs of effects
+std::vector<EffectModel> AllModels(int effects, const std::vector<std::pair<int, int>>& excluded);
+
+/// Triples that have one of these pairs and go together, each once, ascending. in: pairs ascending;
+/// excluded as of AllModels
+std::vector<EffectModel> TriplesOf(int effects, const std::vector<std::pair<int, int>>& excluded,
+                                   const std::vector<EffectModel>& pairs);
+/// How many triples go together.
+int CountTriples(int effects, const std::vector<std::pair<int, int>>& excluded);
 
 /// The points of a model that m points of the unit cube stand for. A cube has base parameters, then
 /// strengths (uniform in their logarithm), then shape parameters of the model's effects, or tau.

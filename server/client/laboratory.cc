@@ -97,6 +97,19 @@ absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& cam
   return LoadView(session_.client(), campaign);
 }
 
+absl::StatusOr<Laboratory::DesignWithBase> Laboratory::DesignNamed(const std::string& campaign) {
+  ASSIGN_OR_RETURN(const auto status, session_.client().Show(campaign));
+  if (messages::PurposeOf(status) != campaign::DerivedFor::kDesign || status.parent().empty())
+    return absl::FailedPreconditionError(
+        absl::StrCat(campaign,
+                     " is no design: the JSON of diagnose names the campaign of its runs in "
+                     "`design.campaign`"));
+  DesignWithBase result;
+  ASSIGN_OR_RETURN(result.design, LoadView(session_.client(), campaign));
+  ASSIGN_OR_RETURN(result.base, Finished(status.parent()));
+  return result;
+}
+
 absl::Status Laboratory::Wait(const std::string& campaign, const std::string& what) {
   std::optional<ProgressLine> line;  // nothing is said of what is done already
   StandstillNotice notice(session_);

@@ -23,6 +23,13 @@ class Laboratory {
   /// trial that diagnose made for another one.
   absl::StatusOr<report::CampaignView> Finished(const std::string& campaign);
 
+  /// A design and the campaign that it was derived from. FAILED_PRECONDITION with a sentence where
+  /// it is no design that diagnose made.
+  struct DesignWithBase {
+    report::CampaignView design, base;
+  };
+  absl::StatusOr<DesignWithBase> DesignNamed(const std::string& campaign);
+
   /// Submits the text with the parent's files and does not wait, so that several campaigns keep all
   /// workers busy; returns the campaign's id. Submitted again it is the same campaign.
   /// OUT_OF_RANGE: it is more than the server takes.
@@ -38,8 +45,8 @@ class Laboratory {
                                            const std::string& yaml, const std::string& what,
                                            const std::map<std::string, std::string>& further = {});
 
-  /// Submits the text of a design (`method: design`) with the parent's files; waits for the runs that
-  /// it has, which are none at first. Errors: as Run().
+  /// Submits the text of a design (`method: design`) with the parent's files; waits for the runs
+  /// that it has, which are none at first. Errors: as Run().
   absl::StatusOr<report::CampaignView> Design(
       const report::CampaignView& parent, const std::string& yaml, const std::string& what,
       const std::map<std::string, std::string>& further = {});

@@ -122,13 +122,27 @@ std::string InWords(const NamedModel& model) {
   return absl::StrJoin(model.effects, " with ");
 }
 
-constexpr double kWorthTelling = 0.05;  // of a second specimen: one chance in twenty
+constexpr double kWorthTelling = 0.05;   // of a second specimen: one chance in twenty
+constexpr std::size_t kMostInWords = 3;  // models of a set that are said one by one
 
 constexpr const char* kNumberWords[] = {"none", "one", "two",   "three", "four",
                                         "five", "six", "seven", "eight", "nine"};
 
 std::string NumberInWords(std::size_t n) {
   return n < std::size(kNumberWords) ? kNumberWords[n] : absl::StrCat(n);
+}
+
+std::string OneOf(std::vector<std::string> words) {
+  const std::string last = words.back();
+  words.pop_back();
+  return words.empty() ? last : absl::StrCat(absl::StrJoin(words, ", "), " or ", last);
+}
+
+// The first few, and how many more.
+std::string SomeOf(std::vector<std::string> words) {
+  const std::size_t more = words.size() - kMostInWords;
+  words.resize(kMostInWords);
+  return absl::StrCat(absl::StrJoin(words, ", "), " and ", more, " more");
 }
 
 std::string ReasonInWords(inference::NotNamed reason) {
@@ -291,16 +305,24 @@ std::string VerdictInWords(const Answer& answer) {
       if (words.size() == 1)
         return absl::StrCat(words[0], ", ", Percent(sum), ", and not certain enough to be named.",
                             beside);
-      const std::string last = words.back();
-      words.pop_back();
-      return absl::StrCat("One of these ", NumberInWords(words.size() + 1), ", ", Percent(sum),
-                          ": ", absl::StrJoin(words, ", "), " or ", last,
-                          "; which of them, these tests cannot tell",
-                          answer.repeat_names_alone >= kWorthTelling
-                              ? absl::StrCat("; on a second specimen they would, with probability ",
-                                             Percent(answer.repeat_names_alone))
-                              : "",
-                          ".", beside);
+      const std::string end =
+          absl::StrCat("; which of them, these tests cannot tell",
+                       answer.repeat_names_alone >= kWorthTelling
+                           ? absl::StrCat("; on a second specimen they would, with probability ",
+                                          Percent(answer.repeat_names_alone))
+                           : "",
+                       ".", beside);
+      if (words.size() <= kMostInWords)
+        return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", Percent(sum), ": ",
+                            OneOf(words), end);
+      const auto family = std::max_element(
+          answer.families.begin(), answer.families.end(),
+          [](const NamedFamily& a, const NamedFamily& b) { return a.probability < b.probability; });
+      if (family != answer.families.end())
+        return absl::StrCat(OneOf(family->effects), " acts, ", Percent(family->probability), ": ",
+                            SomeOf(words), end);
+      return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", Percent(sum), ": ",
+                          SomeOf(words), end);
     }
   }
   return "";

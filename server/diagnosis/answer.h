@@ -56,8 +56,9 @@ struct EffectAnswer {
   std::optional<inference::NotNamed> not_named{};
   // Of the model with that effect alone, at its posterior:
   std::map<std::string, double> amplitude{};  ///< medians: dotted name -> SI
-  /// Of the likelihood ratio against the model without, one-sided where the effect's sign is known;
-  /// not adjusted for the number of effects.     [Chernoff, Ann. Math. Stat. 25 (1954) 573]
+  /// Of the likelihood ratio against the model without, both with the errors of the latter;
+  /// one-sided where the effect's sign is known, not adjusted for the number of effects or shapes;
+  /// 1 where it comes no closer.                   [Chernoff, Ann. Math. Stat. 25 (1954) 573]
   double p_value = 1;
   double explained = 0;                ///< share of the squared error beyond one sd, 0 to 1
   double rms = 0;                      ///< of what it misses, in sd of a measurement
@@ -95,6 +96,7 @@ struct Answer {
   double repeat_names_alone = 0;
   std::vector<std::pair<std::string, std::string>> not_excitable{};  ///< effect, why
   std::map<std::string, int> runs{};                                 ///< by stage
+  int borrowed_runs = 0;  ///< of another campaign's design and its base, which they rest on
   std::vector<std::string> warnings{};
   std::string sentence{};  ///< the verdict in words
 };

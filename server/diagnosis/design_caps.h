@@ -36,6 +36,10 @@ struct DesignCaps {
   int verification_runs = 6, verified_models = 3;
   double sibling = 0.01;  ///< probability of a sibling that is verified too
   double asked = 0.01;    ///< probability of a model whose misfit is asked for
+  /// Triples are asked for that have a pair of such a probability: below it none of them could come
+  /// into a set of 95 % by its prior alone. So many: their evidences take a tenth of the pairs'.
+  double leading_pair = 0.05;
+  int triples = 12;
 };
 inline constexpr DesignCaps kDesignCaps{};
 

@@ -122,20 +122,38 @@ std::vector<ChangedCurve> CurvesOf(const HistoryScale& scale, const Eigen::RowVe
 // A model at the draw that the measurement is most probable at.
 struct AtBest {
   DesignPoints point;
-  double log_density = 0;
   Eigen::RowVectorXd history;
 };
 
 AtBest BestOf(const Knowledge& known, const ModelEvidence& model) {
   AtBest best;
   best.point = BestDraw(known, model.draws);
-  best.log_density = known.set->LogDensity(known.z, best.point)[0];
   best.history = known.set->coordinates()->HistoriesAt(best.point).row(0);
   return best;
 }
 
+// The base model at its best, and the least square of its misfit with the errors that it has there.
+struct BaseAtBest {
+  AtBest best;
+  double square = 0;
+};
+
+// Chance that a right base model comes closer by as much with a model's strengths, with the errors
+// of the base's best, since an emulator that knows an effect less well excuses nothing: each of k
+// strengths takes one square of Student's law. Half of that of one lies at zero where it has one
+// sign.
+double ChanceOfCloser(const Knowledge& known, const BaseAtBest& base, const ModelEvidence& model,
+                      bool two_sided) {
+  const double closer = base.square - SquaresAsAt(known, base.best.point, model.draws).minCoeff();
+  if (!(closer > 0)) return 1;
+  const auto strengths = static_cast<double>(model.model.effects.size());
+  const inference::FisherLaw law{.numerator = strengths,
+                                 .denominator = known.set->errors().freedom};
+  return (two_sided || strengths > 1 ? 1 : 0.5) * law.Tail(closer / strengths);
+}
+
 void DescribeEffect(const KnownBefore& before, const Knowledge& known, const Asked& asked,
-                    const AtBest& base, const Answer& answer, EffectAnswer& own) {
+                    const BaseAtBest& base, const Answer& answer, EffectAnswer& own) {
   const Race& race = known.rows.race();
   bool two_sided = false;
   for (std::size_t i = 0; i < known.part.kept.size(); ++i) {
@@ -160,15 +178,12 @@ void DescribeEffect(const KnownBefore& before, const Knowledge& known, const Ask
   own.amplitude = MediansOf(known, model->draws, own.effect);
   const AtBest best = BestOf(known, *model);
   own.rms = RmsOf(before.base, best.history);
-  const double without = RmsOf(before.base, base.history);
+  const double without = RmsOf(before.base, base.best.history);
   const double excess = without * without - 1;
   if (excess > 0) own.explained = std::clamp((excess + 1 - own.rms * own.rms) / excess, 0.0, 1.0);
-  // Half of the law of one degree of freedom lies at zero where the strength has one sign.
-  const double ratio = 2 * (best.log_density - base.log_density);
-  const inference::FisherLaw law{.numerator = 1, .denominator = known.set->errors().freedom};
-  if (ratio > 0) own.p_value = (two_sided ? 1 : 0.5) * law.Tail(ratio);
+  own.p_value = ChanceOfCloser(known, base, *model, two_sided);
   if (own.probability >= kDesignCaps.asked)
-    own.curves = CurvesOf(before.base.scale, best.history, base.history);
+    own.curves = CurvesOf(before.base.scale, best.history, base.best.history);
 }
 
 }  // namespace
@@ -187,7 +202,8 @@ absl::Status DescribeEffects(const KnownBefore& before, const Knowledge& known, 
   }
   const ModelEvidence* base_model = ModelOf(known, asked, {});
   if (base_model == nullptr) return absl::OkStatus();
-  const AtBest base = BestOf(known, *base_model);
+  BaseAtBest base{.best = BestOf(known, *base_model)};
+  base.square = SquaresAsAt(known, base.best.point, base_model->draws).minCoeff();
   for (EffectAnswer& own : answer.candidates)
     DescribeEffect(before, known, asked, base, answer, own);
   if (known.part.kept.empty()) return absl::OkStatus();

@@ -115,6 +115,13 @@ std::vector<double> DesignRows::Values(const inference::DesignPoints& points, In
   return values;
 }
 
+std::vector<double> DesignRows::WithoutEffects() const {
+  return Values({.base = Eigen::MatrixXd::Zero(1, axes_.middle.size()),
+                 .strength = Eigen::MatrixXd::Zero(1, unit_.size()),
+                 .shape = Eigen::MatrixXd::Zero(1, shape_count_)},
+                0);
+}
+
 inference::DesignPoints DesignRows::Points(const std::vector<std::vector<double>>& rows) const {
   const auto n = static_cast<Index>(rows.size()), d = static_cast<Index>(race_.base.size());
   const auto count = static_cast<int>(race_.effects.size());
@@ -147,6 +154,13 @@ int DesignRows::ChangedNumerics(const std::vector<double>& values) const {
     if (values[first + c] != race_.numerics[c].null) return static_cast<int>(c);
   }
   return -1;
+}
+
+std::vector<double> DesignRows::WithoutNumerics(std::vector<double> values) const {
+  const std::size_t first = names_.size() - race_.numerics.size();
+  for (std::size_t c = 0; c < race_.numerics.size(); ++c)
+    values[first + c] = race_.numerics[c].null;
+  return values;
 }
 
 std::vector<double> DesignRows::WithNumerics(std::vector<double> values, int choice) const {

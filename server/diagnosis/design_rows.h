@@ -57,11 +57,15 @@ class DesignRows {
   /// The values of row `row` of the points, numerics at their null; strengths are cut to what the
   /// entry can have.
   std::vector<double> Values(const inference::DesignPoints& points, Eigen::Index row) const;
+  /// The values of a run at the middle of the base's axes without an effect.
+  std::vector<double> WithoutEffects() const;
   /// The points of rows of values. A strength at its null is zero; shapes of an effect that is off
   /// are zero.
   inference::DesignPoints Points(const std::vector<std::vector<double>>& rows) const;
   /// Number of the numerical choice that the values change; -1: none.
   int ChangedNumerics(const std::vector<double>& values) const;
+  /// These values with all numerical choices at their null.
+  std::vector<double> WithoutNumerics(std::vector<double> values) const;
   /// These values with a numerical choice as it is tried.
   std::vector<double> WithNumerics(std::vector<double> values, int choice) const;
 

@@ -25,8 +25,16 @@ class NoRuns : public RunMaker {
 
 absl::StatusOr<DesignedAnswer> AnswerOnServer(client::Laboratory& laboratory,
                                               const report::CampaignView& base,
-                                              const DesignQuestion& question,
+                                              DesignQuestion question, const std::string& other,
                                               std::optional<std::int64_t> most_runs) {
+  client::Laboratory::DesignWithBase others;
+  if (!other.empty()) {
+    if (base.campaign.precomputed)
+      return absl::FailedPreconditionError(
+          "the runs of this campaign were made elsewhere: it has no use for those of a design");
+    ASSIGN_OR_RETURN(others, laboratory.DesignNamed(other));
+    question.other = {.design = &others.design, .base = &others.base};
+  }
   ASSIGN_OR_RETURN(DesignChain created, DesignChain::Create(base, question));
   const auto kept = std::make_shared<DesignChain>(std::move(created));
   DesignChain& chain = *kept;
@@ -36,7 +44,8 @@ absl::StatusOr<DesignedAnswer> AnswerOnServer(client::Laboratory& laboratory,
     ASSIGN_OR_RETURN(calculated.answer, AnswerBy(chain, none, most_runs));
     return calculated;
   }
-  const campaign::Derivation derivation = DesignOf(base, chain.race());
+  campaign::Derivation derivation = DesignOf(base, chain.race());
+  if (!other.empty()) derivation.name += absl::StrCat(", beside those of ", other);
   ASSIGN_OR_RETURN(const std::string text,
                    campaign::Derive(base.source.campaign_file(), derivation));
   ASSIGN_OR_RETURN(report::CampaignView design,

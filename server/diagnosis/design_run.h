@@ -25,12 +25,13 @@ struct DesignedAnswer {
   std::map<std::string, dem::DefaultPrior> parameters{};
 };
 
-/// Asks the chain of the base campaign with runs of the laboratory. Interrupted anywhere and asked
-/// again it goes on where it was. Errors: FAILED_PRECONDITION with a sentence where nothing can be
-/// asked; RESOURCE_EXHAUSTED where more than most_runs would be needed; those of the runs.
+/// Asks the chain of the base campaign with runs of the laboratory; other: id of another campaign's
+/// design, whose runs take the place of scout and main stage, empty: none. Interrupted anywhere and
+/// asked again it goes on where it was. Errors: FAILED_PRECONDITION with a sentence where nothing
+/// can be asked; RESOURCE_EXHAUSTED where more than most_runs would be needed; those of the runs.
 absl::StatusOr<DesignedAnswer> AnswerOnServer(client::Laboratory& laboratory,
                                               const report::CampaignView& base,
-                                              const DesignQuestion& question,
+                                              DesignQuestion question, const std::string& other,
                                               std::optional<std::int64_t> most_runs);
 
 }  // namespace calib::diagnosis

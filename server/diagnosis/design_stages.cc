@@ -29,23 +29,57 @@ double LargestMove(const inference::EffectProbabilities& a,
 
 absl::StatusOr<DesignChain> DesignChain::Create(const report::CampaignView& base,
                                                 const DesignQuestion& question) {
+  if (question.other) {
+    const report::CampaignView& other = *question.other->design;
+    if (const std::string why = WhyOtherRuns(base.campaign, other.campaign); !why.empty())
+      return absl::FailedPreconditionError(absl::StrCat("the runs of ", other.status.campaign(),
+                                                        " are not of the tests and the model of ",
+                                                        base.status.campaign(), ": ", why));
+  }
   ASSIGN_OR_RETURN(Race race, RaceOf(base, question.without));
   ASSIGN_OR_RETURN(BaseRuns runs, BaseRunsOf(base));
   inference::JointPrior prior = campaign::Priors(base.campaign);
   ASSIGN_OR_RETURN(BaseRegion region, RegionOf(runs, prior));
+  if (question.other) {
+    const report::CampaignView& other = *question.other->design;
+    race = RaceWithin(std::move(race), other);
+    if (race.effects.empty())
+      return absl::FailedPreconditionError(
+          absl::StrCat("the design ", other.status.campaign(), " has no effect that is asked for"));
+  }
   race = WithCalculated(std::move(race), runs);
   campaign::Campaign design = CampaignOfDesign(base.campaign, race);
   const Eigen::VectorXd unit = UnitsOfCatalogue(race);
   DesignRows rows(region.axes, std::move(race), unit);
+  std::vector<EndedBatch> borrowed;
+  if (question.other) {
+    ASSIGN_OR_RETURN(const Race all, RaceOf(base, {}));
+    ASSIGN_OR_RETURN(borrowed, BorrowedBatches(*question.other, all, rows, runs));
+  }
   return DesignChain({.base = std::move(runs),
                       .region = std::move(region),
                       .prior = std::move(prior),
                       .seed = base.campaign.seed},
-                     std::move(rows), std::move(design), question.level);
+                     std::move(rows), std::move(design), std::move(borrowed), question.level);
+}
+
+DesignChain::DesignChain(KnownBefore before, DesignRows scout_rows, campaign::Campaign design,
+                         std::vector<EndedBatch> borrowed, double level)
+    : before_(std::move(before)),
+      scout_rows_(std::move(scout_rows)),
+      design_(std::move(design)),
+      level_(level),
+      batches_(std::move(borrowed)),
+      borrowed_(batches_.size()),
+      first_stream_(before_.base.samples) {
+  for (const EndedBatch& batch : batches_) {
+    for (const EndedRun& ended : batch.runs)
+      first_stream_ = std::max(first_stream_, ended.run.stream + 1);
+  }
 }
 
 absl::Status DesignChain::Add(EndedBatch batch) {
-  const int before = batches_.empty() ? 0 : static_cast<int>(batches_.back().stage);
+  const int before = static_cast<int>(LastStage().value_or(SamplePurpose::kEnsemble));
   const bool again = batch.stage == SamplePurpose::kSequential ||
                      (batch.stage == SamplePurpose::kScout && batches_.size() == 1);
   const bool first = batches_.empty() && batch.stage == SamplePurpose::kScout;
@@ -68,16 +102,25 @@ absl::Status DesignChain::Add(EndedBatch batch) {
   return absl::OkStatus();
 }
 
-int DesignChain::BatchesOf(SamplePurpose stage) const {
-  return static_cast<int>(std::count_if(batches_.begin(), batches_.end(),
+std::optional<SamplePurpose> DesignChain::LastStage() const {
+  if (batches_.size() > borrowed_) return batches_.back().stage;
+  if (borrowed_ > 0) return SamplePurpose::kMain;
+  return std::nullopt;
+}
+
+int DesignChain::BatchesOf(SamplePurpose stage, std::size_t from) const {
+  return static_cast<int>(std::count_if(batches_.begin() + static_cast<std::ptrdiff_t>(from),
+                                        batches_.end(),
                                         [stage](const auto& own) { return own.stage == stage; }));
 }
 
-int DesignChain::NextStream() const {
-  int rows = 0;
-  for (const EndedBatch& batch : batches_) rows += static_cast<int>(batch.runs.size());
-  return before_.base.samples + rows;
+int DesignChain::RunsIn(std::size_t from, std::size_t to) const {
+  int runs = 0;
+  for (std::size_t i = from; i < to; ++i) runs += static_cast<int>(batches_[i].runs.size());
+  return runs;
 }
+
+int DesignChain::NextStream() const { return first_stream_ + own_runs(); }
 
 absl::StatusOr<const Knowledge*> DesignChain::KnownAfter(std::size_t n) {
   if (const auto found = known_.find(n); found != known_.end()) return &found->second;
@@ -85,15 +128,19 @@ absl::StatusOr<const Knowledge*> DesignChain::KnownAfter(std::size_t n) {
   const std::vector<EndedBatch> batches(batches_.begin(),
                                         batches_.begin() + static_cast<std::ptrdiff_t>(n));
   const DesignRows* guess = &scout_rows_;
-  std::optional<Knowledge> calculated;  // as a scout, where there is none
-  if (before_.base.elsewhere) {
-    ASSIGN_OR_RETURN(calculated, Learn(before_, *guess, batches, false));
-    guess = &calculated->rows;
+  // Where no scout lies by itself what is there serves as one, once.
+  const bool alone = before_.base.elsewhere || borrowed_ > 0;
+  if (alone) {
+    if (!units_) {
+      ASSIGN_OR_RETURN(Knowledge known, Learn(before_, *guess, batches, false));
+      units_ = std::move(known.rows);
+    }
+    guess = &*units_;
   } else if (n > scouts) {
     ASSIGN_OR_RETURN(const Knowledge* scouted, KnownAfter(scouts));
     guess = &scouted->rows;
   }
-  const bool with_flat = before_.base.elsewhere || n > scouts;
+  const bool with_flat = alone || n > scouts;
   ASSIGN_OR_RETURN(Knowledge known, Learn(before_, *guess, batches, with_flat));
   return &known_.emplace(n, std::move(known)).first->second;
 }
@@ -106,7 +153,9 @@ absl::StatusOr<const Asked*> DesignChain::AskedAfter(std::size_t n, Effort effor
 }
 
 RunBatch DesignChain::BatchOf(SamplePurpose stage, std::vector<campaign::RunOf> rows) const {
-  return {.number = static_cast<int>(batches_.size()), .stage = stage, .rows = std::move(rows)};
+  return {.number = static_cast<int>(batches_.size() - borrowed_),
+          .stage = stage,
+          .rows = std::move(rows)};
 }
 
 RunBatch DesignChain::Scout() const {
@@ -142,7 +191,7 @@ absl::StatusOr<RunBatch> DesignChain::Main() {
 }
 
 absl::StatusOr<std::optional<RunBatch>> DesignChain::Sequential(std::size_t n) {
-  const int made = BatchesOf(SamplePurpose::kSequential);
+  const int made = BatchesOf(SamplePurpose::kSequential, borrowed_);
   if (made >= kDesignCaps.sequential_batches) return std::nullopt;
   ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n));
   if (known->part.kept.empty()) return std::nullopt;
@@ -199,8 +248,9 @@ absl::StatusOr<Answer> DesignChain::AnswerAfter(std::size_t n,
   }
   ASSIGN_OR_RETURN(Answer answer,
                    AnswerOfDesign(before_, *known, *asked, *misfit_, verification, level_));
-  for (std::size_t i = 0; i < n; ++i)
+  for (std::size_t i = borrowed_; i < n; ++i)
     answer.runs[campaign::ToString(batches_[i].stage)] += static_cast<int>(batches_[i].runs.size());
+  answer.borrowed_runs = RunsIn(0, borrowed_);
   return answer;
 }
 
@@ -226,8 +276,8 @@ absl::StatusOr<AnsweredDesign> DesignChain::Answered() {
 
 absl::StatusOr<NextStep> DesignChain::Next() {
   if (before_.base.elsewhere) return Ended(0, std::nullopt);
-  if (batches_.empty()) return Scout();
-  const SamplePurpose last = batches_.back().stage;
+  const std::optional<SamplePurpose> last = LastStage();
+  if (!last) return Scout();
   if (last == SamplePurpose::kScout) {
     if (batches_.size() == 1) {
       if (std::optional<RunBatch> again = ScoutAgain()) return *std::move(again);
@@ -259,8 +309,7 @@ absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker,
     RETURN_IF_ERROR(next.status());
     if (auto* answer = std::get_if<Answer>(&*next)) return std::move(*answer);
     const RunBatch& batch = std::get<RunBatch>(*next);
-    std::int64_t runs = std::ssize(batch.rows);
-    for (const EndedBatch& before : chain.batches()) runs += std::ssize(before.runs);
+    const std::int64_t runs = std::ssize(batch.rows) + chain.own_runs();
     if (most_runs && runs > *most_runs)
       return absl::ResourceExhaustedError(
           absl::StrCat("the runs that tell effects apart are ", runs, " with those of the stage ",

@@ -13,6 +13,7 @@
 
 #include "absl/status/statusor.h"
 #include "server/diagnosis/answer.h"
+#include "server/diagnosis/borrowed_design.h"
 #include "server/diagnosis/design_answer.h"
 #include "server/diagnosis/knowledge.h"
 #include "server/diagnosis/run_maker.h"
@@ -24,6 +25,8 @@ namespace calib::diagnosis {
 struct DesignQuestion {
   std::vector<std::string> without{};  ///< effects that are left out
   double level = 0.01;                 ///< of the adequacy test
+  /// Whose runs the answer rests on, where they are to be those of another campaign's design.
+  std::optional<OtherDesign> other{};
 };
 
 /// The next batch, or the answer.
@@ -41,19 +44,22 @@ struct AnsweredDesign {
   double level = 0.01;  ///< of the adequacy test
 };
 
-/// The chain, from the batches that it is told of. Where the base's runs were made elsewhere it
+/// The chain, from the batches that it is told of. Where it rests on the runs of another design it
+/// begins with its own sequential batches. Where the base's runs were made elsewhere it
 /// makes none and answers at once, from them and what is calculated on them. What it has found is
 /// kept as long as it lives. Not thread-safe.
 class DesignChain {
  public:
-  /// Errors: those of RaceOf, BaseRunsOf and RegionOf: FAILED_PRECONDITION with a sentence.
+  /// Errors: those of RaceOf, BaseRunsOf, RegionOf and BorrowedBatches: FAILED_PRECONDITION with a
+  /// sentence, also where the other design was made for other runs (WhyOtherRuns).
   static absl::StatusOr<DesignChain> Create(const report::CampaignView& base,
                                             const DesignQuestion& question);
 
   const Race& race() const { return scout_rows_.race(); }
   /// Of the values of rows: DesignRows::names().
   const std::vector<std::string>& names() const { return scout_rows_.names(); }
-  const std::vector<EndedBatch>& batches() const { return batches_; }
+  /// Runs of its own batches so far.
+  int own_runs() const { return RunsIn(borrowed_, batches_.size()); }
 
   /// The next batch that was made. Errors: INVALID_ARGUMENT for one of a stage that cannot follow
   /// (none can where the base's runs were made elsewhere), or rows of another length.
@@ -65,13 +71,13 @@ class DesignChain {
   absl::StatusOr<AnsweredDesign> Answered();
 
  private:
-  DesignChain(KnownBefore before, DesignRows scout_rows, campaign::Campaign design, double level)
-      : before_(std::move(before)),
-        scout_rows_(std::move(scout_rows)),
-        design_(std::move(design)),
-        level_(level) {}
+  DesignChain(KnownBefore before, DesignRows scout_rows, campaign::Campaign design,
+              std::vector<EndedBatch> borrowed, double level);
 
-  int BatchesOf(campaign::SamplePurpose stage) const;
+  /// Of its own batches, the main one where it has those of another design; empty: no batch yet.
+  std::optional<campaign::SamplePurpose> LastStage() const;
+  int BatchesOf(campaign::SamplePurpose stage, std::size_t from = 0) const;
+  int RunsIn(std::size_t from, std::size_t to) const;
   /// What the first n batches say.
   absl::StatusOr<const Knowledge*> KnownAfter(std::size_t n);
   absl::StatusOr<const Asked*> AskedAfter(std::size_t n, Effort effort);
@@ -94,9 +100,12 @@ class DesignChain {
   DesignRows scout_rows_;
   campaign::Campaign design_;
   double level_;
-  std::vector<EndedBatch> batches_;
   std::optional<VerificationChances> verification_;  ///< of the answer, once there is one
+  std::vector<EndedBatch> batches_;   ///< those of another design first
+  std::size_t borrowed_ = 0;          ///< how many those are
+  int first_stream_ = 0;              ///< of its own runs
   std::optional<BaseMisfit> misfit_;  ///< by the scout's numerics, which later batches leave alone
+  std::optional<DesignRows> units_;   ///< where no scout is made: by what there is at first
   std::map<std::size_t, Knowledge> known_;
   std::map<std::pair<std::size_t, Effort>, Asked> asked_;
 };

@@ -53,7 +53,8 @@ class Inquiry {
       ASSIGN_OR_RETURN(
           designed_,
           AnswerOnServer(laboratory_, view_, {.without = options_.without, .level = options_.level},
-                         MostRuns()));
+                         options_.design, MostRuns()));
+      diagnosis_.borrowed = options_.design;
       diagnosis_.answer = designed_.answer;
       diagnosis_.design = designed_.campaign;
       for (const auto& [stage, runs] : diagnosis_.answer.runs)
@@ -110,9 +111,9 @@ class Inquiry {
           "a further measurement is told by runs of its test, and here none are made");
     ASSIGN_OR_RETURN(const AnsweredDesign answered, designed_.chain->Answered());
     ASSIGN_OR_RETURN(ThenAnswer then, AnswerWith(laboratory_, view_, answered, made));
-    std::map<std::string, int> runs = std::move(diagnosis_.answer.runs);
+    then.answer.runs = diagnosis_.answer.runs;
+    then.answer.borrowed_runs = diagnosis_.answer.borrowed_runs;
     diagnosis_.answer = std::move(then.answer);
-    diagnosis_.answer.runs = std::move(runs);
     for (std::string& warning : then.warnings) diagnosis_.warnings.push_back(std::move(warning));
     diagnosis_.then = {.plan = made.plan,
                        .file = made.file,

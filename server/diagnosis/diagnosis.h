@@ -29,6 +29,7 @@ struct Diagnosis {
   std::string campaign{};  ///< id
   Answer answer{};
   std::string design{};        ///< id of the campaign that holds the runs; empty: none were made
+  std::string borrowed{};      ///< id of another campaign's design that it rests on; empty: none
   bool only_adequacy = false;  ///< no effect was tried
   /// Evaluations made for the answer, those of an earlier call included.
   std::int64_t evaluations = 0;
@@ -50,6 +51,7 @@ struct DiagnosisOptions {
   std::vector<std::string> without = {};  ///< effects that do not take part
   /// Of the design, on the fitted experiments; those that were made before count too.
   std::optional<std::int64_t> max_evaluations = {};
+  std::string design = {};      ///< id of another campaign's design that the answer rests on
   bool next_experiment = true;  ///< where the model is not adequate: what to measure next
   /// A proposal of an earlier answer that has been measured: the answer is that of both, and plans
   /// no further one.

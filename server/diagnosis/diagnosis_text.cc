@@ -239,7 +239,7 @@ std::string FamiliesText(const Answer& answer) {
   for (const NamedFamily& family : answer.families) {
     if (family.effects.size() < 2) continue;
     text += report::Wrapped(
-        fmt::format("Hardly told apart by these tests: {}; one of them acts "
+        fmt::format("Of one family, or hardly told apart by these tests: {}; one of them acts "
                     "with probability {}.",
                     fmt::join(family.effects, ", "), report::Percent(family.probability, 3)),
         "", "  ");
@@ -270,8 +270,11 @@ std::string RunsText(const Diagnosis& d) {
     stages += fmt::format("{}{} {}", stages.empty() ? "" : ", ", stage, number);
     runs += number;
   }
-  std::string text = fmt::format("{} runs ({}) in {}, {} model evaluations.\n", runs, stages,
-                                 d.design, d.evaluations);
+  const std::string beside =
+      d.borrowed.empty() ? ""
+                         : fmt::format(", beside {} of {}", d.answer.borrowed_runs, d.borrowed);
+  std::string text = fmt::format("{} runs ({}) in {}, {} model evaluations{}.\n", runs, stages,
+                                 d.design, d.evaluations, beside);
   if (d.then && !d.then->campaign.empty())
     text += fmt::format("{} runs of {} in {}.\n", d.then->evaluations, InWords(d.then->plan),
                         d.then->campaign);
@@ -325,6 +328,10 @@ std::string DiagnosisJson(const Diagnosis& d) {
     json["detectable"] = detectable;
     json["undetectable"] = undetectable;
     json["design"] = {{"campaign", OrNull(d.design)}, {"runs", answer.runs}};
+    if (!d.borrowed.empty()) {
+      json["design"]["borrowed_from"] = d.borrowed;
+      json["design"]["borrowed_runs"] = answer.borrowed_runs;
+    }
     json["without"] = d.left_out;
     json["then"] = ThenJson(d.then);
   }

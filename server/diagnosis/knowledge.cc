@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 
 #include "absl/strings/str_cat.h"
@@ -28,6 +29,19 @@ constexpr int kFewestRunsOn = 2;  // of an effect, as FeatureEmulator::Fit asks
 constexpr double kBeyondTried = 10;
 constexpr double kLargestUnits = 100;  // up to which lambda is looked at
 
+// Entries of the part that may not act together.
+std::vector<std::pair<int, int>> ExcludedIn(const Race& race, const PartOfRace& part) {
+  std::vector<std::pair<int, int>> excluded;
+  for (const auto& [a, b] : race.excluded) {
+    const auto x = std::find(part.kept.begin(), part.kept.end(), a);
+    const auto y = std::find(part.kept.begin(), part.kept.end(), b);
+    if (x == part.kept.end() || y == part.kept.end()) continue;
+    excluded.emplace_back(static_cast<int>(x - part.kept.begin()),
+                          static_cast<int>(y - part.kept.begin()));
+  }
+  return excluded;
+}
+
 inference::ModelSpace SpaceOf(const KnownBefore& before, const DesignRows& rows,
                               const PartOfRace& part) {
   inference::ModelSpace space;
@@ -45,16 +59,51 @@ inference::ModelSpace SpaceOf(const KnownBefore& before, const DesignRows& rows,
   space.log_base_prior = [prior = before.prior, axes = rows.axes()](const Eigen::MatrixXd& base) {
     return LogBasePrior(prior, axes, base);
   };
-  std::vector<std::pair<int, int>> excluded;
-  for (const auto& [a, b] : rows.race().excluded) {
-    const auto x = std::find(part.kept.begin(), part.kept.end(), a);
-    const auto y = std::find(part.kept.begin(), part.kept.end(), b);
-    if (x == part.kept.end() || y == part.kept.end()) continue;
-    excluded.emplace_back(static_cast<int>(x - part.kept.begin()),
-                          static_cast<int>(y - part.kept.begin()));
-  }
-  space.models = inference::AllModels(static_cast<int>(part.kept.size()), excluded);
+  space.models =
+      inference::AllModels(static_cast<int>(part.kept.size()), ExcludedIn(rows.race(), part));
   return space;
+}
+
+// Triples of pairs that lead, those of the most probable pair and effect first, and no more than
+// may be asked.
+std::vector<inference::EffectModel> LeadingTriples(
+    const Asked& asked, const std::vector<std::pair<int, int>>& excluded) {
+  const inference::EffectProbabilities& known = asked.probabilities[0];
+  std::vector<Index> pairs;
+  for (std::size_t i = 0; i < asked.space.models.size(); ++i) {
+    const auto at = static_cast<Index>(i);
+    if (asked.space.models[i].effects.size() == 2 && known.model[at] >= kDesignCaps.leading_pair)
+      pairs.push_back(at);
+  }
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [&known](Index a, Index b) { return known.model[a] > known.model[b]; });
+  std::vector<inference::EffectModel> triples;
+  const auto weight = [&known](const inference::EffectModel& triple) {
+    double sum = 0;
+    for (const int e : triple.effects) sum += known.inclusion[e];
+    return sum;
+  };
+  for (const Index i : pairs) {
+    auto own = inference::TriplesOf(static_cast<int>(asked.space.effects.size()), excluded,
+                                    {asked.space.models[static_cast<std::size_t>(i)]});
+    std::stable_sort(own.begin(), own.end(),
+                     [&weight](const auto& a, const auto& b) { return weight(a) > weight(b); });
+    for (inference::EffectModel& triple : own) {
+      if (static_cast<int>(triples.size()) == kDesignCaps.triples) return triples;
+      if (std::find(triples.begin(), triples.end(), triple) == triples.end())
+        triples.push_back(std::move(triple));
+    }
+  }
+  return triples;
+}
+
+absl::Status SetProbabilities(Asked& asked) {
+  asked.probabilities.clear();
+  for (const auto& evidence : asked.evidence) {
+    ASSIGN_OR_RETURN(auto probabilities, inference::ProbabilitiesOf(evidence, asked.space));
+    asked.probabilities.push_back(std::move(probabilities));
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::shared_ptr<const inference::DiagnosisSet>> FitSet(
@@ -140,15 +189,18 @@ SeenUnits UnitsSeen(const KnownBefore& before, const DesignRows& rows, const Par
   return {.unit = std::move(unit), .reached = std::move(reached)};
 }
 
-// Why no run with the entry came to its end, in a clause.
+// Why too few runs with the entry are there to learn from, in a clause.
 std::string WhyRunsEnd(const DesignRows& rows, const std::vector<EndedBatch>& batches, int entry) {
   std::string reason;
+  bool ended_early = false;
   for (const EndedBatch& batch : batches) {
     for (const EndedRun& ended : batch.runs) {
-      if (ended.readings || ended.reason.empty()) continue;
-      if (rows.Points({ended.run.values}).strength(0, entry) != 0) reason = ended.reason;
+      if (ended.readings || rows.Points({ended.run.values}).strength(0, entry) == 0) continue;
+      ended_early = true;
+      if (!ended.reason.empty()) reason = ended.reason;
     }
   }
+  if (!ended_early) return "too few runs have it where the measurement may lie";
   return reason.empty() ? "runs with it diverge"
                         : absl::StrCat("runs with it diverge (", reason, ")");
 }
@@ -241,6 +293,7 @@ absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge,
   std::vector<inference::MeasuredSet> measured = {{.set = knowledge.set.get(), .z = knowledge.z}};
   if (further != nullptr) {
     asked.space.models = further->models;
+    asked.space.log_prior = further->log_prior;
     measured.insert(measured.end(), further->sets.begin(), further->sets.end());
   }
   const Eigen::VectorXd most = knowledge.rows.Most(), other = knowledge.rows.MostOther();
@@ -276,11 +329,24 @@ absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge,
     options.realisations = 16;
   }
   ASSIGN_OR_RETURN(asked.evidence,
-                   inference::ModelEvidencesUnder(measured, asked.space, priors, options));
-  for (const auto& evidence : asked.evidence) {
-    ASSIGN_OR_RETURN(auto probabilities, inference::ProbabilitiesOf(evidence, asked.space));
-    asked.probabilities.push_back(std::move(probabilities));
-  }
+                   inference::ModelEvidencesUnder(measured, asked.space,
+                                                  priors, options));
+  RETURN_IF_ERROR(SetProbabilities(asked));
+  if (effort == Effort::kToChoose || further != nullptr) return asked;
+  const auto excluded = ExcludedIn(knowledge.rows.race(), knowledge.part);
+  inference::ModelSpace triples = asked.space;
+  triples.models = LeadingTriples(asked, excluded);
+  if (triples.models.empty()) return asked;
+  options.first = static_cast<int>(asked.space.models.size());
+  ASSIGN_OR_RETURN(auto evidence,
+                   inference::ModelEvidencesUnder(measured, triples,
+                                                  priors, options));
+  for (std::size_t w = 0; w < evidence.size(); ++w)
+    std::move(evidence[w].begin(), evidence[w].end(), std::back_inserter(asked.evidence[w]));
+  asked.space.models.insert(asked.space.models.end(), triples.models.begin(), triples.models.end());
+  asked.space.triples =
+      inference::CountTriples(static_cast<int>(asked.space.effects.size()), excluded);
+  RETURN_IF_ERROR(SetProbabilities(asked));
   return asked;
 }
 
@@ -299,6 +365,20 @@ DesignPoints BestDraw(const Knowledge& knowledge, const DesignPoints& draws) {
   Index best = 0;
   knowledge.set->LogDensity(knowledge.z, draws).maxCoeff(&best);
   return inference::RowsOf(draws, {best});
+}
+
+Eigen::VectorXd SquaresAsAt(const Knowledge& knowledge, const DesignPoints& at,
+                            const DesignPoints& points) {
+  const inference::DiagnosisSet& set = *knowledge.set;
+  const inference::SpecimenErrors& errors = set.errors();
+  Eigen::MatrixXd v = errors.staging * errors.staging.transpose();
+  v.diagonal() +=
+      inference::DiagonalVariance(set.emulator().Predict(at), errors).row(0).transpose();
+  const Eigen::LLT<Eigen::MatrixXd> factor(v);
+  const Eigen::MatrixXd r =
+      (-set.emulator().Predict(points).mean).rowwise() + knowledge.z.transpose();
+  const Eigen::MatrixXd solved = factor.solve(r.transpose());
+  return r.cwiseProduct(solved.transpose()).rowwise().sum();
 }
 
 Eigen::VectorXd SquaresOfMisfit(const inference::DiagnosisSet& set, const Eigen::VectorXd& z,

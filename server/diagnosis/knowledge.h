@@ -68,6 +68,7 @@ struct Asked {
 struct FurtherMeasured {
   std::vector<inference::MeasuredSet> sets{};
   std::vector<inference::EffectModel> models{};  ///< of kept entries; the base model the first
+  Eigen::VectorXd log_prior{};                   ///< ModelSpace::log_prior
 };
 
 /// further: null where there are the base's fitted tests alone, for which all models compete.
@@ -87,6 +88,9 @@ inference::DesignPoints BestDraw(const Knowledge& knowledge, const inference::De
 /// and what is not known there.
 Eigen::VectorXd SquaresOfMisfit(const inference::DiagnosisSet& set, const Eigen::VectorXd& z,
                                 const inference::DesignPoints& points);
+/// n: the same over what these are at one point, `at`, so that models are held to one measure.
+Eigen::VectorXd SquaresAsAt(const Knowledge& knowledge, const inference::DesignPoints& at,
+                            const inference::DesignPoints& points);
 
 /// Chance that a right model misses a measured history (T, on the set's scale) by as much as the
 /// closest of these points does: the smaller of that of the coordinates and that of what they leave

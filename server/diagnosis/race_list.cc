@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/registry/declared_effects.h"
+#include "dem/registry/effect_family.h"
 #include "server/campaign/model/excitation.h"
 #include "server/campaign/model/race.h"
 #include "server/diagnosis/extension.h"
@@ -75,6 +76,7 @@ std::vector<RacingEffect> EntriesOf(const report::CampaignView& view,
   for (const dem::StrengthRay* ray : StrengthRays(effect)) {
     const dem::ParameterInfo* parameter = ParameterNamed(effect, ray->parameter);
     RacingEffect entry{.name = effect.name,
+                       .family = dem::FamilyOf(effect),
                        .strength = absl::StrCat(effect.name, ".", ray->parameter)};
     const auto prior = priors.find(entry.strength);
     if (parameter == nullptr || prior == priors.end()) continue;
@@ -256,16 +258,19 @@ absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
     }
   }
   if (race.effects.empty()) return NobodyIn(campaign, race);
-  // Instruments and a denser start exclude nobody, and there is no engine whose choices matter.
-  if (elsewhere) return race;
   for (int a = 0; a < static_cast<int>(race.effects.size()); ++a) {
     for (int b = a + 1; b < static_cast<int>(race.effects.size()); ++b) {
-      const std::string& one = race.effects[static_cast<std::size_t>(a)].name;
-      const std::string& other = race.effects[static_cast<std::size_t>(b)].name;
-      if (one != other && !campaign::WhyNotTogether(campaign, {one, other}).empty())
+      const RacingEffect& one = race.effects[static_cast<std::size_t>(a)];
+      const RacingEffect& other = race.effects[static_cast<std::size_t>(b)];
+      if (one.name == other.name) continue;
+      if (!one.family.empty() && one.family == other.family) race.kin.emplace_back(a, b);
+      // Instruments and a denser start exclude nobody.
+      if (!elsewhere && !campaign::WhyNotTogether(campaign, {one.name, other.name}).empty())
         race.excluded.emplace_back(a, b);
     }
   }
+  // Where the runs were made elsewhere there is no engine whose choices matter.
+  if (elsewhere) return race;
   race.numerics = NumericsOf(campaign);
   return race;
 }

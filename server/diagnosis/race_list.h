@@ -27,6 +27,7 @@ struct ShapeParameter {
 /// by itself (gain and offset of a load cell) has an entry for each.
 struct RacingEffect {
   std::string name{};      ///< of the effect
+  std::string family{};    ///< dem::FamilyOf
   std::string strength{};  ///< dotted name of the parameter
   double null = 0;         ///< its value without the effect, SI
   /// Two moderate distances from the null, the nearer first, SI; their sign is that of positive
@@ -52,7 +53,7 @@ struct Race {
   std::vector<std::string> base{};      ///< names of the parameters that the base calibrates, d
   std::vector<RacingEffect> effects{};  ///< K; entries of one effect stand together
   std::vector<std::pair<int, int>> excluded{};  ///< entries that may not act in one run
-  std::vector<std::pair<int, int>> kin{};       ///< entries that the catalogue calls alike
+  std::vector<std::pair<int, int>> kin{};       ///< entries of different effects of one family
   std::vector<NumericalChoice> numerics{};
   /// Effects that do not take part, and why, in a clause.
   std::vector<std::pair<std::string, std::string>> not_excitable{};

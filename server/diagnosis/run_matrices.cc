@@ -22,6 +22,11 @@ using inference::DesignPoints;
 
 constexpr double kEdgeOfBox = 1e-9;  // of rounding
 
+// Whether scaled base parameters lie where an emulator is made for.
+bool InBox(const Eigen::RowVectorXd& scaled) {
+  return (scaled.array().abs() <= 1 + kEdgeOfBox).all();
+}
+
 // Complete runs of the batches whose numerics are unchanged.
 struct DesignRuns {
   std::vector<std::vector<double>> values;
@@ -47,21 +52,29 @@ Eigen::MatrixXd StagingOf(const BaseRuns& base, const DesignRows& rows,
                           const std::vector<EndedBatch>& batches) {
   std::map<int, Eigen::VectorXd> change;  // by choice, the first that came
   const Index d = base.values.cols();
+  // The same run with unchanged numerics, scaled; nothing: there is none.
+  const auto unchanged = [&](const campaign::RunOf& run) -> std::optional<Eigen::RowVectorXd> {
+    const Eigen::RowVectorXd own = Eigen::Map<const Eigen::RowVectorXd>(run.values.data(), d);
+    for (Index i = 0; i < base.values.rows(); ++i) {
+      if (base.stream[static_cast<std::size_t>(i)] == run.stream && base.values.row(i) == own)
+        return base.histories.row(i);
+    }
+    const std::vector<double> values = rows.WithoutNumerics(run.values);
+    for (const EndedBatch& batch : batches) {
+      for (const EndedRun& ended : batch.runs) {
+        if (ended.readings && ended.run.stream == run.stream && ended.run.values == values)
+          return base.scale.Scaled(*ended.readings);
+      }
+    }
+    return std::nullopt;
+  };
   for (const EndedBatch& batch : batches) {
     for (const EndedRun& ended : batch.runs) {
       const int choice = rows.ChangedNumerics(ended.run.values);
       if (choice < 0 || !ended.readings) continue;
-      const Eigen::RowVectorXd own =
-          Eigen::Map<const Eigen::RowVectorXd>(ended.run.values.data(), d);
-      for (Index i = 0; i < base.values.rows(); ++i) {
-        if (base.stream[static_cast<std::size_t>(i)] != ended.run.stream ||
-            base.values.row(i) != own)
-          continue;
-        const Eigen::VectorXd difference =
-            (base.scale.Scaled(*ended.readings) - base.histories.row(i)).transpose();
-        change.emplace(choice, difference);
-        break;
-      }
+      const std::optional<Eigen::RowVectorXd> without = unchanged(ended.run);
+      if (without)
+        change.emplace(choice, (base.scale.Scaled(*ended.readings) - *without).transpose());
     }
   }
   Eigen::MatrixXd staging(base.histories.cols(), static_cast<Index>(change.size()));
@@ -357,8 +370,11 @@ inference::DesignPoints WholePoints(const DesignRows& rows, const PartOfRace& pa
 }
 
 int RunsWith(const DesignRows& rows, const std::vector<EndedBatch>& batches, int entry) {
-  const DesignRuns design = RunsOfDesign(rows, batches);
-  return static_cast<int>((rows.Points(design.values).strength.col(entry).array() != 0).count());
+  const DesignPoints points = rows.Points(RunsOfDesign(rows, batches).values);
+  int runs = 0;
+  for (Index i = 0; i < points.base.rows(); ++i)
+    runs += points.strength(i, entry) != 0 && InBox(points.base.row(i)) ? 1 : 0;
+  return runs;
 }
 
 inference::SetRuns SetRunsOf(const BaseRuns& base, const DesignRows& rows,
@@ -368,15 +384,13 @@ inference::SetRuns SetRunsOf(const BaseRuns& base, const DesignRows& rows,
   std::vector<bool> known(rows.race().effects.size(), false);
   for (const int k : part.kept) known[static_cast<std::size_t>(k)] = true;
   for (const int k : part.flat) known[static_cast<std::size_t>(k)] = true;
-  const auto in_box = [](const auto& x) { return (x.array().abs() <= 1 + kEdgeOfBox).all(); };
-
   const Eigen::MatrixXd scaled = rows.axes().Scaled(base.values);
   std::vector<Index> of_base, of_design;
   for (Index i = 0; i < scaled.rows(); ++i) {
-    if (in_box(scaled.row(i))) of_base.push_back(i);
+    if (InBox(scaled.row(i))) of_base.push_back(i);
   }
   for (Index i = 0; i < points.rows(); ++i) {
-    bool all_known = in_box(points.base.row(i));
+    bool all_known = InBox(points.base.row(i));
     for (std::size_t k = 0; k < known.size(); ++k)
       all_known = all_known && (known[k] || points.strength(i, static_cast<Index>(k)) == 0);
     if (all_known) of_design.push_back(i);

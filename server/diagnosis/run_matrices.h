@@ -88,9 +88,9 @@ Race WithCalculated(Race race, const BaseRuns& base);
 std::vector<int> EntriesRun(const Race& race, const std::vector<int>& entries);
 
 /// Runs of the base within its axes, and complete runs of the design with unchanged numerics and
-/// only effects of the part; what numerics change, against the run of the base that each repeats;
-/// the base's twins; what calculated entries change of base runs, at strengths of the reference
-/// prior.
+/// only effects of the part; what numerics change, against the run without an effect that each
+/// repeats; the base's twins; what calculated entries change of base runs, at strengths of the
+/// reference prior.
 inference::SetRuns SetRunsOf(const BaseRuns& base, const DesignRows& rows,
                              const std::vector<EndedBatch>& batches, const PartOfRace& part);
 
@@ -98,7 +98,7 @@ inference::SetRuns SetRunsOf(const BaseRuns& base, const DesignRows& rows,
 inference::SetRuns OfExperiment(const inference::SetRuns& runs, const HistoryScale& scale,
                                 const std::string& experiment);
 
-/// Complete runs of the design in which an entry is on.
+/// Complete runs of the design in which an entry is on, within the axes of the rows.
 int RunsWith(const DesignRows& rows, const std::vector<EndedBatch>& batches, int entry);
 
 /// Points of the kept entries alone, and points of all entries that have these.

@@ -84,7 +84,7 @@ DesignPoints ScoutPoints(const DesignRows& rows, const BaseRegion& region,
 
 std::vector<campaign::RunOf> NumericsRows(const DesignRows& rows, const KnownBefore& before) {
   const Index nearest = before.region.nearest, d = before.base.values.cols();
-  std::vector<double> values = rows.Values(PointsOfBase(rows, Eigen::MatrixXd::Zero(1, d)), 0);
+  std::vector<double> values = rows.WithoutEffects();
   // To the bit, so that it is the same run but for its numerics.
   for (Index j = 0; j < d; ++j)
     values[static_cast<std::size_t>(j)] = before.base.values(nearest, j);

@@ -75,7 +75,7 @@ class SecondInquiry {
   absl::StatusOr<ThenAnswer> Run() {
     RETURN_IF_ERROR(ReadFile());
     RETURN_IF_ERROR(LearnSets());
-    further_.models = CompetingModels();
+    SetCompetingModels();
     const Knowledge& known = *answered_.known;
     ASSIGN_OR_RETURN(asked_, Ask(*answered_.before, known, Effort::kToAnswer, &further_));
     const ChanceElsewhere elsewhere = [this](const inference::ModelEvidence& model) {
@@ -170,15 +170,19 @@ class SecondInquiry {
   }
 
   // Those that led, the base model and none of these, in the order in which they were asked.
-  std::vector<inference::EffectModel> CompetingModels() const {
-    std::vector<inference::EffectModel> models;
-    const auto& all = answered_.asked->space.models;
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      if (all[i].effects.empty() ||
-          std::count(leading_.models.begin(), leading_.models.end(), static_cast<Index>(i)) > 0)
-        models.push_back(all[i]);
+  void SetCompetingModels() {
+    const inference::ModelSpace& space = answered_.asked->space;
+    const Eigen::VectorXd prior = space.LogPrior();
+    std::vector<Index> places;
+    for (Index i = 0; i < prior.size(); ++i) {
+      const inference::EffectModel& model = space.models[static_cast<std::size_t>(i)];
+      if (!model.effects.empty() &&
+          std::count(leading_.models.begin(), leading_.models.end(), i) == 0)
+        continue;
+      places.push_back(i);
+      further_.models.push_back(model);
     }
-    return models;
+    further_.log_prior = prior(places);
   }
 
   double ChanceInTest(const inference::ModelEvidence& model) const {

@@ -1,12 +1,14 @@
 // Linear algebra of a diagnosis by probabilities: coordinates and emulator of a design, evidences
-// of base, singles, pairs and none of these under three priors on strengths. 256 runs; parameters,
-// effects, tests.
+// of base, singles, pairs, leading triples and none of these under three priors on strengths. 256
+// runs; parameters, effects, tests.
 
 #include <benchmark/benchmark.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "inference/diagnosis/effect_probabilities.h"
@@ -49,7 +51,14 @@ class RandomDesign {
     space_.shape_low = space_.shape_high = Eigen::VectorXd(0);
     space_.base_low = Eigen::VectorXd::Constant(parameters, -1);
     space_.base_high = Eigen::VectorXd::Constant(parameters, 1);
-    space_.models = AllModels(effects, {{0, 1}, {2, 3}});
+    const std::vector<std::pair<int, int>> excluded = {{0, 1}, {2, 3}};
+    space_.models = AllModels(effects, excluded);
+    // As many triples as a diagnosis asks for at most.
+    std::vector<EffectModel> triples =
+        TriplesOf(effects, excluded, {{.effects = {0, 2}}, {.effects = {1, 4}}});
+    triples.resize(std::min<std::size_t>(12, triples.size()));
+    space_.models.insert(space_.models.end(), triples.begin(), triples.end());
+    space_.triples = CountTriples(effects, excluded);
   }
 
   const SetRuns& runs() const { return runs_; }

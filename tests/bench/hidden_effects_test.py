@@ -573,7 +573,7 @@ class Ways(InAFolder):
         self.assertEqual(found['design'], 1)
         with open(self.path('asked'), encoding='utf-8') as file:
             last = file.read().splitlines()[-1]
-        self.assertTrue(last.startswith('diagnose c1 --design c2 --without x '), last)
+        self.assertTrue(last.startswith('diagnose c1 --design c2 --no-plan --without x '), last)
         self.assertEqual(sorted(os.listdir(self.path('state/designs'))), ['1'])
         with open(self.path('state/cases/removed-0/campaign.yaml'), encoding='utf-8') as file:
             one = file.read()

@@ -14,6 +14,7 @@
 #include "dem/registry/catalog.h"
 #include "inference/sampling/philox.h"
 #include "inference/sampling/sobol.h"
+#include "server/diagnosis/race_list.h"
 #include "server/diagnosis/run_maker.h"
 #include "server/report/views/campaign_view.h"
 
@@ -85,18 +86,30 @@ class RaceToy {
         }
       }
     }
-    for (std::size_t s = 0; s < base_.size(); ++s) {
-      for (int e = 0; e < 2; ++e) {
-        report::StateHistory& history = view.states[{e == 0 ? "low" : "high", static_cast<int>(s)}];
-        history.observables = {"deviatoric_stress", "volumetric_strain"};
-        for (int i = 0; i < kReadings; ++i) {
-          v1::State& state = history.states.emplace_back();
-          state.set_load_step(i);
-          for (int o = 0; o < 2; ++o) state.add_values(base_[s][Place(e, o, i)]);
-        }
+    for (std::size_t s = 0; s < base_.size(); ++s) StoreStates(base_[s], static_cast<int>(s), view);
+    return view;
+  }
+
+  /// A design of the campaign's race as it is stored, with batches that were made of it.
+  static report::CampaignView Stored(const report::CampaignView& base, const Race& race,
+                                     const std::vector<EndedBatch>& batches) {
+    report::CampaignView design;
+    design.status.set_campaign("c2");
+    design.campaign = CampaignOfDesign(base.campaign, race);
+    for (std::size_t b = 0; b < batches.size(); ++b) {
+      for (std::size_t i = 0; i < batches[b].runs.size(); ++i) {
+        const EndedRun& ended = batches[b].runs[i];
+        v1::Sample& sample = design.samples.emplace_back();
+        sample.set_index(static_cast<int>(b) * campaign::kMostRowsOfBatch + static_cast<int>(i));
+        sample.set_iteration(static_cast<int>(b));
+        sample.set_purpose(campaign::ToString(batches[b].stage));
+        sample.set_status(ended.readings ? "finished" : "diverged");
+        sample.set_stream(ended.run.stream);
+        for (const double value : ended.run.values) sample.add_parameters(value);
+        if (ended.readings) StoreStates(*ended.readings, sample.index(), design);
       }
     }
-    return view;
+    return design;
   }
 
   /// One run of a design by the names of its parameters.
@@ -129,6 +142,19 @@ class RaceToy {
   static double PowerOf(int effect) { return effect % 4 == 1 ? 0.75 : 1; }
 
  private:
+  static void StoreStates(const Eigen::RowVectorXd& readings, int sample,
+                          report::CampaignView& view) {
+    for (int e = 0; e < 2; ++e) {
+      report::StateHistory& history = view.states[{e == 0 ? "low" : "high", sample}];
+      history.observables = {"deviatoric_stress", "volumetric_strain"};
+      for (int i = 0; i < kReadings; ++i) {
+        v1::State& state = history.states.emplace_back();
+        state.set_load_step(i);
+        for (int o = 0; o < 2; ++o) state.add_values(readings[Place(e, o, i)]);
+      }
+    }
+  }
+
   static Eigen::Index Place(int experiment, int observable, int i) {
     // Of MakeDataSet: by experiment, load step, observable.
     return 2 * (kReadings * experiment + i) + observable;

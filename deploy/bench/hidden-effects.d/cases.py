@@ -13,7 +13,7 @@ MEASUREMENT_SIDE = {'apparatus_compliance', 'strain_offset', 'membrane_stiffness
 STAGINGS = ('rate', 'step', 'damping', 'grains')
 DESIGNS = 3               # of the shared way
 # Of one family: no pair of hidden effects. Kin by what they do, not by what a diagnosis makes of them.
-KIN = ({'adhesion_dmt', 'adhesion_jkr', 'capillary_bridges', 'linear_cohesion'}, {'rolling_resistance', 'twisting_resistance'},
+KIN = ({'adhesion_dmt', 'adhesion_jkr', 'capillary_bridges', 'linear_cohesion'}, {'nonspherical_shape', 'rolling_resistance', 'twisting_resistance'},
        {'apparatus_compliance', 'strain_offset'}, {'nonspherical_shape', 'particle_crushing'})
 
 

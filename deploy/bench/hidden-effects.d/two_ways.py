@@ -78,7 +78,7 @@ class Designs:
         self.lab.measure(control, steps.folder, laboratory.STANDARD, self.strengths)
         file = self.lab.file(steps.folder, laboratory.STANDARD, 'shared', number)
         campaign = steps.answer('run', 'run', file)['campaign']
-        return steps.answer('diagnose', 'diagnose', campaign, needed=('design',))['design']['campaign']
+        return steps.answer('diagnose', 'diagnose', campaign, '--no-plan', needed=('design',))['design']['campaign']
 
 
 def shared(case, lab, designs, strengths, workers):
@@ -94,7 +94,7 @@ def shared(case, lab, designs, strengths, workers):
     file = lab.file(folder, laboratory.STANDARD, 'shared', case.design)
     ran = steps.answer('run', 'run', file)
     without = [word for effect in case.removed for word in ('--without', effect)]
-    found = steps.answer('diagnose', 'diagnose', ran['campaign'], '--design', design, *without)
+    found = steps.answer('diagnose', 'diagnose', ran['campaign'], '--design', design, '--no-plan', *without)
     return record_of(case, truth, way='shared', diagnose=brief(found))
 
 

@@ -25,9 +25,11 @@ namespace {
 struct DiagnoseOptions {
   std::string campaign;
   std::vector<std::string> without{};  ///< effects that are not to be thought of
+  std::string design{};                ///< id of another campaign's design
   bool gate = false;
   std::string then{};  ///< file of the proposed measurement
   std::optional<int> plan{};
+  bool no_plan = false;
 };
 
 std::string Next(const CommonOptions& common, const DiagnoseOptions& options,
@@ -55,6 +57,11 @@ std::string Next(const CommonOptions& common, const DiagnoseOptions& options,
 void Declare(OptionList& list, DiagnoseOptions& options) {
   list.Campaign(options.campaign);
   list.Texts("--without", options.without, "effect that is not to be thought of");
+  list.Text("--design", options.design,
+            "id of another campaign's design of the same tests (`design.campaign` of its JSON), "
+            "whose runs serve this one too");
+  list.Flag("--no-plan", options.no_plan,
+            "proposes no next experiment, which takes runs of its own");
   const Option gate =
       list.Flag("--gate", options.gate, "adequate or not, by the runs that are there; tries no effect");
   list.Text("--then", options.then,
@@ -67,7 +74,7 @@ void Declare(OptionList& list, DiagnoseOptions& options) {
 // The proposal that the file is a measurement of, as the newest answer with proposals has it.
 absl::StatusOr<diagnosis::MadeMeasurement> MadeOf(client::Client& client,
                                                   const DiagnoseOptions& options,
-                                                  std::vector<std::string>& without) {
+                                                  diagnosis::DiagnosisOptions& question) {
   const std::string name = std::filesystem::path(options.then).filename().string();
   auto content = campaign::DiskReader(options.then)(name);
   if (!content.ok())
@@ -95,7 +102,10 @@ absl::StatusOr<diagnosis::MadeMeasurement> MadeOf(client::Client& client,
         absl::StrCat("--plan ", number, ": ", considered.size(), " were considered, from 0 on"));
   ASSIGN_OR_RETURN(auto plan,
                    diagnosis::PlannedFrom(considered[static_cast<std::size_t>(number)]));
-  if (without.empty()) without = found.value("without", without);
+  // Asked as it was then.
+  if (question.without.empty()) question.without = found.value("without", question.without);
+  if (question.design.empty())
+    question.design = found["design"].value("borrowed_from", std::string());
   return diagnosis::MadeMeasurement{
       .plan = std::move(plan), .file = name, .content = *std::move(content)};
 }
@@ -105,9 +115,12 @@ absl::StatusOr<int> Diagnose(const CommonOptions& common, const DiagnoseOptions&
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
   client::Laboratory laboratory(*session, common.server);
   ASSIGN_OR_RETURN(const auto view, laboratory.Finished(options.campaign));
-  diagnosis::DiagnosisOptions question{.only_adequacy = options.gate, .without = options.without};
+  diagnosis::DiagnosisOptions question{.only_adequacy = options.gate,
+                                       .without = options.without,
+                                       .design = options.design,
+                                       .next_experiment = !options.no_plan};
   if (!options.then.empty()) {
-    ASSIGN_OR_RETURN(question.then, MadeOf(session->client(), options, question.without));
+    ASSIGN_OR_RETURN(question.then, MadeOf(session->client(), options, question));
   }
   RETURN_IF_ERROR(diagnosis::CheckLeftOut(question.without, view.campaign));
   ASSIGN_OR_RETURN(const auto diagnosis, diagnosis::Diagnose(laboratory, view, question));

@@ -90,6 +90,22 @@ TEST(Answer, ASecondSpecimenIsSpokenOfWhereItWouldTell) {
   EXPECT_THAT(VerdictInWords(answer), EndsWith("these tests cannot tell."));
 }
 
+// Of many models the first three are said, after a family that is sure.
+TEST(Answer, OfALongSetTheFamilyIsSaidFirst) {
+  const std::vector<std::string> six = {"a", "b", "c", "d", "e", "f"};
+  Eigen::VectorXd model(9);
+  model << 0.02, 0.3, 0.28, 0.2, 0.1, 0.05, 0.03, 0.01, 0.01;
+  AnswerParts parts = PartsOf(six, model, 1e-5);
+  EXPECT_EQ(Said(parts).sentence,
+            "One of these six, 96 %: a, b, c and 3 more; which of them, these tests cannot tell.");
+  parts.kin = {{0, 1}, {0, 2}, {1, 2}, {0, 3}, {1, 3}, {2, 3}, {0, 4}, {1, 4}, {2, 4}, {3, 4}};
+  EXPECT_THAT(Said(parts).sentence, HasSubstr("and 3 more")) << "no family is sure";
+  parts.kin.insert(parts.kin.end(), {{0, 5}, {1, 5}, {2, 5}, {3, 5}, {4, 5}});
+  EXPECT_EQ(Said(parts).sentence,
+            "a, b, c, d, e or f acts, 97 %: a, b, c and 3 more; which of them, these tests cannot "
+            "tell.");
+}
+
 TEST(Answer, PairsAreNamedTogetherOrNot) {
   Eigen::VectorXd model(6);
   model << 0.001, 0.004, 0.004, 0.001, 0.988, 0.002;

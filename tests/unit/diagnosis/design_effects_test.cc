@@ -222,6 +222,17 @@ TEST(DesignEffects, OfANullNoneIsSignificant) {
   EXPECT_GT(answer.p_square, 0.01);
 }
 
+// What an emulator does not know of an effect makes its own error larger, and is no evidence.
+TEST(DesignEffects, ASmallPValueStandsBesideASmallerError) {
+  for (const Answer* answer : {&OfEffect().answer, &OfNull().answer}) {
+    for (const EffectAnswer& own : answer->candidates) {
+      if (own.p_value < 0.05) {
+        EXPECT_LT(own.rms, answer->rms) << own.effect;
+      }
+    }
+  }
+}
+
 TEST(DesignEffects, ASecondSpecimenPromisesAProbability) {
   const double of_effect = OfEffect().answer.repeat_names_alone;
   const double of_null = OfNull().answer.repeat_names_alone;

@@ -199,7 +199,7 @@ TEST(DiagnosisJson, IsReadBackAsItWasSaid) {
 
 TEST(DiagnosisText, HasATableOfModelsAndOneOfEffects) {
   const std::string text = DiagnosisText(TwoAlike());
-  EXPECT_THAT(text, HasSubstr("One of these four, more than 99 %"));
+  EXPECT_THAT(text, HasSubstr("rolling or twisting acts, 85 %: rolling, twisting, nothing"));
   EXPECT_THAT(text, HasSubstr("Error of the best fit: 2.5 sd; squared misfit 60"));
   EXPECT_THAT(text, HasSubstr("! Only 20 readings are fitted."));
   EXPECT_THAT(text, ContainsRegex("model +probability"));
@@ -209,7 +209,7 @@ TEST(DiagnosisText, HasATableOfModelsAndOneOfEffects) {
   EXPECT_THAT(text, ContainsRegex("all others +0\\.16 %"));
   EXPECT_THAT(text, ContainsRegex("effect +acts +named +explains +error +p"));
   EXPECT_THAT(text, ContainsRegex("rolling +55\\.1 % +75 % +1\\.25 +1e-05"));
-  EXPECT_THAT(text, HasSubstr("Hardly told apart by these tests: rolling, twisting"));
+  EXPECT_THAT(text, HasSubstr("hardly told apart by these tests: rolling, twisting"));
   EXPECT_THAT(text, HasSubstr("rolling fits best at rolling.friction = 0.2"));
   EXPECT_THAT(text, Not(HasSubstr("adhesion fits best")));
   EXPECT_THAT(text, HasSubstr("At no strength that it can have so often: adhesion."));
@@ -223,7 +223,7 @@ TEST(DiagnosisText, ANamedEffectIsMarkedAndAFamilyOfOneIsNone) {
   d.answer.candidates[0].alone = true;
   d.answer.families = {{.effects = {"rolling"}, .probability = 0.96}};
   EXPECT_THAT(DiagnosisText(d), ContainsRegex("rolling +55\\.1 % +yes"));
-  EXPECT_THAT(DiagnosisText(d), Not(HasSubstr("Hardly told apart")));
+  EXPECT_THAT(DiagnosisText(d), Not(HasSubstr("hardly told apart")));
 }
 
 TEST(DiagnosisText, WhatRestsOnWrongErrorsIsSaidWithDoubt) {
@@ -234,7 +234,7 @@ TEST(DiagnosisText, WhatRestsOnWrongErrorsIsSaidWithDoubt) {
   d.in_doubt = true;
   EXPECT_THAT(Read(d)["sentence"].get<std::string>(), HasSubstr(kDoubt));
   EXPECT_EQ(Read(d)["in_doubt"], true);
-  EXPECT_THAT(DiagnosisText(d), ContainsRegex("This is in doubt"));
+  EXPECT_THAT(DiagnosisText(d), ContainsRegex("This is.in doubt"));
 }
 
 TEST(DiagnosisText, TheNextExperimentComesWithWhatItTellsApart) {

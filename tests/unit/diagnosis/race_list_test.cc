@@ -50,6 +50,19 @@ TEST(RaceList, HasTheEffectsOfTheBuildWithTheirStrengths) {
   ASSERT_EQ(rolling.shapes.size(), 1u) << "its stiffness shapes it";
   EXPECT_EQ(rolling.shapes[0].name, "rolling_resistance.stiffness_ratio");
   EXPECT_EQ(rolling.shapes[0].absent, 0) << "as a run without it has it";
+  const auto are_kin = [&race](const std::string& a, const std::string& b) {
+    return std::any_of(race.kin.begin(), race.kin.end(), [&](const auto& pair) {
+      const std::string& one = race.effects[static_cast<std::size_t>(pair.first)].name;
+      const std::string& other = race.effects[static_cast<std::size_t>(pair.second)].name;
+      return (one == a && other == b) || (one == b && other == a);
+    });
+  };
+  EXPECT_TRUE(are_kin("adhesion_dmt", "capillary_bridges"));
+  EXPECT_TRUE(are_kin("rolling_resistance", "nonspherical_shape"));
+  EXPECT_TRUE(are_kin("apparatus_compliance", "strain_offset"));
+  EXPECT_FALSE(are_kin("rolling_resistance", "adhesion_dmt"));
+  EXPECT_FALSE(are_kin("load_cell_error", "load_cell_error")) << "strengths of one effect";
+  EXPECT_FALSE(are_kin("contact_plasticity", "hertz_nonlinearity")) << "neither is of a family";
   // Gain and offset each act alone.
   EXPECT_TRUE(EntryOf(race, "load_cell_error.gain").design.two_sided);
   EXPECT_THAT(EntryOf(race, "load_cell_error.offset").shapes, IsEmpty());

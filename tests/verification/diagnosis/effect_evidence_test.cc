@@ -294,8 +294,15 @@ TEST_F(EffectEvidence, AnotherTestMayKnowFewerEffects) {
 }
 
 TEST(ModelSpaceTest, ListsModelsAndSharesThePrior) {
-  const std::vector<EffectModel> models = AllModels(4, {{2, 1}}, {{0, 1, 3}});
-  EXPECT_EQ(models.size(), 1u + 4 + 5 + 1 + 1);
+  const std::vector<std::pair<int, int>> excluded = {{2, 1}};
+  std::vector<EffectModel> models = AllModels(4, excluded);
+  EXPECT_EQ(models.size(), 1u + 4 + 5 + 1);
+  // Of three that could join the pair one excludes a member; there could be {0, 2, 3} besides.
+  const std::vector<EffectModel> triples = TriplesOf(4, excluded, {{.effects = {0, 1}}});
+  ASSERT_EQ(triples.size(), 1u);
+  EXPECT_EQ(triples[0].effects, (std::vector<int>{0, 1, 3}));
+  EXPECT_EQ(CountTriples(4, excluded), 2);
+  models.push_back(triples[0]);
   CoordinateToy toy({.effects = 4});
   ModelSpace space = ToySpace(toy);
   space.models = models;
@@ -304,6 +311,10 @@ TEST(ModelSpaceTest, ListsModelsAndSharesThePrior) {
   EXPECT_NEAR(prior.sum(), 1, 1e-12);
   EXPECT_NEAR(prior[0] / prior[1], 4, 1e-12);  // 0.4 for it, 0.4 for four singles
   EXPECT_NEAR(prior[5] * 5 / (prior[1] * 4), 0.25, 1e-12);
+  EXPECT_NEAR(prior[11] / (prior[5] * 5), 0.25, 1e-12);
+  space.triples = 2;
+  const Eigen::VectorXd of_two = space.LogPrior().array().exp();
+  EXPECT_NEAR(of_two[11] / (of_two[5] * 5), 0.125, 1e-12) << "one of two that there could be";
   space.strength[1].high = 0.1;
   EXPECT_THAT(space.Validate().message(), HasSubstr("strengths of effect 1 range from 0.4 to 0.1"));
 }
