@@ -145,6 +145,17 @@ std::string SomeOf(std::vector<std::string> words) {
   return absl::StrCat(absl::StrJoin(words, ", "), " and ", more, " more");
 }
 
+const NamedFamily* SurestFamily(const Answer& answer) {
+  const auto family = std::max_element(
+      answer.families.begin(), answer.families.end(),
+      [](const NamedFamily& a, const NamedFamily& b) { return a.probability < b.probability; });
+  return family == answer.families.end() ? nullptr : &*family;
+}
+
+std::string Acts(const NamedFamily& family) {
+  return absl::StrCat(OneOf(family.effects), " acts, ", Percent(family.probability));
+}
+
 std::string ReasonInWords(inference::NotNamed reason) {
   switch (reason) {
     case inference::NotNamed::kOtherPrior:
@@ -284,9 +295,14 @@ std::string VerdictInWords(const Answer& answer) {
       if (first.effects.empty() && !first.none_of_these)
         return absl::StrCat(passes, "; that nothing is missing has probability ",
                             Percent(answer.adequate), ".", beside);
-      return absl::StrCat(passes, ". Yet ", InWords(first), " is more probable (",
-                          Percent(first.probability), ") than that nothing is missing (",
-                          Percent(answer.adequate), ").", beside);
+      const NamedFamily* family = SurestFamily(answer);
+      return absl::StrCat(
+          passes, ". Yet ",
+          family != nullptr
+              ? Acts(*family)
+              : absl::StrCat(InWords(first), " is more probable (", Percent(first.probability),
+                             ") than that nothing is missing (", Percent(answer.adequate), ")"),
+          ".", beside);
     }
     case AnswerVerdict::kUnexplained:
       if (answer.candidates.empty())
@@ -315,12 +331,8 @@ std::string VerdictInWords(const Answer& answer) {
       if (words.size() <= kMostInWords)
         return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", Percent(sum), ": ",
                             OneOf(words), end);
-      const auto family = std::max_element(
-          answer.families.begin(), answer.families.end(),
-          [](const NamedFamily& a, const NamedFamily& b) { return a.probability < b.probability; });
-      if (family != answer.families.end())
-        return absl::StrCat(OneOf(family->effects), " acts, ", Percent(family->probability), ": ",
-                            SomeOf(words), end);
+      if (const NamedFamily* family = SurestFamily(answer))
+        return absl::StrCat(Acts(*family), ": ", SomeOf(words), end);
       return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", Percent(sum), ": ",
                           SomeOf(words), end);
     }

@@ -280,8 +280,9 @@ std::string RunsText(const Diagnosis& d) {
   const std::string beside =
       d.borrowed.empty() ? ""
                          : fmt::format(", beside {} of {}", d.answer.borrowed_runs, d.borrowed);
-  return fmt::format("{} runs ({}) in {}, {} model evaluations{}.\n", runs, stages, d.design,
-                     d.evaluations, beside);
+  return fmt::format("{} runs{} in {}, {} model evaluations{}.\n", runs,
+                     stages.empty() ? "" : fmt::format(" ({})", stages), d.design, d.evaluations,
+                     beside);
 }
 
 }  // namespace
