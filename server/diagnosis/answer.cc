@@ -108,14 +108,6 @@ std::vector<std::string> NamesIn(const std::vector<int>& effects,
   return result;
 }
 
-std::string Percent(double probability) {
-  // 99.7 is not said as 100: of what is not certain nothing is.
-  const double percent = 100 * probability;
-  if (percent >= 99.5) return "more than 99 %";
-  if (percent < 0.5) return "less than 1 %";
-  return absl::StrCat(static_cast<int>(std::lround(percent)), " %");
-}
-
 std::string InWords(const NamedModel& model) {
   if (model.none_of_these) return "something that this library lacks";
   if (model.effects.empty()) return "nothing (the model as it is)";
@@ -145,6 +137,17 @@ std::string SomeOf(std::vector<std::string> words) {
   return absl::StrCat(absl::StrJoin(words, ", "), " and ", more, " more");
 }
 
+const NamedFamily* SurestFamily(const Answer& answer) {
+  const auto family = std::max_element(
+      answer.families.begin(), answer.families.end(),
+      [](const NamedFamily& a, const NamedFamily& b) { return a.probability < b.probability; });
+  return family == answer.families.end() ? nullptr : &*family;
+}
+
+std::string Acts(const NamedFamily& family) {
+  return absl::StrCat(OneOf(family.effects), " acts, ", ChanceInWords(family.probability));
+}
+
 std::string ReasonInWords(inference::NotNamed reason) {
   switch (reason) {
     case inference::NotNamed::kOtherPrior:
@@ -158,6 +161,14 @@ std::string ReasonInWords(inference::NotNamed reason) {
 }
 
 }  // namespace
+
+std::string ChanceInWords(double probability) {
+  // 99.7 is not said as 100: of what is not certain nothing is.
+  const double percent = 100 * probability;
+  if (percent >= 99.5) return "more than 99 %";
+  if (percent < 0.5) return "less than 1 %";
+  return absl::StrCat(static_cast<int>(std::lround(percent)), " %");
+}
 
 const char* ToString(AnswerVerdict verdict) { return campaign::WordOf(kVerdictWords, verdict); }
 
@@ -263,7 +274,7 @@ std::string VerdictInWords(const Answer& answer) {
   std::string beside;  // why a probable effect is not named
   for (const EffectAnswer& own : answer.candidates) {
     if (!own.not_named) continue;
-    beside = absl::StrCat(" ", own.effect, ", ", Percent(own.probability),
+    beside = absl::StrCat(" ", own.effect, ", ", ChanceInWords(own.probability),
                           ", is not named: ", ReasonInWords(*own.not_named), ".");
     break;
   }
@@ -273,7 +284,7 @@ std::string VerdictInWords(const Answer& answer) {
       for (const EffectAnswer& own : answer.candidates) {
         if (own.alone) least = std::min(least, own.probability);
       }
-      return absl::StrCat(absl::StrJoin(answer.effects, " with "), ", ", Percent(least),
+      return absl::StrCat(absl::StrJoin(answer.effects, " with "), ", ", ChanceInWords(least),
                           answer.sure ? "." : ", or something alike that this library lacks.");
     }
     case AnswerVerdict::kAdequate: {
@@ -283,16 +294,21 @@ std::string VerdictInWords(const Answer& answer) {
       const NamedModel& first = answer.probabilities.front();
       if (first.effects.empty() && !first.none_of_these)
         return absl::StrCat(passes, "; that nothing is missing has probability ",
-                            Percent(answer.adequate), ".", beside);
-      return absl::StrCat(passes, ". Yet ", InWords(first), " is more probable (",
-                          Percent(first.probability), ") than that nothing is missing (",
-                          Percent(answer.adequate), ").", beside);
+                            ChanceInWords(answer.adequate), ".", beside);
+      const NamedFamily* family = SurestFamily(answer);
+      return absl::StrCat(
+          passes, ". Yet ",
+          family != nullptr
+              ? Acts(*family)
+              : absl::StrCat(InWords(first), " is more probable (", ChanceInWords(first.probability),
+                             ") than that nothing is missing (", ChanceInWords(answer.adequate), ")"),
+          ".", beside);
     }
     case AnswerVerdict::kUnexplained:
       if (answer.candidates.empty())
         return "The model misses the readings by more than noise and scatter explain.";
       if (answer.none_of_these >= inference::AnswerLevels().unexplained)
-        return absl::StrCat("None of these, ", Percent(answer.none_of_these),
+        return absl::StrCat("None of these, ", ChanceInWords(answer.none_of_these),
                             ": what is missing is like no effect of this library.", beside);
       return absl::StrCat("No model of the race explains the readings.", beside);
     case AnswerVerdict::kAmbiguous: {
@@ -303,25 +319,21 @@ std::string VerdictInWords(const Answer& answer) {
         sum += model.probability;
       }
       if (words.size() == 1)
-        return absl::StrCat(words[0], ", ", Percent(sum), ", and not certain enough to be named.",
+        return absl::StrCat(words[0], ", ", ChanceInWords(sum), ", and not certain enough to be named.",
                             beside);
       const std::string end =
           absl::StrCat("; which of them, these tests cannot tell",
                        answer.repeat_names_alone >= kWorthTelling
                            ? absl::StrCat("; on a second specimen they would, with probability ",
-                                          Percent(answer.repeat_names_alone))
+                                          ChanceInWords(answer.repeat_names_alone))
                            : "",
                        ".", beside);
       if (words.size() <= kMostInWords)
-        return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", Percent(sum), ": ",
+        return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", ChanceInWords(sum), ": ",
                             OneOf(words), end);
-      const auto family = std::max_element(
-          answer.families.begin(), answer.families.end(),
-          [](const NamedFamily& a, const NamedFamily& b) { return a.probability < b.probability; });
-      if (family != answer.families.end())
-        return absl::StrCat(OneOf(family->effects), " acts, ", Percent(family->probability), ": ",
-                            SomeOf(words), end);
-      return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", Percent(sum), ": ",
+      if (const NamedFamily* family = SurestFamily(answer))
+        return absl::StrCat(Acts(*family), ": ", SomeOf(words), end);
+      return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", ChanceInWords(sum), ": ",
                           SomeOf(words), end);
     }
   }

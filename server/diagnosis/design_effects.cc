@@ -119,41 +119,38 @@ std::vector<ChangedCurve> CurvesOf(const HistoryScale& scale, const Eigen::RowVe
   return curves;
 }
 
-// A model at the draw that the measurement is most probable at.
-struct AtBest {
-  DesignPoints point;
+Eigen::RowVectorXd HistoryAt(const Knowledge& known, const DesignPoints& point) {
+  return known.set->coordinates()->HistoriesAt(point).row(0);
+}
+
+// Of a model's draws the one that comes closest to the measurement, with the errors that the base
+// model has at its best: an emulator that knows an effect less well excuses nothing.
+struct Closest {
+  double square = 0;
   Eigen::RowVectorXd history;
 };
 
-AtBest BestOf(const Knowledge& known, const ModelEvidence& model) {
-  AtBest best;
-  best.point = BestDraw(known, model.draws);
-  best.history = known.set->coordinates()->HistoriesAt(best.point).row(0);
-  return best;
+Closest ClosestOf(const Knowledge& known, const DesignPoints& base_at_best,
+                  const ModelEvidence& model) {
+  Index row = 0;
+  const double square = SquaresAsAt(known, base_at_best, model.draws).minCoeff(&row);
+  return {.square = square, .history = HistoryAt(known, inference::RowsOf(model.draws, {row}))};
 }
 
-// The base model at its best, and the least square of its misfit with the errors that it has there.
-struct BaseAtBest {
-  AtBest best;
-  double square = 0;
-};
-
-// Chance that a right base model comes closer by as much with a model's strengths, with the errors
-// of the base's best, since an emulator that knows an effect less well excuses nothing: each of k
-// strengths takes one square of Student's law. Half of that of one lies at zero where it has one
-// sign.
-double ChanceOfCloser(const Knowledge& known, const BaseAtBest& base, const ModelEvidence& model,
+// Chance that a right base model comes closer by as much with strengths: each takes one square of
+// Student's law. Half of that of one lies at zero where it has one sign.
+double ChanceOfCloser(const Knowledge& known, double closer, std::size_t of_strengths,
                       bool two_sided) {
-  const double closer = base.square - SquaresAsAt(known, base.best.point, model.draws).minCoeff();
   if (!(closer > 0)) return 1;
-  const auto strengths = static_cast<double>(model.model.effects.size());
+  const auto strengths = static_cast<double>(of_strengths);
   const inference::FisherLaw law{.numerator = strengths,
                                  .denominator = known.set->errors().freedom};
-  return (two_sided || strengths > 1 ? 1 : 0.5) * law.Tail(closer / strengths);
+  return (two_sided || of_strengths > 1 ? 1 : 0.5) * law.Tail(closer / strengths);
 }
 
 void DescribeEffect(const KnownBefore& before, const Knowledge& known, const Asked& asked,
-                    const BaseAtBest& base, const Answer& answer, EffectAnswer& own) {
+                    const DesignPoints& base_at_best, const Closest& base, const Answer& answer,
+                    EffectAnswer& own) {
   const Race& race = known.rows.race();
   bool two_sided = false;
   for (std::size_t i = 0; i < known.part.kept.size(); ++i) {
@@ -176,14 +173,17 @@ void DescribeEffect(const KnownBefore& before, const Knowledge& known, const Ask
   const ModelEvidence* model = ModelOf(known, asked, {own.effect});
   if (model == nullptr) return;
   own.amplitude = MediansOf(known, model->draws, own.effect);
-  const AtBest best = BestOf(known, *model);
-  own.rms = RmsOf(before.base, best.history);
-  const double without = RmsOf(before.base, base.best.history);
+  const Closest closest = ClosestOf(known, base_at_best, *model);
+  own.rms = RmsOf(before.base, closest.history);
+  const double without = RmsOf(before.base, base.history);
   const double excess = without * without - 1;
   if (excess > 0) own.explained = std::clamp((excess + 1 - own.rms * own.rms) / excess, 0.0, 1.0);
-  own.p_value = ChanceOfCloser(known, base, *model, two_sided);
+  // Closer in the coordinates and further off in what these leave out is no closer.
+  if (own.rms < without)
+    own.p_value =
+        ChanceOfCloser(known, base.square - closest.square, model->model.effects.size(), two_sided);
   if (own.probability >= kDesignCaps.asked)
-    own.curves = CurvesOf(before.base.scale, best.history, base.best.history);
+    own.curves = CurvesOf(before.base.scale, closest.history, base.history);
 }
 
 }  // namespace
@@ -198,14 +198,14 @@ absl::Status DescribeEffects(const KnownBefore& before, const Knowledge& known, 
     if (model == nullptr) continue;
     named.points = PointsOf(known, *model, effects);
     named.posterior = PosteriorOf(known, model->draws, effects);
-    named.rms = RmsOf(before.base, BestOf(known, *model).history);
+    named.rms = RmsOf(before.base, HistoryAt(known, BestDraw(known, model->draws)));
   }
   const ModelEvidence* base_model = ModelOf(known, asked, {});
   if (base_model == nullptr) return absl::OkStatus();
-  BaseAtBest base{.best = BestOf(known, *base_model)};
-  base.square = SquaresAsAt(known, base.best.point, base_model->draws).minCoeff();
+  const DesignPoints base_at_best = BestDraw(known, base_model->draws);
+  const Closest base = ClosestOf(known, base_at_best, *base_model);
   for (EffectAnswer& own : answer.candidates)
-    DescribeEffect(before, known, asked, base, answer, own);
+    DescribeEffect(before, known, asked, base_at_best, base, answer, own);
   if (known.part.kept.empty()) return absl::OkStatus();
   ASSIGN_OR_RETURN(
       const inference::Forecast repeat,

@@ -132,7 +132,9 @@ absl::StatusOr<const Knowledge*> DesignChain::KnownAfter(std::size_t n) {
   const bool alone = before_.base.elsewhere || borrowed_ > 0;
   if (alone) {
     if (!units_) {
-      ASSIGN_OR_RETURN(Knowledge known, Learn(before_, *guess, batches, false));
+      const std::vector<EndedBatch> first(
+          batches_.begin(), batches_.begin() + static_cast<std::ptrdiff_t>(borrowed_));
+      ASSIGN_OR_RETURN(Knowledge known, Learn(before_, *guess, first, false));
       units_ = std::move(known.rows);
     }
     guess = &*units_;

@@ -111,6 +111,18 @@ class Inquiry {
           "a further measurement is told by runs of its test, and here none are made");
     ASSIGN_OR_RETURN(const AnsweredDesign answered, designed_.chain->Answered());
     ASSIGN_OR_RETURN(ThenAnswer then, AnswerWith(laboratory_, view_, answered, made));
+    // What an effect does by itself is known from before where it no longer competes by itself.
+    for (EffectAnswer& own : then.answer.candidates) {
+      if (!own.amplitude.empty()) continue;
+      for (const EffectAnswer& before : diagnosis_.answer.candidates) {
+        if (before.effect != own.effect) continue;
+        own.amplitude = before.amplitude;
+        own.p_value = before.p_value;
+        own.explained = before.explained;
+        own.rms = before.rms;
+        own.curves = before.curves;
+      }
+    }
     then.answer.runs = diagnosis_.answer.runs;
     then.answer.borrowed_runs = diagnosis_.answer.borrowed_runs;
     diagnosis_.answer = std::move(then.answer);

@@ -132,7 +132,7 @@ std::string CostOf(const PlannedExperiment& planned) {
 
 std::string ForecastInWords(const PlanForecast& forecast) {
   return fmt::format("one answer, and the right one, with probability {} ({} bits)",
-                     report::Percent(forecast.decides, 3), Number(forecast.bits, 2));
+                     ChanceInWords(forecast.decides), Number(forecast.bits, 2));
 }
 
 std::string NextText(const NextExperiment& next) {
@@ -141,7 +141,7 @@ std::string NextText(const NextExperiment& next) {
       report::Wrapped(fmt::format("Next experiment: {}. Expected of it: {}; a wrong name with {}.{} "
                                   "For the campaign file:",
                                   InWords(next.best), ForecastInWords(*next.best.forecast),
-                                  report::Percent(next.best.forecast->wrong, 2),
+                                  ChanceInWords(next.best.forecast->wrong),
                                   CostOf(next.best)),
                       "", "") +
       "\n" + next.snippet;
@@ -193,7 +193,7 @@ std::string Sentence(const Diagnosis& d) {
   if (d.next_experiment && d.answer.verdict == AnswerVerdict::kAmbiguous &&
       d.next_experiment->best.repeats.empty())
     sentence += fmt::format(" {} would, with probability {}.", InWords(d.next_experiment->best),
-                            report::Percent(d.next_experiment->best.expected_power, 2));
+                            ChanceInWords(d.next_experiment->best.expected_power));
   return sentence +
          (d.in_doubt ? " This is in doubt, for what the warnings say of the readings." : "");
 }
@@ -204,6 +204,11 @@ std::string NameOf(const NamedModel& model) {
                                : fmt::format("{}", fmt::join(model.effects, " + "));
 }
 
+// Below a hundredth of a percent nothing is counted.
+std::string Probability(double probability) {
+  return report::Percent(probability < 5e-5 ? 0 : probability, 3);
+}
+
 std::string ModelsText(const Answer& answer) {
   report::TextTable table({"<model", "probability"});
   double other = 0;
@@ -212,7 +217,7 @@ std::string ModelsText(const Answer& answer) {
       other += model.probability;
       continue;
     }
-    table.AddRow({NameOf(model), report::Percent(model.probability, 3)});
+    table.AddRow({NameOf(model), Probability(model.probability)});
   }
   if (other > 0) table.AddRow({"all others", report::Percent(other, 2)});
   return "\n" + table.ToString();
@@ -221,7 +226,7 @@ std::string ModelsText(const Answer& answer) {
 std::string EffectsText(const Answer& answer) {
   report::TextTable table({"<effect", "acts", "<named", "explains", "error", "p"});
   for (const EffectAnswer& own : answer.candidates) {
-    table.AddRow({own.effect, report::Percent(own.probability, 3), own.alone ? "yes" : "",
+    table.AddRow({own.effect, Probability(own.probability), own.alone ? "yes" : "",
                   report::ShareExplained(own.explained), Number(own.rms, 3),
                   Number(own.p_value, 2)});
   }
@@ -241,7 +246,7 @@ std::string FamiliesText(const Answer& answer) {
     text += report::Wrapped(
         fmt::format("Of one family, or hardly told apart by these tests: {}; one of them acts "
                     "with probability {}.",
-                    fmt::join(family.effects, ", "), report::Percent(family.probability, 3)),
+                    fmt::join(family.effects, ", "), ChanceInWords(family.probability)),
         "", "  ");
   }
   return text;
@@ -273,8 +278,9 @@ std::string RunsText(const Diagnosis& d) {
   const std::string beside =
       d.borrowed.empty() ? ""
                          : fmt::format(", beside {} of {}", d.answer.borrowed_runs, d.borrowed);
-  std::string text = fmt::format("{} runs ({}) in {}, {} model evaluations{}.\n", runs, stages,
-                                 d.design, d.evaluations, beside);
+  std::string text = fmt::format("{} runs{} in {}, {} model evaluations{}.\n", runs,
+                                 stages.empty() ? "" : fmt::format(" ({})", stages), d.design,
+                                 d.evaluations, beside);
   if (d.then && !d.then->campaign.empty())
     text += fmt::format("{} runs of {} in {}.\n", d.then->evaluations, InWords(d.then->plan),
                         d.then->campaign);

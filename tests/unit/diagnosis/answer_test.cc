@@ -134,6 +134,10 @@ TEST(Answer, NoneOfTheseAndNobodyAdequateAreUnexplained) {
   answer = Said(parts);
   EXPECT_EQ(answer.verdict, AnswerVerdict::kAdequate);
   EXPECT_THAT(answer.sentence, HasSubstr("Yet rolling is more probable (60 %)"));
+  model << 0.01, 0.6, 0.35, 0.01, 0.02, 0.01;
+  parts = PartsOf(kThree, model, 0.3);
+  parts.kin = {{0, 1}};
+  EXPECT_THAT(Said(parts).sentence, EndsWith("Yet rolling or cohesion acts, 97 %."));
 }
 
 TEST(Answer, WhatIsBeyondTheDesignOrNotVerifiedIsNotNamed) {
