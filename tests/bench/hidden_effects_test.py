@@ -459,6 +459,13 @@ class Frozen(InAFolder):
         self.git('commit', '-qam', 'changed')
         with self.assertRaisesRegex(cases.NotFrozen, 'server/diagnosis is not what it was'):
             cases.frozen_commit(self.folder, file)
+        self.git('revert', '-n', 'HEAD')
+        self.write('server/diagnosis/next_test.cc', 'what comes after an answer')
+        self.git('add', '-A')
+        self.git('commit', '-qm', 'after')
+        self.assertEqual(cases.frozen_commit(self.folder, file, 'shared'), commit)
+        with self.assertRaisesRegex(cases.NotFrozen, 'server/diagnosis is not what it was'):
+            cases.frozen_commit(self.folder, file, 'whole')
         self.write('FROZEN', commit[:12])
         with self.assertRaisesRegex(cases.NotFrozen, '40 digits'):
             cases.frozen_commit(self.folder, file)
@@ -495,7 +502,8 @@ if os.path.exists(os.path.join(here, 'slow-' + verb)):
     time.sleep(60)
 after = '--then' in sys.argv
 plan = {'test': 'oedometric', 'settings': {'confining_pressure': 2e5}, 'control': 'axial_strain', 'control_from': 0, 'control_to': 0.04,
-        'unloading_at': 0.02, 'snippet': 'observables: {q_over_p: ', 'considered': [{'test': 'oedometric'}, {'test': 'repeat of high'}]}
+        'unloading_at': 0.02, 'snippet': 'observables: {q_over_p: ', 'repeat_of': None,
+        'considered': [{'test': 'oedometric', 'repeat_of': None}, {'test': 'triaxial_drained', 'repeat_of': 'high'}]}
 diagnosis = {'verdict': 'ambiguous', 'effect': None, 'effects': [], 'candidates': [], 'probabilities': [], 'none_of_these': 0.5,
              'credible_set': [['x']] if after else [['x'], ['y']], 'families': [], 'model_evaluations': 300,
              'design': {'campaign': 'c2', 'runs': {'scout': 30}}, 'next_experiment': None if after else plan}

@@ -8,6 +8,9 @@ import dataclasses, hashlib, os, random, subprocess
 HERE = os.path.dirname(os.path.abspath(__file__))
 # What must not have changed since the commit in FROZEN: what answers, and what makes the cases.
 JUDGED = ('inference', 'server/diagnosis', 'server/campaign/model')
+# Of server/diagnosis what comes after an answer: cases of the shared way do not depend on it.
+AFTER = ('control_way', 'diagnosis_text', 'extended_calibration', 'improve', 'next_', 'plan_', 'setting_plans', 'test_plans', 'test_runs',
+         'then_answer', 'CMakeLists.txt', 'README.md', 'DECISIONS.md')
 OWN = ('deploy/bench/hidden-effects.d/cases.py', 'deploy/bench/hidden-effects.d/strengths.py')
 MEASUREMENT_SIDE = {'apparatus_compliance', 'strain_offset', 'membrane_stiffness', 'load_cell_error'}
 STAGINGS = ('rate', 'step', 'damping', 'grains')
@@ -180,7 +183,19 @@ def git(root, *arguments):
     return done.stdout.strip()
 
 
-def frozen_commit(root, file=os.path.join(HERE, 'FROZEN')):
+def is_judged(path, way):
+    """Whether cases of a way depend on a file that git lists."""
+    folder, name = os.path.split(path)
+    return not (way == 'shared' and folder == 'server/diagnosis' and name.startswith(AFTER))
+
+
+def judged_at(root, commit, path, way):
+    """{file: digest of its content} below a path, of what cases of a way depend on."""
+    lines = git(root, 'ls-tree', '-r', commit, '--', path).splitlines()
+    return {name: of.split()[2] for of, name in (line.split('\t') for line in lines) if is_judged(name, way)}
+
+
+def frozen_commit(root, file=os.path.join(HERE, 'FROZEN'), way='whole'):
     """The commit whose rules are judged; NotFrozen with a sentence where there is none or the sources are not as they were."""
     if not os.path.exists(file):
         raise NotFrozen('no rules are frozen (deploy/bench/hidden-effects.d/FROZEN is not there): only --tune SEED runs')
@@ -189,9 +204,10 @@ def frozen_commit(root, file=os.path.join(HERE, 'FROZEN')):
     if len(commit) != 40 or any(c not in '0123456789abcdef' for c in commit):
         raise NotFrozen(f'{file}: holds the 40 digits of a commit and nothing else')
     for path in JUDGED + OWN:
-        if git(root, 'rev-parse', f'{commit}:{path}') != git(root, 'rev-parse', f'HEAD:{path}'):
+        if judged_at(root, commit, path, way) != judged_at(root, 'HEAD', path, way):
             raise NotFrozen(f'{path} is not what it was when the rules were frozen ({commit[:12]}): freeze anew, which draws new cases')
-    changed = git(root, 'status', '--porcelain', '--', *JUDGED, *OWN)
+    named = [line.split()[-1] for line in git(root, 'status', '--porcelain', '--', *JUDGED, *OWN).splitlines()]
+    changed = [name for name in named if is_judged(name, way)]
     if changed:
-        raise NotFrozen('not committed, so nobody knows what would be judged: ' + ' '.join(changed.split()))
+        raise NotFrozen('not committed, so nobody knows what would be judged: ' + ' '.join(changed))
     return commit

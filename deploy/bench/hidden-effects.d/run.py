@@ -32,7 +32,7 @@ def options_of(arguments):
 
 def label(options):
     """What seeds follow from: the frozen commit, or a word that no commit can be."""
-    return f'tune {options.tune}' if options.tune else cases.frozen_commit(ROOT)
+    return f'tune {options.tune}' if options.tune else cases.frozen_commit(ROOT, way='whole' if options.whole or options.layouts else 'shared')
 
 
 def file_of(options, commit):

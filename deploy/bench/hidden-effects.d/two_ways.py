@@ -13,7 +13,7 @@ OF_DIAGNOSIS = ('verdict', 'effect', 'effects', 'probabilities', 'none_of_these'
 OF_CANDIDATE = ('effect', 'probability', 'alone', 'p_value', 'explained_fraction', 'amplitude', 'predicted_rms_error')
 OF_PLAN = ('test', 'settings', 'expected_power', 'told_apart_bits', 'model_evaluations', 'in_words')
 NEEDED = ('probabilities', 'none_of_these', 'credible_set', 'families', 'candidates', 'model_evaluations')
-FIRST_FITTED, REPEAT = 'low', 'repeat of '
+FIRST_FITTED = 'low'
 
 
 def must_have(document, names, verb='diagnose'):
@@ -114,6 +114,8 @@ def path_of(plan):
 
 def planned_test(plan, pattern):
     """The test of a proposal; pattern: the fitted test whose observables it reads. Its snippet says which of them."""
+    if plan.get('repeat_of'):
+        return laboratory.STANDARD.tests[plan['repeat_of']]
     noise = {name: law for name, law in pattern.noise.items() if name in plan.get('snippet', name)}
     return laboratory.Test(plan['test'], dict(plan['settings']), path=path_of(plan), noise=noise, control=plan['control'])
 
@@ -124,7 +126,7 @@ def told(case, steps, truth, campaign, found):
     plan = found.get('next_experiment')
     if not plan:
         return None
-    repeats = [k for k, one in enumerate(plan['considered']) if one['test'].startswith(REPEAT)]
+    repeats = [k for k, one in enumerate(plan['considered']) if one['repeat_of']]
     answers = {}
     for name in ('then', 'repeat'):
         if name == 'repeat' and not repeats:
@@ -134,8 +136,7 @@ def told(case, steps, truth, campaign, found):
             if name == 'then':
                 test, choice = planned_test(plan, laboratory.STANDARD.tests[FIRST_FITTED]), ()
             else:
-                repeated = plan['considered'][repeats[0]]['test'][len(REPEAT):]
-                test, choice = laboratory.STANDARD.tests[repeated], ('--plan', str(repeats[0]))
+                test, choice = planned_test(plan['considered'][repeats[0]], None), ('--plan', str(repeats[0]))
             specimen = {**truth, 'packing': rnd.randrange(10**6, 2**31 - 1000)}
             steps.lab.read(specimen, steps.folder, laboratory.Layout({name: test}), [name], rnd)
             steps.copy_state('state-' + name)

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "server/diagnosis/diagnosis.h"
+#include "server/diagnosis/plan_json.h"
 #include "server/report/views/stored_diagnosis.h"
 
 namespace calib::diagnosis {
@@ -249,11 +250,15 @@ TEST(DiagnosisText, TheNextExperimentComesWithWhatItTellsApart) {
                .points = 3,
                .together = {{"twisting", "adhesion"}},
                .distance_from_none = 4.0,
-               .power_against_none = 0.85};
+               .power_against_none = 0.85,
+               .forecast = PlanForecast{.bits = 0.75, .decides = 0.9, .wrong = 0.001, .runs = 43}};
   next.separates = {"rolling", "twisting"};
   next.snippet = "  - name: next1\n";
-  next.considered = {next.best, next.best};
-  next.considered[1].expected_power = 0.05;
+  next.considered = {next.best, next.best, next.best};
+  next.considered[1].repeats = "low";
+  next.considered[1].forecast->decides = 0.25;
+  next.considered[2].forecast.reset();
+  next.considered[2].expected_power = 0.05;
   next.evaluations = 30;
   const json read = Read(d)["next_experiment"];
   EXPECT_EQ(read["test"], "triaxial_drained");
@@ -266,12 +271,66 @@ TEST(DiagnosisText, TheNextExperimentComesWithWhatItTellsApart) {
   EXPECT_EQ(read["unloading"], false);
   EXPECT_EQ(read["none_of_these"], json::object({{"distance_sd", 4.0}, {"expected_power", 0.85}}));
   EXPECT_EQ(read["snippet"], "  - name: next1\n");
-  EXPECT_EQ(read["considered"].size(), 2U);
+  EXPECT_EQ(read["path"], json::array({0.01, 0.1}));
+  EXPECT_EQ(read["forecast"], json::object({{"decides", 0.9},
+                                            {"names_wrong", 0.001},
+                                            {"told_apart_bits", 0.75},
+                                            {"runs", 43}}));
+  ASSERT_EQ(read["considered"].size(), 3U);
+  EXPECT_EQ(read["considered"][0]["repeat_of"], nullptr);
+  EXPECT_EQ(read["considered"][1]["repeat_of"], "low");
+  EXPECT_EQ(read["considered"][2]["forecast"], nullptr);
   EXPECT_EQ(Read(d)["model_evaluations"], 102) << "those of the proposal are not of the answer";
   const std::string text = DiagnosisText(d);
   EXPECT_THAT(text, HasSubstr("  - name: next1\n"));
-  EXPECT_THAT(text, ContainsRegex("separates +rolling +and +twisting"));
-  EXPECT_THAT(text, HasSubstr("tells none of them apart"));
+  EXPECT_THAT(text, ContainsRegex("right\\s+one, +with +probability +90 % +.0.75 +bits."));
+  EXPECT_THAT(text, HasSubstr("low again, on another specimen: one answer, and the right one, with "
+                              "probability 25 %"));
+  EXPECT_THAT(text, HasSubstr("at first sight tells none of them apart"));
+  EXPECT_THAT(text, HasSubstr("would, with probability 90 %"));
+}
+
+TEST(DiagnosisJson, AProposalIsReadBackAsItWasMade) {
+  PlannedExperiment planned{.test = "oedometric",
+                            .settings = {{"confining_pressure", 2e5}},
+                            .unloading_at = 0.02,
+                            .control = "axial_strain",
+                            .path = {0.01, 0.02, 0.015, 0.03},
+                            .repeats = "low"};
+  const auto read = PlannedFrom(PlannedJson(planned));
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->test, planned.test);
+  EXPECT_EQ(read->settings, planned.settings);
+  EXPECT_EQ(read->unloading_at, planned.unloading_at);
+  EXPECT_EQ(read->control, planned.control);
+  EXPECT_EQ(read->path, planned.path);
+  EXPECT_EQ(read->repeats, planned.repeats);
+  json older = PlannedJson(planned);
+  older.erase("path");
+  EXPECT_FALSE(PlannedFrom(older).ok()) << "a proposal of an earlier build";
+}
+
+TEST(DiagnosisText, AMeasurementThatWasToldIsNamed) {
+  Diagnosis d = TwoAlike();
+  EXPECT_EQ(Read(d)["then"], nullptr);
+  d.left_out = {"adhesion"};
+  d.then = {.plan = {.test = "triaxial_drained",
+                     .settings = {},
+                     .control = "axial_strain",
+                     .path = {0.01, 0.1},
+                     .repeats = "low"},
+            .file = "again.csv",
+            .digest = "ab",
+            .campaign = "c9",
+            .evaluations = 6};
+  const json read = Read(d);
+  EXPECT_EQ(read["then"]["file"], "again.csv");
+  EXPECT_EQ(read["then"]["campaign"], "c9");
+  EXPECT_EQ(read["then"]["plan"]["repeat_of"], "low");
+  EXPECT_EQ(read["without"], json::array({"adhesion"}));
+  const std::string text = DiagnosisText(d);
+  EXPECT_THAT(text, HasSubstr("With again.csv (low again, on another specimen): "));
+  EXPECT_THAT(text, HasSubstr("6 runs of low again, on another specimen in c9."));
 }
 
 }  // namespace
