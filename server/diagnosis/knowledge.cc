@@ -235,7 +235,8 @@ absl::StatusOr<Knowledge> LearnBase(const KnownBefore& before, const DesignRows&
   return known;
 }
 
-absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort) {
+absl::StatusOr<Asked> AskEvidences(const KnownBefore& before, const Knowledge& knowledge,
+                                   Effort effort) {
   Asked asked{.space = SpaceOf(before, knowledge.rows, knowledge.part)};
   const Eigen::VectorXd most = knowledge.rows.Most(), other = knowledge.rows.MostOther();
   std::vector<std::vector<inference::StrengthPrior>> priors;
@@ -272,6 +273,11 @@ absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge,
   ASSIGN_OR_RETURN(asked.evidence,
                    inference::ModelEvidencesUnder({{knowledge.set.get(), knowledge.z}}, asked.space,
                                                   priors, options));
+  return asked;
+}
+
+absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort) {
+  ASSIGN_OR_RETURN(Asked asked, AskEvidences(before, knowledge, effort));
   for (const auto& evidence : asked.evidence) {
     ASSIGN_OR_RETURN(auto probabilities, inference::ProbabilitiesOf(evidence, asked.space));
     asked.probabilities.push_back(std::move(probabilities));

@@ -64,7 +64,11 @@ struct Asked {
   std::vector<inference::EffectProbabilities> probabilities{};
 };
 
-/// Errors: those of ModelEvidencesUnder and ProbabilitiesOf.
+/// Evidences alone. Errors: those of ModelEvidencesUnder.
+absl::StatusOr<Asked> AskEvidences(const KnownBefore& before, const Knowledge& knowledge,
+                                   Effort effort);
+
+/// Errors: those of AskEvidences and ProbabilitiesOf.
 absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort);
 
 /// Names of the effects of a model of kept entries, each once.
