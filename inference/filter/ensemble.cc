@@ -45,13 +45,19 @@ absl::Status FindSigma(const DataSet& data, const FilterOptions& options,
   return absl::OkStatus();
 }
 
+// Whether a sample was drawn from no density.
+bool IsGiven(const Iteration& iteration, Eigen::Index i) {
+  return iteration.log_proposal && (*iteration.log_proposal)[i] == kInfinity;
+}
+
 Eigen::Index CountStrangers(const Ensemble& ensemble) {
   Eigen::Index strangers = 0;
   Eigen::Index row = 0;
   for (const Iteration& iteration : ensemble.used) {
-    const auto start = ensemble.log_start.segment(row, iteration.parameters.rows());
-    if (!iteration.log_proposal) strangers += (start.array() == -kInfinity).count();
-    row += iteration.parameters.rows();
+    for (Eigen::Index i = 0; i < iteration.parameters.rows(); ++i, ++row) {
+      const bool outside = !iteration.log_proposal && ensemble.log_start[row] == -kInfinity;
+      strangers += outside || IsGiven(iteration, i) ? 1 : 0;
+    }
   }
   return strangers;
 }
@@ -65,7 +71,7 @@ void MarkDiverged(Ensemble& ensemble) {
       if (ensemble.log_likelihood[row] == -kInfinity && !iteration.predictions.row(i).allFinite()) {
         ensemble.log_start[row] = -kInfinity;
         ++ensemble.diverged;
-      } else if (ensemble.log_start[row] == -kInfinity) {
+      } else if (ensemble.log_start[row] == -kInfinity && !IsGiven(iteration, i)) {
         ++ensemble.outside;
       }
     }

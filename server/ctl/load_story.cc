@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
@@ -29,22 +30,6 @@ report::ErrorStep StepOf(const report::CampaignView& view, bool held_out) {
           .heldout_rms_error = held_out ? comparison.heldout_rms_error : std::nullopt,
           .by_observable = std::move(comparison.by_observable),
           .by_segment = std::move(comparison.by_segment)};
-}
-
-// Documents that another version wrote and this one cannot read are passed over.
-absl::Status AddDiagnoses(client::Client& client, const std::string& campaign,
-                          std::vector<report::StoredDiagnosis>& diagnoses) {
-  ASSIGN_OR_RETURN(const auto findings, client.Findings(campaign));
-  for (const v1::Finding& finding : findings) {
-    if (finding.kind() != client::kDiagnosis) continue;
-    ASSIGN_OR_RETURN(const auto document, client.GetBlob(finding.digest()));
-    auto diagnosis = report::ReadDiagnosis(document);
-    if (!diagnosis.ok()) continue;
-    diagnosis->digest = finding.digest();
-    diagnosis->created_unix_ms = finding.created_unix_ms();
-    diagnoses.push_back(*std::move(diagnosis));
-  }
-  return absl::OkStatus();
 }
 
 // The campaign behind its ancestors, base first; empty: it is not known.
@@ -79,6 +64,22 @@ absl::StatusOr<std::optional<report::StoredImprovement>> ImprovementOf(client::C
 }
 
 }  // namespace
+
+absl::StatusOr<std::vector<report::StoredDiagnosis>> LoadDiagnoses(client::Client& client,
+                                                                   const std::string& campaign) {
+  std::vector<report::StoredDiagnosis> diagnoses;
+  ASSIGN_OR_RETURN(const auto findings, client.Findings(campaign));
+  for (const v1::Finding& finding : findings) {
+    if (finding.kind() != client::kDiagnosis) continue;
+    ASSIGN_OR_RETURN(const auto document, client.GetBlob(finding.digest()));
+    auto diagnosis = report::ReadDiagnosis(document);
+    if (!diagnosis.ok()) continue;
+    diagnosis->digest = finding.digest();
+    diagnosis->created_unix_ms = finding.created_unix_ms();
+    diagnoses.push_back(*std::move(diagnosis));
+  }
+  return diagnoses;
+}
 
 absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::CampaignView& view) {
   report::Story story;
@@ -119,7 +120,8 @@ absl::StatusOr<report::Story> LoadStory(client::Client& client, const report::Ca
     line = std::move(way);
   }
   for (const std::string& id : line) {
-    RETURN_IF_ERROR(AddDiagnoses(client, id, story.diagnoses));
+    ASSIGN_OR_RETURN(auto diagnoses, LoadDiagnoses(client, id));
+    std::move(diagnoses.begin(), diagnoses.end(), std::back_inserter(story.diagnoses));
   }
   const auto add = [&](const std::string& id) -> absl::Status {
     report::Relative relative = known.at(id).relative;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -26,15 +27,25 @@ inline constexpr std::array kVerdictWords = {
 };
 const char* ToString(AnswerVerdict verdict);
 
+/// Enough for the first runs of its calibration with twenty parameters.
+inline constexpr int kDrawsOfModel = 100;
+
 /// A model by names; no effects: the base model.
 struct NamedModel {
   std::vector<std::string> effects{};  ///< in the order of the race
   bool none_of_these = false;
   double probability = 0;
+  /// Natural logarithm, under the reference prior, of the density of the coordinates of the
+  /// measurement; its error, that of what the emulator does not know relative to the base model's
+  /// in it. NaN: not asked for.
+  double log_evidence = std::numeric_limits<double>::quiet_NaN();
+  double log_evidence_se = std::numeric_limits<double>::quiet_NaN();
   /// Points of its posterior, the one that the measurement is most probable at first: parameters of
   /// the base and of the effects by dotted name, SI. Of models that are asked for alone.
   std::vector<std::map<std::string, double>> points{};
-  /// Mean and sd of the same parameters.
+  /// Draws of the same parameters from its posterior, kDrawsOfModel evenly spaced.
+  std::vector<std::map<std::string, double>> draws{};
+  /// Mean and sd of them.
   std::map<std::string, campaign::FirstProposal::Place> posterior{};
   double rms = 0;  ///< of what its best point misses, in sd of a measurement
 };

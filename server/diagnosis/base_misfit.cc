@@ -40,7 +40,7 @@ double RmsOf(const BaseRuns& base, const Eigen::RowVectorXd& history) {
 absl::StatusOr<BaseMisfit> MisfitOfBase(const KnownBefore& before, const DesignRows& rows,
                                         const std::vector<EndedBatch>& batches) {
   ASSIGN_OR_RETURN(const Knowledge known, LearnBase(before, rows, batches));
-  ASSIGN_OR_RETURN(const Asked asked, Ask(before, known, Effort::kToChoose));
+  ASSIGN_OR_RETURN(const Asked asked, AskEvidences(before, known, Effort::kToChoose));
   const inference::DesignPoints& draws = asked.evidence[0].front().draws;  // of the base model
   if (draws.rows() == 0)
     return absl::FailedPreconditionError(

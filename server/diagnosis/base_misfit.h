@@ -24,7 +24,7 @@ struct BaseMisfit {
 
 /// By runs of the base, and of the batches by what numerical choices change. rows: of the values of
 /// the batches; without batches any of the base's axes. Errors: FAILED_PRECONDITION where the
-/// model has no posterior; those of DiagnosisSet::Fit and Ask.
+/// model has no posterior; those of DiagnosisSet::Fit and AskEvidences.
 absl::StatusOr<BaseMisfit> MisfitOfBase(const KnownBefore& before, const DesignRows& rows,
                                         const std::vector<EndedBatch>& batches);
 

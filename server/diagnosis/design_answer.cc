@@ -1,11 +1,16 @@
 #include "server/diagnosis/design_answer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <map>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "calib/return_if_error.h"
+#include "inference/numerics/log_weights.h"
 #include "server/diagnosis/design_caps.h"
 #include "server/diagnosis/design_effects.h"
 
@@ -57,6 +62,59 @@ std::vector<double> ChancesOfMisfit(const KnownBefore& before, const Knowledge& 
   return chances;
 }
 
+// Sum of evidences under shares of a prior, and its error.
+class SharedEvidence {
+ public:
+  // relative: R realisations of ln of the evidence over the base model's.
+  void Add(double log_share, const inference::EvidenceEstimate& evidence,
+           const Eigen::VectorXd& relative) {
+    log_shares_.push_back(log_share);
+    logs_.push_back(log_share + evidence.log_evidence);
+    const double unknown = relative.size() > 1
+                               ? std::sqrt((relative.array() - relative.mean()).square().sum() /
+                                           static_cast<double>(relative.size() - 1))
+                               : 0;
+    errors_.push_back(std::hypot(evidence.standard_error, unknown));
+  }
+  void Tell(NamedModel& model) const {
+    if (logs_.empty()) return;
+    const double log_sum = inference::LogSumExp(AsVector(logs_));
+    model.log_evidence = log_sum - inference::LogSumExp(AsVector(log_shares_));
+    double square = 0;
+    for (std::size_t i = 0; i < logs_.size(); ++i)
+      square += std::pow(std::exp(logs_[i] - log_sum) * errors_[i], 2);
+    model.log_evidence_se = std::sqrt(square);
+  }
+
+ private:
+  static Eigen::VectorXd AsVector(const std::vector<double>& values) {
+    return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Index>(values.size()));
+  }
+  std::vector<double> log_shares_, logs_, errors_;
+};
+
+// Evidences of models by names: those of strengths of one effect are one, weighed by their shares
+// of the prior.
+void TellEvidences(const Knowledge& known, const Asked& asked, Answer& answer) {
+  const Eigen::VectorXd log_prior = asked.space.LogPrior();
+  const std::vector<inference::ModelEvidence>& evidence = asked.evidence[0];
+  std::map<std::set<std::string>, SharedEvidence> by_names;
+  for (std::size_t i = 0; i < evidence.size(); ++i) {
+    const inference::ModelEvidence& own = evidence[i];
+    if (own.model.none_of_these || !std::isfinite(own.evidence.log_evidence) ||
+        !std::isfinite(own.evidence.standard_error))
+      continue;
+    const std::vector<std::string> names = EffectsNamed(known, own.model);
+    by_names[{names.begin(), names.end()}].Add(
+        log_prior[static_cast<Index>(i)], own.evidence,
+        own.realised - evidence.front().realised);  // the base model is the first
+  }
+  for (NamedModel& model : answer.probabilities) {
+    const auto found = by_names.find({model.effects.begin(), model.effects.end()});
+    if (!model.none_of_these && found != by_names.end()) found->second.Tell(model);
+  }
+}
+
 }  // namespace
 
 void TellMisfit(const BaseMisfit& misfit, Answer& answer) {
@@ -93,6 +151,7 @@ absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge
   ASSIGN_OR_RETURN(Answer answer, AnswerFrom(parts));
   TellMisfit(misfit, answer);
   answer.adequacy_p = parts.adequacy_p;
+  TellEvidences(known, asked, answer);
   RETURN_IF_ERROR(DescribeEffects(before, known, asked, answer));
   answer.not_excitable = race.not_excitable;
   // An effect of which another strength is seen takes part; of two that are not, one reason is

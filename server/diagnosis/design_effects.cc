@@ -197,6 +197,9 @@ absl::Status DescribeEffects(const KnownBefore& before, const Knowledge& known, 
     const ModelEvidence* model = ModelOf(known, asked, effects);
     if (model == nullptr) continue;
     named.points = PointsOf(known, *model, effects);
+    for (Index i = 0; i < kDrawsOfModel; ++i)
+      named.draws.push_back(
+          ValuesOf(known, model->draws, i * model->draws.rows() / kDrawsOfModel, effects));
     named.posterior = PosteriorOf(known, model->draws, effects);
     named.rms = RmsOf(before.base, HistoryAt(known, BestDraw(known, model->draws)));
   }

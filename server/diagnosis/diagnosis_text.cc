@@ -48,6 +48,20 @@ Json ProbabilitiesJson(const Answer& answer) {
   return json;
 }
 
+// Of the base model, of every effect alone and of what is listed.
+Json EvidencesJson(const Answer& answer) {
+  Json json = Json::array();
+  for (const NamedModel& model : answer.probabilities) {
+    if (!std::isfinite(model.log_evidence) || !std::isfinite(model.log_evidence_se) ||
+        (model.effects.size() > 1 && model.probability < kListed))
+      continue;
+    json.push_back({{"effects", model.effects},
+                    {"log_evidence", model.log_evidence},
+                    {"log_evidence_se", model.log_evidence_se}});
+  }
+  return json;
+}
+
 Json CredibleSetJson(const Answer& answer) {
   Json json = Json::array();
   for (const NamedModel& model : answer.credible_set) {
@@ -328,6 +342,7 @@ std::string DiagnosisJson(const Diagnosis& d) {
   if (!d.only_adequacy) {
     json["probabilities"] = ProbabilitiesJson(answer);
     json["none_of_these"] = answer.none_of_these;
+    json["log_evidences"] = EvidencesJson(answer);
     json["credible_set"] = CredibleSetJson(answer);
     json["families"] = FamiliesJson(answer);
     json["specimens"] = {{"repeat_names_alone", answer.repeat_names_alone}};

@@ -1,13 +1,16 @@
 #pragma once
-// A calibration of a model with more effects, begun where a diagnosis has seen it fit and made
-// again with more runs until it comes as close.
+// The calibration of a model with more effects, begun where a diagnosis has seen it fit: few runs
+// at a time, added to those that were made until its posterior stands still.
 
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
-#include "server/client/laboratory.h"
+#include "server/campaign/file/derive.h"
 #include "server/diagnosis/answer.h"
+#include "server/diagnosis/extension.h"
 #include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
@@ -15,30 +18,38 @@ namespace calib::diagnosis {
 /// Of the fitted data, as in report::Comparison.
 double ErrorOf(const report::CampaignView& view);
 
-class ExtendedCalibration {
- public:
-  /// times: as often as the parent's iterations are made at most, >= 1. budget: model evaluations
-  /// of the fitted tests; none: as many as it takes. laboratory must outlive it.
-  ExtendedCalibration(client::Laboratory& laboratory, int times, std::optional<std::int64_t> budget)
-      : laboratory_(laboratory), times_(times), budget_(budget) {}
+/// Runs of a design that are runs of the extended model: to their ends, with these effects and no
+/// others, the numerics as they are, inside the priors that the extension would have. Each
+/// with all its parameters; found again by their digests, they cost nothing.
+std::vector<campaign::Derivation::Row> RunsOfModel(const report::CampaignView& parent,
+                                                   const report::CampaignView& design,
+                                                   const std::vector<std::string>& effects);
 
-  /// The parent's iterations with the model's effects on top, about its posterior; as many again,
-  /// and so on, as long as they do not come as close. Of these the closest by what is fitted.
-  /// Errors: RESOURCE_EXHAUSTED where the budget allows no iteration; those of the runs.
-  absl::StatusOr<report::CampaignView> Of(const report::CampaignView& parent,
-                                          const NamedModel& model);
-
-  /// That were made, held-out ones too.
-  std::int64_t evaluations() const { return evaluations_; }
-
- private:
-  absl::StatusOr<report::CampaignView> Once(const report::CampaignView& parent,
-                                            const NamedModel& model, int times);
-
-  client::Laboratory& laboratory_;
-  int times_;
-  std::optional<std::int64_t> budget_;
-  std::int64_t evaluations_ = 0;
+/// What steers a calibration that a diagnosis has asked for.
+struct ExtendedOptions {
+  /// Of the diagnosis that saw the model fit, or null; outlives the plan's making.
+  const report::CampaignView* design = nullptr;
+  int times = 1;  ///< as often as few iterations at most; those of fewer are found again
+  /// Model evaluations of the fitted tests; none: as many as it takes.
+  std::optional<std::int64_t> budget{};
 };
+
+/// Up to which ExtendedOptions::times a calibration is worth its runs.
+inline constexpr int kMostTimes = 3;
+
+/// How a model is calibrated with effects on top whose posterior is known about. Of a filter, in
+/// samples of five for each parameter: as many at draws of that posterior, twice as far from its
+/// mean, and as many from a proposal about it, which are ten
+///                                                [Loeppky, Sacks & Welch, Technometrics 51 (2009)]
+/// ; then as many from what is known by then; beside them the runs of the design. Of other
+/// methods: as the parent.
+/// Errors: RESOURCE_EXHAUSTED where the budget allows no iteration.
+absl::StatusOr<ExtensionPlan> PlanExtended(const report::CampaignView& parent,
+                                           const NamedModel& model,
+                                           const ExtendedOptions& options = {});
+
+/// Whether further iterations are not needed: there are none, or the posterior is known and comes
+/// as close as the diagnosis has seen.
+bool IsFound(const report::CampaignView& extended, const NamedModel& model);
 
 }  // namespace calib::diagnosis

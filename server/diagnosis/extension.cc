@@ -8,7 +8,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/registry/declared_effects.h"
-#include "server/campaign/file/derive.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/model/race.h"
 
@@ -220,13 +219,14 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
       .effects = plan.effects,
       .parameters = {},
       .held_out = plan.held_out,
+      .method = plan.method,
       .samples = plan.samples,
       .max_iterations = plan.iterations,
       .first_proposal =
           campaign::FirstProposal{.prior_share = plan.near.empty() ? kPriorShare : kDefensive,
                                   .places = {}},
       .model_evaluations = plan.model_evaluations,
-      .rows = {}};
+      .rows = plan.given};
   campaign::Campaign grown = parent.campaign;
   for (const std::string& name : plan.effects) {
     if (const std::string why = WhyNotJoin(grown, name); !why.empty()) {

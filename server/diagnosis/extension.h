@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "dem/registry/catalog.h"
+#include "server/campaign/file/derive.h"
 #include "server/report/views/campaign_view.h"
 
 namespace calib::diagnosis {
@@ -34,9 +35,12 @@ struct ExtensionPlan {
   /// the parent's posterior.
   std::map<std::string, campaign::FirstProposal::Place> near{};
   bool held_out = true;                             ///< false: held-out experiments stay closed
+  std::optional<campaign::Method> method{};         ///< of the parent's family; as the parent
   std::optional<int> samples{};                     ///< as the parent
   std::optional<int> iterations{};                  ///< as the parent
   std::optional<std::int64_t> model_evaluations{};  ///< budget; as the parent
+  /// Runs of the extended model that it learns from beside its samples, of an iterative filter.
+  std::vector<campaign::Derivation::Row> given{};
 };
 
 /// Without `near`, the parent's posterior is taken ten times as wide: parameters that were bent to

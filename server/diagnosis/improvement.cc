@@ -11,6 +11,7 @@
 #include "calib/return_if_error.h"
 #include "server/campaign/model/sha256.h"
 #include "server/client/findings.h"
+#include "server/client/load_view.h"
 #include "server/diagnosis/extended_calibration.h"
 #include "server/diagnosis/improve_step.h"
 #include "server/report/views/comparison.h"
@@ -18,8 +19,6 @@
 namespace calib::diagnosis {
 namespace {
 
-// As often as the iterations of the parent: two iterations of a filter find what one did not.
-constexpr int kMostTimes = 3;
 constexpr char kExplained[] = "Noise, scatter and the emulator's error explain what is left.";
 
 CalibratedModel Calibrated(const report::CampaignView& view, double rms_error) {
@@ -62,7 +61,7 @@ absl::Status Improvement::From(report::CampaignView view) {
     }
     if (step.reason.empty() && ModelsToTry(diagnosis.answer, left).empty())
       step.reason = diagnosis.answer.sentence;
-    ASSIGN_OR_RETURN(auto extended, Forward(view, diagnosis.answer, left));
+    ASSIGN_OR_RETURN(auto extended, Forward(view, diagnosis, left));
     if (!extended) break;
     view = *std::move(extended);
   }
@@ -70,17 +69,41 @@ absl::Status Improvement::From(report::CampaignView view) {
   return Open();
 }
 
+// As often as few iterations as it takes until the model is found: those that were made are found
+// again by their digests.
+absl::StatusOr<report::CampaignView> Improvement::Calibrate(const report::CampaignView& view,
+                                                            const NamedModel& model,
+                                                            const report::CampaignView* design) {
+  absl::StatusOr<report::CampaignView> extended = absl::UnknownError("not calibrated");
+  for (int times = 1; times <= kMostTimes; ++times) {
+    const auto plan =
+        PlanExtended(view, model, {.design = design, .times = times, .budget = Left()});
+    if (times > 1 && absl::IsResourceExhausted(plan.status())) break;
+    RETURN_IF_ERROR(plan.status());
+    ASSIGN_OR_RETURN(const auto text, ExtensionText(view, *plan));
+    extended =
+        laboratory_.Run(view, text, "calibration with " + absl::StrJoin(model.effects, " + "));
+    RETURN_IF_ERROR(extended.status());
+    evaluations_ += extended->status.model_evaluations();
+    if (IsFound(*extended, model)) break;
+  }
+  return extended;
+}
+
 // The model with the first of those to try that makes it better; none: there is none. Sets the
 // effects of the last step, and its reason.
 absl::StatusOr<std::optional<report::CampaignView>> Improvement::Forward(
-    const report::CampaignView& view, const Answer& answer, int most) {
+    const report::CampaignView& view, const Diagnosis& diagnosis, int most) {
+  const Answer& answer = diagnosis.answer;
   ImproveStep& step = steps_.back();
+  std::optional<report::CampaignView> design;
+  if (!diagnosis.design.empty()) {
+    ASSIGN_OR_RETURN(design, client::LoadView(client_, diagnosis.design));
+  }
   std::string against;
   for (const NamedModel* model : ModelsToTry(answer, most)) {
     const std::string names = absl::StrJoin(model->effects, " and ");
-    ExtendedCalibration calibration(laboratory_, kMostTimes, Left());
-    auto extended = calibration.Of(view, *model);
-    evaluations_ += calibration.evaluations();
+    auto extended = Calibrate(view, *model, design ? &*design : nullptr);
     if (absl::IsResourceExhausted(extended.status())) {
       AddSentence(absl::StrCat(names, " would be added, but --max-evaluations forbids it: ",
                                extended.status().message(), "."),

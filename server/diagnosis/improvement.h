@@ -64,7 +64,10 @@ class Improvement {
                                 std::string& reason);
   absl::StatusOr<Diagnosis> Judge(const report::CampaignView& view, bool last);
   absl::StatusOr<std::optional<report::CampaignView>> Forward(const report::CampaignView& view,
-                                                              const Answer& answer, int most);
+                                                              const Diagnosis& diagnosis, int most);
+  absl::StatusOr<report::CampaignView> Calibrate(const report::CampaignView& view,
+                                                 const NamedModel& model,
+                                                 const report::CampaignView* design);
   absl::Status Open();
   absl::StatusOr<std::vector<std::string>> OpenedBefore();
 

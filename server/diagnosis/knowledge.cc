@@ -227,6 +227,64 @@ inference::DesignRange RangeWithEnds(const DesignRows& rows, const PartOfRace& p
   return range;
 }
 
+// What is asked of the models of a space.
+struct EvidenceQuestion {
+  std::vector<inference::MeasuredSet> measured;
+  inference::ModelSpace space;
+  std::vector<std::vector<inference::StrengthPrior>> priors{};
+  inference::EvidenceOptions options;
+
+  absl::StatusOr<std::vector<std::vector<inference::ModelEvidence>>> Of(
+      const inference::ModelSpace& models) const {
+    return inference::ModelEvidencesUnder(measured, models, priors, options);
+  }
+};
+
+EvidenceQuestion QuestionOf(const KnownBefore& before, const Knowledge& knowledge, Effort effort,
+                            const FurtherMeasured* further) {
+  EvidenceQuestion question{
+      .measured = {{.set = knowledge.set.get(), .z = knowledge.z}},
+      .space = SpaceOf(before, knowledge.rows, knowledge.part),
+      .options = {.sampling = {.seed = before.seed}}};
+  if (further != nullptr) {
+    question.space.models = further->models;
+    question.space.log_prior = further->log_prior;
+    question.measured.insert(question.measured.end(), further->sets.begin(), further->sets.end());
+  }
+  const Eigen::VectorXd most = knowledge.rows.Most(), other = knowledge.rows.MostOther();
+  double widest_low = std::numeric_limits<double>::infinity(), widest_high = 0;
+  const auto prior_of = [&](double low, double high) {
+    std::vector<inference::StrengthPrior> prior;
+    for (const int k : knowledge.part.kept) {
+      // Half of the end, where an effect ends before it is seen.
+      prior.push_back({.low = std::min(low, most[k] / 2),
+                       .high = std::min(high, most[k]),
+                       .negative_low = std::min(low, other[k] / 2),
+                       .negative_high = std::min(high, other[k])});
+    }
+    return prior;
+  };
+  for (const StrengthWidth& width : kStrengthWidths) {
+    question.priors.push_back(prior_of(width.low, width.high));
+    widest_low = std::min(widest_low, width.low);
+    widest_high = std::max(widest_high, width.high);
+    if (effort == Effort::kToChoose) break;
+  }
+  question.space.strength = prior_of(widest_low, widest_high);
+  inference::EvidenceOptions& options = question.options;
+  // The width of a probability that runs are chosen by is that of a batch that moves it by a tenth.
+  if (effort == Effort::kToChoose) {
+    options.sampling.start = 256;
+    options.sampling.points = 250;
+    options.sampling.iterations = 2;
+    options.draws = 64;
+    options.realisations = 2;
+  } else {
+    options.realisations = 16;
+  }
+  return question;
+}
+
 }  // namespace
 
 absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& guess,
@@ -287,60 +345,27 @@ absl::StatusOr<Knowledge> LearnBase(const KnownBefore& before, const DesignRows&
   return known;
 }
 
+absl::StatusOr<Asked> AskEvidences(const KnownBefore& before, const Knowledge& knowledge,
+                                   Effort effort) {
+  const EvidenceQuestion question = QuestionOf(before, knowledge, effort, nullptr);
+  Asked asked{.space = question.space};
+  ASSIGN_OR_RETURN(asked.evidence, question.Of(asked.space));
+  return asked;
+}
+
 absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort,
                           const FurtherMeasured* further) {
-  Asked asked{.space = SpaceOf(before, knowledge.rows, knowledge.part)};
-  std::vector<inference::MeasuredSet> measured = {{.set = knowledge.set.get(), .z = knowledge.z}};
-  if (further != nullptr) {
-    asked.space.models = further->models;
-    asked.space.log_prior = further->log_prior;
-    measured.insert(measured.end(), further->sets.begin(), further->sets.end());
-  }
-  const Eigen::VectorXd most = knowledge.rows.Most(), other = knowledge.rows.MostOther();
-  std::vector<std::vector<inference::StrengthPrior>> priors;
-  double widest_low = std::numeric_limits<double>::infinity(), widest_high = 0;
-  const auto prior_of = [&](double low, double high) {
-    std::vector<inference::StrengthPrior> prior;
-    for (const int k : knowledge.part.kept) {
-      // Half of the end, where an effect ends before it is seen.
-      prior.push_back({.low = std::min(low, most[k] / 2),
-                       .high = std::min(high, most[k]),
-                       .negative_low = std::min(low, other[k] / 2),
-                       .negative_high = std::min(high, other[k])});
-    }
-    return prior;
-  };
-  for (const StrengthWidth& width : kStrengthWidths) {
-    priors.push_back(prior_of(width.low, width.high));
-    widest_low = std::min(widest_low, width.low);
-    widest_high = std::max(widest_high, width.high);
-    if (effort == Effort::kToChoose) break;
-  }
-  asked.space.strength = prior_of(widest_low, widest_high);
-  inference::EvidenceOptions options{.sampling = {.seed = before.seed}};
-  // The width of a probability that runs are chosen by is that of a batch that moves it by a tenth.
-  if (effort == Effort::kToChoose) {
-    options.sampling.start = 256;
-    options.sampling.points = 250;
-    options.sampling.iterations = 2;
-    options.draws = 64;
-    options.realisations = 2;
-  } else {
-    options.realisations = 16;
-  }
-  ASSIGN_OR_RETURN(asked.evidence,
-                   inference::ModelEvidencesUnder(measured, asked.space,
-                                                  priors, options));
+  EvidenceQuestion question = QuestionOf(before, knowledge, effort, further);
+  Asked asked{.space = question.space};
+  ASSIGN_OR_RETURN(asked.evidence, question.Of(asked.space));
   RETURN_IF_ERROR(SetProbabilities(asked));
   if (effort == Effort::kToChoose || further != nullptr) return asked;
   const auto excluded = ExcludedIn(knowledge.rows.race(), knowledge.part);
   inference::ModelSpace triples = asked.space;
   triples.models = LeadingTriples(asked, excluded);
   if (triples.models.empty()) return asked;
-  options.first = static_cast<int>(asked.space.models.size());
-  ASSIGN_OR_RETURN(auto evidence,
-                   inference::ModelEvidencesUnder(measured, triples,
-                                                  priors, options));
+  question.options.first = static_cast<int>(asked.space.models.size());
+  ASSIGN_OR_RETURN(auto evidence, question.Of(triples));
   for (std::size_t w = 0; w < evidence.size(); ++w)
     std::move(evidence[w].begin(), evidence[w].end(), std::back_inserter(asked.evidence[w]));
   asked.space.models.insert(asked.space.models.end(), triples.models.begin(), triples.models.end());

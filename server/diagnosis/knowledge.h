@@ -71,8 +71,12 @@ struct FurtherMeasured {
   Eigen::VectorXd log_prior{};                   ///< ModelSpace::log_prior
 };
 
+/// Evidences alone, for the base's fitted tests. Errors: those of ModelEvidencesUnder.
+absl::StatusOr<Asked> AskEvidences(const KnownBefore& before, const Knowledge& knowledge,
+                                   Effort effort);
+
 /// further: null where there are the base's fitted tests alone, for which all models compete.
-/// Errors: those of ModelEvidencesUnder and ProbabilitiesOf.
+/// Errors: those of AskEvidences and ProbabilitiesOf.
 absl::StatusOr<Asked> Ask(const KnownBefore& before, const Knowledge& knowledge, Effort effort,
                           const FurtherMeasured* further = nullptr);
 

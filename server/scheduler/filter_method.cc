@@ -18,7 +18,16 @@ class FilterMethod final : public Method {
       : definition_(definition), campaign_(definition.campaign) {}
 
   absl::StatusOr<Batch> First() const override {
-    return Draw({}, campaign::FirstProposalOf(campaign_));
+    ASSIGN_OR_RETURN(Batch batch, Draw({}, campaign::FirstProposalOf(campaign_)));
+    if (campaign_.table.has_value()) {
+      const Eigen::MatrixXd& given = campaign_.table->parameters;
+      Eigen::MatrixXd all(given.rows() + batch.parameters.rows(), given.cols());
+      all << given, batch.parameters;
+      batch.parameters = std::move(all);
+      batch.stop_below.insert(batch.stop_below.begin(), static_cast<std::size_t>(given.rows()),
+                              store::kUnknown);
+    }
+    return batch;
   }
 
   absl::StatusOr<Outcome> Conclude(const History& history, bool affordable) const override {

@@ -90,7 +90,27 @@ void AddEnds(const std::vector<store::EvaluationRecord>& evaluations, const Plac
   history.effort.model_evaluations = ran;
 }
 
+// Given runs stand for no density: +infinity. The samples beside them keep their own.
+void MarkGiven(const Definition& definition, History& history) {
+  const Eigen::Index given = GivenRuns(definition.campaign);
+  if (given == 0 || history.iterations.empty()) return;
+  inference::Iteration& iteration = history.iterations.front();
+  iteration.log_proposal =
+      inference::LogDensity(iteration.proposal, definition.priors, iteration.parameters);
+  iteration.log_proposal->head(given).setConstant(std::numeric_limits<double>::infinity());
+}
+
 }  // namespace
+
+Eigen::Index GivenRuns(const campaign::Campaign& campaign) {
+  return campaign.table.has_value() && campaign::IsFilter(campaign.method)
+             ? campaign.table->parameters.rows()
+             : Eigen::Index{0};
+}
+
+int LargestIteration(const campaign::Campaign& campaign) {
+  return campaign.samples + static_cast<int>(GivenRuns(campaign));
+}
 
 absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t campaign,
                                     store::Reader& reader, std::optional<int> first_iterations) {
@@ -137,6 +157,7 @@ absl::StatusOr<History> LoadHistory(const Definition& definition, std::int64_t c
   history.samples.insert(history.samples.end(), samples.begin(), samples.end());
   history.effort = effort;
   AddSamples(definition, known, history);
+  MarkGiven(definition, history);
 
   // Position of a sample within its iteration, by its number.
   Places place;

@@ -42,6 +42,12 @@ inline constexpr const char* kHeldOutDraws = "\"draws from the posterior\"";
 /// Likewise when they are the best estimate on every packing, one sample each.
 inline constexpr const char* kReplicates = "\"best estimate on every packing\"";
 
+/// Runs that a filter learns from beside its samples: the first of its first iteration. They were
+/// drawn from no proposal and have no weight.
+Eigen::Index GivenRuns(const campaign::Campaign& campaign);
+/// Samples of an iteration at most, given runs among them: store::NewCampaign::samples.
+int LargestIteration(const campaign::Campaign& campaign);
+
 /// Reads every record in the order of its natural key; of tmcmc the samples and states alone that
 /// definition.memory has not kept. iterations: the first ones alone, as if nothing had followed
 /// (the core seconds are those of all); empty: all.

@@ -61,7 +61,7 @@ class Planner {
     if (history_.iterations.empty() && runs_rows_only && !campaign_.table.has_value()) {
       Finish();  // a design to which nothing has been added
     } else if (history_.iterations.empty()) {
-      status = Begin(campaign_.table.has_value() ? TableBatch() : MakeMethod(definition_)->First());
+      status = Begin(runs_rows_only ? TableBatch() : MakeMethod(definition_)->First());
       if (DecidesAtOnce(definition_)) {
         plan_.log.emplace_back(
             "decisions are immediate (inference.decisions): this campaign is not reproducible");
@@ -444,7 +444,12 @@ class Planner {
            .parameters = {row.begin(), row.end()},
            .stop_below = batch->stop_below[position]});
       const bool refused = !batch->refused.empty() && batch->refused[position] != 0;
-      RETURN_IF_ERROR(requests_.Calibrate(start.samples.back(), refused));
+      if (iteration == 0 && i < GivenRuns(campaign_)) {
+        RETURN_IF_ERROR(
+            requests_.Run(start.samples.back(), definition_.ExperimentsOf(Role::kCalibrate)));
+      } else {
+        RETURN_IF_ERROR(requests_.Calibrate(start.samples.back(), refused));
+      }
     }
     plan_.start = std::move(start);
     return absl::OkStatus();

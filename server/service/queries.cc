@@ -101,8 +101,8 @@ void CountSamples(const store::CampaignRecord& record,
   }
 }
 
-/// Rows of the last batch of a design.
-int RowsOfBatch(const store::CampaignRecord& record,
+/// Samples of the last iteration, or rows of the last batch of a design.
+int SamplesOfLast(const store::CampaignRecord& record,
                 const std::vector<EvaluationRecord>& evaluations) {
   std::set<int> rows;
   for (const EvaluationRecord& evaluation : evaluations) {
@@ -183,7 +183,12 @@ absl::StatusOr<v1::CampaignStatus> StatusOf(store::Reader& reader, std::int64_t 
   status.set_samples(record.submitted.samples);
   if (record.submitted.method == campaign::Method::kDesign) {  // what may be added nobody knows
     status.set_max_iterations(record.progress.iteration + 1);
-    status.set_samples(RowsOfBatch(record, evaluations));
+    status.set_samples(SamplesOfLast(record, evaluations));
+  }
+  // The first iteration may have given runs besides.
+  if (record.submitted.method == campaign::Method::kIterativeBayesianFilter) {
+    if (const int samples = SamplesOfLast(record, evaluations); samples > 0)
+      status.set_samples(samples);
   }
   CountSamples(record, evaluations, status);
   if (concluded.last.has_value()) {

@@ -14,6 +14,7 @@
 #include "server/campaign/model/race.h"
 #include "server/messages/attempt_spec.h"
 #include "server/scheduler/definition.h"
+#include "server/scheduler/history.h"
 #include "server/service/queries.h"
 
 namespace calib::service {
@@ -140,7 +141,7 @@ absl::StatusOr<std::variant<store::NewCampaign, v1::SubmitReply>> CheckSubmissio
                               .file_name = request.file_name(),
                               .seed = seed,
                               .method = campaign.method,
-                              .samples = campaign.samples,
+                              .samples = scheduler::LargestIteration(campaign),
                               .max_iterations = campaign::MostBatches(campaign),
                               .reading_rules = campaign::kReadingRules};
   if (campaign.lineage.has_value()) {  // its data are the parent's, as they were read there

@@ -69,7 +69,7 @@ void RaiseSamples(YamlNode& root) {
 }
 
 void ChangeInference(const Derivation& derivation, YamlNode& root) {
-  if (derivation.race || !derivation.rows.empty()) {
+  if (derivation.race || (!derivation.rows.empty() && !derivation.method)) {
     YamlNode inference = YamlMap(
         {{"method", YamlScalar(ToString(derivation.race ? Method::kDesign : Method::kTable))}});
     if (derivation.race) {
@@ -84,9 +84,14 @@ void ChangeInference(const Derivation& derivation, YamlNode& root) {
     return;
   }
   YamlNode& inference = YamlAt(root, "inference");
+  if (derivation.method) {
+    YamlAt(inference, "method") = YamlScalar(ToString(*derivation.method));
+    YamlErase(inference, "freeze");  // it speaks of the parent's iterations
+  }
   if (derivation.samples) {
     YamlAt(inference, "samples") = YamlScalar(absl::StrCat(*derivation.samples));
   }
+  if (!derivation.rows.empty()) YamlAt(inference, "rows") = Rows(derivation);
   if (!derivation.parameters.empty()) RaiseSamples(root);
   if (derivation.max_iterations) {
     YamlAt(inference, "max_iterations") = YamlScalar(absl::StrCat(*derivation.max_iterations));

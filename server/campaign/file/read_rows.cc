@@ -38,6 +38,17 @@ std::vector<double> ValuesOfRow(const Campaign& campaign, Eigen::Index row) {
   return {values.begin(), values.end()};
 }
 
+// What a run beside the samples cannot be: it is emulated in coordinates of the prior.
+void CheckWithinPrior(const MapReader& inference, const Campaign& campaign, Eigen::Index row) {
+  for (std::size_t j = 0; j < campaign.parameters.size(); ++j) {
+    const CalibratedParameter& parameter = campaign.parameters[j];
+    const double value = campaign.table->parameters(row, static_cast<Eigen::Index>(j));
+    if (parameter.prior.InSupport(value)) continue;
+    inference.Problem("rows", absl::StrCat("[", row, "]: ", parameter.name, " = ", value,
+                                           " lies outside the prior of the parameter"));
+  }
+}
+
 // Of a name in the race, why it cannot stand there, in a clause; empty: it can.
 std::string WhyNotInRace(const Campaign& campaign, const std::string& name) {
   const auto& declared = campaign.model.user_effects;
@@ -79,13 +90,19 @@ void ReadRace(MapReader& inference, Campaign& campaign) {
 
 void ReadRows(MapReader& inference, Campaign& campaign) {
   const bool is_design = campaign.method == Method::kDesign;
-  if (!RunsRowsOnly(campaign.method)) {
-    if (inference.Has("rows")) inference.Problem("rows", "belongs to method: table and design");
+  const bool is_table = campaign.method == Method::kTable;
+  const bool beside = campaign.method == Method::kIterativeBayesianFilter && !campaign.precomputed;
+  if (!is_design && !is_table && !beside) {
+    if (inference.Has("rows")) {
+      inference.Problem("rows",
+                        "belongs to method: table, design and, with runs still to be made, "
+                        "iterative_bayesian_filter");
+    }
     return;
   }
   const YamlNode* rows =
-      is_design ? inference.Find("rows")
-                : inference.Require("rows", "the parameter values to run, a list of maps");
+      is_table ? inference.Require("rows", "the parameter values to run, a list of maps")
+               : inference.Find("rows");
   if (rows == nullptr) return;
   if (rows->kind != YamlNode::Kind::kSequence || rows->items.empty()) {
     inference.Problem("rows", "has to be a list of maps, one per run");
@@ -96,13 +113,14 @@ void ReadRows(MapReader& inference, Campaign& campaign) {
                                            kMostRowsOfBatch, " at a time"));
     return;
   }
-  if (!is_design) campaign.samples = static_cast<int>(rows->items.size());
+  if (is_table) campaign.samples = static_cast<int>(rows->items.size());
   campaign.table.emplace();
   campaign.table->parameters.setZero(static_cast<Eigen::Index>(rows->items.size()),
                                      static_cast<Eigen::Index>(campaign.parameters.size()));
   for (std::size_t i = 0; i < rows->items.size(); ++i) {
     ReadRow(rows->items[i], absl::StrCat(inference.PathOf("rows"), "[", i, "]"),
             static_cast<Eigen::Index>(i), campaign, inference.problems());
+    if (beside) CheckWithinPrior(inference, campaign, static_cast<Eigen::Index>(i));
   }
 }
 

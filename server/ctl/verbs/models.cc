@@ -7,6 +7,7 @@
 #include "server/client/session.h"
 #include "server/ctl/answer_text.h"
 #include "server/ctl/exit_codes.h"
+#include "server/ctl/load_story.h"
 #include "server/ctl/option_list.h"
 #include "server/ctl/verb.h"
 #include "server/report/documents/json_documents.h"
@@ -37,7 +38,11 @@ absl::StatusOr<int> Models(const CommonOptions& common, const ModelsOptions& opt
     ASSIGN_OR_RETURN(auto rival, LoadRival(session->client(), id));
     rivals.push_back(std::move(rival));
   }
-  ASSIGN_OR_RETURN(const auto comparison, report::CompareModels(rivals));
+  std::vector<report::StoredDiagnosis> diagnoses;
+  if (const std::string base = report::BaseOf(rivals); !base.empty()) {
+    ASSIGN_OR_RETURN(diagnoses, LoadDiagnoses(session->client(), base));
+  }
+  ASSIGN_OR_RETURN(const auto comparison, report::CompareModels(rivals, diagnoses));
   std::cout << (common.json ? report::ModelsJson(comparison) : ModelsText(comparison));
   return kDone;
 }

@@ -347,7 +347,9 @@ std::string ModelsJson(const ModelComparison& comparison) {
                       {"log_bayes_factor", m.probability.log_bayes_factor},
                       {"log_bayes_factor_se", m.probability.log_bayes_factor_se}});
   }
-  return Dump({{"models", models}, {"warnings", comparison.warnings}});
+  return Dump({{"models", models},
+               {"evidence_from", comparison.evidence_from},
+               {"warnings", comparison.warnings}});
 }
 
 std::string StatusJson(const v1::CampaignStatus& status) { return Dump(Status(status)); }

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "calib/return_if_error.h"
 #include "server/campaign/model/identity.h"
+#include "server/campaign/model/words.h"
 #include "server/messages/read_words.h"
 
 namespace calib::report {
@@ -28,23 +29,78 @@ absl::Status CheckRivals(const std::vector<RivalModel>& rivals) {
   return absl::OkStatus();
 }
 
-absl::Status CheckEvidence(const RivalModel& rival) {
-  const v1::Posterior& posterior = rival.posterior;
-  if (rival.campaign.filter.noise == inference::NoiseMode::kEssTarget) {
+bool HasEvidence(const v1::Posterior& posterior) {
+  return messages::SourceOf(posterior) != campaign::PosteriorSource::kNone &&
+         std::isfinite(posterior.log_evidence()) && std::isfinite(posterior.log_evidence_se());
+}
+
+// The first that has none; empty: all have.
+std::string WithoutEvidence(const std::vector<RivalModel>& rivals) {
+  for (const RivalModel& rival : rivals) {
+    if (!HasEvidence(rival.posterior)) return rival.posterior.campaign();
+  }
+  return "";
+}
+
+absl::Status CheckErrors(const std::vector<RivalModel>& rivals) {
+  for (const RivalModel& rival : rivals) {
+    if (rival.campaign.filter.noise != inference::NoiseMode::kEssTarget) continue;
     return absl::FailedPreconditionError(
-        absl::StrCat("campaign ", posterior.campaign(),
+        absl::StrCat("campaign ", rival.posterior.campaign(),
                      " has its errors tempered to an effective sample size (ess_target), so that "
                      "its evidence says nothing about the model; run it with noise: given or "
                      "noise: inferred"));
   }
-  if (messages::SourceOf(posterior) == campaign::PosteriorSource::kNone ||
-      !std::isfinite(posterior.log_evidence()) || !std::isfinite(posterior.log_evidence_se())) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("campaign ", posterior.campaign(),
-                     " has no evidence, because it has no posterior: see `calibctl posterior ",
-                     posterior.campaign(), "` for why"));
-  }
   return absl::OkStatus();
+}
+
+bool IsExtensionOf(const RivalModel& rival, const std::string& parent) {
+  const auto& lineage = rival.campaign.lineage;
+  return lineage && lineage->parent == parent &&
+         campaign::ValueOf(campaign::kDerivedForWords, lineage->purpose) ==
+             campaign::DerivedFor::kExtension;
+}
+
+// Effects that a model has and the base has not.
+std::set<std::string> EffectsBeyond(const campaign::Campaign& base,
+                                    const campaign::Campaign& campaign) {
+  std::set<std::string> effects(campaign.model.effects.begin(), campaign.model.effects.end());
+  for (const std::string& own : base.model.effects) effects.erase(own);
+  return effects;
+}
+
+absl::StatusOr<std::vector<inference::EvidenceEstimate>> EvidencesOfDiagnosis(
+    const std::vector<RivalModel>& rivals, const std::vector<StoredDiagnosis>& diagnoses) {
+  const std::string without = WithoutEvidence(rivals), base = BaseOf(rivals);
+  const std::string why = absl::StrCat("campaign ", without,
+                                       " has no evidence, because it has no posterior: see "
+                                       "`calibctl posterior ",
+                                       without, "` for why");
+  if (base.empty()) return absl::FailedPreconditionError(why);
+  const StoredDiagnosis* const diagnosis = LatestOf(diagnoses, base);
+  if (diagnosis == nullptr || diagnosis->evidences.empty()) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        why, "; `calibctl diagnose ", base, "` gives evidences of it and its extensions"));
+  }
+  const auto is_base = [&base](const RivalModel& r) { return r.posterior.campaign() == base; };
+  const RivalModel& first = *std::find_if(rivals.begin(), rivals.end(), is_base);
+  std::vector<inference::EvidenceEstimate> evidence;
+  for (const RivalModel& rival : rivals) {
+    const auto wanted = EffectsBeyond(first.campaign, rival.campaign);
+    const auto found =
+        std::find_if(diagnosis->evidences.begin(), diagnosis->evidences.end(),
+                     [&wanted](const EvidenceOfEffects& own) {
+                       return std::set(own.effects.begin(), own.effects.end()) == wanted;
+                     });
+    if (found == diagnosis->evidences.end()) {
+      return absl::FailedPreconditionError(
+          absl::StrCat(why, ", and the diagnosis of ", base, " gives none of the model of ",
+                       rival.posterior.campaign(), ": it took no part or was not probable"));
+    }
+    evidence.push_back(
+        {.log_evidence = found->log_evidence, .standard_error = found->log_evidence_se});
+  }
+  return evidence;
 }
 
 absl::Status CheckSameData(const std::vector<RivalModel>& rivals) {
@@ -113,17 +169,45 @@ std::vector<std::string> Warnings(const std::vector<RivalModel>& rivals) {
 
 }  // namespace
 
-absl::StatusOr<ModelComparison> CompareModels(const std::vector<RivalModel>& rivals) {
-  RETURN_IF_ERROR(CheckRivals(rivals));
-  std::vector<inference::EvidenceEstimate> evidence;
-  for (const RivalModel& rival : rivals) {
-    RETURN_IF_ERROR(CheckEvidence(rival));
-    evidence.push_back({.log_evidence = rival.posterior.log_evidence(),
-                        .standard_error = rival.posterior.log_evidence_se()});
+std::string BaseOf(const std::vector<RivalModel>& rivals) {
+  for (const RivalModel& base : rivals) {
+    std::set<std::string> line = {base.posterior.campaign()};
+    for (bool grows = true; grows;) {
+      grows = false;
+      for (const RivalModel& rival : rivals) {
+        const bool joins = std::any_of(line.begin(), line.end(), [&rival](const std::string& id) {
+          return IsExtensionOf(rival, id);
+        });
+        grows = (joins && line.insert(rival.posterior.campaign()).second) || grows;
+      }
+    }
+    if (line.size() == rivals.size()) return base.posterior.campaign();
   }
+  return "";
+}
+
+absl::StatusOr<ModelComparison> CompareModels(const std::vector<RivalModel>& rivals,
+                                              const std::vector<StoredDiagnosis>& diagnoses) {
+  RETURN_IF_ERROR(CheckRivals(rivals));
+  RETURN_IF_ERROR(CheckErrors(rivals));
   RETURN_IF_ERROR(CheckSameData(rivals));
+  ModelComparison comparison;
+  std::vector<inference::EvidenceEstimate> evidence;
+  if (const std::string without = WithoutEvidence(rivals); without.empty()) {
+    for (const RivalModel& rival : rivals) {
+      evidence.push_back({.log_evidence = rival.posterior.log_evidence(),
+                          .standard_error = rival.posterior.log_evidence_se()});
+    }
+    comparison.warnings = Warnings(rivals);
+  } else {
+    ASSIGN_OR_RETURN(evidence, EvidencesOfDiagnosis(rivals, diagnoses));
+    comparison.evidence_from = "diagnosis";
+    comparison.warnings = {absl::StrCat(
+        "The evidences are those of the diagnosis of ", BaseOf(rivals), ", since ", without,
+        " has no posterior: all by one emulator and one likelihood, of what is smooth in the "
+        "readings, strengths under the prior of the diagnosis.")};
+  }
   const auto probabilities = inference::ModelProbabilities(evidence);
-  ModelComparison comparison{.models = {}, .warnings = Warnings(rivals)};
   for (std::size_t k = 0; k < rivals.size(); ++k) {
     comparison.models.push_back({.campaign = rivals[k].posterior.campaign(),
                                  .name = rivals[k].campaign.name,

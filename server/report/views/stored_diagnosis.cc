@@ -34,6 +34,22 @@ std::vector<ProbableEffects> ReadProbable(const Json& json, const char* key) {
   return list;
 }
 
+std::vector<EvidenceOfEffects> ReadEvidences(const Json& json) {
+  std::vector<EvidenceOfEffects> list;
+  const auto found = json.find("log_evidences");
+  if (found == json.end() || !found->is_array()) return list;
+  for (const Json& entry : *found) {
+    if (!entry.is_object() || !entry.contains("effects")) continue;
+    EvidenceOfEffects own{.effects = Names(entry["effects"]),
+                          .log_evidence = std::nan(""),
+                          .log_evidence_se = std::nan("")};
+    Read(entry, "log_evidence", own.log_evidence);
+    Read(entry, "log_evidence_se", own.log_evidence_se);
+    if (std::isfinite(own.log_evidence) && own.log_evidence_se >= 0) list.push_back(own);
+  }
+  return list;
+}
+
 std::vector<EffectCurve> ReadCurves(const Json& json) {
   std::vector<EffectCurve> curves;
   const auto found = json.find("curves");
@@ -85,6 +101,7 @@ absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& text) {
   }
   Read(json, "effect", d.effect);
   d.probabilities = ReadProbable(json, "probabilities");
+  d.evidences = ReadEvidences(json);
   Read(json, "none_of_these", d.none_of_these);
   d.families = ReadProbable(json, "families");
   if (const auto set = json.find("credible_set"); set != json.end() && set->is_array()) {

@@ -25,6 +25,12 @@ struct ProbableEffects {
   double probability = 0;
 };
 
+/// Evidence of a model: the diagnosed one with these effects.
+struct EvidenceOfEffects {
+  std::vector<std::string> effects{};
+  double log_evidence = 0, log_evidence_se = 0;
+};
+
 /// An effect that was tried on the model.
 struct TriedEffect {
   std::string effect{};
@@ -53,6 +59,9 @@ struct StoredDiagnosis {
   /// Models by probability, the largest first; "other" stands for those that are not listed. Empty
   /// in records of earlier rules.
   std::vector<ProbableEffects> probabilities{};
+  /// By one likelihood, of the base model, of each effect alone and of what is probable; empty
+  /// where no effect was tried, and in older records.
+  std::vector<EvidenceOfEffects> evidences{};
   double none_of_these = 0;  ///< probability; with those of the models it sums to one
   /// The fewest models that hold 95 %; "none_of_these" may be one.
   std::vector<std::vector<std::string>> credible_set{};

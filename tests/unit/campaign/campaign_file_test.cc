@@ -338,6 +338,25 @@ TEST(CampaignFile, AnObservableThatIsOnlyPredictedNeedNoColumn) {
   EXPECT_THAT(c.experiments[1].observables[1].values, IsEmpty());
 }
 
+// Runs that an iterative filter learns from beside its samples.
+TEST(CampaignFile, AFilterTakesRunsBesideItsSamples) {
+  const std::string filter =
+      "inference: {method: iterative_bayesian_filter, samples: 20, max_iterations: 3}";
+  const auto with = [&filter](const std::string& angle) {
+    return Spoiled(filter, filter.substr(0, filter.size() - 1) +
+                               ", rows: [{young_modulus: 1 GPa, friction_angle: " + angle +
+                               ", rolling_resistance.stiffness: 0.1, "
+                               "rolling_resistance.friction: 0.1, like: 41}]}");
+  };
+  const Campaign c = Read(with("30 deg")).campaign;
+  EXPECT_EQ(c.samples, 20);
+  ASSERT_TRUE(c.table.has_value());
+  EXPECT_EQ(c.table->parameters.rows(), 1);
+  EXPECT_EQ(StreamOf(c, 0), 41);
+  EXPECT_EQ(StreamOf(c, 1), 1) << "a sample of its own";
+  EXPECT_THAT(testing::ProblemsOf(with("89 deg")), HasSubstr("lies outside the prior"));
+}
+
 // What will be measured has the error that the file states of it.
 TEST(CampaignFile, NoiseStatedOfWhatIsNotMeasuredIsKept) {
   const std::string table =

@@ -89,6 +89,21 @@ INSTANTIATE_TEST_SUITE_P(
                       "{method: surrogate_msrs, samples: 9, in_flight: 2, termination: 16}",
                       "{method: surrogate_msrs, samples: 12, decisions: immediate}"));
 
+TEST(Derive, AnExtensionOfOneIterationMayHaveMore) {
+  const auto text =
+      Derive("name: a\ninference: {method: sqmc, samples: 96, design: sobol, freeze: {2: [x]}}\n",
+             {.name = "b",
+              .lineage = {.parent = "c1", .purpose = "extension"},
+              .method = Method::kIterativeBayesianFilter,
+              .samples = 15,
+              .max_iterations = 6});
+  ASSERT_TRUE(text.ok()) << text.status();
+  EXPECT_NE(text->find("inference: {method: iterative_bayesian_filter, samples: 15, design: sobol, "
+                       "max_iterations: 6}"),
+            std::string::npos)
+      << *text;
+}
+
 TEST(Derive, ABudgetTakesThePlaceOfTheParents) {
   const std::string parent = "name: a\nbudget: {model_evaluations: 400, core_hours: 2}\n";
   const auto text = Derive(parent, {.name = "b",

@@ -183,6 +183,28 @@ TEST(ComputePosterior, RowsMadeForAWiderPriorDoNotLowerTheEvidence) {
               of_inside->log_evidence + std::log(static_cast<double>(kept) / 400), 1e-12);
 }
 
+// They teach an emulator, and the weights know nothing of them.
+TEST(ComputePosterior, RunsThatWereDrawnFromNoDensityHaveNoWeight) {
+  const FilterOptions options;
+  Iteration drawn = FirstIteration(options, 400);
+  drawn.log_proposal = LogDensity({}, Priors(), drawn.parameters);
+  Iteration with;
+  with.parameters.resize(403, 2);
+  with.parameters << Eigen::Vector2d(0.4, 3.1).transpose().replicate(3, 1), drawn.parameters;
+  with.predictions = with.parameters;
+  with.log_proposal = Eigen::VectorXd::Constant(403, INFINITY);
+  with.log_proposal->tail(400) = *drawn.log_proposal;
+  const auto one = ComputePosterior(Priors(), Data(0.2), options, std::span(&drawn, 1));
+  const auto other = ComputePosterior(Priors(), Data(0.2), options, std::span(&with, 1));
+  ASSERT_TRUE(one.ok() && other.ok()) << one.status() << other.status();
+  EXPECT_EQ(other->log_weights.head(3).maxCoeff(), -INFINITY) << "though they fit best";
+  EXPECT_TRUE(other->log_weights.tail(400).isApprox(one->log_weights));
+  EXPECT_NEAR(other->log_evidence, one->log_evidence, 1e-12);
+  EXPECT_NEAR(other->log_evidence_se, one->log_evidence_se, 1e-12);
+  EXPECT_NEAR(other->parameters[0].mean, one->parameters[0].mean, 1e-12);
+  EXPECT_THAT(other->warnings, testing::IsEmpty());
+}
+
 TEST(ComputePosterior, TinyNoiseStaysFinite) {
   const FilterOptions options;
   const Iteration iteration = FirstIteration(options, 100);

@@ -64,6 +64,68 @@ bool IsAbout(const Place& place, const store::SampleRecord& sample) {
          std::abs(sample.parameters[1] / place.friction_angle - 1) < 5 * kSd;
 }
 
+// Rows that are run with the first samples, with the numbers and specimens of others.
+testing::SmallCampaign WithRows(int rows) {
+  testing::SmallCampaign campaign = Derived("iterative_bayesian_filter", std::nullopt);
+  campaign::Derivation derivation{.name = "derived",
+                                  .lineage = {.parent = "c1", .purpose = "extension"},
+                                  .method = campaign::Method::kIterativeBayesianFilter};
+  for (int i = 0; i < rows; ++i)
+    derivation.rows.push_back(
+        {.like = 100 + i,
+         .values = {{"young_modulus", 2e8 * (1 + 0.05 * i)}, {"friction_angle", 0.4}}});
+  const auto text = campaign::Derive(campaign.yaml, derivation);
+  EXPECT_TRUE(text.ok()) << text.status();
+  campaign.yaml = *text;
+  return campaign;
+}
+
+TEST(GivenRuns, AreTheFirstOfTheFirstIterationAndHaveNoWeight) {
+  SimulatedService service("given_runs");
+  service.Submit(WithRows(5));
+  const auto first = FirstSamples(service);
+  ASSERT_EQ(first.size(), 26U);
+  for (std::size_t i = 0; i < 5; ++i)
+    EXPECT_NEAR(first[i].parameters[0], 2e8 * (1 + 0.05 * static_cast<double>(i)), 1e-3) << i;
+  service.RunToEnd(1, /*calm=*/true);
+  const auto samples = Value(service.Read().Samples(1));
+  int of_second = 0;
+  int weighed = 0;
+  for (const store::SampleRecord& sample : samples) {
+    if (sample.sample < 5) {
+      EXPECT_EQ(sample.log_weight, -INFINITY) << sample.sample;
+    }
+    of_second += sample.iteration == 1 ? 1 : 0;
+    weighed += sample.log_weight > -INFINITY ? 1 : 0;
+  }
+  EXPECT_GT(weighed, 0);
+  EXPECT_EQ(of_second, 21) << "later iterations have their own samples alone";
+}
+
+// What has been run is not run again: those of an extension are runs of a design.
+TEST(GivenRuns, AreFoundWhereTheyWereRun) {
+  SimulatedService service("given_runs_found");
+  service.Submit(WithRows(5));
+  service.RunToEnd(1, /*calm=*/true);
+  service.Submit(WithRows(3));
+  const auto evaluations = Value(service.Read().Evaluations(2));
+  int reused = 0;
+  for (const store::EvaluationRecord& evaluation : evaluations)
+    reused += evaluation.key.sample < 3 && evaluation.reused ? 1 : 0;
+  EXPECT_EQ(reused, 3);
+}
+
+TEST(GivenRuns, SameBitsWhateverGoesWrong) {
+  std::string calm;
+  for (const unsigned seed : {0U, 1U, 2U}) {
+    SimulatedService service("given_runs_bits");
+    service.Submit(WithRows(5));
+    service.RunToEnd(seed, seed == 0);
+    if (seed == 0) calm = service.Fingerprint();
+    EXPECT_EQ(service.Fingerprint(), calm) << seed;
+  }
+}
+
 TEST(FirstProposal, EveryMethodBeginsThere) {
   const Place place{.young_modulus = 2e8, .friction_angle = 0.4};
   for (const std::string method :

@@ -10,6 +10,7 @@
 
 #include "dem/registry/catalog.h"
 #include "server/campaign/model/sha256.h"
+#include "server/scheduler/history.h"
 #include "server/scheduler/posterior_record.h"
 
 namespace calib::scheduler {
@@ -124,7 +125,7 @@ std::string SimulatedService::Submit(const testing::SmallCampaign& campaign) {
                       .yaml = campaign.yaml,
                       .file_name = "small.yaml",
                       .method = outcome.campaign.method,
-                      .samples = outcome.campaign.samples,
+                      .samples = LargestIteration(outcome.campaign),
                       .max_iterations = outcome.campaign.max_iterations},
                      digests, "", {},
                      [&id](const absl::StatusOr<std::string>& answer) { id = *answer; });
