@@ -34,8 +34,10 @@ struct ExtendedOptions {
   std::optional<std::int64_t> budget{};
 };
 
-/// Up to which ExtendedOptions::times a calibration is worth its runs.
-inline constexpr int kMostTimes = 3;
+/// Up to which ExtendedOptions::times a calibration is worth its runs: 25 samples for each
+/// parameter by then, for three what a diagnosis of 125 runs leaves of 220 in all, replicates among
+/// them.
+inline constexpr int kMostTimes = 2;
 
 /// How a model is calibrated with effects on top whose posterior is known about. Of a filter, in
 /// samples of five for each parameter: as many at draws of that posterior, twice as far from its

@@ -70,7 +70,8 @@ absl::Status Improvement::From(report::CampaignView view) {
 }
 
 // As often as few iterations as it takes until the model is found: those that were made are found
-// again by their digests.
+// again by their digests. More runs may show that an emulator was not good enough; a posterior that
+// passed is kept.
 absl::StatusOr<report::CampaignView> Improvement::Calibrate(const report::CampaignView& view,
                                                             const NamedModel& model,
                                                             const report::CampaignView* design) {
@@ -81,10 +82,13 @@ absl::StatusOr<report::CampaignView> Improvement::Calibrate(const report::Campai
     if (times > 1 && absl::IsResourceExhausted(plan.status())) break;
     RETURN_IF_ERROR(plan.status());
     ASSIGN_OR_RETURN(const auto text, ExtensionText(view, *plan));
-    extended =
+    auto next =
         laboratory_.Run(view, text, "calibration with " + absl::StrJoin(model.effects, " + "));
-    RETURN_IF_ERROR(extended.status());
-    evaluations_ += extended->status.model_evaluations();
+    RETURN_IF_ERROR(next.status());
+    evaluations_ += next->status.model_evaluations();
+    const bool loses = extended.ok() && Calibrated(*extended, 0).has_posterior &&
+                       !Calibrated(*next, 0).has_posterior;
+    if (!loses) extended = std::move(next);
     if (IsFound(*extended, model)) break;
   }
   return extended;

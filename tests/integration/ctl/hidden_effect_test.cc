@@ -72,6 +72,12 @@ TEST_F(HiddenEffect, IsNamedAddedAndTheErrorFallsOnHeldOutData) {
   // By how much runs of one packing wander is not in the errors: a little above 1.3 is chance.
   EXPECT_LE(steps[1]["heldout_rms_error"].get<double>(), 1.6);
   const std::string final_campaign = improved.json()["final_campaign"];
+  EXPECT_LE(improved.json()["model_evaluations"], 220 * 2) << "220 runs of two fitted tests";
+  // The base has no posterior: its diagnosis has evidences of both models.
+  const Answer models = Call("models c1 " + final_campaign + " --state s --json");
+  ASSERT_EQ(models.code, 0) << models.err;
+  EXPECT_EQ(models.json()["evidence_from"], "diagnosis");
+  EXPECT_EQ(models.json()["models"][0]["campaign"], final_campaign);
   // improve has asked of its last model whether it is adequate: nothing is run again.
   const std::size_t campaigns = Call("list --state s --json").json().size();
   const Answer again = Call("diagnose " + final_campaign + " --gate --state s --json");
