@@ -296,13 +296,13 @@ std::string VerdictInWords(const Answer& answer) {
         return absl::StrCat(passes, "; that nothing is missing has probability ",
                             ChanceInWords(answer.adequate), ".", beside);
       const NamedFamily* family = SurestFamily(answer);
-      return absl::StrCat(
-          passes, ". Yet ",
-          family != nullptr
-              ? Acts(*family)
-              : absl::StrCat(InWords(first), " is more probable (", ChanceInWords(first.probability),
-                             ") than that nothing is missing (", ChanceInWords(answer.adequate), ")"),
-          ".", beside);
+      return absl::StrCat(passes, ". Yet ",
+                          family != nullptr ? Acts(*family)
+                                            : absl::StrCat(InWords(first), " is more probable (",
+                                                           ChanceInWords(first.probability),
+                                                           ") than that nothing is missing (",
+                                                           ChanceInWords(answer.adequate), ")"),
+                          ".", beside);
     }
     case AnswerVerdict::kUnexplained:
       if (answer.candidates.empty())
@@ -319,8 +319,8 @@ std::string VerdictInWords(const Answer& answer) {
         sum += model.probability;
       }
       if (words.size() == 1)
-        return absl::StrCat(words[0], ", ", ChanceInWords(sum), ", and not certain enough to be named.",
-                            beside);
+        return absl::StrCat(words[0], ", ", ChanceInWords(sum),
+                            ", and not certain enough to be named.", beside);
       const std::string end =
           absl::StrCat("; which of them, these tests cannot tell",
                        answer.repeat_names_alone >= kWorthTelling
@@ -329,12 +329,12 @@ std::string VerdictInWords(const Answer& answer) {
                            : "",
                        ".", beside);
       if (words.size() <= kMostInWords)
-        return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", ChanceInWords(sum), ": ",
-                            OneOf(words), end);
+        return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", ChanceInWords(sum),
+                            ": ", OneOf(words), end);
       if (const NamedFamily* family = SurestFamily(answer))
         return absl::StrCat(Acts(*family), ": ", SomeOf(words), end);
-      return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", ChanceInWords(sum), ": ",
-                          SomeOf(words), end);
+      return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", ChanceInWords(sum),
+                          ": ", SomeOf(words), end);
     }
   }
   return "";

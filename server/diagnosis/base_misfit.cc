@@ -50,7 +50,8 @@ absl::StatusOr<BaseMisfit> MisfitOfBase(const KnownBefore& before, const DesignR
   const inference::SpecimenErrors& errors = known.set->errors();
   const inference::DesignPoints best = BestDraw(known, draws);
   const Eigen::RowVectorXd history = known.set->coordinates()->HistoriesAt(best).row(0);
-  misfit.chance = ChanceOfMisfit(*known.set, Eigen::VectorXd::Zero(before.base.histories.cols()), draws, parameters);
+  misfit.chance = ChanceOfMisfit(*known.set, Eigen::VectorXd::Zero(before.base.histories.cols()),
+                                 draws, parameters);
   misfit.square = SquaresOfMisfit(*known.set, known.z, draws).minCoeff();
   misfit.degrees = static_cast<double>(std::max<Index>(1, known.z.size() - parameters));
   misfit.chance_of_square =

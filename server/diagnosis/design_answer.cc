@@ -43,8 +43,8 @@ double OfBoth(double a, double b) { return std::min(1.0, 2 * std::min(a, b)); }
 
 // Chance of the misfit of each model that is probable enough to be asked, and of the base model; 0
 // of the others and of none of these.
-std::vector<double> ChancesOfMisfit(const KnownBefore& before, const Knowledge& known, const Asked& asked,
-                                    const ChanceElsewhere& elsewhere) {
+std::vector<double> ChancesOfMisfit(const KnownBefore& before, const Knowledge& known,
+                                    const Asked& asked, const ChanceElsewhere& elsewhere) {
   std::vector<double> chances;
   const auto parameters = static_cast<int>(known.rows.race().base.size());
   for (std::size_t i = 0; i < asked.evidence[0].size(); ++i) {
@@ -53,8 +53,8 @@ std::vector<double> ChancesOfMisfit(const KnownBefore& before, const Knowledge& 
                         asked.probabilities[0].model[static_cast<Index>(i)] >= kDesignCaps.asked;
     double chance = 0;
     if (wanted && !own.model.none_of_these && own.draws.rows() > 0) {
-      chance = ChanceOfMisfit(*known.set, Eigen::VectorXd::Zero(before.base.histories.cols()), own.draws,
-                              parameters + static_cast<int>(own.model.effects.size()));
+      chance = ChanceOfMisfit(*known.set, Eigen::VectorXd::Zero(before.base.histories.cols()),
+                              own.draws, parameters + static_cast<int>(own.model.effects.size()));
       if (elsewhere) chance = OfBoth(chance, elsewhere(own));
     }
     chances.push_back(chance);

@@ -20,7 +20,7 @@ namespace calib::diagnosis {
 struct DesignedAnswer {
   Answer answer{};
   std::shared_ptr<DesignChain> chain{};  ///< that has answered
-  std::string campaign{};  ///< id of the design; empty: it has no runs
+  std::string campaign{};                ///< id of the design; empty: it has no runs
   /// Of the parameters that the design has beside those of the base: ranges, SI.
   std::map<std::string, dem::DefaultPrior> parameters{};
 };

@@ -298,8 +298,8 @@ absl::StatusOr<NextStep> DesignChain::Next() {
   }
   ASSIGN_OR_RETURN(const std::vector<VerifiedModel> models, ToVerify(n - 1));
   ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n - 1));
-  return Ended(n, ChancesOf(before_.base, *known, models, batches_.back(),
-                            kDesignCaps.verification_runs));
+  return Ended(
+      n, ChancesOf(before_.base, *known, models, batches_.back(), kDesignCaps.verification_runs));
 }
 
 absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker,

@@ -69,8 +69,7 @@ class Inquiry {
            "they seem too large, and an effect can hide in them."});
     NameUnits();
     if (options_.next_experiment && !options_.then && !options_.only_adequacy &&
-        !view_.campaign.precomputed &&
-        diagnosis_.answer.verdict != AnswerVerdict::kAdequate) {
+        !view_.campaign.precomputed && diagnosis_.answer.verdict != AnswerVerdict::kAdequate) {
       const absl::Status planned = PlanNext();
       if (absl::IsCancelled(planned)) return planned;
       if (!planned.ok()) {
@@ -177,13 +176,12 @@ class Inquiry {
     Index like = 0;  // the run that comes closest
     runs.histories.rowwise().squaredNorm().minCoeff(&like);
     ASSIGN_OR_RETURN(const AnsweredDesign answered, designed_.chain->Answered());
-    ASSIGN_OR_RETURN(
-        NextPlan plan,
-        PlanNextExperiment(laboratory_, view_, answered,
-                           {.rivals = rivals,
-                            .none = None(rivals),
-                            .like = runs.sample[static_cast<std::size_t>(like)],
-                            .scatter = diagnosis_.answer.scatter}));
+    ASSIGN_OR_RETURN(NextPlan plan,
+                     PlanNextExperiment(laboratory_, view_, answered,
+                                        {.rivals = rivals,
+                                         .none = None(rivals),
+                                         .like = runs.sample[static_cast<std::size_t>(like)],
+                                         .scatter = diagnosis_.answer.scatter}));
     diagnosis_.next_experiment = std::move(plan.next);
     for (std::string& warning : plan.warnings) diagnosis_.warnings.push_back(std::move(warning));
     if (!diagnosis_.next_experiment)

@@ -152,12 +152,12 @@ std::string ForecastInWords(const PlanForecast& forecast) {
 std::string NextText(const NextExperiment& next) {
   std::string text =
       "\n" +
-      report::Wrapped(fmt::format("Next experiment: {}. Expected of it: {}; a wrong name with {}.{} "
-                                  "For the campaign file:",
-                                  InWords(next.best), ForecastInWords(*next.best.forecast),
-                                  ChanceInWords(next.best.forecast->wrong),
-                                  CostOf(next.best)),
-                      "", "") +
+      report::Wrapped(
+          fmt::format("Next experiment: {}. Expected of it: {}; a wrong name with {}.{} "
+                      "For the campaign file:",
+                      InWords(next.best), ForecastInWords(*next.best.forecast),
+                      ChanceInWords(next.best.forecast->wrong), CostOf(next.best)),
+          "", "") +
       "\n" + next.snippet;
   if (next.considered.size() > 1) text += "\nAlso tried:\n";
   for (std::size_t k = 1; k < next.considered.size(); ++k) {

@@ -242,10 +242,9 @@ struct EvidenceQuestion {
 
 EvidenceQuestion QuestionOf(const KnownBefore& before, const Knowledge& knowledge, Effort effort,
                             const FurtherMeasured* further) {
-  EvidenceQuestion question{
-      .measured = {{.set = knowledge.set.get(), .z = knowledge.z}},
-      .space = SpaceOf(before, knowledge.rows, knowledge.part),
-      .options = {.sampling = {.seed = before.seed}}};
+  EvidenceQuestion question{.measured = {{.set = knowledge.set.get(), .z = knowledge.z}},
+                            .space = SpaceOf(before, knowledge.rows, knowledge.part),
+                            .options = {.sampling = {.seed = before.seed}}};
   if (further != nullptr) {
     question.space.models = further->models;
     question.space.log_prior = further->log_prior;
@@ -430,10 +429,8 @@ double ChanceOfMisfit(const inference::DiagnosisSet& set, const Eigen::VectorXd&
   const double inside =
       inference::FisherLaw{.numerator = degrees, .denominator = set.errors().freedom}.Tail(least /
                                                                                            degrees);
-  const double outside = set.coordinates()
-                             ->LeftOut(history,
-                                       inference::RowsOf(points, {closest}))
-                             .chance;
+  const double outside =
+      set.coordinates()->LeftOut(history, inference::RowsOf(points, {closest})).chance;
   return std::min(1.0, 2 * std::min(inside, outside));
 }
 

@@ -65,9 +65,8 @@ class Choice {
       : laboratory_(laboratory), base_(base), answered_(answered), leading_(LeadingOf(answered)) {}
 
   absl::StatusOr<NextPlan> Plan(const ScreenQuestion& question) {
-    ASSIGN_OR_RETURN(PlanScreen screen,
-                     ScreenPlans(laboratory_, question.rivals, question.none, question.like,
-                                 question.scatter));
+    ASSIGN_OR_RETURN(PlanScreen screen, ScreenPlans(laboratory_, question.rivals, question.none,
+                                                    question.like, question.scatter));
     evaluations_ = screen.evaluations;
     if (!screen.warning.empty()) plan_.warnings.push_back(screen.warning + ".");
     if (leading_.models.size() < 2) {
@@ -120,6 +119,18 @@ class Choice {
     return names;
   }
 
+  // Of a run of the base, mean over those that are known; 0: of none.
+  double CoreSecondsOf(const std::string& experiment) const {
+    double sum = 0;
+    int runs = 0;
+    for (const auto& [of, states] : base_.states) {
+      if (of.first != experiment || !(states.core_seconds > 0)) continue;
+      sum += states.core_seconds;
+      ++runs;
+    }
+    return runs > 0 ? sum / runs : 0;
+  }
+
   absl::Status Repeats() {
     for (const campaign::Experiment& experiment : base_.campaign.experiments) {
       if (experiment.role != campaign::Role::kCalibrate) continue;
@@ -136,6 +147,7 @@ class Choice {
           const inference::Forecast forecast,
           ForecastOf(answered_, {.set = test.known.set.get(), .measured = test.known.z}));
       Forecasted(forecast, 0, repeat.experiment);
+      repeat.experiment.core_seconds = CoreSecondsOf(experiment.name);
       proposals_.push_back(std::move(repeat));
     }
     return absl::OkStatus();
@@ -143,29 +155,29 @@ class Choice {
 
   // A plan that cannot be run stays without a forecast.
   absl::Status Run(ScreenedPlan& screened) {
-    auto runs = NextTestRuns::Open(
-        laboratory_, base_, answered_, leading_,
-        {.entry = screened.entry, .file = screened.file, .data = screened.data});
+    auto runs =
+        NextTestRuns::Open(laboratory_, base_, answered_, leading_,
+                           {.entry = screened.entry, .file = screened.file, .data = screened.data});
     absl::StatusOr<KnownTest> known =
         runs.ok() ? runs->Learn() : absl::StatusOr<KnownTest>(runs.status());
     if (absl::IsCancelled(known.status())) return known.status();
     const std::string words = InWords(screened.experiment);
     if (!known.ok()) {
-      plan_.warnings.push_back(absl::StrCat("What ", words, " would tell is not known: ",
-                                            known.status().message(), "."));
+      plan_.warnings.push_back(absl::StrCat(
+          "What ", words, " would tell is not known: ", known.status().message(), "."));
       return absl::OkStatus();
     }
     evaluations_ += runs->runs();
     if (!known->holds) {
-      plan_.warnings.push_back(
-          absl::StrCat("What ", words, " would tell cannot be promised: an emulator of ",
-                       runs->runs(), " runs of it does not predict them."));
+      plan_.warnings.push_back(absl::StrCat("What ", words,
+                                            " would tell cannot be promised: an emulator of ",
+                                            runs->runs(), " runs of it does not predict them."));
       return absl::OkStatus();
     }
-    ASSIGN_OR_RETURN(const inference::Forecast forecast,
-                     ForecastOf(answered_, {.set = known->known.set.get(),
-                                            .measured = {},
-                                            .columns = leading_.columns}));
+    ASSIGN_OR_RETURN(
+        const inference::Forecast forecast,
+        ForecastOf(answered_,
+                   {.set = known->known.set.get(), .measured = {}, .columns = leading_.columns}));
     Forecasted(forecast, static_cast<int>(runs->runs()), screened.experiment);
     return absl::OkStatus();
   }

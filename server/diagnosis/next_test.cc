@@ -18,8 +18,8 @@ using Eigen::Index;
 using inference::DesignPoints;
 using inference::ModelEvidence;
 
-constexpr double kHeld = 0.99;       // by the models that a next measurement is to tell apart
-constexpr int kFewestOfEach = 3;     // runs of a leading model: one more than an emulator asks for
+constexpr double kHeld = 0.99;        // by the models that a next measurement is to tell apart
+constexpr int kFewestOfEach = 3;      // runs of a leading model: one more than an emulator asks for
 constexpr Index kMoreThanPlane = 10;  // runs without effects, as StageCoordinates::Fit asks
 
 const ModelEvidence& EvidenceOf(const AnsweredDesign& answered, Index model) {
@@ -171,10 +171,9 @@ absl::StatusOr<KnownTest> LearnTest(const AnsweredDesign& answered, const Leadin
 bool LeftOutHolds(const inference::FeatureEmulator& emulator) {
   constexpr double kInside = 0.9, kNormalQuantile = 1.6449;  // of 0.95
   const inference::LeftOutRuns& left = emulator.left_out();
-  const double inside =
-      (left.error.array().abs() <= kNormalQuantile * left.variance.array().sqrt())
-          .cast<double>()
-          .mean();
+  const double inside = (left.error.array().abs() <= kNormalQuantile * left.variance.array().sqrt())
+                            .cast<double>()
+                            .mean();
   return inside >=
          kInside - 2 * std::sqrt(kInside * (1 - kInside) / static_cast<double>(left.error.rows()));
 }
@@ -188,7 +187,8 @@ absl::StatusOr<KnownTest> LearnRepeat(const AnsweredDesign& answered,
   const inference::SetRuns runs =
       OfExperiment(SetRunsOf(answered.before->base, known.rows, *answered.batches, known.part),
                    answered.before->base.scale, experiment);
-  KnownTest test{.base = WithoutRuns(alone), .known = {.rows = known.rows, .part = known.part, .set = nullptr}};
+  KnownTest test{.base = WithoutRuns(alone),
+                 .known = {.rows = known.rows, .part = known.part, .set = nullptr}};
   RETURN_IF_ERROR(FitTest(runs, test));
   return test;
 }

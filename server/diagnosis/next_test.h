@@ -27,9 +27,9 @@ LeadingModels LeadingOf(const AnsweredDesign& answered);
 
 /// Rows that an emulator of the test is made by: at draws of the leading models some more without
 /// effects than a plane through the base parameters has coefficients (StageCoordinates::Fit), and
-/// kRunsOfTest with the models' own effects, more where models are many. made: rows that there are; with
-/// some, the second number again at other draws. What the test's curves allow to be calculated is
-/// not run.
+/// kRunsOfTest with the models' own effects, more where models are many. made: rows that there are;
+/// with some, the second number again at other draws. What the test's curves allow to be calculated
+/// is not run.
 inline constexpr int kRunsOfTest = 24;
 std::vector<campaign::RunOf> RowsOfTest(const AnsweredDesign& answered,
                                         const LeadingModels& leading, const BaseRuns& test,

@@ -188,7 +188,8 @@ class Planning {
   absl::Status Try(std::vector<PlannedExperiment> wanted) {
     std::vector<Tried> plans;
     std::map<std::string, std::string> files;
-    const std::optional<YamlNode> original = EntryNamed(base_.source.campaign_file(), pattern_.name);
+    const std::optional<YamlNode> original =
+        EntryNamed(base_.source.campaign_file(), pattern_.name);
     if (!original) return absl::OkStatus();
     for (TestPlan& plan : Named(std::move(wanted), numbered_ + 1)) {
       ++numbered_;
@@ -342,11 +343,11 @@ class Planning {
   }
 
   ScreenedPlan Screened(const Tried& tried) const {
-    ScreenedPlan screened{.experiment = tried.plan.experiment,
-                          .entry = tried.entry,
-                          .file = tried.plan.file,
-                          .data = DataOf(tried.plan.experiment, pattern_,
-                                         tried.curves.front().front())};
+    ScreenedPlan screened{
+        .experiment = tried.plan.experiment,
+        .entry = tried.entry,
+        .file = tried.plan.file,
+        .data = DataOf(tried.plan.experiment, pattern_, tried.curves.front().front())};
     for (const Rival& rival : rivals_) {
       if (std::any_of(tried.pairs.begin(), tried.pairs.end(), [&rival](const RivalPair& pair) {
             return pair.power >= kToldApart && (pair.a == rival.name || pair.b == rival.name);

@@ -24,29 +24,28 @@ absl::StatusOr<NextTestRuns> NextTestRuns::Open(client::Laboratory& laboratory,
   derivation.experiments = {test.entry};
   ASSIGN_OR_RETURN(const std::string text,
                    campaign::Derive(base.source.campaign_file(), derivation));
-  ASSIGN_OR_RETURN(report::CampaignView design,
-                   laboratory.Design(base, text, "runs of the next experiment",
-                                     {{test.file, test.data}}));
-  return NextTestRuns(
-      answered, leading,
-      ServerRunMaker(laboratory, std::move(design), answered.known->rows.names()));
+  ASSIGN_OR_RETURN(
+      report::CampaignView design,
+      laboratory.Design(base, text, "runs of the next experiment", {{test.file, test.data}}));
+  return NextTestRuns(answered, leading,
+                      ServerRunMaker(laboratory, std::move(design), answered.known->rows.names()));
 }
 
 absl::StatusOr<KnownTest> NextTestRuns::Learn() {
   for (int number = 0;; ++number) {
     ASSIGN_OR_RETURN(const std::vector<EndedBatch> made, maker_.Batches());
     if (static_cast<int>(made.size()) <= number) {
-      ASSIGN_OR_RETURN(const TestRuns test,
-                       RunsOfTest(maker_.design(), answered_->known->rows, 0));
-      RunBatch batch{.number = number,
-                     .stage = number == 0 ? SamplePurpose::kMain : SamplePurpose::kSequential,
-                     .rows = RowsOfTest(*answered_, *leading_, test.base,
-                                        static_cast<int>(runs()))};
+      ASSIGN_OR_RETURN(const TestRuns test, RunsOfTest(maker_.design(), answered_->known->rows, 0));
+      RunBatch batch{
+          .number = number,
+          .stage = number == 0 ? SamplePurpose::kMain : SamplePurpose::kSequential,
+          .rows = RowsOfTest(*answered_, *leading_, test.base, static_cast<int>(runs()))};
       if (!batch.rows.empty()) {
         ASSIGN_OR_RETURN(const EndedBatch ended, maker_.Make(batch));
       }
     }
-    ASSIGN_OR_RETURN(KnownTest known, LearnTest(*answered_, *leading_, maker_.design(), number + 1));
+    ASSIGN_OR_RETURN(KnownTest known,
+                     LearnTest(*answered_, *leading_, maker_.design(), number + 1));
     if (known.holds || number == 1) return known;
   }
 }

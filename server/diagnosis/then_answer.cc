@@ -65,7 +65,7 @@ std::optional<Eigen::MatrixXd> HistoryOfRepeat(const campaign::Experiment& first
 class SecondInquiry {
  public:
   SecondInquiry(client::Laboratory& laboratory, const report::CampaignView& base,
-           const AnsweredDesign& answered, const MadeMeasurement& made)
+                const AnsweredDesign& answered, const MadeMeasurement& made)
       : laboratory_(laboratory),
         base_(base),
         answered_(answered),
@@ -105,9 +105,8 @@ class SecondInquiry {
 
   absl::Status ReadFile() {
     const bool repeats = !made_.plan.repeats.empty();
-    const campaign::Experiment& pattern = repeats
-                                              ? ExperimentNamed(base_.campaign, made_.plan.repeats)
-                                              : PatternOf(base_.campaign);
+    const campaign::Experiment& pattern =
+        repeats ? ExperimentNamed(base_.campaign, made_.plan.repeats) : PatternOf(base_.campaign);
     const auto original = EntryNamed(base_.source.campaign_file(), pattern.name);
     if (!original) return absl::InternalError("the pattern has no entry in the campaign file");
     PlannedExperiment changed = made_.plan;
@@ -118,11 +117,9 @@ class SecondInquiry {
              .data = made_.content};
     ASSIGN_OR_RETURN(
         const std::string text,
-        campaign::Derive(base_.source.campaign_file(),
-                         {.name = "next",
-                                              .lineage = {},
-                                              .held_out = false,
-                                              .experiments = {test_.entry}}));
+        campaign::Derive(
+            base_.source.campaign_file(),
+            {.name = "next", .lineage = {}, .held_out = false, .experiments = {test_.entry}}));
     auto read = laboratory_.Read(base_, text, {{test_.file, test_.data}});
     if (!read.ok()) return NotPlanned(std::string(read.status().message()));
     measured_ = *std::move(read);
@@ -133,11 +130,9 @@ class SecondInquiry {
   // The sets of the new measurement, and what they share with the first ones.
   absl::Status LearnSets() {
     if (!made_.plan.repeats.empty()) {
-      ASSIGN_OR_RETURN(KnownTest known,
-                       LearnRepeat(answered_, base_.campaign, made_.plan.repeats));
-      const auto history =
-          HistoryOfRepeat(ExperimentNamed(base_.campaign, made_.plan.repeats), known.base.scale,
-                          measured_);
+      ASSIGN_OR_RETURN(KnownTest known, LearnRepeat(answered_, base_.campaign, made_.plan.repeats));
+      const auto history = HistoryOfRepeat(ExperimentNamed(base_.campaign, made_.plan.repeats),
+                                           known.base.scale, measured_);
       if (history) {
         const inference::DiagnosisSet* set = known.known.set.get();
         history_ = history->row(0);
@@ -188,7 +183,8 @@ class SecondInquiry {
   double ChanceInTest(const inference::ModelEvidence& model) const {
     if (model.draws.rows() == 0) return 0;
     // Its parameters were free in the first tests.
-    return ChanceOfMisfit(*known_->known.set, history_, inference::ColumnsOf(model.draws, columns_), 0);
+    return ChanceOfMisfit(*known_->known.set, history_, inference::ColumnsOf(model.draws, columns_),
+                          0);
   }
 
   // Of fresh runs of what would be named, with those of the design; none: nothing would be.
@@ -198,8 +194,7 @@ class SecondInquiry {
       if (own.alone) question.named.push_back(own.effect);
     }
     if (question.named.empty()) return VerificationChances();
-    const std::vector<VerifiedModel> models =
-        ModelsToVerify(*answered_.known, asked_, question);
+    const std::vector<VerifiedModel> models = ModelsToVerify(*answered_.known, asked_, question);
     RETURN_IF_ERROR(OpenRuns());
     ASSIGN_OR_RETURN(auto chances, runs_->Verify(*known_, models));
     if (answered_.verification) {

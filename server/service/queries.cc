@@ -103,7 +103,7 @@ void CountSamples(const store::CampaignRecord& record,
 
 /// Samples of the last iteration, or rows of the last batch of a design.
 int SamplesOfLast(const store::CampaignRecord& record,
-                const std::vector<EvaluationRecord>& evaluations) {
+                  const std::vector<EvaluationRecord>& evaluations) {
   std::set<int> rows;
   for (const EvaluationRecord& evaluation : evaluations) {
     if (evaluation.key.sample / record.submitted.samples == record.progress.iteration) {

@@ -62,8 +62,8 @@ void Declare(OptionList& list, DiagnoseOptions& options) {
             "whose runs serve this one too");
   list.Flag("--no-plan", options.no_plan,
             "proposes no next experiment, which takes runs of its own");
-  const Option gate =
-      list.Flag("--gate", options.gate, "adequate or not, by the runs that are there; tries no effect");
+  const Option gate = list.Flag("--gate", options.gate,
+                                "adequate or not, by the runs that are there; tries no effect");
   list.Text("--then", options.then,
             "file of the proposed measurement, once it is made: the answer with both")
       .Excludes(gate);
@@ -78,8 +78,7 @@ absl::StatusOr<diagnosis::MadeMeasurement> MadeOf(client::Client& client,
   const std::string name = std::filesystem::path(options.then).filename().string();
   auto content = campaign::DiskReader(options.then)(name);
   if (!content.ok())
-    return absl::InvalidArgumentError(
-        absl::StrCat(options.then, ": ", content.status().message()));
+    return absl::InvalidArgumentError(absl::StrCat(options.then, ": ", content.status().message()));
   ASSIGN_OR_RETURN(const auto findings, client.Findings(options.campaign));
   nlohmann::json found;
   std::int64_t newest = -1;
@@ -93,15 +92,16 @@ absl::StatusOr<diagnosis::MadeMeasurement> MadeOf(client::Client& client,
   }
   if (newest < 0)
     return absl::FailedPreconditionError(
-        absl::StrCat("no measurement has been proposed for ", options.campaign, "; `calibctl "
-                     "diagnose ", options.campaign, "` does where the model is not adequate"));
+        absl::StrCat("no measurement has been proposed for ", options.campaign,
+                     "; `calibctl "
+                     "diagnose ",
+                     options.campaign, "` does where the model is not adequate"));
   const nlohmann::json& considered = found["next_experiment"]["considered"];
   const int number = options.plan.value_or(0);
   if (!considered.is_array() || number < 0 || number >= static_cast<int>(considered.size()))
     return absl::InvalidArgumentError(
         absl::StrCat("--plan ", number, ": ", considered.size(), " were considered, from 0 on"));
-  ASSIGN_OR_RETURN(auto plan,
-                   diagnosis::PlannedFrom(considered[static_cast<std::size_t>(number)]));
+  ASSIGN_OR_RETURN(auto plan, diagnosis::PlannedFrom(considered[static_cast<std::size_t>(number)]));
   // Asked as it was then.
   if (question.without.empty()) question.without = found.value("without", question.without);
   if (question.design.empty())

@@ -116,9 +116,19 @@ class Impacts : public Diagnosis {
   // What is found from a measurement that an effect takes part in, of a model without it.
   Json Found(const std::string& effect, const std::string& strength, const std::string& readings,
              const std::string& control, const std::string& setting, int samples) {
-    const auto campaign = [&](const std::string& effects, const std::string& fixed) {
-      return "name: impacts\nmodel: {contact: hertz_mindlin, effects: [" + effects +
-             "], density: 2500 kg/m^3, fixed: {poisson_ratio: 0.25" + fixed + R"(}}
+    Measure(effect, strength, readings, control, setting, samples, "wall.csv");
+    Write("model.yaml", Campaign("", "", control, setting, samples, "wall.csv"));
+    EXPECT_EQ(Call("run model.yaml --state s --workers 2 --json").code, 0) << Read("err");
+    const Answer answer = Call("diagnose c1 --state s --workers 2 --json");
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    return answer.json();
+  }
+
+  static std::string Campaign(const std::string& effects, const std::string& fixed,
+                              const std::string& control, const std::string& setting, int samples,
+                              const std::string& file) {
+    return "name: impacts\nmodel: {contact: hertz_mindlin, effects: [" + effects +
+           "], density: 2500 kg/m^3, fixed: {poisson_ratio: 0.25" + fixed + R"(}}
 parameters:
   young_modulus: {prior: log_uniform, min: 0.02 GPa, max: 1 GPa}
   friction_coefficient: {prior: uniform, min: 0.05, max: 1}
@@ -127,33 +137,47 @@ experiments:
     test: collision
     radius: 5 mm
     )" + setting +
-             R"(
-    data: {file: wall.csv}
+           R"(
+    data: {file: )" +
+           file + R"(}
     control: )" +
-             control + R"(
+           control + R"(
     observables:
       normal_restitution: {noise: {absolute: 0.01}}
       tangential_restitution: {noise: {absolute: 0.01}}
       contact_duration: {noise: {relative: 0.01}}
 inference: {method: iterative_bayesian_filter, max_iterations: 3, samples: )" +
-             std::to_string(samples) + "}\nseed: 5\n";
-    };
+           std::to_string(samples) + "}\nseed: 5\n";
+  }
+
+  // A file as an effect of this strength makes it.
+  void Measure(const std::string& effect, const std::string& strength, const std::string& readings,
+               const std::string& control, const std::string& setting, int samples,
+               const std::string& file) {
     std::string table = control + ",normal_restitution,tangential_restitution,contact_duration\n";
     for (const std::string& at : std::vector<std::string>(absl::StrSplit(readings, ' '))) {
       table += at + ",1,1,1\n";
     }
-    Write("wall.csv", table);
-    Write("truth.yaml", campaign(effect, ", " + effect + "." + strength));
+    Write(file, table);
+    Write("truth.yaml",
+          Campaign(effect, ", " + effect + "." + strength, control, setting, samples, file));
     EXPECT_EQ(Call("simulate truth.yaml --set young_modulus='0.2 GPa' --set "
-                   "friction_coefficient=0.3 -o wall.csv")
+                   "friction_coefficient=0.3 -o " +
+                   file)
                   .code,
               0)
         << Read("err");
-    Write("model.yaml", campaign("", ""));
-    EXPECT_EQ(Call("run model.yaml --state s --workers 2 --json").code, 0) << Read("err");
-    const Answer answer = Call("diagnose c1 --state s --workers 2 --json");
-    EXPECT_EQ(answer.code, 0) << answer.err;
-    return answer.json();
+  }
+
+  // What a proposal measures where that dashpot acts.
+  void MeasureProposal(const Json& planned, const std::string& file) {
+    std::string settings, readings;
+    for (const auto& [name, value] : planned["settings"].items()) {
+      if (name != "radius")
+        settings += (settings.empty() ? "" : "\n    ") + name + ": " + value.dump();
+    }
+    for (const Json& at : planned["path"]) readings += (readings.empty() ? "" : " ") + at.dump();
+    Measure("viscous_damping", "ratio: 0.1", readings, planned["control"], settings, 24, file);
   }
 };
 
@@ -168,6 +192,35 @@ TEST_F(Impacts, ADashpotIsFound) {
   const Json& first = json["candidates"][0];
   ASSERT_EQ(first["effect"], "viscous_damping") << json["sentence"];
   EXPECT_NEAR(first["amplitude"]["viscous_damping.ratio"].get<double>(), 0.1, 0.01);
+
+  // The measurement that is proposed, made and told.
+  ASSERT_TRUE(json["next_experiment"].is_object()) << json["warnings"];
+  MeasureProposal(json["next_experiment"], "next.csv");
+  const std::string then = "diagnose c1 --state s --workers 2 --json --then ";
+  const Answer told = Call(then + "next.csv");
+  ASSERT_EQ(told.code, 0) << told.err;
+  const Json both = told.json();
+  EXPECT_EQ(both["then"]["file"], "next.csv");
+  EXPECT_EQ(both["next_experiment"], nullptr);
+  EXPECT_EQ(both["candidates"][0]["effect"], "viscous_damping") << both["sentence"];
+  EXPECT_NE(both["verdict"], "unexplained") << both["sentence"];
+  EXPECT_LE(both["credible_set"].size(), json["credible_set"].size()) << both["sentence"];
+  const auto evaluations = Evaluations();
+  EXPECT_EQ(Call(then + "next.csv").out, told.out) << "asked again";
+  EXPECT_EQ(Evaluations(), evaluations);
+
+  // Another measurement is none of the proposed test, and changes nothing.
+  Write("short.csv", Read("wall.csv").substr(0, Read("wall.csv").find('\n', 120) + 1));
+  const Answer other = Call(then + "short.csv");
+  EXPECT_EQ(other.code, 2) << other.out;
+  EXPECT_NE(other.err.find("short.csv is not the proposed test"), std::string::npos) << other.err;
+  const Answer none = Call(then + "nowhere.csv");
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.err.find("nowhere.csv: no such file"), std::string::npos) << none.err;
+  const Answer many = Call(then + "next.csv --plan 99");
+  EXPECT_EQ(many.code, 2);
+  EXPECT_NE(many.err.find("--plan 99"), std::string::npos) << many.err;
+  EXPECT_EQ(Evaluations(), evaluations);
 }
 
 using ImpactsSlow = Impacts;
@@ -337,11 +390,16 @@ TEST_F(Misfit, ATestThatCannotBePreparedIsLeftOutOfTheNextOnes) {
   ASSERT_TRUE(json["next_experiment"].is_object()) << json["warnings"];
   const Json& considered = json["next_experiment"]["considered"];
   EXPECT_GE(considered.size(), 3U) << considered;
+  int repeats = 0, forecasts = 0;
   for (const Json& planned : considered) {
     EXPECT_LT(planned["settings"].value("porosity", 0.0), 0.43) << considered;
     EXPECT_GT(planned["cost"]["core_seconds_per_evaluation"].get<double>(), 0) << planned;
+    repeats += planned["repeat_of"].is_null() ? 0 : 1;
+    forecasts += planned["forecast"].is_null() ? 0 : 1;
   }
-  EXPECT_GT(json["next_experiment"]["points"], 1) << json["next_experiment"];
+  EXPECT_EQ(repeats, 1) << "of the fitted test, on another specimen";
+  EXPECT_GE(forecasts, 2) << considered;
+  EXPECT_FALSE(json["next_experiment"]["forecast"].is_null());
   const std::string snippet = json["next_experiment"]["snippet"];
   EXPECT_NE(snippet.find("# Control: axial strain to "), std::string::npos) << snippet;
 }

@@ -272,10 +272,10 @@ TEST(DiagnosisText, TheNextExperimentComesWithWhatItTellsApart) {
   EXPECT_EQ(read["none_of_these"], json::object({{"distance_sd", 4.0}, {"expected_power", 0.85}}));
   EXPECT_EQ(read["snippet"], "  - name: next1\n");
   EXPECT_EQ(read["path"], json::array({0.01, 0.1}));
-  EXPECT_EQ(read["forecast"], json::object({{"decides", 0.9},
-                                            {"names_wrong", 0.001},
-                                            {"told_apart_bits", 0.75},
-                                            {"runs", 43}}));
+  EXPECT_EQ(
+      read["forecast"],
+      json::object(
+          {{"decides", 0.9}, {"names_wrong", 0.001}, {"told_apart_bits", 0.75}, {"runs", 43}}));
   ASSERT_EQ(read["considered"].size(), 3U);
   EXPECT_EQ(read["considered"][0]["repeat_of"], nullptr);
   EXPECT_EQ(read["considered"][1]["repeat_of"], "low");

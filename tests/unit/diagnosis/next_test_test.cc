@@ -82,8 +82,8 @@ TEST_F(NextTest, ARepeatIsToldByItsOwnTestAndTellsLessThanItHasTo) {
     ASSERT_TRUE(repeat.ok()) << repeat.status();
     EXPECT_EQ(repeat->base.scale.curves().size(), 2U) << "the curves of one test of two";
     EXPECT_TRUE(repeat->holds);
-    const auto forecast = ForecastOf(
-        answered, {.set = repeat->known.set.get(), .measured = repeat->known.z});
+    const auto forecast =
+        ForecastOf(answered, {.set = repeat->known.set.get(), .measured = repeat->known.z});
     ASSERT_TRUE(forecast.ok()) << forecast.status();
     EXPECT_GE(forecast->information, -3 * forecast->error);
     EXPECT_GE(forecast->decided, forecast->named_right);
@@ -104,12 +104,11 @@ TEST(LeftOutHolds, IsWhetherIntervalsHoldWhatTheySay) {
     y(i, 0) = base(i, 0) + stream.Normal();
   }
   const inference::EffectFeatures line(1, {}, 1);
-  inference::EmulatorData data{.points = {.base = base,
-                                          .strength = Eigen::MatrixXd(40, 0),
-                                          .shape = Eigen::MatrixXd(40, 0)},
-                               .packing = std::vector<int>(40, 0),
-                               .outputs = y,
-                               .differences = {}};
+  inference::EmulatorData data{
+      .points = {.base = base, .strength = Eigen::MatrixXd(40, 0), .shape = Eigen::MatrixXd(40, 0)},
+      .packing = std::vector<int>(40, 0),
+      .outputs = y,
+      .differences = {}};
   const auto good = inference::FeatureEmulator::Fit(line, data);
   ASSERT_TRUE(good.ok()) << good.status();
   EXPECT_TRUE(LeftOutHolds(*good));

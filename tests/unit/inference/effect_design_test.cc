@@ -120,8 +120,7 @@ TEST_F(EffectDesign, ATestOfFewerEffectsTellsItsOwnModelsApart) {
   errors.specimen = emulator->specimen();
   const DiagnosisSet one(*std::move(emulator), std::move(errors));
   const ProposedMeasurement proposed{.set = &one, .columns = PointColumns{.strength = {0}}};
-  const auto alone =
-      ExpectedInformation(proposed, Two(Point(0.1, 3, 0), Point(0.1, 0, 3)), Even());
+  const auto alone = ExpectedInformation(proposed, Two(Point(0.1, 3, 0), Point(0.1, 0, 3)), Even());
   ASSERT_TRUE(alone.ok()) << alone.status();
   EXPECT_NEAR(alone->information, 0, 1e-12);
   EXPECT_THAT(ExpectedInformation({.set = &one}, Two(Point(0.1, 3, 0), Point(0.1, 0, 3)), Even())

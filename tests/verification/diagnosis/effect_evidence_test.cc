@@ -270,14 +270,14 @@ TEST_F(EffectEvidence, RepeatOfAMeasuredTestCountsTheFirstOnce) {
 TEST_F(EffectEvidence, AnotherTestMayKnowFewerEffects) {
   CoordinateToy other({.parameters = 1, .effects = 1, .coordinates = 3, .seed = 8});
   const DiagnosisSet second = SetOf(other, other.Runs(16, 16, 4));
-  const Eigen::VectorXd z = other.Mean({.base = Eigen::MatrixXd{{0.3}},
-                                        .strength = Eigen::MatrixXd{{1.5}},
-                                        .shape = Eigen::MatrixXd(1, 0)})
+  const Eigen::VectorXd z = other
+                                .Mean({.base = Eigen::MatrixXd{{0.3}},
+                                       .strength = Eigen::MatrixXd{{1.5}},
+                                       .shape = Eigen::MatrixXd(1, 0)})
                                 .row(0);
   ModelSpace space = ToySpace(toy_);
   const std::vector<MeasuredSet> measured = {
-      {.set = &set_, .z = z_},
-      {.set = &second, .z = z, .columns = PointColumns{.strength = {0}}}};
+      {.set = &set_, .z = z_}, {.set = &second, .z = z, .columns = PointColumns{.strength = {0}}}};
   EXPECT_THAT(ModelEvidences(measured, space).status().message(),
               HasSubstr("a model has effect 1, which a set's emulator has not"));
   space.models = {{}, {.effects = {0}}};
@@ -287,8 +287,8 @@ TEST_F(EffectEvidence, AnotherTestMayKnowFewerEffects) {
   ASSERT_TRUE(joint.ok() && first.ok()) << joint.status();
   for (std::size_t i = 0; i < 2; ++i) {
     const DesignPoints draws = ColumnsOf((*first)[i].draws, measured[1].columns);
-    const double gain = LogSumExp(second.LogDensity(z, draws)) -
-                        std::log(static_cast<double>(draws.rows()));
+    const double gain =
+        LogSumExp(second.LogDensity(z, draws)) - std::log(static_cast<double>(draws.rows()));
     EXPECT_NEAR((*joint)[i].evidence.log_evidence - (*first)[i].evidence.log_evidence, gain, 0.1);
   }
 }
