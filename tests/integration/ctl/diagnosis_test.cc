@@ -441,7 +441,8 @@ TEST_F(Misfit, AParentOfOneIterationIsImprovedToo) {
       Among({"rolling_resistance", "contact_plasticity", "initial_density", "load_cell_error"}));
   ASSERT_EQ(improved.code, 0) << improved.err;
   EXPECT_EQ(improved.json()["steps"].size(), 2U) << improved.out;
-  // As much again is as many samples; of all that were made the closest is kept.
+  // Few samples an iteration, since the diagnosis knows where; of all that were made the closest
+  // is kept.
   const auto of = [this](const std::string& verb, const std::string& campaign) {
     return Call(verb + " " + campaign + " --state s --json").json();
   };
@@ -455,7 +456,7 @@ TEST_F(Misfit, AParentOfOneIterationIsImprovedToo) {
       EXPECT_GE(of("compare", id)["rms_error"], of("compare", kept)["rms_error"]) << id;
     }
   }
-  EXPECT_EQ(most_samples, 3 * 36) << improved.out;
+  EXPECT_LE(most_samples, 5 * 5) << "five for each parameter, of which an effect has up to three";
 }
 
 // No verdict without support: two readings for two parameters.
