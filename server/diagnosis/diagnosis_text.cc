@@ -118,7 +118,6 @@ Json CandidateJson(const Answer& answer, const EffectAnswer& own) {
 Json NextJson(const std::optional<NextExperiment>& next) {
   if (!next) return nullptr;
   Json json = PlannedJson(next->best);
-  json["in_words"] = InWords(next->best);
   json["separates"] = next->separates;
   json["snippet"] = next->snippet;
   json["model_evaluations"] = next->evaluations;

@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "server/diagnosis/plan_words.h"
+
 namespace calib::diagnosis {
 namespace {
 
@@ -23,6 +25,7 @@ nlohmann::json PlannedJson(const PlannedExperiment& planned) {
   using nlohmann::json;
   return {{"test", planned.test},
           {"repeat_of", planned.repeats.empty() ? json(nullptr) : json(planned.repeats)},
+          {"in_words", InWords(planned)},
           {"settings", planned.settings},
           {"unloading", planned.unloading_at.has_value()},
           {"unloading_at", NumberOrNull(planned.unloading_at)},

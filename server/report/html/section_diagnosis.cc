@@ -75,8 +75,25 @@ std::string Detectable(const StoredDiagnosis& d) {
   return html + "</ul>\n";
 }
 
+// What each measurement is expected to tell.
+std::string ProposalsHtml(const StoredDiagnosis& d) {
+  std::string html =
+      "<h3>Next experiment</h3>\n<div class=\"scroll\"><table><tr><th class=\"l\">measurement</th>"
+      "<th>one answer, and right</th><th>tells [bits]</th></tr>\n";
+  for (const StoredProposal& own : d.proposals) {
+    html += fmt::format("<tr><td class=\"l wide\">{}</td><td>{}</td><td>{}</td></tr>\n",
+                        Escape(own.in_words), Percent(std::min(own.decides, 0.999), 3),
+                        Number(own.bits, 2));
+  }
+  return html +
+         "</table></div>\n<p class=\"sub\">By runs of each test at what the models that lead "
+         "leave open; the first for the campaign file:</p>\n<pre>" +
+         Escape(d.next_experiment) + "</pre>\n";
+}
+
 std::string NextExperimentHtml(const StoredDiagnosis& d) {
   if (d.next_experiment.empty()) return "";
+  if (!d.proposals.empty()) return ProposalsHtml(d);
   std::string names;
   for (const std::string& name : d.next_separates) {
     names += (names.empty() ? "" : " and ") + NameForPeople(name);

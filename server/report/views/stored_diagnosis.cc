@@ -87,6 +87,22 @@ TriedEffect ReadTried(const Json& json) {
   return tried;
 }
 
+std::vector<StoredProposal> ReadProposals(const Json& next) {
+  std::vector<StoredProposal> proposals;
+  const auto considered = next.find("considered");
+  if (considered == next.end() || !considered->is_array()) return proposals;
+  for (const Json& planned : *considered) {
+    if (!planned.is_object()) continue;
+    const auto forecast = planned.find("forecast");
+    if (forecast == planned.end() || !forecast->is_object()) continue;
+    StoredProposal& own = proposals.emplace_back();
+    Read(planned, "in_words", own.in_words);
+    Read(*forecast, "decides", own.decides);
+    Read(*forecast, "told_apart_bits", own.bits);
+  }
+  return proposals;
+}
+
 }  // namespace
 
 absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& text) {
@@ -143,6 +159,7 @@ absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& text) {
     Read(*next, "in_words", d.next_in_words);
     Read(*next, "separates", d.next_separates);
     Read(*next, "expected_power", d.next_power);
+    d.proposals = ReadProposals(*next);
     if (const auto pairs = next->find("not_separated"); pairs != next->end()) {
       for (const Json& pair : *pairs) {
         if (pair.is_array() && pair.size() == 2 && pair[0].is_string() && pair[1].is_string()) {
@@ -151,6 +168,8 @@ absl::StatusOr<StoredDiagnosis> ReadDiagnosis(const std::string& text) {
       }
     }
   }
+  if (const auto then = json.find("then"); then != json.end() && then->is_object())
+    Read(*then, "file", d.then_file);
   return d;
 }
 
@@ -161,7 +180,7 @@ const StoredDiagnosis* LatestOf(const std::vector<StoredDiagnosis>& diagnoses,
     if (d.campaign != campaign) continue;
     const bool says_less = latest != nullptr && d.verdict == latest->verdict &&
                            d.chi2 == latest->chi2 && d.next_experiment.empty() &&
-                           !latest->next_experiment.empty();
+                           d.then_file == latest->then_file && !latest->next_experiment.empty();
     if (says_less) continue;  // improve asks for no next experiment
     if (latest == nullptr || latest->only_adequacy || !d.only_adequacy) latest = &d;
   }

@@ -50,6 +50,13 @@ struct TriedEffect {
   std::optional<double> advantage_nats{};  ///< gain of the refit over the model without the effect
 };
 
+/// A measurement that could be made next.
+struct StoredProposal {
+  std::string in_words{};
+  double decides = 0;  ///< probability of one answer, and that it is right
+  double bits = 0;     ///< expected about which model is right
+};
+
 struct StoredDiagnosis {
   std::string campaign{};
   std::string digest{};  ///< SHA-256 of the document
@@ -84,6 +91,10 @@ struct StoredDiagnosis {
   std::vector<std::string> next_separates{};
   double next_power = 0;
   std::vector<std::pair<std::string, std::string>> next_together{};  ///< that it does not separate
+  /// What was foretold by runs, best first, the next experiment the first of them; empty in records
+  /// of earlier rules.
+  std::vector<StoredProposal> proposals{};
+  std::string then_file{};  ///< of a further measurement that the answer knows; empty: of none
 };
 
 /// INVALID_ARGUMENT when the text is no such document; fields of other versions are left out.

@@ -228,6 +228,33 @@ TEST(StoredDiagnosis, TheLatestThatTriedEffectsIsShown) {
   EXPECT_EQ(LatestOf(kept, "c1"), &kept[1]);
   kept.push_back(make("ambiguous", false, ""));
   EXPECT_EQ(LatestOf(kept, "c1"), &kept[4]);
+  kept.push_back(make("ambiguous", false, "- name: next"));
+  kept.push_back(make("ambiguous", false, ""));
+  EXPECT_EQ(LatestOf(kept, "c1"), &kept[5]);
+  kept.back().then_file = "next.csv";
+  EXPECT_EQ(LatestOf(kept, "c1"), &kept[6]) << "it knows another measurement";
+}
+
+TEST(Report, ShowsWhatEachMeasurementIsExpectedToTell) {
+  const CampaignView view = testing::ExampleView("sand");
+  auto diagnosis = ReadDiagnosis(R"json({
+    "campaign": "c1", "verdict": "ambiguous", "sentence": "One of these two.",
+    "probabilities": [{"effects": ["a"], "probability": 1}],
+    "then": {"file": "again.csv"},
+    "next_experiment": {"snippet": "  - name: next\n", "expected_power": 0.8, "considered": [
+      {"in_words": "oedometric <one>", "forecast": {"decides": 0.8, "told_apart_bits": 0.75}},
+      {"in_words": "low again", "forecast": {"decides": 0.25, "told_apart_bits": 0.125}},
+      {"in_words": "not run", "forecast": null}]}})json");
+  ASSERT_TRUE(diagnosis.ok()) << diagnosis.status();
+  EXPECT_EQ(diagnosis->then_file, "again.csv");
+  Story story;
+  story.known = true;
+  story.diagnoses = {*diagnosis};
+  const std::string html = RenderReport(view, story);
+  EXPECT_THAT(html, HasSubstr("oedometric &lt;one&gt;</td><td>80 %</td><td>0.75</td>"));
+  EXPECT_THAT(html, HasSubstr("low again</td><td>25 %</td><td>0.12</td>"));
+  EXPECT_THAT(html, Not(HasSubstr("not run")));
+  EXPECT_THAT(html, HasSubstr("<pre>  - name: next"));
 }
 
 TEST(StoredDiagnosis, AnotherDocumentIsRefused) {
