@@ -168,6 +168,10 @@ class Choice {
       return absl::OkStatus();
     }
     evaluations_ += runs->runs();
+    if (!known->unknown.empty())
+      plan_.warnings.push_back(
+          absl::StrCat("What ", words, " would tell of ", absl::StrJoin(known->unknown, ", "),
+                       " is not known: too few of its runs with it come to their ends."));
     if (!known->holds) {
       plan_.warnings.push_back(absl::StrCat("What ", words,
                                             " would tell cannot be promised: an emulator of ",
@@ -177,7 +181,7 @@ class Choice {
     ASSIGN_OR_RETURN(
         const inference::Forecast forecast,
         ForecastOf(answered_,
-                   {.set = known->known.set.get(), .measured = {}, .columns = leading_.columns}));
+                   {.set = known->known.set.get(), .measured = {}, .columns = known->columns}));
     Forecasted(forecast, static_cast<int>(runs->runs()), screened.experiment);
     return absl::OkStatus();
   }

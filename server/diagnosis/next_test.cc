@@ -19,6 +19,7 @@ using inference::DesignPoints;
 using inference::ModelEvidence;
 
 constexpr double kHeld = 0.99;        // by the models that a next measurement is to tell apart
+constexpr int kFewestWithEffect = 2;  // runs, as FeatureEmulator::Fit asks
 constexpr int kFewestOfEach = 3;      // runs of a leading model: one more than an emulator asks for
 constexpr Index kMoreThanPlane = 10;  // runs without effects, as StageCoordinates::Fit asks
 
@@ -69,6 +70,22 @@ DesignRows RowsFor(const AnsweredDesign& answered, const BaseRuns& test) {
   return {rows.axes(), std::move(race), rows.unit()};
 }
 
+// Columns of these entries among those of points of the kept ones.
+inference::PointColumns ColumnsOfEntries(const Knowledge& known, const std::vector<int>& entries) {
+  inference::PointColumns columns;
+  Index place = 0, shape = 0;
+  for (const int entry : known.part.kept) {
+    const int shapes = known.rows.race().effects[static_cast<std::size_t>(entry)].design.shapes;
+    if (std::count(entries.begin(), entries.end(), entry) > 0) {
+      columns.strength.push_back(place);
+      for (int h = 0; h < shapes; ++h) columns.shape.push_back(shape + h);
+    }
+    ++place;
+    shape += shapes;
+  }
+  return columns;
+}
+
 absl::Status FitTest(const inference::SetRuns& runs, KnownTest& test) {
   ASSIGN_OR_RETURN(inference::DiagnosisSet set, inference::DiagnosisSet::Fit(runs));
   test.known.set = std::make_shared<const inference::DiagnosisSet>(std::move(set));
@@ -93,19 +110,8 @@ LeadingModels LeadingOf(const AnsweredDesign& answered) {
     const std::vector<int>& effects = EvidenceOf(answered, i).model.effects;
     places.insert(effects.begin(), effects.end());
   }
-  const std::vector<int>& kept = answered.known->part.kept;
-  Index shape = 0;
-  for (int place = 0; place < static_cast<int>(kept.size()); ++place) {
-    const int entry = kept[static_cast<std::size_t>(place)];
-    const int shapes =
-        answered.known->rows.race().effects[static_cast<std::size_t>(entry)].design.shapes;
-    if (places.count(place) > 0) {
-      leading.part.kept.push_back(entry);
-      leading.columns.strength.push_back(place);
-      for (int h = 0; h < shapes; ++h) leading.columns.shape.push_back(shape + h);
-    }
-    shape += shapes;
-  }
+  for (const int place : places)
+    leading.part.kept.push_back(answered.known->part.kept[static_cast<std::size_t>(place)]);
   return leading;
 }
 
@@ -162,7 +168,17 @@ absl::StatusOr<KnownTest> LearnTest(const AnsweredDesign& answered, const Leadin
   ASSIGN_OR_RETURN(TestRuns runs, RunsOfTest(design, answered.known->rows, batches));
   DesignRows rows = RowsFor(answered, runs.base);
   KnownTest test{.base = std::move(runs.base),
-                 .known = {.rows = std::move(rows), .part = leading.part, .set = nullptr}};
+                 .known = {.rows = std::move(rows), .part = {}, .set = nullptr}};
+  for (const int entry : leading.part.kept) {
+    const RacingEffect& own = test.known.rows.race().effects[static_cast<std::size_t>(entry)];
+    if (own.design.calculated ||
+        RunsWith(test.known.rows, runs.batches, entry) >= kFewestWithEffect) {
+      test.known.part.kept.push_back(entry);
+    } else {
+      test.unknown.push_back(own.name);
+    }
+  }
+  test.columns = ColumnsOfEntries(*answered.known, test.known.part.kept);
   RETURN_IF_ERROR(
       FitTest(SetRunsOf(test.base, test.known.rows, runs.batches, test.known.part), test));
   return test;

@@ -19,7 +19,6 @@ namespace calib::diagnosis {
 struct LeadingModels {
   std::vector<Eigen::Index> models{};  ///< among those asked, most probable first
   PartOfRace part{};                   ///< entries that they have
-  inference::PointColumns columns{};   ///< of these, among those of points of the kept entries
 };
 
 /// The most probable models, until they hold 99 %, at most twelve (inference::ForecastOptions).
@@ -38,7 +37,10 @@ std::vector<campaign::RunOf> RowsOfTest(const AnsweredDesign& answered,
 /// What runs of the test say.
 struct KnownTest {
   BaseRuns base;
-  Knowledge known;  ///< of the leading models' entries; z: what its file, or the base's, holds
+  /// Of entries that two runs of the test have; z: what its file, or the base's, holds.
+  Knowledge known;
+  inference::PartOfColumns columns{};  ///< of these entries, among those of points of the kept ones
+  std::vector<std::string> unknown{};  ///< effects of the leading models that too few runs have
   /// Each run is predicted by the others as well as is said (LeftOutHolds).
   bool holds = false;
 };

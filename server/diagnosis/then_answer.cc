@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "calib/return_if_error.h"
 #include "server/campaign/file/derive.h"
 #include "server/diagnosis/next_test.h"
@@ -146,7 +147,11 @@ class SecondInquiry {
     RETURN_IF_ERROR(OpenRuns());
     ASSIGN_OR_RETURN(KnownTest known, runs_->Learn());
     known_.emplace(std::move(known));
-    columns_ = leading_.columns;
+    columns_ = known_->columns;
+    if (!known_->unknown.empty())
+      result_.warnings.push_back(
+          absl::StrCat("Too few runs of the new test with ", absl::StrJoin(known_->unknown, ", "),
+                       " come to their ends: who has them competes no longer."));
     history_ = Eigen::VectorXd::Zero(known_->base.histories.cols());
     if (!known_->holds)
       result_.warnings.push_back(
@@ -174,6 +179,10 @@ class SecondInquiry {
       if (!model.effects.empty() &&
           std::count(leading_.models.begin(), leading_.models.end(), i) == 0)
         continue;
+      const auto is_known = [this](int k) {
+        return !columns_ || std::count(columns_->strength.begin(), columns_->strength.end(), k) > 0;
+      };
+      if (!std::all_of(model.effects.begin(), model.effects.end(), is_known)) continue;
       places.push_back(i);
       further_.models.push_back(model);
     }

@@ -111,6 +111,8 @@ absl::StatusOr<diagnosis::MadeMeasurement> MadeOf(client::Client& client,
 }
 
 absl::StatusOr<int> Diagnose(const CommonOptions& common, const DiagnoseOptions& options) {
+  if (options.plan && options.then.empty())
+    return absl::InvalidArgumentError("--plan: says which proposal the file of --then measures");
   client::CatchInterrupts();
   ASSIGN_OR_RETURN(const auto session, client::Session::Open(common.server));
   client::Laboratory laboratory(*session, common.server);
