@@ -431,6 +431,30 @@ class Records(InAFolder):
         kept.close()
 
 
+    def test_cases_that_the_repository_keeps_are_not_made_again(self):
+        own, kept = self.path('cases.jsonl'), self.path('judged.jsonl.gz')
+        first = records.Records(own, COMMIT)
+        for name in ('b', 'a'):
+            first.add({'case': name})
+        first.close()
+        records.keep(kept, first.all)
+        with open(kept, 'rb') as file:
+            once = file.read()
+        records.keep(kept, first.all[::-1])
+        with open(kept, 'rb') as file:
+            self.assertEqual(file.read(), once)
+        os.remove(own)
+        records.bring(own, kept, 'f' * 40)
+        self.assertFalse(os.path.exists(own), 'cases of other rules')
+        records.bring(own, kept, COMMIT)
+        again = records.Records(own, COMMIT)
+        self.assertEqual(again.done, {'a', 'b'})
+        again.add({'case': 'c'})
+        again.close()
+        records.bring(own, kept, COMMIT)
+        self.assertEqual(len(records.read(own)), 3, 'what is there stays')
+
+
 class Frozen(InAFolder):
 
     def git(self, *arguments):

@@ -1,5 +1,5 @@
 """Finished cases: one line of JSON each, in one file. A line that was cut short by a kill counts for nothing."""
-import fcntl, json, os, threading
+import fcntl, gzip, json, os, threading
 
 
 def read(path):
@@ -15,6 +15,24 @@ def read(path):
         record = json.loads(line)
         found.setdefault((record['commit'], record['case']), record)
     return list(found.values())
+
+
+def keep(path, kept):
+    """Finished cases as a file of the repository: the same records give the same bytes."""
+    text = ''.join(json.dumps(record, sort_keys=True) + '\n' for record in sorted(kept, key=lambda r: r['case']))
+    with open(path, 'wb') as file:
+        file.write(gzip.compress(text.encode(), mtime=0))
+
+
+def bring(path, kept, commit):
+    """Puts cases of the commit that the repository keeps where there are none yet."""
+    if os.path.exists(path) or not os.path.exists(kept):
+        return
+    with gzip.open(kept, 'rt', encoding='utf-8') as file:
+        text = file.read()
+    if all(json.loads(line)['commit'] == commit for line in text.splitlines()):
+        with open(path, 'w', encoding='utf-8') as out:
+            out.write(text)
 
 
 class Records:

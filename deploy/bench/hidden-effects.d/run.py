@@ -5,6 +5,7 @@ import cases, judge, laboratory, layouts, programs, records, strengths, two_ways
 
 ROOT = os.path.abspath(os.path.join(cases.HERE, '..', '..', '..'))
 RESULTS = os.path.join(cases.HERE, 'RESULTS.md')
+KEPT = os.path.join(cases.HERE, 'judged.jsonl.gz')
 
 
 def options_of(arguments):
@@ -21,7 +22,7 @@ def options_of(arguments):
     parser.add_argument('--tune', metavar='SEED', help='other cases, in a file of their own that is never judged')
     parser.add_argument('--list', action='store_true', help='names of the cases and whether they are finished; nothing is run')
     parser.add_argument('--table', action='store_true', help='table of what is finished; nothing is run')
-    parser.add_argument('--results', action='store_true', help='writes the table into RESULTS.md as well; not with --tune')
+    parser.add_argument('--results', action='store_true', help='writes the table into RESULTS.md and the cases into judged.jsonl.gz; not with --tune')
     options = parser.parse_args(arguments)
     if options.tune and options.results:
         parser.error('--results: cases of --tune are not judged')
@@ -90,6 +91,8 @@ def main(arguments=None):
     file = file_of(options, commit)
     os.makedirs(os.path.dirname(file), exist_ok=True)
     try:
+        if not options.tune:
+            records.bring(file, KEPT, commit)
         kept = records.Records(file, commit)
     except ValueError as reason:
         print(f'hidden-effects: {reason}', file=sys.stderr)
@@ -111,6 +114,7 @@ def main(arguments=None):
     print((f'Cases of "{commit}" for tuning, not judged.\n\n' if options.tune else '') + text)
     if options.results:
         judge.write_results(RESULTS, f'Rules frozen at {commit[:12]}.\n\n{text}')
+        records.keep(KEPT, kept.all)
     return 1 if failed else 0
 
 
