@@ -202,7 +202,7 @@ absl::StatusOr<report::CampaignView> Laboratory::Design(
     const std::map<std::string, std::string>& further) {
   ASSIGN_OR_RETURN(const auto campaign, Submit(parent, yaml, what, further));
   ASSIGN_OR_RETURN(const auto status, session_.client().Show(campaign));
-  // Without runs it is queued until the first are added.
+  // Without runs it finishes by itself.
   if (messages::StateOf(status) != CampaignState::kQueued) RETURN_IF_ERROR(Wait(campaign, what));
   return LoadView(session_.client(), campaign);
 }

@@ -32,6 +32,7 @@ constexpr std::array kTransitions = {
     Transition{S::kPaused, E::kFail, S::kFailed},  // the computation that ran when it was paused
     Transition{S::kPaused, E::kFinish, S::kFinished},  // likewise
     Transition{S::kFinished, E::kGrow, S::kRunning},
+    Transition{S::kQueued, E::kGrow, S::kRunning},  // submitted just now: once that has finished
 };
 
 }  // namespace

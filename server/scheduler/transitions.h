@@ -15,7 +15,7 @@ enum class CampaignEvent {
   kCancel,
   kFinish,  ///< nothing is left to be run
   kFail,    ///< no posterior can be computed
-  kGrow,    ///< runs were added to a design that had finished
+  kGrow,    ///< runs were added to a design that had finished, as one without runs does at once
 };
 
 const char* ToString(CampaignEvent event);

@@ -71,7 +71,46 @@ void Declare(OptionList& list, DiagnoseOptions& options) {
                    "which of what was considered that file is, from 0, the best [0]");
 }
 
-// The proposal that the file is a measurement of, as the newest answer with proposals has it.
+// The newest answer that has proposals, as it was kept.
+absl::StatusOr<nlohmann::json> AnswerWithProposals(client::Client& client,
+                                                   const std::string& campaign) {
+  ASSIGN_OR_RETURN(const auto findings, client.Findings(campaign));
+  nlohmann::json newest;
+  std::int64_t when = -1;
+  for (const v1::Finding& finding : findings) {
+    if (finding.kind() != client::kDiagnosis || finding.created_unix_ms() < when) continue;
+    ASSIGN_OR_RETURN(const auto document, client.GetBlob(finding.digest()));
+    auto json = nlohmann::json::parse(document, nullptr, false);
+    if (!json.is_object() || !json["next_experiment"].is_object()) continue;
+    when = finding.created_unix_ms();
+    newest = std::move(json);
+  }
+  if (when < 0)
+    return absl::FailedPreconditionError(absl::StrCat("no measurement has been proposed for ",
+                                                      campaign, "; `calibctl diagnose ", campaign,
+                                                      "` does where the model is not adequate"));
+  return newest;
+}
+
+// One of its proposals; the question becomes the one that was asked then.
+absl::StatusOr<diagnosis::PlannedExperiment> ProposalOf(const nlohmann::json& answer, int number,
+                                                        diagnosis::DiagnosisOptions& question) {
+  try {
+    const nlohmann::json& considered = answer.at("next_experiment").at("considered");
+    if (number >= static_cast<int>(considered.size()))
+      return absl::InvalidArgumentError(
+          absl::StrCat("--plan ", number, ": ", considered.size(), " were considered, from 0 on"));
+    if (question.without.empty()) question.without = answer.value("without", question.without);
+    if (question.design.empty())
+      question.design = answer.at("design").value("borrowed_from", question.design);
+    return diagnosis::PlannedFrom(considered.at(static_cast<std::size_t>(number)));
+  } catch (const nlohmann::json::exception&) {
+    return absl::FailedPreconditionError(
+        "the proposals that are kept are of another build; `calibctl diagnose` makes new ones");
+  }
+}
+
+// The proposal that the file is a measurement of.
 absl::StatusOr<diagnosis::MadeMeasurement> MadeOf(client::Client& client,
                                                   const DiagnoseOptions& options,
                                                   diagnosis::DiagnosisOptions& question) {
@@ -79,33 +118,8 @@ absl::StatusOr<diagnosis::MadeMeasurement> MadeOf(client::Client& client,
   auto content = campaign::DiskReader(options.then)(name);
   if (!content.ok())
     return absl::InvalidArgumentError(absl::StrCat(options.then, ": ", content.status().message()));
-  ASSIGN_OR_RETURN(const auto findings, client.Findings(options.campaign));
-  nlohmann::json found;
-  std::int64_t newest = -1;
-  for (const v1::Finding& finding : findings) {
-    if (finding.kind() != client::kDiagnosis || finding.created_unix_ms() < newest) continue;
-    ASSIGN_OR_RETURN(const auto document, client.GetBlob(finding.digest()));
-    auto json = nlohmann::json::parse(document, nullptr, false);
-    if (!json.is_object() || !json["next_experiment"].is_object()) continue;
-    newest = finding.created_unix_ms();
-    found = std::move(json);
-  }
-  if (newest < 0)
-    return absl::FailedPreconditionError(
-        absl::StrCat("no measurement has been proposed for ", options.campaign,
-                     "; `calibctl "
-                     "diagnose ",
-                     options.campaign, "` does where the model is not adequate"));
-  const nlohmann::json& considered = found["next_experiment"]["considered"];
-  const int number = options.plan.value_or(0);
-  if (!considered.is_array() || number < 0 || number >= static_cast<int>(considered.size()))
-    return absl::InvalidArgumentError(
-        absl::StrCat("--plan ", number, ": ", considered.size(), " were considered, from 0 on"));
-  ASSIGN_OR_RETURN(auto plan, diagnosis::PlannedFrom(considered[static_cast<std::size_t>(number)]));
-  // Asked as it was then.
-  if (question.without.empty()) question.without = found.value("without", question.without);
-  if (question.design.empty())
-    question.design = found["design"].value("borrowed_from", std::string());
+  ASSIGN_OR_RETURN(const nlohmann::json answer, AnswerWithProposals(client, options.campaign));
+  ASSIGN_OR_RETURN(auto plan, ProposalOf(answer, options.plan.value_or(0), question));
   return diagnosis::MadeMeasurement{
       .plan = std::move(plan), .file = name, .content = *std::move(content)};
 }

@@ -200,6 +200,20 @@ TEST(Growth, TheSameBatchIsThereAndAnotherOfItsNumberIsRefused) {
   EXPECT_TRUE(service.Fingerprint() == before);
 }
 
+TEST(Growth, RunsMayBeAddedAsSoonAsTheDesignIsSubmitted) {
+  SimulatedService service("growth_soon");
+  absl::StatusOr<bool> added = absl::UnknownError("no answer");
+  service.Submit(Design(), [&] {
+    service.scheduler().AddRuns(Scout(),
+                                [&added](const absl::StatusOr<bool>& answer) { added = answer; });
+  });
+  ASSERT_TRUE(added.ok()) << added.status();
+  EXPECT_TRUE(*added);
+  EXPECT_EQ(StateOf(service), S::kRunning);
+  service.RunToEnd(1, true);
+  EXPECT_EQ(Value(service.Read().Samples(1)).size(), 3U);
+}
+
 TEST(Growth, TwoWhoAddAtOnceAreAnsweredByTheirContent) {
   SimulatedService service("growth_two");
   service.Submit(Design());

@@ -109,7 +109,8 @@ void SimulatedService::Restart() {
   ports_->Run();
 }
 
-std::string SimulatedService::Submit(const testing::SmallCampaign& campaign) {
+std::string SimulatedService::Submit(const testing::SmallCampaign& campaign,
+                                     const std::function<void()>& answered) {
   std::map<std::string, std::string> digests;
   for (const auto& [path, content] : campaign.files) {
     digests[path] = campaign::Sha256Hex(content);
@@ -127,8 +128,10 @@ std::string SimulatedService::Submit(const testing::SmallCampaign& campaign) {
                       .method = outcome.campaign.method,
                       .samples = LargestIteration(outcome.campaign),
                       .max_iterations = outcome.campaign.max_iterations},
-                     digests, "", {},
-                     [&id](const absl::StatusOr<std::string>& answer) { id = *answer; });
+                     digests, "", {}, [&](const absl::StatusOr<std::string>& answer) {
+                       id = *answer;
+                       if (answered) answered();
+                     });
   ports_->Run();
   return id;
 }

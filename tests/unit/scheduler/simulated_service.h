@@ -66,7 +66,8 @@ class SimulatedService {
 
   /// A new server process on the same file: memory is gone, streams are cut.
   void Restart();
-  std::string Submit(const testing::SmallCampaign& campaign);
+  std::string Submit(const testing::SmallCampaign& campaign,
+                     const std::function<void()>& answered = {});
   absl::StatusOr<bool> AddRuns(const NewRuns& runs);
   std::int64_t Connect(const std::string& worker, int slots,
                        const std::vector<std::int64_t>& held = {});

@@ -18,7 +18,7 @@ constexpr std::array kEvents = {E::kStart,  E::kPause, E::kResume, E::kCancel,
 TEST(Transitions, NothingHappensToACampaignThatIsOverButThatADesignGrows) {
   for (const S state : kStates) {
     for (const E event : kEvents) {
-      if (state == S::kFinished && event == E::kGrow) {
+      if ((state == S::kFinished || state == S::kQueued) && event == E::kGrow) {
         EXPECT_EQ(*Next(state, event), S::kRunning);
       } else if (IsOver(state) || event == E::kGrow) {
         EXPECT_FALSE(Next(state, event).ok()) << ToString(event) << " " << ToString(state);
