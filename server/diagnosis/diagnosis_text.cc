@@ -204,9 +204,10 @@ std::string Sentence(const Diagnosis& d) {
   if (d.then)
     sentence = fmt::format("With {} ({}): {}", d.then->file, InWords(d.then->plan), sentence);
   if (d.next_experiment && d.answer.verdict == AnswerVerdict::kAmbiguous &&
-      d.next_experiment->best.repeats.empty())
+      d.next_experiment->best.repeats.empty()) {
     sentence += fmt::format(" {} would, with probability {}.", InWords(d.next_experiment->best),
                             ChanceInWords(d.next_experiment->best.expected_power));
+  }
   return sentence +
          (d.in_doubt ? " This is in doubt, for what the warnings say of the readings." : "");
 }
@@ -294,9 +295,10 @@ std::string RunsText(const Diagnosis& d) {
   std::string text = fmt::format("{} runs{} in {}, {} model evaluations{}.\n", runs,
                                  stages.empty() ? "" : fmt::format(" ({})", stages), d.design,
                                  d.evaluations, beside);
-  if (d.then && !d.then->campaign.empty())
+  if (d.then && !d.then->campaign.empty()) {
     text += fmt::format("{} runs of {} in {}.\n", d.then->evaluations, InWords(d.then->plan),
                         d.then->campaign);
+  }
   return text;
 }
 

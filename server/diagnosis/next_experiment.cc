@@ -168,10 +168,11 @@ class Choice {
       return absl::OkStatus();
     }
     evaluations_ += runs->runs();
-    if (!known->unknown.empty())
+    if (!known->unknown.empty()) {
       plan_.warnings.push_back(
           absl::StrCat("What ", words, " would tell of ", absl::StrJoin(known->unknown, ", "),
                        " is not known: too few of its runs with it come to their ends."));
+    }
     if (!known->holds) {
       plan_.warnings.push_back(absl::StrCat("What ", words,
                                             " would tell cannot be promised: an emulator of ",

@@ -28,11 +28,12 @@ const ModelEvidence& EvidenceOf(const AnsweredDesign& answered, Index model) {
 }
 
 // `count` draws evenly spread over those of a model; again: between them.
-std::vector<Index> EvenDraws(Index draws, int count, bool again) {
+std::vector<Index> EvenDraws(Index draws, Index count, bool again) {
   std::vector<Index> rows;
-  for (Index i = 0; i < count; ++i)
-    rows.push_back(((2 * i + 1) * draws / (2 * count) + (again ? draws / (2 * count) + 1 : 0)) %
-                   draws);
+  for (Index i = 0; i < count; ++i) {
+    const Index even = (2 * i + 1) * draws / (2 * count);
+    rows.push_back((even + (again ? draws / (2 * count) + 1 : 0)) % draws);
+  }
   return rows;
 }
 

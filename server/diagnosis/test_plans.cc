@@ -181,9 +181,10 @@ std::string DataOf(const PlannedExperiment& planned, const campaign::Experiment&
   for (std::size_t i = 0; i < planned.path.size(); ++i) {
     text += fmt::format("{:.9g}", planned.path[i]);
     // Runs of a table are not compared with readings: at one a relative noise is known.
-    for (std::size_t k = 0; k < pattern.observables.size(); ++k)
+    for (std::size_t k = 0; k < pattern.observables.size(); ++k) {
       text +=
           curves.empty() ? ",1" : fmt::format(",{:.9g}", curves[k][static_cast<Eigen::Index>(i)]);
+    }
     text += "\n";
   }
   return text;

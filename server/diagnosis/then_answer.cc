@@ -148,15 +148,17 @@ class SecondInquiry {
     ASSIGN_OR_RETURN(KnownTest known, runs_->Learn());
     known_.emplace(std::move(known));
     columns_ = known_->columns;
-    if (!known_->unknown.empty())
+    if (!known_->unknown.empty()) {
       result_.warnings.push_back(
           absl::StrCat("Too few runs of the new test with ", absl::StrJoin(known_->unknown, ", "),
                        " come to their ends: who has them competes no longer."));
+    }
     history_ = Eigen::VectorXd::Zero(known_->base.histories.cols());
-    if (!known_->holds)
+    if (!known_->holds) {
       result_.warnings.push_back(
           absl::StrCat("An emulator of ", runs_->runs(),
                        " runs of the new test does not predict them as well as it says."));
+    }
     further_.sets = {{.set = known_->known.set.get(), .z = known_->known.z, .columns = columns_}};
     return absl::OkStatus();
   }

@@ -85,10 +85,11 @@ absl::StatusOr<nlohmann::json> AnswerWithProposals(client::Client& client,
     when = finding.created_unix_ms();
     newest = std::move(json);
   }
-  if (when < 0)
+  if (when < 0) {
     return absl::FailedPreconditionError(absl::StrCat("no measurement has been proposed for ",
                                                       campaign, "; `calibctl diagnose ", campaign,
                                                       "` does where the model is not adequate"));
+  }
   return newest;
 }
 
@@ -97,9 +98,10 @@ absl::StatusOr<diagnosis::PlannedExperiment> ProposalOf(const nlohmann::json& an
                                                         diagnosis::DiagnosisOptions& question) {
   try {
     const nlohmann::json& considered = answer.at("next_experiment").at("considered");
-    if (number >= static_cast<int>(considered.size()))
+    if (number >= static_cast<int>(considered.size())) {
       return absl::InvalidArgumentError(
           absl::StrCat("--plan ", number, ": ", considered.size(), " were considered, from 0 on"));
+    }
     if (question.without.empty()) question.without = answer.value("without", question.without);
     if (question.design.empty())
       question.design = answer.at("design").value("borrowed_from", question.design);

@@ -152,9 +152,10 @@ std::string DiagnosisSection(const ReportData& data) {
   const bool by_earlier_rules = d->probabilities.empty() && !d->only_adequacy;
   std::string html = "<h2>Which effect is missing</h2>\n<p><strong>" +
                      Escape(d->sentence.empty() ? d->verdict : d->sentence) + "</strong></p>\n";
-  if (by_earlier_rules)
+  if (by_earlier_rules) {
     html += "<p>By rules of an earlier build; <code>calibctl diagnose " + Escape(campaign) +
             "</code> asks again.</p>\n";
+  }
   html += fmt::format(
       "<p>Error of the best fit: {} sd; chi-squared {}, of a right model {} are expected "
       "({}).{}</p>\n",
