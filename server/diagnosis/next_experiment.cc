@@ -22,6 +22,7 @@ namespace {
 
 using campaign::YamlNode;
 
+// Each costs some forty runs; the best at first sight may fail its check.
 constexpr int kPlansWithRuns = 2;
 
 constexpr const char* kSnippetHead =
@@ -73,7 +74,7 @@ class Choice {
       plan_.why_none = "one model is certain, and there are no two to tell apart";
       return std::move(plan_);
     }
-    RETURN_IF_ERROR(Repeats());
+    Repeats();
     for (std::size_t i = 0; i < screen.plans.size(); ++i) {
       ScreenedPlan& one = screen.plans[i];
       if (i < kPlansWithRuns) RETURN_IF_ERROR(Run(one));
@@ -84,8 +85,8 @@ class Choice {
     std::stable_sort(proposals_.begin(), proposals_.end(), [](const auto& a, const auto& b) {
       return Told(a.experiment) > Told(b.experiment);
     });
-    const Proposal& best = proposals_.front();
-    if (Told(best.experiment) * std::numbers::ln2 < kDesignCaps.told) {
+    if (proposals_.empty() ||
+        Told(proposals_.front().experiment) * std::numbers::ln2 < kDesignCaps.told) {
       plan_.why_none = absl::StrCat(
           screen.why_none.empty()
               ? fmt::format("of the {} measurements that were tried", proposals_.size())
@@ -93,6 +94,7 @@ class Choice {
           " none is expected to tell these models apart");
       return std::move(plan_);
     }
+    const Proposal& best = proposals_.front();
     NextExperiment next{.best = best.experiment,
                         .separates = best.separates,
                         .snippet = SnippetOf(best),
@@ -131,7 +133,13 @@ class Choice {
     return runs > 0 ? sum / runs : 0;
   }
 
-  absl::Status Repeats() {
+  absl::StatusOr<inference::Forecast> ForecastOfRepeat(const std::string& experiment) const {
+    ASSIGN_OR_RETURN(const KnownTest test, LearnRepeat(answered_, base_.campaign, experiment));
+    return ForecastOf(answered_, {.set = test.known.set.get(), .measured = test.known.z});
+  }
+
+  // One whose test by itself cannot be learnt is left out.
+  void Repeats() {
     for (const campaign::Experiment& experiment : base_.campaign.experiments) {
       if (experiment.role != campaign::Role::kCalibrate) continue;
       const auto original = EntryNamed(base_.source.campaign_file(), experiment.name);
@@ -141,16 +149,17 @@ class Choice {
       repeat.entry =
           EntryFor({.experiment = AsMeasured(experiment), .name = name, .file = name + ".csv"},
                    experiment, *original);
-      ASSIGN_OR_RETURN(const KnownTest test,
-                       LearnRepeat(answered_, base_.campaign, experiment.name));
-      ASSIGN_OR_RETURN(
-          const inference::Forecast forecast,
-          ForecastOf(answered_, {.set = test.known.set.get(), .measured = test.known.z}));
-      Forecasted(forecast, 0, repeat.experiment);
+      const auto forecast = ForecastOfRepeat(experiment.name);
+      if (!forecast.ok()) {
+        plan_.warnings.push_back(
+            absl::StrCat("What ", InWords(repeat.experiment),
+                         " would tell is not known: ", forecast.status().message(), "."));
+        continue;
+      }
+      Forecasted(*forecast, 0, repeat.experiment);
       repeat.experiment.core_seconds = CoreSecondsOf(experiment.name);
       proposals_.push_back(std::move(repeat));
     }
-    return absl::OkStatus();
   }
 
   // A plan that cannot be run stays without a forecast.
