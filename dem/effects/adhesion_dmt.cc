@@ -66,6 +66,7 @@ EffectEntry AdhesionDmt() {
                .parameters = {WorkOfAdhesion()},
                .reference = "Derjaguin, Muller & Toporov, J. Colloid Interface Sci. 53 (1975) "
                             "314",
+               .family = "adhesion",
                .two_sided = false,
                .rays = {{.parameter = "work_of_adhesion", .steps = {0.1, 0.4}}}},
       .place = 60,

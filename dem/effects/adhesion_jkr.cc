@@ -149,6 +149,7 @@ EffectEntry AdhesionJkr() {
                    .parameters = {WorkOfAdhesion()},
                    .reference = "Johnson, Kendall & Roberts, Proc. R. Soc. Lond. A 324 (1971) 301; "
                                 "Johnson, Contact Mechanics (1985), sec. 5.5",
+                   .family = "adhesion",
                    .two_sided = false,
                    .rays = {{.parameter = "work_of_adhesion", .steps = {0.1, 0.4}}},
                    .excludes = {"adhesion_dmt"}},

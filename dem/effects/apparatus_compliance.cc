@@ -35,6 +35,7 @@ EffectEntry ApparatusCompliance() {
                    .contacts = {},
                    .parameters = {compliance},
                    .reference = "Jardine, Symes & Burland, Geotechnique 34 (1984) 323",
+                   .family = "strain_reading",
                    .two_sided = false,
                    .rays = {{.parameter = "compliance", .steps = {0.1, 0.5}}}},
           .place = 160,

@@ -159,6 +159,7 @@ EffectEntry CapillaryBridges() {
                .parameters = Parameters(),
                .reference = "Willett et al., Langmuir 16 (2000) 9396, Eq. 12; Lian, Thornton & "
                             "Adams, J. Colloid Interface Sci. 161 (1993) 138",
+               .family = "adhesion",
                .two_sided = false,
                .rays = {{.parameter = "surface_tension",
                          .steps = {0.05, 0.2},

@@ -78,6 +78,7 @@ EffectEntry LinearCohesion() {
                    .parameters = {density},
                    .reference = "Luding, Granular Matter 10 (2008) 235, sec. 2.2; Johnson, Contact "
                                 "Mechanics (1985), sec. 5.5",
+                   .family = "adhesion",
                    .two_sided = false,
                    .rays = {{.parameter = "energy_density", .steps = {1, 3}}}},
           .place = 50,

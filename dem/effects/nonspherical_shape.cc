@@ -38,6 +38,7 @@ EffectEntry NonsphericalShape() {
                    .parameters = {aspect},
                    .reference = "Favier et al., Eng. Comput. 16 (1999) 467; Ng, J. Eng. Mech. 130 "
                                 "(2004) 193",
+                   .family = "rotation",
                    .two_sided = false,
                    .rays = {{.parameter = "aspect", .steps = {0.1, 0.3}}},
                    .makes_clumps = true,

@@ -76,6 +76,7 @@ EffectEntry RollingResistance() {
                .parameters = MomentParameters("rolling"),
                .reference = "Cheng et al. 2018, Table 1; Iwashita & Oda, J. Eng. Mech. 124 "
                             "(1998) 285",
+               .family = "rotation",
                .two_sided = false,
                .rays = MomentRays()},
       .place = 110,

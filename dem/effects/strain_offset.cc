@@ -47,6 +47,7 @@ EffectEntry StrainOffset() {
            .reference =
                "Jardine, Symes & Burland, Geotechnique 34 (1984) 323; Goto et al., Soils Found. 31 "
                "(1991) 169",
+           .family = "strain_reading",
            .two_sided = false,
            .rays = {{.parameter = "offset", .steps = {0.1, 0.4}, .held = {{"stress", 0.3}}}}},
       .place = 170,

@@ -62,6 +62,7 @@ EffectEntry TwistingResistance() {
                .contacts = {},
                .parameters = MomentParameters("twisting"),
                .reference = "Cheng et al. 2018, Table 1",
+               .family = "rotation",
                .two_sided = false,
                .rays = MomentRays(),
                .needs_space = true},

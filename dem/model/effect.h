@@ -37,7 +37,11 @@ struct EffectInfo {
       description;  ///< formula, sign (one- or two-sided) and the value at which it vanishes
   std::vector<std::string> contacts;  ///< contact laws it can join; empty: all
   std::vector<ParameterInfo> parameters;
-  std::string reference;               ///< paper and equations
+  std::string reference;  ///< paper and equations
+  /// A word that effects share which act alike, so that curves that show one may as well show
+  /// another; empty: none. `adhesion`: grains pull at each other; `rotation`: they turn less
+  /// easily; `strain_reading`: strain is read that the specimen does not have.
+  std::string family = {};
   bool two_sided = false;              ///< parameters of the rays may leave their null either way
   std::vector<StrengthRay> rays = {};  ///< 1 .. 3, for paired runs with and without the effect
   std::vector<std::string> excited_by = {};  ///< tests whose curves it can change; empty: all

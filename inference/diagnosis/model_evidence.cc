@@ -21,10 +21,11 @@ absl::Status CheckMeasured(const std::vector<MeasuredSet>& measured, const Model
   if (measured.empty()) return absl::InvalidArgumentError("nothing is measured");
   for (const MeasuredSet& m : measured) {
     const EffectFeatures& features = m.set->emulator().features();
-    if (m.z.size() != m.set->emulator().coordinates() || !m.z.allFinite())
+    if (m.z.size() != m.set->emulator().coordinates() || !m.z.allFinite()) {
       return absl::InvalidArgumentError(absl::StrCat("a measurement has ", m.z.size(),
                                                      " coordinates, its set ",
                                                      m.set->emulator().coordinates()));
+    }
     const PartOfColumns& part = m.columns;
     if (features.effects().size() != (part ? part->strength.size() : space.effects.size()) ||
         features.parameters() != space.base_low.size() ||
@@ -33,9 +34,10 @@ absl::Status CheckMeasured(const std::vector<MeasuredSet>& measured, const Model
       return absl::InvalidArgumentError("a set's emulator has other parameters than the space");
     for (const EffectModel& model : space.models) {
       for (const int k : model.effects) {
-        if (part && std::count(part->strength.begin(), part->strength.end(), k) == 0)
+        if (part && std::count(part->strength.begin(), part->strength.end(), k) == 0) {
           return absl::InvalidArgumentError(
               absl::StrCat("a model has effect ", k, ", which a set's emulator has not"));
+        }
       }
     }
     if (m.specimens < 1) return absl::InvalidArgumentError("a measurement has no specimen");
@@ -114,9 +116,10 @@ std::vector<SignedSample> SampleSigns(const std::vector<MeasuredSet>& measured,
     };
     CubeSample sample = SampleCube(likelihood, cube.dimensions(), sampling);
     // Normalised weights know the evidence no more.
-    if (std::isfinite(sample.evidence.log_evidence))
+    if (std::isfinite(sample.evidence.log_evidence)) {
       sample.log_weights.array() +=
           sample.evidence.log_evidence + std::log(static_cast<double>(sample.log_weights.size()));
+    }
     result.push_back({.cube = std::move(cube),
                       .points = std::move(sample.points),
                       .log_weights = std::move(sample.log_weights),
@@ -260,16 +263,18 @@ absl::StatusOr<std::vector<std::vector<ModelEvidence>>> ModelEvidencesUnder(
     const std::vector<MeasuredSet>& measured, const ModelSpace& space,
     const std::vector<std::vector<StrengthPrior>>& priors, const EvidenceOptions& options) {
   RETURN_IF_ERROR(CheckMeasured(measured, space));
-  if (options.draws < 2 || options.realisations < 2 || options.first < 0 || priors.empty())
+  if (options.draws < 2 || options.realisations < 2 || options.first < 0 || priors.empty()) {
     return absl::InvalidArgumentError(
         "a prior, two draws and realisations and a place >= 0 are asked for");
+  }
   for (const std::vector<StrengthPrior>& prior : priors) {
     if (prior.size() != space.effects.size())
       return absl::InvalidArgumentError("as many strength priors as effects are asked for");
     for (std::size_t k = 0; k < prior.size(); ++k) {
-      if (!Within(prior[k], space.strength[k], space.effects[k].two_sided))
+      if (!Within(prior[k], space.strength[k], space.effects[k].two_sided)) {
         return absl::InvalidArgumentError(
             absl::StrCat("a prior on the strength of effect ", k, " is not within the space's"));
+      }
     }
   }
   std::vector<std::vector<ModelEvidence>> result(priors.size());

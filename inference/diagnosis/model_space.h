@@ -28,10 +28,12 @@ struct StrengthPrior {
 };
 
 /// Prior shares of what a model may lack, normalised on use; equal within each, those of triples
-/// among all that there could be. A model with one effect more counts a quarter of what those with
-/// one less do.
+/// among all that there could be. Beside what acts, one effect more acts with odds of one to ten: a
+/// pair is one of two effects more, a triple one of three pairs more. Of each single model those
+/// with one effect more together so have a tenth of its share, however many effects there are.
 struct PriorShares {
-  double adequate = 0.4, singles = 0.4, pairs = 0.1, triples = 0.025, none_of_these = 0.1;
+  double adequate = 0.4, singles = 0.4, pairs = singles / 10 / 2, triples = pairs / 10 / 3,
+         none_of_these = 0.1;
 };
 
 /// What may be before a measurement: effects, priors and models.

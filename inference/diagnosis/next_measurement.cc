@@ -120,6 +120,7 @@ absl::StatusOr<Forecast> ExpectedInformation(const ProposedMeasurement& proposed
 
   Forecast result;
   double squares = 0;
+  int named_right = 0, decided = 0, named_wrong = 0;
   const auto n = static_cast<double>(options.measurements);
   for (int s = 0; s < options.measurements; ++s) {
     PhiloxStream stream({.seed = options.seed,
@@ -163,15 +164,19 @@ absl::StatusOr<Forecast> ExpectedInformation(const ProposedMeasurement& proposed
     }
     const std::vector<int>& acts =
         evidence[static_cast<std::size_t>(leading[static_cast<std::size_t>(truth)])].model.effects;
-    bool right = false, wrong = false;
+    std::size_t right = 0, wrong = 0;
     for (Index e = 0; e < inclusion.size(); ++e) {
       if (inclusion[e] < options.alone) continue;
-      (std::count(acts.begin(), acts.end(), static_cast<int>(e)) > 0 ? right : wrong) = true;
+      ++(std::count(acts.begin(), acts.end(), static_cast<int>(e)) > 0 ? right : wrong);
     }
-    result.named_right += right ? 1 / n : 0;
-    result.decided += right || (acts.empty() && after[truth] >= options.alone) ? 1 / n : 0;
-    result.named_wrong += wrong ? 1 / n : 0;
+    const bool all = right == acts.size() && wrong == 0;
+    named_right += !acts.empty() && all ? 1 : 0;
+    decided += all && (!acts.empty() || after[truth] >= options.alone) ? 1 : 0;
+    named_wrong += wrong > 0 ? 1 : 0;
   }
+  result.named_right = named_right / n;
+  result.decided = decided / n;
+  result.named_wrong = named_wrong / n;
   result.error =
       std::sqrt(std::max(squares - result.information * result.information, 0.0) / (n - 1));
   return result;

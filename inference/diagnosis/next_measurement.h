@@ -37,17 +37,17 @@ struct ForecastOptions {
 struct Forecast {
   double information = 0;  ///< nats about the model indicator, >= 0 but for chance
   double error = 0;        ///< standard error of that
-  double named_right = 0;  ///< chance that an effect of the true model is at `alone` or above
+  /// Chance that the true model has effects, all of them are at `alone` or above, and no other is.
+  double named_right = 0;
   /// Chance of that, or where the true model has no effect that it is at `alone` or above itself.
   double decided = 0;
-  double named_wrong = 0;  ///< chance that one that is not is
+  double named_wrong = 0;  ///< chance that an effect that the true model has not is
 };
 
 /// Mutual information of the measurement and the model indicator, by nested sampling: a model by
 /// its probability, a draw of its posterior, a measurement there; then the posterior of all leading
 /// models, each averaged over its draws (so that parameters of rivals are fitted again by weight),
-/// none
-/// of these among them.      [Chaloner & Verdinelli, Stat. Sci. 10 (1995) 273; Ryan 2003, Eq. 7]
+/// none of these among them.      [Chaloner & Verdinelli, Stat. Sci. 10 (1995) 273; Ryan 2003, Eq. 7]
 /// Deterministic in the seed. Errors: INVALID_ARGUMENT for what does not fit.
 absl::StatusOr<Forecast> ExpectedInformation(const ProposedMeasurement& proposed,
                                              const std::vector<ModelEvidence>& evidence,

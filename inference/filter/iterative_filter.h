@@ -72,7 +72,7 @@ struct Iteration {
   /// N x T, in the readings' units; a row with any NaN is a diverged sample: weight zero.
   Eigen::MatrixXd predictions;
   /// N: ln of the density from which each sample was really drawn, for runs made elsewhere; it
-  /// replaces the proposal's.
+  /// replaces the proposal's. +infinity: drawn from no density; its weight is zero.
   std::optional<Eigen::VectorXd> log_proposal;
   /// N x T or empty: runs stopped early as far as they came, NaN beyond and in the rows of others.
   /// To the weights they are diverged; an emulator learns from them (emulator/stopped_runs.h).

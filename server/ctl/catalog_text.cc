@@ -2,7 +2,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "dem/registry/effect_family.h"
 #include "server/report/text/people_units.h"
 #include "server/report/text/text_table.h"
 
@@ -78,8 +77,7 @@ std::string EffectText(const dem::EffectInfo& effect) {
     text += "  only where grains move in three dimensions: not with flat: 1\n";
   if (effect.across_pressures)
     text += "  only where the pressure differs, between experiments or within one\n";
-  if (const std::string family = dem::FamilyOf(effect); !family.empty())
-    absl::StrAppend(&text, "  family: ", family, "\n");
+  if (!effect.family.empty()) absl::StrAppend(&text, "  family: ", effect.family, "\n");
   if (!effect.excludes.empty()) {
     text += report::Wrapped(absl::StrJoin(effect.excludes, ", "), "  not together with: ", kIndent);
   }

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "calib/return_if_error.h"
+#include "server/report/text/people_units.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -145,7 +146,7 @@ const NamedFamily* SurestFamily(const Answer& answer) {
 }
 
 std::string Acts(const NamedFamily& family) {
-  return absl::StrCat(OneOf(family.effects), " acts, ", ChanceInWords(family.probability));
+  return absl::StrCat(OneOf(family.effects), " acts, ", report::ChanceInWords(family.probability));
 }
 
 std::string ReasonInWords(inference::NotNamed reason) {
@@ -161,14 +162,6 @@ std::string ReasonInWords(inference::NotNamed reason) {
 }
 
 }  // namespace
-
-std::string ChanceInWords(double probability) {
-  // 99.7 is not said as 100: of what is not certain nothing is.
-  const double percent = 100 * probability;
-  if (percent >= 99.5) return "more than 99 %";
-  if (percent < 0.5) return "less than 1 %";
-  return absl::StrCat(static_cast<int>(std::lround(percent)), " %");
-}
 
 const char* ToString(AnswerVerdict verdict) { return campaign::WordOf(kVerdictWords, verdict); }
 
@@ -187,9 +180,10 @@ absl::StatusOr<Answer> AnswerFrom(const AnswerParts& parts, const inference::Ans
     basis.beyond.push_back(LargestOf(parts.beyond[w], effects));
   }
   std::vector<std::pair<int, int>> kin;
-  for (const auto& [a, b] : parts.kin)
+  for (const auto& [a, b] : parts.kin) {
     kin.emplace_back(effects.of[static_cast<std::size_t>(a)],
                      effects.of[static_cast<std::size_t>(b)]);
+  }
   basis.families = inference::Families(AnglesOfEffects(parts.angles, effects), kin);
   // Once runs were made to verify, a name needs some of its own.
   basis.verification =
@@ -207,10 +201,11 @@ absl::StatusOr<Answer> AnswerFrom(const AnswerParts& parts, const inference::Ans
                 .adequate = reference.adequate,
                 .none_of_these = reference.none_of_these,
                 .adequacy_p = parts.adequacy_p};
-  for (std::size_t i = 0; i < merged.models.size(); ++i)
+  for (std::size_t i = 0; i < merged.models.size(); ++i) {
     answer.probabilities.push_back({.effects = NamesIn(merged.models[i].effects, names),
                                     .none_of_these = merged.models[i].none_of_these,
                                     .probability = reference.model[static_cast<Index>(i)]});
+  }
   std::stable_sort(
       answer.probabilities.begin(), answer.probabilities.end(),
       [](const NamedModel& a, const NamedModel& b) { return a.probability > b.probability; });
@@ -220,9 +215,10 @@ absl::StatusOr<Answer> AnswerFrom(const AnswerParts& parts, const inference::Ans
     sum += model.probability;
     if (sum >= levels.set) break;
   }
-  for (const inference::ProbableFamily& family : core.families)
+  for (const inference::ProbableFamily& family : core.families) {
     answer.families.push_back(
         {.effects = NamesIn(family.effects, names), .probability = family.probability});
+  }
 
   for (std::size_t e = 0; e < names.size(); ++e) {
     EffectAnswer& own = answer.candidates.emplace_back();
@@ -274,7 +270,7 @@ std::string VerdictInWords(const Answer& answer) {
   std::string beside;  // why a probable effect is not named
   for (const EffectAnswer& own : answer.candidates) {
     if (!own.not_named) continue;
-    beside = absl::StrCat(" ", own.effect, ", ", ChanceInWords(own.probability),
+    beside = absl::StrCat(" ", own.effect, ", ", report::ChanceInWords(own.probability),
                           ", is not named: ", ReasonInWords(*own.not_named), ".");
     break;
   }
@@ -284,7 +280,8 @@ std::string VerdictInWords(const Answer& answer) {
       for (const EffectAnswer& own : answer.candidates) {
         if (own.alone) least = std::min(least, own.probability);
       }
-      return absl::StrCat(absl::StrJoin(answer.effects, " with "), ", ", ChanceInWords(least),
+      return absl::StrCat("Missing: ", absl::StrJoin(answer.effects, " with "), ", ",
+                          report::ChanceInWords(least),
                           answer.sure ? "." : ", or something alike that this library lacks.");
     }
     case AnswerVerdict::kAdequate: {
@@ -292,24 +289,27 @@ std::string VerdictInWords(const Answer& answer) {
           "The model is adequate: it misses the readings no more than a right one would";
       if (answer.probabilities.empty()) return absl::StrCat(passes, ".");  // nobody raced
       const NamedModel& first = answer.probabilities.front();
-      if (first.effects.empty() && !first.none_of_these)
+      if (first.effects.empty() && !first.none_of_these) {
         return absl::StrCat(passes, "; that nothing is missing has probability ",
-                            ChanceInWords(answer.adequate), ".", beside);
+                            report::ChanceInWords(answer.adequate), ".", beside);
+      }
       const NamedFamily* family = SurestFamily(answer);
       return absl::StrCat(passes, ". Yet ",
-                          family != nullptr ? Acts(*family)
-                                            : absl::StrCat(InWords(first), " is more probable (",
-                                                           ChanceInWords(first.probability),
-                                                           ") than that nothing is missing (",
-                                                           ChanceInWords(answer.adequate), ")"),
+                          family != nullptr
+                              ? Acts(*family)
+                              : absl::StrCat(InWords(first), " is more probable (",
+                                             report::ChanceInWords(first.probability),
+                                             ") than that nothing is missing (",
+                                             report::ChanceInWords(answer.adequate), ")"),
                           ".", beside);
     }
     case AnswerVerdict::kUnexplained:
       if (answer.candidates.empty())
         return "The model misses the readings by more than noise and scatter explain.";
-      if (answer.none_of_these >= inference::AnswerLevels().unexplained)
-        return absl::StrCat("None of these, ", ChanceInWords(answer.none_of_these),
+      if (answer.none_of_these >= inference::AnswerLevels().unexplained) {
+        return absl::StrCat("None of these, ", report::ChanceInWords(answer.none_of_these),
                             ": what is missing is like no effect of this library.", beside);
+      }
       return absl::StrCat("No model of the race explains the readings.", beside);
     case AnswerVerdict::kAmbiguous: {
       std::vector<std::string> words;
@@ -318,23 +318,25 @@ std::string VerdictInWords(const Answer& answer) {
         words.push_back(InWords(model));
         sum += model.probability;
       }
-      if (words.size() == 1)
-        return absl::StrCat(words[0], ", ", ChanceInWords(sum),
+      if (words.size() == 1) {
+        return absl::StrCat(words[0], ", ", report::ChanceInWords(sum),
                             ", and not certain enough to be named.", beside);
+      }
       const std::string end =
           absl::StrCat("; which of them, these tests cannot tell",
                        answer.repeat_names_alone >= kWorthTelling
                            ? absl::StrCat("; on a second specimen they would, with probability ",
-                                          ChanceInWords(answer.repeat_names_alone))
+                                          report::ChanceInWords(answer.repeat_names_alone))
                            : "",
                        ".", beside);
-      if (words.size() <= kMostInWords)
-        return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", ChanceInWords(sum),
-                            ": ", OneOf(words), end);
+      if (words.size() <= kMostInWords) {
+        return absl::StrCat("One of these ", NumberInWords(words.size()), ", ",
+                            report::ChanceInWords(sum), ": ", OneOf(words), end);
+      }
       if (const NamedFamily* family = SurestFamily(answer))
         return absl::StrCat(Acts(*family), ": ", SomeOf(words), end);
-      return absl::StrCat("One of these ", NumberInWords(words.size()), ", ", ChanceInWords(sum),
-                          ": ", SomeOf(words), end);
+      return absl::StrCat("One of these ", NumberInWords(words.size()), ", ",
+                          report::ChanceInWords(sum), ": ", SomeOf(words), end);
     }
   }
   return "";

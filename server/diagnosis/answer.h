@@ -136,9 +136,6 @@ struct AnswerParts {
 absl::StatusOr<Answer> AnswerFrom(const AnswerParts& parts,
                                   const inference::AnswerLevels& levels = {});
 
-/// In whole percent; of what is not certain nothing is said to be: "more than 99 %".
-std::string ChanceInWords(double probability);
-
 /// The verdict in one or two sentences.
 std::string VerdictInWords(const Answer& answer);
 

@@ -42,9 +42,10 @@ absl::StatusOr<BaseMisfit> MisfitOfBase(const KnownBefore& before, const DesignR
   ASSIGN_OR_RETURN(const Knowledge known, LearnBase(before, rows, batches));
   ASSIGN_OR_RETURN(const Asked asked, AskEvidences(before, known, Effort::kToChoose));
   const inference::DesignPoints& draws = asked.evidence[0].front().draws;  // of the base model
-  if (draws.rows() == 0)
+  if (draws.rows() == 0) {
     return absl::FailedPreconditionError(
         "no point of the model has a density that the readings could be judged by");
+  }
   BaseMisfit misfit;
   const auto parameters = static_cast<int>(rows.race().base.size());
   const inference::SpecimenErrors& errors = known.set->errors();

@@ -75,20 +75,21 @@ Eigen::VectorXd LogBasePrior(const inference::JointPrior& prior, const BaseAxes&
 absl::StatusOr<BaseRegion> RegionOf(const BaseRuns& base, const inference::JointPrior& prior) {
   const Index n = base.values.rows(), d = base.values.cols();
   const int fewest = FewestBaseRuns(static_cast<int>(d));
-  if (n < fewest)
+  if (n < fewest) {
     return absl::FailedPreconditionError(absl::StrCat(
         n,
         " runs of the campaign came to their ends; which effect is missing is asked of an "
         "emulator, and of ",
         d, d == 1 ? " parameter" : " parameters", " it takes ", fewest,
         " runs: raise `samples` or `max_iterations`"));
+  }
   BaseRegion region{.axes = AxesOver({prior.begin(), prior.end()}, base.values)};
   const Eigen::MatrixXd net = NetOver(d);
   // Twice, since an emulator of the narrower box knows it better.
   for (const bool last : {false, true}) {
     ASSIGN_OR_RETURN(inference::DiagnosisSet set,
                      inference::DiagnosisSet::Fit(WithoutRace(base, region.axes)));
-    if (set.coordinates()->count() <= d)
+    if (set.coordinates()->count() <= d) {
       return absl::FailedPreconditionError(absl::StrCat("the fitted curves have ",
                                                         set.coordinates()->count(),
                                                         " shapes that can be told apart, "
@@ -96,6 +97,7 @@ absl::StatusOr<BaseRegion> RegionOf(const BaseRuns& base, const inference::Joint
                                                         d, d == 1 ? " parameter" : " parameters",
                                                         " may take them all: give longer curves "
                                                         "or more tests"));
+    }
     BaseFit fit{.set = std::move(set), .z = {}};
     fit.z = fit.set.coordinates()->Of(Eigen::MatrixXd::Zero(1, base.histories.cols())).row(0);
     const Eigen::MatrixXd scaled = region.axes.Scaled(base.values);

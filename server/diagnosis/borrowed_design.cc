@@ -163,10 +163,11 @@ class ColumnsOf {
     for (const campaign::CalibratedParameter& parameter : design.campaign.parameters) {
       const auto own = std::find(names.begin(), names.end(), parameter.name);
       const auto strength = nulls.find(parameter.name);
-      if (own == names.end() && strength == nulls.end() && shapes.count(parameter.name) == 0)
+      if (own == names.end() && strength == nulls.end() && shapes.count(parameter.name) == 0) {
         return absl::FailedPreconditionError(
             absl::StrCat("the design ", design.status.campaign(), " has runs with ", parameter.name,
                          ", which this build cannot try here; have a design made anew"));
+      }
       Column& column = result.columns_.emplace_back();
       if (own != names.end()) column.place = own - names.begin();
       if (own == names.end() && strength != nulls.end()) column.null = strength->second;
@@ -206,9 +207,10 @@ EndedBatch RunsOfItsBase(const BaseRuns& of_other, const std::vector<std::string
   for (Index i = 0; i < values.rows(); ++i) {
     const int stream = of_other.stream[static_cast<std::size_t>(i)];
     bool known = false;
-    for (Index k = 0; k < base.values.rows() && !known; ++k)
+    for (Index k = 0; k < base.values.rows() && !known; ++k) {
       known =
           base.stream[static_cast<std::size_t>(k)] == stream && base.values.row(k) == values.row(i);
+    }
     if (known) continue;
     EndedRun& ended = batch.runs.emplace_back();
     ended.run = {.values = rows.WithoutEffects(), .stream = stream};
@@ -249,9 +251,10 @@ Race RaceWithin(Race race, const report::CampaignView& design) {
   race.effects = std::move(within);
   for (const std::string& name : out) {
     const std::vector<std::string> left = race.Names();
-    if (std::find(left.begin(), left.end(), name) == left.end())
+    if (std::find(left.begin(), left.end(), name) == left.end()) {
       race.not_excitable.emplace_back(
           name, absl::StrCat("the runs of ", design.status.campaign(), " were made without it"));
+    }
   }
   for (auto* pairs : {&race.excluded, &race.kin}) {
     std::vector<std::pair<int, int>> kept;
@@ -275,10 +278,11 @@ absl::StatusOr<std::vector<EndedBatch>> BorrowedBatches(const OtherDesign& other
   const auto is_main = [](const EndedBatch& batch) {
     return batch.stage == campaign::SamplePurpose::kMain;
   };
-  if (std::none_of(batches.begin(), batches.end(), is_main))
+  if (std::none_of(batches.begin(), batches.end(), is_main)) {
     return absl::FailedPreconditionError(
         absl::StrCat("the design ", other.design->status.campaign(),
                      " has no runs of the stage main: take one whose own diagnosis has ended"));
+  }
   for (EndedBatch& batch : batches) {
     std::vector<EndedRun> usable;
     for (EndedRun& ended : batch.runs) {

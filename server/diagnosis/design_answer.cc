@@ -145,9 +145,10 @@ absl::StatusOr<Answer> AnswerOfDesign(const KnownBefore& before, const Knowledge
       elsewhere ? OfBoth(misfit.chance, elsewhere(asked.evidence[0].front())) : misfit.chance;
   for (int i = 0; i < static_cast<int>(known.part.kept.size()); ++i)
     parts.effect_of.push_back(KeptEntry(known, i).name);
-  for (std::size_t w = 0; w < asked.evidence.size(); ++w)
+  for (std::size_t w = 0; w < asked.evidence.size(); ++w) {
     parts.beyond.push_back(
         inference::BeyondDesign(asked.evidence[w], asked.probabilities[w], known.range));
+  }
   ASSIGN_OR_RETURN(Answer answer, AnswerFrom(parts));
   TellMisfit(misfit, answer);
   answer.adequacy_p = parts.adequacy_p;

@@ -29,12 +29,12 @@ struct DesignCaps {
   /// Sequential batches end when no probability has moved by more than `moved`, or when a batch is
   /// expected to tell less than a move from 0.5 by that does: 0.02 nats.
   ///                                         [relative entropy: Kullback & Leibler 1951, Eq. 2.4]
-  int sequential_runs = 6, sequential_batches = 4;
+  int sequential_runs = 6, sequential_batches = 3;
   double moved = 0.1, told = 0.02;
   /// Verification: fresh runs at the optimum of what would be named and of its siblings; the mean
   /// of six is known to 0.4 of a run's scatter.
-  int verification_runs = 6, verified_models = 3;
-  double sibling = 0.01;  ///< probability of a sibling that is verified too
+  int verification_runs = 6, verified_models = 4;
+  double sibling = 0.01;  ///< probability of a model that is verified too, of another family
   double asked = 0.01;    ///< probability of a model whose misfit is asked for
   /// Triples are asked for that have a pair of such a probability: below it none of them could come
   /// into a set of 95 % by its prior alone. So many: their evidences take a tenth of the pairs'.

@@ -179,9 +179,10 @@ void DescribeEffect(const KnownBefore& before, const Knowledge& known, const Ask
   const double excess = without * without - 1;
   if (excess > 0) own.explained = std::clamp((excess + 1 - own.rms * own.rms) / excess, 0.0, 1.0);
   // Closer in the coordinates and further off in what these leave out is no closer.
-  if (own.rms < without)
+  if (own.rms < without) {
     own.p_value =
         ChanceOfCloser(known, base.square - closest.square, model->model.effects.size(), two_sided);
+  }
   if (own.probability >= kDesignCaps.asked)
     own.curves = CurvesOf(before.base.scale, closest.history, base.history);
 }
@@ -197,9 +198,10 @@ absl::Status DescribeEffects(const KnownBefore& before, const Knowledge& known, 
     const ModelEvidence* model = ModelOf(known, asked, effects);
     if (model == nullptr) continue;
     named.points = PointsOf(known, *model, effects);
-    for (Index i = 0; i < kDrawsOfModel; ++i)
+    for (Index i = 0; i < kDrawsOfModel; ++i) {
       named.draws.push_back(
           ValuesOf(known, model->draws, i * model->draws.rows() / kDrawsOfModel, effects));
+    }
     named.posterior = PosteriorOf(known, model->draws, effects);
     named.rms = RmsOf(before.base, HistoryAt(known, BestDraw(known, model->draws)));
   }

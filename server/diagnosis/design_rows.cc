@@ -36,9 +36,10 @@ Eigen::MatrixXd BaseAxes::Values(const Eigen::MatrixXd& scaled) const {
   Eigen::MatrixXd values(scaled.rows(), scaled.cols());
   for (Index j = 0; j < scaled.cols(); ++j) {
     const inference::Prior& prior = priors[static_cast<std::size_t>(j)];
-    for (Index i = 0; i < scaled.rows(); ++i)
+    for (Index i = 0; i < scaled.rows(); ++i) {
       values(i, j) =
           std::clamp(prior.FromStandard(middle[j] + half[j] * scaled(i, j)), prior.min, prior.max);
+    }
   }
   return values;
 }

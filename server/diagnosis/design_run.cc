@@ -10,6 +10,8 @@
 namespace calib::diagnosis {
 namespace {
 
+constexpr char kWhat[] = "runs that tell effects apart";
+
 // Of a campaign whose runs were made elsewhere: no batch of its chain is asked for.
 class NoRuns : public RunMaker {
  public:
@@ -29,9 +31,10 @@ absl::StatusOr<DesignedAnswer> AnswerOnServer(client::Laboratory& laboratory,
                                               std::optional<std::int64_t> most_runs) {
   client::Laboratory::DesignWithBase others;
   if (!other.empty()) {
-    if (base.campaign.precomputed)
+    if (base.campaign.precomputed) {
       return absl::FailedPreconditionError(
           "the runs of this campaign were made elsewhere: it has no use for those of a design");
+    }
     ASSIGN_OR_RETURN(others, laboratory.DesignNamed(other));
     question.other = {.design = &others.design, .base = &others.base};
   }
@@ -48,11 +51,10 @@ absl::StatusOr<DesignedAnswer> AnswerOnServer(client::Laboratory& laboratory,
   if (!other.empty()) derivation.name += absl::StrCat(", beside those of ", other);
   ASSIGN_OR_RETURN(const std::string text,
                    campaign::Derive(base.source.campaign_file(), derivation));
-  ASSIGN_OR_RETURN(report::CampaignView design,
-                   laboratory.Design(base, text, "runs that tell effects apart"));
+  ASSIGN_OR_RETURN(report::CampaignView design, laboratory.Design(base, text, kWhat));
   DesignedAnswer designed{
       .chain = kept, .campaign = design.status.campaign(), .parameters = derivation.parameters};
-  ServerRunMaker maker(laboratory, std::move(design), chain.names());
+  ServerRunMaker maker(laboratory, std::move(design), chain.names(), kWhat);
   ASSIGN_OR_RETURN(designed.answer, AnswerBy(chain, maker, most_runs));
   return designed;
 }

@@ -31,10 +31,11 @@ absl::StatusOr<DesignChain> DesignChain::Create(const report::CampaignView& base
                                                 const DesignQuestion& question) {
   if (question.other) {
     const report::CampaignView& other = *question.other->design;
-    if (const std::string why = WhyOtherRuns(base.campaign, other.campaign); !why.empty())
+    if (const std::string why = WhyOtherRuns(base.campaign, other.campaign); !why.empty()) {
       return absl::FailedPreconditionError(absl::StrCat("the runs of ", other.status.campaign(),
                                                         " are not of the tests and the model of ",
                                                         base.status.campaign(), ": ", why));
+    }
   }
   ASSIGN_OR_RETURN(Race race, RaceOf(base, question.without));
   ASSIGN_OR_RETURN(BaseRuns runs, BaseRunsOf(base));
@@ -43,9 +44,10 @@ absl::StatusOr<DesignChain> DesignChain::Create(const report::CampaignView& base
   if (question.other) {
     const report::CampaignView& other = *question.other->design;
     race = RaceWithin(std::move(race), other);
-    if (race.effects.empty())
+    if (race.effects.empty()) {
       return absl::FailedPreconditionError(
           absl::StrCat("the design ", other.status.campaign(), " has no effect that is asked for"));
+    }
   }
   race = WithCalculated(std::move(race), runs);
   campaign::Campaign design = CampaignOfDesign(base.campaign, race);
@@ -87,10 +89,11 @@ absl::Status DesignChain::Add(EndedBatch batch) {
   if (before_.base.elsewhere || !campaign::IsStageOfDesign(batch.stage) ||
       batch.stage == SamplePurpose::kNumerics ||
       (!first && !(stage > before && !batches_.empty()) && !(again && stage == before)) ||
-      (stage > static_cast<int>(SamplePurpose::kMain) && BatchesOf(SamplePurpose::kMain) == 0))
+      (stage > static_cast<int>(SamplePurpose::kMain) && BatchesOf(SamplePurpose::kMain) == 0)) {
     return absl::InvalidArgumentError(absl::StrCat("a batch of the stage ",
                                                    campaign::ToString(batch.stage),
                                                    " cannot follow what the design holds"));
+  }
   for (const EndedRun& run : batch.runs) {
     if (run.run.values.size() != names().size() ||
         (run.readings &&
@@ -185,9 +188,10 @@ std::optional<RunBatch> DesignChain::ScoutAgain() const {
 
 absl::StatusOr<RunBatch> DesignChain::Main() {
   ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(batches_.size()));
-  if (EntriesRun(race(), known->part.kept).empty())
+  if (EntriesRun(race(), known->part.kept).empty()) {
     return absl::FailedPreconditionError(absl::StrCat(
         "no effect can be tried: ", known->out.front().second, "; the tests stay unexplained"));
+  }
   return BatchOf(SamplePurpose::kMain, AdmissibleRows(design_, known->rows, before_.region,
                                                       MainPoints(before_, *known), NextStream()));
 }
@@ -235,6 +239,7 @@ absl::StatusOr<std::vector<VerifiedModel>> DesignChain::ToVerify(std::size_t n) 
   for (const EffectAnswer& own : answer.candidates) {
     if (own.alone) question.named.push_back(own.effect);
   }
+  for (const NamedFamily& family : answer.families) question.families.push_back(family.effects);
   if (question.named.empty()) return std::vector<VerifiedModel>();
   ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n));
   ASSIGN_OR_RETURN(const Asked* asked, AskedAfter(n, Effort::kToAnswer));
@@ -312,12 +317,13 @@ absl::StatusOr<Answer> AnswerBy(DesignChain& chain, RunMaker& maker,
     if (auto* answer = std::get_if<Answer>(&*next)) return std::move(*answer);
     const RunBatch& batch = std::get<RunBatch>(*next);
     const std::int64_t runs = std::ssize(batch.rows) + chain.own_runs();
-    if (most_runs && runs > *most_runs)
+    if (most_runs && runs > *most_runs) {
       return absl::ResourceExhaustedError(
           absl::StrCat("the runs that tell effects apart are ", runs, " with those of the stage ",
                        campaign::ToString(batch.stage),
                        ", each one parameter set through all fitted tests, and ", *most_runs,
                        " are allowed (what an earlier diagnosis has run counts too)"));
+    }
     ASSIGN_OR_RETURN(EndedBatch ended, maker.Make(batch));
     RETURN_IF_ERROR(chain.Add(std::move(ended)));
   }

@@ -63,10 +63,11 @@ class Inquiry {
     if (options_.then) RETURN_IF_ERROR(TellMeasurement(*options_.then));
     for (const std::string& warning : diagnosis_.answer.warnings)
       diagnosis_.warnings.push_back(warning + ".");
-    if (diagnosis_.answer.p_square > kTooGood)
+    if (diagnosis_.answer.p_square > kTooGood) {
       Doubt(
           {"The model is closer to the readings than the stated errors and the scatter explain: "
            "they seem too large, and an effect can hide in them."});
+    }
     NameUnits();
     if (options_.next_experiment && !options_.then && !options_.only_adequacy &&
         !view_.campaign.precomputed && diagnosis_.answer.verdict != AnswerVerdict::kAdequate) {
@@ -99,15 +100,17 @@ class Inquiry {
 
   void NameUnits() {
     const dem::Model& model = view_.campaign.model;
-    for (const EffectAnswer& own : diagnosis_.answer.candidates)
+    for (const EffectAnswer& own : diagnosis_.answer.candidates) {
       diagnosis_.units.merge(
           UnitsOf(*dem::FindEffect(model.user_effects, own.effect), model.contact));
+    }
   }
 
   absl::Status TellMeasurement(const MadeMeasurement& made) {
-    if (options_.only_adequacy || view_.campaign.precomputed)
+    if (options_.only_adequacy || view_.campaign.precomputed) {
       return absl::FailedPreconditionError(
           "a further measurement is told by runs of its test, and here none are made");
+    }
     ASSIGN_OR_RETURN(const AnsweredDesign answered, designed_.chain->Answered());
     ASSIGN_OR_RETURN(ThenAnswer then, AnswerWith(laboratory_, view_, answered, made));
     // What an effect does by itself is known from before where it no longer competes by itself.
@@ -184,9 +187,10 @@ class Inquiry {
                                          .scatter = diagnosis_.answer.scatter}));
     diagnosis_.next_experiment = std::move(plan.next);
     for (std::string& warning : plan.warnings) diagnosis_.warnings.push_back(std::move(warning));
-    if (!diagnosis_.next_experiment)
+    if (!diagnosis_.next_experiment) {
       diagnosis_.warnings.push_back(
           absl::StrCat("No next experiment is planned: ", plan.why_none, "."));
+    }
     return absl::OkStatus();
   }
 

@@ -145,7 +145,7 @@ std::string CostOf(const PlannedExperiment& planned) {
 
 std::string ForecastInWords(const PlanForecast& forecast) {
   return fmt::format("one answer, and the right one, with probability {} ({} bits)",
-                     ChanceInWords(forecast.decides), Number(forecast.bits, 2));
+                     report::ChanceInWords(forecast.decides), Number(forecast.bits, 2));
 }
 
 std::string NextText(const NextExperiment& next) {
@@ -155,7 +155,7 @@ std::string NextText(const NextExperiment& next) {
           fmt::format("Next experiment: {}. Expected of it: {}; a wrong name with {}.{} "
                       "For the campaign file:",
                       InWords(next.best), ForecastInWords(*next.best.forecast),
-                      ChanceInWords(next.best.forecast->wrong), CostOf(next.best)),
+                      report::ChanceInWords(next.best.forecast->wrong), CostOf(next.best)),
           "", "") +
       "\n" + next.snippet;
   if (next.considered.size() > 1) text += "\nAlso tried:\n";
@@ -206,7 +206,7 @@ std::string Sentence(const Diagnosis& d) {
   if (d.next_experiment && d.answer.verdict == AnswerVerdict::kAmbiguous &&
       d.next_experiment->best.repeats.empty()) {
     sentence += fmt::format(" {} would, with probability {}.", InWords(d.next_experiment->best),
-                            ChanceInWords(d.next_experiment->best.expected_power));
+                            report::ChanceInWords(d.next_experiment->best.expected_power));
   }
   return sentence +
          (d.in_doubt ? " This is in doubt, for what the warnings say of the readings." : "");
@@ -260,7 +260,7 @@ std::string FamiliesText(const Answer& answer) {
     text += report::Wrapped(
         fmt::format("Of one family, or hardly told apart by these tests: {}; one of them acts "
                     "with probability {}.",
-                    fmt::join(family.effects, ", "), ChanceInWords(family.probability)),
+                    fmt::join(family.effects, ", "), report::ChanceInWords(family.probability)),
         "", "  ");
   }
   return text;

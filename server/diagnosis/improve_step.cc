@@ -43,9 +43,10 @@ std::string WhyNext(const Answer& answer, const NamedModel& model) {
   if (answer.verdict == AnswerVerdict::kMissingEffect)
     return absl::StrCat(effects, are, " named and added.");
   const std::string probability = report::Percent(model.probability, 2);
-  if (answer.verdict == AnswerVerdict::kAmbiguous)
+  if (answer.verdict == AnswerVerdict::kAmbiguous) {
     return absl::StrCat(effects, are, " added, of what these tests do not tell apart (probability ",
                         probability, ").");
+  }
   return absl::StrCat(effects, are, " added, the most probable of what does not explain all (",
                       probability, ").");
 }

@@ -327,10 +327,11 @@ absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& gue
   known.angles =
       inference::SignatureAngles({known.set.get()}, before.region.centre.transpose(),
                                  Eigen::VectorXd::Ones(static_cast<Index>(known.part.kept.size())));
-  if (before.base.unfinished > 0)
+  if (before.base.unfinished > 0) {
     known.warnings.push_back(absl::StrCat(before.base.unfinished,
                                           " runs of the campaign did not come to their last "
                                           "reading; the emulator does not know them"));
+  }
   return known;
 }
 

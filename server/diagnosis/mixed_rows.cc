@@ -136,9 +136,10 @@ inference::DesignPoints MixedRows(const MixedDesign& design) {
       const std::vector<double> places = Strata(
           uses, StreamFor(design, DrawOf::kShapes, static_cast<std::uint64_t>(first_shape + h)),
           false);
-      for (Index u = 0; u < uses; ++u)
+      for (Index u = 0; u < uses; ++u) {
         points.shape(rows[static_cast<std::size_t>(u)], first_shape + h) =
             2 * places[static_cast<std::size_t>(u)] - 1;
+      }
     }
     first_shape += effect.shapes;
   }

@@ -12,10 +12,10 @@
 #include "calib/return_if_error.h"
 #include "server/campaign/file/text/yaml_text.h"
 #include "server/diagnosis/design_caps.h"
-#include "server/diagnosis/next_test.h"
 #include "server/diagnosis/plan_words.h"
+#include "server/diagnosis/proposed_runs.h"
+#include "server/diagnosis/proposed_test.h"
 #include "server/diagnosis/setting_plans.h"
-#include "server/diagnosis/test_runs.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -66,14 +66,14 @@ class Choice {
       : laboratory_(laboratory), base_(base), answered_(answered), leading_(LeadingOf(answered)) {}
 
   absl::StatusOr<NextPlan> Plan(const ScreenQuestion& question) {
-    ASSIGN_OR_RETURN(PlanScreen screen, ScreenPlans(laboratory_, question.rivals, question.none,
-                                                    question.like, question.scatter));
-    evaluations_ = screen.evaluations;
-    if (!screen.warning.empty()) plan_.warnings.push_back(screen.warning + ".");
     if (leading_.models.size() < 2) {
       plan_.why_none = "one model is certain, and there are no two to tell apart";
       return std::move(plan_);
     }
+    ASSIGN_OR_RETURN(PlanScreen screen, ScreenPlans(laboratory_, question.rivals, question.none,
+                                                    question.like, question.scatter));
+    evaluations_ = screen.evaluations;
+    if (!screen.warning.empty()) plan_.warnings.push_back(screen.warning + ".");
     Repeats();
     for (std::size_t i = 0; i < screen.plans.size(); ++i) {
       ScreenedPlan& one = screen.plans[i];
@@ -165,7 +165,7 @@ class Choice {
   // A plan that cannot be run stays without a forecast.
   absl::Status Run(ScreenedPlan& screened) {
     auto runs =
-        NextTestRuns::Open(laboratory_, base_, answered_, leading_,
+        ProposedRuns::Open(laboratory_, base_, answered_, leading_,
                            {.entry = screened.entry, .file = screened.file, .data = screened.data});
     absl::StatusOr<KnownTest> known =
         runs.ok() ? runs->Learn() : absl::StatusOr<KnownTest>(runs.status());

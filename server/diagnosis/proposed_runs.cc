@@ -1,4 +1,4 @@
-#include "server/diagnosis/test_runs.h"
+#include "server/diagnosis/proposed_runs.h"
 
 #include <utility>
 #include <vector>
@@ -13,7 +13,11 @@ namespace calib::diagnosis {
 
 using campaign::SamplePurpose;
 
-absl::StatusOr<NextTestRuns> NextTestRuns::Open(client::Laboratory& laboratory,
+namespace {
+constexpr char kWhatOfTest[] = "runs of the next experiment";
+}  // namespace
+
+absl::StatusOr<ProposedRuns> ProposedRuns::Open(client::Laboratory& laboratory,
                                                 const report::CampaignView& base,
                                                 const AnsweredDesign& answered,
                                                 const LeadingModels& leading,
@@ -24,14 +28,14 @@ absl::StatusOr<NextTestRuns> NextTestRuns::Open(client::Laboratory& laboratory,
   derivation.experiments = {test.entry};
   ASSIGN_OR_RETURN(const std::string text,
                    campaign::Derive(base.source.campaign_file(), derivation));
-  ASSIGN_OR_RETURN(
-      report::CampaignView design,
-      laboratory.Design(base, text, "runs of the next experiment", {{test.file, test.data}}));
-  return NextTestRuns(answered, leading,
-                      ServerRunMaker(laboratory, std::move(design), answered.known->rows.names()));
+  ASSIGN_OR_RETURN(report::CampaignView design,
+                   laboratory.Design(base, text, kWhatOfTest, {{test.file, test.data}}));
+  return ProposedRuns(
+      answered, leading,
+      ServerRunMaker(laboratory, std::move(design), answered.known->rows.names(), kWhatOfTest));
 }
 
-absl::StatusOr<KnownTest> NextTestRuns::Learn() {
+absl::StatusOr<KnownTest> ProposedRuns::Learn() {
   for (int number = 0;; ++number) {
     ASSIGN_OR_RETURN(const std::vector<EndedBatch> made, maker_.Batches());
     if (static_cast<int>(made.size()) <= number) {
@@ -50,7 +54,7 @@ absl::StatusOr<KnownTest> NextTestRuns::Learn() {
   }
 }
 
-absl::StatusOr<std::map<std::string, double>> NextTestRuns::Verify(
+absl::StatusOr<std::map<std::string, double>> ProposedRuns::Verify(
     const KnownTest& known, const std::vector<VerifiedModel>& models) {
   std::map<std::string, double> none;
   if (models.empty()) return none;
@@ -69,7 +73,7 @@ absl::StatusOr<std::map<std::string, double>> NextTestRuns::Verify(
   return ChancesOf(known.base, known.known, models, made.back(), kDesignCaps.verification_runs);
 }
 
-std::int64_t NextTestRuns::runs() const {
+std::int64_t ProposedRuns::runs() const {
   std::int64_t runs = 0;
   for (const v1::Sample& sample : maker_.design().samples) runs += sample.iteration() >= 0 ? 1 : 0;
   return runs;

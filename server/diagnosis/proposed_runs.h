@@ -7,7 +7,7 @@
 #include "absl/status/statusor.h"
 #include "server/campaign/file/text/yaml_tree.h"
 #include "server/client/laboratory.h"
-#include "server/diagnosis/next_test.h"
+#include "server/diagnosis/proposed_test.h"
 #include "server/diagnosis/run_maker.h"
 #include "server/report/views/campaign_view.h"
 
@@ -20,11 +20,11 @@ struct TestEntry {
 };
 
 /// Of a test that no design of the base has. Not thread-safe.
-class NextTestRuns {
+class ProposedRuns {
  public:
   /// Finds or submits the design; runs nothing. What is pointed to outlives it. Errors:
   /// INVALID_ARGUMENT for an entry that is no test of a campaign; those of the laboratory.
-  static absl::StatusOr<NextTestRuns> Open(client::Laboratory& laboratory,
+  static absl::StatusOr<ProposedRuns> Open(client::Laboratory& laboratory,
                                            const report::CampaignView& base,
                                            const AnsweredDesign& answered,
                                            const LeadingModels& leading, const TestEntry& test);
@@ -40,7 +40,7 @@ class NextTestRuns {
   std::int64_t runs() const;  ///< so far
 
  private:
-  NextTestRuns(const AnsweredDesign& answered, const LeadingModels& leading, ServerRunMaker maker)
+  ProposedRuns(const AnsweredDesign& answered, const LeadingModels& leading, ServerRunMaker maker)
       : answered_(&answered), leading_(&leading), maker_(std::move(maker)) {}
 
   const AnsweredDesign* answered_;

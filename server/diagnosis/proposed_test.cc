@@ -1,4 +1,4 @@
-#include "server/diagnosis/next_test.h"
+#include "server/diagnosis/proposed_test.h"
 
 #include <algorithm>
 #include <cmath>

@@ -8,7 +8,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "dem/registry/declared_effects.h"
-#include "dem/registry/effect_family.h"
 #include "server/campaign/model/excitation.h"
 #include "server/campaign/model/race.h"
 #include "server/diagnosis/extension.h"
@@ -76,7 +75,7 @@ std::vector<RacingEffect> EntriesOf(const report::CampaignView& view,
   for (const dem::StrengthRay* ray : StrengthRays(effect)) {
     const dem::ParameterInfo* parameter = ParameterNamed(effect, ray->parameter);
     RacingEffect entry{.name = effect.name,
-                       .family = dem::FamilyOf(effect),
+                       .family = effect.family,
                        .strength = absl::StrCat(effect.name, ".", ray->parameter)};
     const auto prior = priors.find(entry.strength);
     if (parameter == nullptr || prior == priors.end()) continue;
@@ -144,10 +143,11 @@ std::string WhyNotCalculated(const EffectsOnCurves& curves, const std::string& e
 
 // Nobody takes part in a race.
 absl::Status NobodyIn(const campaign::Campaign& campaign, const Race& race) {
-  if (!campaign.precomputed)
+  if (!campaign.precomputed) {
     return absl::FailedPreconditionError(
         "no effect of this build can join the model and be seen in the fitted experiments, so "
         "there is nothing to ask; `not_excitable` says why");
+  }
   std::vector<std::string> reasons;
   for (const auto& [effect, why] : race.not_excitable) {
     if (why != kNotCalculated) reasons.push_back(absl::StrCat(effect, " (", why, ")"));
@@ -184,12 +184,13 @@ std::vector<campaign::CalibratedParameter> RacingParameters(const Race& race) {
     for (const ShapeParameter& shape : effect.shapes)
       parameters.push_back({.name = shape.name, .unit = "1", .prior = shape.prior});
   }
-  for (const NumericalChoice& choice : race.numerics)
+  for (const NumericalChoice& choice : race.numerics) {
     parameters.push_back({.name = choice.name,
                           .unit = "1",
                           .prior = {.kind = inference::PriorKind::kUniform,
                                     .min = std::min(choice.null, choice.tried),
                                     .max = std::max(choice.null, choice.tried)}});
+  }
   return parameters;
 }
 
@@ -282,12 +283,13 @@ campaign::Derivation DesignOf(const report::CampaignView& view, const Race& race
                   .purpose = campaign::ToString(campaign::DerivedFor::kDesign)},
       .held_out = false,
       .race = race.Names()};
-  for (const campaign::CalibratedParameter& parameter : RacingParameters(race))
+  for (const campaign::CalibratedParameter& parameter : RacingParameters(race)) {
     design.parameters[parameter.name] = {
         .kind =
             parameter.prior.kind == inference::PriorKind::kLogUniform ? "log_uniform" : "uniform",
         .min = parameter.prior.min,
         .max = parameter.prior.max};
+  }
   return design;
 }
 

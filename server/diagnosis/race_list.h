@@ -27,7 +27,7 @@ struct ShapeParameter {
 /// by itself (gain and offset of a load cell) has an entry for each.
 struct RacingEffect {
   std::string name{};      ///< of the effect
-  std::string family{};    ///< dem::FamilyOf
+  std::string family{};    ///< dem::EffectInfo::family
   std::string strength{};  ///< dotted name of the parameter
   double null = 0;         ///< its value without the effect, SI
   /// Two moderate distances from the null, the nearer first, SI; their sign is that of positive

@@ -27,11 +27,12 @@ absl::StatusOr<std::vector<int>> PlacesAmong(const campaign::Campaign& design,
     if (found == design.parameters.end()) break;
     places.push_back(static_cast<int>(found - design.parameters.begin()));
   }
-  if (places.size() != names.size() || names.size() != design.parameters.size())
+  if (places.size() != names.size() || names.size() != design.parameters.size()) {
     return absl::FailedPreconditionError(
         absl::StrCat("the design ", design.name,
                      " was made for other parameters than this build asks for; delete it and ask "
                      "again"));
+  }
   return places;
 }
 
@@ -51,9 +52,10 @@ absl::StatusOr<std::vector<EndedBatch>> EndedBatchesOf(const report::CampaignVie
     if (sample.iteration() < 0 || !stage || !campaign::IsStageOfDesign(*stage)) continue;
     const auto status = messages::StatusOf(sample);
     if (status == campaign::EvaluationStatus::kWaiting ||
-        status == campaign::EvaluationStatus::kRunning)
+        status == campaign::EvaluationStatus::kRunning) {
       return absl::FailedPreconditionError(absl::StrCat("run ", sample.index(), " of the design ",
                                                         design.status.campaign(), " is open"));
+    }
     if (sample.iteration() >= static_cast<int>(batches.size()))
       batches.resize(static_cast<std::size_t>(sample.iteration()) + 1);
     EndedBatch& batch = batches[static_cast<std::size_t>(sample.iteration())];
@@ -74,8 +76,11 @@ absl::StatusOr<std::vector<EndedBatch>> EndedBatchesOf(const report::CampaignVie
 }
 
 ServerRunMaker::ServerRunMaker(client::Laboratory& laboratory, report::CampaignView design,
-                               std::vector<std::string> names)
-    : laboratory_(laboratory), design_(std::move(design)), names_(std::move(names)) {}
+                               std::vector<std::string> names, std::string what)
+    : laboratory_(laboratory),
+      design_(std::move(design)),
+      names_(std::move(names)),
+      what_(std::move(what)) {}
 
 absl::StatusOr<std::vector<EndedBatch>> ServerRunMaker::Batches() {
   return EndedBatchesOf(design_, names_);
@@ -93,9 +98,9 @@ absl::StatusOr<EndedBatch> ServerRunMaker::Make(const RunBatch& batch) {
     for (std::size_t j = 0; j < places.size(); ++j) row.set_parameters(places[j], run.values[j]);
     row.set_stream(run.stream);
   }
-  ASSIGN_OR_RETURN(design_,
-                   laboratory_.Grow(request, absl::StrCat("runs that tell effects apart, ",
-                                                          campaign::ToString(batch.stage))));
+  ASSIGN_OR_RETURN(
+      design_,
+      laboratory_.Grow(request, absl::StrCat(what_, ", ", campaign::ToString(batch.stage))));
   ASSIGN_OR_RETURN(std::vector<EndedBatch> batches, Batches());
   if (static_cast<int>(batches.size()) <= batch.number)
     return absl::InternalError(absl::StrCat("batch ", batch.number, " of the design is not there"));

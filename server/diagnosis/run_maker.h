@@ -55,9 +55,9 @@ absl::StatusOr<std::vector<EndedBatch>> EndedBatchesOf(const report::CampaignVie
 class ServerRunMaker : public RunMaker {
  public:
   /// laboratory outlives it. design: as it is stored, without an open run; names as
-  /// EndedBatchesOf().
+  /// EndedBatchesOf(); what: the runs in words, for who waits.
   ServerRunMaker(client::Laboratory& laboratory, report::CampaignView design,
-                 std::vector<std::string> names);
+                 std::vector<std::string> names, std::string what);
   absl::StatusOr<std::vector<EndedBatch>> Batches() override;
   absl::StatusOr<EndedBatch> Make(const RunBatch& batch) override;
   const report::CampaignView& design() const { return design_; }  ///< with all batches so far
@@ -66,6 +66,7 @@ class ServerRunMaker : public RunMaker {
   client::Laboratory& laboratory_;
   report::CampaignView design_;
   std::vector<std::string> names_;
+  std::string what_;
 };
 
 }  // namespace calib::diagnosis

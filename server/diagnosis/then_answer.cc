@@ -11,10 +11,10 @@
 #include "absl/strings/str_join.h"
 #include "calib/return_if_error.h"
 #include "server/campaign/file/derive.h"
-#include "server/diagnosis/next_test.h"
 #include "server/diagnosis/plan_words.h"
+#include "server/diagnosis/proposed_runs.h"
+#include "server/diagnosis/proposed_test.h"
 #include "server/diagnosis/setting_plans.h"
-#include "server/diagnosis/test_runs.h"
 
 namespace calib::diagnosis {
 namespace {
@@ -165,8 +165,8 @@ class SecondInquiry {
 
   absl::Status OpenRuns() {
     if (runs_) return absl::OkStatus();
-    ASSIGN_OR_RETURN(NextTestRuns runs,
-                     NextTestRuns::Open(laboratory_, base_, answered_, leading_, test_));
+    ASSIGN_OR_RETURN(ProposedRuns runs,
+                     ProposedRuns::Open(laboratory_, base_, answered_, leading_, test_));
     runs_.emplace(std::move(runs));
     return absl::OkStatus();
   }
@@ -224,7 +224,7 @@ class SecondInquiry {
   const LeadingModels leading_;
   TestEntry test_;
   campaign::Campaign measured_;
-  std::optional<NextTestRuns> runs_;
+  std::optional<ProposedRuns> runs_;
   std::optional<KnownTest> known_;
   inference::PartOfColumns columns_;
   Eigen::VectorXd history_;  // measured, on the scale of the set

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <set>
 
 #include "inference/diagnosis/next_runs.h"
@@ -10,29 +11,57 @@ namespace calib::diagnosis {
 
 using Eigen::Index;
 
+namespace {
+
+using Names = std::set<std::string>;
+
+// Whether a model is the other with one effect exchanged for another of its family.
+bool IsExchanged(const Names& model, const Names& other,
+                 const std::vector<std::vector<std::string>>& families) {
+  std::vector<std::string> own, lost;
+  std::set_difference(model.begin(), model.end(), other.begin(), other.end(),
+                      std::back_inserter(own));
+  std::set_difference(other.begin(), other.end(), model.begin(), model.end(),
+                      std::back_inserter(lost));
+  if (own.size() != 1 || lost.size() != 1) return false;
+  return std::any_of(families.begin(), families.end(), [&](const std::vector<std::string>& family) {
+    return std::count(family.begin(), family.end(), own[0]) > 0 &&
+           std::count(family.begin(), family.end(), lost[0]) > 0;
+  });
+}
+
+}  // namespace
+
 std::vector<VerifiedModel> ModelsToVerify(const Knowledge& knowledge, const Asked& asked,
                                           const VerificationQuestion& question) {
-  std::vector<VerifiedModel> models;
   const std::vector<inference::ModelEvidence>& evidence = asked.evidence[0];
-  const std::set<std::string> named(question.named.begin(), question.named.end());
-  std::vector<std::set<std::string>> taken;
-  if (named.empty()) return models;
+  const Names named(question.named.begin(), question.named.end());
+  std::vector<VerifiedModel> kin, others;  // kin: what would be named the first
+  std::set<Names> taken;
+  Names leader;
+  if (named.empty()) return {};
   for (const Index i : inference::LeadingModels(evidence, asked.probabilities[0], 0,
                                                 static_cast<int>(evidence.size()))) {
     const inference::ModelEvidence& own = evidence[static_cast<std::size_t>(i)];
     const std::vector<std::string> names = EffectsNamed(knowledge, own.model);
-    const std::set<std::string> each(names.begin(), names.end());
-    if (names.empty() || std::find(taken.begin(), taken.end(), each) != taken.end()) continue;
+    const Names each(names.begin(), names.end());
+    if (names.empty() || taken.count(each) > 0) continue;
     const bool has_all = std::includes(each.begin(), each.end(), named.begin(), named.end());
-    if (models.empty() ? !has_all
-                       : has_all || each.size() > models.front().effects.size() ||
-                             asked.probabilities[0].model[i] < question.sibling)
+    const bool first = leader.empty();
+    const bool exchanged = !first && IsExchanged(each, leader, question.families);
+    if (first ? !has_all
+              : has_all || each.size() > leader.size() ||
+                    (!exchanged && asked.probabilities[0].model[i] < question.sibling))
       continue;
-    taken.push_back(each);
-    models.push_back({.effects = names, .optimum = BestDraw(knowledge, own.draws)});
-    if (static_cast<int>(models.size()) == question.most) break;
+    if (first) leader = each;
+    taken.insert(each);
+    (first || exchanged ? kin : others)
+        .push_back({.effects = names, .optimum = BestDraw(knowledge, own.draws)});
   }
-  return models;
+  kin.insert(kin.end(), std::make_move_iterator(others.begin()),
+             std::make_move_iterator(others.end()));
+  kin.resize(std::min(kin.size(), static_cast<std::size_t>(question.most)));
+  return kin;
 }
 
 std::map<std::string, double> ChancesOf(const BaseRuns& base, const Knowledge& knowledge,
@@ -62,10 +91,7 @@ std::map<std::string, double> ChancesOf(const BaseRuns& base, const Knowledge& k
           PartOfPoints(knowledge.rows, knowledge.part, knowledge.rows.Points(values)), packing,
           base.scale.Scaled(rows));
     }
-    for (const std::string& effect : model.effects) {
-      const auto [place, fresh] = chances.try_emplace(effect, chance);
-      if (!fresh) place->second = std::min(place->second, chance);
-    }
+    for (const std::string& effect : model.effects) chances.try_emplace(effect, chance);
   }
   return chances;
 }

@@ -16,20 +16,24 @@ struct VerifiedModel {
   inference::DesignPoints optimum{};   ///< 1 point, of the kept entries
 };
 
-/// Names that would be given, and how many models may be verified: siblings from a probability on.
+/// Names that would be given, and who is a sibling.
 struct VerificationQuestion {
   std::vector<std::string> named{};
-  int most = 3;
-  double sibling = 0.01;
+  /// Effects that act alike: a model with one of what would be named exchanged for another of its
+  /// family is a sibling, however improbable. An emulator that has never been where the sibling
+  /// would lie does not know how improbable it is.
+  std::vector<std::vector<std::string>> families{};
+  int most = 4;           ///< models that may be verified
+  double sibling = 0.01;  ///< other models of no more effects are siblings from this probability on
 };
 /// The most probable model that has all that would be named, at the draw of its posterior that the
-/// measurement is most probable at; then, most probable first, models of no more effects that lack
-/// one of them. None: nothing would be named.
+/// measurement is most probable at; then its siblings, which lack one of them: those of a family
+/// first, then most probable first. None: nothing would be named.
 std::vector<VerifiedModel> ModelsToVerify(const Knowledge& knowledge, const Asked& asked,
                                           const VerificationQuestion& question);
 
-/// For each effect of the models the smallest chance of the fresh runs of a model that has it
-/// (inference::VerificationChance). base: of the tests that were run; knowledge: of them, without
+/// For each effect of the models the chance of the fresh runs of the first model that has it
+/// (inference::VerificationChance): of what would be named its own. base: of the tests that were run; knowledge: of them, without
 /// these runs. runs: `each` of every model in their order; those that did not come to their ends
 /// are left out, and where none came the chance is 0.
 std::map<std::string, double> ChancesOf(const BaseRuns& base, const Knowledge& knowledge,

@@ -484,7 +484,7 @@ class Frozen(InAFolder):
         with self.assertRaisesRegex(cases.NotFrozen, 'server/diagnosis is not what it was'):
             cases.frozen_commit(self.folder, file)
         self.git('revert', '-n', 'HEAD')
-        self.write('server/diagnosis/next_test.cc', 'what comes after an answer')
+        self.write('server/diagnosis/proposed_test.cc', 'what comes after an answer')
         self.git('add', '-A')
         self.git('commit', '-qm', 'after')
         self.assertEqual(cases.frozen_commit(self.folder, file, 'shared'), commit)

@@ -9,7 +9,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 # What must not have changed since the commit in FROZEN: what answers, and what makes the cases.
 JUDGED = ('inference', 'server/diagnosis', 'server/campaign/model')
 # Of server/diagnosis what comes after an answer: cases of the shared way do not depend on it.
-AFTER = ('control_way', 'diagnosis_text', 'extended_calibration', 'improve', 'next_', 'plan_', 'setting_plans', 'test_plans', 'test_runs',
+AFTER = ('control_way', 'diagnosis_text', 'extended_calibration', 'improve', 'next_', 'plan_', 'proposed_', 'setting_plans', 'test_plans',
          'then_answer', 'CMakeLists.txt', 'README.md', 'DECISIONS.md')
 OWN = ('deploy/bench/hidden-effects.d/cases.py', 'deploy/bench/hidden-effects.d/strengths.py')
 MEASUREMENT_SIDE = {'apparatus_compliance', 'strain_offset', 'membrane_stiffness', 'load_cell_error'}

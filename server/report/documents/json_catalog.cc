@@ -4,7 +4,6 @@
 
 #include "dem/registry/catalog.h"
 #include "dem/registry/declared_effects.h"
-#include "dem/registry/effect_family.h"
 #include "server/report/documents/json_documents.h"
 
 namespace calib::report {
@@ -101,7 +100,7 @@ std::string EffectsJson(std::span<const dem::UserEffect> declared) {
                     {"needs_space", e->needs_space},
                     {"across_pressures", e->across_pressures},
                     {"excludes", e->excludes},
-                    {"family", dem::FamilyOf(*e).empty() ? Json(nullptr) : Json(dem::FamilyOf(*e))},
+                    {"family", e->family.empty() ? Json(nullptr) : Json(e->family)},
                     {"parameters", EffectParameters(e->parameters)},
                     {"reference", e->reference}});
   }

@@ -82,8 +82,7 @@ std::string ProposalsHtml(const StoredDiagnosis& d) {
       "<th>one answer, and right</th><th>tells [bits]</th></tr>\n";
   for (const StoredProposal& own : d.proposals) {
     html += fmt::format("<tr><td class=\"l wide\">{}</td><td>{}</td><td>{}</td></tr>\n",
-                        Escape(own.in_words), Percent(std::min(own.decides, 0.999), 3),
-                        Number(own.bits, 2));
+                        Escape(own.in_words), ChanceInWords(own.decides), Number(own.bits, 2));
   }
   return html +
          "</table></div>\n<p class=\"sub\">By runs of each test at what the models that lead "

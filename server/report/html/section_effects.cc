@@ -195,7 +195,7 @@ std::string EffectsSection(const ReportData& data, const StoredDiagnosis& diagno
   if (diagnosis.repeat_names_alone) {
     html += fmt::format(
         "<p>The same tests on a second specimen would name one effect with probability {}.</p>\n",
-        Percent(*diagnosis.repeat_names_alone, 2));
+        ChanceInWords(*diagnosis.repeat_names_alone));
   }
   std::string changes;
   if (ErrorsAreKnown(data.view)) {

@@ -91,6 +91,13 @@ std::string Percent(double share, int digits) {
   return std::isnan(share) ? Number(share) : Number(100 * share, digits) + " %";
 }
 
+std::string ChanceInWords(double probability) {
+  const double percent = 100 * probability;
+  if (percent >= 99.5) return "more than 99 %";
+  if (percent < 0.5) return "less than 1 %";
+  return fmt::format("{} %", std::lround(percent));
+}
+
 std::string ShareExplained(double share) {
   constexpr double kLeast = 1e-3;
   return share > 0 && share < kLeast ? "< 0.1 %" : Percent(share, 2);

@@ -30,6 +30,8 @@ std::string DateForPeople(std::int64_t unix_ms);
 
 /// A share in percent: "4.1 %"; "–" for NaN.
 std::string Percent(double share, int digits);
+/// A probability in whole percent; of what is not certain nothing is said to be: "more than 99 %".
+std::string ChanceInWords(double probability);
 /// Percent with two digits, "< 0.1 %" where less is chance.
 std::string ShareExplained(double share);
 

@@ -1,6 +1,7 @@
 // diagnose, extend and improve as a user meets them, on a calibration of 64 grains.
 #include <algorithm>
 
+#include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
 #include "tests/integration/ctl/calibctl_fixture.h"
 
@@ -169,15 +170,15 @@ inference: {method: iterative_bayesian_filter, max_iterations: 3, samples: )" +
         << Read("err");
   }
 
-  // What a proposal measures where that dashpot acts.
-  void MeasureProposal(const Json& planned, const std::string& file) {
+  // What a proposal measures where a dashpot acts.
+  void MeasureProposal(const std::string& ratio, const Json& planned, const std::string& file) {
     std::string settings, readings;
     for (const auto& [name, value] : planned["settings"].items()) {
       if (name != "radius")
         settings += (settings.empty() ? "" : "\n    ") + name + ": " + value.dump();
     }
     for (const Json& at : planned["path"]) readings += (readings.empty() ? "" : " ") + at.dump();
-    Measure("viscous_damping", "ratio: 0.1", readings, planned["control"], settings, 24, file);
+    Measure("viscous_damping", "ratio: " + ratio, readings, planned["control"], settings, 24, file);
   }
 };
 
@@ -192,10 +193,26 @@ TEST_F(Impacts, ADashpotIsFound) {
   const Json& first = json["candidates"][0];
   ASSERT_EQ(first["effect"], "viscous_damping") << json["sentence"];
   EXPECT_NEAR(first["amplitude"]["viscous_damping.ratio"].get<double>(), 0.1, 0.01);
+}
 
-  // The measurement that is proposed, made and told.
-  ASSERT_TRUE(json["next_experiment"].is_object()) << json["warnings"];
-  MeasureProposal(json["next_experiment"], "next.csv");
+// A dashpot so weak that it leaves a question.
+TEST_F(Impacts, TheMeasurementThatIsProposedIsMadeAndTold) {
+  const Json json = Found("viscous_damping", "ratio: 0.035", "0 0.2 0.4 0.6 0.8 1 1.2",
+                          "impact_angle", "impact_speed: 1 m/s", 24);
+  ASSERT_TRUE(json["next_experiment"].is_object()) << json["sentence"] << json["warnings"];
+
+  // It goes into the campaign file as it is printed.
+  const std::string snippet = json["next_experiment"]["snippet"];
+  Write("pasted.yaml", absl::StrReplaceAll(Read("model.yaml"),
+                                           {{"\ninference:", "\n" + snippet + "inference:"}}));
+  const Answer unmeasured = Call("validate pasted.yaml");
+  EXPECT_EQ(unmeasured.code, 2);
+  EXPECT_NE(unmeasured.err.find("measurement_to_be_made.csv"), std::string::npos) << unmeasured.err;
+  MeasureProposal("0.035", json["next_experiment"], "measurement_to_be_made.csv");
+  const Answer pasted = Call("validate pasted.yaml");
+  EXPECT_EQ(pasted.code, 0) << pasted.err << Read("pasted.yaml");
+  Write("next.csv", Read("measurement_to_be_made.csv"));
+
   const std::string then = "diagnose c1 --state s --workers 2 --json --then ";
   const Answer told = Call(then + "next.csv");
   ASSERT_EQ(told.code, 0) << told.err;

@@ -55,7 +55,8 @@ TEST(Answer, NamesWhatIsProbableEnoughWhateverTheAdequacyTestSays) {
     EXPECT_EQ(answer.verdict, AnswerVerdict::kMissingEffect);
     EXPECT_THAT(answer.effects, ElementsAre("rolling"));
     EXPECT_FALSE(answer.sure);
-    EXPECT_EQ(answer.sentence, "rolling, 98 %, or something alike that this library lacks.");
+    EXPECT_EQ(answer.sentence,
+              "Missing: rolling, 98 %, or something alike that this library lacks.");
     ASSERT_EQ(answer.credible_set.size(), 1u);
     EXPECT_EQ(answer.candidates.front().effect, "rolling");
     EXPECT_TRUE(answer.candidates.front().alone);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "server/diagnosis/design_caps.h"
 #include "server/diagnosis/design_stages.h"
 #include "tests/support/race_toy.h"
 
@@ -130,6 +131,14 @@ TEST(DesignEffects, AHiddenEffectComesClosestWithItsStrength) {
   EXPECT_NEAR(stated.center, own.amplitude.at("e0.strength"), stated.sd) << "mean and median";
   EXPECT_GT(stated.sd, 0);
   EXPECT_LT(stated.sd, 0.2 * kHiddenStrength);
+}
+
+// e1 is 15 degrees from e0, the others far from both.
+TEST(DesignEffects, ASiblingIsVerifiedHoweverImprobable) {
+  const Answer answer = TellOf({.x = 0.4, .y = 0.6, .effect = 0, .units = 9}).answer;
+  ASSERT_EQ(answer.effects, std::vector<std::string>{"e0"}) << answer.sentence;
+  EXPECT_LT(ModelOfNames(answer, {"e1"}).probability, kDesignCaps.sibling);
+  EXPECT_EQ(answer.runs.at("verification"), 2 * kDesignCaps.verification_runs);
 }
 
 TEST(DesignEffects, PointsOfAModelHaveItsParametersAndNoOthers) {

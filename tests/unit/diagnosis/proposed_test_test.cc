@@ -1,5 +1,5 @@
 // A test that the campaign does not have: its runs, and what a repeat is expected to tell.
-#include "server/diagnosis/next_test.h"
+#include "server/diagnosis/proposed_test.h"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 using Eigen::Index;
 
 // A hidden effect that another one is like, asked once.
-class NextTest : public ::testing::Test {
+class ProposedTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     toy_ = new RaceToy(3, 21, 48);
@@ -40,7 +40,7 @@ class NextTest : public ::testing::Test {
   static inline DesignChain* chain_ = nullptr;
 };
 
-TEST_F(NextTest, LeadingModelsHoldNinetyNinePercentAndTheirEffectsAreKnown) {
+TEST_F(ProposedTest, LeadingModelsHoldNinetyNinePercentAndTheirEffectsAreKnown) {
   const AnsweredDesign answered = Answered();
   const LeadingModels leading = LeadingOf(answered);
   double held = 0;
@@ -54,7 +54,7 @@ TEST_F(NextTest, LeadingModelsHoldNinetyNinePercentAndTheirEffectsAreKnown) {
   EXPECT_TRUE(held >= 0.99 || leading.models.size() == 12);
 }
 
-TEST_F(NextTest, RowsHaveThePlaneOfTheBaseAndEveryLeadingEffect) {
+TEST_F(ProposedTest, RowsHaveThePlaneOfTheBaseAndEveryLeadingEffect) {
   const AnsweredDesign answered = Answered();
   const LeadingModels leading = LeadingOf(answered);
   const BaseRuns& test = answered.before->base;
@@ -75,7 +75,7 @@ TEST_F(NextTest, RowsHaveThePlaneOfTheBaseAndEveryLeadingEffect) {
   EXPECT_NE(further.front().values, rows[13].values) << "at other draws";
 }
 
-TEST_F(NextTest, ARepeatIsToldByItsOwnTestAndTellsLessThanItHasTo) {
+TEST_F(ProposedTest, ARepeatIsToldByItsOwnTestAndTellsLessThanItHasTo) {
   const AnsweredDesign answered = Answered();
   double bits = 0;
   for (const campaign::Experiment& experiment : view_->campaign.experiments) {
