@@ -92,31 +92,33 @@ double ChainLength(const DataSet& data, std::pair<int, int> key, const std::vect
   sum -= factor * term;
 }
 
+constexpr Eigen::Index kEight = kLanes;  // as a difference of pointers
+
 // z <- z - sum_l factors_l earlier_l over n samples, the terms in order; four times eight samples
 // stay in registers until all terms are taken off.
 CALIB_INFERENCE_CLONES void SubtractEarlier(const double* factors, const double* const* earlier,
                                             Eigen::Index terms, Eigen::Index n, double* z) {
   Eigen::Index i = 0;
-  for (; i + 4 * kLanes <= n; i += 4 * kLanes) {
+  for (; i + 4 * kEight <= n; i += 4 * kEight) {
     Lanes first;
     Lanes second;
     Lanes third;
     Lanes fourth;
     std::memcpy(&first, z + i, sizeof(Lanes));
-    std::memcpy(&second, z + i + kLanes, sizeof(Lanes));
-    std::memcpy(&third, z + i + 2 * kLanes, sizeof(Lanes));
-    std::memcpy(&fourth, z + i + 3 * kLanes, sizeof(Lanes));
+    std::memcpy(&second, z + i + kEight, sizeof(Lanes));
+    std::memcpy(&third, z + i + 2 * kEight, sizeof(Lanes));
+    std::memcpy(&fourth, z + i + 3 * kEight, sizeof(Lanes));
     for (Eigen::Index l = 0; l < terms; ++l) {
       const double* of_term = earlier[l] + i;
       Subtract(factors[l], of_term, first);
-      Subtract(factors[l], of_term + kLanes, second);
-      Subtract(factors[l], of_term + 2 * kLanes, third);
-      Subtract(factors[l], of_term + 3 * kLanes, fourth);
+      Subtract(factors[l], of_term + kEight, second);
+      Subtract(factors[l], of_term + 2 * kEight, third);
+      Subtract(factors[l], of_term + 3 * kEight, fourth);
     }
     std::memcpy(z + i, &first, sizeof(Lanes));
-    std::memcpy(z + i + kLanes, &second, sizeof(Lanes));
-    std::memcpy(z + i + 2 * kLanes, &third, sizeof(Lanes));
-    std::memcpy(z + i + 3 * kLanes, &fourth, sizeof(Lanes));
+    std::memcpy(z + i + kEight, &second, sizeof(Lanes));
+    std::memcpy(z + i + 2 * kEight, &third, sizeof(Lanes));
+    std::memcpy(z + i + 3 * kEight, &fourth, sizeof(Lanes));
   }
   for (; i < n; ++i) {
     for (Eigen::Index l = 0; l < terms; ++l) z[i] -= factors[l] * earlier[l][i];
@@ -185,7 +187,7 @@ absl::StatusOr<GaussianLikelihood> GaussianLikelihood::Create(const DataSet& dat
       ASSIGN_OR_RETURN(auto factor, CorrelatedCholesky(data, key, indices));
       for (Eigen::Index k = 0; k < factor.rows(); ++k)
         likelihood.log_diagonal_[indices[static_cast<std::size_t>(k)]] = std::log(factor(k, k));
-      group.cholesky = std::move(factor);
+      group.cholesky = factor;  // its rows where columns were
       likelihood.is_plain_ = false;
     } else {
       for (std::size_t k = 0; k < indices.size(); ++k) {

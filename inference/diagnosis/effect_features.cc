@@ -13,9 +13,10 @@ EffectFeatures::EffectFeatures(Index parameters, std::vector<DesignEffect> effec
   // Each monomial once: its variables in ascending order.
   for (std::size_t m = 0; m < monomials_.size(); ++m) {
     const Monomial parent = monomials_[m];
-    for (int j = parent.variable; parent.degree < base_degree && j < parameters; ++j)
+    for (int j = parent.variable; parent.degree < base_degree && j < parameters; ++j) {
       monomials_.push_back(
           {.parent = static_cast<int>(m), .variable = j, .degree = parent.degree + 1});
+    }
   }
   for (int degree = 0; degree <= base_degree; ++degree)
     groups_.push_back({.kind = FeatureKind::kBase, .number = degree});

@@ -93,11 +93,12 @@ absl::StatusOr<EffectProbabilities> ProbabilitiesOf(const std::vector<ModelEvide
         InclusionOf(NormalizedLogWeights(logs).array().exp(), space.models, k).transpose();
   }
   result.inclusion_sd = Eigen::VectorXd::Zero(k);
-  if (realisations > 1)
+  if (realisations > 1) {
     result.inclusion_sd =
         ((inclusion.rowwise() - inclusion.colwise().mean()).colwise().squaredNorm() /
          static_cast<double>(realisations - 1))
             .cwiseSqrt();
+  }
   return result;
 }
 
@@ -156,8 +157,8 @@ std::vector<std::vector<int>> Families(const Eigen::MatrixXd& angles,
   const auto k = static_cast<int>(angles.rows());
   Eigen::MatrixXd distance = angles.cwiseMax(angles.transpose());
   for (const auto& [a, b] : kin) distance(a, b) = distance(b, a) = 0;
-  std::vector<std::vector<int>> groups;
-  for (int e = 0; e < k; ++e) groups.push_back({e});
+  std::vector<std::vector<int>> groups(static_cast<std::size_t>(k));
+  for (int e = 0; e < k; ++e) groups[static_cast<std::size_t>(e)] = {e};
   const auto apart = [&](const std::vector<int>& a, const std::vector<int>& b) {
     double largest = 0;
     for (const int x : a) {

@@ -62,18 +62,21 @@ absl::Status CheckEmulatorData(const EffectFeatures& features, const EmulatorDat
         d.outputs.rows() > 0
             ? (d.with.strength.col(k) - d.without.strength.col(k)).cwiseAbs().count()
             : 0;
-    if (runs + calculated < 2)
+    if (runs + calculated < 2) {
       return absl::FailedPreconditionError(
           absl::StrCat("effect ", k, " is on in ", runs, " runs and ", calculated,
                        " calculated differences; two are asked for"));
+    }
     if (!features.effects()[static_cast<std::size_t>(k)].two_sided &&
-        (data.points.strength.col(k).array() < 0).any())
+        (data.points.strength.col(k).array() < 0).any()) {
       return absl::InvalidArgumentError(
           absl::StrCat("effect ", k, " has one sign, and a run has a negative strength of it"));
+    }
   }
-  if (n < features.base_count() + 10)
+  if (n < features.base_count() + 10) {
     return absl::FailedPreconditionError(absl::StrCat(
         n, " runs are too few for an emulator; ", features.base_count() + 10, " are asked for"));
+  }
   return absl::OkStatus();
 }
 
@@ -180,9 +183,10 @@ double ImproveVariances(const EffectFeatures& features, const EmulatorData& data
     if (Shrunk(features.groups()[static_cast<std::size_t>(g)]))
       variances.group[g] = (sum[g] + kStartWeight * start.group[g]) / (number[g] + kStartWeight);
   }
-  if (rows.packings > 0)
+  if (rows.packings > 0) {
     variances.packing = (squares.tail(rows.packings).sum() + kStartWeight * start.packing) /
                         (static_cast<double>(q * rows.packings) + kStartWeight);
+  }
   const Eigen::MatrixXd residual = data.outputs - rows.x * posterior.mean;
   double change = 0;
   for (Index c = 0; c < q; ++c) {

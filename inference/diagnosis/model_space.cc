@@ -37,10 +37,11 @@ absl::Status ModelSpace::Validate() const {
   for (int e = 0; e < k; ++e) {
     const StrengthPrior& s = strength[static_cast<std::size_t>(e)];
     if (!ValidRange(s.low, s.high) || (effects[static_cast<std::size_t>(e)].two_sided &&
-                                       !ValidRange(s.negative_low, s.negative_high)))
+                                       !ValidRange(s.negative_low, s.negative_high))) {
       return absl::InvalidArgumentError(absl::StrCat("strengths of effect ", e, " range from ",
                                                      s.low, " to ", s.high,
                                                      "; 0 < low <= high is asked for"));
+    }
   }
   const Index h = ShapesBefore(*this, k);
   if (shape_low.size() != h || shape_high.size() != h || !shape_low.allFinite() ||
@@ -139,9 +140,10 @@ DesignPoints ModelCube::Points(const Eigen::MatrixXd& cube) const {
   DesignPoints points{.base = Eigen::MatrixXd(m, d),
                       .strength = Eigen::MatrixXd::Zero(m, k),
                       .shape = Eigen::MatrixXd::Zero(m, ShapesBefore(space_, k))};
-  for (Index j = 0; j < d; ++j)
+  for (Index j = 0; j < d; ++j) {
     points.base.col(j) =
         space_.base_low[j] + (space_.base_high[j] - space_.base_low[j]) * cube.col(j).array();
+  }
   Index column = d;
   for (std::size_t e = 0; e < model_.effects.size(); ++e, ++column) {
     const int effect = model_.effects[e];
@@ -153,10 +155,11 @@ DesignPoints ModelCube::Points(const Eigen::MatrixXd& cube) const {
   }
   for (const int effect : model_.effects) {
     const Index first = ShapesBefore(space_, effect);
-    for (int h = 0; h < space_.effects[static_cast<std::size_t>(effect)].shapes; ++h, ++column)
+    for (int h = 0; h < space_.effects[static_cast<std::size_t>(effect)].shapes; ++h, ++column) {
       points.shape.col(first + h) =
           space_.shape_low[first + h] +
           (space_.shape_high[first + h] - space_.shape_low[first + h]) * cube.col(column).array();
+    }
   }
   return points;
 }

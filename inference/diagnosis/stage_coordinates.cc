@@ -54,9 +54,10 @@ absl::Status CheckSetRuns(const SetRuns& runs, const CoordinateOptions& options)
 std::vector<Index> Spread(const std::vector<Index>& rows, int n) {
   const auto all = static_cast<Index>(rows.size());
   std::vector<Index> result;
-  for (Index i = 0; i < std::min<Index>(n, all); ++i)
+  for (Index i = 0; i < std::min<Index>(n, all); ++i) {
     result.push_back(
         rows[static_cast<std::size_t>((2 * i + 1) * all / (2 * std::min<Index>(n, all)))]);
+  }
   return result;
 }
 
@@ -195,9 +196,10 @@ absl::StatusOr<StageCoordinates> StageCoordinates::Fit(const SetRuns& runs,
   }
   const auto base_runs = static_cast<Index>(without.size());
   const EffectFeatures polynomial(d, {}, EffectFeatures::DegreeFor(d, base_runs));
-  if (base_runs < polynomial.base_count() + 10)
+  if (base_runs < polynomial.base_count() + 10) {
     return absl::FailedPreconditionError(absl::StrCat(
         base_runs, " runs without effects; ", polynomial.base_count() + 10, " are asked for"));
+  }
   const Eigen::RowVectorXd mean = runs.histories(without, Eigen::all).colwise().mean();
   const Eigen::MatrixXd raw = (runs.histories.rowwise() - mean) * a.transpose();  // N x M
   const Eigen::MatrixXd raw_base = raw(without, Eigen::all);

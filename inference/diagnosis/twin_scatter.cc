@@ -23,7 +23,10 @@ struct LogVariance {
   // [Abramowitz & Stegun 6.4.6, 6.4.12]
   static double Trigamma(double x) {
     double sum = 0;
-    for (; x < 6; ++x) sum += 1 / (x * x);
+    while (x < 6) {
+      sum += 1 / (x * x);
+      x += 1;
+    }
     return sum + 1 / x + 1 / (2 * x * x) + 1 / (6 * x * x * x) - 1 / (30 * std::pow(x, 5));
   }
 };

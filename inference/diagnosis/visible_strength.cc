@@ -40,9 +40,10 @@ Eigen::MatrixXd WhitenedSensitivities(const std::vector<const DiagnosisSet*>& se
   for (const DiagnosisSet* set : sets) {
     const SpecimenErrors& errors = set->errors();
     const Eigen::ArrayXd sd = errors.OfMeasurement().cwiseSqrt();
-    for (Index j = 0; j < base.cols(); ++j)
+    for (Index j = 0; j < base.cols(); ++j) {
       result.col(j).segment(row, sd.size()) =
           set->emulator().BaseDerivative(base, j).row(0).transpose().array() / sd;
+    }
     row += sd.size();
   }
   return result;

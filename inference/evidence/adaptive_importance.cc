@@ -117,9 +117,10 @@ double PowerFor(const Eigen::VectorXd& log_likelihood, const Eigen::VectorXd& lo
                 double effective) {
   const auto left = [&](double power) {
     Eigen::VectorXd w(log_likelihood.size());
-    for (Index i = 0; i < w.size(); ++i)
+    for (Index i = 0; i < w.size(); ++i) {
       w[i] =
           log_likelihood[i] == -kInfinity ? -kInfinity : power * log_likelihood[i] + log_start[i];
+    }
     return EffectiveSampleSize(w);
   };
   if (left(1) >= effective) return 1;
@@ -184,9 +185,10 @@ CubePoints Together(const std::vector<CubeProposal>& proposals,
   for (Index t = 0; t < count; ++t)
     densities.col(t) = proposals[static_cast<std::size_t>(t)].LogDensity(result.points);
   all.log_start.resize(count * n);
-  for (Index i = 0; i < all.log_start.size(); ++i)
+  for (Index i = 0; i < all.log_start.size(); ++i) {
     all.log_start[i] =
         std::log(static_cast<double>(count)) - LogSumExp(densities.row(i).transpose());
+  }
   const Eigen::VectorXd log_weights = result.log_likelihood + all.log_start;
   result.evidence = ImportanceEvidence(log_weights);
   result.tail = ParetoTailIndex(log_weights);

@@ -287,6 +287,7 @@ std::vector<Basin> FindBasins(const SampledModel& s) {
   std::stable_sort(by_density.begin(), by_density.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<Basin> basins;
+  basins.reserve(by_density.size());
   for (auto& [density_of_best, basin] : by_density) basins.push_back(std::move(basin));
   return basins;
 }

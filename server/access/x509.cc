@@ -176,6 +176,7 @@ std::int64_t UnixSeconds(const ASN1_TIME* time) {
 std::vector<std::string> RevokedSerials(X509_CRL* revocations) {
   std::vector<std::string> serials;
   STACK_OF(X509_REVOKED)* const all = X509_CRL_get_REVOKED(revocations);
+  serials.reserve(static_cast<std::size_t>(std::max(0, sk_X509_REVOKED_num(all))));
   for (int i = 0; i < sk_X509_REVOKED_num(all); ++i) {
     serials.push_back(HexOf(X509_REVOKED_get0_serialNumber(sk_X509_REVOKED_value(all, i))));
   }
@@ -191,7 +192,7 @@ bool IsName(const std::string& name) {
 }
 
 std::string NameForMessages(X509* certificate) {
-  const std::string name = SubjectEntry(certificate, NID_commonName).value_or("");
+  std::string name = SubjectEntry(certificate, NID_commonName).value_or("");
   if (IsName(name)) return name;
   return name.empty() ? "nobody"
                       : absl::StrCat("'", absl::CHexEscape(name).substr(0, kLongestName), "'");

@@ -99,11 +99,12 @@ absl::StatusOr<report::CampaignView> Laboratory::Finished(const std::string& cam
 
 absl::StatusOr<Laboratory::DesignWithBase> Laboratory::DesignNamed(const std::string& campaign) {
   ASSIGN_OR_RETURN(const auto status, session_.client().Show(campaign));
-  if (messages::PurposeOf(status) != campaign::DerivedFor::kDesign || status.parent().empty())
+  if (messages::PurposeOf(status) != campaign::DerivedFor::kDesign || status.parent().empty()) {
     return absl::FailedPreconditionError(
         absl::StrCat(campaign,
                      " is no design: the JSON of diagnose names the campaign of its runs in "
                      "`design.campaign`"));
+  }
   DesignWithBase result;
   ASSIGN_OR_RETURN(result.design, LoadView(session_.client(), campaign));
   ASSIGN_OR_RETURN(result.base, Finished(status.parent()));

@@ -105,6 +105,7 @@ Eigen::MatrixXd AnglesOfEffects(const Eigen::MatrixXd& angles, const EffectsOfEn
 std::vector<std::string> NamesIn(const std::vector<int>& effects,
                                  const std::vector<std::string>& names) {
   std::vector<std::string> result;
+  result.reserve(effects.size());
   for (const int e : effects) result.push_back(names[static_cast<std::size_t>(e)]);
   return result;
 }

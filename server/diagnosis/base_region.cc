@@ -124,7 +124,7 @@ absl::StatusOr<BaseRegion> RegionOf(const BaseRuns& base, const inference::Joint
       const Eigen::VectorXd x = scaled.row(i);
       left += (x.array() >= low.array()).all() && (x.array() <= high.array()).all() ? 1 : 0;
     }
-    if (left < 2 * fewest || ((high - low).array() <= 0).any()) break;
+    if (left < Index{2} * fewest || ((high - low).array() <= 0).any()) break;
     region.axes = region.axes.Narrowed(low, high);
   }
   const Eigen::MatrixXd scaled = region.axes.Scaled(base.values);

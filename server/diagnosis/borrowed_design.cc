@@ -201,6 +201,7 @@ EndedBatch RunsOfItsBase(const BaseRuns& of_other, const std::vector<std::string
   EndedBatch batch{.stage = campaign::SamplePurpose::kScout};
   const std::vector<std::string>& names = rows.race().base;
   std::vector<Index> column;
+  column.reserve(names.size());
   for (const std::string& name : names)
     column.push_back(std::find(parameters.begin(), parameters.end(), name) - parameters.begin());
   const Eigen::MatrixXd values = of_other.values(Eigen::all, column);

@@ -49,7 +49,7 @@ absl::StatusOr<DesignChain> DesignChain::Create(const report::CampaignView& base
           absl::StrCat("the design ", other.status.campaign(), " has no effect that is asked for"));
     }
   }
-  race = WithCalculated(std::move(race), runs);
+  race = WithCalculated(race, runs);
   campaign::Campaign design = CampaignOfDesign(base.campaign, race);
   const Eigen::VectorXd unit = UnitsOfCatalogue(race);
   DesignRows rows(region.axes, std::move(race), unit);

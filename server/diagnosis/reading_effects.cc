@@ -223,32 +223,33 @@ std::vector<ActOnCurve> ActsOnCurves(const Scales& scales) {
   };
   using Row = Eigen::RowVectorXd;
   using Change = Eigen::Ref<Eigen::RowVectorXd>;
-  return {{"load_cell_error", "gain", kGain, kNoStress,
-           [](const Curve& c, double gain, const Row& y, Change change) {
-             if (MayHaveRig(c)) MisreadLoad(c, gain, 0, y, change);
-           }},
-          {"load_cell_error", "offset", kOffset * scales.stress, kNoStress,
-           [](const Curve& c, double offset, const Row& y, Change change) {
-             if (MayHaveRig(c)) MisreadLoad(c, 0, offset, y, change);
-           }},
-          {"apparatus_compliance", "compliance", load > 0 ? kStrain / load : 1, no_strain,
-           [reads_strain](const Curve& c, double compliance, const Row& y, Change change) {
-             if (!reads_strain(c)) return;
-             MisreadStrain(
-                 c, [compliance](double x) { return compliance * x; }, y, change);
-           }},
-          {"strain_offset", "offset", kStrain, no_strain,
-           [reads_strain, seating](const Curve& c, double offset, const Row& y, Change change) {
-             if (!reads_strain(c)) return;
-             const auto closed = [offset, seating](double x) {
-               return offset * (1 - std::exp(-std::max(x, 0.0) / seating));
-             };
-             MisreadStrain(c, closed, y, change);
-           }},
-          {"initial_density", "densification", kPorosity, kNoPorosity,
-           [](const Curve& c, double fall, const Row& y, Change change) {
-             ShiftPorosity(c, fall, y, change);
-           }}};
+  return {
+      {"load_cell_error", "gain", kGain, kNoStress,
+       [](const Curve& c, double gain, const Row& y, const Change& change) {
+         if (MayHaveRig(c)) MisreadLoad(c, gain, 0, y, change);
+       }},
+      {"load_cell_error", "offset", kOffset * scales.stress, kNoStress,
+       [](const Curve& c, double offset, const Row& y, const Change& change) {
+         if (MayHaveRig(c)) MisreadLoad(c, 0, offset, y, change);
+       }},
+      {"apparatus_compliance", "compliance", load > 0 ? kStrain / load : 1, no_strain,
+       [reads_strain](const Curve& c, double compliance, const Row& y, const Change& change) {
+         if (!reads_strain(c)) return;
+         MisreadStrain(
+             c, [compliance](double x) { return compliance * x; }, y, change);
+       }},
+      {"strain_offset", "offset", kStrain, no_strain,
+       [reads_strain, seating](const Curve& c, double offset, const Row& y, const Change& change) {
+         if (!reads_strain(c)) return;
+         const auto closed = [offset, seating](double x) {
+           return offset * (1 - std::exp(-std::max(x, 0.0) / seating));
+         };
+         MisreadStrain(c, closed, y, change);
+       }},
+      {"initial_density", "densification", kPorosity, kNoPorosity,
+       [](const Curve& c, double fall, const Row& y, const Change& change) {
+         ShiftPorosity(c, fall, y, change);
+       }}};
 }
 
 // A campaign of its own with its curves.

@@ -344,7 +344,7 @@ std::vector<int> EntriesRun(const Race& race, const std::vector<int>& entries) {
   return run;
 }
 
-Race WithCalculated(Race race, const BaseRuns& base) {
+Race WithCalculated(const Race& race, const BaseRuns& base) {
   Race marked = race;
   for (RacingEffect& entry : marked.effects)
     entry.design.calculated = entry.shapes.empty() && base.calculated.count(entry.strength) > 0;

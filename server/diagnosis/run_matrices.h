@@ -82,7 +82,7 @@ PartOfRace WholeOf(const Race& race);
 /// The race with DesignEffect::calculated as the base's curves allow it: of all entries where the
 /// runs were made elsewhere, else as long as some entry is run, since a design without runs is
 /// none.
-Race WithCalculated(Race race, const BaseRuns& base);
+Race WithCalculated(const Race& race, const BaseRuns& base);
 
 /// Those of the entries that are run.
 std::vector<int> EntriesRun(const Race& race, const std::vector<int>& entries);

@@ -89,6 +89,7 @@ std::vector<campaign::RunOf> NumericsRows(const DesignRows& rows, const KnownBef
   for (Index j = 0; j < d; ++j)
     values[static_cast<std::size_t>(j)] = before.base.values(nearest, j);
   std::vector<campaign::RunOf> result;
+  result.reserve(rows.race().numerics.size());
   for (int c = 0; c < static_cast<int>(rows.race().numerics.size()); ++c) {
     result.push_back({.values = rows.WithNumerics(values, c),
                       .stream = before.base.stream[static_cast<std::size_t>(nearest)]});

@@ -33,9 +33,10 @@ class RandomDesign {
     std::uniform_real_distribution<double> uniform;
     for (double& x : runs_.points.base.reshaped()) x = 2 * uniform(random_) - 1;
     for (Index i = kBase; i < kAll; ++i) {
-      for (int k = 0; k < 3; ++k)
+      for (int k = 0; k < 3; ++k) {
         runs_.points.strength(i, (i + k * (1 + i % (effects - 1))) % effects) =
             0.4 * std::pow(40, uniform(random_));
+      }
     }
     for (Index i = 0; i < kAll; ++i) runs_.packing.push_back(static_cast<int>(i % 16));
     const Eigen::MatrixXd slopes = Shapes(parameters), curvatures = Shapes(parameters);

@@ -263,10 +263,11 @@ class RaceToy {
       e.control = strain_;
       for (int i = 0; i < kReadings; ++i)
         e.path.push_back({.target = strain_[static_cast<std::size_t>(i)], .load_step = i});
-      for (const int stage : stage_)
+      for (const int stage : stage_) {
         e.segment.emplace_back(stage == 0   ? "initial_loading"
                                : stage == 1 ? "unload_1"
                                             : "reload_1");
+      }
       e.observables.resize(2);
       e.observables[0].name = "deviatoric_stress";
       e.observables[0].noise =
@@ -301,9 +302,10 @@ class RaceToy {
       for (std::size_t l = 0; l < k; ++l) result += 0.01 * s * units[l] * signatures_[(k + l) % 3];
     }
     for (std::size_t c = 0; c < numerics.size(); ++c) {
-      for (int p = 0; p < 4 * kReadings && numerics[c] != 1; ++p)
+      for (int p = 0; p < 4 * kReadings && numerics[c] != 1; ++p) {
         result[p] += 0.003 * static_cast<double>(c + 1) *
                      strain_[static_cast<std::size_t>(p / 2 % kReadings)];
+      }
     }
     return result;
   }

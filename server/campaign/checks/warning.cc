@@ -12,6 +12,7 @@ std::string Sentence(const Warning& warning) {
 
 std::vector<std::string> Sentences(const std::vector<Warning>& warnings) {
   std::vector<std::string> sentences;
+  sentences.reserve(warnings.size());
   for (const Warning& warning : warnings) sentences.push_back(Sentence(warning));
   return sentences;
 }

@@ -52,7 +52,7 @@ struct SpokenColumns {
 
 SpokenColumns SpokenColumnsOf(const DataTable& table) {
   SpokenColumns names;
-  const std::vector<std::string> functions = dem::FormulaFunctions();
+  const std::vector<std::string>& functions = dem::FormulaFunctions();
   for (std::size_t i = 0; i < table.columns().size(); ++i) {
     const std::string& column = table.columns()[i];
     names.words.push_back(NameOfNumber(i + 1));
@@ -116,6 +116,7 @@ void DerivedColumns::Compute(const MapReader& data, const std::string& path, con
     std::vector<double>& values = values_[name];
     for (std::size_t i = 0; i < table.rows(); ++i) {
       std::vector<double> row;
+      row.reserve(columns.size());
       for (const std::vector<double>& column : columns) row.push_back(column[i]);
       double value = 0;
       parsed.Evaluate(row.data(), 1, &value);

@@ -189,9 +189,10 @@ TEST(DesignEffects, ChangesOfCurvesTakeAwayWhatTheBaseMisses) {
     ASSERT_EQ(curve.change.size(), static_cast<std::size_t>(RaceToy::kReadings));
     const int experiment = curve.experiment == "low" ? 0 : 1;
     const int observable = curve.observable == "deviatoric_stress" ? 0 : 1;
-    for (int i = 0; i < RaceToy::kReadings; ++i)
+    for (int i = 0; i < RaceToy::kReadings; ++i) {
       changed[2 * (RaceToy::kReadings * experiment + i) + observable] +=
           curve.change[static_cast<std::size_t>(i)];
+    }
   }
   const double before = Missed(told.view, readings), after = Missed(told.view, changed);
   std::cout << "missed " << before << " without the effect, " << after

@@ -70,10 +70,11 @@ testing::SmallCampaign WithRows(int rows) {
   campaign::Derivation derivation{.name = "derived",
                                   .lineage = {.parent = "c1", .purpose = "extension"},
                                   .method = campaign::Method::kIterativeBayesianFilter};
-  for (int i = 0; i < rows; ++i)
+  for (int i = 0; i < rows; ++i) {
     derivation.rows.push_back(
         {.like = 100 + i,
          .values = {{"young_modulus", 2e8 * (1 + 0.05 * i)}, {"friction_angle", 0.4}}});
+  }
   const auto text = campaign::Derive(campaign.yaml, derivation);
   EXPECT_TRUE(text.ok()) << text.status();
   campaign.yaml = *text;

@@ -80,9 +80,10 @@ void CalibrateOn(int designs, int truths, const std::string& what) {
       while (chosen + 1 < prior.size() && u >= prior[chosen]) u -= prior[chosen++];
       const EffectModel& truth = space.models[static_cast<std::size_t>(chosen)];
       std::vector<int> sign;
-      for (const int k : truth.effects)
+      for (const int k : truth.effects) {
         sign.push_back(
             space.effects[static_cast<std::size_t>(k)].two_sided && toy.Uniform() < 0.5 ? -1 : 1);
+      }
       const ModelCube cube(space, truth, sign);
       Eigen::MatrixXd at(1, cube.dimensions());
       for (double& x : at.reshaped()) x = toy.Uniform();

@@ -61,9 +61,8 @@ std::vector<double> DataTable::Read(const std::string& name, bool gaps,
     const std::string field = at < row.cells.size() ? row.cells[at] : "";
     const auto number = NumberIn(field, layout_.mark);
     std::string what;
-    if (gaps && SaysMissing(field, missing_)) {
-      continue;
-    } else if (number && std::isfinite(*number)) {
+    if (gaps && SaysMissing(field, missing_)) continue;
+    if (number && std::isfinite(*number)) {
       values[i] = *number;
     } else if (at >= row.cells.size()) {
       what = absl::StrCat("is missing: the line has ", row.cells.size(), " of ", columns().size(),

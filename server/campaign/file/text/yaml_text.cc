@@ -103,10 +103,10 @@ YamlNode YamlNumber(double value) {
   return YamlScalar(std::string(std::begin(buffer), end));
 }
 
-YamlNode YamlMap(std::vector<std::pair<std::string, YamlNode>> entries) {
+YamlNode YamlMap(const std::vector<std::pair<std::string, YamlNode>>& entries) {
   YamlNode node;
   node.kind = Kind::kMap;
-  for (auto& [key, value] : entries) node.entries.push_back({key, 0, std::move(value)});
+  for (const auto& [key, value] : entries) node.entries.push_back({key, 0, value});
   return node;
 }
 

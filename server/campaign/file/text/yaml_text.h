@@ -15,7 +15,7 @@ std::string ToYaml(const YamlNode& root);
 YamlNode YamlScalar(const std::string& text);
 /// Shortest text that reads back to the same number.
 YamlNode YamlNumber(double value);
-YamlNode YamlMap(std::vector<std::pair<std::string, YamlNode>> entries = {});
+YamlNode YamlMap(const std::vector<std::pair<std::string, YamlNode>>& entries = {});
 YamlNode YamlList(std::vector<YamlNode> items);
 
 /// Value of a key, made (null) if need be; a node that is no map becomes an empty one.
