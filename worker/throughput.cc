@@ -22,9 +22,12 @@ dem::Packing Lattice() {
     length = kGrainsPerEdge * kSpacing * kRadius;
   }
   for (int i = 0; i < kGrainsPerEdge * kGrainsPerEdge * kGrainsPerEdge; ++i) {
-    packing.x.push_back((i % kGrainsPerEdge + 0.5) * kSpacing * kRadius);
-    packing.y.push_back((i / kGrainsPerEdge % kGrainsPerEdge + 0.5) * kSpacing * kRadius);
-    packing.z.push_back((i / (kGrainsPerEdge * kGrainsPerEdge) + 0.5) * kSpacing * kRadius);
+    const int x = i % kGrainsPerEdge;
+    const int y = i / kGrainsPerEdge % kGrainsPerEdge;
+    const int z = i / (kGrainsPerEdge * kGrainsPerEdge);
+    packing.x.push_back((x + 0.5) * kSpacing * kRadius);
+    packing.y.push_back((y + 0.5) * kSpacing * kRadius);
+    packing.z.push_back((z + 0.5) * kSpacing * kRadius);
     packing.radius.push_back(kRadius);
     packing.clump.push_back(-1);
   }

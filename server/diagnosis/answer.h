@@ -107,7 +107,9 @@ struct Answer {
   double repeat_names_alone = 0;
   std::vector<std::pair<std::string, std::string>> not_excitable{};  ///< effect, why
   std::map<std::string, int> runs{};                                 ///< by stage
-  int borrowed_runs = 0;  ///< of another campaign's design and its base, which they rest on
+  /// Of another campaign's design and its base, which they rest on; or with effects, of tables of
+  /// runs made elsewhere.
+  int borrowed_runs = 0;
   std::vector<std::string> warnings{};
   std::string sentence{};  ///< the verdict in words
 };

@@ -7,6 +7,8 @@
 #include "calib/return_if_error.h"
 #include "inference/diagnosis/next_runs.h"
 #include "server/diagnosis/design_caps.h"
+#include "server/diagnosis/held_runs.h"
+#include "server/diagnosis/proposed_test.h"
 #include "server/diagnosis/stage_rows.h"
 
 namespace calib::diagnosis {
@@ -58,6 +60,8 @@ absl::StatusOr<DesignChain> DesignChain::Create(const report::CampaignView& base
     ASSIGN_OR_RETURN(const Race all, RaceOf(base, {}));
     ASSIGN_OR_RETURN(borrowed, BorrowedBatches(*question.other, all, rows, runs));
   }
+  if (EndedBatch held = HeldRuns(base.campaign, rows, runs.samples); !held.runs.empty())
+    borrowed.push_back(std::move(held));
   return DesignChain({.base = std::move(runs),
                       .region = std::move(region),
                       .prior = std::move(prior),
@@ -281,8 +285,28 @@ absl::StatusOr<AnsweredDesign> DesignChain::Answered() {
   return answered;
 }
 
+absl::StatusOr<NextStep> DesignChain::EndedElsewhere() {
+  const std::size_t n = batches_.size();
+  if (n == 0) return Ended(n, std::nullopt);
+  // No run can be made to verify a name: each that is there has to be foreseen by the others.
+  ASSIGN_OR_RETURN(const Knowledge* known, KnownAfter(n));
+  const bool holds = LeftOutHolds(known->set->emulator());
+  std::map<std::string, double> chances;
+  for (const int k : known->part.kept) {
+    const RacingEffect& entry = race().effects[static_cast<std::size_t>(k)];
+    chances[entry.name] = holds || entry.design.calculated ? 1 : 0;
+  }
+  ASSIGN_OR_RETURN(NextStep step, Ended(n, std::move(chances)));
+  if (!holds) {
+    std::get<Answer>(step).warnings.push_back(
+        "the runs with effects are not foreseen by each other as well as is said: more of them, at "
+        "more strengths, would name what these cannot");
+  }
+  return step;
+}
+
 absl::StatusOr<NextStep> DesignChain::Next() {
-  if (before_.base.elsewhere) return Ended(0, std::nullopt);
+  if (before_.base.elsewhere) return EndedElsewhere();
   const std::optional<SamplePurpose> last = LastStage();
   if (!last) return Scout();
   if (last == SamplePurpose::kScout) {

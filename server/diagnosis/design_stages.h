@@ -45,9 +45,9 @@ struct AnsweredDesign {
 };
 
 /// The chain, from the batches that it is told of. Where it rests on the runs of another design it
-/// begins with its own sequential batches. Where the base's runs were made elsewhere it
-/// makes none and answers at once, from them and what is calculated on them. What it has found is
-/// kept as long as it lives. Not thread-safe.
+/// begins with its own sequential batches. Where the base's runs were made elsewhere it makes none
+/// and answers at once, from them, those with effects that the same tables hold and what is
+/// calculated on them. What it has found is kept as long as it lives. Not thread-safe.
 class DesignChain {
  public:
   /// Errors: those of RaceOf, BaseRunsOf, RegionOf and BorrowedBatches: FAILED_PRECONDITION with a
@@ -93,6 +93,7 @@ class DesignChain {
   absl::StatusOr<Answer> AnswerAfter(std::size_t n, const VerificationChances& verification);
   /// The answer by the first n batches, which is the last word.
   absl::StatusOr<NextStep> Ended(std::size_t n, const VerificationChances& verification);
+  absl::StatusOr<NextStep> EndedElsewhere();
   RunBatch BatchOf(campaign::SamplePurpose stage, std::vector<campaign::RunOf> rows) const;
   int NextStream() const;
 

@@ -282,7 +282,12 @@ std::string DetectableText(const Diagnosis& d) {
 }
 
 std::string RunsText(const Diagnosis& d) {
-  if (d.design.empty()) return "";
+  if (d.design.empty()) {
+    return d.answer.borrowed_runs == 0
+               ? ""
+               : fmt::format("By {} runs of the tables that have effects.\n",
+                             d.answer.borrowed_runs);
+  }
   std::string stages;
   int runs = 0;
   for (const auto& [stage, number] : d.answer.runs) {
@@ -353,6 +358,8 @@ std::string DiagnosisJson(const Diagnosis& d) {
     if (!d.borrowed.empty()) {
       json["design"]["borrowed_from"] = d.borrowed;
       json["design"]["borrowed_runs"] = answer.borrowed_runs;
+    } else if (d.design.empty()) {
+      json["design"]["held_runs"] = answer.borrowed_runs;
     }
     json["without"] = d.left_out;
     json["then"] = ThenJson(d.then);

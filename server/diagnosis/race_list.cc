@@ -129,6 +129,13 @@ std::vector<RacingEffect> EntriesOnCurves(const report::CampaignView& view,
   return entries;
 }
 
+// Whether rows of the campaign's tables have the effect.
+bool IsHeld(const campaign::Campaign& campaign, const std::string& effect) {
+  const auto& declared = campaign.model.user_effects;
+  return std::any_of(declared.begin(), declared.end(),
+                     [&effect](const dem::UserEffect& own) { return own.info.name == effect; });
+}
+
 // Why an effect cannot be calculated on curves, in a clause; empty: it can.
 std::string WhyNotCalculated(const EffectsOnCurves& curves, const std::string& effect) {
   for (const auto& [name, why] : curves.impossible) {
@@ -243,13 +250,16 @@ absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
     race.base.push_back(parameter.name);
   for (const dem::EffectInfo* effect : dem::AllEffects(campaign.model.user_effects)) {
     if (IsAmong(campaign.model.effects, effect->name)) continue;
-    std::string why =
-        elsewhere ? WhyNotCalculated(curves, effect->name) : WhyNotJoin(campaign, effect->name);
+    const bool held = elsewhere && IsHeld(campaign, effect->name);
+    std::string why;
+    if (elsewhere && !held) why = WhyNotCalculated(curves, effect->name);
+    if (!elsewhere) why = WhyNotJoin(campaign, effect->name);
     if (why.empty() && IsAmong(without, effect->name)) why = "left out as asked for";
     if (why.empty() && !elsewhere) why = WhyNotShown(campaign, *effect);
     std::vector<RacingEffect> entries;
     if (why.empty()) {
-      entries = elsewhere ? EntriesOnCurves(view, *effect, curves) : EntriesOf(view, *effect);
+      entries =
+          elsewhere && !held ? EntriesOnCurves(view, *effect, curves) : EntriesOf(view, *effect);
       if (entries.empty()) why = "the catalogue gives no strength to try";
     }
     if (why.empty()) {
@@ -266,7 +276,10 @@ absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
       if (one.name == other.name) continue;
       if (!one.family.empty() && one.family == other.family) race.kin.emplace_back(a, b);
       // Instruments and a denser start exclude nobody.
-      if (!elsewhere && !campaign::WhyNotTogether(campaign, {one.name, other.name}).empty())
+      const auto& declared = campaign.model.user_effects;
+      if (elsewhere ? dem::Exclude(*dem::FindEffect(declared, one.name),
+                                   *dem::FindEffect(declared, other.name))
+                    : !campaign::WhyNotTogether(campaign, {one.name, other.name}).empty())
         race.excluded.emplace_back(a, b);
     }
   }

@@ -67,8 +67,9 @@ struct Race {
 std::string WhyNotShown(const campaign::Campaign& campaign, const dem::EffectInfo& effect);
 
 /// Who can join the model of a calibrated campaign and be seen in its fitted experiments. without:
-/// effects that are left out as asked for. Where the runs were made elsewhere: the strengths that
-/// EffectsOnReadings calculates, without shapes, which it holds, and no numerics. Errors:
+/// effects that are left out as asked for. Where the runs were made elsewhere: effects that their
+/// rows hold, the strengths that EffectsOnReadings calculates, without shapes, which it holds, and
+/// no numerics. Errors:
 /// FAILED_PRECONDITION with a sentence where nobody can.
 absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
                             const std::vector<std::string>& without);

@@ -58,9 +58,10 @@ class Planner {
     plan_.converged = record_.progress.converged;
     absl::Status status;
     const bool runs_rows_only = campaign::RunsRowsOnly(campaign_.method);
-    if (history_.iterations.empty() && runs_rows_only && !campaign_.table.has_value()) {
-      Finish();  // a design to which nothing has been added
-    } else if (history_.iterations.empty()) {
+    // A design to which nothing has been added.
+    const bool is_empty =
+        history_.iterations.empty() && runs_rows_only && !campaign_.table.has_value();
+    if (history_.iterations.empty() && !is_empty) {
       status = Begin(runs_rows_only ? TableBatch() : MakeMethod(definition_)->First());
       if (DecidesAtOnce(definition_)) {
         plan_.log.emplace_back(
@@ -70,7 +71,7 @@ class Planner {
         plan_.event = CampaignEvent::kStart;
       }
     } else if (plan_.phase == campaign::Phase::kCalibrating && DecidesWhileRunning(definition_) &&
-               !replicating_) {
+               !replicating_ && !is_empty) {
       status = GoOn();
     } else if (history_.open > 0) {
       return std::move(plan_);  // nothing to say

@@ -1,8 +1,8 @@
 #pragma once
 // Calls as they begin and end: each is let in by the guard (guard.h), holds its pass of the door
-// (door.h) until gRPC is done with it,
-// and one that is turned away ends at once with a status.
+// (door.h) until gRPC is done with it, and one that is turned away ends at once with a status.
 
+#include <grpcpp/server_context.h>
 #include <grpcpp/support/server_callback.h>
 #include <spdlog/spdlog.h>
 
@@ -93,10 +93,11 @@ absl::StatusOr<Reply> Outgoing(absl::StatusOr<Reply> reply) {
 template <typename Reply>
 void Answer(grpc::ServerUnaryReactor* reactor, absl::StatusOr<Reply> answer, Reply* reply) {
   auto outgoing = Outgoing(std::move(answer));
-  if (outgoing.ok()) {
+  const absl::Status status = outgoing.status();
+  if (status.ok()) {
     *reply = *std::move(outgoing);
   }
-  reactor->Finish(rpc::ToGrpc(outgoing.status()));
+  reactor->Finish(rpc::ToGrpc(status));
 }
 
 }  // namespace calib::service

@@ -5,6 +5,8 @@
 #include <map>
 
 #include "absl/strings/str_cat.h"
+#include "dem/registry/catalog.h"
+#include "server/campaign/file/read_user_effects.h"
 #include "server/campaign/file/run_states.h"
 #include "server/campaign/file/run_table.h"
 #include "server/campaign/file/text/suggestion.h"
@@ -22,6 +24,69 @@ void CheckNames(const MapReader& map, const std::string& key, const NameMap& nam
   }
 }
 
+// One column is one parameter.
+void CheckColumnsDiffer(const MapReader& map, const NameMap& columns,
+                        const std::vector<std::string>& parameters) {
+  std::map<std::string, std::string> reader;
+  for (const std::string& name : parameters) {
+    const std::string column = ColumnOf(columns, name);
+    const auto [first, is_new] = reader.emplace(column, name);
+    if (!is_new) {
+      map.Problem("parameter_columns",
+                  absl::StrCat(first->second, " and ", name, " would both be read from the column ",
+                               Quoted(column)));
+    }
+  }
+}
+
+// A parameter of an effect that rows have.
+struct HeldParameter {
+  std::string name;  // dotted
+  std::string unit;
+  std::optional<double> null;
+};
+
+std::vector<HeldParameter> HeldParametersOf(const Campaign& campaign) {
+  std::vector<HeldParameter> held;
+  for (const dem::UserEffect& effect : campaign.model.user_effects) {
+    for (const dem::ParameterInfo& own : effect.info.parameters)
+      held.push_back({absl::StrCat(effect.info.name, ".", own.name), own.unit, own.null_value});
+  }
+  return held;
+}
+
+// The key `effects`: what some of the rows have and the model that is calibrated lacks.
+void ReadHeldEffects(MapReader& map, const ReadContext& context, Campaign& campaign) {
+  auto effects = map.Map("effects");
+  if (!effects) return;
+  const std::vector<std::string> names = effects->Keys();
+  for (const std::string& name : names) {
+    auto one = effects->Map(name);
+    if (!one) continue;
+    dem::UserEffect effect;
+    effect.info.name = name;
+    effect.info.kind = "held";
+    effect.info.reference = "runs made elsewhere";
+    effect.info.description = one->Text("description").value_or("");
+    if (name.find('.') != std::string::npos) {
+      effects->Problem(name, "an effect's name has no dot: what stands behind it is a parameter");
+    } else if (dem::FindEffect(name) != nullptr) {
+      effects->Problem(name, "is an effect of this build; call that of your runs another");
+    }
+    ReadEffectParameters(*one, context.is_new(), effect.info);
+    effect.info.excludes = one->TextList("excludes").value_or(std::vector<std::string>{});
+    for (const std::string& other : effect.info.excludes) {
+      if (other == name || std::find(names.begin(), names.end(), other) == names.end()) {
+        one->Problem("excludes", absl::StrCat(Quoted(other), " is none of the others; ",
+                                              Suggestion(other, names)));
+      }
+    }
+    one->Finish();
+    campaign.model.user_effects.push_back(std::move(effect));
+  }
+  effects->Finish();
+}
+
 // The table of parameters, one row per sample.
 class ParametersReader {
  public:
@@ -34,6 +99,8 @@ class ParametersReader {
     for (const CalibratedParameter& parameter : campaign_.parameters) {
       wanted.push_back(ColumnOf(keys_.parameter_columns, parameter.name));
     }
+    for (const HeldParameter& own : held_)
+      wanted.push_back(ColumnOf(keys_.parameter_columns, own.name));
     const auto table = OpenRunTable(map_, "parameters", keys_.parameters, wanted, context_);
     if (table) ReadParameters(*table);
   }
@@ -41,9 +108,59 @@ class ParametersReader {
   // Row of each sample.
   [[nodiscard]] const std::map<int, Eigen::Index>& row_of_sample() const { return row_of_sample_; }
 
+  // Takes the rows that have effects out of the runs that calibrate.
+  void TakeOutEffects() {
+    Precomputed& runs = *campaign_.precomputed;
+    RunsWithEffects& with = runs.with_effects;
+    if (held_.empty() || !is_sound_) return;
+    std::vector<Eigen::Index> own, others;
+    for (Eigen::Index i = 0; i < effects_.rows(); ++i) {
+      bool has_effect = false;
+      for (std::size_t k = 0; k < held_.size(); ++k) {
+        has_effect = has_effect ||
+                     (held_[k].null && effects_(i, static_cast<Eigen::Index>(k)) != *held_[k].null);
+      }
+      (has_effect ? others : own).push_back(i);
+    }
+    for (const HeldParameter& parameter : held_) with.names.push_back(parameter.name);
+    const auto d = runs.parameters.cols();
+    with.parameters.resize(static_cast<Eigen::Index>(others.size()), d + effects_.cols());
+    with.parameters.leftCols(d) = runs.parameters(others, Eigen::all);
+    with.parameters.rightCols(effects_.cols()) = effects_(others, Eigen::all);
+    runs.parameters = Eigen::MatrixXd(runs.parameters(own, Eigen::all));
+    if (runs.log_proposal) runs.log_proposal = Eigen::VectorXd((*runs.log_proposal)(own));
+    for (auto& states : runs.values) {
+      const auto take = [&states](const std::vector<Eigen::Index>& rows) {
+        std::vector<std::vector<double>> taken;
+        taken.reserve(rows.size());
+        for (const Eigen::Index i : rows) taken.push_back(states[static_cast<std::size_t>(i)]);
+        return taken;
+      };
+      with.values.push_back(take(others));
+      states = take(own);
+    }
+    if (own.empty()) {
+      context_.problems().AddIn(keys_.parameters, 0, "",
+                                "every row has an effect; a calibration needs runs without one, "
+                                "whose effects are all at their null");
+    } else if (others.empty()) {
+      context_.problems().AddIn(keys_.parameters, 0, "",
+                                "no row has an effect: all are at their null; leave `effects` out "
+                                "or give the runs that have them");
+    }
+  }
+
+  // How many samples calibrate.
+  void Count() {
+    const Eigen::MatrixXd& parameters = campaign_.precomputed->parameters;
+    campaign_.samples = static_cast<int>(parameters.rows());
+    if (context_.is_new()) RefuseOneSet(keys_.parameters);
+  }
+
  private:
   void ReadParameters(const DataTable& table) {
     const std::string& path = keys_.parameters;
+    const std::size_t before = context_.problems().size();
     const std::vector<int> samples = KeyColumn(path, table, keys_.sample, context_);
     for (std::size_t i = 0; i < samples.size(); ++i) {
       if (!row_of_sample_.emplace(samples[i], static_cast<Eigen::Index>(i)).second) {
@@ -73,8 +190,18 @@ class ParametersReader {
       campaign_.precomputed->log_proposal = Eigen::Map<const Eigen::VectorXd>(
           column.data(), static_cast<Eigen::Index>(column.size()));
     }
-    campaign_.samples = static_cast<int>(parameters.rows());
-    if (context_.is_new()) RefuseOneSet(path);
+    effects_.resize(parameters.rows(), static_cast<Eigen::Index>(held_.size()));
+    for (std::size_t k = 0; k < held_.size(); ++k) {
+      const HeldParameter& own = held_[k];
+      const double factor =
+          FactorOf(map_, "parameter_units", keys_.parameter_units, own.name, own.unit);
+      const auto column =
+          NumberColumn(path, table, ColumnOf(keys_.parameter_columns, own.name), context_);
+      for (std::size_t i = 0; i < column.size(); ++i) {
+        effects_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = factor * column[i];
+      }
+    }
+    is_sound_ = parameters.rows() > 0 && context_.problems().size() == before;
   }
 
   // One run told many times says nothing of any other parameters.
@@ -97,6 +224,9 @@ class ParametersReader {
   const RunTableKeys& keys_;
   ReadContext& context_;
   Campaign& campaign_;
+  std::vector<HeldParameter> held_ = HeldParametersOf(campaign_);
+  Eigen::MatrixXd effects_;  // of all rows
+  bool is_sound_ = false;    // the table could be read
   std::map<int, Eigen::Index> row_of_sample_;
 };
 
@@ -106,6 +236,7 @@ void CheckKeyNames(const MapReader& map, const RunTableKeys& keys, const Campaig
   for (const CalibratedParameter& parameter : campaign.parameters) {
     parameters.push_back(parameter.name);
   }
+  for (const HeldParameter& own : HeldParametersOf(campaign)) parameters.push_back(own.name);
   std::vector<std::string> of_states;  // observables, and what tells how far a run has come
   for (const Experiment& experiment : campaign.experiments) {
     for (const MeasuredObservable& observable : experiment.observables) {
@@ -116,6 +247,7 @@ void CheckKeyNames(const MapReader& map, const RunTableKeys& keys, const Campaig
     if (!experiment.control_name.empty()) of_states.push_back(experiment.control_name);
   }
   CheckNames(map, "parameter_columns", keys.parameter_columns, parameters);
+  CheckColumnsDiffer(map, keys.parameter_columns, parameters);
   CheckNames(map, "parameter_units", keys.parameter_units, parameters);
   NameMap absolute;
   for (const std::string& name : keys.absolute) absolute.emplace_back(name, "");
@@ -131,12 +263,15 @@ void ReadPrecomputed(MapReader& campaign_map, ReadContext& context, Campaign& ca
   if (!model) return;
   auto map = model->Map("precomputed");
   if (!map) return;
+  ReadHeldEffects(*map, context, campaign);
   const RunTableKeys keys = ReadRunTableKeys(*map);
   CheckKeyNames(*map, keys, campaign);
   ParametersReader parameters(*map, keys, context, campaign);
   parameters.Read();
   campaign.precomputed->values =
       ReadRunStates(*map, keys, campaign, parameters.row_of_sample(), context);
+  parameters.TakeOutEffects();
+  parameters.Count();
 }
 
 }  // namespace calib::campaign

@@ -23,7 +23,7 @@ namespace calib::campaign {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-/// Where on the prior of a strength the screen tries it, without `steps`.
+/// Where on the prior of a strength it is tried, without `steps`.
 constexpr double kNearQuantile = 0.5;
 constexpr double kFarQuantile = 0.8;
 
@@ -119,7 +119,7 @@ constexpr std::array kSignWords = {
     Word{Sign::kEither, "either"},
 };
 
-void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::UserEffect& effect) {
+void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::EffectInfo& effect) {
   const std::size_t before = map.problems().size();
   dem::ParameterInfo info;
   info.name = name;
@@ -165,14 +165,14 @@ void ReadParameter(MapReader& map, const std::string& name, bool is_new, dem::Us
   }
   if (prior && info.null_value && map.problems().size() == before) {
     if (const auto ray = ReadRay(map, info, *prior, both, is_new)) {
-      effect.info.rays.push_back(*ray);
-      effect.info.two_sided = effect.info.two_sided || both;
+      effect.rays.push_back(*ray);
+      effect.two_sided = effect.two_sided || both;
     }
   } else {
     map.Ignore({"steps"});
   }
   map.Finish();
-  effect.info.parameters.push_back(std::move(info));
+  effect.parameters.push_back(std::move(info));
 }
 
 void ReadTarget(MapReader& map, dem::UserEffect& effect) {
@@ -254,14 +254,7 @@ dem::UserEffect ReadOne(MapReader& map, const std::string& name, bool is_new) {
                                        wanted == "1" ? "a plain number" : wanted));
     }
   }
-  if (auto parameters = map.Map("parameters")) {
-    for (const std::string& key : parameters->Keys()) {
-      if (auto parameter = parameters->Map(key)) ReadParameter(*parameter, key, is_new, effect);
-    }
-    parameters->Finish();
-  } else if (!map.Has("parameters")) {
-    map.Problem("parameters", "is missing; at least one, with its null, is the effect's strength");
-  }
+  ReadEffectParameters(map, is_new, effect.info);
   effect.info.contacts = map.TextList("contacts").value_or(std::vector<std::string>{});
   for (const std::string& contact : effect.info.contacts) {
     if (dem::FindContact(contact) == nullptr) {
@@ -278,19 +271,6 @@ dem::UserEffect ReadOne(MapReader& map, const std::string& name, bool is_new) {
   effect.info.description = Describe(effect, map.Text("description").value_or(""));
   map.Finish();
   if (map.problems().size() > before) return effect;
-  const auto strengths =
-      std::count_if(effect.info.parameters.begin(), effect.info.parameters.end(),
-                    [](const dem::ParameterInfo& p) { return p.null_value.has_value(); });
-  if (strengths == 0) {
-    map.Problem("parameters",
-                "none has a null; one at least has to be the effect's strength, with the value at "
-                "which the effect vanishes");
-    return effect;
-  }
-  for (dem::ParameterInfo& p : effect.info.parameters) {  // several strengths: each may stay away
-    if (strengths > 1 && p.null_value && !p.default_value) p.default_value = p.null_value;
-  }
-  for (dem::StrengthRay& ray : effect.info.rays) ray.held = MediansOfOthers(effect.info.parameters);
   if (!UnitsAreSound(map, effect)) return effect;
   const auto problems = dem::UserEffectProblems(effect);
   for (const std::string& problem : problems) map.Problem("formula", problem);
@@ -312,6 +292,38 @@ dem::UserEffect ReadOne(MapReader& map, const std::string& name, bool is_new) {
 }
 
 }  // namespace
+
+void ReadEffectParameters(MapReader& map, bool is_new, dem::EffectInfo& effect) {
+  const std::size_t before = map.problems().size();
+  auto parameters = map.Map("parameters");
+  if (!parameters) {
+    if (!map.Has("parameters")) {
+      map.Problem("parameters",
+                  "is missing; at least one, with its null, is the effect's strength");
+    }
+    return;
+  }
+  const std::string prefix = effect.name + ".";
+  for (const std::string& key : parameters->Keys()) {
+    const std::string name = key.starts_with(prefix) ? key.substr(prefix.size()) : key;
+    if (auto parameter = parameters->Map(key)) ReadParameter(*parameter, name, is_new, effect);
+  }
+  parameters->Finish();
+  if (map.problems().size() > before) return;
+  const auto strengths =
+      std::count_if(effect.parameters.begin(), effect.parameters.end(),
+                    [](const dem::ParameterInfo& p) { return p.null_value.has_value(); });
+  if (strengths == 0) {
+    map.Problem("parameters",
+                "none has a null; one at least has to be the effect's strength, with the value at "
+                "which the effect vanishes");
+    return;
+  }
+  for (dem::ParameterInfo& p : effect.parameters) {  // several strengths: each may stay away
+    if (strengths > 1 && p.null_value && !p.default_value) p.default_value = p.null_value;
+  }
+  for (dem::StrengthRay& ray : effect.rays) ray.held = MediansOfOthers(effect.parameters);
+}
 
 void ReadUserEffects(MapReader& model_map, const ReadContext& context, dem::Model& model) {
   auto effects = model_map.Map("user_effects");

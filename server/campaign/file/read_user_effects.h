@@ -1,11 +1,18 @@
 #pragma once
-// The section `model.user_effects` of a campaign file: effects that are formulas.
+// Effects that a campaign file declares: the section `model.user_effects`, effects that are
+// formulas, and the parameters of any.
 
 #include "dem/model/scenario.h"
 #include "server/campaign/file/map_reader.h"
 #include "server/campaign/file/read_context.h"
 
 namespace calib::campaign {
+
+/// Reads `parameters` of the map of one effect, whose name is known: nulls, priors, signs and steps
+/// as parameters, rays and two_sided of the effect. A name may begin with that of its effect and a
+/// dot. is_new: of a new campaign also that the prior of a strength holds what is tried. What is
+/// wrong is added to the map's problems.
+void ReadEffectParameters(MapReader& map, bool is_new, dem::EffectInfo& effect);
 
 /// Reads `user_effects` of the map `model` and adds what is sound to model.user_effects: names,
 /// syntax, units and null values are checked here; of a new campaign also that the prior of a

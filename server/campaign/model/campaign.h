@@ -116,6 +116,16 @@ struct Experiment {
   std::vector<MeasuredObservable> observables;
 };
 
+/// Runs that exist already and have effects that the campaign's model lacks: they calibrate
+/// nothing, a diagnosis learns from them. The effects are declared in Model::user_effects, without
+/// a formula.
+struct RunsWithEffects {
+  /// e dotted names of the effects' parameters, in the order of the declarations.
+  std::vector<std::string> names{};
+  Eigen::MatrixXd parameters{};  ///< n x (d + e): the campaign's parameters, then these; SI
+  std::vector<std::vector<std::vector<double>>> values{};  ///< as Precomputed::values, of the n
+};
+
 /// Runs that exist already, from any code.
 struct Precomputed {
   Eigen::MatrixXd parameters;  ///< N x d, the campaign's parameters in order
@@ -124,6 +134,7 @@ struct Precomputed {
   std::vector<std::vector<std::vector<double>>> values;
   /// ln density from which the rows were drawn; empty: the prior.
   std::optional<Eigen::VectorXd> log_proposal;
+  RunsWithEffects with_effects{};
 };
 
 /// Parameter values to run, given one by one.

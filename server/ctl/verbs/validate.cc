@@ -74,6 +74,11 @@ absl::StatusOr<int> Validate(const CommonOptions& common, const ValidateOptions&
             << " measured numbers, ";
   if (campaign::RunsRowsOnly(campaign.method)) {
     std::cout << (campaign.table ? campaign.table->like.size() : 0) << " row(s) to run.\n";
+  } else if (campaign.precomputed) {
+    const auto with = campaign.precomputed->with_effects.parameters.rows();
+    std::cout << campaign.samples << " runs made elsewhere";
+    if (with > 0) std::cout << ", and " << with << " with effects, for diagnose";
+    std::cout << ".\n";
   } else {
     std::cout << campaign.samples << " samples in each of at most " << campaign.max_iterations
               << " iteration(s).\n";

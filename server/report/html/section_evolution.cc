@@ -120,6 +120,7 @@ constexpr int kMostRows = 20;
 std::vector<int> IterationsShown(int iterations) {
   std::vector<int> shown;
   const int rows = std::min(iterations, kMostRows);
+  shown.reserve(static_cast<std::size_t>(rows));
   for (int row = 0; row < rows; ++row) {
     shown.push_back(rows == 1 ? 0 : row * (iterations - 1) / (rows - 1));
   }

@@ -65,8 +65,9 @@ void Axis::PlaceLinearTicks(int wanted, bool tight) {
   constexpr double kOverhang = 0.03;
   const double first = tight ? std::ceil(min_ / step - 1e-9) : std::floor(min_ / step + kOverhang);
   const double last = tight ? std::floor(max_ / step + 1e-9) : std::ceil(max_ / step - kOverhang);
-  for (double k = first; k <= last; ++k) {
-    const double value = k * step;
+  const auto ticks = static_cast<int>(std::round(last - first)) + 1;
+  for (int k = 0; k < ticks; ++k) {
+    const double value = (first + k) * step;
     ticks_.push_back({value, TickLabel(std::abs(value) < 1e-9 * step ? 0 : value)});
   }
   if (!tight) {
@@ -77,8 +78,8 @@ void Axis::PlaceLinearTicks(int wanted, bool tight) {
 
 void Axis::PlaceLogTicks() {
   const bool many_decades = std::log10(max_ / min_) > 2.5;
-  for (double decade = std::floor(std::log10(min_)); decade <= std::ceil(std::log10(max_));
-       ++decade) {
+  const auto last = static_cast<int>(std::ceil(std::log10(max_)));
+  for (auto decade = static_cast<int>(std::floor(std::log10(min_))); decade <= last; ++decade) {
     for (const double digit : {1.0, 2.0, 5.0}) {
       if (many_decades && digit > 1) continue;
       const double value = digit * std::pow(10, decade);

@@ -149,6 +149,87 @@ TEST(Precomputed, RefusesWhatOnlyASimulationNeeds) {
             "c.yaml:19: experiments[1].packing: has no meaning with precomputed runs; remove it\n");
 }
 
+// Rows of two effects of the user's code: none, one, the other, both.
+std::map<std::string, std::string> TablesWithEffects() {
+  auto files = Tables();
+  files["par.csv"] =
+      "sample,E_GPa,km_nNm,friction_mN,glue\n3,100,8000,0,0\n4,110,7000,200,0\n5,120,5000,0,0\n"
+      "6,130,6000,0,0.5\n7,140,6000,100,0.25\n";
+  files["sta.csv"] = "sample,step,p_MPa,porosity\n";
+  for (const char* sample : {"3", "4", "5", "6", "7"}) {
+    for (const char* step : {",0,1.", ",1,2.", ",2,1.5"})
+      files["sta.csv"] += std::string(sample) + step + sample + ",0.39\n";
+  }
+  return files;
+}
+
+std::string EffectsYaml() {
+  std::string yaml = BeadsYaml();
+  const std::string keys = "    absolute: [rolling_stiffness]\n";
+  yaml.insert(yaml.find(keys) + keys.size(), R"(    effects:
+      rolling:
+        parameters: {rolling.limit: {null: 0, unit: N, prior: {prior: uniform, min: 0, max: 0.5 N}}}
+        excludes: [bonds]
+      bonds:
+        parameters: {strength: {null: 0, prior: {prior: uniform, min: 0, max: 1}}}
+)");
+  const auto put = [&yaml](const std::string& before, const std::string& what) {
+    yaml.insert(yaml.find(before) + before.size(), what);
+  };
+  put("rolling_stiffness: km_nNm", ", rolling.limit: friction_mN, bonds.strength: glue");
+  put("nN m/rad", ", rolling.limit: mN");
+  return yaml;
+}
+
+std::string WithText(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+TEST(Precomputed, RowsThatHaveEffectsDoNotCalibrate) {
+  ASSERT_EQ(ProblemsOf(EffectsYaml(), TablesWithEffects()), "");
+  const Campaign c = ReadCampaign(EffectsYaml(), "c.yaml", ReaderOf(TablesWithEffects())).campaign;
+  EXPECT_EQ(c.samples, 2);
+  EXPECT_EQ(c.precomputed->parameters.col(0), Eigen::Vector2d(1e11, 1.2e11));
+  EXPECT_DOUBLE_EQ(c.precomputed->values[0][1][0], 1.5e6);
+  const RunsWithEffects& with = c.precomputed->with_effects;
+  EXPECT_EQ(with.names, (std::vector<std::string>{"rolling.limit", "bonds.strength"}));
+  ASSERT_EQ(with.parameters.rows(), 3);
+  const Eigen::RowVectorXd last = with.parameters.row(2);
+  EXPECT_DOUBLE_EQ(last[0], 1.4e11);
+  EXPECT_DOUBLE_EQ(last[2], 0.1);
+  EXPECT_DOUBLE_EQ(last[3], 0.25);
+  ASSERT_EQ(with.values.at(0).size(), 3U);
+  EXPECT_DOUBLE_EQ(with.values[0][2][2], 2.7e6);
+  ASSERT_EQ(c.model.user_effects.size(), 2U);
+  EXPECT_EQ(c.model.user_effects[0].info.excludes, std::vector<std::string>{"bonds"});
+  EXPECT_FALSE(c.model.user_effects[1].info.two_sided);
+}
+
+TEST(Precomputed, WhatIsWrongWithTheEffectsOfRowsIsSaidOnce) {
+  const auto problems = [](const std::string& from, const std::string& to) {
+    return ProblemsOf(WithText(EffectsYaml(), from, to), TablesWithEffects());
+  };
+  EXPECT_EQ(problems("bonds.strength: glue", "bonds.strength: glu"),
+            "par.csv:1: glu: is not a column of this file; did you mean 'glue'?\n");
+  EXPECT_THAT(problems("bonds.strength: glue", "bonds.strength: friction_mN"),
+              HasSubstr("rolling.limit and bonds.strength would both be read from the column "
+                        "'friction_mN'"));
+  EXPECT_THAT(problems("[bonds]", "[bond]"), HasSubstr("'bond' is none of the others"));
+  EXPECT_THAT(problems("strength: {null: 0, ", "strength: {"), HasSubstr("none has a null"));
+  EXPECT_THAT(problems("rolling.limit: mN", "rolling.limit: MPa"), HasSubstr("expected a force"));
+  EXPECT_THAT(problems("      bonds:", "      capillary_bridges:"),
+              HasSubstr("is an effect of this build; call that of your runs another"));
+  auto files = TablesWithEffects();
+  files["par.csv"] =
+      "sample,E_GPa,km_nNm,friction_mN,glue\n3,100,8000,0,0\n4,110,7000,0,0\n5,120,"
+      "5000,0,0\n6,130,6000,0,0\n7,140,6000,0,0\n";
+  EXPECT_THAT(ProblemsOf(EffectsYaml(), files), HasSubstr("par.csv: no row has an effect"));
+  files["par.csv"] =
+      "sample,E_GPa,km_nNm,friction_mN,glue\n3,100,8000,0,1\n4,110,7000,0,1\n5,120,"
+      "5000,0,1\n6,130,6000,0,1\n7,140,6000,0,1\n";
+  EXPECT_THAT(ProblemsOf(EffectsYaml(), files), HasSubstr("par.csv: every row has an effect"));
+}
+
 TEST(Precomputed, AFormulaThatActsOnNothingIsRefused) {
   std::string yaml = BeadsYaml();
   yaml.insert(

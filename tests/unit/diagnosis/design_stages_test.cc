@@ -178,6 +178,82 @@ TEST(DesignStagesElsewhere, ARightModelIsAdequate) {
   }
 }
 
+// The same campaign, whose tables hold runs with two effects. Measured with one of them.
+report::CampaignView HoldsEffects(double strength, std::uint64_t number) {
+  const RaceToy toy(2, 7, 96);
+  report::CampaignView view =
+      toy.Measured({.x = 0.4, .y = 0.6, .effect = 0, .units = strength / RaceToy::Unit(0)}, number);
+  for (campaign::Experiment& e : view.campaign.experiments) e.specimens.clear();
+  const campaign::Campaign design =
+      CampaignOfDesign(view.campaign, *RaceOf(view, RaceToy::Without()));
+  campaign::Precomputed runs;
+  campaign::RunsWithEffects& with = runs.with_effects;
+  std::vector<std::string> names;
+  for (const campaign::CalibratedParameter& own : design.parameters) {
+    names.push_back(own.name);
+    if (own.name[0] == 'e') with.names.push_back(own.name);
+  }
+  const std::vector<std::string> all(names.begin(), names.begin() + 2 + std::ssize(with.names));
+  constexpr int kRuns = 40;
+  with.parameters.resize(kRuns, std::ssize(all));
+  const inference::DataSet data = campaign::MakeDataSet(view.campaign);
+  with.values.resize(view.campaign.experiments.size());
+  for (int i = 0; i < kRuns; ++i) {
+    campaign::RunOf run{.values = {}, .stream = 96 + i};
+    for (std::size_t j = 0; j < all.size(); ++j) {
+      const inference::Prior& prior = design.parameters[j].prior;
+      const double at = std::fmod(0.5 + i * (0.7548776662 + 0.13 * static_cast<double>(j)), 1.0);
+      const bool off = j >= 2 && i % 3 == static_cast<int>(j) - 2;
+      run.values.push_back(off ? 0 : j < 2 ? prior.Quantile(at) : 0.05 + 0.9 * at);
+    }
+    with.parameters.row(i) =
+        Eigen::Map<const Eigen::RowVectorXd>(run.values.data(), std::ssize(run.values));
+    const Eigen::RowVectorXd readings = *toy.Made(run, all).readings;
+    for (std::size_t e = 0; e < with.values.size(); ++e) {
+      const campaign::Experiment& experiment = view.campaign.experiments[e];
+      with.values[e].emplace_back(experiment.control.size() * experiment.observables.size());
+      for (std::size_t t = 0; t < data.readings.size(); ++t) {
+        const inference::Reading& own = data.readings[t];
+        if (own.experiment != static_cast<int>(e)) continue;
+        with.values[e]
+            .back()[static_cast<std::size_t>(own.load_step) * experiment.observables.size() +
+                    static_cast<std::size_t>(own.observable)] =
+            readings[static_cast<Eigen::Index>(t)];
+      }
+    }
+  }
+  view.campaign.model.contact.clear();
+  view.campaign.precomputed = std::move(runs);
+  return view;
+}
+
+TEST(DesignStagesElsewhere, AnEffectThatRowsHoldIsNamedWithoutARun) {
+  DesignChain chain = *DesignChain::Create(HoldsEffects(0.6, 1), {});
+  const Answer answer = AnswerAtOnce(chain);
+  ExpectFinite(answer);
+  EXPECT_EQ(answer.verdict, AnswerVerdict::kMissingEffect) << answer.sentence;
+  EXPECT_EQ(answer.effects, std::vector<std::string>{"e0"}) << answer.sentence;
+  EXPECT_NEAR(answer.candidates.front().amplitude.at("e0.strength"), 0.6, 0.2);
+  EXPECT_TRUE(answer.runs.empty());
+  EXPECT_EQ(answer.borrowed_runs, 40);
+}
+
+TEST(DesignStagesElsewhere, RowsOfAnEffectThatIsLeftOutAreNotUsed) {
+  DesignChain chain = *DesignChain::Create(HoldsEffects(0.6, 1), {.without = {"e1"}});
+  const Answer answer = AnswerAtOnce(chain);
+  ExpectFinite(answer);
+  for (const EffectAnswer& own : answer.candidates) EXPECT_NE(own.effect, "e1");
+  EXPECT_LT(answer.borrowed_runs, 40);
+  EXPECT_GT(answer.borrowed_runs, 0);
+}
+
+TEST(DesignStagesElsewhere, WithoutAnEffectNoneThatRowsHoldIsNamed) {
+  DesignChain chain = *DesignChain::Create(HoldsEffects(0, 2), {});
+  const Answer answer = AnswerAtOnce(chain);
+  EXPECT_EQ(answer.verdict, AnswerVerdict::kAdequate) << answer.sentence;
+  EXPECT_GT(answer.adequate, 0.5);
+}
+
 // By the base's runs alone: nobody is in the race.
 TEST(Adequacy, OfANullIsPassedAndOfAStrongEffectIsNot) {
   const RaceToy toy(1, 5);
