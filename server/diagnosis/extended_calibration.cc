@@ -132,6 +132,8 @@ absl::StatusOr<ExtensionPlan> PlanExtended(const report::CampaignView& parent,
                                            const ExtendedOptions& options) {
   const std::optional<std::int64_t>& budget = options.budget;
   const campaign::Campaign& campaign = parent.campaign;
+  if (campaign.precomputed)  // its runs are there
+    return ExtensionPlan{.effects = model.effects, .purpose = "extension"};
   ExtensionPlan plan{.effects = model.effects,
                      .purpose = "extension",
                      .near = model.posterior,

@@ -42,7 +42,8 @@ inline constexpr int kMostTimes = 2;
 /// How a model is calibrated with effects on top whose posterior is known about. Of a filter, five
 /// samples for each parameter at draws of that posterior, twice as far from its mean, and five from
 /// a proposal about it: together the ten that an emulator takes; then five from what is known by
-/// then; beside them the runs of the design. Of other methods: as the parent.
+/// then; beside them the runs of the design. Of other methods: as the parent; of tables of runs
+/// what they hold.
 ///                                     [Loeppky, Sacks & Welch, Technometrics 51 (2009) 366]
 /// Errors: RESOURCE_EXHAUSTED where the budget allows no iteration.
 absl::StatusOr<ExtensionPlan> PlanExtended(const report::CampaignView& parent,

@@ -190,16 +190,23 @@ std::string WhyNotJoin(const campaign::Campaign& campaign, const std::string& na
     return absl::StrCat("there is no effect ", name, "; this build has ",
                         absl::StrJoin(names, ", "));
   }
-  if (campaign.precomputed) {
-    return absl::StrCat(
-        "runs that were made elsewhere cannot be joined by ", name,
-        "; `calibctl diagnose` says what instruments or a denser start would change of them, and "
-        "runs that your code makes with ",
-        name, " are a campaign of their own (compare it: `calibctl models`)");
-  }
   const auto& has = campaign.model.effects;
   if (std::find(has.begin(), has.end(), name) != has.end()) {
     return absl::StrCat(name, " is part of the model already");
+  }
+  if (campaign.precomputed) {
+    if (dem::FindEffect(name) != nullptr) {
+      return absl::StrCat(
+          "runs that were made elsewhere cannot be joined by ", name,
+          "; `calibctl diagnose` says what instruments or a denser start would change of them, and "
+          "runs that your code makes with an effect go into the same tables, declared under "
+          "model.precomputed.effects");
+    }
+    for (const std::string& other : has) {
+      if (dem::Exclude(*dem::FindEffect(declared, name), *dem::FindEffect(declared, other)))
+        return absl::StrCat(name, " excludes ", other, ", which acts");
+    }
+    return "";
   }
   return campaign::WhyNotTogether(campaign, {name});
 }
@@ -248,6 +255,7 @@ absl::StatusOr<std::string> ExtensionText(const report::CampaignView& parent,
     if (place.sd > 0)
       derivation.first_proposal->places[name] = {.center = place.center, .sd = kWider * place.sd};
   }
+  if (parent.campaign.precomputed) derivation.first_proposal.reset();  // nothing is run
   return campaign::Derive(parent.source.campaign_file(), derivation);
 }
 

@@ -17,6 +17,8 @@ bool HasAnother(const campaign::Campaign& campaign, const std::vector<std::strin
                 const Eigen::RowVectorXd& parameters) {
   Index column = 0;
   for (const dem::UserEffect& effect : campaign.model.user_effects) {
+    const std::vector<std::string>& acting = campaign.model.effects;
+    if (std::find(acting.begin(), acting.end(), effect.info.name) != acting.end()) continue;
     const bool takes_part =
         std::find(racing.begin(), racing.end(), effect.info.name) != racing.end();
     for (const dem::ParameterInfo& own : effect.info.parameters) {

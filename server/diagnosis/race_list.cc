@@ -251,9 +251,8 @@ absl::StatusOr<Race> RaceOf(const report::CampaignView& view,
   for (const dem::EffectInfo* effect : dem::AllEffects(campaign.model.user_effects)) {
     if (IsAmong(campaign.model.effects, effect->name)) continue;
     const bool held = elsewhere && IsHeld(campaign, effect->name);
-    std::string why;
-    if (elsewhere && !held) why = WhyNotCalculated(curves, effect->name);
-    if (!elsewhere) why = WhyNotJoin(campaign, effect->name);
+    std::string why = elsewhere && !held ? WhyNotCalculated(curves, effect->name)
+                                         : WhyNotJoin(campaign, effect->name);
     if (why.empty() && IsAmong(without, effect->name)) why = "left out as asked for";
     if (why.empty() && !elsewhere) why = WhyNotShown(campaign, *effect);
     std::vector<RacingEffect> entries;

@@ -144,6 +144,12 @@ std::string ConditionedOn(const Definition& definition,
                                      "this, and leave its uncertainty out.");
 }
 
+// Whether tables hold runs with and without an effect of the model, in whatever numbers.
+bool IsDesign(const campaign::Campaign& campaign) {
+  return campaign.precomputed && !campaign.model.effects.empty() &&
+         !campaign.precomputed->log_proposal;
+}
+
 // How well the runs that the weights rest on fit each stage: of a large table only these are
 // copied.
 std::vector<double> StagePOfWeights(const Definition& definition,
@@ -179,6 +185,11 @@ absl::StatusOr<Answer> FindAnswer(const Definition& definition,
   answer.warnings = answer.weighted.warnings;
   if (std::string held = ConditionedOn(definition, answer.weighted.frozen); !held.empty()) {
     answer.warnings.insert(answer.warnings.begin(), std::move(held));
+  }
+  if (answer.FromWeights() && IsDesign(definition.campaign)) {
+    answer.weighted.degeneracy =
+        "Runs with and without what acts are a design and no draws of the prior: their weights "
+        "make no posterior.";
   }
   if (!answer.FromWeights()) {
     AskEmulator(definition, iterations, answer);

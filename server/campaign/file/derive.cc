@@ -16,7 +16,12 @@ using Kind = YamlNode::Kind;
 
 void ChangeModel(const Derivation& derivation, YamlNode& root) {
   YamlNode& model = YamlAt(root, "model");
-  if (!derivation.effects.empty()) {
+  if (YamlFind(model, "precomputed") != nullptr) {
+    // Of tables of runs: what is declared there acts from now on.
+    YamlNode& declared = YamlAt(YamlAt(model, "precomputed"), "effects");
+    for (const std::string& effect : derivation.effects)
+      YamlAt(YamlAt(declared, effect), "acts") = YamlScalar("true");
+  } else if (!derivation.effects.empty()) {
     std::vector<YamlNode> effects;
     if (const YamlNode* given = YamlFind(model, "effects"); given != nullptr) {
       if (given->kind == Kind::kSequence) effects = given->items;

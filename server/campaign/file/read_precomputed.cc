@@ -46,9 +46,16 @@ struct HeldParameter {
   std::optional<double> null;
 };
 
+bool Acts(const Campaign& campaign, const std::string& effect) {
+  const std::vector<std::string>& acting = campaign.model.effects;
+  return std::find(acting.begin(), acting.end(), effect) != acting.end();
+}
+
+// Of effects that do not act: the parameters of those that do are the campaign's.
 std::vector<HeldParameter> HeldParametersOf(const Campaign& campaign) {
   std::vector<HeldParameter> held;
   for (const dem::UserEffect& effect : campaign.model.user_effects) {
+    if (Acts(campaign, effect.info.name)) continue;
     for (const dem::ParameterInfo& own : effect.info.parameters)
       held.push_back({absl::StrCat(effect.info.name, ".", own.name), own.unit, own.null_value});
   }
@@ -79,6 +86,17 @@ void ReadHeldEffects(MapReader& map, const ReadContext& context, Campaign& campa
       if (other == name || std::find(names.begin(), names.end(), other) == names.end()) {
         one->Problem("excludes", absl::StrCat(Quoted(other), " is none of the others; ",
                                               Suggestion(other, names)));
+      }
+    }
+    if (one->TrueOrFalse("acts").value_or(false)) {
+      campaign.model.effects.push_back(name);
+      for (const dem::ParameterInfo& own : effect.info.parameters) {
+        const std::string dotted = absl::StrCat(name, ".", own.name);
+        if (std::any_of(campaign.parameters.begin(), campaign.parameters.end(),
+                        [&dotted](const auto& parameter) { return parameter.name == dotted; }))
+          continue;
+        one->Problem("acts", absl::StrCat("its parameter ", dotted,
+                                          " is not calibrated; add it to parameters"));
       }
     }
     one->Finish();
@@ -143,7 +161,7 @@ class ParametersReader {
       context_.problems().AddIn(keys_.parameters, 0, "",
                                 "every row has an effect; a calibration needs runs without one, "
                                 "whose effects are all at their null");
-    } else if (others.empty()) {
+    } else if (others.empty() && campaign_.model.effects.empty()) {
       context_.problems().AddIn(keys_.parameters, 0, "",
                                 "no row has an effect: all are at their null; leave `effects` out "
                                 "or give the runs that have them");

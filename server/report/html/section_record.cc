@@ -74,7 +74,9 @@ std::string RecordSection(const ReportData& data) {
                                       ? "–"
                                       : campaign::WordOf(campaign::kShearUnloadingWords,
                                                          campaign.model.shear_unloading)) +
-      Entry("effects", campaign.precomputed ? "–" : Listed(campaign.model.effects)) +
+      Entry("effects", campaign.precomputed && campaign.model.effects.empty()
+                           ? "–"
+                           : Listed(campaign.model.effects)) +
       Entry("engine", dem::EngineVersion()) + Entry("seed", std::to_string(campaign.seed)) +
       Entry("noise", NoiseSentence(campaign)) +
       Entry("samples", fmt::format("{} per iteration, at most {} iterations", campaign.samples,
