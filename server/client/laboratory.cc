@@ -155,10 +155,11 @@ absl::StatusOr<std::string> Laboratory::Submit(const report::CampaignView& paren
   request.set_file_name(parent.source.file_name());
   if (parent.source.has_seed()) request.set_seed(parent.source.seed());
   *request.mutable_files() = parent.source.files();
-  for (const auto& [path, content] : further) {
+  for (const auto& file : further) {
+    const std::string& content = file.second;
     RETURN_IF_ERROR(ServersLimit(OnceThereIsRoom(
         session_, parent.status.campaign(), [&] { return session_.client().PutBlob(content); })));
-    (*request.mutable_files())[path] = campaign::Sha256Hex(content);
+    (*request.mutable_files())[file.first] = campaign::Sha256Hex(content);
   }
   campaign::Submission submission{.campaign_file = yaml,
                                   .file_name = parent.source.file_name(),

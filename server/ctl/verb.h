@@ -37,11 +37,11 @@ struct Verb {
 /// A verb with options of its own. `declare` and `run` see the same Options, which begin as their
 /// defaults.
 template <typename Options>
-Verb MakeVerb(VerbHelp help, void (*declare)(OptionList&, Options&),
+Verb MakeVerb(const VerbHelp& help, void (*declare)(OptionList&, Options&),
               absl::StatusOr<int> (*run)(const CommonOptions&, const Options&)) {
   const auto options = std::make_shared<Options>();
   return {
-      .help = std::move(help),
+      .help = help,
       .declare = [declare, options](OptionList& list) { declare(list, *options); },
       .run = [run, options](const CommonOptions& common) { return run(common, *options); },
   };

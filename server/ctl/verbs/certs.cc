@@ -106,6 +106,7 @@ absl::StatusOr<int> Answer(const absl::Status& status) {
 
 std::vector<std::string> Paths(const std::string& folder, const std::vector<std::string>& names) {
   std::vector<std::string> paths;
+  paths.reserve(names.size());
   for (const std::string& name : names) {
     paths.push_back((std::filesystem::path(folder) / name).string());
   }

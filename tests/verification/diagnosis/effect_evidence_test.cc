@@ -310,13 +310,38 @@ TEST(ModelSpaceTest, ListsModelsAndSharesThePrior) {
   const Eigen::VectorXd prior = space.LogPrior().array().exp();
   EXPECT_NEAR(prior.sum(), 1, 1e-12);
   EXPECT_NEAR(prior[0] / prior[1], 4, 1e-12);  // 0.4 for it, 0.4 for four singles
-  EXPECT_NEAR(prior[5] * 5 / (prior[1] * 4), 0.25, 1e-12);
-  EXPECT_NEAR(prior[11] / (prior[5] * 5), 0.25, 1e-12);
+  EXPECT_NEAR(prior[5] * 5 / (prior[1] * 4), 1. / 20, 1e-12);
+  EXPECT_NEAR(prior[11] / (prior[5] * 5), 1. / 30, 1e-12);
   space.triples = 2;
   const Eigen::VectorXd of_two = space.LogPrior().array().exp();
-  EXPECT_NEAR(of_two[11] / (of_two[5] * 5), 0.125, 1e-12) << "one of two that there could be";
+  EXPECT_NEAR(of_two[11] / (of_two[5] * 5), 1. / 60, 1e-12) << "one of two that there could be";
   space.strength[1].high = 0.1;
   EXPECT_THAT(space.Validate().message(), HasSubstr("strengths of effect 1 range from 0.4 to 0.1"));
+}
+
+// Of any number of effects, none of which exclude each other.
+TEST(ModelSpaceTest, OneEffectMoreActsWithOddsOfOneToTen) {
+  for (const int effects : {4, 9}) {
+    CoordinateToy toy({.effects = effects});
+    ModelSpace space = ToySpace(toy);
+    space.models = AllModels(effects, {});
+    for (const EffectModel& triple : TriplesOf(effects, {}, space.models)) {
+      if (triple.effects.size() == 3) space.models.push_back(triple);
+    }
+    const Eigen::VectorXd prior = space.LogPrior().array().exp();
+    const auto with = [&](const std::vector<int>& acting, std::size_t more) {
+      double sum = 0;
+      for (std::size_t i = 0; i < space.models.size(); ++i) {
+        const std::vector<int>& own = space.models[i].effects;
+        if (own.size() == acting.size() + more &&
+            std::includes(own.begin(), own.end(), acting.begin(), acting.end()))
+          sum += prior[static_cast<Index>(i)];
+      }
+      return sum;
+    };
+    EXPECT_NEAR(with({1}, 1), 0.1 * with({1}, 0), 1e-12);
+    EXPECT_NEAR(with({1, 3}, 1), 0.1 * with({1, 3}, 0), 1e-12);
+  }
 }
 
 TEST_F(EffectEvidence, StrengthOfLambdaIsSeenAsStated) {
