@@ -73,6 +73,20 @@ DesignRows::DesignRows(BaseAxes axes, Race race, Eigen::VectorXd unit)
   for (const NumericalChoice& choice : race_.numerics) names_.push_back(choice.name);
 }
 
+DesignRows DesignRows::EndingAt(const Eigen::VectorXd& most,
+                                const Eigen::VectorXd& most_other) const {
+  Race race = race_;
+  for (std::size_t k = 0; k < race.effects.size(); ++k) {
+    RacingEffect& entry = race.effects[k];
+    const auto i = static_cast<Index>(k);
+    entry.ends = entry.ends && most[i] >= entry.most;
+    entry.other_ends = entry.other_ends && most_other[i] >= entry.most_other;
+    entry.most = std::min(entry.most, most[i]);
+    entry.most_other = std::min(entry.most_other, most_other[i]);
+  }
+  return {axes_, std::move(race), unit_};
+}
+
 double DesignRows::SignOf(int entry) const {
   return race_.effects[static_cast<std::size_t>(entry)].near > 0 ? 1 : -1;
 }

@@ -43,6 +43,9 @@ class DesignRows {
     return {std::move(axes), race_, std::move(unit)};
   }
 
+  /// The same rows, whose entries go no farther than these distances (K, SI) from their nulls.
+  DesignRows EndingAt(const Eigen::VectorXd& most, const Eigen::VectorXd& most_other) const;
+
   /// Of the parameters: those of the base, strength and shapes of each entry, numerics.
   const std::vector<std::string>& names() const { return names_; }
   Eigen::Index shape_count() const { return shape_count_; }  ///< H

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <iterator>
@@ -184,9 +185,45 @@ SeenUnits UnitsSeen(const KnownBefore& before, const DesignRows& rows, const Par
     const double most = std::abs(entry.far) * kBeyondTried;
     if (least[i] * own > most) reached[i] = false;
     own = std::clamp(least[i] * own, std::abs(entry.near) / kBeyondTried, most);
-    own = std::min(own, std::max(entry.most, entry.most_other));
+    // Of what is not seen before its end strengths are tried to both sides of half of it.
+    own = std::min(own, std::max(entry.most, entry.most_other) / (reached[i] ? 1 : 2));
   }
   return {.unit = std::move(unit), .reached = std::move(reached)};
+}
+
+// The rows whose entries end where runs do not come to their ends: at the weakest run of an entry
+// alone that did not, of those stronger than every run with it that did. Runs beyond it would be
+// wasted, and what shows only just below it would be tried nowhere.
+DesignRows EndingWhereRunsEnd(const DesignRows& rows, const std::vector<EndedBatch>& batches) {
+  const auto count = static_cast<Index>(rows.race().effects.size());
+  // Distances from the null to either side, SI.
+  struct Side {
+    Eigen::VectorXd reached, end;
+  };
+  const Side from = {
+      .reached = Eigen::VectorXd::Zero(count),
+      .end = Eigen::VectorXd::Constant(count, std::numeric_limits<double>::infinity())};
+  std::array<Side, 2> sides = {from, from};
+  const auto each = [&](bool finished, const auto& tell) {
+    for (const EndedBatch& batch : batches) {
+      for (const EndedRun& ended : batch.runs) {
+        if (ended.readings.has_value() != finished) continue;
+        const Eigen::RowVectorXd strength = rows.Points({ended.run.values}).strength.row(0);
+        if (!finished && (strength.array() != 0).count() != 1) continue;
+        for (Index k = 0; k < count; ++k) {
+          if (strength[k] != 0)
+            tell(sides[strength[k] > 0 ? 0 : 1], k, std::abs(strength[k]) * rows.unit()[k]);
+        }
+      }
+    }
+  };
+  each(true, [](Side& side, Index k, double distance) {
+    side.reached[k] = std::max(side.reached[k], distance);
+  });
+  each(false, [](Side& side, Index k, double distance) {
+    if (distance > side.reached[k]) side.end[k] = std::min(side.end[k], distance);
+  });
+  return rows.EndingAt(sides[0].end, sides[1].end);
 }
 
 // Why too few runs with the entry are there to learn from, in a clause.
@@ -286,8 +323,9 @@ EvidenceQuestion QuestionOf(const KnownBefore& before, const Knowledge& knowledg
 
 }  // namespace
 
-absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& guess,
+absl::StatusOr<Knowledge> Learn(const KnownBefore& before, const DesignRows& of_guess,
                                 const std::vector<EndedBatch>& batches, bool with_flat) {
+  const DesignRows guess = EndingWhereRunsEnd(of_guess, batches);
   Knowledge known{.rows = guess, .part = {}, .set = nullptr};
   for (int k = 0; k < static_cast<int>(guess.race().effects.size()); ++k) {
     if (guess.race().effects[static_cast<std::size_t>(k)].design.calculated ||

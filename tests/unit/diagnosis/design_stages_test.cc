@@ -68,6 +68,28 @@ TEST_F(DesignStages, WhereRunsEndEarlyAWeakerScoutFollows) {
   for (const campaign::RunOf& run : main.rows) EXPECT_EQ(run.values[3], 0);
 }
 
+// What shows only just below where runs end is tried there, and no run is wasted beyond.
+TEST_F(DesignStages, MainRunsStayWhereRunsOfAnEffectComeToTheirEnds) {
+  EndedBatch ended = Made(NextBatch(chain_));
+  const double near = std::min(ended.runs[1].run.values[3], ended.runs[4].run.values[3]);
+  ended.runs[1].readings.reset();
+  ended.runs[4].readings.reset();
+  ASSERT_TRUE(chain_.Add(ended).ok());
+  const RunBatch again = NextBatch(chain_);
+  ASSERT_EQ(again.rows.size(), 2u);
+  ASSERT_TRUE(chain_.Add(Made(again)).ok());
+  const RunBatch main = NextBatch(chain_);
+  EXPECT_EQ(main.stage, SamplePurpose::kMain);
+  double most = 0;
+  int uses = 0;
+  for (const campaign::RunOf& run : main.rows) {
+    most = std::max(most, run.values[3]);
+    uses += run.values[3] > 0 ? 1 : 0;
+  }
+  EXPECT_GT(uses, 8);
+  EXPECT_NEAR(most, near, 1e-9 * near);
+}
+
 TEST_F(DesignStages, BatchesThatDoNotFollowAreRefused) {
   EXPECT_THAT(chain_.Add({.stage = SamplePurpose::kMain}).message(), HasSubstr("cannot follow"));
   EndedBatch scout = Made(NextBatch(chain_));
