@@ -268,9 +268,11 @@ class Impacts : public Diagnosis {
     return answer.json();
   }
 
-  static std::string Campaign(const std::string& effects, const std::string& fixed,
-                              const std::string& control, const std::string& setting, int samples,
-                              const std::string& file) {
+  std::string noise_ = "0.01";
+
+  std::string Campaign(const std::string& effects, const std::string& fixed,
+                       const std::string& control, const std::string& setting, int samples,
+                       const std::string& file) const {
     return "name: impacts\nmodel: {contact: hertz_mindlin, effects: [" + effects +
            "], density: 2500 kg/m^3, fixed: {poisson_ratio: 0.25" + fixed + R"(}}
 parameters:
@@ -287,9 +289,12 @@ experiments:
     control: )" +
            control + R"(
     observables:
-      normal_restitution: {noise: {absolute: 0.01}}
-      tangential_restitution: {noise: {absolute: 0.01}}
-      contact_duration: {noise: {relative: 0.01}}
+      normal_restitution: {noise: {absolute: )" +
+           noise_ + R"(}}
+      tangential_restitution: {noise: {absolute: )" +
+           noise_ + R"(}}
+      contact_duration: {noise: {relative: )" +
+           noise_ + R"(}}
 inference: {method: iterative_bayesian_filter, max_iterations: 3, samples: )" +
            std::to_string(samples) + "}\nseed: 5\n";
   }
@@ -338,8 +343,9 @@ TEST_F(Impacts, ADashpotIsFound) {
   EXPECT_NEAR(first["amplitude"]["viscous_damping.ratio"].get<double>(), 0.1, 0.01);
 }
 
-// A dashpot so weak that it leaves a question.
+// A dashpot so weak, read so coarsely, that plastic contacts may stand for it.
 TEST_F(Impacts, TheMeasurementThatIsProposedIsMadeAndTold) {
+  noise_ = "0.03";
   const Json json = Found("viscous_damping", "ratio: 0.035", "0 0.2 0.4 0.6 0.8 1 1.2",
                           "impact_angle", "impact_speed: 1 m/s", 24);
   ASSERT_TRUE(json["next_experiment"].is_object()) << json["sentence"] << json["warnings"];
