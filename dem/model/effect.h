@@ -32,7 +32,9 @@ struct StrengthRay {
 /// Catalogue entry of an effect.
 struct EffectInfo {
   std::string name;
-  std::string kind;  ///< "contact" | "particle" | "initial_state" | "boundary" | "measurement"
+  /// "contact" | "particle" | "initial_state" | "boundary" | "measurement"; "held": not of this
+  /// engine, but of runs that another code made.
+  std::string kind;
   std::string
       description;  ///< formula, sign (one- or two-sided) and the value at which it vanishes
   std::vector<std::string> contacts;  ///< contact laws it can join; empty: all

@@ -31,6 +31,8 @@ struct StrengthPrior {
 /// among all that there could be. Beside what acts, one effect more acts with odds of one to ten: a
 /// pair is one of two effects more, a triple one of three pairs more. Of each single model those
 /// with one effect more together so have a tenth of its share, however many effects there are.
+/// Chosen on 46 measurements of deploy/bench/hidden-effects, so that sets hold about two effects
+/// where lambda is 60; other measurements judge it.
 struct PriorShares {
   double adequate = 0.4, singles = 0.4, pairs = singles / 10 / 2, triples = pairs / 10 / 3,
          none_of_these = 0.1;

@@ -103,8 +103,8 @@ class DesignChain {
   double level_;
   std::optional<VerificationChances> verification_;  ///< of the answer, once there is one
   std::vector<EndedBatch> batches_;                  ///< those of another design first
-  std::size_t borrowed_ = 0;                         ///< how many those are
-  int first_stream_ = 0;                             ///< of its own runs
+  std::size_t borrowed_ = 0;          ///< how many come first: of others, or held by tables
+  int first_stream_ = 0;              ///< of its own runs
   std::optional<BaseMisfit> misfit_;  ///< by the scout's numerics, which later batches leave alone
   std::optional<DesignRows> units_;   ///< where no scout is made: by what there is at first
   std::map<std::size_t, Knowledge> known_;

@@ -145,7 +145,7 @@ std::string ConditionedOn(const Definition& definition,
 }
 
 // Whether tables hold runs with and without an effect of the model, in whatever numbers.
-bool IsDesign(const campaign::Campaign& campaign) {
+bool AreNoDraws(const campaign::Campaign& campaign) {
   return campaign.precomputed && !campaign.model.effects.empty() &&
          !campaign.precomputed->log_proposal;
 }
@@ -186,7 +186,7 @@ absl::StatusOr<Answer> FindAnswer(const Definition& definition,
   if (std::string held = ConditionedOn(definition, answer.weighted.frozen); !held.empty()) {
     answer.warnings.insert(answer.warnings.begin(), std::move(held));
   }
-  if (answer.FromWeights() && IsDesign(definition.campaign)) {
+  if (answer.FromWeights() && AreNoDraws(definition.campaign)) {
     answer.weighted.degeneracy =
         "Runs with and without what acts are a design and no draws of the prior: their weights "
         "make no posterior.";

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "dem/registry/catalog.h"
@@ -44,6 +45,7 @@ struct HeldParameter {
   std::string name;  // dotted
   std::string unit;
   std::optional<double> null;
+  double min = 0, max = 0;  // what its sign allows
 };
 
 bool Acts(const Campaign& campaign, const std::string& effect) {
@@ -57,7 +59,8 @@ std::vector<HeldParameter> HeldParametersOf(const Campaign& campaign) {
   for (const dem::UserEffect& effect : campaign.model.user_effects) {
     if (Acts(campaign, effect.info.name)) continue;
     for (const dem::ParameterInfo& own : effect.info.parameters)
-      held.push_back({absl::StrCat(effect.info.name, ".", own.name), own.unit, own.null_value});
+      held.push_back({absl::StrCat(effect.info.name, ".", own.name), own.unit, own.null_value,
+                      own.min, own.max});
   }
   return held;
 }
@@ -72,7 +75,7 @@ void ReadHeldEffects(MapReader& map, const ReadContext& context, Campaign& campa
     if (!one) continue;
     dem::UserEffect effect;
     effect.info.name = name;
-    effect.info.kind = "held";
+    effect.info.kind = "held";  // by rows, and unknown to the engine
     effect.info.reference = "runs made elsewhere";
     effect.info.description = one->Text("description").value_or("");
     if (name.find('.') != std::string::npos) {
@@ -216,7 +219,14 @@ class ParametersReader {
       const auto column =
           NumberColumn(path, table, ColumnOf(keys_.parameter_columns, own.name), context_);
       for (std::size_t i = 0; i < column.size(); ++i) {
-        effects_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = factor * column[i];
+        const double value = factor * column[i];
+        effects_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = value;
+        if (value >= own.min && value <= own.max) continue;
+        context_.problems().AddIn(
+            path, table.LineOf(i), ColumnOf(keys_.parameter_columns, own.name),
+            absl::StrCat(own.name, " is ", value, ", on the other side of its null ", *own.null,
+                         "; sign: either allows both"));
+        break;
       }
     }
     is_sound_ = parameters.rows() > 0 && context_.problems().size() == before;
@@ -249,7 +259,8 @@ class ParametersReader {
 };
 
 // Names in the keys are those of the campaign.
-void CheckKeyNames(const MapReader& map, const RunTableKeys& keys, const Campaign& campaign) {
+void CheckKeyNames(const MapReader& map, const RunTableKeys& keys, const Campaign& campaign,
+                   bool is_new) {
   std::vector<std::string> parameters;
   for (const CalibratedParameter& parameter : campaign.parameters) {
     parameters.push_back(parameter.name);
@@ -265,7 +276,7 @@ void CheckKeyNames(const MapReader& map, const RunTableKeys& keys, const Campaig
     if (!experiment.control_name.empty()) of_states.push_back(experiment.control_name);
   }
   CheckNames(map, "parameter_columns", keys.parameter_columns, parameters);
-  CheckColumnsDiffer(map, keys.parameter_columns, parameters);
+  if (is_new) CheckColumnsDiffer(map, keys.parameter_columns, parameters);
   CheckNames(map, "parameter_units", keys.parameter_units, parameters);
   NameMap absolute;
   for (const std::string& name : keys.absolute) absolute.emplace_back(name, "");
@@ -283,7 +294,7 @@ void ReadPrecomputed(MapReader& campaign_map, ReadContext& context, Campaign& ca
   if (!map) return;
   ReadHeldEffects(*map, context, campaign);
   const RunTableKeys keys = ReadRunTableKeys(*map);
-  CheckKeyNames(*map, keys, campaign);
+  CheckKeyNames(*map, keys, campaign, context.is_new());
   ParametersReader parameters(*map, keys, context, campaign);
   parameters.Read();
   campaign.precomputed->values =

@@ -101,6 +101,15 @@ experiments:
 
   Answer Call(const std::string& arguments) const { return CallWith("", arguments); }
 
+  /// Evaluations made for all campaigns of the folder `s` together.
+  std::int64_t Evaluations() const {
+    std::int64_t sum = 0;
+    for (const Json& c : Call("list --state s --json").json()) {
+      sum += c["model_evaluations"].get<std::int64_t>();
+    }
+    return sum;
+  }
+
   /// wrapper: a program that starts calibctl and gives back its exit code (timeout
   /// --preserve-status).
   Answer CallWith(const std::string& wrapper, const std::string& arguments) const {

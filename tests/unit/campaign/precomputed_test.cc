@@ -220,6 +220,10 @@ TEST(Precomputed, WhatIsWrongWithTheEffectsOfRowsIsSaidOnce) {
   EXPECT_THAT(problems("      bonds:", "      capillary_bridges:"),
               HasSubstr("is an effect of this build; call that of your runs another"));
   auto files = TablesWithEffects();
+  files["par.csv"] = WithText(files["par.csv"], "6000,0,0.5", "6000,0,-0.5");
+  EXPECT_THAT(
+      ProblemsOf(EffectsYaml(), files),
+      HasSubstr("par.csv:5: glue: bonds.strength is -0.5, on the other side of its null 0"));
   files["par.csv"] =
       "sample,E_GPa,km_nNm,friction_mN,glue\n3,100,8000,0,0\n4,110,7000,0,0\n5,120,"
       "5000,0,0\n6,130,6000,0,0\n7,140,6000,0,0\n";
