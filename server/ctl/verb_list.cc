@@ -4,6 +4,7 @@ namespace calib::ctl {
 
 // Each is a file in verbs/: that of X defines the function XVerb. The order is that of the help.
 #define CALIB_VERBS(VERB) \
+  VERB(Inspect)           \
   VERB(Simulate)          \
   VERB(Run)               \
   VERB(Submit)            \

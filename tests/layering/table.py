@@ -10,7 +10,7 @@ inference  numerics < sampling < prior < data < mixture < scatter < evidence < f
 proto      calib/v1 < rpc
 worker     .
 server     { campaign/model campaign/file/text access } < campaign/checks < campaign/file < messages < { store report/text } < { scheduler/leases report/views }
-           < { scheduler report/plot } < { service report/html } < report/documents < client < diagnosis < ctl < ctl/verbs < .
+           < { scheduler report/plot } < { service report/html } < report/documents < client < { diagnosis inspection } < ctl < ctl/verbs < .
 """
 
 # What a folder may include of other parts (prefixes), and which of the watched libraries. The longest row that fits counts;
@@ -35,7 +35,8 @@ server/report     | {ASKING_OF_DEM} inference proto/calib server/campaign server
 server/client     | inference proto server/campaign server/access server/messages server/report | grpcpp chrono
 server/client/session | proto server/access server/messages server/service server/client               | grpcpp chrono
 server/diagnosis  | {ASKING_OF_DEM} dem/simulate inference proto/calib server/campaign server/messages server/report server/client | nlohmann
-server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/access server/messages server/report server/client server/diagnosis | CLI nlohmann chrono
+server/inspection | dem/registry server/campaign                                          | nlohmann
+server/ctl        | {ASKING_OF_DEM} dem/simulate inference proto server/campaign server/access server/messages server/report server/client server/diagnosis server/inspection | CLI nlohmann chrono
 """
 WATCHED = 'grpcpp openssl SQLiteCpp sqlite3 yaml-cpp spdlog CLI nlohmann chrono'
 

@@ -23,6 +23,7 @@
 #include "server/campaign/file/read_noise.h"
 #include "server/campaign/file/read_precomputed.h"
 #include "server/campaign/file/read_rows.h"
+#include "server/campaign/file/text/workbook.h"
 #include "server/campaign/file/text/yaml_tree.h"
 #include "server/campaign/model/excitation.h"
 
@@ -40,10 +41,24 @@ absl::StatusOr<std::string> ExpandPath(const std::string& path) {
   return path.substr(0, at) + value + path.substr(at + std::string(kVariable).size());
 }
 
-absl::StatusOr<std::string> ReadFromDisk(const std::filesystem::path& path) {
+// "t.xlsx[Data]" as "t.xlsx" and "Data".
+std::pair<std::string, std::string> PartsOfSheetPath(const std::string& path) {
+  const std::size_t open = path.find('[');
+  if (open == std::string::npos || !path.ends_with(']')) return {path, ""};
+  const std::string file = path.substr(0, open);
+  if (!IsWorkbookPath(file)) return {path, ""};
+  return {file, path.substr(open + 1, path.size() - open - 2)};
+}
+
+absl::Status ProblemOfFile(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return absl::NotFoundError("no such file");
   if (!std::filesystem::is_regular_file(path, error)) return absl::NotFoundError("not a file");
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::string> ReadFromDisk(const std::filesystem::path& path) {
+  RETURN_IF_ERROR(ProblemOfFile(path));
   std::ifstream file(path, std::ios::binary);
   std::ostringstream content;
   content << file.rdbuf();
@@ -118,11 +133,19 @@ void CheckCorrelationLengths(const MapReader& map, const Campaign& campaign) {
 
 }  // namespace
 
+std::string SheetPath(const std::string& path, const std::string& sheet) {
+  return sheet.empty() || !IsWorkbookPath(path) ? path : absl::StrCat(path, "[", sheet, "]");
+}
+
 FileReader DiskReader(const std::string& campaign_file_path) {
   const std::filesystem::path folder = std::filesystem::path(campaign_file_path).parent_path();
   return [folder](const std::string& path) -> absl::StatusOr<std::string> {
     ASSIGN_OR_RETURN(const auto expanded, ExpandPath(path));
-    return ReadFromDisk(folder / expanded);  // an absolute path replaces the folder
+    const auto [name, sheet] = PartsOfSheetPath(expanded);
+    const std::filesystem::path file = folder / name;  // an absolute path replaces the folder
+    if (!IsWorkbookPath(name)) return ReadFromDisk(file);
+    RETURN_IF_ERROR(ProblemOfFile(file));
+    return SheetAsText(file.string(), sheet);
   };
 }
 

@@ -21,7 +21,12 @@ namespace calib::campaign {
 /// blobs.
 using FileReader = std::function<absl::StatusOr<std::string>(const std::string& path)>;
 
-/// Reader for paths relative to the folder of the campaign file; expands $CALIB_DATA.
+/// What a sheet of a workbook is called where files are called by their paths: "t.xlsx[Data]";
+/// the path itself where no sheet is named, or the path is of no workbook.
+std::string SheetPath(const std::string& path, const std::string& sheet);
+
+/// Reader for paths relative to the folder of the campaign file; expands $CALIB_DATA. Of a workbook
+/// it gives a sheet as text (file/text/workbook.h), so that none travels to a server.
 FileReader DiskReader(const std::string& campaign_file_path);
 
 struct ReadOutcome {

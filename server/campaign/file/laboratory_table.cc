@@ -9,6 +9,7 @@
 #include "server/campaign/file/read_table_format.h"
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
+#include "server/campaign/file/text/workbook.h"
 
 namespace calib::campaign {
 namespace {
@@ -166,23 +167,23 @@ bool LaboratoryTable::Open(MapReader& data, const std::vector<std::string>& want
   format.first_rules = context.by_first_rules();
   const bool sound = context.problems().size() == before;
   const auto path = data.RequiredText("file", "the table of measured values");
-  const bool sheet = data.Text("sheet").has_value();
+  const auto sheet = data.Text("sheet");
   data.Finish();
   if (!path || !sound) return false;
-  path_ = *path;
-  const std::string* text = context.ReadNamedFile(data, "file", *path);
+  path_ = SheetPath(*path, sheet.value_or(""));
+  const std::string* text = context.ReadNamedFile(data, "file", path_);
   if (text == nullptr) return false;
   std::vector<std::string> columns = derived_.Words();
   for (const std::string& name : wanted) columns.push_back(ColumnOf(name));
   std::vector<TableProblem> found;
   table_ = std::make_shared<const DataTable>(*text, format, columns, found);
-  context.AddTableProblems(*path, found);
+  context.AddTableProblems(path_, found);
   if (!found.empty()) return false;
-  if (sheet) {
+  if (sheet && !IsWorkbookPath(*path)) {
     data.Problem("sheet", absl::StrCat(*path, " is a text, which holds one table; remove it"));
   }
   const std::size_t computed = context.problems().size();
-  derived_.Compute(data, *path, *table_, context);
+  derived_.Compute(data, path_, *table_, context);
   for (std::size_t i = 0; i < table_->rows(); ++i) kept_.push_back(i);
   return context.problems().size() == computed;
 }

@@ -72,7 +72,7 @@ DecodedText Decode(std::string_view bytes) {
   if (bytes.starts_with("\xFF\xFE")) return {FromUtf16(bytes.substr(2), true), "UTF-16 LE", ""};
   if (bytes.starts_with("\xFE\xFF")) return {FromUtf16(bytes.substr(2), false), "UTF-16 BE", ""};
   if (bytes.starts_with("PK\x03\x04") || bytes.starts_with("\xD0\xCF\x11\xE0")) {
-    return {"", "", "is a workbook or an archive, not a text: save its sheet as CSV"};
+    return {"", "", "is a workbook or an archive, not a text: name it .xlsx if it is one, or save its sheet as CSV"};
   }
   if (bytes.find('\0') != std::string_view::npos) {
     if (ShareOfZeros(bytes, 1) > kMostlyZero) return {FromUtf16(bytes, true), "UTF-16 LE", ""};
