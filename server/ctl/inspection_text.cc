@@ -24,19 +24,19 @@ constexpr const char* kDrawn[] = {"deviatoric_stress", "q_over_p",     "stress_r
 std::string Plot(const Inspection& inspection, const report::TerminalStyle& style) {
   if (inspection.control.empty()) return "";
   const auto axis = [&inspection](const std::string& role) {
-    const inspection::ColumnMeaning& column = *inspection.Find(role);
-    return absl::StrCat(role, column.unit.empty() || column.unit == "1"
-                                  ? ""
-                                  : absl::StrCat(" [", column.unit, "]"));
+    const std::string unit = inspection.Find(role) != nullptr ? inspection.Find(role)->unit
+                                                              : inspection.FindDerived(role)->unit;
+    return absl::StrCat(role, unit.empty() || unit == "1" ? "" : absl::StrCat(" [", unit, "]"));
   };
   const auto numbers = [&inspection](std::size_t test, const std::string& role) {
-    const double factor = inspection.Find(role)->factor;
+    const double factor = inspection.Find(role) != nullptr ? inspection.Find(role)->factor
+                                                           : inspection.FindDerived(role)->factor;
     std::vector<double> values = inspection.Values(test, role);
     for (double& v : values) v /= factor;
     return values;
   };
   for (const char* role : kDrawn) {
-    if (inspection.Find(role) == nullptr || inspection.control == role) continue;
+    if (!inspection.Has(role) || inspection.control == role) continue;
     std::vector<report::TerminalCurve> curves;
     constexpr std::size_t kMostCurves = 6;  // signs and colours that are told apart
     for (std::size_t i = 0; i < std::min(inspection.tests.size(), kMostCurves); ++i) {

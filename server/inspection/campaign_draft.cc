@@ -90,7 +90,7 @@ class ExperimentDraft {
       : file_(file), in_(file.inspection), test_(test), info_(info), question_(question) {}
 
   absl::Status Read() {
-    if (in_.Find(info_.control) == nullptr) {
+    if (!in_.Has(info_.control)) {
       return absl::InvalidArgumentError(absl::StrCat(
           file_.file, " has no column that is known to be ", info_.control, ", which drives ",
           info_.name, "; if it has one, say so: --meaning COLUMN=", info_.control));
@@ -99,7 +99,7 @@ class ExperimentDraft {
     for (const char* role : kPreferred) {
       const bool given = std::find(info_.observables.begin(), info_.observables.end(), role) !=
                          info_.observables.end();
-      if (!given || role == info_.control || in_.Find(role) == nullptr) continue;
+      if (!given || role == info_.control || !in_.Has(role)) continue;
       if (campaign::IsHeld(info_.name, {}, info_.control, role)) continue;
       if (!(ExtentOf(in_.Values(test_, role)).range() > 0)) continue;
       found.emplace_back(role);
@@ -205,8 +205,19 @@ class ExperimentDraft {
     std::vector<std::string> signs;
     std::vector<std::string> roles = {info_.control};
     roles.insert(roles.end(), observables_.begin(), observables_.end());
+    std::vector<std::string> formulas;
+    std::vector<std::string> why;
     for (const std::string& role : roles) {
+      if (const DerivedQuantity* derived = in_.FindDerived(role)) {
+        columns.push_back(absl::StrCat(role, ": ", derived->name));
+        formulas.push_back(absl::StrCat(derived->name, ": ", YamlText(derived->formula)));
+        why.push_back(derived->how);
+        if (derived->factor != 1)
+          units.push_back(absl::StrCat(role, ": ", YamlText(derived->unit)));
+        continue;
+      }
       const ColumnMeaning& column = *in_.Find(role);
+      why.push_back(absl::StrJoin(column.evidence, "; "));
       columns.push_back(absl::StrCat(role, ": ", YamlText(column.name)));
       if (column.factor != 1) {
         units.push_back(absl::StrCat(role, ": ", YamlText(column.unit)));
@@ -215,8 +226,10 @@ class ExperimentDraft {
     }
     absl::StrAppend(&text, "      columns:  # confirm each\n");
     for (std::size_t i = 0; i < roles.size(); ++i) {
-      absl::StrAppend(&text, "        ", columns[i], "  # ",
-                      OneLine(absl::StrJoin(in_.Find(roles[i])->evidence, "; ")), "\n");
+      absl::StrAppend(&text, "        ", columns[i], "  # ", OneLine(why[i]), "\n");
+    }
+    if (!formulas.empty()) {
+      absl::StrAppend(&text, "      formulas: {", absl::StrJoin(formulas, ", "), "}  # confirm\n");
     }
     if (!units.empty()) absl::StrAppend(&text, "      units: {", absl::StrJoin(units, ", "), "}\n");
     if (!signs.empty()) {
@@ -237,6 +250,7 @@ class ExperimentDraft {
   }
 
   [[nodiscard]] double Noise(const std::string& role) const {
+    if (in_.Find(role) == nullptr) return 0;
     const ColumnMeaning& column = *in_.Find(role);
     const InspectedTest& test = in_.tests[test_];
     const auto at = test.noise.find(column.name);

@@ -53,6 +53,12 @@ bool IsDate(const std::string& cell) {
   });
 }
 
+bool IsKnownHeading(const std::string& cell) {
+  if (cell.empty() || IsNumberSomehow(cell)) return false;
+  return !ReadHeader(campaign::NameWithoutUnit(cell), campaign::UnitInName(cell))
+              .candidates.empty();
+}
+
 // --- stacked sections
 
 // Lines of one table within a text: its header and rows.
@@ -99,20 +105,30 @@ class Sections {
 
   // A new table begins where lines without numbers name as many columns as the next row has.
   void Begin(const std::vector<std::size_t>& above, std::size_t width) {
+    const std::vector<Parting> partings =
+        parting_ == Parting::kBlanks || parting_ == Parting::kTabs
+            ? std::vector{parting_, Parting::kGaps, Parting::kUnits, Parting::kUnitEnds}
+            : std::vector{parting_};
+    std::optional<Block> best;
+    std::ptrdiff_t most = -1;  // names that are known
     for (std::size_t k = 0; k < above.size(); ++k) {
       const TableLine& line = lines_[above[k]];
       if (line.comment) continue;
-      for (const Parting parting :
-           {parting_, Parting::kGaps, Parting::kUnits, Parting::kUnitEnds}) {
+      for (const Parting parting : partings) {
         const auto names = WithoutEmptyEnd(campaign::CellsOf(line.content, parting));
         if (names.size() < width || width < 2) continue;
-        Block block{.header = above[k], .named = true, .names = names};
-        if (k > 0) block.title = std::string(campaign::Trimmed(lines_[above[k - 1]].content));
-        blocks_.push_back(block);
-        return;
+        const auto known = std::count_if(names.begin(), names.end(), &IsKnownHeading);
+        if (known <= most) continue;
+        most = known;
+        best = Block{.header = above[k], .named = true, .names = names};
+        if (k > 0) best->title = std::string(campaign::Trimmed(lines_[above[k - 1]].content));
       }
     }
-    if (blocks_.empty()) blocks_.emplace_back();
+    if (best) {
+      blocks_.push_back(*std::move(best));
+    } else if (blocks_.empty()) {
+      blocks_.emplace_back();
+    }
   }
 
   const std::vector<TableLine>& lines_;
@@ -247,6 +263,21 @@ std::optional<std::size_t> NamingColumn(const TableLayout& layout,
   return best;
 }
 
+// Cells of the text's words that name quantities: of several lines that may be the header the one
+// with most of them is.
+std::vector<std::string> KnownHeadings(const std::vector<TableLine>& lines) {
+  constexpr std::size_t kMostLines = 200;  // looked at
+  std::set<std::string> known;
+  for (std::size_t i = 0; i < std::min(lines.size(), kMostLines); ++i) {
+    for (const Parting parting : {LikelyParting(lines), Parting::kGaps, Parting::kUnits}) {
+      for (const std::string& cell : campaign::CellsOf(lines[i].content, parting)) {
+        if (IsKnownHeading(cell)) known.insert(cell);
+      }
+    }
+  }
+  return {known.begin(), known.end()};
+}
+
 TableLayout LayoutOf(const std::string& text, const TableFormat& format,
                      const std::vector<std::string>& wanted, std::vector<TableProblem>& problems) {
   return campaign::FindLayout(text, format, wanted, problems);
@@ -291,8 +322,7 @@ std::vector<Choice> StackedChoices(const std::vector<TableLine>& lines) {
 
 }  // namespace
 
-InspectedTable ReadInspectedTable(const std::string& bytes, const TableQuestion& question,
-                                  std::vector<TableProblem>& problems) {
+InspectedTable ReadInspectedTable(const std::string& bytes, std::vector<TableProblem>& problems) {
   InspectedTable table;
   const campaign::DecodedText decoded = campaign::DecodeText(bytes);
   if (!decoded.problem.empty()) {
@@ -305,12 +335,13 @@ InspectedTable ReadInspectedTable(const std::string& bytes, const TableQuestion&
     problems.push_back({0, "", "is empty"});
     return table;
   }
+  const std::vector<std::string> known = KnownHeadings(lines);
   std::vector<Choice> choices = StackedChoices(lines);
   const bool stacked = choices.size() > 1;
   if (choices.empty()) choices.emplace_back();
   for (Choice& choice : choices) {
     std::vector<TableProblem> found;
-    TableLayout layout = LayoutOf(decoded.text, choice.format, question.names_wanted, found);
+    TableLayout layout = LayoutOf(decoded.text, choice.format, known, found);
     const bool nameless = choice.format.skip == 0 && !found.empty() && layout.rows.empty();
     if (nameless) {
       std::vector<TableProblem> without;

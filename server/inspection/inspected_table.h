@@ -39,15 +39,10 @@ struct InspectedTable {
   std::vector<InspectedPart> parts{};  ///< one at least; all with the same columns where named
 };
 
-/// What is said of the form of a file by who asks.
-struct TableQuestion {
-  std::vector<std::string> names_wanted{};  ///< decide between lines that may be the header
-};
-
 /// Reads a file's bytes. Appends what is wrong, each with its line; the table is meaningful only if
 /// nothing was added. A header that the campaign's reader would not take for one is none: such
 /// columns are called 1, 2, ... Pure.
-InspectedTable ReadInspectedTable(const std::string& bytes, const TableQuestion& question,
+InspectedTable ReadInspectedTable(const std::string& bytes,
                                   std::vector<campaign::TableProblem>& problems);
 
 }  // namespace calib::inspection

@@ -9,6 +9,7 @@
 #include "server/campaign/file/text/quantity.h"
 #include "server/campaign/file/text/suggestion.h"
 #include "server/campaign/model/control_path.h"
+#include "server/inspection/derived.h"
 #include "server/inspection/header_words.h"
 #include "server/inspection/meanings.h"
 #include "server/inspection/numbers.h"
@@ -33,7 +34,7 @@ constexpr const char* kControls[] = {"axial_strain", "shear_strain", kDisplaceme
 
 std::string ControlRole(const Inspection& inspection) {
   for (const char* role : kControls) {
-    if (inspection.Find(role) != nullptr) return role;
+    if (inspection.Has(role)) return role;
   }
   return "";
 }
@@ -75,7 +76,7 @@ class TestSeries {
         const double noise = NoiseOf(curve);
         if (std::isfinite(noise)) result.noise[column.name] = noise;
       }
-      if (!IsObservable(meaning.role) || meaning.role == out_.control) continue;
+      if (counts || !IsObservable(meaning.role) || meaning.role == out_.control) continue;
       Plateau(column);
       if (driven && IsStrainControl(out_.control))
         Pauses(meaning, curve, result.noise[column.name]);
@@ -145,7 +146,10 @@ class TestSeries {
                      at_turns > 0 ? absl::StrCat(at_turns, " of them where the path turns") : ""));
   }
 
-  std::string ControlName() const { return Quoted(out_.Find(out_.control)->name); }
+  std::string ControlName() const {
+    const ColumnMeaning* column = out_.Find(out_.control);
+    return Quoted(column != nullptr ? column->name : out_.control);
+  }
 
   void Unloading(const InspectedTest& test) {
     if (test.turning.empty()) return;
@@ -298,6 +302,17 @@ const ColumnMeaning* Inspection::Find(const std::string& role) const {
   return nullptr;
 }
 
+const DerivedQuantity* Inspection::FindDerived(const std::string& role) const {
+  for (const DerivedQuantity& one : derived) {
+    if (one.role == role) return &one;
+  }
+  return nullptr;
+}
+
+bool Inspection::Has(const std::string& role) const {
+  return Find(role) != nullptr || FindDerived(role) != nullptr;
+}
+
 bool Inspection::IsOpen() const {
   return std::any_of(findings.begin(), findings.end(),
                      [](const Finding& f) { return f.kind == FindingKind::kAmbiguous; });
@@ -310,7 +325,8 @@ std::vector<double> Inspection::Values(std::size_t test, const std::string& role
     for (double& v : values) v *= columns[i].sign * columns[i].factor;
     return values;
   }
-  return {};
+  const DerivedQuantity* const other = FindDerived(role);
+  return other != nullptr ? other->values[test] : std::vector<double>{};
 }
 
 Inspection Inspect(const std::string& file, const std::string& bytes,
@@ -318,13 +334,14 @@ Inspection Inspect(const std::string& file, const std::string& bytes,
                    std::vector<campaign::TableProblem>& problems) {
   Inspection inspection;
   inspection.file = file;
-  inspection.table = ReadInspectedTable(bytes, {}, problems);
+  inspection.table = ReadInspectedTable(bytes, problems);
   if (!problems.empty()) return inspection;
   for (const InspectedPart& part : inspection.table.parts) inspection.rows += part.lines.size();
   inspection.stated_pressure = StatedSizesOf(inspection.table.remarks).pressure;
   if (inspection.stated_pressure == 0) inspection.stated_pressure = PressureInName(file);
   SayForm(inspection);
   DecideMeanings(said, inspection);
+  DeriveQuantities(inspection);
   SayMissing(inspection);
   inspection.control = ControlRole(inspection);
   for (std::size_t i = 0; i < inspection.table.parts.size(); ++i) {
@@ -350,8 +367,6 @@ std::optional<SaidMeaning> ReadSaidMeaning(const std::string& text, std::string&
   if (said.name.front() == '-' || said.name.front() == '+') {
     said.sign = said.name.front() == '-' ? -1 : 1;
     said.name.erase(0, 1);
-  } else {
-    said.sign = 1;
   }
   if (said.name.ends_with(']')) {
     const std::size_t open = said.name.find('[');

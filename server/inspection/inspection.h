@@ -29,9 +29,21 @@ struct ColumnMeaning {
   double factor = 1;     ///< value [SI] = sign * factor * number; 1 where the unit is not known
   int sign = 1;          ///< -1: compression is negative in the file
   int missing = 0;       ///< readings, over all tests of the file
-  bool open = false;     ///< it cannot be used until --meaning says what it is
+  bool sign_said = false;               ///< by --meaning
+  bool open = false;                    ///< it cannot be used until --meaning says what it is
   std::vector<std::string> options{};   ///< where open: what it may be, "mean_stress[kPa]"
   std::vector<std::string> evidence{};  ///< why, each a clause
+};
+
+/// A quantity that no column holds.
+struct DerivedQuantity {
+  std::string role{};                         ///< an observable
+  std::string name{};                         ///< of the formula in a campaign file
+  std::string formula{};                      ///< as the key `formulas` of a campaign takes it
+  std::string unit{};                         ///< of what it gives
+  double factor = 1;                          ///< value [SI] = factor * what it gives
+  std::string how{};                          ///< in words
+  std::vector<std::vector<double>> values{};  ///< by test and row, SI; NaN: missing
 };
 
 /// One test of the file.
@@ -49,6 +61,7 @@ struct Inspection {
   InspectedTable table{};
   std::size_t rows = 0;
   std::vector<ColumnMeaning> columns{};  ///< one per column of the first test
+  std::vector<DerivedQuantity> derived{};
   std::string control{};  ///< role of the column that drives the test; empty: none is known
   std::vector<InspectedTest> tests{};  ///< one per part of the table
   std::vector<Finding> findings{};
@@ -58,8 +71,12 @@ struct Inspection {
   double stated_pressure = 0;  ///< confining pressure that file or its name state [Pa]; 0: none
 
   [[nodiscard]] const ColumnMeaning* Find(const std::string& role) const;
+  [[nodiscard]] const DerivedQuantity* FindDerived(const std::string& role) const;
+  /// Whether a column holds it, or it is derived.
+  [[nodiscard]] bool Has(const std::string& role) const;
   [[nodiscard]] bool IsOpen() const;  ///< whether anything is ambiguous
-  /// Numbers of the column with this role in a test, SI, compression positive; empty: none has it.
+  /// Numbers of the column with this role in a test, or derived, SI, compression positive; empty:
+  /// neither.
   [[nodiscard]] std::vector<double> Values(std::size_t test, const std::string& role) const;
 };
 

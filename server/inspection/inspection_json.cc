@@ -68,7 +68,17 @@ Json FileJson(const InspectedFile& file) {
                {"findings", findings},
                {"noise", inspection.noise},
                {"independent_readings", std::round(inspection.independent_readings)}};
-  if (!inspection.control.empty()) json["control"] = inspection.Find(inspection.control)->name;
+  if (!inspection.control.empty()) {
+    const ColumnMeaning* control = inspection.Find(inspection.control);
+    json["control"] = control != nullptr ? control->name : inspection.control;
+  }
+  if (!inspection.derived.empty()) {
+    json["derived"] = Json::array();
+    for (const DerivedQuantity& one : inspection.derived) {
+      json["derived"].push_back(
+          {{"meaning", one.role}, {"formula", one.formula}, {"unit", one.unit}});
+    }
+  }
   if (inspection.tests.size() > 1) {
     json["tests_by"] = inspection.table.naming_column.empty()
                            ? Json(nullptr)

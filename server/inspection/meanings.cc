@@ -165,6 +165,7 @@ class Resolver {
     column.role = said.name == "nothing" ? "" : said.name;
     if (!said.unit.empty()) column.unit = said.unit;
     if (said.sign != 0) column.sign = said.sign;
+    column.sign_said = said.sign != 0;
     column.evidence = {"as --meaning says"};
     decided_[i] = true;
     said_columns_.insert(i);

@@ -328,7 +328,7 @@ class Relations {
   void SignsOfStresses() {
     for (const char* role : {"lateral_stress", "axial_stress", "mean_stress"}) {
       ColumnMeaning* column = Column(role);
-      if (column == nullptr || Said(*column)) continue;
+      if (column == nullptr || column->sign_said) continue;
       const Extent e = ExtentOf(Of(role));
       if (e.max <= 0 && e.min < 0) Turn(*column, "grains carry no tension, and all are negative");
     }
@@ -372,11 +372,11 @@ class Relations {
       }
       return;
     }
-    if (Said(*column)) return;
+    if (column->sign_said) return;
     if (pushed > 0) {
       Turn(*column, absl::StrCat("it falls while ", by, " rises"));
     } else {
-      Open(*column, {"-axial_strain", "axial_strain"},
+      Open(*column, {"-axial_strain", "+axial_strain"},
            absl::StrCat("strain ", Quoted(column->name), " rises while ", by,
                         " is negative: one of the two has the other sign"));
     }
@@ -411,7 +411,7 @@ class Relations {
     } else if (oedometer) {
       return;  // lateral strain is free, and nothing is known of it
     } else if (is(-1)) {
-      if (!Said(*volume)) Turn(*volume, "the voids grow while it rises");
+      if (!volume->sign_said) Turn(*volume, "the voids grow while it rises");
     } else if (is(100) || is(0.01)) {
       const std::string other = is(100) ? "1" : "percent";
       Say(FindingKind::kUnits, true,
@@ -471,7 +471,7 @@ class Relations {
       volume->evidence.push_back(absl::StrCat("is ", axial->name, " + 2 ", lateral->name));
       lateral->evidence.push_back(absl::StrCat("(", volume->name, " - ", axial->name, ")/2"));
       volume_known_ = true;
-    } else if (Apart(ev, other) < kHolds * std::max(1.0, scale) && !Said(*volume)) {
+    } else if (Apart(ev, other) < kHolds * std::max(1.0, scale) && !volume->sign_said) {
       Turn(*volume, absl::StrCat("it is -(", axial->name, " + 2 ", lateral->name, ")"));
       volume_known_ = true;
     }
@@ -480,7 +480,7 @@ class Relations {
   // Sheared grains contract before they dilate.
   void SignOfVolume() {
     ColumnMeaning* volume = Column("volumetric_strain");
-    if (volume == nullptr || volume->sign < 0 || volume_known_ || Said(*volume)) return;
+    if (volume == nullptr || volume->sign < 0 || volume_known_ || volume->sign_said) return;
     if (Column("void_ratio") != nullptr || Column("porosity") != nullptr) return;
     if (Column("pore_pressure") != nullptr) return;
     const std::vector<double> ev = Of("volumetric_strain");
@@ -502,7 +502,7 @@ class Relations {
       if (fell) break;
     }
     const bool rises_later = most <= 0 && extent.max - extent.first > 0.1 * extent.range();
-    Open(*volume, {"-volumetric_strain", "volumetric_strain"},
+    Open(*volume, {"-volumetric_strain", "+volumetric_strain"},
          absl::StrCat("column ", Quoted(volume->name),
                       rises_later
                           ? " falls first and rises then: sheared grains contract first, so "

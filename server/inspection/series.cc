@@ -15,6 +15,7 @@ constexpr std::size_t kMostOrder = 4;  // of differences; higher ones need close
 // and where the control stands still, which it does for a reason.
 constexpr double kDrop = 6;
 constexpr double kDropAtRest = 3;
+constexpr double kLeastDrop = 1e-3;     // of the range: less is not seen in a picture
 constexpr double kSeldom = 0.05;        // of all steps
 constexpr double kStandsStill = 0.02;   // of the usual step of the control
 constexpr std::size_t kLongestDip = 3;  // readings. Chosen: a pause is logged once or twice
@@ -213,6 +214,9 @@ std::vector<std::size_t> DipsOf(const Curve& curve, double noise) {
     const std::size_t n = points.y.size();
     std::vector<double> steps;
     for (std::size_t i = 1; i < n; ++i) steps.push_back(std::abs(points.x[i] - points.x[i - 1]));
+    const double range = n > 0 ? *std::max_element(points.y.begin(), points.y.end()) -
+                                     *std::min_element(points.y.begin(), points.y.end())
+                               : 0;
     const double still = kStandsStill * MedianOf(steps);
     const auto stands = static_cast<double>(
         std::count_if(steps.begin(), steps.end(), [still](double step) { return step <= still; }));
@@ -222,9 +226,10 @@ std::vector<std::size_t> DipsOf(const Curve& curve, double noise) {
       const double before = std::abs(points.y[i - 1]);
       const double drop = before - std::abs(points.y[i]);
       const double limit = rests && steps[i - 1] <= still ? kDropAtRest : kDrop;
-      if (drop <= limit * least) continue;
+      if (drop <= limit * least || drop <= kLeastDrop * range) continue;
       for (std::size_t k = i + 1; k < n && k <= i + kLongestDip; ++k) {
-        if (std::abs(points.y[k]) < before) continue;
+        // What goes through zero and grows again has turned, not paused.
+        if (points.y[k] * points.y[i - 1] < 0 || std::abs(points.y[k]) < before) continue;
         dips.push_back(points.at[i]);
         i = k;
         break;

@@ -68,6 +68,24 @@ TEST(CampaignDraft, EachTestOfAFileIsAnExperiment) {
   EXPECT_EQ(outcome.campaign.experiments[1].control.size(), 12U);
 }
 
+// A load frame's file: strain and stress are computed by the campaign as by the inspection.
+TEST(CampaignDraft, LoadAndDisplacementBecomeStressAndStrain) {
+  const KnownTest test = MakeKnownTest();
+  std::string table = "height: 100 mm, diameter: 50 mm\nload [N],displacement [mm]\n";
+  for (std::size_t i = 0; i < test.ea.size(); ++i) {
+    absl::StrAppend(&table, test.q[i] * 1963.4954e-6 / (1 - test.ea[i]), ",", test.ea[i] * 100,
+                    "\n");
+  }
+  const auto yaml =
+      CampaignDraft({FileOf(table)}, {.test = "triaxial_drained", .campaign_file = "out.yaml"});
+  ASSERT_TRUE(yaml.ok()) << yaml.status();
+  const campaign::ReadOutcome outcome = Read(*yaml, table);
+  ASSERT_TRUE(outcome.problems.empty()) << campaign::ToString(outcome.problems.front()) << *yaml;
+  const campaign::MeasuredObservable& q = outcome.campaign.experiments.front().observables.front();
+  EXPECT_EQ(q.name, "deviatoric_stress");
+  EXPECT_NEAR(q.values.back(), test.q.back(), 1e-4 * test.q.back());
+}
+
 TEST(CampaignDraft, SaysWhatIsMissing) {
   const auto question = DraftQuestion{.test = "triaxial_drained", .campaign_file = "out.yaml"};
   EXPECT_THAT(CampaignDraft({FileOf("q[kPa],p[kPa]\n0,200\n50,217\n90,230\n")}, question)
